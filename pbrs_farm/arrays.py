@@ -1,0 +1,87 @@
+"""Named array types and their guards: shape, dtype, unit, special values; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+ItemBuffer = NDArray[np.uint32]
+"""(H, W) uint32: instance id of the item seen through each pixel's centre, 0 = nothing."""
+
+RadianceImage = NDArray[np.float32]
+"""(H, W, 3) float32, linear sRGB primaries, W m-2 sr-1; finite and >= 0."""
+
+Srgb8Image = NDArray[np.uint8]
+"""(H, W, 3) uint8, sRGB-encoded."""
+
+DepthZ = NDArray[np.float32]
+"""(H, W) float32, metres along the optical axis, 0 = nothing."""
+
+UnitVectors = NDArray[np.float32]
+"""(H, W, 3) float32 unit vectors; (0, 0, 0) = nothing."""
+
+Mask = NDArray[np.bool_]
+"""(H, W) bool."""
+
+Points = NDArray[np.float32]
+"""(N, 3) float32, metres, world frame."""
+
+Points2 = NDArray[np.float64]
+"""(N, 2) float64, metres, plan: columns are world x and world z."""
+
+Matrix4 = NDArray[np.float64]
+"""(4, 4) float64, affine, column vectors: p_a = a_from_b @ p_b."""
+
+
+def guard(
+    array: NDArray[Any], name: str, shape: tuple[int | None, ...], dtype: type[np.generic]
+) -> NDArray[Any]:
+    """Return array, or raise ValueError if its shape (None = any length) or dtype is not as said."""
+    fits = array.ndim == len(shape) and all(
+        want is None or want == got for want, got in zip(shape, array.shape, strict=True)
+    )
+    if not fits or array.dtype != dtype:
+        wanted = ", ".join("any" if n is None else str(n) for n in shape)
+        raise ValueError(
+            f"{name}: expected ({wanted}) {np.dtype(dtype)}, got {array.shape} {array.dtype}"
+        )
+    return array
+
+
+def frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a C-contiguous, read-only view or copy of array."""
+    contiguous = np.ascontiguousarray(array)
+    if contiguous is array and array.flags.writeable:
+        contiguous = array.view()
+    contiguous.flags.writeable = False
+    return contiguous
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HitRecord:
+    """What the ray through each pixel's centre hits first: the one source of every label (rule 8).
+
+    face: (H, W) int32, index into Geometry.faces, -1 = nothing
+    item: (H, W) uint32, instance id, 0 = nothing
+    depth_z: (H, W) float32, metres along the optical axis, 0 = nothing
+    position_world: (H, W, 3) float32, metres, 0 = nothing
+    geo_normal_world, shading_normal_world: (H, W, 3) float32, unit, turned towards the camera,
+        (0, 0, 0) = nothing
+    uv: (H, W, 2) float32 texture coordinates, v up
+    """
+
+    face: NDArray[np.int32]
+    item: ItemBuffer
+    depth_z: DepthZ
+    position_world: NDArray[np.float32]
+    geo_normal_world: UnitVectors
+    shading_normal_world: UnitVectors
+    uv: NDArray[np.float32]
+
+    @property
+    def valid(self) -> Mask:
+        """(H, W) bool: the pixel sees something."""
+        return np.asarray(self.face >= 0)

@@ -1,0 +1,103 @@
+"""The exceptions of pbrs_farm; no effects.
+
+PbrsError                 every error a user can meet; one clear line, no traceback
+├── BadInput              a file or an argument given by the user is wrong
+│   ├── BadHouse          a house's source: the file and the place inside it
+│   └── BadRecipe         a recipe, a preset's name or a --set
+├── RenderFailed          a picture could not be made: view, mode and seed reproduce it
+├── StoreFailed           an object could not be read or written: its key
+└── MachineFailed         this machine lacks something: LLVM, EGL, a package
+
+Transient                 a second base; only errors that carry it are worth another try
+"""
+
+from __future__ import annotations
+
+
+class PbrsError(Exception):
+    """An error whose text says what, where, and what to do next.
+
+    hint: what to do next, or "".  command: the shell line that reproduces it, or "".
+    """
+
+    def __init__(self, message: str, *, hint: str = "", command: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+        self.command = command
+
+    def __str__(self) -> str:
+        text = self.message
+        if self.hint:
+            text += f" ({self.hint})"
+        if self.command:
+            text += f" [reproduce: {self.command}]"
+        return text
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Exceptions cross process boundaries: rebuild without calling subclass constructors.
+        return (_rebuild, (type(self), dict(self.__dict__)))
+
+
+def _rebuild(cls: type[PbrsError], state: dict[str, object]) -> PbrsError:
+    error = cls.__new__(cls)
+    error.__dict__.update(state)
+    Exception.__init__(error, state.get("message", ""))
+    return error
+
+
+class Transient(Exception):
+    """Second base of errors that may pass by themselves; only these are retried."""
+
+
+class BadInput(PbrsError):
+    """A file or an argument given by the user is wrong.
+
+    file: the file's path or name.  place: where inside it ("wall w3", "line 12"), or "".
+    """
+
+    def __init__(
+        self, file: object, place: str, message: str, *, hint: str = "", command: str = ""
+    ) -> None:
+        where = f"{file}: {place}" if place else f"{file}"
+        super().__init__(f"{where}: {message}", hint=hint, command=command)
+        self.file = str(file)
+        self.place = place
+
+
+class BadHouse(BadInput):
+    """A house's source cannot be read or repaired; names the file and the place inside it."""
+
+
+class BadRecipe(PbrsError):
+    """A recipe, a preset's name or an override is not valid."""
+
+
+class RenderFailed(PbrsError):
+    """A picture could not be made; view, mode and seed reproduce it."""
+
+    def __init__(
+        self, message: str, *, view: str, mode: str, seed: int, hint: str = "", command: str = ""
+    ) -> None:
+        super().__init__(
+            f"{message} (view {view}, mode {mode}, seed {seed})", hint=hint, command=command
+        )
+        self.view = view
+        self.mode = mode
+        self.seed = seed
+
+
+class StoreFailed(PbrsError):
+    """An object could not be read from or written to the store; names its key."""
+
+    def __init__(self, key: str, message: str, *, hint: str = "") -> None:
+        super().__init__(f"{key}: {message}", hint=hint)
+        self.key = key
+
+
+class StoreUnavailable(StoreFailed, Transient):
+    """The store did not answer; the same call may succeed later."""
+
+
+class MachineFailed(PbrsError):
+    """This machine lacks something a step needs; the hint says how to get it."""

@@ -1,0 +1,100 @@
+"""Ids, the key of every stored object, digests and seeds; no effects.
+
+A key is a path with "/" below the output root. Equal inputs give equal digests on every machine:
+digests are over canonical JSON, never over Python's own hash.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict
+
+RECIPE: Final = "recipe.json"
+MANIFEST: Final = "manifest.jsonl"
+
+
+def slug(name: str) -> str:
+    """name in lower case with only a-z, 0-9 and single dashes; "house" if nothing is left."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:60] or "house"
+
+
+def house_id(file_stem: str, source_sha256: str) -> str:
+    """`<slug of the file name>-<first 8 hex of the source's sha256>`."""
+    return f"{slug(file_stem)}-{source_sha256[:8]}"
+
+
+def view_id(room_id: str, sector: int, k: int | None = None) -> str:
+    """`<room>_<sector>`, `_<k>` when a sector has several."""
+    return f"{room_id}_{sector}" if k is None else f"{room_id}_{sector}_{k}"
+
+
+def house_key(house: str, file: str = "") -> str:
+    """Key of a house's file; of its folder, with a trailing slash, when file is ""."""
+    return f"houses/{house}/{file}"
+
+
+def view_key(house: str, view: str, file: str = "") -> str:
+    """Key of a view's file; of its folder, with a trailing slash, when file is ""."""
+    return f"houses/{house}/views/{view}/{file}"
+
+
+def marker_key(house: str, step: str, view: str | None = None) -> str:
+    """Key of the marker that says a step is done."""
+    name = step if view is None else f"{step}.{view}"
+    return f"houses/{house}/done/{name}.json"
+
+
+def canonical_json(value: Any) -> str:
+    """JSON with sorted keys and no spaces: equal values give equal text."""
+    if isinstance(value, BaseModel):
+        value = value.model_dump(mode="json")
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+
+
+def sha256(data: bytes) -> str:
+    """Hex sha256 of data."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def digest(*parts: Any) -> str:
+    """First 32 hex of the sha256 over the parts' canonical JSON."""
+    return sha256("\n".join(canonical_json(p) for p in parts).encode())[:32]
+
+
+def seed(*parts: str | int) -> int:
+    """A 32-bit seed from names: seed(house, view, mode, recipe digest), rule 7."""
+    return int(digest(*parts)[:8], 16)
+
+
+class StoredFile(BaseModel):
+    """One object a step wrote."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    key: str
+    n_bytes: int
+    sha256: str
+
+
+class Marker(BaseModel):
+    """Written last and if-absent: this step is done with these inputs (architecture rule 4).
+
+    digest: of ids, recipe fields the step uses, the step's version and its inputs' digests.
+    facts: what later steps or view.json need to know; equal for equal inputs, no clock.
+    seconds, worker, attempt, finished_utc: the only clocks in the whole output.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    step: str
+    house_id: str
+    view_id: str | None = None
+    digest: str
+    files: tuple[StoredFile, ...] = ()
+    facts: dict[str, Any] = {}
+    seconds: float = 0.0
+    worker: str = ""
+    attempt: int = 1
+    finished_utc: str = ""

@@ -1,0 +1,86 @@
+"""The table of output layers: file, channels, dtype, unit, colour space, step, how it is checked.
+
+No effects. README's table is printed from it (`python -m pbrs_farm.layers`).
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """One file of a view. step: the step that writes it. optional: only when asked by --layers."""
+
+    name: str
+    file: str
+    channels: str
+    dtype: str
+    unit: str
+    nodata: str
+    step: str
+    check: str
+    optional: bool = False
+
+
+def _label(
+    name: str, file: str, channels: str, dtype: str, unit: str, nodata: str, check: str,
+    *, optional: bool = False,
+) -> Layer:  # fmt: skip
+    return Layer(name, file, channels, dtype, unit, nodata, "truth", check, optional)
+
+
+LAYERS: Final[tuple[Layer, ...]] = (
+    Layer(
+        "opengl_dl", "opengl_dl.png", "RGB", "uint8", "sRGB", "-", "opengl", "size, not constant"
+    ),
+    Layer(
+        "opengl_il", "opengl_il.png", "RGB", "uint8", "sRGB", "-", "opengl", "size, not constant"
+    ),
+    Layer("mlt_ol", "mlt_ol.png", "RGB", "uint8", "sRGB", "-", "light", "size, not constant"),
+    Layer("mlt_il_ol", "mlt_il_ol.png", "RGB", "uint8", "sRGB", "-", "light", "size, not constant"),
+    Layer(
+        "radiance",
+        "radiance.exr",
+        "outdoor.{R,G,B} indoor.{R,G,B} albedo.{R,G,B}",
+        "float32",
+        "W m-2 sr-1, linear sRGB primaries; albedo 0..1",
+        "-",
+        "light",
+        "finite, >= 0",
+    ),
+    _label(
+        "depth", "depth.png", "Y", "uint16", "planar z, mm", "0", "ray through the pixel's centre"
+    ),
+    _label(
+        "normal",
+        "normal.png",
+        "RGB",
+        "uint16",
+        "camera frame x right, y forward, z up; round((n + 1) 65535 / 2)",
+        "32768 in all three, valid = 0",
+        "unit length, ray",
+    ),
+    _label("valid", "valid.png", "Y", "uint8", "0 / 255", "0", "equals depth > 0"),
+    _label("semantic", "semantic.png", "Y", "uint8", "NYU40 id", "0", "table in view.json"),
+    _label(
+        "instance", "instance.png", "Y", "uint16", "instance id", "0", "ray, table in view.json"
+    ),
+    _label("boundary", "boundary.png", "Y", "uint8", "0 / 255", "0", "recomputed from instance"),
+)
+"""Layers that every view has, and (optional) those written when --layers names them."""
+
+LAYER: Final = {layer.name: layer for layer in LAYERS}
+
+
+def table() -> str:
+    """The layers as a Markdown table."""
+    rows = ["| file | channels | type | unit | nothing |", "|---|---|---|---|---|"]
+    rows += [f"| `{x.file}` | {x.channels} | {x.dtype} | {x.unit} | {x.nodata} |" for x in LAYERS]
+    return "\n".join(rows)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(table() + "\n")

@@ -1,0 +1,76 @@
+"""The lighting modes, the light groups they are sums of, and what a lamp emits; no effects."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+
+class Mode(StrEnum):
+    """A lighting mode of the paper (section 3.2); the value is the name of its picture."""
+
+    OPENGL_DL = "opengl_dl"
+    OPENGL_IL = "opengl_il"
+    MLT_OL = "mlt_ol"
+    MLT_IL_OL = "mlt_il_ol"
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """The light groups whose sum is this mode; empty for the OpenGL modes."""
+        return GROUPS_OF_MODE[self]
+
+
+class Group(StrEnum):
+    """Light transport is linear: each group is rendered by itself and modes are sums (rule 9)."""
+
+    OUTDOOR = "outdoor"
+    INDOOR = "indoor"
+
+
+GROUPS_OF_MODE: Final = MappingProxyType(
+    {
+        Mode.OPENGL_DL: (),
+        Mode.OPENGL_IL: (),
+        Mode.MLT_OL: (Group.OUTDOOR,),
+        Mode.MLT_IL_OL: (Group.OUTDOOR, Group.INDOOR),
+    }
+)
+
+ALL_MODES: Final = tuple(Mode)
+
+
+class LightForm(StrEnum):
+    """The shape of a lamp's light source as its model describes it."""
+
+    POINT = "point"
+    SPOT = "spot"
+    LINE = "line"
+
+
+class PowerUnit(StrEnum):
+    """What the number LightPart.power means in the source."""
+
+    SWEETHOME3D = "sweethome3d"  # power 0..1, 0.5 in every example lamp
+    WATT = "watt"  # SUNCG: electric watts of an incandescent lamp
+    LUMEN = "lumen"
+
+
+def flux_lm(
+    power: float,
+    unit: PowerUnit,
+    share: float,
+    *,
+    lamp_lm: float = 800.0,
+    lm_per_watt: float = 13.0,
+) -> float:
+    """Luminous flux in lm of one light source (spec/sky.md: one photometric scale).
+
+    share: the part of the lamp's power that falls to this source (1 / number of sources).
+    lamp_lm: the flux of a Sweet Home 3D lamp of power 0.5; lm_per_watt: for SUNCG's watts.
+    """
+    if unit is PowerUnit.SWEETHOME3D:
+        return float(lamp_lm * (power / 0.5) ** 2 * share)
+    if unit is PowerUnit.WATT:
+        return power * lm_per_watt * share
+    return power * share
