@@ -6,6 +6,7 @@ PbrsError                 every error a user can meet; one clear line, no traceb
 │   └── BadRecipe         a recipe, a preset's name or a --set
 ├── RenderFailed          a picture could not be made: view, mode and seed reproduce it
 ├── StoreFailed           an object could not be read or written: its key
+│   └── ObjectMissing     there is no object under that key
 └── MachineFailed         this machine lacks something: LLVM, EGL, a package
 
 Transient                 a second base; only errors that carry it are worth another try
@@ -93,6 +94,10 @@ class StoreFailed(PbrsError):
     def __init__(self, key: str, message: str, *, hint: str = "") -> None:
         super().__init__(f"{key}: {message}", hint=hint)
         self.key = key
+
+
+class ObjectMissing(StoreFailed):
+    """There is no object under that key."""
 
 
 class StoreUnavailable(StoreFailed, Transient):

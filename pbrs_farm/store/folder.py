@@ -1,0 +1,171 @@
+"""A store in a folder: each object a file, written whole through a temporary name. Effects: files."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final, TypeVar
+
+from pbrs_farm.errors import ObjectMissing, StoreFailed, StoreUnavailable
+from pbrs_farm.store.interface import Head, check_key, check_prefix
+
+T = TypeVar("T")
+TEMPORARY: Final = ".incomplete"
+_FULL: Final = {errno.ENOSPC, errno.EDQUOT}
+_SICK: Final = {errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EAGAIN, errno.EINTR, errno.ENETDOWN}
+_FORBIDDEN: Final = {errno.EACCES, errno.EPERM, errno.EROFS}
+
+
+class FolderStore:
+    """Objects as files below `root`; rename makes them appear whole, hard link if-absent.
+
+    Unfinished files live in `root/.incomplete`, on the same file system, and are never listed.
+    fsync: flush the file and its folder before an object counts as written (power loss).
+    """
+
+    def __init__(self, root: Path, *, fsync: bool = False) -> None:
+        self.root = root.absolute()
+        self._fsync = fsync
+
+    @property
+    def url(self) -> str:
+        return self.root.as_uri()
+
+    def put(self, key: str, data: bytes) -> None:
+        path = self._path(key)
+        try:
+            temporary = self._write_temporary(data)
+            try:
+                _with_parent(path, lambda: temporary.replace(path))
+            except OSError:
+                _unlink(temporary)
+                raise
+            self._flush_folder(path.parent)
+        except OSError as error:
+            raise self._failure(key, error) from error
+
+    def put_if_absent(self, key: str, data: bytes) -> bool:
+        path = self._path(key)
+        try:
+            if path.exists():
+                return False
+            temporary = self._write_temporary(data)
+            try:
+                _with_parent(path, lambda: os.link(temporary, path))
+            except FileExistsError:
+                return False
+            finally:
+                _unlink(temporary)
+            self._flush_folder(path.parent)
+        except OSError as error:
+            raise self._failure(key, error) from error
+        return True
+
+    def get(self, key: str) -> bytes:
+        try:
+            return self._path(key).read_bytes()
+        except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
+            raise ObjectMissing(key, f"no such object in {self.root}") from None
+        except OSError as error:
+            raise self._failure(key, error) from error
+
+    def head(self, key: str) -> Head | None:
+        path = self._path(key)
+        try:
+            return Head(n_bytes=path.stat().st_size) if path.is_file() else None
+        except OSError as error:
+            raise self._failure(key, error) from error
+
+    def list(self, prefix: str = "") -> Iterator[str]:
+        check_prefix(prefix)
+        return self._walk(prefix)
+
+    def delete(self, key: str) -> None:
+        try:
+            self._path(key).unlink()
+        except (FileNotFoundError, NotADirectoryError):
+            return
+        except OSError as error:
+            raise self._failure(key, error) from error
+
+    def sweep(self, older_than_s: float = 24 * 3600.0) -> int:
+        """Remove unfinished files that killed writers left; their count."""
+        n_removed = 0
+        oldest = time.time() - older_than_s
+        for path in (self.root / TEMPORARY).glob("*"):
+            if path.stat().st_mtime < oldest:
+                _unlink(path)
+                n_removed += 1
+        return n_removed
+
+    def _path(self, key: str) -> Path:
+        return self.root / check_key(key)
+
+    def _write_temporary(self, data: bytes) -> Path:
+        temporary = self.root / TEMPORARY / f"{os.getpid()}-{secrets.token_hex(8)}"
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+        descriptor = _with_parent(temporary, lambda: os.open(temporary, flags, 0o666))
+        try:
+            with os.fdopen(descriptor, "wb", buffering=0) as file:
+                view = memoryview(data)
+                while view:
+                    view = view[file.write(view) :]
+                if self._fsync:
+                    os.fsync(file.fileno())
+        except OSError:
+            _unlink(temporary)
+            raise
+        return temporary
+
+    def _flush_folder(self, folder: Path) -> None:
+        if not self._fsync:
+            return
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+    def _walk(self, prefix: str) -> Iterator[str]:
+        try:
+            with os.scandir(self.root / prefix) as entries:
+                found = sorted(entries, key=lambda entry: entry.name)
+        except (FileNotFoundError, NotADirectoryError):
+            return
+        except OSError as error:
+            raise self._failure(prefix, error) from error
+        for entry in found:
+            if entry.name.startswith("."):
+                continue
+            if entry.is_dir():
+                yield from self._walk(f"{prefix}{entry.name}/")
+            else:
+                yield prefix + entry.name
+
+    def _failure(self, key: str, error: OSError) -> StoreFailed:
+        code = error.errno
+        reason = error.strerror or str(error)
+        if code in _FULL:
+            return StoreUnavailable(key, f"{self.root} is full: {reason}", hint="free some space")
+        if code in _FORBIDDEN:
+            return StoreFailed(key, f"{self.root} cannot be written: {reason}")
+        if code in _SICK:
+            return StoreUnavailable(key, f"{self.root} does not answer: {reason}")
+        return StoreFailed(key, f"{self.root}: {reason}")
+
+
+def _with_parent(path: Path, act: Callable[[], T]) -> T:
+    """act(), once more with path's folder made if that was what it lacked."""
+    try:
+        return act()
+    except FileNotFoundError:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return act()
+
+
+def _unlink(path: Path) -> None:
+    path.unlink(missing_ok=True)

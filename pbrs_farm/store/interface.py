@@ -1,0 +1,96 @@
+"""What a store is: whole objects under keys, and which keys are allowed; no effects."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from pbrs_farm.errors import StoreFailed
+
+_SEGMENT: Final = re.compile(r"[A-Za-z0-9_\-+=@,~ ()\[\]!][A-Za-z0-9_.\-+=@,~ ()\[\]!]*")
+_MAX_KEY: Final = 900
+_MAX_SEGMENT: Final = 200
+
+CONTENT_TYPES: Final = {
+    "png": "image/png",
+    "exr": "image/x-exr",
+    "jpg": "image/jpeg",
+    "json": "application/json",
+    "jsonl": "application/x-ndjson",
+    "html": "text/html; charset=utf-8",
+    "txt": "text/plain; charset=utf-8",
+    "glb": "model/gltf-binary",
+    "parquet": "application/vnd.apache.parquet",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What a store knows about an object without reading it."""
+
+    n_bytes: int
+
+
+class Store(Protocol):
+    """Whole objects under keys. A reader sees all of an object or nothing of it.
+
+    Every method raises StoreFailed with the key, and StoreUnavailable (worth another try) when
+    the store did not answer. Keys are relative, "/" between segments, never "..".
+    """
+
+    @property
+    def url(self) -> str:
+        """Where the store is, without secrets."""
+        ...
+
+    def put(self, key: str, data: bytes) -> None:
+        """Write the object whole, over an older one if there is one."""
+        ...
+
+    def put_if_absent(self, key: str, data: bytes) -> bool:
+        """Write the object unless it exists; True for the one writer who did."""
+        ...
+
+    def get(self, key: str) -> bytes:
+        """The object's bytes; ObjectMissing if there is none."""
+        ...
+
+    def head(self, key: str) -> Head | None:
+        """Size of the object, None if there is none."""
+        ...
+
+    def list(self, prefix: str = "") -> Iterator[str]:
+        """Keys below the folder `prefix` ("" or "a/b/"), in no promised order."""
+        ...
+
+    def delete(self, key: str) -> None:
+        """Remove the object; nothing happens if there is none."""
+        ...
+
+
+def check_key(key: str) -> str:
+    """key itself; raises StoreFailed when it could name anything outside the store."""
+    segments = key.split("/")
+    if not key or len(key) > _MAX_KEY or any(not _is_segment(s) for s in segments):
+        raise StoreFailed(repr(key[:120]), "not a valid key: relative, no '..', no leading dot")
+    return key
+
+
+def check_prefix(prefix: str) -> str:
+    """prefix itself: "" or a folder with a trailing slash; raises StoreFailed otherwise."""
+    if prefix and not prefix.endswith("/"):
+        raise StoreFailed(prefix, "a prefix to list ends with '/'")
+    if prefix:
+        check_key(prefix[:-1])
+    return prefix
+
+
+def content_type(key: str) -> str:
+    """The content type told by the key's ending."""
+    return CONTENT_TYPES.get(key.rpartition(".")[2], "application/octet-stream")
+
+
+def _is_segment(segment: str) -> bool:
+    return len(segment) <= _MAX_SEGMENT and _SEGMENT.fullmatch(segment) is not None

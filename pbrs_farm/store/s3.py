@@ -1,0 +1,207 @@
+"""A store in an S3 bucket of any vendor, through obstore. Effects: network.
+
+obstore's runtime does not survive a fork: once a process has made a call, every call in its
+children hangs for ever, even through a new store. So this module remembers who called first and
+raises in a child instead, and Celery's parent process forbids itself storage altogether.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any, Final, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, SecretStr
+
+from pbrs_farm.errors import MachineFailed, ObjectMissing, StoreFailed, StoreUnavailable
+from pbrs_farm.store.interface import Head, check_key, check_prefix, content_type
+
+T = TypeVar("T")
+_LIST_CHUNK: Final = 1000
+
+
+class S3Settings(BaseModel):
+    """How an S3 store is reached; empty credentials mean the environment's own (AWS_*, IAM)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    endpoint: str = ""
+    region: str = "us-east-1"
+    access_key: str = ""
+    secret_key: SecretStr = SecretStr("")
+    session_token: SecretStr = SecretStr("")
+    allow_http: bool = False
+    path_style: bool = Field(True, description="https://endpoint/bucket/key; most vendors want it")
+    timeout_s: float = Field(120.0, gt=0, description="of one request")
+    patience_s: float = Field(60.0, ge=0, description="how long one call is tried again")
+
+
+@dataclass(slots=True)
+class _ForkGuard:
+    """Which process may talk to S3: the first one that did, never its children."""
+
+    first_pid: int = 0
+    forbidden_pid: int = 0
+
+    def enter(self, key: str) -> None:
+        pid = os.getpid()
+        if pid == self.forbidden_pid:
+            raise StoreFailed(key, "storage is not to be used in this process: it forks workers")
+        if self.first_pid and pid != self.first_pid:
+            raise StoreFailed(
+                key,
+                f"process {self.first_pid} used S3 before it forked {pid}; obstore would hang here",
+                hint="start the process by spawn, or use storage only in the children",
+            )
+        self.first_pid = pid
+
+
+_guard = _ForkGuard()
+
+
+def forbid_in_this_process() -> None:
+    """From now on every S3 call of this very process raises; its children may still call."""
+    _guard.forbidden_pid = os.getpid()
+
+
+class S3Store:
+    """Objects below `s3://bucket/prefix`; every write is one PUT, if-absent is If-None-Match: *."""
+
+    def __init__(self, bucket: str, prefix: str, settings: S3Settings) -> None:
+        try:
+            import obstore
+            from obstore.store import S3Store as Client
+        except ImportError:
+            raise MachineFailed(
+                "s3:// needs the package obstore", hint='pip install "pbrs-farm[s3]"'
+            ) from None
+        self._bucket = bucket
+        self._prefix = prefix.strip("/")
+        self._patience_s = settings.patience_s
+        self._obstore: Any = obstore
+        self._client: Any = Client(bucket, **_client_options(self._prefix, settings))
+
+    @property
+    def url(self) -> str:
+        return f"s3://{self._bucket}/{self._prefix}" if self._prefix else f"s3://{self._bucket}"
+
+    def put(self, key: str, data: bytes) -> None:
+        self._call(key, lambda _tries: self._put(key, data, "overwrite"))
+
+    def put_if_absent(self, key: str, data: bytes) -> bool:
+        def create(n_tries: int) -> bool:
+            try:
+                self._put(key, data, "create")
+            except self._obstore.exceptions.AlreadyExistsError:
+                # An earlier try may have been written though its answer was lost.
+                return n_tries > 0 and bytes(self._obstore.get(self._client, key).bytes()) == data
+            return True
+
+        return self._call(key, create)
+
+    def get(self, key: str) -> bytes:
+        return self._call(key, lambda _tries: bytes(self._obstore.get(self._client, key).bytes()))
+
+    def head(self, key: str) -> Head | None:
+        try:
+            found = self._call(key, lambda _tries: self._obstore.head(self._client, key))
+        except ObjectMissing:
+            return None
+        return Head(n_bytes=int(found["size"]))
+
+    def list(self, prefix: str = "") -> Iterator[str]:
+        check_prefix(prefix)
+        return self._list(prefix)
+
+    def delete(self, key: str) -> None:
+        try:
+            self._call(key, lambda _tries: self._obstore.delete(self._client, key))
+        except ObjectMissing:
+            return
+
+    def _put(self, key: str, data: bytes, mode: str) -> None:
+        attributes = {"Content-Type": content_type(key)}
+        # A multipart upload would not honour If-None-Match on every gateway (Ceph RGW 16).
+        self._obstore.put(
+            self._client, key, data, attributes=attributes, mode=mode, use_multipart=False
+        )
+
+    def _list(self, prefix: str) -> Iterator[str]:
+        last = ""
+        while True:
+            chunk = self._chunk(prefix, last)
+            yield from chunk
+            if len(chunk) < _LIST_CHUNK:
+                return
+            last = chunk[-1]
+
+    def _chunk(self, prefix: str, after: str) -> tuple[str, ...]:
+        options: dict[str, Any] = {"chunk_size": _LIST_CHUNK} | ({"offset": after} if after else {})
+
+        def first_chunk(_tries: int) -> tuple[str, ...]:
+            stream = self._obstore.list(self._client, prefix=prefix.rstrip("/") or None, **options)
+            return tuple(str(entry["path"]) for entry in next(iter(stream), ()))
+
+        return self._call(prefix or "x", first_chunk)
+
+    def _call(self, key: str, act: Callable[[int], T]) -> T:
+        """act(number of earlier tries) until it does not fail transiently, with full jitter."""
+        check_key(key.rstrip("/"))
+        _guard.enter(key)
+        give_up = time.monotonic() + self._patience_s
+        n_tries = 0
+        while True:
+            try:
+                return act(n_tries)
+            except (self._obstore.exceptions.BaseError, OSError) as error:
+                failure = self._failure(key, error)
+                pause_s = random.uniform(0.0, min(8.0, 0.2 * 2**n_tries))
+                if (
+                    not isinstance(failure, StoreUnavailable)
+                    or time.monotonic() + pause_s > give_up
+                ):
+                    raise failure from error
+            time.sleep(pause_s)
+            n_tries += 1
+
+    def _failure(self, key: str, error: Exception) -> StoreFailed:
+        kinds = self._obstore.exceptions
+        text = " ".join(str(error).split())
+        if isinstance(error, FileNotFoundError | kinds.NotFoundError):
+            if "NoSuchBucket" in text:
+                return StoreFailed(key, f"no bucket {self._bucket!r}")
+            return ObjectMissing(key, f"no such object in {self.url}")
+        if isinstance(error, kinds.UnauthenticatedError | kinds.PermissionDeniedError):
+            return StoreFailed(key, f"{self.url} refuses these credentials", hint=_short(text))
+        if isinstance(error, kinds.GenericError | OSError):
+            return StoreUnavailable(key, f"{self.url} does not answer", hint=_short(text))
+        return StoreFailed(key, f"{self.url}: {_short(text)}")
+
+
+def _client_options(prefix: str, settings: S3Settings) -> dict[str, Any]:
+    options: dict[str, Any] = {
+        "region": settings.region,
+        "virtual_hosted_style_request": not settings.path_style,
+        "client_options": {
+            "timeout": timedelta(seconds=settings.timeout_s),
+            "connect_timeout": timedelta(seconds=5),
+            "allow_http": settings.allow_http,
+        },
+        # The loop in _call retries, so that its patience is the only one.
+        "retry_config": {"max_retries": 1, "retry_timeout": timedelta(seconds=settings.timeout_s)},
+    }
+    secrets = {
+        "prefix": prefix,
+        "endpoint": settings.endpoint,
+        "access_key_id": settings.access_key,
+        "secret_access_key": settings.secret_key.get_secret_value(),
+        "session_token": settings.session_token.get_secret_value(),
+    }
+    return options | {name: value for name, value in secrets.items() if value}
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 200 else text[:197] + "..."

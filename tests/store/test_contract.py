@@ -1,0 +1,122 @@
+"""Every store keeps the same promises; S3 joins when PBRS_S3_ENDPOINT names a gateway."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.errors import ObjectMissing, StoreFailed
+from pbrs_farm.store import MemoryStore, Store, StoreSettings, store_from_url
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.s3 import S3Settings
+
+
+def s3_store() -> Store:
+    """A fresh prefix in the bucket the environment names; skips when it names none."""
+    endpoint = os.environ.get("PBRS_S3_ENDPOINT")
+    if not endpoint:
+        pytest.skip("PBRS_S3_ENDPOINT is not set")
+    settings = S3Settings(
+        endpoint=endpoint,
+        access_key=os.environ.get("AWS_ACCESS_KEY_ID", ""),
+        secret_key=os.environ.get("AWS_SECRET_ACCESS_KEY", ""),  # type: ignore[arg-type]
+        allow_http=endpoint.startswith("http:"),
+        patience_s=5.0,
+    )
+    bucket = os.environ.get("PBRS_S3_BUCKET", "pbrs")
+    return store_from_url(f"s3://{bucket}/t-{secrets.token_hex(4)}", StoreSettings(s3=settings))
+
+
+@pytest.fixture(params=["memory", "folder", "fsync", pytest.param("s3", marks=pytest.mark.infra)])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
+    if request.param == "memory":
+        yield MemoryStore()
+    elif request.param == "s3":
+        yield s3_store()
+    else:
+        yield FolderStore(tmp_path / "store", fsync=request.param == "fsync")
+
+
+def test_what_was_put_is_what_is_got(store: Store) -> None:
+    store.put("houses/h/house.json", b"{}")
+    assert store.get("houses/h/house.json") == b"{}"
+    head = store.head("houses/h/house.json")
+    assert head is not None
+    assert head.n_bytes == 2
+
+
+def test_a_later_put_replaces_an_earlier_one(store: Store) -> None:
+    store.put("a", b"long first version")
+    store.put("a", b"")
+    assert store.get("a") == b""
+
+
+def test_put_if_absent_keeps_the_first(store: Store) -> None:
+    assert store.put_if_absent("done/a.json", b"first")
+    assert not store.put_if_absent("done/a.json", b"second")
+    assert store.get("done/a.json") == b"first"
+
+
+def test_of_racing_creators_exactly_one_wins(store: Store) -> None:
+    wins: list[int] = []
+    start = threading.Barrier(8)
+
+    def create(number: int) -> None:
+        start.wait()
+        if store.put_if_absent("race", str(number).encode() * 1000):
+            wins.append(number)
+
+    threads = [threading.Thread(target=create, args=(n,)) for n in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(wins) == 1
+    assert store.get("race") == str(wins[0]).encode() * 1000
+
+
+def test_a_missing_object_is_told_apart(store: Store) -> None:
+    assert store.head("no/such") is None
+    with pytest.raises(ObjectMissing, match="no/such"):
+        store.get("no/such")
+
+
+def test_delete_twice_is_no_error(store: Store) -> None:
+    store.put("x/y", b"1")
+    store.delete("x/y")
+    store.delete("x/y")
+    assert store.head("x/y") is None
+
+
+def test_list_gives_the_keys_below_a_folder(store: Store) -> None:
+    for key in ("houses/a/1", "houses/a/b/2", "houses/ab/3", "recipe.json"):
+        store.put(key, b".")
+    assert sorted(store.list("houses/a/")) == ["houses/a/1", "houses/a/b/2"]
+    assert len(list(store.list())) == 4
+    assert list(store.list("nothing/here/")) == []
+
+
+def test_list_goes_past_one_page(store: Store) -> None:
+    keys = {f"many/{n:04d}" for n in range(1100)}
+    for key in keys:
+        store.put(key, b"")
+    assert set(store.list("many/")) == keys
+
+
+@pytest.mark.parametrize(
+    "key", ["", "/etc/passwd", "../up", "a/../b", "a//b", "a/", ".hidden", "a\\b", "a\0b", "a\nb"]
+)
+def test_a_key_that_leaves_the_store_is_refused(store: Store, key: str) -> None:
+    for act in (lambda: store.put(key, b""), lambda: store.get(key), lambda: store.delete(key)):
+        with pytest.raises(StoreFailed, match="not a valid key"):
+            act()
+
+
+def test_a_prefix_is_a_folder(store: Store) -> None:
+    with pytest.raises(StoreFailed, match="ends with"):
+        list(store.list("houses/a"))
