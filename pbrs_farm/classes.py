@@ -1,0 +1,53 @@
+"""The label sets NYU40 and NYU13: names, the map between them, legend colours; no effects.
+
+Ids start at 1; 0 is "nothing". NYU40: Gupta, Arbelaez, Malik 2013. NYU13: Couprie et al. 2013, by
+the usual 40 to 13 table (SceneNet). `TABLE_VERSION` changes when any row here does.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+TABLE_VERSION: Final = 1
+
+NYU40_NAMES: Final = (
+    "none", "wall", "floor", "cabinet", "bed", "chair", "sofa", "table", "door", "window",
+    "bookshelf", "picture", "counter", "blinds", "desk", "shelves", "curtain", "dresser", "pillow",
+    "mirror", "floor mat", "clothes", "ceiling", "books", "refrigerator", "television", "paper",
+    "towel", "shower curtain", "box", "whiteboard", "person", "night stand", "toilet", "sink",
+    "lamp", "bathtub", "bag", "otherstructure", "otherfurniture", "otherprop",
+)  # fmt: skip
+"""Name of each NYU40 id, 0..40."""
+
+NYU13_NAMES: Final = (
+    "none", "bed", "books", "ceiling", "chair", "floor", "furniture", "objects", "picture", "sofa",
+    "table", "television", "wall", "window",
+)  # fmt: skip
+"""Name of each NYU13 id, 0..13."""
+
+NYU13_FROM_NYU40: Final[NDArray[np.uint8]] = np.array(
+    [
+        0, 12, 5, 6, 1, 4, 9, 10, 12, 13, 6, 8, 6, 13, 10, 6, 13, 6, 7, 7, 5,
+        7, 3, 2, 6, 11, 7, 7, 7, 7, 7, 7, 6, 7, 7, 7, 7, 7, 7, 6, 7,
+    ],
+    np.uint8,
+)  # fmt: skip
+"""(41,) NYU13 id of each NYU40 id."""
+
+
+def palette(n: int) -> NDArray[np.uint8]:
+    """(n, 3) sRGB colours, well apart for neighbouring ids; row 0 is black (nothing)."""
+    golden = 0.61803398875
+    colours = [
+        colorsys.hsv_to_rgb(
+            (0.13 + golden * i) % 1.0, (0.45, 0.75, 0.95)[i % 3], (0.95, 0.7)[i // 3 % 2]
+        )
+        for i in range(n)
+    ]
+    table: NDArray[np.uint8] = np.rint(np.array(colours).reshape(n, 3) * 255).astype(np.uint8)
+    table[:1] = 0
+    return table
