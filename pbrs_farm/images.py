@@ -1,0 +1,278 @@
+"""Pixels <-> PNG, EXR and JPEG bytes: the only user of OpenImageIO.
+
+Effects: a temporary file per call, because the binding reads and writes files only; it is gone
+when the call returns. EXR channels are found by name, never by position (OpenEXR sorts them), and
+carry a fixed DateTime, so that equal images give equal bytes.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import OpenImageIO as oiio  # noqa: N813
+from numpy.typing import NDArray
+
+from pbrs_farm.errors import BadInput, MachineFailed
+
+MAX_PIXELS: Final = 16384 * 16384
+"""A picture that says it is larger is refused before its pixels are read."""
+
+_FIXED_DATE: Final = "2000:01:01 00:00:00"
+
+# (libpng filter, zlib level), measured at 640x480 (python benchmarks/images.py): rows of labels
+# repeat the row above; photographs shrink best against the mean of left and above.
+_PNG_LABELS: Final = (32, 4)
+_PNG_PHOTO: Final = (64, 2)
+
+_MAGIC: Final = (
+    (b"\x89PNG\r\n\x1a\n", ".png"),
+    (b"\xff\xd8\xff", ".jpg"),
+    (b"GIF8", ".gif"),
+    (b"BM", ".bmp"),
+    (b"\x76\x2f\x31\x01", ".exr"),
+    (b"#?", ".hdr"),
+)
+_TEXTURE_KINDS: Final = (".png", ".jpg", ".gif", ".bmp", ".tga")
+
+
+def png_from_array(array: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """PNG bytes of (H, W) or (H, W, 3 or 4) uint8 or uint16; no alpha is added, no clock written.
+
+    Colour of 8 bits is marked sRGB; everything else is data and carries no colour space.
+    """
+    channels = _channels(array, (1, 3, 4))
+    if array.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"a PNG holds uint8 or uint16, got {array.dtype}")
+    is_photo = channels >= 3 and array.dtype == np.uint8
+    png_filter, level = _PNG_PHOTO if is_photo else _PNG_LABELS
+    spec = oiio.ImageSpec(array.shape[1], array.shape[0], channels, str(array.dtype))
+    spec["oiio:ColorSpace"] = "sRGB" if is_photo else "data"
+    spec["png:filter"] = png_filter
+    spec["png:compressionLevel"] = level
+    spec["oiio:UnassociatedAlpha"] = 1
+    return _encoded(array, spec, ".png")
+
+
+def jpeg_from_array(array: NDArray[np.uint8], quality: int = 85) -> bytes:
+    """JPEG bytes of (H, W) or (H, W, 3) uint8 sRGB; quality 1..100."""
+    channels = _channels(array, (1, 3))
+    if array.dtype != np.uint8:
+        raise ValueError(f"a JPEG holds uint8, got {array.dtype}")
+    spec = oiio.ImageSpec(array.shape[1], array.shape[0], channels, "uint8")
+    spec["Compression"] = f"jpeg:{quality}"
+    return _encoded(array, spec, ".jpg")
+
+
+def thumbnail_jpeg(
+    array: NDArray[np.uint8], *, max_edge_px: int = 320, nearest: bool = False
+) -> bytes:
+    """JPEG bytes of array, (H, W) or (H, W, 3) uint8, made no larger than max_edge_px."""
+    return jpeg_from_array(thumbnail(array, max_edge_px=max_edge_px, nearest=nearest), 82)
+
+
+def thumbnail(
+    array: NDArray[np.uint8], *, max_edge_px: int, nearest: bool = False
+) -> NDArray[np.uint8]:
+    """array, (H, W) or (H, W, C) uint8, with its longer edge at most max_edge_px; same form."""
+    height, width = array.shape[:2]
+    scale = min(1.0, max_edge_px / max(height, width))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    return resized(array, *size, nearest=nearest)
+
+
+def resized(
+    array: NDArray[np.uint8], width_px: int, height_px: int, *, nearest: bool = False
+) -> NDArray[np.uint8]:
+    """array, (H, W) or (H, W, C) uint8, on another grid: a box filter, or the nearest pixel."""
+    height, width = array.shape[:2]
+    if (height, width) == (height_px, width_px):
+        return array
+    if nearest:
+        rows = (np.arange(height_px) + 0.5) * height / height_px
+        columns = (np.arange(width_px) + 0.5) * width / width_px
+        return np.asarray(array[rows.astype(np.intp)[:, None], columns.astype(np.intp)])
+    channels = _channels(array, (1, 3, 4))
+    source = oiio.ImageBuf(np.ascontiguousarray(array).reshape(height, width, channels))
+    target = oiio.ImageBuf(oiio.ImageSpec(width_px, height_px, channels, "uint8"))
+    if not oiio.ImageBufAlgo.resize(target, source, filtername="box"):
+        raise MachineFailed(f"OpenImageIO cannot resize: {target.geterror()}")
+    pixels = np.asarray(target.get_pixels("uint8"), np.uint8)
+    return pixels.reshape(height_px, width_px, *array.shape[2:])
+
+
+def exr_from_layers(
+    layers: Mapping[str, NDArray[np.float32]], *, half: bool = False, compression: str = "zip"
+) -> bytes:
+    """OpenEXR bytes of named channels ("outdoor.R": (H, W) float32), all of one size.
+
+    half: 16-bit floats instead of 32. compression: OpenEXR's name ("zip", "zips", "piz", "none").
+    Not handled: channels of unequal type.
+    """
+    if not layers:
+        raise ValueError("an EXR needs at least one layer")
+    names = sorted(layers)
+    shapes = {layers[name].shape for name in names}
+    if len(shapes) != 1 or any(len(shape) != 2 for shape in shapes):
+        raise ValueError(f"layers of one (H, W) wanted, got {sorted(shapes)}")
+    pixels = np.stack([np.asarray(layers[name], np.float32) for name in names], axis=-1)
+    height, width = pixels.shape[:2]
+    spec = oiio.ImageSpec(width, height, len(names), "half" if half else "float")
+    spec.channelnames = tuple(names)
+    spec["Compression"] = compression
+    spec["DateTime"] = _FIXED_DATE
+    return _encoded(pixels, spec, ".exr")
+
+
+def layers_from_exr(data: bytes, name: str = "radiance.exr") -> dict[str, NDArray[np.float32]]:
+    """Channel name -> (H, W) float32 of an OpenEXR file; BadInput if it cannot be read."""
+    if _kind(data, name) != ".exr":
+        raise BadInput(name, "", "not an OpenEXR file")
+    pixels, spec = _decoded(data, name, ".exr", "float")
+    return {
+        channel: np.ascontiguousarray(pixels[..., i]) for i, channel in enumerate(spec.channelnames)
+    }
+
+
+def array_from_png(
+    data: bytes, name: str = "picture.png"
+) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """(H, W) or (H, W, C) uint8 or uint16 as the PNG stores it; BadInput if it cannot be read."""
+    if _kind(data, name) != ".png":
+        raise BadInput(name, "", "not a PNG file")
+    pixels, _spec = _decoded(data, name, ".png", "unknown")
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise BadInput(name, "", f"expected 8 or 16 bits, got {pixels.dtype}")
+    return pixels[..., 0] if pixels.shape[2] == 1 else pixels
+
+
+def decode_photo(data: bytes, name: str) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 sRGB of a PNG, JPEG, GIF, BMP or TGA; alpha is dropped. Raises BadInput."""
+    return decode_texture(data, name)[..., :3]
+
+
+def decode_texture(data: bytes, name: str, media_type: str = "") -> NDArray[np.uint8]:
+    """(H, W, 3) or (H, W, 4) uint8 sRGB, row 0 = top, of a PNG, JPEG, GIF, BMP or TGA.
+
+    The kind is told by the bytes; TGA, which has no signature, by name or media_type. Grey is
+    repeated to three channels; alpha is not multiplied into the colours and a wholly opaque one
+    is dropped. EXIF orientation is ignored. Raises BadInput naming name.
+    """
+    kind = _kind(data, f"{name} {media_type}".strip())
+    if kind not in _TEXTURE_KINDS:
+        raise BadInput(name, "", "not a PNG, JPEG, GIF, BMP or TGA picture")
+    pixels, spec = _decoded(data, name, kind, "uint8")
+    channels = pixels.shape[2]
+    if channels in (2, 4) and (spec.alpha_channel >= 0 or channels == 4):
+        colour, alpha = pixels[..., :-1], pixels[..., -1:]
+        colour = np.repeat(colour, 3, axis=2) if channels == 2 else colour
+        if int(alpha.min()) == 255:
+            return np.ascontiguousarray(colour)
+        return np.concatenate([colour, alpha], axis=2)
+    if channels in (1, 2):
+        return np.repeat(pixels[..., :1], 3, axis=2)
+    return np.ascontiguousarray(pixels[..., :3])
+
+
+def decode_radiance(data: bytes, name: str) -> NDArray[np.float32]:
+    """(H, W, 3) float32 linear of a Radiance .hdr or OpenEXR panorama; BadInput if unreadable."""
+    kind = _kind(data, name)
+    if kind not in (".hdr", ".exr"):
+        raise BadInput(name, "", "not a Radiance HDR or OpenEXR picture")
+    pixels, spec = _decoded(data, name, kind, "float")
+    names = list(spec.channelnames)
+    if all(channel in names for channel in "RGB"):
+        pixels = pixels[..., [names.index(channel) for channel in "RGB"]]
+    elif pixels.shape[2] != 3:
+        raise BadInput(name, "", f"expected channels R, G and B, got {', '.join(names)}")
+    return np.ascontiguousarray(pixels)
+
+
+def _channels(array: NDArray[Any], allowed: tuple[int, ...]) -> int:
+    channels = 1 if array.ndim == 2 else array.shape[2] if array.ndim == 3 else 0
+    if channels not in allowed or 0 in array.shape:
+        raise ValueError(f"a picture is (H, W) or (H, W, C), C in {allowed}; got {array.shape}")
+    return channels
+
+
+def _kind(data: bytes, name: str) -> str:
+    for magic, suffix in _MAGIC:
+        if data.startswith(magic):
+            return suffix
+    return ".tga" if name.lower().endswith((".tga", "tga", "targa")) else ""
+
+
+@contextmanager
+def _temporary(suffix: str, data: bytes | None = None) -> Iterator[Path]:
+    handle, text = tempfile.mkstemp(suffix=suffix, prefix="pbrs-image-")
+    path = Path(text)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            if data is not None:
+                file.write(data)
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
+
+
+def _encoded(array: NDArray[Any], spec: Any, suffix: str) -> bytes:
+    with _temporary(suffix) as path:
+        output = oiio.ImageOutput.create(str(path))
+        if output is None:
+            raise MachineFailed(f"OpenImageIO cannot write {suffix}: {oiio.geterror()}")
+        # The binding takes a two-dimensional array for a row of pixels: always give it channels.
+        pixels = np.ascontiguousarray(array).reshape(spec.height, spec.width, spec.nchannels)
+        written = output.open(str(path), spec) and output.write_image(pixels)
+        closed = output.close()
+        if not (written and closed):
+            raise MachineFailed(
+                f"OpenImageIO cannot write {suffix}: {output.geterror()}",
+                hint=f"is there room in {path.parent}?",
+            )
+        return path.read_bytes()
+
+
+def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[Any], Any]:
+    """(H, W, C) array of type kind ("unknown": as stored) and the file's ImageSpec."""
+    if suffix == ".png" and _is_cut_short(data):  # said here: libpng would write to stderr
+        raise BadInput(name, "", "cannot be read as a picture: damaged or truncated")
+    config = oiio.ImageSpec()
+    config["oiio:UnassociatedAlpha"] = 1
+    with _temporary(suffix, data) as path:
+        source = oiio.ImageInput.open(str(path), config)
+        if source is None:
+            raise BadInput(name, "", _reason(oiio.geterror(), path))
+        try:
+            spec = source.spec()
+            if spec.width * spec.height > MAX_PIXELS:
+                raise BadInput(name, "", f"{spec.width}x{spec.height} pixels are too many")
+            pixels = source.read_image(0, 0, 0, spec.nchannels, kind)
+            fault = source.geterror()
+        finally:
+            source.close()
+    if pixels is None or fault:
+        raise BadInput(name, "", _reason(fault, path))
+    return pixels, spec
+
+
+def _is_cut_short(png: bytes) -> bool:
+    """Whether a chunk of the PNG is longer than what is left of the file."""
+    at = 8
+    while at < len(png):
+        end = at + 12 + int.from_bytes(png[at : at + 4], "big")
+        if end > len(png):
+            return True
+        if png[at + 4 : at + 8] == b"IEND":
+            return False
+        at = end
+    return at == 8
+
+
+def _reason(fault: str, path: Path) -> str:
+    text = " ".join(fault.replace(str(path), "it").split())
+    return f"cannot be read as a picture: {text or 'damaged or truncated'}"
