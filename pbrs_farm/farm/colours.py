@@ -89,7 +89,8 @@ def depth_colours(
     table = np.stack(
         [np.interp(np.arange(256) / 255, ramp, column) for column in _NEAR_TO_FAR.T], axis=-1
     )
-    colours = np.rint(table).astype(np.uint8)[np.rint(share * 255).astype(np.intp)]
+    picked = np.rint(table[np.rint(share * 255).astype(np.intp)])
+    colours = np.asarray(picked, np.uint8)
     colours[depth_mm == 0] = (58, 58, 62)
     return colours
 
