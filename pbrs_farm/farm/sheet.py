@@ -6,6 +6,7 @@ The HTML gallery of the same folder is `gallery`, in gallery.py.
 from __future__ import annotations
 
 import io
+import unicodedata
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -103,11 +104,22 @@ def _classes(rows: Sequence[Sequence[Tile]]) -> list[int]:
 
 def _credits(views: Sequence[ViewEntry]) -> list[str]:
     lines = dict.fromkeys(v.house.attribution for v in views if v.house.attribution)
-    return [line if len(line) < 260 else line[:257] + "..." for line in lines]
+    return [_drawable(line if len(line) < 260 else line[:257] + "...") for line in lines]
 
 
 def _font(size: int) -> _Font:
     return ImageFont.load_default(size)
+
+
+def _drawable(text: str) -> str:
+    """text in the letters Pillow's own font has: accents dropped, what is left unknown as "?"."""
+    dashes = text.translate({0x2013: "-", 0x2014: "-", 0x2019: "'", 0xDF: "ss"})
+    letters = unicodedata.normalize("NFKD", dashes)
+    return (
+        "".join(c for c in letters if not unicodedata.combining(c))
+        .encode("ascii", "replace")
+        .decode()
+    )
 
 
 def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown: int) -> None:
@@ -127,10 +139,10 @@ def _draw_row(
     sheet: Image.Image, draw: ImageDraw.ImageDraw, y: int, view: ViewEntry, tiles: Sequence[Tile]
 ) -> None:
     draw.line([(_MARGIN_PX, y + 2), (sheet.width - _MARGIN_PX, y + 2)], fill=(38, 42, 52), width=1)
-    title = f"{view.room_name}"
+    title = _drawable(view.room_name)
     draw.text((_MARGIN_PX, y + 9), title, _INK, _font(16))
     after = _MARGIN_PX + draw.textlength(title, _font(16)) + 14
-    draw.text((after, y + 11), f"{view.house.name}, view {view.id}", _FAINT, _font(14))
+    draw.text((after, y + 11), _drawable(f"{view.house.name}, view {view.id}"), _FAINT, _font(14))
     for i, tile in enumerate(tiles):
         x = _MARGIN_PX + i * (_TILE_PX + _GAP_PX)
         _draw_tile(sheet, draw, (x, y + 34), tile)

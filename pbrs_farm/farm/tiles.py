@@ -94,7 +94,7 @@ def _photo(stored: NDArray[Any]) -> Srgb8Image:
 def _note(kind: TileKind, stored: NDArray[Any]) -> str:
     if kind.layer == "depth":
         near, far = colours.depth_range_m(stored)
-        return f"{near:.1f} – {far:.1f} m"
+        return f"{near:.1f} to {far:.1f} m"
     if kind.layer == "instance":
         return f"{len(np.unique(stored[stored > 0]))} instances"
     return ""

@@ -171,3 +171,9 @@ def test_a_damaged_view_json_is_named(root: Path) -> None:
     (root / "houses/a/views/0_0_1/view.json").write_text("{")
     with pytest.raises(BadInput, match=r"0_0_1/view\.json"):
         gallery(root)
+
+
+def test_names_are_drawn_with_letters_the_font_has(tmp_path: Path) -> None:
+    write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – 中")
+    assert sheet._drawable("Modèle d’Élise – 中") == "Modele d'Elise - ?"
+    assert "Modèle d’Élise – 中" in gallery(tmp_path)
