@@ -1,0 +1,56 @@
+"""Camera -> OpenGL clip space on the pixel grid of Camera.rays(); which boxes it can see.
+
+No effects.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.arrays import Matrix4
+from pbrs_farm.camera import Camera
+
+NEAR_M = 0.02
+
+
+def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
+    """(4, 4) world -> clip. OpenGL samples at pixel centres, so row 0 of the picture (OpenGL's last)
+    and column 0 are hit at (0.5, 0.5) in the pixel coordinates of K."""
+    i = camera.intrinsics
+    w, h, n, f = i.width_px, i.height_px, NEAR_M, far_m
+    clip_from_camera = np.array(
+        [
+            [2 * i.fx / w, 0, 1 - 2 * i.cx / w, 0],
+            [0, 2 * i.fy / h, 2 * i.cy / h - 1, 0],
+            [0, 0, -(f + n) / (f - n), -2 * f * n / (f - n)],
+            [0, 0, -1, 0],
+        ]
+    )
+    return np.asarray(clip_from_camera @ np.linalg.inv(camera.world_from_camera))
+
+
+def far_plane(camera: Camera, low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+    """Depth just beyond every box (N, 3), and at least a metre, for the camera."""
+    if not len(low):
+        return 1.0
+    reach = np.maximum(np.abs(low.min(0) - camera.eye), np.abs(high.max(0) - camera.eye))
+    return max(1.0, 1.01 * float(np.linalg.norm(reach)))
+
+
+def boxes_in_view(
+    clip: Matrix4, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(N,) bool: the box is not wholly outside one plane of the view pyramid."""
+    planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])
+    normal, offset = planes[:, :3], planes[:, 3]
+    farthest = np.where(normal[:, None] > 0, high, low)
+    return np.asarray((np.einsum("pk,pnk->pn", normal, farthest) + offset[:, None] >= 0).all(0))
+
+
+def distance_to_boxes(
+    eye: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(N,) distance from eye to the nearest point of each box."""
+    gap = np.maximum(np.maximum(low - eye, eye - high), 0.0)
+    return np.asarray(np.sqrt(np.einsum("nk,nk->n", gap, gap)))

@@ -1,0 +1,165 @@
+import numpy as np
+import pytest
+from raster_scenes import camera, house, item, square
+
+from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.errors import MachineFailed
+from pbrs_farm.frames import srgb_from_linear
+from pbrs_farm.house import LightPart, Material, MaterialKind, geometry_from_house
+from pbrs_farm.lighting import PowerUnit
+from pbrs_farm.raster import Rasterizer, device
+from pbrs_farm.raster.programs import DL_SCALE, PANE_OPACITY
+from pbrs_farm.read.builtin import builtin_home
+from pbrs_farm.transport.caster import Caster
+
+WHITE = Material("white")
+RED = Material("red", diffuse=(1.0, 0.0, 0.0))
+BLUE = Material("blue", diffuse=(0.0, 0.0, 1.0))
+
+
+def byte(linear: float) -> float:
+    return float(255 * srgb_from_linear(np.array(min(linear, 1.0))))
+
+
+def test_depth_and_items_agree_with_the_hit_record():
+    home = builtin_home()
+    stored = home.cameras[0]
+    view = Camera.look(Intrinsics.from_hfov(320, 240), stored.eye, stored.towards)
+    hit = Caster(geometry_from_house(home)).hit_record(view)
+    with Rasterizer(home, {}) as raster:
+        depth_z, items = raster.depth_and_items(view)
+    same = items == hit.item
+    assert same.mean() > 0.9995
+    assert np.quantile(np.abs(depth_z - hit.depth_z)[same], 0.999) < 1e-4
+    assert np.median(np.abs(depth_z - hit.depth_z)[same]) < 1e-5
+
+
+def test_an_off_centre_principal_point_moves_the_grid_with_the_rays():
+    home = builtin_home()
+    stored = home.cameras[0]
+    view = Camera.look(Intrinsics(161, 90, 140.0, 120.0, 60.25, 50.5), stored.eye, stored.towards)
+    hit = Caster(geometry_from_house(home)).hit_record(view)
+    with Rasterizer(home, {}) as raster:
+        _, items = raster.depth_and_items(view)
+    assert (items == hit.item).mean() > 0.999
+
+
+def test_a_white_wall_under_directional_light_has_the_brightness_of_the_closed_form():
+    with Rasterizer(house((item(square(-2.0, 0)),), (WHITE,)), {}) as raster:
+        picture = raster.render_dl(camera())
+    # Normal +z towards the camera: headlight 0.5, key light 5 / sqrt(50), the fill comes from behind.
+    expected = byte(DL_SCALE * (0.5 + 5 / np.sqrt(50)))
+    assert np.abs(picture.astype(float) - expected).max() <= 1
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_wall_is_lit_the_same_from_both_sides_of_its_winding(turned):
+    with Rasterizer(house((item(square(-2.0, 0, turned=turned)),), (WHITE,)), {}) as raster:
+        picture = raster.render_dl(camera())
+    assert np.abs(picture.astype(float) - byte(DL_SCALE * (0.5 + 5 / np.sqrt(50)))).max() <= 1
+
+
+def test_diffuse_colour_is_decoded_from_srgb_before_it_is_lit():
+    grey = Material("grey", diffuse=(0.5, 0.5, 0.5))
+    with Rasterizer(house((item(square(-2.0, 0)),), (grey,)), {}) as raster:
+        picture = raster.render_dl(camera())
+    linear = ((0.5 + 0.055) / 1.055) ** 2.4
+    assert abs(float(picture.mean()) - byte(linear * DL_SCALE * (0.5 + 5 / np.sqrt(50)))) <= 1
+
+
+def test_the_top_row_of_a_texture_is_at_the_top_of_the_wall():
+    pixels = np.zeros((4, 4, 3), np.uint8)
+    pixels[:2, :, 0] = 255
+    pixels[2:, :, 2] = 255
+    painted = Material("painted", texture_id="t")
+    with Rasterizer(house((item(square(-2.0, 0, half=1.0)),), (painted,)), {"t": pixels}) as raster:
+        picture = raster.render_dl(camera())
+    assert picture[8, 16, 0] > 100 > picture[8, 16, 2]
+    assert picture[15, 16, 2] > 100 > picture[15, 16, 0]
+
+
+def test_a_cut_out_texture_shows_what_lies_behind():
+    pixels = np.full((8, 8, 4), 255, np.uint8)
+    pixels[..., 3] = 0
+    holed = Material("holed", texture_id="t", alpha_cutout=True)
+    scene = house((item(square(-2.0, 0)), item(square(-3.0, 1))), (holed, RED))
+    with Rasterizer(scene, {"t": pixels}) as raster:
+        picture = raster.render_dl(camera())
+    assert (picture[..., 1] == 0).all()
+    assert (picture[..., 0] > 100).all()
+
+
+def test_a_window_pane_lets_nearly_everything_through():
+    pane = Material("pane", MaterialKind.PANE, opacity=0.5)
+    wall = item(square(-3.0, 0))
+    with Rasterizer(house((wall,), (RED,)), {}) as bare:
+        without = bare.render_dl(camera())
+    with Rasterizer(house((wall, item(square(-2.0, 1))), (RED, pane)), {}) as glazed:
+        picture = glazed.render_dl(camera())
+    red = picture[12, 16, 0] / without[12, 16, 0]
+    assert 1 - 2 * PANE_OPACITY < red <= 1
+    assert picture[12, 16, 1] < 100
+
+
+def test_blended_sheets_give_the_same_picture_in_any_order_of_items():
+    red_glass = Material("r", MaterialKind.GLASS, diffuse=(1.0, 0.0, 0.0), opacity=0.5)
+    blue_glass = Material("b", MaterialKind.GLASS, diffuse=(0.0, 0.0, 1.0), opacity=0.5)
+    near, far = item(square(-2.0, 0)), item(square(-3.0, 1))
+    pictures = []
+    for items in ((near, far), (far, near)):
+        with Rasterizer(house(items, (red_glass, blue_glass)), {}) as raster:
+            pictures.append(raster.render_dl(camera()).astype(int))
+    assert np.abs(pictures[0] - pictures[1]).max() == 0
+    assert pictures[0][12, 16, 0] > pictures[0][12, 16, 2]
+
+
+def test_edges_are_averages_of_four_samples_in_linear_light():
+    scene = house((item(square(-2.0, 0, half=1.06)),), (Material("black", diffuse=(0, 0, 0)),))
+    with Rasterizer(scene, {}) as raster:
+        picture = raster.render_dl(camera())
+    levels = np.unique(picture[..., 0])
+    assert 2 < len(levels) <= 5
+
+
+def test_a_lamp_lights_what_is_near_it_most():
+    bulb = LightPart((-0.8, 0.0, -1.6), 0.03, 0.5, PowerUnit.SWEETHOME3D)
+    scene = house((item(square(-2.0, 0, half=2.0), lights=(bulb,)),), (WHITE,))
+    with Rasterizer(scene, {}) as raster:
+        picture = raster.render_il(camera())
+    assert picture[12, 8, 0] > 1.5 * picture[12, 30, 0]
+
+
+def test_a_house_without_lamps_is_dim_but_not_black():
+    with Rasterizer(house((item(square(-2.0, 0)),), (WHITE,)), {}) as raster:
+        picture = raster.render_il(camera())
+    assert 30 < picture.mean() < 120
+
+
+def test_a_house_without_triangles_shows_the_sky_and_holds_no_item():
+    with Rasterizer(house((), ()), {}) as raster:
+        depth_z, items = raster.depth_and_items(camera())
+        picture = raster.render_dl(camera())
+    assert not depth_z.any()
+    assert not items.any()
+    assert (picture == picture[0, 0]).all()
+
+
+def test_two_rasterizers_live_side_by_side():
+    first = Rasterizer(house((item(square(-2.0, 0)),), (RED,)), {})
+    second = Rasterizer(house((item(square(-2.0, 0)),), (BLUE,)), {})
+    red, blue = first.render_dl(camera()), second.render_dl(camera())
+    second.close()
+    again = first.render_dl(camera())
+    first.close()
+    assert (red == again).all()
+    assert red[12, 16, 0] > 100 > red[12, 16, 2]
+    assert blue[12, 16, 2] > 100 > blue[12, 16, 0]
+
+
+def test_a_machine_without_egl_is_told_what_to_install(monkeypatch):
+    def refuse(**_: object) -> None:
+        raise Exception("(detect) libEGL.so: cannot open shared object file")
+
+    monkeypatch.setattr(device.moderngl, "create_context", refuse)
+    with pytest.raises(MachineFailed, match="libegl1"):
+        Rasterizer(house((), ()), {})
