@@ -101,6 +101,12 @@ def mitsuba(variant: str | None = None) -> Any:
     return module
 
 
+def set_threads(n_threads: int) -> None:
+    """Let Dr.Jit use n_threads cores of this process; raises MachineFailed without Dr.Jit."""
+    choose_variant()
+    importlib.import_module("drjit").set_thread_count(n_threads)
+
+
 def _has_good_llvm(dr: Any) -> bool:
     # Dr.Jit may have loaded another library before we named one: ask it, do not compile yet.
     if not dr.has_backend(dr.JitBackend.LLVM):

@@ -1,0 +1,52 @@
+# pbrs_farm: `make demo` and `make test` need nothing typed before them.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+VENV := .venv
+BIN := $(VENV)/bin
+NAME ?=
+HOME_NAME ?= Studio
+
+.PHONY: help setup demo check test test-farm test-infra test-slow bench bench-light bench-farm format clean
+
+help: ## what can be made
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 14
+
+setup: ## system packages (through apt when it may) and the virtual environment; quick the second time
+	@bash scripts/setup.sh
+
+demo: setup ## render a real home to labelled pictures: out/demo/sheet.png and index.html
+	@$(BIN)/pbrs-farm demo --home "$(HOME_NAME)" --out out/demo
+
+check: setup ## lint, types, import contracts: under a minute
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: check ## check, then the tests
+	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra"
+
+test-slow: setup ## the tests that take minutes
+	$(BIN)/pytest -m slow
+
+test-farm: setup ## the farm's tests that really kill processes
+	$(BIN)/pytest -m chaos
+
+test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm.md)
+	$(BIN)/pytest -m infra -rs
+
+bench: setup ## measure everything but light and farm (NAME=cameras for one), under 25 minutes
+	$(BIN)/python -m benchmarks $(NAME)
+
+bench-light: setup ## light transport: path, metropolis, Cycles
+	$(BIN)/python -m benchmarks light
+
+bench-farm: setup ## queue, ledger, coordinator (FULL=1 for the whole job)
+	$(BIN)/python -m benchmarks farm
+
+format: setup ## format and fix what can be fixed
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+clean: ## remove what was made, the virtual environment apart
+	rm -rf out build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,152 @@
+"""A run on this machine, no server: the steps of every house through a pool of processes.
+
+Effects: the store's, and worker processes.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from pbrs_farm.errors import PbrsError
+from pbrs_farm.farm import plan
+from pbrs_farm.farm.plan import Wanted
+from pbrs_farm.farm.pool import Pool
+from pbrs_farm.farm.root import claim_root, finish_house, merge_manifests
+from pbrs_farm.farm.sources import SourceRef, resolve
+from pbrs_farm.farm.tasks import Event, Setting, Task
+from pbrs_farm.recipe import Recipe
+from pbrs_farm.store import StoreSettings, store_from_url
+
+Observer = Callable[[Event], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What is asked of a local run. homes: words as sources.resolve takes them."""
+
+    homes: Sequence[str]
+    store_url: str
+    recipe: Recipe
+    want: Wanted = field(default_factory=Wanted)
+    n_jobs: int = 1
+    update: bool = False
+    step_timeout_s: float = 3600.0
+    debug: bool = False
+    store: StoreSettings = field(default_factory=StoreSettings)
+
+
+@dataclass(slots=True)
+class Summary:
+    """What came of a run. failures: (what, message, command that reproduces it)."""
+
+    houses: list[str] = field(default_factory=list)
+    n_views: int = 0
+    n_done: int = 0
+    n_kept: int = 0
+    peak_mb: float = 0.0
+    failures: list[tuple[str, str, str]] = field(default_factory=list)
+
+
+def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
+    """Do everything that is not done yet; a fault costs its step and the run goes on.
+
+    Raises BadRecipe when the root holds another recipe, StoreFailed when it cannot be written.
+    """
+    store = store_from_url(run.store_url, run.store)
+    claim_root(store, run.recipe, update=run.update)
+    summary = Summary()
+    sources = _resolved(run, summary)
+    n_jobs = max(1, run.n_jobs)
+    n_threads = max(1, (os.cpu_count() or 1) // n_jobs)
+    setting = Setting(run.store_url, run.recipe, n_threads, run.debug, run.store)
+    with Pool(n_jobs, setting, step_timeout_s=run.step_timeout_s) as pool:
+        _Schedule(run, sources, summary, observe).drive(pool)
+    for house_id in summary.houses:
+        finish_house(store, house_id)
+    manifests = [k for k in store.list("houses/") if k.endswith("/manifest.jsonl")]
+    merge_manifests(store, [key.split("/")[1] for key in manifests])
+    return summary
+
+
+def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
+    sources: dict[str, SourceRef] = {}
+    for word in run.homes:
+        try:
+            source = resolve(word)
+        except PbrsError as error:
+            summary.failures.append((word, str(error), ""))
+            continue
+        sources.setdefault(source.house_id, source)
+    return list(sources.values())
+
+
+class _Schedule:
+    """Which task next: houses in order, each followed by its cameras and then its views."""
+
+    def __init__(
+        self, run: Run, sources: list[SourceRef], summary: Summary, observe: Observer
+    ) -> None:
+        self._run = run
+        self._summary = summary
+        self._observe = observe
+        self._sources = {s.house_id: s for s in sources}
+        self._waiting = deque(Task(s.house_id, ("house", "cameras"), s) for s in sources)
+
+    def drive(self, pool: Pool) -> None:
+        """Until nothing waits and nobody works."""
+        while self._waiting or pool.n_busy:
+            for held in pool.idle_houses():
+                task = self._next(held, pool.busy_houses())
+                if task is not None:
+                    pool.give(task)
+            for event in pool.events():
+                self._take(event)
+
+    def _next(self, held_house: str, busy: set[str]) -> Task | None:
+        """A waiting task: of the house already in memory, else of one nobody works on, else any."""
+        if not self._waiting:
+            return None
+
+        def rank(task: Task) -> int:
+            return 0 if task.house_id == held_house else 1 + (task.house_id in busy)
+
+        task = min(self._waiting, key=rank)
+        self._waiting.remove(task)
+        return task
+
+    def _take(self, event: Event) -> None:
+        summary = self._summary
+        summary.peak_mb = max(summary.peak_mb, event.peak_mb)
+        if event.kind in ("done", "kept"):
+            summary.n_done += event.kind == "done"
+            summary.n_kept += event.kind == "kept"
+            if event.step == "house":
+                summary.houses.append(event.house_id)
+            if event.step == "cameras":
+                self._add_views(event)
+        elif event.kind == "failed":
+            what = "/".join(x for x in (event.house_id, event.view_id, event.step) if x)
+            summary.failures.append((what, event.message, self._command(event)))
+        self._observe(event)
+
+    def _add_views(self, event: Event) -> None:
+        rows = [(str(v), str(room), float(score)) for v, room, score in event.facts["views"]]
+        views = plan.spread(rows, self._run.want.n_views)
+        self._summary.n_views += len(views)
+        source = self._sources[event.house_id]
+        tasks = [
+            Task(event.house_id, plan.view_steps(self._run.want), source, v, self._run.want.layers)
+            for v in views
+        ]
+        self._waiting.extendleft(reversed(tasks))
+
+    def _command(self, event: Event) -> str:
+        source = self._sources[event.house_id].location
+        words = ["pbrs-farm", "step", event.step, source, "--out", self._run.store_url]
+        if event.view_id:
+            words += ["--view", event.view_id]
+        return shlex.join(words)

@@ -1,0 +1,215 @@
+"""The story: get -> pure stage -> put. Each step reads the store, calls one stage, gives files.
+
+Effects: reads the store; farm/marked.py writes what a step made and its marker.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pbrs_farm
+from pbrs_farm import keys
+from pbrs_farm.camera import Camera, View
+from pbrs_farm.errors import BadHouse, BadInput
+from pbrs_farm.farm import plan
+from pbrs_farm.farm.loaded import LoadedHouse
+from pbrs_farm.farm.marked import Made, Outcome, Work, read_marker, required_source, run_marked
+from pbrs_farm.farm.records import json_bytes, plain_from_view, views_from_json
+from pbrs_farm.farm.sources import read_house
+from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm.layers import LAYER
+from pbrs_farm.recipe import Recipe
+
+
+def _loaded(work: Work) -> LoadedHouse:
+    marker = read_marker(work.store, keys.marker_key(work.house_id, "house"))
+    if marker is None:
+        raise BadInput(work.house_id, "", "the house has not been read yet")
+    return work.shelf.take(work.store, work.recipe, work.house_id, marker.digest)
+
+
+def _view_at_size(work: Work, loaded: LoadedHouse) -> tuple[View, Camera]:
+    view = loaded.view(work.view_id or "")
+    image = work.recipe.image
+    return view, view.camera.with_size(image.width_px, image.height_px)
+
+
+# The steps, in the order they run.
+
+
+def _house(work: Work) -> Made:
+    from pbrs_farm.read.bundle import bundle_from_house
+    from pbrs_farm.repair import repair
+    from pbrs_farm.transport.caster import Caster
+
+    source = required_source(work)
+    house = read_house(source, work.recipe.read)
+    if house.id != work.house_id:
+        raise BadInput(source.location, house.id, f"expected house {work.house_id}")
+    _check_strict(house, work.recipe)
+
+    def occluder_from(some: House) -> Caster:
+        return Caster(geometry_from_house(some))
+
+    repaired, report = repair(house, work.recipe.repair, occluder_from=occluder_from)
+    glb, description = bundle_from_house(repaired)
+    files = {"house.glb": glb, "house.json": description, "repair.json": json_bytes(report)}
+    facts = {
+        "rooms": len(repaired.rooms),
+        "items": len(repaired.items),
+        "notes": len(repaired.notes),
+    }
+    return Made(files, facts)
+
+
+def _check_strict(house: House, recipe: Recipe) -> None:
+    if recipe.read.strict and house.notes:
+        note = house.notes[0]
+        more = f" and {len(house.notes) - 1} more" if len(house.notes) > 1 else ""
+        raise BadHouse(house.source.file, note.place, f"{note.text}{more}", hint="--strict")
+
+
+def _cameras(work: Work) -> Made:
+    from pbrs_farm.sample import cameras
+
+    loaded = _loaded(work)
+    seed = keys.seed(work.house_id, "cameras", work.recipe.digest("cameras"))
+    views, report = cameras(
+        loaded.house, work.recipe.cameras, seed=seed, counter=loaded.caster.item_counts
+    )
+    plain = {"views": [plain_from_view(v) for v in views], "report": report.model_dump(mode="json")}
+    facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
+    return Made({"cameras.json": json_bytes(plain)}, facts)
+
+
+def _truth(work: Work) -> Made:
+    from pbrs_farm.images import png_from_array
+    from pbrs_farm.truth import layers_from_hit, view_table
+
+    loaded = _loaded(work)
+    _view, camera = _view_at_size(work, loaded)
+    hit = loaded.caster.hit_record(camera)
+    arrays = layers_from_hit(hit, loaded.house, camera)
+    files = {LAYER[name].file: png_from_array(array) for name, array in arrays.items()}
+    return Made(files, {"table": view_table(hit.item, loaded.house, camera)})
+
+
+def _opengl(work: Work, mode: str) -> Made:
+    from pbrs_farm.images import png_from_array
+
+    loaded = _loaded(work)
+    _view, camera = _view_at_size(work, loaded)
+    rasterizer = loaded.rasterizer
+    draw = rasterizer.render_dl if mode == "opengl_dl" else rasterizer.render_il
+    return Made({LAYER[mode].file: png_from_array(draw(camera))}, {"renderer": rasterizer.name})
+
+
+def _opengl_dl(work: Work) -> Made:
+    return _opengl(work, "opengl_dl")
+
+
+def _opengl_il(work: Work) -> Made:
+    return _opengl(work, "opengl_il")
+
+
+def _light(work: Work) -> Made:
+    from pbrs_farm.images import exr_from_layers
+
+    loaded = _loaded(work)
+    view, camera = _view_at_size(work, loaded)
+    groups = ("image", "light", "sky", "emission", "materials")
+    seed = keys.seed(work.house_id, view.id, "light", work.recipe.digest(*groups))
+    result = loaded.light_scene.render(camera, view.room_id, seed=seed)
+    layers: dict[str, NDArray[np.float32]] = {}
+    for name in ("outdoor", "indoor", "albedo"):
+        image: NDArray[np.float32] = getattr(result, name)
+        layers |= {f"{name}.{c}": image[..., k] for k, c in enumerate("RGB")}
+    return Made({"radiance.exr": exr_from_layers(layers)}, {"seed": seed, **result.facts()})
+
+
+def _develop(work: Work) -> Made:
+    from pbrs_farm.images import array_from_png, layers_from_exr, png_from_array
+    from pbrs_farm.transport.develop import develop
+
+    get = work.store.get
+    view = work.view_id or ""
+    exr = layers_from_exr(get(keys.view_key(work.house_id, view, "radiance.exr")))
+    image = {
+        name: np.stack([exr[f"{name}.{c}"] for c in "RGB"], -1)
+        for name in ("outdoor", "indoor", "albedo")
+    }
+    normal = array_from_png(get(keys.view_key(work.house_id, view, "normal.png")))
+    pictures = develop(
+        outdoor=image["outdoor"],
+        indoor=image["indoor"],
+        albedo=image["albedo"],
+        normal=normal.astype(np.float32) * (2 / 65535) - 1,
+        denoise=work.recipe.light.denoise,
+        tone=work.recipe.tone,
+    )
+    return Made({LAYER[mode].file: png_from_array(rgb) for mode, rgb in pictures.items()})
+
+
+def _view(work: Work) -> Made:
+    loaded_views = keys.house_key(work.house_id, "cameras.json")
+    view = views_from_json(work.store.get(loaded_views), loaded_views)[work.view_id or ""]
+    facts = _facts_of_view(work)
+    sheet = {
+        "house": work.house_id,
+        "view": view.id,
+        "room": view.room_id,
+        "sector": view.sector,
+        "origin": view.origin,
+        "score": view.score,
+        **facts.pop("truth", {}).get("table", {}),
+        "recipe": work.recipe.digest(),
+        "modes": facts,
+        "versions": versions(),
+    }
+    files = {"view.json": json_bytes(sheet)}
+    return Made(files)
+
+
+def _facts_of_view(work: Work) -> dict[str, dict[str, Any]]:
+    """Step -> facts of its marker, for every step of this view that is done."""
+    facts = {}
+    for name in plan.STEPS["view"].after:
+        if plan.STEPS[name].per_view:
+            marker = read_marker(work.store, keys.marker_key(work.house_id, name, work.view_id))
+            if marker is not None:
+                facts[name] = dict(marker.facts)
+    return facts
+
+
+def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
+    """Do one step unless its marker says it is done; see marked.run_marked."""
+    return run_marked(name, work, _FUNCTIONS[name], attempt=attempt)
+
+
+def versions() -> dict[str, str]:
+    """Versions of what makes the pictures."""
+    found = {"pbrs_farm": pbrs_farm.__version__, "python": platform.python_version()}
+    for package in ("mitsuba", "drjit", "moderngl", "pyoidn", "numpy"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "-"
+    return found
+
+
+_FUNCTIONS: Final[Mapping[str, Callable[[Work], Made]]] = {
+    "house": _house,
+    "cameras": _cameras,
+    "truth": _truth,
+    "opengl_dl": _opengl_dl,
+    "opengl_il": _opengl_il,
+    "light": _light,
+    "develop": _develop,
+    "view": _view,
+}

@@ -1,0 +1,179 @@
+"""How a run tells what it does: bars on a terminal, plain lines otherwise, JSON lines for machines.
+
+Effects: writes to standard output.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from types import TracebackType
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from pbrs_farm.farm.tasks import Event
+
+
+class Teller(Protocol):
+    """Takes a run's events until it is left."""
+
+    def __enter__(self) -> Teller: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        tb: TracebackType | None,
+    ) -> None: ...
+
+    def __call__(self, event: Event) -> None: ...
+
+
+def teller(n_homes: int, n_views: int, *, as_json: bool) -> Teller:
+    """The teller that fits standard output."""
+    if as_json:
+        return _JsonLines()
+    if sys.stdout.isatty():
+        return _Bars(n_homes, n_views)
+    return _PlainLines()
+
+
+def _name(event: Event) -> str:
+    return "/".join(x for x in (event.house_id, event.view_id) if x)
+
+
+class _Silent:
+    def __enter__(self) -> Teller:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        tb: TracebackType | None,
+    ) -> None:
+        return None
+
+    def __call__(self, event: Event) -> None:
+        """Say nothing."""
+
+
+class _JsonLines(_Silent):
+    def __call__(self, event: Event) -> None:
+        row = {
+            "event": event.kind,
+            "house": event.house_id,
+            "view": event.view_id,
+            "step": event.step,
+            "seconds": round(event.seconds, 3),
+        }
+        if event.message:
+            row["message"] = event.message
+        sys.stdout.write(json.dumps(row) + "\n")
+        sys.stdout.flush()
+
+
+class _PlainLines(_Silent):
+    """A line per house's step and per finished view."""
+
+    def __init__(self) -> None:
+        self._started = time.monotonic()
+        self._seconds: dict[str, float] = {}
+        self._made: dict[str, int] = {}
+
+    def __call__(self, event: Event) -> None:
+        name = _name(event)
+        clock = f"[{time.monotonic() - self._started:6.1f} s]"
+        if event.kind == "failed":
+            self._say(f"{clock} {name} {event.step}: FAILED: {event.message}")
+        elif event.kind in ("done", "kept"):
+            self._seconds[name] = self._seconds.get(name, 0.0) + event.seconds
+            self._made[name] = self._made.get(name, 0) + (event.kind == "done")
+            if event.view_id is None:
+                self._say(f"{clock} {name} {event.step}: {_how(event)}{_facts(event)}")
+        elif event.kind == "end" and event.view_id is not None:
+            seconds, made = self._seconds.pop(name, 0.0), self._made.pop(name, 0)
+            self._say(f"{clock} {name}: {f'{seconds:.1f} s' if made else 'already there'}")
+
+    def _say(self, line: str) -> None:
+        sys.stdout.write(line + "\n")
+        sys.stdout.flush()
+
+
+def _how(event: Event) -> str:
+    return f"{event.seconds:.1f} s" if event.kind == "done" else "already there"
+
+
+def _facts(event: Event) -> str:
+    facts = event.facts
+    if event.step == "cameras" and "views" in facts:
+        return f", {len(facts['views'])} views"
+    if event.step == "house" and "rooms" in facts:
+        return f", {facts['rooms']} rooms, {facts['items']} items"
+    return ""
+
+
+class _Bars(_Silent):
+    """A bar for houses and one for views, with rate and time left."""
+
+    def __init__(self, n_homes: int, n_views: int) -> None:
+        self._limit = n_views
+        self._progress = Progress(
+            TextColumn("{task.description:<7}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[note]}"),
+            console=Console(),
+        )
+        self._houses = self._progress.add_task("houses", total=n_homes, note="")
+        self._views = self._progress.add_task("views", total=None, note="")
+        self._n_views = 0
+        self._n_ended = 0
+        self._started = 0.0
+
+    def __enter__(self) -> Teller:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        tb: TracebackType | None,
+    ) -> None:
+        self._progress.stop()
+
+    def __call__(self, event: Event) -> None:
+        if event.kind == "failed":
+            self._progress.console.print(
+                f"{_name(event)} {event.step}: FAILED: {event.message}", style="red", markup=False
+            )
+        elif event.kind == "begin":
+            note = f"{_name(event)} {event.step}"
+            self._progress.update(self._views, note=f"{self._rate()}  {note}")
+        elif event.step == "cameras" and event.kind in ("done", "kept"):
+            n = len(event.facts.get("views", []))
+            self._n_views += min(n, self._limit) if self._limit else n
+            self._progress.update(self._views, total=self._n_views)
+        elif event.kind == "end" and event.view_id is None:
+            self._progress.advance(self._houses)
+        elif event.kind == "end":
+            self._started = self._started or time.monotonic()
+            self._n_ended += 1
+            self._progress.advance(self._views)
+
+    def _rate(self) -> str:
+        seconds = time.monotonic() - self._started if self._started else 0.0
+        return f"{60 * (self._n_ended - 1) / seconds:.1f}/min" if self._n_ended > 1 else ""
