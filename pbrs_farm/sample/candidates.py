@@ -1,0 +1,130 @@
+"""Candidate viewpoints of a room: one per grid cell and sector; no effects.
+
+Randomness is hashed from (seed, house, room, sector, cell), so that no candidate depends on how
+many others there are or on the order they are made in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm import keys
+from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.recipe import CameraFields
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """N viewpoints of one room, sector by sector, cells in order of z, then x.
+
+    eye: (N, 3) float64, metres. towards: (N, 3) float64 unit. sector: (N,) int32.
+    cell: (N, 2) int32, column along x and row along z.
+    """
+
+    eye: NDArray[np.float64]
+    towards: NDArray[np.float64]
+    sector: NDArray[np.int32]
+    cell: NDArray[np.int32]
+
+    def __len__(self) -> int:
+        return len(self.sector)
+
+    def cameras(self, which: NDArray[np.intp], intrinsics: Intrinsics) -> list[Camera]:
+        """The candidates numbered by which (M,), as cameras."""
+        return cameras_looking(intrinsics, self.eye[which], self.towards[which])
+
+
+def cameras_looking(
+    intrinsics: Intrinsics,
+    eyes: NDArray[np.float64],
+    towards: NDArray[np.float64],
+    up: tuple[float, float, float] = (0.0, 1.0, 0.0),
+) -> list[Camera]:
+    """Camera.look for many at once: eyes, towards (N, 3), neither parallel to up."""
+    back = -towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    right = np.cross(np.array(up), back)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    poses = np.zeros((len(eyes), 4, 4))
+    poses[:, :3, 0], poses[:, :3, 1], poses[:, :3, 2] = right, np.cross(back, right), back
+    poses[:, :3, 3], poses[:, 3, 3] = eyes, 1.0
+    return [Camera(intrinsics, pose) for pose in poses]
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Where a room is sampled: plan bounds and the height that eye heights are above, metres."""
+
+    x_min: float
+    z_min: float
+    x_max: float
+    z_max: float
+    base_y: float
+
+
+def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ...]) -> Candidates:
+    """One random viewpoint in each cell for each sector (paper section 3.1).
+
+    Position uniform in the cell, azimuth uniform in the sector (measured from +x towards +z),
+    height uniform between the fields' bounds above the grid's base, a fixed tilt downwards.
+    names: what the randomness is hashed from besides sector and cell.
+    """
+    n_x, n_z = n_cells(grid, fields.cell_m)
+    row, column = np.divmod(np.arange(n_x * n_z, dtype=np.int64), n_x)
+    cell = np.stack([column, row], axis=1).astype(np.int32)
+    step = 2 * np.pi / fields.n_sectors
+    tilt = np.deg2rad(fields.tilt_deg)
+
+    eyes, directions = [], []
+    for sector in range(fields.n_sectors):
+        u = uniforms(int(keys.digest(*names, sector)[:16], 16), cell, 4)
+        x = grid.x_min + (column + u[:, 0]) * fields.cell_m
+        z = grid.z_min + (row + u[:, 1]) * fields.cell_m
+        height = fields.height_min_m + u[:, 3] * (fields.height_max_m - fields.height_min_m)
+        azimuth = (sector + u[:, 2]) * step
+        eyes.append(np.stack([x, grid.base_y + height, z], axis=1))
+        directions.append(
+            np.stack(
+                [
+                    np.cos(azimuth) * np.cos(tilt),
+                    np.full(len(cell), -np.sin(tilt)),
+                    np.sin(azimuth) * np.cos(tilt),
+                ],
+                axis=1,
+            )
+        )
+    return Candidates(
+        eye=np.concatenate(eyes),
+        towards=np.concatenate(directions),
+        sector=np.repeat(np.arange(fields.n_sectors, dtype=np.int32), len(cell)),
+        cell=np.tile(cell, (fields.n_sectors, 1)),
+    )
+
+
+def n_cells(grid: Grid, cell_m: float) -> tuple[int, int]:
+    """Cells along x and z that cover the grid, at least one each."""
+    return (
+        max(1, int(np.ceil((grid.x_max - grid.x_min) / cell_m - 1e-9))),
+        max(1, int(np.ceil((grid.z_max - grid.z_min) / cell_m - 1e-9))),
+    )
+
+
+def uniforms(key: int, cell: NDArray[np.int32], n: int) -> NDArray[np.float64]:
+    """(len(cell), n) float64 in [0, 1), hashed from key and cell.
+
+    SplitMix64's finalizer (Steele et al. 2014) over key, column, row and the number's index.
+    """
+    state = np.full(len(cell), key % 2**64, np.uint64)
+    for part in (cell[:, 0], cell[:, 1]):
+        state = _mixed(state ^ part.astype(np.int64).astype(np.uint64))
+    numbers = [_mixed(state ^ np.uint64(k)) for k in range(n)]
+    return np.stack([(x >> np.uint64(11)).astype(np.float64) * 2.0**-53 for x in numbers], axis=1)
+
+
+def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    x = x + np.uint64(0x9E3779B97F4A7C15)
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))

@@ -1,0 +1,121 @@
+"""The best view of a sector: coarse pictures first, finalists again at full size; no effects.
+
+A candidate is rescored while its coarse score, with the margin a coarse picture can be wrong by,
+could still beat the best full one; so the answer is that of scoring all at full size wherever the
+margin holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.sample.scores import Scored
+
+COARSE_MARGIN: Final = 0.005
+"""Share of the picture by which a coarse score may fall short of the full one."""
+
+COARSE_SLACK: Final = 0.8
+"""An object of this part of the least share in a coarse picture may be large enough in a full one."""
+
+_BATCH: Final = 4
+
+Rescore = Callable[[NDArray[np.intp]], tuple[Scored, NDArray[np.uint32]]]
+"""Full-size scores and item counts of the candidates of those numbers."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coarse:
+    """Coarse scores of a sector's N candidates.
+
+    strict, lenient: objects large enough by the rule, and by the rule with COARSE_SLACK.
+    """
+
+    strict: NDArray[np.int64]
+    lenient: NDArray[np.int64]
+    score: NDArray[np.float64]
+
+
+@dataclass(slots=True, eq=False)
+class FullScores:
+    """Full-size results so far: candidate -> objects large enough, score, item counts."""
+
+    min_objects: int
+    rescore: Rescore
+    n_objects: dict[int, int] = field(default_factory=dict)
+    score: dict[int, float] = field(default_factory=dict)
+    counts: dict[int, NDArray[np.uint32]] = field(default_factory=dict)
+
+    def ask(self, candidates: NDArray[np.intp]) -> None:
+        """Score these candidates at full size, unless that was done."""
+        new = np.array([c for c in candidates.tolist() if c not in self.score], np.intp)
+        if not len(new):
+            return
+        scored, rows = self.rescore(new)
+        for k, candidate in enumerate(new.tolist()):
+            self.n_objects[candidate] = int(scored.n_objects[k])
+            self.score[candidate] = float(scored.score[k])
+            self.counts[candidate] = rows[k]
+
+    def keeps(self, candidate: int) -> bool:
+        """It was scored at full size, keeps the rule of the objects and scores above nothing."""
+        enough = self.n_objects.get(candidate, -1) >= self.min_objects
+        return enough and self.score[candidate] > 0
+
+    @property
+    def ranking(self) -> list[int]:
+        """Candidates that keep the rule, best first; equal scores in order of number."""
+        kept = [c for c in self.score if self.keeps(c)]
+        return sorted(kept, key=lambda c: (-self.score[c], c))
+
+
+def best_first(coarse: Coarse, full: FullScores, *, exact: bool) -> int | None:
+    """Number of the candidate with the best full-size score; None if none keeps the rules.
+
+    exact: every candidate is scored at full size.
+    """
+    order = np.argsort(-coarse.score, kind="stable")
+    if exact:
+        full.ask(order)
+    else:
+        order = order[coarse.lenient[order] >= full.min_objects]
+        for start in range(0, len(order), _BATCH):
+            batch = order[start : start + _BATCH]
+            ranking = full.ranking
+            if ranking:
+                reach = coarse.score[batch] + COARSE_MARGIN
+                batch = batch[reach >= full.score[ranking[0]]]
+                if not len(batch):
+                    break
+            full.ask(batch)
+    ranking = full.ranking
+    return ranking[0] if ranking else None
+
+
+def next_diverse(
+    coarse: Coarse,
+    share: NDArray[np.float32],
+    chosen: list[int],
+    full: FullScores,
+    min_fraction: float,
+) -> int | None:
+    """The candidate that shows most that the chosen ones do not; None when none is left.
+
+    share: (N, n_objects) part of the coarse picture each object covers. Greedy: first by objects
+    newly seen, then by how much more of every object is seen than in the best chosen view.
+    """
+    seen = share[chosen].max(0)
+    new_objects = ((share >= min_fraction) & (seen < min_fraction)).sum(1)
+    gain = np.maximum(share - seen, 0).sum(1)
+    order = np.lexsort((-gain, -new_objects))
+    for candidate in order.tolist():
+        if candidate in chosen or coarse.lenient[candidate] < full.min_objects:
+            continue
+        full.ask(np.array([candidate]))
+        if full.keeps(candidate):
+            return int(candidate)
+    return None

@@ -1,0 +1,84 @@
+"""Camera sampling of a house by the paper's rule (section 3.1); no effects of its own.
+
+The pictures the rule needs come from a counter, an argument: pixels of each item in each camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pbrs_farm.camera import View
+from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm.recipe import CameraFields
+from pbrs_farm.sample.probes import Counter
+from pbrs_farm.sample.report import CameraReport, RoomReport, total_refused
+from pbrs_farm.sample.room import RoomSampler, RoomTrace
+from pbrs_farm.sample.stored import stored_views
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampling:
+    """The views of a house, the report for cameras.json, and all candidates room by room."""
+
+    views: tuple[View, ...]
+    report: CameraReport
+    traces: tuple[RoomTrace, ...]
+
+
+def cameras(
+    house: House, fields: CameraFields, seed: int, counter: Counter
+) -> tuple[tuple[View, ...], CameraReport]:
+    """The views of a house and why every other candidate was refused; see sample_cameras."""
+    sampling = sample_cameras(house, fields, seed, counter)
+    return sampling.views, sampling.report
+
+
+def sample_cameras(house: House, fields: CameraFields, seed: int, counter: Counter) -> Sampling:
+    """The best view of each sector of each room that something lights (paper section 3.1).
+
+    counter: pixels of each item of this house in each camera, panes included. The same house,
+    fields and seed give the same views, whatever the counter's speed and the rooms' order.
+    Views have the scoring size (640x480) and are in order of rooms and sectors; with the preset
+    released in order of falling score, as published. fields.source "stored": see stored_views.
+    """
+    if fields.source == "stored":
+        return _stored(house, fields, counter)
+    geometry = geometry_from_house(house)
+    views: list[View] = []
+    rooms: list[RoomReport] = []
+    traces: list[RoomTrace] = []
+    for room in house.rooms:
+        job = RoomSampler(house, room, fields, seed, counter, geometry)
+        reason = job.why_not()
+        if reason:
+            rooms.append(RoomReport(room_id=room.id, name=room.name, reason=reason))
+            continue
+        found, report, trace = job.run()
+        views += found
+        rooms.append(report)
+        traces.append(trace)
+    if fields.preset == "released":
+        views.sort(key=lambda view: -view.score)
+    return Sampling(tuple(views), _report(fields, views, tuple(rooms)), tuple(traces))
+
+
+def _stored(house: House, fields: CameraFields, counter: Counter) -> Sampling:
+    views, notes = stored_views(house, fields, counter)
+    return Sampling(views, _report(fields, list(views), (), notes), ())
+
+
+def _report(
+    fields: CameraFields,
+    views: list[View],
+    rooms: tuple[RoomReport, ...],
+    notes: tuple[str, ...] = (),
+) -> CameraReport:
+    return CameraReport(
+        preset=fields.preset,
+        source=fields.source,
+        n_views=len(views),
+        n_candidates=sum(s.n_candidates for room in rooms for s in room.sectors),
+        refused=total_refused(rooms),
+        rooms=rooms,
+        notes=notes,
+    )

@@ -1,0 +1,25 @@
+"""What became of a candidate viewpoint; no effects."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Verdict(IntEnum):
+    """The first rule that refused a candidate, in the order the rules are tried, or its success."""
+
+    OUTSIDE_ROOM = 0  # not inside the room's polygon
+    NEAR_OBSTACLE = 1  # closer to a triangle than the clearance
+    NOT_ABOVE_FLOOR = 2  # a wall or a ceiling is below: inside a wall, or above a sloped ceiling
+    ENCLOSED = 3  # inside a piece of furniture or a wall
+    FEW_OBJECTS = 4  # too few objects cover enough of the picture
+    LOWER_SCORE = 5  # kept every rule; another one of its sector scored higher
+    WINNER = 6
+
+    @property
+    def word(self) -> str:
+        """The name in reports: "near_obstacle"."""
+        return self.name.lower()
+
+
+REFUSALS = tuple(v for v in Verdict if v < Verdict.LOWER_SCORE)
