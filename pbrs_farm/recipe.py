@@ -82,6 +82,8 @@ class LightFields(_Group):
     mutations_per_pixel: int = Field(1024, ge=1)
     max_depth: int = Field(12, ge=1, description="path segments; Russian roulette from rr_depth")
     rr_depth: int = Field(4, ge=1)
+    filter: Literal["box", "tent"] = Field("tent", description="of a pixel's samples")
+    pilot_spp: int = Field(8, ge=0, description="64x48 pixels per emitter; 0 = uniform choice")
     denoise: bool = True
 
 
@@ -167,7 +169,13 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "sky": {"kind": "panorama"},
     },
     "released": {
-        "cameras": {"preset": "released", "n_sectors": 4},
+        "cameras": {
+            "preset": "released",
+            "n_sectors": 4,
+            "tilt_deg": 11.309932,  # direction (cos, -0.2, sin), suncg section 3.2 c
+            "clearance_m": 0.0,
+            "min_objects": 4,
+        },
         "light": {"integrator": "metropolis", "denoise": False},
         "sky": {"kind": "panorama"},
         "emission": {"preset": "released"},
