@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,63 +17,92 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: NDArray[np.i
     """The record of face (H, W), int32, -1 = nothing, seen by the camera's unjittered rays.
 
     The hit is where the ray meets the face's plane, computed in float64 and held to the triangle
-    (at grazing angles the plane's hit may lie beside it). Geometric normals are the faces' own.
+    (at grazing angles the plane's hit may lie beside it). Geometric normals are the faces' own,
+    turned towards the camera; shading normals lie on the geometric normal's side. Faces must
+    have an area.
     """
-    seen = np.flatnonzero(face.ravel() >= 0)
-    f = face.ravel()[seen]
     origin, directions = camera.rays()
-    o, d = origin.astype(np.float64), directions.reshape(-1, 3)[seen].astype(np.float64)
+    pixels = np.flatnonzero(face.ravel() >= 0)
+    d = directions.reshape(-1, 3)[pixels].astype(np.float64)
+    f, local = _numbered(face.ravel()[pixels], len(geometry.faces))
+    planes = _planes(geometry, f, origin.astype(np.float64))
 
-    corner = geometry.faces[f]
-    a, b, c = (geometry.positions[corner[:, k]].astype(np.float64) for k in range(3))
-    normal = np.cross(b - a, c - a)
-    weights = _weights(a, b, c, normal, _plane_point(o, d, a, normal))
-    point = np.einsum("nk,knj->nj", weights, np.stack([a, b, c]))
-    towards_back = camera.world_from_camera[:3, 2]
-    depth_z = (o - point) @ towards_back
-
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    away = np.einsum("nj,nj->n", normal, d) > 0
-    normal[away] *= -1
-    shading = _shading_normal(geometry, corner, weights, normal)
-    uv = np.einsum("nk,nkj->nj", weights, geometry.uvs[corner].astype(np.float64))
+    t, weights = _meet(planes, local, d, -camera.world_from_camera[:3, 2])
+    normal = planes.normal[local]
+    normal[_dot(normal, d) > 0] *= -1
+    corner = geometry.faces[f][local]
 
     shape = face.shape
     return HitRecord(
         face=np.ascontiguousarray(face, np.int32),
-        item=_scattered(geometry.face_item[f], seen, shape, np.uint32),
-        depth_z=_scattered(depth_z, seen, shape, np.float32),
-        position_world=_scattered(o + depth_z[:, None] * d, seen, shape, np.float32),
-        geo_normal_world=_scattered(normal, seen, shape, np.float32),
-        shading_normal_world=_scattered(shading, seen, shape, np.float32),
-        uv=_scattered(uv, seen, shape, np.float32),
+        item=_image(geometry.face_item[f][local], pixels, shape, np.uint32),
+        depth_z=_image(t, pixels, shape, np.float32),
+        position_world=_image(planes.origin + t[:, None] * d, pixels, shape, np.float32),
+        geo_normal_world=_image(normal, pixels, shape, np.float32),
+        shading_normal_world=_image(
+            _shading_normal(geometry, corner, weights, normal), pixels, shape, np.float32
+        ),
+        uv=_image(_mixed(weights, geometry.uvs, corner), pixels, shape, np.float32),
     )
 
 
-def _plane_point(
-    o: NDArray[np.float64], d: NDArray[np.float64], a: NDArray[np.float64], n: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(N, 3) where o + t d meets the plane through a with normal n; a itself where they are parallel."""
-    along = np.einsum("nj,nj->n", d, n)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Planes:
+    """What a ray from origin needs of K faces, float64.
+
+    a, b, c: (K, 3) corners. normal: (K, 3) unit. grad_b, grad_c: (K, 3) gradients of the
+    barycentric coordinates of b and c.
+    """
+
+    origin: NDArray[np.float64]
+    a: NDArray[np.float64]
+    b: NDArray[np.float64]
+    c: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    grad_b: NDArray[np.float64]
+    grad_c: NDArray[np.float64]
+
+
+def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: NDArray[np.float64]) -> _Planes:
+    corner = geometry.faces[faces]
+    a, b, c = (geometry.positions[corner[:, k]].astype(np.float64) for k in range(3))
+    n = np.cross(b - a, c - a)
+    squared = _dot(n, n)[:, None]
+    return _Planes(
+        origin=origin,
+        a=a,
+        b=b,
+        c=c,
+        normal=n / np.sqrt(squared),
+        grad_b=np.cross(c - a, n) / squared,
+        grad_c=np.cross(n, b - a) / squared,
+    )
+
+
+def _meet(
+    planes: _Planes,
+    local: NDArray[np.intp],
+    d: NDArray[np.float64],
+    axis: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(N,) t along d (N, 3) to plane local[n], and (N, 3) weights of a, b, c, all >= 0."""
+    from_a = planes.origin - planes.a
+    along = _dot(planes.normal[local], d)
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.einsum("nj,nj->n", a - o, n) / along
-    t = np.where(np.isfinite(t), t, np.einsum("nj,nj->n", a - o, d))
-    return np.asarray(o + t[:, None] * d)
+        t = -_dot(from_a, planes.normal)[local] / along
+        w_b = _dot(from_a, planes.grad_b)[local] + t * _dot(planes.grad_b[local], d)
+        w_c = _dot(from_a, planes.grad_c)[local] + t * _dot(planes.grad_c[local], d)
+    weights = np.stack([1 - w_b - w_c, w_b, w_c], axis=1)
 
-
-def _weights(
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
-    n: NDArray[np.float64],
-    p: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """(N, 3) barycentric coordinates of p, held to the triangle a, b, c with normal n (any length)."""
-    area = np.einsum("nj,nj->n", n, n)
-    w_b = np.einsum("nj,nj->n", np.cross(p - a, c - a), n) / area
-    w_c = np.einsum("nj,nj->n", np.cross(b - a, p - a), n) / area
-    w = np.maximum(np.stack([1 - w_b - w_c, w_b, w_c], axis=1), 0)
-    return np.asarray(w / w.sum(1, keepdims=True))
+    # Hold to the triangle what the plane puts beside it; a ray in the plane takes its middle.
+    beside = np.flatnonzero(~((weights >= 0).all(1) & np.isfinite(t)))
+    held = np.nan_to_num(weights[beside], nan=1.0, posinf=1.0, neginf=0.0).clip(0.0, 1.0)
+    held /= held.sum(1, keepdims=True)
+    weights[beside] = held
+    k = local[beside]
+    point = held[:, :1] * planes.a[k] + held[:, 1:2] * planes.b[k] + held[:, 2:] * planes.c[k]
+    t[beside] = (point - planes.origin) @ axis
+    return t, weights
 
 
 def _shading_normal(
@@ -82,17 +112,38 @@ def _shading_normal(
     geo_normal: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """(N, 3) interpolated vertex normals on the geometric normal's side; that normal where flat."""
-    shading = np.einsum("nk,nkj->nj", weights, geometry.normals[corner].astype(np.float64))
-    length = np.linalg.norm(shading, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        shading /= length[:, None]
-    flat = ~(np.isfinite(shading).all(1) & (length > 1e-6))
-    shading[flat] = geo_normal[flat]
-    shading[np.einsum("nj,nj->n", shading, geo_normal) < 0] *= -1
-    return np.asarray(shading)
+    shading = _mixed(weights, geometry.normals, corner)
+    length = np.sqrt(_dot(shading, shading))
+    smooth = length > 1e-6
+    shading /= np.where(smooth, length, 1.0)[:, None]
+    shading[~smooth] = geo_normal[~smooth]
+    shading[_dot(shading, geo_normal) < 0] *= -1
+    return shading
 
 
-def _scattered(
+def _mixed(
+    weights: NDArray[np.float64], values: NDArray[np.float32], corner: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """(N, C) values (V, C) at the corners (N, 3), weighted."""
+    mixed = weights[:, :1] * values[corner[:, 0]]
+    for k in (1, 2):
+        mixed += weights[:, k : k + 1] * values[corner[:, k]]
+    return np.asarray(mixed)
+
+
+def _numbered(face: NDArray[np.int32], n_faces: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The distinct faces, ascending, and each pixel's place among them."""
+    seen = np.zeros(n_faces, np.bool_)
+    seen[face] = True
+    place = np.cumsum(seen) - 1
+    return np.flatnonzero(seen), place[face]
+
+
+def _dot(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.einsum("ij,ij->i", x, y))
+
+
+def _image(
     values: NDArray[Any], pixels: NDArray[np.intp], shape: tuple[int, ...], dtype: type[np.generic]
 ) -> NDArray[Any]:
     """Image of shape + values' own axes, values at the pixels and 0 elsewhere."""
