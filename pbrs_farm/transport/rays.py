@@ -13,12 +13,12 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.camera import Camera
+from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.transport.variant import mitsuba
 
 _RAYS_PER_LAUNCH: Final = 1 << 22
 _COUNTS_PER_LAUNCH: Final = 1 << 24
-_TILE: Final = 4
+_TILE: Final = 8
 
 
 class RayTracer(Protocol):
@@ -92,10 +92,11 @@ class JitTracer:
     ) -> NDArray[np.uint32]:
         """(n_cameras, n_labels) pixels of each label; label 0 also counts what hits nothing."""
         counts = np.zeros((len(cameras), n_labels), np.uint32)
-        for size, members in _by_size(cameras).items():
-            most = min(_RAYS_PER_LAUNCH // (size[0] * size[1]), _COUNTS_PER_LAUNCH // n_labels)
-            for start in range(0, len(members), max(most, 1)):
-                part = members[start : start + max(most, 1)]
+        for i, members in _by_intrinsics(cameras).items():
+            n_pixels = i.width_px * i.height_px
+            most = max(1, min(_RAYS_PER_LAUNCH // n_pixels, _COUNTS_PER_LAUNCH // n_labels))
+            for start in range(0, len(members), most):
+                part = members[start : start + most]
                 counts[part] = self._count([cameras[i] for i in part], face_label, n_labels)
         return counts
 
@@ -142,7 +143,7 @@ class JitTracer:
         inside = (x < dr.opaque(mi.UInt32, width)) & (y < dr.opaque(mi.UInt32, height))
 
         # Turn each pixel's centre into a ray whose direction has unit length along the axis.
-        table = mi.Float(np.concatenate([_ray_row(c) for c in cameras]))
+        table = mi.Float(_ray_table(cameras).ravel())
         row = [dr.gather(mi.Float, table, which * 12 + k) for k in range(12)]
         u, v = mi.Float(x) + 0.5, mi.Float(y) + 0.5
         ray = mi.Ray3f(
@@ -159,18 +160,24 @@ class JitTracer:
         return np.asarray(counts.numpy().reshape(len(cameras), n_labels))
 
 
-def _ray_row(camera: Camera) -> NDArray[np.float32]:
-    """(12,) d0, du, dv, eye: the direction at pixel coordinates (u, v) is d0 + u du + v dv."""
-    i, rotation = camera.intrinsics, camera.world_from_camera[:3, :3]
-    d0 = rotation @ np.array([-i.cx / i.fx, i.cy / i.fy, -1.0])
-    return np.concatenate([d0, rotation[:, 0] / i.fx, -rotation[:, 1] / i.fy, camera.eye]).astype(
-        np.float32
+def _ray_table(cameras: Sequence[Camera]) -> NDArray[np.float32]:
+    """(n, 12) d0, du, dv, eye: the direction at pixel coordinates (u, v) is d0 + u du + v dv.
+
+    Of cameras that share their intrinsics.
+    """
+    i = cameras[0].intrinsics
+    poses = np.stack([camera.world_from_camera for camera in cameras])
+    axes = np.array(
+        [[-i.cx / i.fx, i.cy / i.fy, -1.0], [1 / i.fx, 0, 0], [0, -1 / i.fy, 0]], np.float64
     )
+    table = np.empty((len(cameras), 4, 3), np.float32)
+    table[:, :3] = np.einsum("nij,kj->nki", poses[:, :3, :3], axes)
+    table[:, 3] = poses[:, :3, 3]
+    return table.reshape(-1, 12)
 
 
-def _by_size(cameras: Sequence[Camera]) -> dict[tuple[int, int], list[int]]:
-    sizes: dict[tuple[int, int], list[int]] = {}
+def _by_intrinsics(cameras: Sequence[Camera]) -> dict[Intrinsics, list[int]]:
+    groups: dict[Intrinsics, list[int]] = {}
     for index, camera in enumerate(cameras):
-        i = camera.intrinsics
-        sizes.setdefault((i.width_px, i.height_px), []).append(index)
-    return sizes
+        groups.setdefault(camera.intrinsics, []).append(index)
+    return groups
