@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from pbrs_farm import keys
 from pbrs_farm.errors import BadRecipe
@@ -120,6 +120,9 @@ class ToneFields(_Group):
 
     preset: Literal["photo", "released"] = "photo"
     key: float = Field(0.18, gt=0)
+    white_balance: float = Field(
+        0.7, ge=0, le=1, description="how far the light's colour is turned to white; 1 = all the way"
+    )
 
 
 class RasterFields(_Group):
@@ -129,11 +132,43 @@ class RasterFields(_Group):
     lights_per_object: int = Field(8, ge=1, description="best ones, paper section 3.2")
 
 
-class SelectionFields(_Group):
-    """Image selection (paper section 3.3)."""
+class HistogramFields(_Group):
+    """The histograms of a view and its quality numbers, written beside it (paper section 3.3).
 
-    min_colour: float = Field(0.70, ge=0, le=1)
-    min_depth: float = Field(0.70, ge=0, le=1)
+    Bins are powers of two, so that every coarser binning is an exact sum of these.
+    """
+
+    colour_space: Literal["rgb", "ycbcr"] = Field("rgb", description="sRGB-encoded; joint bins")
+    colour_bins: Literal[2, 4, 8, 16] = Field(8, description="per channel, three channels jointly")
+    depth_bins: Literal[8, 16, 32, 64, 128, 256] = 128
+    depth_min_m: float = Field(0.0, ge=0, description="nearer counts as the first bin")
+    depth_max_m: float = Field(10.0, gt=0, description="farther counts as the last bin")
+    near_m: float = Field(0.25, gt=0, description="what is nearer counts as touching the camera")
+    object_fraction: float = Field(0.01, ge=0, le=1, description="of the picture, to be an object")
+
+    @model_validator(mode="after")
+    def _depth_grows(self) -> Self:
+        if self.depth_max_m <= self.depth_min_m:
+            raise ValueError("depth_max_m must be above depth_min_m")
+        return self
+
+
+class SelectionFields(_Group):
+    """Image selection (paper section 3.3) and the thresholds of image quality."""
+
+    min_colour: float = Field(0.70, ge=0, le=1, description="kept when above, paper section 3.3")
+    min_depth: float = Field(0.70, ge=0, le=1, description="kept when above, paper section 3.3")
+    score_mode: Literal["mlt_il_ol", "mlt_ol", "opengl_il", "opengl_dl"] = Field(
+        "mlt_il_ol", description="scored where a view lacks mlt_il_ol"
+    )
+    per_room_cap: int = Field(0, ge=0, description="best views kept per room; 0 = all")
+    min_brightness: float = Field(0.06, ge=0, le=1, description="median sRGB luma; too dark below")
+    max_blown: float = Field(0.50, ge=0, le=1, description="share of saturated pixels")
+    max_surface: float = Field(0.85, ge=0, le=1, description="share of the largest instance")
+    max_near: float = Field(0.30, ge=0, le=1, description="share nearer than near_m: inside it")
+    min_objects: int = Field(3, ge=0, description="objects of object_fraction and more")
+    max_noise: float = Field(1.0, ge=0, description="relative error of the raw light")
+    max_missing_textures: int = Field(3, ge=0, description="of the house")
 
 
 class Recipe(_Group):
@@ -151,6 +186,7 @@ class Recipe(_Group):
     materials: MaterialFields = MaterialFields()
     tone: ToneFields = ToneFields()
     raster: RasterFields = RasterFields()
+    histogram: HistogramFields = HistogramFields()
     selection: SelectionFields = SelectionFields()
 
     def digest(self, *groups: str) -> str:
@@ -180,7 +216,7 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "sky": {"kind": "panorama"},
         "emission": {"preset": "released"},
         "materials": {"preset": "released"},
-        "tone": {"preset": "released", "key": 0.8},
+        "tone": {"preset": "released", "key": 0.8, "white_balance": 0.0},
     },
 }
 

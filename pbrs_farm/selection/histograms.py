@@ -1,0 +1,102 @@
+"""Pictures -> normalised colour and depth histograms, and coarser ones of those; no effects.
+
+Bin edges are nested powers of two: a histogram at any coarser binning is an exact sum of bins, so
+one stored histogram serves every binning a reference may choose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.arrays import Srgb8Image
+from pbrs_farm.recipe import HistogramFields
+
+Counts = NDArray[np.uint32]
+"""(bins,) uint32: pixels in each bin."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Histogram:
+    """Pixel counts of one picture. colour: (colour_bins ** 3,), first channel slowest.
+
+    depth: (depth_bins,), pixels of unknown depth left out, so its sum may be smaller.
+    """
+
+    colour: Counts
+    depth: Counts
+
+
+def histogram(
+    rgb_srgb8: Srgb8Image, depth_mm: NDArray[np.integer], settings: HistogramFields
+) -> Histogram:
+    """Histogram of a picture (H, W, 3) uint8 and its depth (H, W) in mm, 0 = unknown.
+
+    Paper section 3.3. The two need not be of one size. Raises ValueError for other shapes.
+    """
+    return Histogram(colour_counts(rgb_srgb8, settings), depth_counts(depth_mm, settings))
+
+
+def colour_counts(rgb_srgb8: Srgb8Image, settings: HistogramFields) -> Counts:
+    """(colour_bins ** 3,) uint32 counts of the pixels of (H, W, 3) uint8 in settings.colour_space."""
+    if rgb_srgb8.ndim != 3 or rgb_srgb8.shape[2] != 3 or rgb_srgb8.dtype != np.uint8:
+        raise ValueError(f"a picture is (H, W, 3) uint8, got {rgb_srgb8.shape} {rgb_srgb8.dtype}")
+    pixels = _ycbcr(rgb_srgb8) if settings.colour_space == "ycbcr" else rgb_srgb8
+    bits = settings.colour_bins.bit_length() - 1
+    index = (pixels[..., 0] >> (8 - bits)).astype(np.uint16)
+    for channel in (1, 2):
+        index <<= np.uint16(bits)
+        index |= pixels[..., channel] >> (8 - bits)
+    return np.bincount(index.reshape(-1), minlength=settings.colour_bins**3).astype(np.uint32)
+
+
+def depth_counts(depth_mm: NDArray[np.integer], settings: HistogramFields) -> Counts:
+    """(depth_bins,) uint32 counts of known depths; beyond either end counts in the end's bin."""
+    if depth_mm.ndim != 2 or not np.issubdtype(depth_mm.dtype, np.integer):
+        raise ValueError(f"depth is (H, W) whole millimetres, got {depth_mm.dtype}")
+    # Count each millimetre first: a table of 65536 bins is quicker than a division per pixel.
+    per_mm = np.bincount(np.clip(depth_mm, 0, 65535).reshape(-1).astype(np.intp), minlength=65536)
+    per_mm[0] = 0
+    low, high = settings.depth_min_m * 1000.0, settings.depth_max_m * 1000.0
+    place = np.floor((np.arange(65536) - low) * (settings.depth_bins / (high - low)))
+    bins = np.clip(place, 0, settings.depth_bins - 1).astype(np.intp)
+    return np.bincount(bins, weights=per_mm, minlength=settings.depth_bins).astype(np.uint32)
+
+
+def _ycbcr(rgb: Srgb8Image) -> Srgb8Image:
+    """(H, W, 3) uint8 luma and chroma of full range (BT.601), in 16-bit fixed point, rounded."""
+    r, g, b = (rgb[..., k].astype(np.int32) for k in range(3))
+    half = 1 << 15
+    y = (19595 * r + 38470 * g + 7471 * b + half) >> 16
+    cb = (-11059 * r - 21709 * g + 32768 * b + half) // 65536 + 128
+    cr = (32768 * r - 27439 * g - 5329 * b + half) // 65536 + 128
+    return np.clip(np.stack([y, cb, cr], axis=-1), 0, 255).astype(np.uint8)
+
+
+def coarser_colour(counts: NDArray[np.generic], shape: tuple[int, int, int]) -> NDArray[np.generic]:
+    """(..., a * b * c) sums of a cube of colour bins (..., n ** 3) at shape = (a, b, c) bins.
+
+    Raises ValueError if a, b or c does not divide n.
+    """
+    n = round(counts.shape[-1] ** (1 / 3))
+    if n**3 != counts.shape[-1] or any(n % k for k in shape):
+        raise ValueError(f"{counts.shape[-1]} colour bins cannot be summed to {shape}")
+    a, b, c = shape
+    cube = counts.reshape(*counts.shape[:-1], a, n // a, b, n // b, c, n // c)
+    return np.asarray(cube.sum(axis=(-5, -3, -1))).reshape(*counts.shape[:-1], a * b * c)
+
+
+def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generic]:
+    """(..., n_bins) sums of neighbouring depth bins; ValueError if n_bins does not divide them."""
+    if counts.shape[-1] % n_bins:
+        raise ValueError(f"{counts.shape[-1]} depth bins cannot be summed to {n_bins}")
+    pairs = counts.reshape(*counts.shape[:-1], n_bins, counts.shape[-1] // n_bins)
+    return np.asarray(pairs.sum(axis=-1))
+
+
+def normalised(counts: NDArray[np.generic]) -> NDArray[np.float32]:
+    """(..., bins) float32 shares that sum to 1; all zero where nothing was counted."""
+    total = counts.sum(axis=-1, keepdims=True, dtype=np.float64)
+    return np.asarray(counts / np.where(total > 0, total, 1.0), np.float32)

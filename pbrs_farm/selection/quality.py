@@ -1,0 +1,76 @@
+"""Numbers that tell a picture nobody can use, whatever it resembles; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from pbrs_farm.arrays import Srgb8Image
+from pbrs_farm.house import ItemKind
+from pbrs_farm.recipe import HistogramFields
+
+_SATURATED: Final = 254
+
+
+class PictureQuality(BaseModel):
+    """Of one lighting mode. brightness: median sRGB luma, 0..1. blown: share with a channel >= 254."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    brightness: float
+    blown: float
+
+
+class SceneQuality(BaseModel):
+    """Of a view, whatever its light. All shares are of the picture.
+
+    surface: share of the largest instance. near: share nearer than near_m (a camera inside an
+    object sees little else). n_objects: objects (no walls, floors, ceilings) of object_fraction.
+    noise: relative error of the raw light, None where none was traced. missing_textures: of the
+    house.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    surface: float
+    near: float
+    n_objects: int
+    noise: float | None = None
+    missing_textures: int = 0
+
+
+def picture_quality(rgb_srgb8: Srgb8Image) -> PictureQuality:
+    """Brightness and saturation of (H, W, 3) uint8."""
+    # Every second pixel is plenty for a median, and quick.
+    r, g, b = (rgb_srgb8[::2, ::2, k].astype(np.uint32) for k in range(3))
+    luma = np.bincount(((54 * r + 183 * g + 19 * b) >> 8).reshape(-1), minlength=256)
+    median = int(np.searchsorted(np.cumsum(luma), (luma.sum() + 1) // 2))
+    brightest = np.maximum(np.maximum(rgb_srgb8[..., 0], rgb_srgb8[..., 1]), rgb_srgb8[..., 2])
+    blown = np.count_nonzero(brightest >= _SATURATED) / brightest.size
+    return PictureQuality(brightness=round(median / 255, 5), blown=round(blown, 5))
+
+
+def scene_quality(
+    depth_mm: NDArray[np.integer],
+    instances: Iterable[Mapping[str, Any]],
+    settings: HistogramFields,
+    *,
+    noise: float | None = None,
+    missing_textures: int = 0,
+) -> SceneQuality:
+    """Numbers of a view from its depth (H, W) in mm and the rows "instances" of its view.json.
+
+    Of a row only "kind" (house.ItemKind) and "fraction" are read.
+    """
+    rows = [(str(row["kind"]), float(row["fraction"])) for row in instances]
+    objects = [share for kind, share in rows if not ItemKind(kind).is_structure]
+    near = (depth_mm > 0) & (depth_mm < settings.near_m * 1000.0)
+    return SceneQuality(
+        surface=round(max((share for _kind, share in rows), default=0.0), 5),
+        near=round(float(near.mean()), 5),
+        n_objects=sum(share >= settings.object_fraction for share in objects),
+        noise=None if noise is None else round(noise, 5),
+        missing_textures=missing_textures,
+    )
