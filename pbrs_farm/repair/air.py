@@ -1,0 +1,94 @@
+"""The air of rooms as solids, so that no slab or joint sticks into another room; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from manifold3d import Manifold
+
+from pbrs_farm.house import Room
+from pbrs_farm.repair import plan
+from pbrs_farm.repair.prisms import Plane, level_plane, polygons_of, prism
+from pbrs_farm.repair.sheets import Sheet
+from pbrs_farm.repair.solids import (
+    F64,
+    Tag,
+    TagTable,
+    bounds,
+    overlap_of_bounds,
+    reduced,
+    solid_from_patches,
+)
+
+_MARGIN_M = 0.005
+_TOUCH_M = 0.002
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Air:
+    """A part of a room's air: plan area between two planes. items: the room's own sheets."""
+
+    area: shapely.Polygon
+    low: Plane
+    high: Plane
+    items: frozenset[int]
+    bounds: F64
+
+
+def airs_of_rooms(
+    rooms: Sequence[Room], sheets: Sequence[Sheet], grounds: Sequence[plan.Shape]
+) -> list[Air]:
+    """The air of every room, below each plane of its ceiling, a little of its floor and ceiling
+    included, so that what is cut by it ends inside them.
+    """
+    margin = _margin(rooms)
+    found = []
+    for room in rooms:
+        own = frozenset(s.item for s in sheets if s.room_id == room.id)
+        area = plan.polygon_of_room(room.polygon)
+        ceilings = [s for s in sheets if s.is_ceiling and s.room_id == room.id]
+        floor = level_plane(room.floor_y - margin)
+        parts = [(s.area, s.plane.raised(margin)) for s in ceilings]
+        bare = plan.without(area, *(s.area for s in ceilings))
+        parts.append((bare, level_plane(room.ceiling_y + margin)))
+        for shape, high in parts:
+            found += [_air(p, floor, high, own) for p in polygons_of(shape, min_area_m2=1e-3)]
+    return found
+
+
+def _margin(rooms: Sequence[Room]) -> float:
+    # Thin floors (a roof 1 mm above a ceiling) leave no room for a margin of 5 mm.
+    gaps = [
+        upper.floor_y - lower.ceiling_y
+        for lower in rooms
+        for upper in rooms
+        if upper.floor_y > lower.ceiling_y
+    ]
+    return min([_MARGIN_M, *(gap / 3 for gap in gaps)])
+
+
+def _air(area: shapely.Polygon, low: Plane, high: Plane, items: frozenset[int]) -> Air:
+    corners = shapely.get_coordinates(area)
+    x0, z0, x1, z1 = area.bounds
+    box = np.array([[x0, low.at(corners).min(), z0], [x1, high.at(corners).max(), z1]])
+    return Air(area, low, high, items, box)
+
+
+def without_air(
+    solid: Manifold, tag: Tag, item: int | None, airs: Sequence[Air], table: TagTable
+) -> Manifold:
+    """solid less the air of rooms, but not of the room item (a floor or ceiling) belongs to.
+
+    New faces get tag.
+    """
+    cutters = []
+    for air in airs:
+        if item in air.items or (overlap_of_bounds(bounds(solid), air.bounds) < _TOUCH_M).any():
+            continue
+        cutter = solid_from_patches(prism(air.area, air.low, air.high, (tag,) * 3), table)
+        if cutter is not None:
+            cutters.append(cutter)
+    return reduced(solid, cutters)

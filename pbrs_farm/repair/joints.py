@@ -1,0 +1,99 @@
+"""Where walls meet walls, floors and ceilings: solids inside both, so that joints intersect.
+
+No effects. Joints keep _RECESS_M behind the walls' own faces: where the walls do touch nothing
+of a joint shows, where they do not it fills the gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import shapely
+from manifold3d import Manifold
+
+from pbrs_farm.repair import plan
+from pbrs_farm.repair.prisms import level_plane, polygons_of, prism
+from pbrs_farm.repair.sheets import Sheet
+from pbrs_farm.repair.slabs import GAP_M
+from pbrs_farm.repair.solids import TagTable, solid_from_patches
+from pbrs_farm.repair.walls import Wall
+
+_RECESS_M = 0.001
+_OVERLAP_M = 0.01
+
+
+def joints_between_walls(
+    walls: Sequence[Wall], table: TagTable
+) -> tuple[list[tuple[Wall, Manifold]], int]:
+    """A solid across each place where two walls come within GAP_M, with the wall it belongs to.
+
+    Second: how many of them bridge a gap (the others lie inside walls that touch).
+    """
+    found: list[tuple[Wall, Manifold]] = []
+    n_gaps = 0
+    tree = shapely.STRtree([w.footprint for w in walls])
+    for i, a in enumerate(walls):
+        for j in sorted(tree.query(a.footprint, "dwithin", GAP_M).tolist()):
+            if j <= i:
+                continue
+            solids = _joint(a, walls[j], table)
+            found += [(a, s) for s in solids]
+            n_gaps += bool(solids) and a.footprint.distance(walls[j].footprint) > 1e-4
+    return found, n_gaps
+
+
+def _joint(a: Wall, b: Wall, table: TagTable) -> list[Manifold]:
+    both = plan.union([a.footprint, b.footprint])
+    near = plan.common(plan.grown(a.footprint, GAP_M), plan.grown(b.footprint, GAP_M))
+    inner = plan.grown(plan.closed(both, GAP_M), -_RECESS_M)
+    solids = []
+    for polygon in polygons_of(plan.common(near, inner)):
+        corners = shapely.get_coordinates(polygon)
+        low = max(a.bottom_y, b.bottom_y) + _RECESS_M
+        high = min(float(a.top.at(corners).min()), float(b.top.at(corners).min())) - _RECESS_M
+        if high - low < _OVERLAP_M:
+            continue
+        tags = (a.tag("joint"),) * 3
+        solid = solid_from_patches(prism(polygon, level_plane(low), level_plane(high), tags), table)
+        if solid is not None:
+            solids.append(solid)
+    return solids
+
+
+def joints_with_sheet(
+    sheet: Sheet,
+    ground: plan.Shape,
+    walls: Sequence[Wall],
+    doors: plan.Shape,
+    thickness_m: float,
+    table: TagTable,
+) -> list[tuple[Wall, Manifold]]:
+    """Wall parts that reach half a slab into the floor below or the ceiling above, hidden in it.
+
+    Made where a wall ends within GAP_M of the sheet's plane, so that a gap there is filled too.
+    doors: plan area of openings down to the floor, where a wall has no foot.
+    """
+    depth_m = 0.5 * thickness_m
+    away = 1.0 if sheet.is_ceiling else -1.0
+    found = []
+    for wall in walls:
+        if wall.footprint.distance(ground) > 0:
+            continue
+        area = plan.common(plan.grown(wall.footprint, -_RECESS_M), ground)
+        if not sheet.is_ceiling:
+            area = plan.without(area, doors)
+        for polygon in polygons_of(area):
+            corners = shapely.get_coordinates(polygon)
+            end = wall.top if sheet.is_ceiling else level_plane(wall.bottom_y)
+            gap = away * (sheet.plane.at(corners) - end.at(corners))
+            if gap.max() > GAP_M or gap.max() < -depth_m:
+                continue
+            near, far = end.raised(-away * _OVERLAP_M), sheet.plane.raised(away * depth_m)
+            low, high = (near, far) if sheet.is_ceiling else (far, near)
+            if (high.at(corners) - low.at(corners)).min() < _RECESS_M:
+                continue
+            patches = prism(polygon, low, high, (wall.tag("joint"),) * 3)
+            solid = solid_from_patches(patches, table)
+            if solid is not None:
+                found.append((wall, solid))
+    return found

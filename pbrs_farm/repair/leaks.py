@@ -1,0 +1,189 @@
+"""The leak meter: rays in closed spaces, openings plugged; none may reach the sky. No effects.
+
+The sky's radiance is 1 and everything else is black, so a ray that hits nothing is light that
+leaks in. Rays follow diffuse bounces, so that a crack which is not straight counts too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from pbrs_farm.house import House, Item, ItemKind, Surface, geometry_from_house
+from pbrs_farm.repair import plan
+from pbrs_farm.repair.enclosure import Space
+from pbrs_farm.repair.occluder import Occluder
+from pbrs_farm.repair.patches import face_normals
+from pbrs_farm.repair.prisms import Plane, polygons_of
+from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
+from pbrs_farm.repair.solids import F64
+
+WITHIN_M = 0.005
+_MAX_LEAKS = 50
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomAir:
+    """A part of a room between its floor and one plane of its ceiling; area: plan, walls left out."""
+
+    area: plan.Shape
+    low: Plane
+    high: Plane
+
+    @property
+    def height(self) -> float:
+        """Largest height over the area's corners, metres."""
+        corners = shapely.get_coordinates(self.area)
+        return float((self.high.at(corners) - self.low.at(corners)).max())
+
+    def lids(self, inset_m: float) -> tuple[tuple[Plane, float], tuple[Plane, float]]:
+        """Floor and ceiling, each with the step that leads inset_m into the air."""
+        return (self.low, inset_m), (self.high, -inset_m)
+
+
+@dataclass(frozen=True, slots=True)
+class LeakMeter:
+    """How closely the meter looks.
+
+    step_m: distance of starts along every edge where walls, floor and ceiling meet; per_start:
+    rays from each; n_inside: random points per space; n_bounces: after the first flight.
+    """
+
+    step_m: float = 0.03
+    per_start: int = 24
+    n_inside: int = 1000
+    per_inside: int = 48
+    n_bounces: int = 2
+
+
+def leaks_of_house(
+    house: House,
+    spaces: Sequence[Space],
+    airs: Mapping[str, Sequence[RoomAir]],
+    plugs: Sequence[Surface],
+    occluder_from: Callable[[House], Occluder],
+    meter: LeakMeter | None = None,
+) -> LeakReport:
+    """Count, for each closed space, the rays that reach the sky. The house is a repaired one.
+
+    airs: by room id. plugs: fill its openings. Only structure and plugs stop rays: furniture hides no leak.
+    """
+    meter = LeakMeter() if meter is None else meter
+    shell = plugged_shell(house, plugs)
+    geometry = geometry_from_house(shell)
+    normals = face_normals(geometry.positions, geometry.faces)
+    closed = [s for s in spaces if s.is_closed]
+    occluder = occluder_from(shell) if closed else None
+    rng = np.random.default_rng(0)
+    found = []
+    for space in closed:
+        origins, directions = _rays([a for r in space.rooms for a in airs[r]], meter, rng)
+        assert occluder is not None
+        found.append(_measured(space, origins, directions, normals, occluder, meter, rng))
+    areas = {r.id: float(shapely.area(plan.polygon_of_room(r.polygon))) for r in house.rooms}
+    in_closed = sum(areas[r] for s in closed for r in s.rooms)
+    return LeakReport(
+        spaces=tuple(found),
+        n_rays=sum(s.n_rays for s in found),
+        n_sky=sum(s.n_sky for s in found),
+        closed_share=round(in_closed / max(sum(areas.values()), 1e-9), 4),
+    )
+
+
+def plugged_shell(house: House, plugs: Sequence[Surface]) -> House:
+    """The house's structure alone, its openings filled."""
+    items = [i for i in house.items if i.kind.is_structure and i.kind is not ItemKind.GROUND]
+    plug = Item("plugs", "plugs", ItemKind.WALL, house.levels[0].id, tuple(plugs))
+    return replace(house, items=(*items, plug))
+
+
+def _rays(airs: Sequence[RoomAir], meter: LeakMeter, rng: np.random.Generator) -> tuple[F64, F64]:
+    edges = np.concatenate([_edge_starts(a, meter.step_m, rng) for a in airs])
+    areas = np.array([a.area.area for a in airs])
+    shares = rng.multinomial(meter.n_inside, areas / areas.sum())
+    inside = np.concatenate([_inside(a, int(n), rng) for a, n in zip(airs, shares, strict=True)])
+    origins = np.concatenate(
+        [np.repeat(edges, meter.per_start, 0), np.repeat(inside, meter.per_inside, 0)]
+    )
+    return origins, _unit(rng.normal(size=origins.shape))
+
+
+def _edge_starts(air: RoomAir, step_m: float, rng: np.random.Generator) -> F64:
+    """Points within 5 mm of the edges where walls, floor and ceiling meet, in the air."""
+    inner = shapely.buffer(air.area, -0.5 * WITHIN_M, join_style="mitre", mitre_limit=2.0)
+    found = [np.zeros((0, 3))]
+    for polygon in polygons_of(inner):
+        for ring in (polygon.exterior, *polygon.interiors):
+            n = max(int(ring.length / step_m), 8)
+            steps = ring.length * (np.arange(n) + rng.random()) / n
+            along = shapely.get_coordinates(shapely.line_interpolate_point(ring, steps))
+            corners = np.asarray(ring.coords)[:-1]
+            found += [_lifted(along, lid.at(along) + s) for lid, s in air.lids(0.5 * WITHIN_M)]
+            m = max(int(air.height / step_m), 8)
+            t = (np.arange(m) + rng.random()) / m
+            low, high = (lid.at(corners) + s for lid, s in air.lids(0.5 * WITHIN_M))
+            for corner, y0, y1 in zip(corners, low, high, strict=True):
+                found.append(_lifted(np.tile(corner, (m, 1)), y0 + t * (y1 - y0)))
+    points = np.concatenate(found)
+    return np.asarray(points + rng.uniform(-0.4, 0.4, points.shape) * WITHIN_M)
+
+
+def _lifted(plan_points: F64, y: F64) -> F64:
+    return np.stack([plan_points[:, 0], y, plan_points[:, 1]], 1)
+
+
+def _inside(air: RoomAir, n: int, rng: np.random.Generator) -> F64:
+    area = shapely.buffer(air.area, -0.02)
+    if n == 0 or shapely.is_empty(area):
+        return np.zeros((0, 3))
+    x0, z0, x1, z1 = area.bounds
+    found = np.zeros((0, 2))
+    while len(found) < n:
+        points = rng.uniform((x0, z0), (x1, z1), (4 * n, 2))
+        found = np.concatenate([found, points[shapely.contains_xy(area, *points.T)]])
+    found = found[:n]
+    low, high = (lid.at(found) + s for lid, s in air.lids(0.02))
+    return _lifted(found, low + rng.random(n) * (high - low))
+
+
+def _measured(
+    space: Space,
+    origins: F64,
+    directions: F64,
+    normals: F64,
+    occluder: Occluder,
+    meter: LeakMeter,
+    rng: np.random.Generator,
+) -> SpaceLeaks:
+    n_sky = 0
+    leaks: list[Leak] = []
+    p, d = origins, directions
+    for _ in range(meter.n_bounces + 1):
+        distance, face = occluder.first_hit(p.astype(np.float32), d.astype(np.float32))
+        gone = ~np.isfinite(distance)
+        n_sky += int(gone.sum())
+        leaks += [
+            Leak(origin=_triple(a), direction=_triple(b))
+            for a, b in zip(p[gone][: _MAX_LEAKS - len(leaks)], d[gone], strict=False)
+        ]
+        # From the front of a face light goes on; behind one it is inside a solid, absorbed.
+        lit = ~gone
+        lit[lit] = (d[lit] * normals[face[lit]]).sum(1) < 0
+        reached = p[lit] + d[lit] * distance[lit, None].astype(np.float64)
+        n = normals[face[lit]]
+        d = _unit(_unit(rng.normal(size=n.shape)) + n)
+        p = reached + 1e-4 * n
+    return SpaceLeaks(
+        rooms=space.rooms, n_rays=len(origins), n_sky=n_sky, leaks=tuple(leaks[:_MAX_LEAKS])
+    )
+
+
+def _unit(v: F64) -> F64:
+    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12))
+
+
+def _triple(v: F64) -> tuple[float, float, float]:
+    return round(float(v[0]), 5), round(float(v[1]), 5), round(float(v[2]), 5)
