@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pbrs_farm.raster import Rasterizer
     from pbrs_farm.transport.caster import Caster
     from pbrs_farm.transport.scene import LightScene
+    from pbrs_farm.transport.sky import Sky
 
 
 class LoadedHouse:
@@ -69,14 +70,23 @@ class LoadedHouse:
         """The GL renderer."""
         from pbrs_farm.raster import Rasterizer
 
-        return Rasterizer(self.house, self.textures)
+        return Rasterizer(self.house, self.textures, self.recipe.raster)
 
     @cached_property
     def light_scene(self) -> LightScene:
         """The scene that carries light."""
         from pbrs_farm.transport.scene import LightScene
 
-        return LightScene.load(self.house, self.textures, self.recipe)
+        return LightScene.load(self.house, self.textures, self.recipe, self.sky)
+
+    @cached_property
+    def sky(self) -> Sky:
+        """The sky over this house; BadRecipe when the recipe's panoramas cannot be had."""
+        from pbrs_farm.farm.panoramas import panorama_for_house
+        from pbrs_farm.transport.sky import sky_for_house
+
+        panorama = panorama_for_house(self.recipe, self.house_id)
+        return sky_for_house(self.recipe, self.house_id, panorama=panorama)
 
     def views(self) -> dict[str, View]:
         """View id -> view, as cameras.json holds them now."""

@@ -125,17 +125,24 @@ def _light(work: Work) -> Made:
     view, camera = _view_at_size(work, loaded)
     groups = ("image", "light", "sky", "emission", "materials")
     seed = keys.seed(work.house_id, view.id, "light", work.recipe.digest(*groups))
-    result = loaded.light_scene.render(camera, view.room_id, seed=seed)
+    result = loaded.light_scene.render(camera, view.room_id, work.recipe.light, seed)
     layers: dict[str, NDArray[np.float32]] = {}
     for name in ("outdoor", "indoor", "albedo"):
         image: NDArray[np.float32] = getattr(result, name)
         layers |= {f"{name}.{c}": image[..., k] for k, c in enumerate("RGB")}
-    return Made({"radiance.exr": exr_from_layers(layers)}, {"seed": seed, **result.facts()})
+    facts = {
+        **result.facts,
+        "noise": result.noise,
+        "spp": result.spp,
+        "n_nonfinite": result.n_nonfinite,
+        "sky": loaded.sky.facts(),
+    }
+    return Made({"radiance.exr": exr_from_layers(layers)}, facts)
 
 
 def _develop(work: Work) -> Made:
     from pbrs_farm.images import array_from_png, layers_from_exr, png_from_array
-    from pbrs_farm.transport.develop import develop
+    from pbrs_farm.transport.develop import Negative, develop
 
     get = work.store.get
     view = work.view_id or ""
@@ -145,14 +152,14 @@ def _develop(work: Work) -> Made:
         for name in ("outdoor", "indoor", "albedo")
     }
     normal = array_from_png(get(keys.view_key(work.house_id, view, "normal.png")))
-    pictures = develop(
-        outdoor=image["outdoor"],
-        indoor=image["indoor"],
-        albedo=image["albedo"],
-        normal=normal.astype(np.float32) * (2 / 65535) - 1,
-        denoise=work.recipe.light.denoise,
-        tone=work.recipe.tone,
+    negative = Negative(
+        image["outdoor"],
+        image["indoor"],
+        image["albedo"],
+        normal.astype(np.float32) * np.float32(2 / 65535) - 1,
     )
+    light = work.recipe.light
+    pictures = develop(negative, work.recipe.tone, denoise=light.denoise)
     return Made({LAYER[mode].file: png_from_array(rgb) for mode, rgb in pictures.items()})
 
 

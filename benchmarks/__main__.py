@@ -1,0 +1,39 @@
+"""Run benches by name: `python -m benchmarks [NAME...]`; all but light and farm when none is named.
+
+Each bench is a module of this folder with main(); a bench that fails does not stop the others.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import time
+import traceback
+
+DEFAULT = ("demo", "view", "houses", "cameras", "labels", "gl", "selection")
+OWN_TARGET = ("light", "farm")
+
+
+def main(names: list[str]) -> int:
+    """Run the named benches; 1 if any failed, 2 for a name that is none."""
+    unknown = [n for n in names if n not in (*DEFAULT, *OWN_TARGET)]
+    if unknown:
+        print(f"no bench {unknown[0]!r}; of {', '.join((*DEFAULT, *OWN_TARGET))}", file=sys.stderr)
+        return 2
+    failed = []
+    for name in names or DEFAULT:
+        print(f"== {name}", flush=True)
+        started = time.monotonic()
+        try:
+            importlib.import_module(f"benchmarks.{name}").main()
+        except Exception:  # noqa: BLE001  one bench's fault is told, the others still run
+            traceback.print_exc()
+            failed.append(name)
+        print(f"== {name}: {time.monotonic() - started:.1f} s\n", flush=True)
+    if failed:
+        print(f"failed: {', '.join(failed)}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

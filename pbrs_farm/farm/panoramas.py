@@ -1,0 +1,37 @@
+"""The panorama of a house: a file of the recipe's folder, chosen by the house's id.
+
+Effects: reads files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.errors import BadRecipe
+from pbrs_farm.recipe import Recipe
+
+SUFFIXES = (".exr", ".hdr")
+
+
+def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.floating]] | None:
+    """(name, (H, W, 3) linear radiance) of a house's sky; None when the recipe wants no panorama.
+
+    Raises BadRecipe when the folder is missing or holds no outdoor panorama.
+    """
+    if recipe.sky.kind != "panorama":
+        return None
+    from pbrs_farm.images import decode_radiance
+    from pbrs_farm.transport.sky import choose_panorama
+
+    folder = Path(recipe.sky.panoramas)
+    if not recipe.sky.panoramas or not folder.is_dir():
+        raise BadRecipe(
+            f"sky.panoramas: {recipe.sky.panoramas or 'no folder'!r} is no folder of panoramas",
+            hint="`pbrs-farm skies --fetch` gets four from Debian's blender-data; or --set sky.kind=sunsky",
+        )
+    files = {p.name: p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES}
+    name = choose_panorama(list(files), house_id, recipe.seed)
+    return name, decode_radiance(files[name].read_bytes(), name)
