@@ -96,7 +96,7 @@ class Rasterizer:
             self._context = None
 
     @property
-    def renderer(self) -> str:
+    def name(self) -> str:
         """The driver's own name for what draws, for versions in view.json."""
         return str(self._context.info["GL_RENDERER"])
 

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from raster_scenes import house, item, square
 
 from pbrs_farm.house import ItemKind, LightPart, Material, Surface
 from pbrs_farm.lighting import LightForm, PowerUnit
@@ -12,6 +11,7 @@ from pbrs_farm.raster.lights import (
     illuminance,
     light_table,
 )
+from tests.raster.raster_scenes import house, item, square
 
 
 def lamp(x: float, lumen: float = 800.0, **rest: object) -> LightPart:

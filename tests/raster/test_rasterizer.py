@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from raster_scenes import camera, house, item, square
 
 from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.errors import MachineFailed
@@ -11,6 +10,7 @@ from pbrs_farm.raster import Rasterizer, device
 from pbrs_farm.raster.programs import DL_SCALE, PANE_OPACITY
 from pbrs_farm.read.builtin import builtin_home
 from pbrs_farm.transport.caster import Caster
+from tests.raster.raster_scenes import camera, house, item, square
 
 WHITE = Material("white")
 RED = Material("red", diffuse=(1.0, 0.0, 0.0))

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from hits import camera, hit, house
 
 from pbrs_farm import truth
 from pbrs_farm.camera import Camera, Intrinsics
@@ -10,6 +9,7 @@ from pbrs_farm.house import geometry_from_house
 from pbrs_farm.layers import LAYER
 from pbrs_farm.read.builtin import builtin_home
 from pbrs_farm.transport.caster import Caster
+from tests.truth.hits import camera, hit, house
 
 
 def test_depth_is_rounded_to_millimetres():

@@ -2,10 +2,10 @@ import json
 
 import numpy as np
 import pytest
-from hits import camera, house
 
 from pbrs_farm import truth
 from pbrs_farm.frames import transform_points
+from tests.truth.hits import camera, house
 
 
 def test_each_visible_instance_has_a_row_with_its_pixels_and_box():

@@ -1,0 +1,103 @@
+"""What `verify` found: how much was checked, how much failed, and where; no effects."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+MAX_LISTED = 20
+"""Failures of one check that are listed by place; all are counted."""
+
+
+class Count(BaseModel):
+    """One check: things looked at, failed ones, and ties (two right answers at one pixel)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    checked: int = 0
+    failed: int = 0
+    ties: int = 0
+
+
+class Certificate(BaseModel):
+    """The outcome of verify. failures: at most MAX_LISTED lines per check, "check: place: what"."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    folder: str
+    all_pixels: bool
+    n_houses: int
+    n_views: int
+    counts: dict[str, Count]
+    failures: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_clean(self) -> bool:
+        """Nothing failed, and there was something to check."""
+        return self.n_views > 0 and not any(c.failed for c in self.counts.values())
+
+    def text(self) -> str:
+        """The certificate as lines for a terminal."""
+        what = "every pixel" if self.all_pixels else "a sample of pixels"
+        lines = [
+            f"{self.folder}: {self.n_houses} houses, {self.n_views} views, {what}",
+            f"{'check':<22}{'checked':>12}{'failed':>9}{'ties':>9}",
+        ]
+        lines += [
+            f"{name:<22}{c.checked:>12}{c.failed:>9}{c.ties:>9}" for name, c in self.counts.items()
+        ]
+        lines += [f"note: {note}" for note in self.notes]
+        lines += list(self.failures)
+        if self.n_views == 0:
+            lines.append("nothing to verify: no finished view in this folder")
+        lines.append("CLEAN" if self.is_clean else "NOT CLEAN")
+        return "\n".join(lines)
+
+
+class Tally:
+    """Collects counts and failures while verify runs."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, list[int]] = {}
+        self._listed: dict[str, list[str]] = {}
+        self.notes: list[str] = []
+
+    def add(self, check: str, checked: int, *, ties: int = 0) -> None:
+        """checked more things were looked at, of which ties are ties."""
+        row = self._counts.setdefault(check, [0, 0, 0])
+        row[0] += int(checked)
+        row[2] += int(ties)
+
+    def fail(self, check: str, place: str, what: str, n_failed: int = 1) -> None:
+        """n_failed of the things already added failed at place."""
+        self._counts.setdefault(check, [0, 0, 0])[1] += int(n_failed)
+        listed = self._listed.setdefault(check, [])
+        if len(listed) < MAX_LISTED:
+            listed.append(f"{check}: {place}: {what}")
+
+    def expect(self, check: str, place: str, holds: bool, what: str) -> bool:
+        """One thing was looked at; it fails with what unless it holds."""
+        self.add(check, 1)
+        if not holds:
+            self.fail(check, place, what)
+        return holds
+
+    def totals(self, check: str) -> tuple[int, int]:
+        """(things looked at, ties) of a check so far."""
+        row = self._counts.get(check, [0, 0, 0])
+        return row[0], row[2]
+
+    def certificate(
+        self, folder: str, n_houses: int, n_views: int, *, all_pixels: bool
+    ) -> Certificate:
+        """What was collected."""
+        return Certificate(
+            folder=folder,
+            all_pixels=all_pixels,
+            n_houses=n_houses,
+            n_views=n_views,
+            counts={
+                name: Count(checked=c[0], failed=c[1], ties=c[2])
+                for name, c in self._counts.items()
+            },
+            failures=tuple(line for lines in self._listed.values() for line in lines),
+            notes=tuple(self.notes),
+        )

@@ -1,0 +1,89 @@
+"""Manifest, markers and files of a house: nothing missing, nothing changed, nothing unlisted.
+
+Effects: reads files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from pbrs_farm.check.certificate import Tally
+
+
+def check_files(root: Path, house: Path, tally: Tally) -> None:
+    """Compare manifest.jsonl of house with the files on disk and with the done markers."""
+    rows = _manifest(house / "manifest.jsonl", house.name, tally)
+    for key, row in rows.items():
+        _check_row(root, key, row, tally)
+    _check_markers(house, rows, tally)
+    listed = {root / key for key in rows}
+    for file in sorted(p for p in (house / "views").rglob("*") if p.is_file()):
+        tally.expect(
+            "files", str(file.relative_to(root)), file in listed, "is not in manifest.jsonl"
+        )
+
+
+def check_root_manifest(root: Path, houses: list[Path], tally: Tally) -> None:
+    """The root's manifest.jsonl is the houses' manifests one after another, if there is one."""
+    merged = root / "manifest.jsonl"
+    if not merged.is_file():
+        return
+    parts = [
+        h.joinpath("manifest.jsonl").read_bytes()
+        for h in houses
+        if (h / "manifest.jsonl").is_file()
+    ]
+    tally.expect(
+        "files",
+        "manifest.jsonl",
+        merged.read_bytes() == b"".join(parts),
+        "differs from the houses'",
+    )
+
+
+def _manifest(file: Path, house: str, tally: Tally) -> dict[str, dict[str, Any]]:
+    if not tally.expect("files", house, file.is_file(), "has no manifest.jsonl"):
+        return {}
+    rows: dict[str, dict[str, Any]] = {}
+    for number, line in enumerate(file.read_text("utf-8").splitlines(), start=1):
+        try:
+            row = json.loads(line)
+            key = str(row["key"])
+            if not {"n_bytes", "sha256"} <= row.keys() or ".." in key.split("/") or key[:1] == "/":
+                raise ValueError
+        except (ValueError, KeyError, TypeError):
+            tally.expect("files", f"{house}/manifest.jsonl line {number}", False, "is no row")
+            continue
+        tally.expect("files", key, key not in rows, "is listed twice")
+        rows[key] = row
+    return rows
+
+
+def _check_row(root: Path, key: str, row: dict[str, Any], tally: Tally) -> None:
+    file = root / key
+    if not tally.expect("files", key, file.is_file(), "is missing"):
+        return
+    data = file.read_bytes()
+    tally.expect(
+        "files", key, len(data) == row["n_bytes"], f"{len(data)} bytes, not {row['n_bytes']}"
+    )
+    digest = hashlib.sha256(data).hexdigest()
+    tally.expect("hashes", key, digest == row["sha256"], "content differs from its sha256")
+
+
+def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -> None:
+    for file in sorted(house.glob("done/*.json")):
+        place = f"{house.name}/done/{file.name}"
+        try:
+            stored = json.loads(file.read_bytes())["files"]
+            pairs = [(str(s["key"]), s["sha256"], s["n_bytes"]) for s in stored]
+        except (ValueError, KeyError, TypeError):
+            tally.expect("markers", place, False, "is no marker")
+            continue
+        for key, sha256, n_bytes in pairs:
+            row = rows.get(key, {})
+            same = row.get("sha256") == sha256 and row.get("n_bytes") == n_bytes
+            tally.expect("markers", place, same, f"{key} is not as in manifest.jsonl")

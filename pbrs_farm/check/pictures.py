@@ -1,0 +1,126 @@
+"""What a view's files must be by themselves: sizes, types, tables, boundaries; no rays.
+
+Effects: reads files.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.stored import StoredView
+from pbrs_farm.classes import NYU40_NAMES
+from pbrs_farm.errors import BadInput
+from pbrs_farm.layers import LAYERS, Layer
+
+BASIC = ("depth", "normal", "valid", "semantic", "instance", "boundary")
+
+
+def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | None:
+    """The basic layers by name, None when one of them is missing, damaged or of a wrong shape."""
+    arrays = {}
+    for layer in LAYERS:
+        if layer.name in BASIC or (view.has(layer.file) and layer.file.endswith(".png")):
+            array = _read_png(view, layer, tally)
+            if array is not None:
+                arrays[layer.name] = array
+    return arrays if all(name in arrays for name in BASIC) else None
+
+
+def _read_png(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | None:
+    place = f"{view.place}/{layer.file}"
+    if not tally.expect("layers", place, view.has(layer.file), "is missing"):
+        return None
+    try:
+        array = view.png(layer.file)
+    except BadInput as error:
+        tally.expect("layers", place, False, str(error))
+        return None
+    shape = (*view.size, 3) if layer.channels == "RGB" else view.size
+    fits = array.shape == shape and str(array.dtype) == layer.dtype
+    what = f"{array.shape} {array.dtype}, expected {shape} {layer.dtype}"
+    return array if tally.expect("layers", place, fits, what) else None
+
+
+def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """The modes' pictures are no single colour; radiance is finite and not negative."""
+    for layer in LAYERS:
+        if layer.step in ("opengl", "light") and layer.name in arrays:
+            picture = arrays[layer.name]
+            constant = bool((picture == picture[0, 0]).all())
+            tally.expect("pictures", f"{view.place}/{layer.file}", not constant, "is one colour")
+    if view.has("radiance.exr"):
+        try:
+            channels = view.exr("radiance.exr")
+        except BadInput as error:
+            tally.expect("radiance", view.place, False, str(error))
+            return
+        names = {f"{g}.{c}" for g in ("outdoor", "indoor", "albedo") for c in "RGB"}
+        tally.expect(
+            "radiance", view.place, names <= channels.keys(), f"lacks {names - channels.keys()}"
+        )
+        for name, plane in channels.items():
+            bad = int((~(np.isfinite(plane) & (plane >= 0))).sum())
+            tally.add("radiance", plane.size)
+            if bad or plane.shape != view.size:
+                tally.fail(
+                    "radiance",
+                    f"{view.place} {name}",
+                    f"{bad} pixels negative or not finite",
+                    max(bad, 1),
+                )
+
+
+def check_consistency(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """Layers against each other over the whole picture: valid, unit normals, ids, boundary."""
+    instance, depth, valid = arrays["instance"], arrays["depth"], arrays["valid"]
+    _same(view, tally, "valid = depth", (valid == 255) == (depth > 0))
+    _same(view, tally, "valid is 0 or 255", (valid == 255) | (valid == 0))
+    _same(view, tally, "instance = depth", (instance > 0) == (depth > 0))
+    length = np.linalg.norm(arrays["normal"] * (2 / 65535) - 1, axis=-1)
+    _same(
+        view, tally, "unit normals", np.where(valid > 0, np.abs(length - 1) < 1e-3, length < 1e-4)
+    )
+    classes = np.zeros(65536, np.int64)
+    for instance_id, nyu40 in view.nyu40.items():
+        classes[instance_id] = nyu40
+    _same(view, tally, "semantic = table", classes[instance] == arrays["semantic"])
+    _same(view, tally, "boundary", arrays["boundary"] == np.where(_boundary(instance), 255, 0))
+    _check_table(view, instance, tally)
+
+
+def _same(view: StoredView, tally: Tally, check: str, right: NDArray[np.bool_]) -> None:
+    tally.add(check, right.size)
+    if not right.all():
+        row, column = np.argwhere(~right)[0]
+        tally.fail(check, view.place, f"row {row}, column {column}", int((~right).sum()))
+
+
+def _boundary(ids: NDArray[Any]) -> NDArray[np.bool_]:
+    """The published instance boundary: any unequal adjacent pair in the block to the lower right."""
+    padded = np.pad(ids.astype(np.int64), ((0, 1), (0, 1)), mode="edge")
+    a, b, c, d = padded[:-1, :-1], padded[:-1, 1:], padded[1:, :-1], padded[1:, 1:]
+    return np.asarray((a != b) | (a != c) | (b != d) | (c != d), bool)
+
+
+def _check_table(view: StoredView, instance: NDArray[Any], tally: Tally) -> None:
+    """The table has a row for each id in the picture, with its pixels, share, box and class name."""
+    counts = np.bincount(instance.reshape(-1), minlength=1)
+    seen = {int(i) for i in np.nonzero(counts)[0]} - {0}
+    rows = {int(row["id"]): row for row in view.table["instances"]}
+    tally.expect("table", view.place, seen == rows.keys(), f"ids {sorted(seen ^ rows.keys())[:5]}")
+    boxes = ndimage.find_objects(instance.astype(np.int32))
+    for i in sorted(seen & rows.keys()):
+        row, (ys, xs) = rows[i], boxes[i - 1]
+        place = f"{view.place} instance {i}"
+        tally.expect("table", place, row["pixels"] == counts[i], f"{counts[i]} pixels")
+        share = abs(row["fraction"] - counts[i] / instance.size) < 1e-9
+        tally.expect("table", place, share, "fraction is not pixels over the picture's")
+        box = [xs.start, ys.start, xs.stop, ys.stop]
+        tally.expect("table", place, row["box2d"] == box, f"box2d is not {box}")
+        named = row["class"] == NYU40_NAMES[int(row["nyu40"])]
+        tally.expect("table", place, named, f"class {row['class']} is not {row['nyu40']}")

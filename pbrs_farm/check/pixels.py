@@ -1,0 +1,161 @@
+"""Every label of a pixel against what an independent ray through its centre finds; no effects.
+
+A ray that grazes an edge, or meets two surfaces in the same place, has more than one right
+answer. Where the centre's answer does not explain what is stored, the triangles next to it (rays
+0.02 px away) and those of the stored instance at the same depth are tried. If one of them
+explains every layer at once the pixel is a tie, which is counted; otherwise it failed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.check.rays import Faces, Floats, Rays
+from pbrs_farm.check.stored import StoredView
+from pbrs_farm.check.triangles import Triangles
+
+Bools = NDArray[np.bool_]
+
+DEPTH_TOLERANCE_MM = 0.51
+NORMAL_TOLERANCE_DEG = 0.02
+TIE_DEPTH_M = 1e-4
+_JITTER_PX = 0.02
+_JITTER = _JITTER_PX * np.array(
+    [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]], np.float64
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Labels:
+    """The stored layers at N pixels. normal: (N, 3) as stored; the rest (N,)."""
+
+    depth: NDArray[np.int64]
+    normal: NDArray[np.int64]
+    valid: NDArray[np.int64]
+    semantic: NDArray[np.int64]
+    instance: NDArray[np.int64]
+
+    def at(self, index: NDArray[np.int64]) -> Labels:
+        """The labels of some of the pixels."""
+        return Labels(*(getattr(self, name)[index] for name in Labels.__slots__))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """Per check (N,) bool: what is stored is right; tied: right by another triangle; (N,) faces."""
+
+    right: dict[str, Bools]
+    tied: Bools
+    face: Faces
+
+
+def judge(
+    view: StoredView,
+    labels: Labels,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    scene: tuple[Triangles, Rays],
+) -> Verdict:
+    """Compare labels at pixels (rows, columns) with rays through the scene."""
+    _, rays = scene
+    origin, directions = view.rays(rows, columns)
+    face = rays.first(origin, directions)
+    right = _explained(view, labels, face, directions, scene)
+    tied = np.zeros(len(rows), bool)
+
+    # Try other triangles where the first one does not explain everything.
+    open_ = np.nonzero(~np.logical_and.reduce(list(right.values())))[0]
+    candidates = [
+        rays.first(origin, view.rays(rows[open_] + dy, columns[open_] + dx)[1])
+        for dx, dy in _JITTER
+    ]
+    candidates.append(_coincident(labels.at(open_), face[open_], origin, directions[open_], scene))
+    best = np.sum([~right[name][open_] for name in right], axis=0)
+    for other in candidates:
+        trial = _explained(view, labels.at(open_), other, directions[open_], scene)
+        wrong = np.sum([~ok for ok in trial.values()], axis=0)
+        better = wrong < best
+        best = np.where(better, wrong, best)
+        face[open_[better]] = other[better]
+        for name in right:
+            right[name][open_[better]] = trial[name][better]
+    tied[open_] = best == 0
+    return Verdict(right, tied, face)
+
+
+def _explained(
+    view: StoredView,
+    labels: Labels,
+    face: Faces,
+    directions: Floats,
+    scene: tuple[Triangles, Rays],
+) -> dict[str, Bools]:
+    """Per check whether hitting these faces explains the labels."""
+    triangles, rays = scene
+    hit = face >= 0
+    instance = np.where(hit, triangles.instance[face], 0) if len(triangles.faces) else 0 * face
+    origin = view.world_from_camera[:3, 3]
+    mm = np.clip(rays.distance(face, origin, directions) * 1000, 0.5, 65535)
+    classes = np.array(
+        [triangles.nyu40.get(int(i), 0) for i in range(int(instance.max(initial=0)) + 1)]
+    )
+    return {
+        "instance": labels.instance == instance,
+        "semantic": labels.semantic == classes[instance],
+        "depth": np.where(hit, np.abs(labels.depth - mm) <= DEPTH_TOLERANCE_MM, labels.depth == 0),
+        "normal": normal_is_right(labels.normal, rays.normal(face, directions), view),
+        "valid": labels.valid == np.where(hit, 255, 0),
+    }
+
+
+def normal_is_right(stored: NDArray[np.int64], world: Floats, view: StoredView) -> Bools:
+    """(N,) stored 16-bit camera normals decode to the world ones; where those are 0, to nothing."""
+    camera = world @ view.world_from_camera[:3, :3]
+    published = np.stack([camera[:, 0], camera[:, 2], -camera[:, 1]], axis=1)
+    decoded = stored * (2 / 65535) - 1
+    length = np.linalg.norm(decoded, axis=1)
+    sine = np.linalg.norm(np.cross(decoded, published), axis=1)
+    close = (np.einsum("ni,ni->n", decoded, published) > 0) & (
+        sine <= np.radians(NORMAL_TOLERANCE_DEG) * length
+    )
+    nothing = (stored == 32768).all(axis=1)
+    right = np.where(published.any(axis=1), close & (np.abs(length - 1) < 1e-3), nothing)
+    return np.asarray(right, bool)
+
+
+def _coincident(
+    labels: Labels,
+    face: Faces,
+    origin: Floats,
+    directions: Floats,
+    scene: tuple[Triangles, Rays],
+) -> Faces:
+    """(N,) triangle of the stored instance that the ray pierces at the first hit's depth, or -1."""
+    triangles, rays = scene
+    found = np.full(len(face), -1, np.int64)
+    first = rays.distance(face, origin, directions)
+    for instance in np.unique(labels.instance):
+        own = np.nonzero(triangles.instance == instance)[0]
+        for pixel in np.nonzero(labels.instance == instance)[0]:
+            t = _pierced(triangles, own, origin, directions[pixel])
+            gap = np.abs(t - first[pixel])
+            if len(own) and gap.min() <= TIE_DEPTH_M:
+                found[pixel] = own[gap.argmin()]
+    return found
+
+
+def _pierced(triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: Floats) -> Floats:
+    """(F,) distance at which one ray pierces each of the triangles own; inf = misses it."""
+    a, b, c = (triangles.vertices[triangles.faces[own, k]].astype(np.float64) for k in range(3))
+    e1, e2, s = b - a, c - a, origin - a
+    p = np.cross(ray, e2)
+    q = np.cross(s, e1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1 / np.einsum("fi,fi->f", e1, p)
+        u, v = np.einsum("fi,fi->f", s, p) * inverse, (q @ ray) * inverse
+        t = np.einsum("fi,fi->f", e2, q) * inverse
+        inside = (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 0)
+    return np.where(inside, t, np.inf)

@@ -1,0 +1,84 @@
+"""A finished view as its stored files say: camera, table of instances, layers on demand.
+
+Effects: reads files. Knows nothing of the House or the Camera that made them.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.images import array_from_png, layers_from_exr
+
+
+@dataclass(frozen=True)
+class StoredView:
+    """One views/<view_id> folder. place: how messages name it."""
+
+    folder: Path
+    table: dict[str, Any]
+
+    @property
+    def place(self) -> str:
+        """House and view, as messages name them."""
+        return f"{self.folder.parent.parent.name}/{self.folder.name}"
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return int(self.table["height_px"]), int(self.table["width_px"])
+
+    @cached_property
+    def k(self) -> NDArray[np.float64]:
+        """(3, 3) K."""
+        return np.array(self.table["K"], np.float64)
+
+    @cached_property
+    def world_from_camera(self) -> NDArray[np.float64]:
+        """(4, 4) pose with OpenCV axes (x right, y down, z forward)."""
+        return np.array(self.table["world_from_camera_opencv"], np.float64)
+
+    @cached_property
+    def nyu40(self) -> dict[int, int]:
+        """Instance id -> class, of the instances in the table."""
+        return {int(row["id"]): int(row["nyu40"]) for row in self.table["instances"]}
+
+    def has(self, file: str) -> bool:
+        """Whether the view has this file."""
+        return (self.folder / file).is_file()
+
+    def png(self, file: str) -> NDArray[Any]:
+        """Pixels of a PNG; BadInput if it cannot be read."""
+        return array_from_png((self.folder / file).read_bytes(), f"{self.place}/{file}")
+
+    def exr(self, file: str) -> dict[str, NDArray[np.float32]]:
+        """Channels of an EXR; BadInput if it cannot be read."""
+        return layers_from_exr((self.folder / file).read_bytes(), f"{self.place}/{file}")
+
+    def rays(
+        self, rows: NDArray[Any], columns: NDArray[Any]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origin (3,) and directions (N, 3) of unit depth through (column + 0.5, row + 0.5)."""
+        pixel = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))], axis=1)
+        camera = np.linalg.solve(self.k, pixel.T).T
+        return self.world_from_camera[:3, 3], camera @ self.world_from_camera[:3, :3].T
+
+
+def views_of_house(house: Path) -> list[StoredView]:
+    """Every view of a house folder that has a readable view.json, by name.
+
+    Raises ValueError naming a view.json that is no JSON object.
+    """
+    views = []
+    for file in sorted(house.glob("views/*/view.json")):
+        table = json.loads(file.read_bytes())
+        if not isinstance(table, dict):
+            raise ValueError(f"{file}: not an object")
+        views.append(StoredView(file.parent, table))
+    return views

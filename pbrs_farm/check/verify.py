@@ -1,0 +1,114 @@
+"""`pbrs-farm verify`: is what lies in a folder right? From the stored files alone.
+
+Effects: reads files. No House, no code of the stages that made them: triangles come from
+house.glb, cameras from view.json, hits from Embree.
+"""
+
+from __future__ import annotations
+
+import zlib
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.check.certificate import Certificate, Tally
+from pbrs_farm.check.files import check_files, check_root_manifest
+from pbrs_farm.check.pictures import check_consistency, check_pictures, read_labels
+from pbrs_farm.check.pixels import Labels, judge
+from pbrs_farm.check.poses import check_pose, check_reprojection
+from pbrs_farm.check.rays import Rays
+from pbrs_farm.check.stored import StoredView, views_of_house
+from pbrs_farm.check.triangles import BadGlb, Triangles, triangles_from_glb
+from pbrs_farm.errors import BadInput
+
+SAMPLE = 2000
+"""Pixels of each view that are recomputed unless told otherwise."""
+
+MAX_TIES = 0.0002
+"""Share of pixels whose instance may be the other of two right answers."""
+
+
+def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False) -> Certificate:
+    """Check every house and view below folder (an output root) and say how much was checked.
+
+    sample: pixels of each view that are recomputed by rays (SAMPLE when None); all_pixels: every
+    one. Checks on files, tables and whole pictures are always complete. Raises BadInput when
+    folder is no output root.
+    """
+    houses = sorted(p for p in (folder / "houses").glob("*") if p.is_dir())
+    if not houses:
+        raise BadInput(folder, "houses/", "no houses here", hint="give the folder of --out")
+    tally, n_views = Tally(), 0
+    n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)
+    check_root_manifest(folder, houses, tally)
+    for house in houses:
+        check_files(folder, house, tally)
+        n_views += _check_house(house, n_pixels, tally)
+    _judge_ties(tally)
+    return tally.certificate(str(folder), len(houses), n_views, all_pixels=all_pixels)
+
+
+def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
+    try:
+        views = views_of_house(house)
+        triangles = triangles_from_glb((house / "house.glb").read_bytes())
+    except (OSError, ValueError) as error:
+        what = f"house.glb {error}" if isinstance(error, BadGlb) else str(error)
+        tally.expect("layers", house.name, False, what)
+        return 0
+    scene = (triangles, Rays(triangles))
+    depths: list[tuple[StoredView, NDArray[Any]]] = []
+    for view in views:
+        try:
+            depth = _check_view(view, scene, n_pixels, tally)
+        except (KeyError, TypeError, ValueError, IndexError, np.linalg.LinAlgError) as error:
+            tally.expect(
+                "layers", f"{view.place}/view.json", False, f"{type(error).__name__}: {error}"
+            )
+            continue
+        if depth is not None:
+            depths.append((view, depth))
+    for (a, depth_a), (b, depth_b) in pairwise([*depths, *depths[:1]] if len(depths) > 1 else []):
+        check_reprojection(a, b, (depth_a, depth_b), tally)
+    return len(views)
+
+
+def _check_view(
+    view: StoredView, scene: tuple[Triangles, Rays], n_pixels: int | None, tally: Tally
+) -> NDArray[Any] | None:
+    """Check one view; its depth picture, None when its labels cannot be read."""
+    check_pose(view, tally)
+    arrays = read_labels(view, tally)
+    if arrays is None:
+        return None
+    check_pictures(view, arrays, tally)
+    check_consistency(view, arrays, tally)
+    rows, columns = _chosen(view, n_pixels)
+    labels = Labels(*(arrays[name][rows, columns].astype(np.int64) for name in Labels.__slots__))
+    verdict = judge(view, labels, rows, columns, scene)
+    for check, right in verdict.right.items():
+        tally.add(f"ray: {check}", len(rows), ties=int(verdict.tied.sum()))
+        for k in np.nonzero(~right)[0]:
+            tally.fail(f"ray: {check}", view.place, f"row {rows[k]}, column {columns[k]}")
+    return arrays["depth"]
+
+
+def _chosen(view: StoredView, n_pixels: int | None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows and columns of the pixels to recompute: all, or a sample that the view's name fixes."""
+    height, width = view.size
+    if n_pixels is None or n_pixels >= height * width:
+        index = np.arange(height * width)
+    else:
+        rng = np.random.default_rng(zlib.crc32(view.place.encode()))
+        index = rng.choice(height * width, n_pixels, replace=False)
+    return index // width, index % width
+
+
+def _judge_ties(tally: Tally) -> None:
+    checked, ties = tally.totals("ray: instance")
+    if checked and ties > max(2, MAX_TIES * checked):
+        what = f"{ties} of {checked} pixels have another right answer"
+        tally.expect("ties", "all views", False, what)

@@ -1,0 +1,80 @@
+"""A finished output root with labels of the small home, as a run writes it (no light, no GL)."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from pbrs_farm import keys, truth
+from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm.images import png_from_array
+from pbrs_farm.keys import Marker, StoredFile
+from pbrs_farm.layers import LAYER
+from pbrs_farm.read.builtin import builtin_home
+from pbrs_farm.read.bundle import bundle_from_house
+from pbrs_farm.transport.caster import Caster
+
+SIZE = (128, 96)
+
+
+def views_of(home: House) -> dict[str, Camera]:
+    """The home's stored cameras, small."""
+    intrinsics = Intrinsics.from_hfov(*SIZE)
+    return {f"v{k}": Camera.look(intrinsics, c.eye, c.towards) for k, c in enumerate(home.cameras)}
+
+
+def make_root(root: Path) -> Path:
+    """Write the root and return its house folder."""
+    home = builtin_home()
+    house = root / "houses" / home.id
+    caster = Caster(geometry_from_house(home))
+    glb, plain = bundle_from_house(home)
+    files = {"house": {"house.glb": glb, "house.json": plain}}
+    for name, camera in views_of(home).items():
+        hit = caster.hit_record(camera)
+        layers = truth.layers_from_hit(hit, home, camera)
+        table = {"house": home.id, "view": name, **truth.view_table(hit.item, home, camera)}
+        made = {LAYER[k].file: png_from_array(v) for k, v in layers.items()}
+        made["view.json"] = json.dumps(table).encode()
+        files[f"truth.{name}"] = {f"views/{name}/{k}": v for k, v in made.items()}
+    for step, made in files.items():
+        for file, data in made.items():
+            (house / file).parent.mkdir(parents=True, exist_ok=True)
+            (house / file).write_bytes(data)
+        (house / "done").mkdir(exist_ok=True)
+        (house / "done" / f"{step}.json").write_text(json.dumps({"files": list(made)}))
+    sign(root, house)
+    return house
+
+
+def sign(root: Path, house: Path) -> None:
+    """Make manifest and markers agree with the files as they are now."""
+    rows = []
+    for marker in sorted((house / "done").glob("*.json")):
+        old = json.loads(marker.read_text())["files"]
+        names = [f if isinstance(f, str) else f["key"].split("/", 2)[2] for f in old]
+        stored = []
+        for name in names:
+            data = (house / name).read_bytes()
+            key = keys.house_key(house.name, name)
+            stored.append(StoredFile(key=key, n_bytes=len(data), sha256=keys.sha256(data)))
+        step, _, view = marker.stem.partition(".")
+        whole = Marker(
+            step=step, house_id=house.name, view_id=view or None, digest="0", files=tuple(stored)
+        )
+        marker.write_text(whole.model_dump_json())
+        rows += [{**f.model_dump(), "step": step, "digest": "0"} for f in stored]
+    lines = "".join(keys.canonical_json(r) + "\n" for r in sorted(rows, key=lambda r: r["key"]))
+    (house / "manifest.jsonl").write_text(lines)
+    (root / "manifest.jsonl").write_text(lines)
+
+
+def changed_pixel(file: Path, row: int, column: int, by: int) -> None:
+    """Add by to one pixel of a PNG (its first channel)."""
+    from pbrs_farm.images import array_from_png
+
+    array = array_from_png(file.read_bytes()).copy()
+    index = (row, column) if array.ndim == 2 else (row, column, 0)
+    array[index] = np.array(int(array[index]) + by).astype(array.dtype)
+    file.write_bytes(png_from_array(array))

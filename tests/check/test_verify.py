@@ -1,0 +1,171 @@
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.check import verify
+from pbrs_farm.errors import BadInput
+from tests.check.roots import changed_pixel, make_root, sign
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("clean")
+    make_root(root)
+    return root
+
+
+@pytest.fixture
+def root(clean: Path, tmp_path: Path) -> Path:
+    shutil.copytree(clean, tmp_path / "root")
+    return tmp_path / "root"
+
+
+def house_of(root: Path) -> Path:
+    return next((root / "houses").iterdir())
+
+
+def failed(root: Path, *, all_pixels: bool = True) -> set[str]:
+    certificate = verify(root, all_pixels=all_pixels)
+    return {name for name, count in certificate.counts.items() if count.failed}
+
+
+def test_a_finished_folder_is_clean_to_the_last_pixel(clean):
+    certificate = verify(clean, all_pixels=True)
+    assert certificate.is_clean, certificate.text()
+    assert certificate.n_views == 2
+    assert certificate.counts["ray: depth"].checked == 2 * 128 * 96
+    assert certificate.counts["ray: instance"].ties <= 2
+    assert certificate.counts["reprojection"].checked >= 0
+    assert certificate.text().endswith("\nCLEAN")
+
+
+def test_a_sample_checks_as_many_pixels_as_asked(clean):
+    assert verify(clean, sample=100).counts["ray: normal"].checked == 200
+
+
+@pytest.mark.parametrize(
+    ("file", "by", "check"),
+    [
+        ("depth.png", 3, "ray: depth"),
+        ("normal.png", 200, "ray: normal"),
+        ("instance.png", 1, "ray: instance"),
+        ("semantic.png", 1, "ray: semantic"),
+        ("valid.png", 1, "ray: valid"),
+        ("boundary.png", 1, "boundary"),
+    ],
+)
+def test_one_changed_pixel_is_caught_though_the_hashes_agree(root, file, by, check):
+    changed_pixel(house_of(root) / "views/v0" / file, 48, 64, by)
+    sign(root, house_of(root))
+    assert check in failed(root)
+
+
+def test_one_changed_pixel_is_caught_by_its_hash_without_looking_at_pixels(root):
+    changed_pixel(house_of(root) / "views/v0/depth.png", 48, 64, 1)
+    certificate = verify(root, sample=0)
+    assert certificate.counts["hashes"].failed == 1
+    assert "views/v0/depth.png" in certificate.failures[0]
+
+
+def edit_table(root: Path, change) -> None:  # type: ignore[no-untyped-def]
+    file = house_of(root) / "views/v0/view.json"
+    table = json.loads(file.read_text())
+    change(table)
+    file.write_text(json.dumps(table))
+    sign(root, house_of(root))
+
+
+def test_a_moved_camera_is_caught(root):
+    def move(table):
+        for name in ("world_from_camera_opengl", "world_from_camera_opencv"):
+            table[name][0][3] += 0.01
+
+    edit_table(root, move)
+    assert {"ray: depth", "ray: instance"} & failed(root)
+
+
+def test_poses_that_disagree_are_caught(root):
+    edit_table(root, lambda t: t["world_from_camera_opengl"][0].__setitem__(3, 9.0))
+    assert failed(root) == {"pose"}
+
+
+def test_a_mirrored_pose_is_caught(root):
+    def mirror(table):
+        for name in ("world_from_camera_opengl", "world_from_camera_opencv"):
+            for row in table[name][:3]:
+                row[0] = -row[0]
+
+    edit_table(root, mirror)
+    assert "pose" in failed(root, all_pixels=False)
+
+
+def test_a_wrong_focal_length_is_caught(root):
+    edit_table(root, lambda t: t["K"][0].__setitem__(0, t["K"][0][0] * 1.02))
+    assert "ray: depth" in failed(root)
+
+
+def test_a_wrong_class_in_the_table_is_caught(root):
+    edit_table(root, lambda t: t["instances"][0].update(nyu40=3, **{"class": "cabinet"}))
+    assert "semantic = table" in failed(root, all_pixels=False)
+
+
+def test_a_wrong_pixel_count_in_the_table_is_caught(root):
+    edit_table(root, lambda t: t["instances"][0].update(pixels=1))
+    assert failed(root) == {"table"}
+
+
+def test_an_instance_missing_from_the_table_is_caught(root):
+    edit_table(root, lambda t: t["instances"].pop())
+    assert "table" in failed(root, all_pixels=False)
+
+
+def test_a_missing_file_and_an_unlisted_one_are_caught(root):
+    view = house_of(root) / "views/v0"
+    (view / "normal.png").unlink()
+    (view / "stray.txt").write_text("?")
+    certificate = verify(root, sample=0)
+    assert any("normal.png: is missing" in f for f in certificate.failures)
+    assert any("stray.txt: is not in manifest.jsonl" in f for f in certificate.failures)
+
+
+def test_a_truncated_file_is_caught_and_the_rest_still_checked(root):
+    file = house_of(root) / "views/v0/instance.png"
+    file.write_bytes(file.read_bytes()[:200])
+    certificate = verify(root, sample=100)
+    assert certificate.counts["layers"].failed == 1
+    assert certificate.counts["ray: depth"].checked == 100
+
+
+def test_a_changed_house_is_caught(root):
+    glb = house_of(root) / "house.glb"
+    data = bytearray(glb.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    glb.write_bytes(bytes(data))
+    assert "hashes" in failed(root, all_pixels=False)
+
+
+def test_damaged_view_json_and_glb_are_failures_not_tracebacks(root):
+    (house_of(root) / "views/v0/view.json").write_text("{}")
+    assert "layers" in failed(root, all_pixels=False)
+    (house_of(root) / "views/v0/view.json").write_text("[]")
+    assert "layers" in failed(root, all_pixels=False)
+    (house_of(root) / "house.glb").write_bytes(b"glTF")
+    assert "layers" in failed(root, all_pixels=False)
+
+
+def test_markers_that_disagree_with_the_manifest_are_caught(root):
+    marker = house_of(root) / "done/truth.v0.json"
+    marker.write_text(marker.read_text().replace('"n_bytes":', '"n_bytes":1', 1))
+    assert failed(root, all_pixels=False) == {"markers"}
+
+
+def test_a_folder_that_is_no_output_root_is_told_so(tmp_path):
+    with pytest.raises(BadInput, match="no houses here"):
+        verify(tmp_path)
+
+
+def test_a_root_without_views_is_not_clean(tmp_path):
+    (tmp_path / "houses/empty").mkdir(parents=True)
+    assert not verify(tmp_path).is_clean
