@@ -1,0 +1,126 @@
+"""Random numbers as pure functions of (pixel, sample, dimension): hashed, or scrambled Sobol.
+
+No state travels with a path: dimension d of sample s of pixel p is computed when it is asked for.
+Neighbouring streams of PCG32 are correlated; every number here comes out of a hash of all its
+coordinates instead.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import drjit as dr
+import mitsuba as mi
+
+CAMERA_DIMS = 2
+VERTEX_DIMS = 10
+
+
+class Numbers(Protocol):
+    """Uniform numbers of one path in [0, 1); dim may vary from lane to lane."""
+
+    def one(self, dim: Any) -> Any:
+        """Float of one dimension."""
+        ...
+
+    def two(self, dim: Any) -> Any:
+        """Point2f of dimensions dim and dim + 1, well spread as a pair."""
+        ...
+
+
+class HashedNumbers:
+    """Independent numbers."""
+
+    def __init__(self, key: Any, sample: Any) -> None:
+        self._key = hash32(key ^ hash32(sample + 0x9E3779B9))
+
+    def one(self, dim: Any) -> Any:
+        """Float of one dimension."""
+        return unit_float(hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B)))
+
+    def two(self, dim: Any) -> Any:
+        """Point2f of dimensions dim and dim + 1."""
+        return mi.Point2f(self.one(dim), self.one(mi.UInt32(dim) + 1))
+
+
+class SobolNumbers:
+    """Owen-scrambled, index-shuffled Sobol pairs (Burley 2020): the samples of a pixel are spread
+    evenly in every dimension and every pair, and their first halves and quarters are too."""
+
+    def __init__(self, key: Any, sample: Any) -> None:
+        self._key = key
+        self._reversed = dr.brev(mi.UInt32(sample))
+
+    def one(self, dim: Any) -> Any:
+        """Float of one dimension."""
+        seed = hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B))
+        index = dr.brev(_laine_karras(self._reversed, seed))
+        return unit_float(dr.brev(_laine_karras(index, hash32(seed + 0x68BC21EB))))
+
+    def two(self, dim: Any) -> Any:
+        """Point2f of dimensions dim and dim + 1."""
+        seed = hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B))
+        index = dr.brev(_laine_karras(self._reversed, seed))
+        x = dr.brev(_laine_karras(index, hash32(seed + 0x68BC21EB)))
+        y = dr.brev(_laine_karras(_pascal(index), hash32(seed + 0x02E5BE93)))
+        return mi.Point2f(unit_float(x), unit_float(y))
+
+
+def device_array(kind: Any, values: Any) -> Any:
+    """A 1D array on the device, in memory of Dr.Jit's own.
+
+    An array that merely wraps NumPy's memory may be less aligned; then its packet gathers fall
+    apart into single ones, and the kernel is another one each time.
+    """
+    wrapped = kind(values)
+    own = dr.empty(kind, len(wrapped))
+    dr.scatter(own, wrapped, dr.arange(mi.UInt32, len(wrapped)))
+    dr.eval(own)
+    return own
+
+
+def opaque3(kind: Any, values: Any) -> Any:
+    """A 3-vector of host values that the compiled kernel does not contain."""
+    return kind(*(dr.opaque(mi.Float, float(v)) for v in values))
+
+
+def stream_key(lane: Any, seed: Any) -> Any:
+    """A 32-bit key of a pixel (or chain) under a seed."""
+    mixer: Any = mi.sample_tea_32
+    return mixer(mi.UInt32(lane), mi.UInt32(seed), 4)[0]
+
+
+def hash32(x: Any) -> Any:
+    """A bijective 32-bit mixer (Wellons's `lowbias32`)."""
+    x = x ^ (x >> 16)
+    x = x * mi.UInt32(0x7FEB352D)
+    x = x ^ (x >> 15)
+    x = x * mi.UInt32(0x846CA68B)
+    return x ^ (x >> 16)
+
+
+def unit_float(bits: Any) -> Any:
+    """Float in [0, 1) of the top 24 bits."""
+    return mi.Float(bits >> 8) * (1.0 / (1 << 24))
+
+
+def _laine_karras(x: Any, seed: Any) -> Any:
+    # Nested uniform scrambling of a bit-reversed number; constants of Vegdahl 2021.
+    x = x ^ (x * mi.UInt32(0x3D20ADEA))
+    x = x + seed
+    x = x * ((seed >> 16) | 1)
+    x = x ^ (x * mi.UInt32(0x05526C56))
+    return x ^ (x * mi.UInt32(0x53A22864))
+
+
+def _pascal(x: Any) -> Any:
+    # Sobol's second dimension is Pascal's triangle modulo 2, applied here by butterflies.
+    for shift, mask in (
+        (16, 0xFFFF),
+        (8, 0xFF00FF),
+        (4, 0x0F0F0F0F),
+        (2, 0x33333333),
+        (1, 0x55555555),
+    ):
+        x = x ^ ((x >> shift) & mi.UInt32(mask))
+    return x

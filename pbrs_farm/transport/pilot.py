@@ -1,0 +1,110 @@
+"""Weights of lamps and outdoor techniques for one view, from a small picture per emitter.
+
+No effects. A home has 12 to 18 lamps and most shadow rays of a uniform choice go to other rooms.
+The pilot renders 64x48 pixels with each emitter alone, in one launch, and chooses in proportion to
+the root of the mean square that a path brings from it, with a floor so that nothing is forgotten.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.camera import Camera
+from pbrs_farm.frames import LUMINANCE
+from pbrs_farm.house import House, MaterialKind
+from pbrs_farm.recipe import LightFields
+from pbrs_farm.transport.emitters import FIRST_PORTAL, MAX_PORTALS, Emitters, Weights
+from pbrs_farm.transport.path import Lanes, trace
+from pbrs_farm.transport.surface import Stage
+
+LAMP_FLOOR: Final = 0.01
+_SUN_FLOOR: Final = 0.1
+_DOME_FLOOR: Final = 0.1
+_PILOT_SIZE: Final = (64, 48)
+
+
+def uniform_weights(n_lamps: int, n_portals: int) -> Weights:
+    """Every lamp and every outdoor technique alike."""
+    n_outdoor = FIRST_PORTAL + n_portals
+    return Weights(np.full(n_lamps, 1 / max(n_lamps, 1)), np.full(n_outdoor, 1 / n_outdoor))
+
+
+def pilot_weights(
+    stage: Stage,
+    emitters: Emitters,
+    camera: Camera,
+    n_lamps: int,
+    n_portals: int,
+    fields: LightFields,
+    seed: int,
+) -> Weights:
+    """Weights for a view; emitters may carry any weights, the pilot does not use them."""
+    n_outdoor = FIRST_PORTAL + n_portals
+    width, height = _PILOT_SIZE
+    lanes = Lanes(
+        width, height, 0, fields.pilot_spp, seed, n_only_lamps=n_lamps, n_only_outdoor=n_outdoor
+    )
+    sums = trace(stage, emitters, camera.with_size(width, height), lanes, fields)
+    brought = ((sums.outdoor + sums.indoor) @ LUMINANCE / fields.pilot_spp).reshape(
+        width * height, n_lamps + n_outdoor
+    )
+    # A pixel's noise matters relative to its brightness.
+    bright = brought.sum(1, keepdims=True)
+    relative = brought / (bright + max(float(bright.mean()), 1e-12))
+    strength = np.sqrt((relative.astype(np.float64) ** 2).mean(0))
+    return Weights(
+        _with_floors(strength[:n_lamps], np.full(n_lamps, LAMP_FLOOR)),
+        _with_floors(
+            strength[n_lamps:],
+            np.array([_SUN_FLOOR, _DOME_FLOOR, *[LAMP_FLOOR] * n_portals]),
+        ),
+    )
+
+
+def _with_floors(strength: NDArray[np.float64], floors: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not len(strength):
+        return strength
+    total = strength.sum()
+    share = strength / total if total > 0 else np.full(len(strength), 1 / len(strength))
+    floored = np.maximum(share, floors)
+    # Round, so that the last bits of a sum never change a picture.
+    return np.asarray(np.round(floored / floored.sum(), 6))
+
+
+def portals_of_house(house: House) -> NDArray[np.float64]:
+    """(K, 4, 3) rectangles through which daylight enters: windows, and doors with panes."""
+    glazed = {
+        item.id
+        for item in house.items
+        if any(house.materials[s.material].kind is MaterialKind.PANE for s in item.surfaces)
+    }
+    quads = [
+        np.asarray(o.quad, np.float64)
+        for o in house.openings
+        if (o.is_window or o.item_id in glazed) and _is_rectangle(np.asarray(o.quad))
+    ]
+    return np.array(quads).reshape(-1, 4, 3)
+
+
+def nearest_portals(portals: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+    """At most MAX_PORTALS of them, those that subtend most at the camera."""
+    if len(portals) <= MAX_PORTALS:
+        return portals
+    area = np.linalg.norm(
+        np.cross(portals[:, 1] - portals[:, 0], portals[:, 3] - portals[:, 0]), axis=1
+    )
+    distance = np.linalg.norm(portals.mean(1) - camera.eye, axis=1)
+    order = np.argsort(-area / np.maximum(distance, 0.1) ** 2, kind="stable")
+    return np.asarray(portals[np.sort(order[:MAX_PORTALS])])
+
+
+def _is_rectangle(quad: NDArray[np.floating]) -> bool:
+    if quad.shape != (4, 3) or not np.isfinite(quad).all():
+        return False
+    a, b = quad[1] - quad[0], quad[3] - quad[0]
+    size = np.linalg.norm(a) * np.linalg.norm(b)
+    closes = np.linalg.norm(quad[0] + a + b - quad[2]) < 1e-3 * (1 + np.sqrt(size))
+    return bool(size > 1e-4 and abs(a @ b) < 1e-2 * size and closes)
