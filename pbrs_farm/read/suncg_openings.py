@@ -1,0 +1,136 @@
+"""Holes that doors and windows have in released walls, found in the walls' meshes; no effects.
+
+Released walls are cut already (suncg section 1.5): the cutter lies just inside the hole, so that
+subtracting it changes nothing; the quad is the hole itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.house import Box, Item, ItemKind, Opening, Surface
+
+_HOLE_MARGIN_M: Final = 0.10
+_SHRINK_M: Final = 0.0005
+_REACH_M: Final = 0.02
+_NEAR_M: Final = 0.15
+_UP: Final = np.array([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _WallFrame:
+    """A wall by its plan normal; points (V, 3): along the wall, up, across."""
+
+    level_id: str
+    normal: NDArray[np.float64]
+    points: NDArray[np.float64]
+
+
+def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
+    """An opening for every door and window that has a box and stands in a wall."""
+    frames = [f for item in items if item.kind is ItemKind.WALL for f in (_frame(item),) if f]
+    found = []
+    for item in items:
+        if item.kind in (ItemKind.DOOR, ItemKind.WINDOW) and item.box is not None:
+            opening = _opening(item, item.box, frames)
+            if opening is not None:
+                found.append(opening)
+    return tuple(found)
+
+
+def _frame(item: Item) -> _WallFrame | None:
+    """The wall's frame across its largest vertical faces."""
+    corners = np.concatenate([s.positions[s.faces] for s in item.surfaces]).astype(np.float64)
+    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    upright = np.abs(n[:, 1]) < 0.01 * np.linalg.norm(n, axis=1)
+    if not upright.any():
+        return None
+    best = n[upright][np.linalg.norm(n[upright], axis=1).argmax()]
+    normal = best / np.linalg.norm(best)
+    normal[1] = 0.0
+    points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
+    return _WallFrame(item.level_id, normal, points @ _axes(normal))
+
+
+def _axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 3) columns: along the wall, up, across."""
+    return np.stack([np.cross(_UP, normal), _UP, normal], 1)
+
+
+def _opening(item: Item, box: Box, frames: Sequence[_WallFrame]) -> Opening | None:
+    normal = box.axes[:, 2] * [1, 0, 1]  # a model's front is +z, whatever its leaf does
+    if np.linalg.norm(normal) < 0.5:
+        return None  # lies flat: a roof window, which no wall holds
+    normal = normal / np.linalg.norm(normal)
+    axes = _axes(normal)
+    corners = box.corners @ axes
+    low, high = corners.min(0), corners.max(0)
+    standing = [p for f in frames if f.level_id == item.level_id for p in _wall(f, axes, low, high)]
+    if not standing:
+        return None
+    holes = [h for h in (_hole(points, low, high) for points in standing) if h is not None]
+    if holes:
+        low[:2] = np.max([h[0] for h in holes], 0)
+        high[:2] = np.min([h[1] for h in holes], 0)
+    low[2] = min(p[:, 2].min() for p in standing)
+    high[2] = max(p[:, 2].max() for p in standing)
+    if (high - low)[:2].min() < 0.05:
+        return None
+    middle = (low[2] + high[2]) / 2
+    quad = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
+    inside = np.array([_SHRINK_M, _SHRINK_M, -_REACH_M])
+    return Opening(
+        id=f"{item.id}_hole",
+        level_id=item.level_id,
+        item_id=item.id,
+        is_window=item.kind is ItemKind.WINDOW,
+        cutter=_solid(low + inside, high - inside, axes),
+        quad=np.array([[s, y, middle] for s, y in quad]) @ axes.T,
+        normal=normal,
+    )
+
+
+def _wall(
+    frame: _WallFrame,
+    axes: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> list[NDArray[np.float64]]:
+    """The wall's points in axes, if it is the one (or one of those) that low..high stands in."""
+    if abs(frame.normal @ axes[:, 2]) < 0.999:
+        return []
+    points = frame.points @ _axes(frame.normal).T @ axes
+    wall_low, wall_high = points.min(0), points.max(0)
+    apart = np.maximum(wall_low - high, low - wall_high)
+    return [points] if (apart < [-_NEAR_M, -_NEAR_M, _NEAR_M]).all() else []
+
+
+def _hole(
+    points: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """(low, high) along and up of the hole that a wall has where low..high stands; None if none."""
+    s, y = points[:, 0], points[:, 1]
+    inner = (s > s.min() + _REACH_M) & (s < s.max() - _REACH_M)
+    near = (s > low[0] - _HOLE_MARGIN_M) & (s < high[0] + _HOLE_MARGIN_M)
+    near &= (y > low[1] - _HOLE_MARGIN_M) & (y < high[1] + _HOLE_MARGIN_M)
+    rim = points[inner & near, :2]
+    if len(rim) < 4 or np.ptp(rim, axis=0).min() < _REACH_M:
+        return None
+    return rim.min(0), rim.max(0)
+
+
+def _solid(
+    low: NDArray[np.float64], high: NDArray[np.float64], axes: NDArray[np.float64]
+) -> Surface:
+    """A closed box low..high in the frame axes, outward faces."""
+    corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+    faces = [
+        [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
+        [2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5],
+    ]  # fmt: skip
+    return Surface("cutter", (corners @ axes.T).astype(np.float32), np.array(faces, np.int32), 0)

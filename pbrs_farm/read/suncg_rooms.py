@@ -1,0 +1,98 @@
+"""Floor polygon and heights of a room from its meshes; no effects.
+
+The walkable polygon is the top of the floor's mesh less the walls that stand on it: SUNCG's floor
+slab reaches under the walls (suncg section 1.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.house import Surface
+
+MAX_OUTLINE_FACES: Final = 20_000
+"""A floor of more triangles is taken by its convex hull, so that time stays bounded."""
+
+_SAME_HEIGHT_M: Final = 0.02
+_CRACK_M: Final = 1e-4
+_SLACK_M: Final = 0.002
+
+
+def floor_height(surfaces: Sequence[Surface]) -> float | None:
+    """World y of the walkable surface: of the highest upward faces; None if there are none."""
+    corners = _facing(surfaces, 1)
+    return None if not len(corners) else float(corners[..., 1].mean(1).max())
+
+
+def ceiling_height(surfaces: Sequence[Surface]) -> float | None:
+    """World y of the lowest downward faces; None if there are none."""
+    corners = _facing(surfaces, -1)
+    return None if not len(corners) else float(corners[..., 1].mean(1).min())
+
+
+def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> NDArray[np.float64] | None:
+    """(N, 2) plan (x, z), counter-clockwise, of the largest piece of floor between the walls.
+
+    None if the floor has no area.
+    """
+    corners = _facing(floor, 1)
+    if not len(corners):
+        return None
+    y = corners[..., 1].mean(1)
+    area = _outline(corners[y > y.max() - _SAME_HEIGHT_M])
+    standing = _facing(walls, 1), _facing(walls, -1)
+    between = shapely.difference(area, _outline(np.concatenate(standing)))
+    return polygon_of(between if not between.is_empty else area)
+
+
+def enclosed_polygon(walls: Sequence[Surface]) -> NDArray[np.float64] | None:
+    """The largest piece of plan between walls, for a room without a floor; None if there is none."""
+    footprint = _outline(np.concatenate([_facing(walls, 1), _facing(walls, -1)]))
+    return polygon_of(shapely.difference(footprint.convex_hull, footprint))
+
+
+def polygon_of(area: Any) -> NDArray[np.float64] | None:
+    """The outline of the largest polygon of a shapely area: simple, counter-clockwise, no holes."""
+    pieces = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon" and g.area > 1e-4]
+    if not pieces:
+        return None
+    largest = max(pieces, key=lambda g: (g.area, g.bounds))
+    # Opening removes slivers that a wall's bevel leaves; corners of walls stay where they are.
+    opened = largest.buffer(-_SLACK_M, join_style="mitre").buffer(_SLACK_M, join_style="mitre")
+    simple = shapely.simplify(_largest(opened, largest), _SLACK_M)
+    outline = shapely.orient_polygons(shapely.Polygon(simple.exterior))
+    return np.asarray(shapely.get_coordinates(outline)[:-1], np.float64)
+
+
+def _largest(area: Any, otherwise: Any) -> Any:
+    pieces = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon" and g.area > 1e-4]
+    return max(pieces, key=lambda g: (g.area, g.bounds), default=otherwise)
+
+
+def _facing(surfaces: Sequence[Surface], sign: int) -> NDArray[np.float64]:
+    """(F, 3, 3) corners of the faces that look up (sign 1) or down (-1)."""
+    found = [np.zeros((0, 3, 3))]
+    for surface in surfaces:
+        p = surface.positions[surface.faces].astype(np.float64)
+        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        found.append(p[sign * normal[:, 1] > 0.7 * np.linalg.norm(normal, axis=1)])
+    return np.concatenate(found)
+
+
+def _outline(corners: NDArray[np.float64]) -> Any:
+    """The union of triangles seen from above, as a shapely area."""
+    if not len(corners):
+        return shapely.Polygon()
+    plan = corners[:, :, [0, 2]]
+    if len(plan) > MAX_OUTLINE_FACES:
+        return shapely.MultiPoint(plan.reshape(-1, 2)).convex_hull
+    triangles: Any = shapely.polygons(plan)
+    triangles = triangles[shapely.area(triangles) > 1e-10]
+    return shapely.union_all(shapely.buffer(triangles, _CRACK_M, join_style="mitre")).buffer(
+        -_CRACK_M, join_style="mitre"
+    )
