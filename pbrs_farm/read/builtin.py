@@ -200,7 +200,7 @@ def _frame(
 
 
 def _door_piece(w: float, h: float) -> furniture.Piece:
-    leaf = ((-w / 2 + 0.05, 0.005, -0.02), (w / 2 - 0.05, h - 0.05, 0.02))
+    leaf = ((-w / 2 + 0.05, 0.0, -0.02), (w / 2 - 0.05, h - 0.05, 0.02))
     knobs = (((w / 2 - 0.16, 0.98, -0.07), (w / 2 - 0.1, 1.02, 0.07)),)
     parts = (
         furniture.Part("white", _frame(w, h, 0.05, 0.11)),

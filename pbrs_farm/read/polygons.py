@@ -1,0 +1,77 @@
+"""Polygons of mixed size in space -> triangles; no effects."""
+
+from __future__ import annotations
+
+import mapbox_earcut
+import numpy as np
+from numpy.typing import NDArray
+
+
+def triangle_corners(positions: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(T, 3) corner numbers of the triangles that polygons are cut into, in the polygons' order.
+
+    positions: (C, 3) the polygons' corners one after the other; sizes: (P,) corners of each.
+    Convex polygons become fans, others are ear-cut; polygons under three corners give nothing.
+    """
+    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    triangles: list[NDArray[np.int64]] = []
+    owners: list[NDArray[np.int64]] = []
+    for n in np.unique(sizes):
+        if n < 3:
+            continue
+        which = np.flatnonzero(sizes == n)
+        corners = starts[which][:, None] + np.arange(n)
+        fans = np.stack(
+            [
+                np.broadcast_to(corners[:, :1], (len(which), n - 2)),
+                corners[:, 1:-1],
+                corners[:, 2:],
+            ],
+            -1,
+        )
+        if n == 3:
+            triangles.append(fans.reshape(-1, 3))
+            owners.append(which)
+            continue
+        is_convex = _convex(positions[corners])
+        triangles.append(fans[is_convex].reshape(-1, 3))
+        owners.append(np.repeat(which[is_convex], n - 2))
+        for polygon in np.flatnonzero(~is_convex):
+            cut = _ear_cut(positions[corners[polygon]])
+            triangles.append(corners[polygon][cut])
+            owners.append(np.full(len(cut), which[polygon]))
+    if not triangles:
+        return np.zeros((0, 3), np.int64)
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    return np.concatenate(triangles)[order]
+
+
+def _newell(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
+    following = np.roll(polygons, -1, axis=1)
+    return np.asarray(np.cross(polygons, following).sum(1))
+
+
+def _convex(polygons: NDArray[np.float64]) -> NDArray[np.bool_]:
+    # polygons: (P, n, 3); no corner turns against the polygon's own normal.
+    local = polygons - polygons[:, :1]
+    edges = np.roll(local, -1, axis=1) - local
+    turns = np.cross(edges, np.roll(edges, -1, axis=1))
+    along = (turns * _newell(local)[:, None]).sum(-1)
+    return np.asarray((along >= -1e-12 * np.abs(along).max(1, keepdims=True)).all(1))
+
+
+def _ear_cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
+    # (T, 3) corners of one polygon; a fan where ear cutting finds nothing.
+    n = len(polygon)
+    normal = _newell(polygon[None] - polygon[0])[0]
+    drop = int(np.abs(normal).argmax())
+    flat = np.ascontiguousarray(np.delete(polygon, drop, axis=1), np.float64)
+    cut = np.asarray(
+        mapbox_earcut.triangulate_float64(flat, np.array([n], np.uint32)), np.int64
+    ).reshape(-1, 3)
+    if not len(cut):
+        return np.stack([np.zeros(n - 2, np.int64), np.arange(1, n - 1), np.arange(2, n)], -1)
+    a, b, c = (polygon[cut[:, k]] for k in range(3))
+    against = np.cross(b - a, c - a) @ normal < 0
+    cut[against] = cut[against][:, [0, 2, 1]]
+    return cut

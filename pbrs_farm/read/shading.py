@@ -1,0 +1,69 @@
+"""Face normals and shading normals with a crease angle; no effects."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+
+def face_normals(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(F, 3) normals whose length is twice the face's area."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return np.asarray(np.cross(b - a, c - a))
+
+
+def crease_normals(
+    points: NDArray[np.float64], faces: NDArray[np.int64], crease_rad: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Unit normals (N, 3) and, for each face corner (F, 3), which of them it has.
+
+    Two faces share a normal at a vertex if they meet in an edge there whose faces turn by less
+    than crease_rad (or through a chain of such edges around the vertex). Faces are weighted by
+    area. Vertices at equal positions count as one.
+    """
+    areas = face_normals(points, faces)
+    length = np.linalg.norm(areas, axis=1, keepdims=True)
+    unit = areas / np.where(length > 0, length, 1)
+    n_faces = len(faces)
+    if crease_rad <= 0:
+        return unit, np.repeat(np.arange(n_faces), 3).reshape(-1, 3)
+    _, welded = np.unique(points[faces.ravel()], axis=0, return_inverse=True)
+    welded = welded.reshape(-1, 3)
+    first, second = _smooth_links(welded, unit, np.cos(crease_rad))
+    n = 3 * n_faces
+    links = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(n, n))
+    n_normals, label = connected_components(links, directed=False)
+    normals = np.zeros((n_normals, 3))
+    for k in range(3):
+        normals[:, k] = np.bincount(label, np.repeat(areas[:, k], 3), n_normals)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.where(length > 0, length, 1)
+    return normals, label.reshape(-1, 3).astype(np.int64)
+
+
+def _smooth_links(
+    welded: NDArray[np.int64], unit: NDArray[np.float64], min_cos: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    # Pairs of corner numbers (3 face + k) at the ends of edges that two faces share smoothly.
+    n_faces = len(welded)
+    corner = np.arange(3 * n_faces).reshape(-1, 3)
+    low_corner = corner.ravel()
+    high_corner = np.roll(corner, -1, axis=1).ravel()
+    a, b = welded.ravel(), np.roll(welded, -1, axis=1).ravel()
+    swap = a > b
+    low_corner, high_corner = (
+        np.where(swap, high_corner, low_corner),
+        np.where(swap, low_corner, high_corner),
+    )
+    key = np.minimum(a, b) * (int(welded.max(initial=0)) + 1) + np.maximum(a, b)
+    order = np.argsort(key, kind="stable")
+    same = key[order[:-1]] == key[order[1:]]
+    one, other = order[:-1][same], order[1:][same]
+    is_smooth = (unit[one // 3] * unit[other // 3]).sum(1) >= min_cos
+    one, other = one[is_smooth], other[is_smooth]
+    return (
+        np.concatenate([low_corner[one], high_corner[one]]),
+        np.concatenate([low_corner[other], high_corner[other]]),
+    )

@@ -1,0 +1,26 @@
+"""Stored viewpoints -> cameras in the world; no effects."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pbrs_farm.house import StoredCamera
+from pbrs_farm.read.sweethome3d.plan import Plan
+
+
+def stored_cameras(plan: Plan) -> tuple[StoredCamera, ...]:
+    """The author's viewpoints: direction (-sin yaw cos pitch, -sin pitch, cos yaw cos pitch)."""
+    cameras = []
+    for c in plan.cameras:
+        x, y, z = c.at
+        towards = np.array(
+            [
+                -math.sin(c.yaw) * math.cos(c.pitch),
+                -math.sin(c.pitch),
+                math.cos(c.yaw) * math.cos(c.pitch),
+            ]
+        )
+        cameras.append(StoredCamera(c.name, np.array([x, z, y]), towards, c.hfov))
+    return tuple(cameras)

@@ -1,0 +1,73 @@
+"""A home file's bytes -> its XML tree and the contents it names; no effects.
+
+Nothing in the file is trusted: entity definitions and external entities are refused unexpanded,
+zip entries are bounded (read.resources).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element, ParseError
+
+from defusedxml.common import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from pbrs_farm.errors import BadHouse
+from pbrs_farm.read.resources import Layered, Resources, ZipResources
+
+MAX_XML_BYTES = 128 * 2**20
+MAX_DEPTH = 200
+_RESAVE = "open it in Sweet Home 3D 5.3 or later and save it again"
+
+
+@dataclass(frozen=True, slots=True)
+class Container:
+    """The root element <home> and whatever holds models and textures."""
+
+    root: Element
+    contents: Resources
+
+
+def open_container(data: bytes, file: str, resources: Resources | None) -> Container:
+    """Take a home file apart; resources: the program's own models, for files that refer to them.
+
+    Raises BadHouse for what is neither a zip nor XML, has no Home.xml, or is unsafe.
+    """
+    if data.startswith(b"PK"):
+        archive = ZipResources(data, file)
+        xml = archive.read("Home.xml")
+        if xml is None:
+            what = "holds no Home.xml"
+            if "Home" in archive.names():
+                what += ", only the binary form of older versions"
+            raise BadHouse(file, "", what, hint=_RESAVE)
+        return Container(_parsed(xml, file, "Home.xml"), Layered(archive, resources))
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return Container(_parsed(data, file, ""), Layered(resources))
+    raise BadHouse(file, "", "neither a .sh3d archive (zip) nor a Home.xml", hint=_RESAVE)
+
+
+def _parsed(xml: bytes, file: str, entry: str) -> Element:
+    if len(xml) > MAX_XML_BYTES:
+        raise BadHouse(file, entry, f"{len(xml)} bytes of XML, at most {MAX_XML_BYTES} are read")
+    try:
+        root: Element = fromstring(xml, forbid_dtd=False, forbid_entities=True)
+    except DefusedXmlException as error:
+        what = type(error).__name__
+        raise BadHouse(file, entry, f"XML with entity definitions is refused ({what})") from None
+    except ParseError as error:
+        raise BadHouse(file, entry, f"XML is not well-formed: {error}", hint=_RESAVE) from None
+    except (ValueError, LookupError, RecursionError) as error:
+        raise BadHouse(file, entry, f"XML cannot be read: {error}") from None
+    if root.tag != "home":
+        raise BadHouse(file, entry, f"the root element is <{root.tag[:40]}>, not <home>")
+    if _depth(root) > MAX_DEPTH:
+        raise BadHouse(file, entry, f"elements nested deeper than {MAX_DEPTH}")
+    return root
+
+
+def _depth(root: Element) -> int:
+    depth, level = 0, [root]
+    while level and depth <= MAX_DEPTH:
+        depth, level = depth + 1, [child for element in level for child in element]
+    return depth

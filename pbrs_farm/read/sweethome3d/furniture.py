@@ -1,0 +1,136 @@
+"""Pieces of furniture -> items and openings; no effects."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from pbrs_farm.classes import NYU40_NAMES
+from pbrs_farm.house import Item, MaterialKind, Opening, Surface
+from pbrs_farm.read.labels import OTHERPROP, kind_of, nyu40_of
+from pbrs_farm.read.sweethome3d.cutouts import StandingWall, opening_of
+from pbrs_farm.read.sweethome3d.finish import finish_of
+from pbrs_farm.read.sweethome3d.lamps import light_parts
+from pbrs_farm.read.sweethome3d.looks import Looks
+from pbrs_farm.read.sweethome3d.models import PANE, Model, Models
+from pbrs_farm.read.sweethome3d.placement import (
+    Frame,
+    frame_of,
+    local_from_model,
+    placed_surface,
+)
+from pbrs_farm.read.sweethome3d.plan import PlanLevel, PlanPiece
+from pbrs_farm.read.sweethome3d.rooms import ReadRoom
+
+DOOR, WINDOW = NYU40_NAMES.index("door"), NYU40_NAMES.index("window")
+LAMP = NYU40_NAMES.index("lamp")
+NEAR_M = 0.5
+"""A piece outside every room belongs to a room no farther than this."""
+
+
+def piece_item(
+    piece: PlanPiece,
+    level: PlanLevel,
+    models: Models,
+    looks: Looks,
+    ids: tuple[str, str],
+    rooms: list[ReadRoom],
+) -> tuple[Item, Frame] | None:
+    """The placed item and its frame, or None (with a note) if there is no model to place.
+
+    ids: of the item, of its level.
+    """
+    model = models.get(piece.model, piece.place)
+    if model is None:
+        return None
+    matrix = local_from_model(piece, model)
+    points = [m.positions @ matrix[:3, :3].T + matrix[:3, 3] for m in model.meshes]
+    frame = frame_of(piece, level, np.concatenate(points) if points else None)
+    surfaces: list[Surface] = []
+    emitting: list[int] = []
+    for mesh, local in zip(model.meshes, points, strict=True):
+        finish = finish_of(piece, mesh, model, looks)
+        if finish is None:
+            continue
+        if finish.emits:
+            emitting.append(len(surfaces))
+        surfaces.append(placed_surface(mesh, finish, frame, local, matrix))
+    nyu40, tags = _label(piece, model, looks)
+    lights = light_parts(piece, frame, tuple(emitting))
+    if not surfaces and not lights:
+        looks.note("empty-model", piece.place, "nothing to see in it: left out")
+        return None
+    item_id, level_id = ids
+    kind = kind_of(
+        piece.catalogue_id,
+        piece.name,
+        nyu40,
+        is_opening=piece.frame is not None,
+        is_light=piece.tag == "light",
+    )
+    item = Item(
+        id=item_id,
+        name=piece.name,
+        kind=kind,
+        level_id=level_id,
+        surfaces=tuple(surfaces),
+        nyu40=nyu40,
+        source_class=piece.catalogue_id,
+        room_id=_room_of(frame, level_id, rooms),
+        lights=lights,
+        box=frame.box,
+        tags=tags,
+    )
+    return item, frame
+
+
+def _label(piece: PlanPiece, model: Model, looks: Looks) -> tuple[int, tuple[str, ...]]:
+    tags = ["mirrored"] if piece.is_mirrored else []
+    label = nyu40_of(piece.catalogue_id, piece.name)
+    if piece.frame is not None and label not in (DOOR, WINDOW):
+        has_pane = any(m.group == PANE for m in model.meshes)
+        label = WINDOW if has_pane and piece.elevation > 0.3 else DOOR
+    elif piece.tag == "light" and label in (None, 0, OTHERPROP):
+        label = LAMP
+    if label is None:
+        label = OTHERPROP
+        tags.append("unmapped")
+        looks.note(
+            "unmapped-class", piece.place, f"no class for {piece.catalogue_id or piece.name!r}"
+        )
+    return label, tuple(tags)
+
+
+def _room_of(frame: Frame, level_id: str, rooms: list[ReadRoom]) -> str | None:
+    point = shapely.Point(frame.origin[[0, 2]])
+    best, nearest = None, NEAR_M
+    for room in rooms:
+        if room.level_id != level_id:
+            continue
+        gap = float(room.outline.distance(point))
+        if gap <= nearest:
+            best, nearest = room.id, gap
+    return best
+
+
+def piece_opening(
+    piece: PlanPiece,
+    item: Item,
+    frame: Frame,
+    walls: list[StandingWall],
+    looks: Looks,
+    material: int,
+) -> Opening | None:
+    """What a door or window cuts out of walls."""
+    if piece.frame is None:
+        return None
+    kinds = {looks.materials[s.material].kind for s in item.surfaces}
+    return opening_of(
+        piece,
+        frame,
+        walls,
+        looks,
+        (f"opening_{item.id}", item.level_id, item.id),
+        material,
+        is_window=item.nyu40 == WINDOW or MaterialKind.PANE in kinds,
+    )

@@ -1,0 +1,169 @@
+"""A Sweet Home 3D home -> House: the order of reading; no effects."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+import shapely
+
+from pbrs_farm import keys
+from pbrs_farm.errors import BadHouse
+from pbrs_farm.house import MAX_INSTANCES, House, Item, Level, Opening, Source
+from pbrs_farm.read.resources import Resources
+from pbrs_farm.read.sweethome3d.cameras import stored_cameras
+from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
+from pbrs_farm.read.sweethome3d.container import open_container
+from pbrs_farm.read.sweethome3d.cutouts import StandingWall
+from pbrs_farm.read.sweethome3d.furniture import piece_item, piece_opening
+from pbrs_farm.read.sweethome3d.looks import Looks
+from pbrs_farm.read.sweethome3d.models import Models
+from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
+from pbrs_farm.read.sweethome3d.parse import parse_plan
+from pbrs_farm.read.sweethome3d.plan import Paint, Plan, level_of
+from pbrs_farm.read.sweethome3d.rooms import ReadRoom, plane_items, read_rooms, room_nouns
+from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
+from pbrs_farm.read.sweethome3d.walls import wall_items
+from pbrs_farm.recipe import ReadFields
+
+ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
+
+
+def read_home(
+    data: bytes,
+    name: str,
+    *,
+    resources: Resources | None = None,
+    fields: ReadFields | None = None,
+    package: str = "",
+) -> House:
+    """The house in a .sh3d archive or a bare Home.xml, unrepaired.
+
+    data: the file's bytes. name: the file's name, for messages and the house's id. resources: the
+    program's own models (homes.fetch), for files that refer to them. package: where the file came
+    from. The same bytes give the same House. Raises BadHouse, which names the file and the place.
+    """
+    fields = fields or ReadFields()
+    file = PurePath(name).name
+    container = open_container(data, file, resources)
+    plan = parse_plan(container.root, file, fields.max_extent_m)
+    looks = Looks(container.contents)
+    visible = [level for level in plan.levels if level.is_visible]
+    house_level = {level.id: str(k) for k, level in enumerate(visible)} | {"": "0"}
+    _note_hidden_levels(plan, looks)
+
+    outlines = outlines_of(plan.walls)
+    rooms = read_rooms(plan, looks, house_level)
+    if not rooms:
+        raise BadHouse(
+            file, "", "no rooms", hint="draw rooms (Plan > Create rooms) and save the home again"
+        )
+    ceilings = CeilingHeights(plan, outlines)
+    floor_cuts, ceiling_cuts = staircase_cuts(plan, looks, house_level)
+    structure = wall_items(plan, outlines, looks, house_level)
+    structure += plane_items(rooms, ceilings, looks, floor_cuts, ceiling_cuts)
+    pieces, openings = _furniture(plan, looks, outlines, rooms, house_level, file, fields)
+
+    items = (*structure, *pieces)
+    if len(items) > MAX_INSTANCES:
+        raise BadHouse(file, "", f"{len(items)} items, at most {MAX_INSTANCES} have instance ids")
+    sha = keys.sha256(data)
+    if fields.strict and looks.notes:
+        note = looks.notes[0]
+        raise BadHouse(file, note.place, f"{note.text} ({note.kind})", hint="read without --strict")
+    return House(
+        id=keys.house_id(PurePath(file).stem, sha),
+        name=PurePath(plan.name).stem if plan.name else PurePath(file).stem,
+        source=_source(plan, file, sha, package),
+        levels=_levels(plan, house_level),
+        rooms=room_nouns(rooms, ceilings),
+        items=items,
+        materials=looks.materials,
+        textures=looks.textures,
+        openings=openings,
+        cameras=stored_cameras(plan),
+        notes=tuple(looks.notes),
+    )
+
+
+def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:
+    if not plan.levels:
+        return (Level("0", "", 0.0, plan.wall_height),)
+    return tuple(
+        Level(house_level[x.id], x.name, x.elevation, x.height, x.floor_thickness)
+        for x in plan.levels
+        if x.is_visible
+    )
+
+
+def _note_hidden_levels(plan: Plan, looks: Looks) -> None:
+    for level in plan.levels:
+        if not level.is_visible:
+            looks.note("hidden-level", f"level {level.id} '{level.name}'", "not visible: left out")
+
+
+def _furniture(
+    plan: Plan,
+    looks: Looks,
+    outlines: dict[str, Outline],
+    rooms: list[ReadRoom],
+    house_level: dict[str, str],
+    file: str,
+    fields: ReadFields,
+) -> tuple[list[Item], tuple[Opening, ...]]:
+    models = Models(looks, file, fields.max_model_triangles)
+    walls = _standing_walls(plan, outlines)
+    cutter_material = looks.painted(Paint(), "cut", "")
+    items: list[Item] = []
+    openings: list[Opening] = []
+    n_faces = n_pieces = 0
+    for number, piece in enumerate(plan.pieces):
+        level = level_of(plan, piece.level)
+        if not level.is_visible:
+            continue
+        n_pieces += 1
+        ids = (f"piece_{number}", house_level[level.id])
+        placed = piece_item(piece, level, models, looks, ids, rooms)
+        if placed is None:
+            continue
+        item, frame = placed
+        n_faces += item.n_faces
+        if n_faces > fields.max_triangles:
+            raise BadHouse(
+                file, piece.place, f"more than {fields.max_triangles} triangles in the house",
+                hint="raise read.max_triangles",
+            )  # fmt: skip
+        items.append(item)
+        opening = piece_opening(piece, item, frame, walls, looks, cutter_material)
+        if opening is not None:
+            openings.append(opening)
+    missing = sum(n.kind == "missing-model" for n in looks.notes)
+    if n_pieces and missing and not items:
+        raise BadHouse(
+            file, "", f"none of its {n_pieces} models can be found",
+            hint="save the home as .sh3d with its contents, or fetch the program's: pbrs-farm homes",
+        )  # fmt: skip
+    return items, tuple(openings)
+
+
+def _standing_walls(plan: Plan, outlines: dict[str, Outline]) -> list[StandingWall]:
+    walls = []
+    for wall in plan.walls:
+        level = level_of(plan, wall.level)
+        if wall.id not in outlines or not level.is_visible:
+            continue
+        polygon = shapely.make_valid(shapely.Polygon(outlines[wall.id].polygon))
+        board = max((b.thickness for b in wall.baseboards), default=0.0)
+        top = level.elevation + max(wall.height, wall.height_end or 0.0)
+        walls.append(StandingWall(wall, polygon, level.elevation - level.reach_down, top, board))
+    return walls
+
+
+def _source(plan: Plan, file: str, sha: str, package: str) -> Source:
+    author = plan.properties.get("Author", "")
+    licence = plan.properties.get("License", "")
+    owner = f"{author} {plan.properties.get('Copyright', '')}".lower()
+    if "puybaret" in owner and "CC-BY" in licence:
+        attribution = ETEKS_ATTRIBUTION
+    else:
+        attribution = ", ".join(x for x in (author, licence) if x)
+    return Source("sweethome3d", file, sha, package, author, licence, attribution)

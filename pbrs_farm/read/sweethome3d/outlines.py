@@ -1,0 +1,137 @@
+"""Plan outlines of walls: straight or arc, mitred with their neighbours; no effects.
+
+The left side is the one at (+sin, -cos) of the wall's direction, walking in a plan with y down.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbrs_farm.arrays import Points2
+from pbrs_farm.read.sweethome3d.plan import PlanWall
+
+ARC_STEP_RAD = math.radians(5.0)
+MITRE_LIMIT = 2.0
+MIN_LENGTH_M = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outline:
+    """left, right: (N, 2) plan points from the wall's start to its end; along: (N,) 0..1."""
+
+    left: Points2
+    right: Points2
+    along: np.ndarray[tuple[int], np.dtype[np.float64]]
+
+    @property
+    def polygon(self) -> Points2:
+        """(2N, 2) around the wall."""
+        return np.concatenate([self.left, self.right[::-1]])
+
+
+def outlines_of(walls: tuple[PlanWall, ...]) -> dict[str, Outline]:
+    """Mitred outline of each wall by id; walls without length or thickness have none."""
+    bare = {w.id: _unjoined(w) for w in walls if _has_size(w)}
+    order = {w.id: k for k, w in enumerate(walls)}
+    by_id = {w.id: w for w in walls}
+    joined = {}
+    for wall_id, outline in bare.items():
+        wall = by_id[wall_id]
+        left, right = outline.left.copy(), outline.right.copy()
+        for at_start, other_id in ((True, wall.at_start), (False, wall.at_end)):
+            other = by_id.get(other_id)
+            if other is None or other_id not in bare or other_id == wall_id:
+                continue
+            _join(wall, other, at_start, (left, right), bare, order)
+        joined[wall_id] = Outline(left, right, outline.along)
+    return joined
+
+
+def _has_size(wall: PlanWall) -> bool:
+    return math.dist(wall.start, wall.end) > MIN_LENGTH_M and wall.thickness > MIN_LENGTH_M
+
+
+def _unjoined(wall: PlanWall) -> Outline:
+    start, end = np.array(wall.start), np.array(wall.end)
+    half = wall.thickness / 2
+    if abs(wall.arc) > 1e-3 and abs(wall.arc) < 2 * math.pi - 1e-3:
+        return _arc(wall, start, end, half)
+    along = (end - start) / np.linalg.norm(end - start)
+    offset = np.array([along[1], -along[0]]) * half
+    line = np.stack([start, end])
+    return Outline(line + offset, line - offset, np.array([0.0, 1.0]))
+
+
+def _arc(wall: PlanWall, start: Points2, end: Points2, half: float) -> Outline:
+    chord = end - start
+    centre = (start + end) / 2 + np.array([-chord[1], chord[0]]) / (2 * math.tan(wall.arc / 2))
+    n = max(2, math.ceil(abs(wall.arc) / ARC_STEP_RAD))
+    along = np.linspace(0.0, 1.0, n + 1)
+    first = math.atan2(start[1] - centre[1], start[0] - centre[0])
+    angles = first + wall.arc * along
+    outward = np.stack([np.cos(angles), np.sin(angles)], -1)
+    radius = float(np.linalg.norm(start - centre))
+    # Turning clockwise on the plan (positive extent) keeps the centre on the right.
+    sign = 1.0 if wall.arc > 0 else -1.0
+    left = centre + outward * max(0.0, radius + sign * half)
+    right = centre + outward * max(0.0, radius - sign * half)
+    return Outline(left, right, along)
+
+
+def _join(
+    wall: PlanWall,
+    other: PlanWall,
+    at_start: bool,
+    sides: tuple[Points2, Points2],
+    bare: dict[str, Outline],
+    order: dict[str, int],
+) -> None:
+    # Replace the wall's two points at one end by the crossings of the side lines.
+    other_at_start = _joins_at_start(wall, other, at_start)
+    if other_at_start is None:
+        return
+    limit = MITRE_LIMIT * max(wall.thickness, other.thickness)
+    mine, theirs = bare[wall.id], bare[other.id]
+    here, inner = (0, 1) if at_start else (-1, -2)
+    there, beyond = (0, 1) if other_at_start else (-1, -2)
+    # Two walls that both start (or both end) at the joint run against each other.
+    swapped = at_start == other_at_start
+    pairs = (
+        (sides[0], mine.left, theirs.right if swapped else theirs.left),
+        (sides[1], mine.right, theirs.left if swapped else theirs.right),
+    )
+    for target, line, facing in pairs:
+        a = (line[here], line[inner])
+        b = (facing[there], facing[beyond])
+        if order[wall.id] > order[other.id]:
+            a, b = b, a
+        crossing = _crossing(*a, *b)
+        if crossing is None:
+            continue
+        if math.dist(crossing, line[here]) < limit:
+            target[here] = crossing
+
+
+def _joins_at_start(wall: PlanWall, other: PlanWall, at_start: bool) -> bool | None:
+    # Which end of the other wall meets this one; by its own links, else by the nearer end.
+    back_start, back_end = other.at_start == wall.id, other.at_end == wall.id
+    if back_start != back_end:
+        return back_start
+    if not back_start:
+        return None
+    point = wall.start if at_start else wall.end
+    return math.dist(other.start, point) <= math.dist(other.end, point)
+
+
+def _crossing(p0: Points2, p1: Points2, q0: Points2, q1: Points2) -> Points2 | None:
+    # Where two lines meet, None if they are parallel to within 1e-6 or so.
+    d, e = p1 - p0, q1 - q0
+    turn = d[0] * e[1] - d[1] * e[0]
+    if abs(turn) <= 1e-5 * float(np.linalg.norm(d) * np.linalg.norm(e)):
+        return None
+    w = q0 - p0
+    t = (w[0] * e[1] - w[1] * e[0]) / turn
+    return np.asarray(p0 + t * d)

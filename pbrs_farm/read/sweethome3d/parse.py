@@ -1,0 +1,155 @@
+"""The XML tree of a home -> Plan; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from pbrs_farm.errors import BadHouse
+from pbrs_farm.read.sweethome3d.attributes import Attributes
+from pbrs_farm.read.sweethome3d.paints import baseboard_of, room_paint, wall_paint
+from pbrs_farm.read.sweethome3d.parse_pieces import parse_piece
+from pbrs_farm.read.sweethome3d.plan import (
+    Plan,
+    PlanCamera,
+    PlanLevel,
+    PlanRoom,
+    PlanWall,
+    as_points,
+)
+
+MAX_PIECES = 20_000
+_PIECES = frozenset({"pieceOfFurniture", "doorOrWindow", "light", "shelfUnit"})
+FALLBACK_HEIGHT_M = 2.5
+
+
+def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
+    """Read every element the pipeline uses; BadHouse names the element that is wrong."""
+    home = Attributes(file, "home", root, max_extent_m)
+    wall_height = home.length("wallHeight", FALLBACK_HEIGHT_M)
+
+    def open_(element: Element, place: str) -> Attributes:
+        return Attributes(file, place, element, max_extent_m)
+
+    walls = tuple(
+        _wall(open_(e, f"wall {e.get('id', f'#{k}')}"), k, wall_height)
+        for k, e in enumerate(root.findall("wall"))
+    )
+    rooms = tuple(
+        _room(open_(e, f"room #{k} '{e.get('name', '')}'"))
+        for k, e in enumerate(root.findall("room"))
+    )
+    pieces = tuple(
+        parse_piece(open_(e, f"{e.tag} #{k} '{e.get('name', '')}'"), level)
+        for k, (e, level) in enumerate(_furniture(root, file))
+        if e.get("visible", "true") != "false"
+    )
+    cameras = tuple(
+        _camera(open_(e, f"camera '{e.get('name', '')}'"), k)
+        for k, e in enumerate(
+            e for e in root if e.get("attribute") == "storedCamera" and "amera" in e.tag
+        )
+    )
+    return Plan(
+        name=root.get("name", ""),
+        version=root.get("version", ""),
+        wall_height=wall_height,
+        properties={e.get("name", ""): e.get("value", "") for e in root.findall("property")},
+        levels=_levels([open_(e, f"level {e.get('id', '')}") for e in root.findall("level")]),
+        walls=walls,
+        rooms=rooms,
+        pieces=pieces,
+        cameras=cameras,
+    )
+
+
+def _furniture(root: Element, file: str) -> Iterator[tuple[Element, str]]:
+    # Pieces in document order with their level; a group's pieces have absolute coordinates.
+    n = 0
+    stack = [(e, "") for e in reversed(list(root))]
+    while stack:
+        element, level = stack.pop()
+        if element.tag == "furnitureGroup":
+            if element.get("visible", "true") != "false":
+                inherited = element.get("level", level)
+                stack += [(e, inherited) for e in reversed(list(element))]
+        elif element.tag in _PIECES:
+            n += 1
+            if n > MAX_PIECES:
+                raise BadHouse(file, "", f"more than {MAX_PIECES} pieces of furniture")
+            yield element, element.get("level", level)
+            if element.tag == "shelfUnit":
+                stack += [(e, element.get("level", level)) for e in reversed(list(element))]
+
+
+def _levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
+    found = [
+        (a.metres("elevation", 0.0), a.number("elevationIndex", 0.0), k)
+        for k, a in enumerate(elements)
+    ]
+    lowest = min((f[0] for f in found), default=0.0)
+    levels = []
+    for index, (elevation, _, k) in enumerate(sorted(found)):
+        a = elements[k]
+        thickness = a.length("floorThickness", 0.12)
+        levels.append(
+            PlanLevel(
+                id=a.text("id"),
+                name=a.text("name"),
+                elevation=elevation,
+                floor_thickness=thickness,
+                height=a.length("height", FALLBACK_HEIGHT_M),
+                is_visible=a.flag("visible", True) and a.flag("viewable", True),
+                index=index,
+                reach_down=thickness if elevation > lowest else 0.0,
+            )
+        )
+    return tuple(levels)
+
+
+def _wall(a: Attributes, number: int, wall_height: float) -> PlanWall:
+    boards = [b for e in a.element.findall("baseboard") if (b := baseboard_of(a, e)) is not None]
+    return PlanWall(
+        id=a.text("id", f"#{number}"),
+        level=a.text("level"),
+        start=(a.metres("xStart"), a.metres("yStart")),
+        end=(a.metres("xEnd"), a.metres("yEnd")),
+        thickness=a.length("thickness", 0.1),
+        height=a.length("height", wall_height),
+        height_end=a.optional_metres("heightAtEnd"),
+        arc=a.number("arcExtent", 0.0),
+        at_start=a.text("wallAtStart"),
+        at_end=a.text("wallAtEnd"),
+        left=wall_paint(a, "left"),
+        right=wall_paint(a, "right"),
+        top=wall_paint(a, "top"),
+        baseboards=tuple(boards),
+    )
+
+
+def _room(a: Attributes) -> PlanRoom:
+    points = [
+        Attributes(a.file, f"{a.place} point #{k}", e, a.max_extent_m)
+        for k, e in enumerate(a.element.findall("point"))
+    ]
+    return PlanRoom(
+        place=a.place,
+        level=a.text("level"),
+        name=a.text("name"),
+        points=as_points([(p.metres("x"), p.metres("y")) for p in points]),
+        has_floor=a.flag("floorVisible", True),
+        has_ceiling=a.flag("ceilingVisible", True),
+        floor=room_paint(a, "floor"),
+        ceiling=room_paint(a, "ceiling"),
+        is_ceiling_flat=a.flag("ceilingFlat", False),
+    )
+
+
+def _camera(a: Attributes, number: int) -> PlanCamera:
+    return PlanCamera(
+        name=a.text("name", f"camera {number}"),
+        at=(a.metres("x"), a.metres("y"), a.metres("z")),
+        yaw=a.number("yaw", 0.0),
+        pitch=a.number("pitch", 0.0),
+        hfov=min(max(a.number("fieldOfView", 1.1), 0.05), 3.0),
+    )

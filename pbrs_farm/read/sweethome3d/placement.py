@@ -1,0 +1,136 @@
+"""A piece of furniture -> its frame in the world and its placed surfaces; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.frames import rotation_y
+from pbrs_farm.house import Box, Surface
+from pbrs_farm.read.obj import Mesh
+from pbrs_farm.read.sweethome3d.finish import Finish
+from pbrs_farm.read.sweethome3d.models import Model
+from pbrs_farm.read.sweethome3d.plan import Picture, PlanLevel, PlanPiece
+from pbrs_farm.read.sweethome3d.walls import picture_uvs
+
+F64 = NDArray[np.float64]
+_FLAT = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A piece's own frame: origin in its box's middle, x right, y up, z to its front, metres.
+
+    axes: (3, 3), columns are the frame's unit axes in the world. half: half extents of its box.
+    mirror: -1 if the model is mirrored along x, else 1.
+    """
+
+    origin: F64
+    axes: F64
+    half: F64
+    mirror: float
+
+    @property
+    def box(self) -> Box:
+        """The piece's oriented box."""
+        return Box(self.origin, self.half, self.axes)
+
+    def world(self, local: F64) -> F64:
+        """(N, 3) world points of local ones."""
+        return np.asarray(local @ self.axes.T + self.origin)
+
+
+def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None) -> Frame:
+    """Where a piece stands. local_height: (N, 3) its local points, to measure a tilted height."""
+    width, depth, height = piece.size
+    half = np.array([width, height, depth]) / 2
+    tilt = _rotation_z(-piece.roll) @ _rotation_x(-piece.pitch)
+    axes = rotation_y(-piece.angle) @ tilt
+    in_plan = height
+    if piece.pitch or piece.roll:
+        if local_height is not None and len(local_height):
+            rotated_y = local_height @ tilt.T[:, 1]
+            in_plan = float(rotated_y.max() - rotated_y.min())
+        elif piece.height_in_plan is not None:
+            in_plan = piece.height_in_plan
+    x, z = piece.centre
+    origin = np.array([x, level.elevation + piece.elevation + in_plan / 2, z])
+    return Frame(origin, axes, half, -1.0 if piece.is_mirrored else 1.0)
+
+
+def local_from_model(piece: PlanPiece, model: Model) -> F64:
+    """(4, 4) from the model's frame to the piece's: centred, turned, scaled to the piece's size."""
+    turn = np.eye(3) if piece.rotation is None else np.array(piece.rotation).reshape(3, 3)
+    centre = (model.low + model.high) / 2
+    if piece.rotation is None:
+        low, high = model.low - centre, model.high - centre
+    else:
+        points = [(m.positions - centre) @ turn.T for m in model.meshes] or [np.zeros((1, 3))]
+        low = np.min([p.min(0) for p in points], axis=0)
+        high = np.max([p.max(0) for p in points], axis=0)
+    extent = high - low
+    width, depth, height = piece.size
+    scale = np.where(
+        extent > _FLAT, np.array([width, height, depth]) / np.maximum(extent, _FLAT), 1
+    )
+    scale[0] *= -1.0 if piece.is_mirrored else 1.0
+    matrix = np.eye(4)
+    matrix[:3, :3] = scale[:, None] * turn
+    matrix[:3, 3] = -matrix[:3, :3] @ centre - scale * (low + high) / 2
+    return matrix
+
+
+def placed_surface(mesh: Mesh, finish: Finish, frame: Frame, local: F64, matrix: F64) -> Surface:
+    """One mesh of a piece in the world. local: (V, 3) its points in the piece's frame."""
+    linear = frame.axes @ matrix[:3, :3]
+    inverse = _inverse_transpose(linear)
+    normals = mesh.normals @ inverse.T
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(length > 0, length, 1)
+    faces = mesh.faces
+    if np.linalg.det(matrix[:3, :3]) < 0:
+        faces = faces[:, [0, 2, 1]]
+    uvs = mesh.uvs
+    if finish.picture is not None:
+        uvs = _projected(local, normals @ frame.axes, frame.half, finish.picture)
+    return Surface(
+        name=finish.name,
+        positions=np.ascontiguousarray(frame.world(local), np.float32),
+        faces=np.ascontiguousarray(faces, np.int32),
+        material=finish.material,
+        uvs=None if uvs is None else np.ascontiguousarray(uvs, np.float32),
+        normals=np.ascontiguousarray(normals, np.float32),
+    )
+
+
+def _inverse_transpose(linear: F64) -> F64:
+    # A piece flat along an axis has no inverse: its cofactors do, up to a positive scale.
+    a, b, c = linear[:, 0], linear[:, 1], linear[:, 2]
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], -1)
+    return cofactors * (-1.0 if np.linalg.det(linear) < 0 else 1.0)
+
+
+def _projected(local: F64, normals: F64, half: F64, picture: Picture) -> F64:
+    # Metres right and up on the side of the box that each vertex's normal faces.
+    p = local + half
+    axis = np.abs(normals).argmax(1)
+    right = np.where(axis == 0, p[:, 2], p[:, 0])
+    up = np.where(axis == 1, -p[:, 2], p[:, 1])
+    if picture.is_fitting:
+        spans = 2 * np.maximum(half, 1e-6)
+        right = right / np.where(axis == 0, spans[2], spans[0])
+        up = up / np.where(axis == 1, spans[2], spans[1])
+        return np.stack([right, up], -1)
+    return picture_uvs(np.stack([right, up], -1), picture)
+
+
+def _rotation_x(angle: float) -> F64:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def _rotation_z(angle: float) -> F64:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0], [0, 0, 1]])
