@@ -108,7 +108,7 @@ def _edge(
             linked.append(j)
             bare &= ~reached
     open_m = float(bare.sum() * _STEP_M)
-    reason = f"{open_m:.2f} m of its edge have no full-height wall" if open_m > _OPEN_EDGE_M else ""
+    reason = f"{open_m:.1f} m of its edge have no full-height wall" if open_m > _OPEN_EDGE_M else ""
     return linked, reason
 
 
@@ -179,8 +179,10 @@ def _cover(
             linked.append(j)
             bare = plan.without(bare, plan.grown(areas[j], GAP_M))
     what = "ceiling" if above else "floor"
-    reason = f"{_area(bare):.2f} m2 of it have no {what}" if _area(bare) > _OPEN_AREA_M2 else ""
-    return linked, reason
+    if _area(bare) <= _OPEN_AREA_M2:
+        return linked, ""
+    exact = plan.common(plan.without(areas[i], *near), plan.grown(bare, 2 * GAP_M))
+    return linked, f"{_area(exact):.1f} m2 of it have no {what}"
 
 
 def _area(shape: plan.Shape) -> float:

@@ -52,8 +52,8 @@ class LeakMeter:
     rays from each; n_inside: random points per space; n_bounces: after the first flight.
     """
 
-    step_m: float = 0.03
-    per_start: int = 24
+    step_m: float = 0.025
+    per_start: int = 48
     n_inside: int = 1000
     per_inside: int = 48
     n_bounces: int = 2

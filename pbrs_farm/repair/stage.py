@@ -17,6 +17,7 @@ from pbrs_farm.repair.leaks import leaks_of_house
 from pbrs_farm.repair.lit import with_lit_rooms
 from pbrs_farm.repair.occluder import Occluder
 from pbrs_farm.repair.report import RepairReport, RoomAudit
+from pbrs_farm.repair.shades import with_shades
 from pbrs_farm.repair.structure import repaired_structure, with_structure
 
 
@@ -46,6 +47,8 @@ def repair(
     # The lights.
     house, sources = with_bulbs(house, fields)
     house, given = with_lit_rooms(house, fallback=fields.fallback_light)
+    if occluder_from is not None:
+        house, sources = with_shades(house, sources, fields, occluder_from)
 
     # What is closed, and whether it is tight.
     house = replace(house, rooms=_with_enclosure(house.rooms, structure.spaces), is_repaired=True)

@@ -1,0 +1,139 @@
+"""Bulbs, escape and shades of single lamps, built in code."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pbrs_farm.house import House, Item, ItemKind, LightPart, Material, MaterialKind, Surface
+from pbrs_farm.lighting import PowerUnit
+from pbrs_farm.read.builtin import builtin_home
+from pbrs_farm.recipe import RepairFields
+from pbrs_farm.repair.bulbs import icosphere, triangles_of, with_bulbs
+from pbrs_farm.repair.distance import distance_to_triangles
+from pbrs_farm.repair.lit import with_lit_rooms
+from pbrs_farm.repair.patches import face_areas
+from pbrs_farm.repair.shades import with_shades
+from tests.repair.embree import EmbreeOccluder
+
+FIELDS = RepairFields()
+WHITE = Material("white")
+
+
+def _ball(radius: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Surface:
+    return icosphere("ball", np.array(centre), radius, 0, n_splits=3)
+
+
+def _half_ball(radius: float) -> Surface:
+    ball = _ball(radius)
+    above = ball.positions[ball.faces][:, :, 1].min(1) > -1e-6
+    return replace(ball, faces=ball.faces[above])
+
+
+def _lamp(*surfaces: Surface, radius_m: float = 0.03) -> House:
+    light = LightPart((0.0, 0.0, 0.0), radius_m, 0.5, PowerUnit.SWEETHOME3D)
+    item = Item("lamp", "lamp", ItemKind.LAMP, "0", surfaces, lights=(light,))
+    home = builtin_home()
+    return replace(home, items=(item,), materials=(WHITE,), rooms=())
+
+
+def _with_shades(house: House) -> tuple[House, float, float]:
+    house, sources = with_bulbs(house, FIELDS)
+    house, sources = with_shades(house, sources, FIELDS, EmbreeOccluder)
+    before, after = sources[0].escape_before, sources[0].escape
+    assert before is not None
+    assert after is not None
+    assert house.items[0].lights[0].escape == after
+    return house, before, after
+
+
+def test_the_bulb_has_the_sources_radius_where_there_is_room() -> None:
+    house, (source,) = with_bulbs(_lamp(_ball(0.2)), FIELDS)
+    assert (source.bulb_added, source.radius_m, source.moved_m) == (True, 0.03, 0.0)
+    bulb = house.items[0].surfaces[house.items[0].lights[0].emitting[0]]
+    assert house.materials[bulb.material].kind is MaterialKind.BULB
+    assert np.linalg.norm(bulb.positions, axis=1) == pytest.approx(0.03, abs=1e-7)
+    assert face_areas(bulb.positions, bulb.faces).sum() == pytest.approx(4 * np.pi * 0.03**2, rel=0.03)  # fmt: skip
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.tuples(*[st.floats(-0.05, 0.05)] * 3),
+    st.floats(0.01, 0.06),
+)
+def test_the_bulb_touches_nothing_of_its_lamp(
+    centre: tuple[float, float, float], radius: float
+) -> None:
+    # Whatever ball stands in the way, through the light's centre or around it.
+    lamp = _lamp(_ball(radius, centre))
+    house, (source,) = with_bulbs(lamp, FIELDS)
+    place = np.array(house.items[0].lights[0].position)
+    free = distance_to_triangles(place, triangles_of(lamp.items[0])).min()
+    assert free > source.radius_m > 0.0005
+    assert source.moved_m <= 0.03 + 1e-9
+
+
+def test_a_naked_bulb_loses_nothing() -> None:
+    _, before, after = _with_shades(_lamp())
+    assert (before, after) == (1.0, 1.0)
+
+
+def test_half_a_ball_around_the_bulb_leaves_half_the_light() -> None:
+    house, before, after = _with_shades(_lamp(_half_ball(0.2)))
+    # The sphere has equator triangles on both sides: nearly half of it is left.
+    covered = face_areas(house.items[0].surfaces[0].positions, house.items[0].surfaces[0].faces)
+    assert before == after == pytest.approx(1 - covered.sum() / (4 * np.pi * 0.04), abs=0.03)
+    assert all(m.kind is not MaterialKind.SHADE for m in house.materials)
+
+
+def test_a_closed_ball_becomes_a_shade_that_lets_its_share_through() -> None:
+    house, before, after = _with_shades(_lamp(_ball(0.2)))
+    assert before == 0.0
+    assert after == pytest.approx(FIELDS.shade_transmission, abs=1e-4)
+    assert house.materials[house.items[0].surfaces[0].material].kind is MaterialKind.SHADE
+
+
+def test_only_the_part_that_encloses_becomes_a_shade() -> None:
+    # Shade and foot are one surface of one material; the foot stays opaque.
+    ball, foot = _ball(0.2), _ball(0.1, (0.0, -0.6, 0.0))
+    both = replace(
+        ball,
+        positions=np.concatenate([ball.positions, foot.positions]),
+        faces=np.concatenate([ball.faces, foot.faces + len(ball.positions)]),
+        normals=None,
+    )
+    house, _, after = _with_shades(_lamp(both))
+    kinds = [house.materials[s.material].kind for s in house.items[0].surfaces]
+    assert kinds == [MaterialKind.OPAQUE, MaterialKind.BULB, MaterialKind.SHADE]
+    assert [len(s.faces) for s in house.items[0].surfaces][::2] == [
+        len(foot.faces),
+        len(ball.faces),
+    ]
+    assert 0.35 < after < 0.4
+    assert house.items[0].lights[0].emitting == (1,)
+
+
+def test_a_room_that_nothing_lights_gets_a_ceiling_light() -> None:
+    home = builtin_home()
+    dark = replace(home, openings=(), items=tuple(i for i in home.items if not i.lights))
+    house, given_to = with_lit_rooms(dark, fallback=True)
+    assert given_to == ["0_0", "0_1"]
+    assert {r.lit_by for r in house.rooms} == {("fallback",)}
+    lamp = house.items[-1]
+    assert (lamp.id, lamp.nyu40, lamp.tags) == ("fallback_0_1", 35, ("fallback",))
+    assert house.materials[lamp.surfaces[0].material].kind is MaterialKind.BULB
+    low, high = lamp.bounds
+    assert low[1] > 2.0
+    assert high[1] < 2.5
+
+
+def test_the_fallback_light_can_be_switched_off() -> None:
+    home = builtin_home()
+    dark = replace(home, openings=(), items=tuple(i for i in home.items if not i.lights))
+    house, given_to = with_lit_rooms(dark, fallback=False)
+    assert given_to == []
+    assert {r.lit_by for r in house.rooms} == {()}
