@@ -100,7 +100,8 @@ def _depth_span(
         if standing.high < low_y + 0.01 or standing.low > high_y - 0.01:
             continue
         shared = shapely.intersection(piece, standing.polygon)
-        if shared.area < 1e-4 * min(piece.area, standing.polygon.area):
+        smaller = min(piece.area, float(shapely.area(standing.polygon)))
+        if shared.area < 1e-4 * smaller:
             continue
         z = _depths(shared, frame)
         if _is_along(standing.wall, frame) and door.cuts_both_sides:
