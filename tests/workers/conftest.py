@@ -1,0 +1,56 @@
+"""One redis-server for the folder's tests; each test has its own key prefix in it."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from pydantic import SecretStr
+
+from pbrs_farm.recipe import recipe_from_name
+from tests.workers.redis_server import RedisServer
+from workers.config import FarmConfig
+from workers.job import JobRules, JobSpec
+from workers.redis_ledger import RedisLedger
+
+
+@pytest.fixture(scope="session")
+def redis_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RedisServer]:
+    server = RedisServer(tmp_path_factory.mktemp("redis"))
+    server.start()
+    yield server
+    server.end()
+
+
+@pytest.fixture
+def config(redis_server: RedisServer, tmp_path: Path) -> FarmConfig:
+    return FarmConfig(
+        redis_url=SecretStr(redis_server.url),
+        store_url=(tmp_path / "store").as_uri(),
+        prefix=f"t{secrets.token_hex(3)}:",
+        worker="w1",
+        scratch=tmp_path,
+        lease_s=0.3,
+        beat_s=0.05,
+        retry_delay_s=0.0,
+        window_min=100,
+    )
+
+
+@pytest.fixture
+def ledger(config: FarmConfig) -> Iterator[RedisLedger]:
+    ledger = RedisLedger(config)
+    yield ledger
+    ledger.client.close()
+
+
+def spec(n_houses: int, job_id: str = "0123456789ab", **rules: object) -> JobSpec:
+    return JobSpec(
+        job_id=job_id,
+        version="0.1.0",
+        recipe=recipe_from_name("preview"),
+        n_houses=n_houses,
+        rules=JobRules.model_validate(rules),
+    )

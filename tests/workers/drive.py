@@ -1,0 +1,92 @@
+"""Drives a ledger by hand, as a coordinator and workers would, without Celery."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from tests.workers.conftest import spec
+from workers.config import FarmConfig
+from workers.ids import STAGES
+from workers.job import HouseEntry, JobSpec
+from workers.ledger import Claim, Fault, FaultClass, Finished
+from workers.redis_ledger import RedisLedger
+
+ROOM = dict.fromkeys(STAGES, 100)
+GROUPS = (("a", "b"), ("c",))
+
+
+@dataclass
+class Drive:
+    """A job of n houses in a ledger, with a leader and any worker's hands."""
+
+    ledger: RedisLedger
+    job: JobSpec
+    leader: str = "leader"
+    ran: Counter[str] = field(default_factory=Counter)
+
+    def feed(self) -> list[str]:
+        assert self.ledger.lead(self.leader)
+        tasks = self.ledger.feed(self.job.job_id, self.leader, max_open=100, room=ROOM)
+        assert tasks is not None
+        return tasks
+
+    def claim(self, task: str, worker: str = "w1", *, direct: bool = False) -> Claim:
+        config = self.ledger.config.model_copy(update={"worker": worker})
+        other = RedisLedger(config, self.ledger.client)
+        return other.claim(
+            self.job.job_id, task, token=f"{worker}:{task}:{self.ran[task]}",
+            recipe=self.job.recipe.digest(), direct=direct,
+        )  # fmt: skip
+
+    def run(self, task: str, groups: tuple[tuple[str, ...], ...] = GROUPS) -> None:
+        """Claim, and finish well."""
+        claim = self.claim(task)
+        assert claim.verdict == "run", (task, claim)
+        self.ran[task] += 1
+        self.finish(task, claim, groups)
+
+    def finish(self, task: str, claim: Claim, groups: tuple[tuple[str, ...], ...] = GROUPS) -> None:
+        stage = task.rpartition("/")[2]
+        end = Finished(1.0, groups if stage == "geometry" else (), 1)
+        self.ledger.finish(self.job.job_id, task, claim.token, end, sticky=False)
+
+    def fail(self, task: str, claim: Claim, kind: FaultClass = "crash", worker: str = "w1") -> str:
+        fault = Fault(fault=kind, fingerprint=kind, message=kind, worker=worker)
+        config = self.ledger.config.model_copy(update={"worker": worker})
+        other = RedisLedger(config, self.ledger.client)
+        return other.fail(self.job.job_id, task, claim.token, fault, delay_s=0.0)
+
+    def run_all(self) -> None:
+        """Feed and run until nothing comes any more."""
+        while tasks := self.feed():
+            for task in tasks:
+                self.run(task)
+
+    @property
+    def counts(self) -> dict[str, float]:
+        view = self.ledger.view(self.job.job_id)
+        assert view is not None
+        return {k: v for k, v in view.counts.items() if v}
+
+    @property
+    def state(self) -> str:
+        view = self.ledger.view(self.job.job_id)
+        assert view is not None
+        return view.state
+
+
+def drive(ledger: RedisLedger, n_houses: int, **rules: object) -> Drive:
+    """A submitted job of houses h0, h1, ..."""
+    job = spec(n_houses, **rules)
+    assert ledger.create(job) == ""
+    ledger.add_houses(
+        job.job_id, 0, [HouseEntry(house_id=f"h{k}", source="{}") for k in range(n_houses)]
+    )
+    ledger.open(job.job_id, job.priority)
+    return Drive(ledger, job)
+
+
+def with_config(ledger: RedisLedger, **changes: object) -> RedisLedger:
+    config: FarmConfig = ledger.config.model_copy(update=changes)
+    return RedisLedger(config, ledger.client)

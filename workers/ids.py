@@ -1,0 +1,67 @@
+"""Names of the farm's tasks, stages and queues; no effects.
+
+A task is `<house>/<unit>/<stage>`. Unit "-" is the house as a whole, "0", "1", ... its groups of
+views. House "-" is the job: `-/s3/shard` merges shard 3, `-/-/job` ends the job.
+
+    geometry -> each group: gl -> light -> reduce -> (all of a shard) shard -> (all shards) job
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from pbrs_farm.errors import BadInput
+
+GEOMETRY: Final = "geometry"
+GL: Final = "gl"
+LIGHT: Final = "light"
+REDUCE: Final = "reduce"
+SHARD: Final = "shard"
+JOB: Final = "job"
+STAGES: Final = (GEOMETRY, GL, LIGHT, REDUCE, SHARD, JOB)
+QUEUES: Final = (GEOMETRY, GL, LIGHT, "light.gpu", REDUCE)
+WHOLE: Final = "-"
+
+_JOB_ID: Final = re.compile(r"[0-9a-f]{12}")
+_TASK: Final = re.compile(r"([A-Za-z0-9_.\-]{1,120})/(-|[0-9]{1,4}|s[0-9]{1,5})/([a-z]+)")
+
+
+@dataclass(frozen=True, slots=True)
+class TaskId:
+    """One piece of work of a job."""
+
+    house: str
+    unit: str
+    stage: str
+
+    def __str__(self) -> str:
+        return f"{self.house}/{self.unit}/{self.stage}"
+
+
+def task_from_text(text: str) -> TaskId:
+    """The task a word names; raises BadInput when it cannot be one."""
+    match = _TASK.fullmatch(text)
+    if match is None or match[3] not in STAGES:
+        raise BadInput(repr(text[:120]), "", "not a task", hint="HOUSE/UNIT/STAGE")
+    return TaskId(match[1], match[2], match[3])
+
+
+def check_job_id(text: str) -> str:
+    """text itself, if it is 12 hex digits; raises BadInput otherwise."""
+    if not _JOB_ID.fullmatch(text):
+        raise BadInput(repr(text[:40]), "", "not a job", hint="12 hex digits, as `submit` prints")
+    return text
+
+
+def queue_of(stage: str, *, gpu: bool) -> str:
+    """The queue a stage's tasks go to: by kind of worker, not by job."""
+    if stage in (REDUCE, SHARD, JOB):
+        return REDUCE
+    return "light.gpu" if gpu and stage == LIGHT else stage
+
+
+def stages_of_queue(queue: str) -> tuple[str, ...]:
+    """The stages whose tasks a queue carries."""
+    return tuple(s for s in STAGES if queue in (queue_of(s, gpu=False), queue_of(s, gpu=True)))

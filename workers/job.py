@@ -1,0 +1,91 @@
+"""What a job is and where its own objects are stored; frozen values, no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from pbrs_farm import keys
+from pbrs_farm.recipe import Recipe
+from workers.ids import GL, LIGHT
+
+
+class HouseEntry(BaseModel):
+    """A house of a job. source: JSON the runner understands; it travels to the geometry task only.
+
+    sha256: of the source, so that a house that changed since submission is told.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    house_id: str
+    source: str = ""
+    sha256: str = ""
+
+
+class JobRules(BaseModel):
+    """When to give up on a task, a house, a job."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    max_attempts: int = Field(3, ge=1)
+    failed_share: float = Field(0.5, description="of a house's groups; more quarantines the house")
+    max_quarantined: int = Field(20, ge=1, description="houses; fewer never pause a job")
+    quarantined_share: float = Field(0.2, description="of closed houses; more pauses the job")
+    max_same_failure: int = Field(50, ge=1, description="alike for good; as many pause the job")
+    shard_size: int = Field(500, ge=1, description="houses merged by one task")
+
+
+class JobSpec(BaseModel):
+    """Everything a job is made with except its houses; stored as jobs/<id>/job.json."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    job_id: str
+    version: str
+    recipe: Recipe
+    modes: tuple[str, ...] = ()
+    layers: tuple[str, ...] = ()
+    n_views: int = 0
+    gpu: bool = False
+    priority: int = Field(5, ge=0, le=9, description="0 goes first")
+    group_stages: tuple[str, ...] = (GL, LIGHT)
+    seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the groups")
+    reference: str = Field("", description="folder of reference pairs for selection, or none")
+    rules: JobRules = JobRules()
+    n_houses: int = 0
+
+
+def job_id(spec: JobSpec, houses: Iterable[HouseEntry]) -> str:
+    """The id of a job: equal for equal work, so that submitting twice is submitting once."""
+    plain = spec.model_dump(mode="json", exclude={"job_id", "priority", "rules", "n_houses"})
+    plain["recipe"] = spec.recipe.digest()
+    return keys.digest(plain, [[h.house_id, h.sha256] for h in houses])[:12]
+
+
+def job_key(job: str, file: str = "job.json") -> str:
+    """Key of one of the job's own objects: job.json, houses.jsonl, logs/..., failed/..."""
+    return f"jobs/{job}/{file}"
+
+
+def log_key(job: str, task: str, attempt: int) -> str:
+    """Key of a task's log: of a failed attempt, and of a long one while it runs."""
+    return job_key(job, f"logs/{_flat(task)}.{attempt}.txt")
+
+
+def failed_key(job: str, task: str) -> str:
+    """Key of the record of a task that failed for good; survives the loss of Redis."""
+    return job_key(job, f"failed/{_flat(task)}.json")
+
+
+def _flat(task: str) -> str:
+    return task.replace("-/", "whole/", 1) if task.startswith("-/") else task
+
+
+def lines_from_houses(houses: Iterable[HouseEntry]) -> bytes:
+    """houses.jsonl: a house a line, in the job's order."""
+    return "".join(house.model_dump_json() + "\n" for house in houses).encode()
+
+
+def houses_from_lines(data: bytes) -> Iterator[HouseEntry]:
+    """The houses of a houses.jsonl."""
+    for line in data.splitlines():
+        yield HouseEntry.model_validate_json(line)

@@ -1,0 +1,24 @@
+"""Log lines of the farm's processes: one line each, never a password. Effects: logging set-up."""
+
+from __future__ import annotations
+
+import logging
+import re
+import sys
+from typing import Final
+
+_SECRETS: Final = re.compile(r"(rediss?://[^:/@\s]*:)[^@\s]+@")
+
+
+class _NoSecrets(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return _SECRETS.sub(r"\1***@", super().format(record))
+
+
+def log_plainly(level: int | str = "INFO") -> None:
+    """Log to stderr with time, process and level; passwords in URLs are blotted out."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(_NoSecrets("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
+    root = logging.getLogger()
+    root.handlers[:] = [handler]
+    root.setLevel(level)

@@ -1,0 +1,59 @@
+-- Moves due and ready tasks towards the queues. ARGV: leader token, most open houses, then pairs of
+-- stage and how many of it may be sent -> {tasks to send...}, or "not leading"
+if not leads(ARGV[1]) then return 'not leading' end
+local t = now()
+for _, task in ipairs(redis.call('ZRANGEBYSCORE', P .. 'later', '-inf', t, 'LIMIT', 0, 500)) do
+  local house, unit, stage = split(task)
+  redis.call('ZREM', P .. 'later', task)
+  local at_stage, letter = unit_at(house, unit)
+  if at_stage == stage and letter == 'w' then redis.call('LPUSH', P .. 'out:' .. stage, task) end
+end
+local running = redis.call('HGET', P .. 'job', 'state') == 'running'
+
+-- Admit houses, in order, while few are open.
+local open = tonumber(redis.call('HGET', P .. 'n', 'houses:open') or '0')
+local admitted = 0
+while running and open < tonumber(ARGV[2]) and admitted < 200 do
+  local entry = redis.call('LPOP', P .. 'order')
+  if not entry then break end
+  local i, house = string.match(entry, '^(%d+)|(.*)$')
+  local key = house_key(house)
+  local known = redis.call('HGET', key, 's')
+  if not known then
+    redis.call('HSET', key, 'i', i, 's', 'open')
+    ready(house, '-', 'geometry', 'RPUSH')
+    open = open + 1
+    bump('houses:open', 1)
+  elseif known == 'loaded' then
+    redis.call('HSET', key, 's', 'open')
+    local fields = redis.call('HGETALL', key)
+    for j = 1, #fields, 2 do
+      local stage = string.match(fields[j + 1], '^(%l+):l$')
+      if stage then ready(house, fields[j], stage, 'RPUSH') end
+    end
+    open = open + 1
+    bump('houses:open', 1)
+  end
+  admitted = admitted + 1
+end
+
+local sent = {}
+for i = 3, #ARGV, 2 do
+  local stage, room = ARGV[i], tonumber(ARGV[i + 1])
+  while room > 0 and (running or stage == 'job') do
+    local batch = redis.call('LPOP', P .. 'out:' .. stage, room)
+    if not batch then break end
+    for _, task in ipairs(batch) do
+      local house, unit = split(task)
+      local at_stage, letter = unit_at(house, unit)
+      -- Anything else was cancelled, or taken without a message.
+      if at_stage == stage and letter == 'w' then
+        set_unit(house, unit, stage, 'q')
+        redis.call('ZADD', P .. 'queued', t, task)
+        sent[#sent + 1] = task
+        room = room - 1
+      end
+    end
+  end
+end
+return sent

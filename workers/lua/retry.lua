@@ -1,0 +1,63 @@
+-- A task that failed for good gets fresh attempts. ARGV: task -> 1 | 0 (had not failed)
+local task = ARGV[1]
+local house, unit, stage = split(task)
+if not house then return 0 end
+local at_stage, letter = unit_at(house, unit)
+if at_stage ~= stage or letter ~= 'f' then return 0 end
+redis.call('HDEL', P .. 'failed', task)
+local key = house_key(house)
+
+-- A closed house opens again, and with it its shard and the job's reduction.
+local function open_again(how)
+  bump('houses:' .. how, -1)
+  bump('houses:open', 1)
+  redis.call('HSET', key, 's', 'open')
+  local shard = math.floor(tonumber(redis.call('HGET', key, 'i'))
+    / tonumber(redis.call('HGET', P .. 'job', 'shard_size')))
+  if redis.call('HINCRBY', P .. 'shards', shard, 1) == 1 then
+    local _, at = unit_at('-', 's' .. shard)
+    if at == 'd' then
+      bump('done:shard', -1)
+      redis.call('HINCRBY', P .. 'job', 'shards_left', 1)
+      set_unit('-', 's' .. shard, 'shard', 'x')
+    end
+    local _, last = unit_at('-', '-')
+    if last == 'd' then
+      bump('done:job', -1)
+      set_unit('-', '-', 'job', 'x')
+    end
+  end
+  local at_reduce, at = unit_at(house, '-')
+  if at_reduce == 'reduce' and at == 'd' then bump('done:reduce', -1) end
+end
+
+local function recount()
+  local left, n_failed = 0, 0
+  local fields = redis.call('HGETALL', key)
+  for i = 1, #fields, 2 do
+    local s, at = string.match(fields[i + 1], '^(%l+):(%l)$')
+    if s and fields[i] ~= '-' then
+      if at == 'x' then
+        ready(house, fields[i], s, 'RPUSH') -- what the quarantine took away
+        left = left + 1
+      elseif at == 'f' then
+        n_failed = n_failed + 1
+      elseif at ~= 'd' then
+        left = left + 1
+      end
+    end
+  end
+  redis.call('HSET', key, 'left', left, 'nf', n_failed)
+end
+
+if house ~= '-' then
+  local how = redis.call('HGET', key, 's')
+  if how ~= 'open' then open_again(how) end
+end
+ready(house, unit, stage, 'LPUSH')
+if house ~= '-' then recount() end
+if redis.call('HGET', P .. 'job', 'state') == 'done' then
+  redis.call('HSET', P .. 'job', 'state', 'running', 'reason', '')
+  redis.call('ZADD', G .. 'jobs', redis.call('HGET', P .. 'job', 'priority'), job_of(P))
+end
+return 1

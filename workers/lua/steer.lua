@@ -1,0 +1,24 @@
+-- pause, resume, cancel, reduce. ARGV: what, reason -> the job's state afterwards, "" if unknown
+local state = redis.call('HGET', P .. 'job', 'state')
+if not state then return '' end
+if ARGV[1] == 'pause' then
+  pause_job(ARGV[2])
+elseif ARGV[1] == 'resume' and state == 'paused' then
+  redis.call('HSET', P .. 'job', 'state', 'running', 'reason', '')
+elseif ARGV[1] == 'cancel' and state ~= 'done' then
+  redis.call('HSET', P .. 'job', 'state', 'cancelled', 'reason', ARGV[2], 'ended', now())
+  redis.call('ZREM', G .. 'jobs', job_of(P))
+  redis.call('DEL', P .. 'order', P .. 'later')
+  for _, stage in ipairs({ 'geometry', 'gl', 'light', 'reduce', 'shard', 'job' }) do
+    redis.call('DEL', P .. 'out:' .. stage)
+  end
+elseif ARGV[1] == 'reduce' and state ~= 'cancelled' then
+  local _, letter = unit_at('-', '-')
+  if letter ~= 'w' and letter ~= 'q' and letter ~= 'r' then
+    if letter == 'd' then bump('done:job', -1) end
+    ready('-', '-', 'job', 'LPUSH')
+    if state == 'done' then redis.call('HSET', P .. 'job', 'state', 'running') end
+    redis.call('ZADD', G .. 'jobs', redis.call('HGET', P .. 'job', 'priority'), job_of(P))
+  end
+end
+return redis.call('HGET', P .. 'job', 'state')

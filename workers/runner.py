@@ -1,0 +1,77 @@
+"""What the farm asks of whatever makes the pictures; values and one interface, no effects.
+
+A renderer process holds one runner and gives it tasks one after another. The runner keeps loaded
+what the next task may need (scenes), writes outputs and markers to the store, and may be killed
+at any time: a task that is run again finds its markers and does only what is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Literal, Protocol
+
+from pydantic import BaseModel, ConfigDict
+
+from pbrs_farm.errors import BadInput
+from workers.config import FarmConfig
+from workers.ledger import FaultClass
+
+Tell = Callable[[str], None]
+
+
+class Request(BaseModel):
+    """A task for the runner. views: of its group. source: of the house, for geometry only."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    job_id: str
+    house: str
+    unit: str
+    stage: str
+    views: tuple[str, ...] = ()
+    source: str = ""
+    attempt: int = 1
+
+
+class Result(BaseModel):
+    """What came of it. groups: of views to be made, only after geometry."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    groups: tuple[tuple[str, ...], ...] = ()
+    n_views: int = 0
+
+
+class Reply(BaseModel):
+    """A line from the renderer: a sign of life, trouble with storage, or the end of the task."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    kind: Literal["ready", "step", "storage", "done", "fault"]
+    text: str = ""
+    result: Result | None = None
+    fault: FaultClass | None = None
+    fingerprint: str = ""
+
+
+class StepRunner(Protocol):
+    """Runs the steps of a task; raises the errors of pbrs_farm.errors."""
+
+    def run(self, request: Request, tell: Tell) -> Result:
+        """Do what the markers say is missing. tell: called with the name of each step begun."""
+        ...
+
+
+RunnerMaker = Callable[[FarmConfig, Tell], StepRunner]
+
+
+def runner_maker(name: str) -> RunnerMaker:
+    """The function a `module:function` of this machine's own configuration names.
+
+    It is called with the configuration and with what to call while storage does not answer.
+    Names never come from messages. Raises BadInput.
+    """
+    module, _, attribute = name.partition(":")
+    try:
+        maker: RunnerMaker = getattr(import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise BadInput("PBRS_FARM_RUNNER", name, f"no such runner: {error}") from None
+    return maker
