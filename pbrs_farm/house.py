@@ -198,6 +198,7 @@ class Opening:
     cutter: a closed solid in the world that repair subtracts from every wall it touches.
     quad: (4, 3) corners of the opening's rectangle in the wall's middle plane, in order around.
     normal: (3,) unit, across the wall, either way. item_id: the door or window, or None.
+    is_cut: the source's walls have the hole already; the cutter then is its plug.
     """
 
     id: str
@@ -207,6 +208,7 @@ class Opening:
     cutter: Surface
     quad: NDArray[np.float64]
     normal: NDArray[np.float64]
+    is_cut: bool = False
 
 
 class Enclosure(StrEnum):

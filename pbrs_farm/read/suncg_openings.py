@@ -1,7 +1,7 @@
 """Holes that doors and windows have in released walls, found in the walls' meshes; no effects.
 
-Released walls are cut already (suncg section 1.5): the cutter lies just inside the hole, so that
-subtracting it changes nothing; the quad is the hole itself.
+Released walls are cut already (suncg section 1.5): there the quad is the hole itself and the cutter
+its plug, of the wall's thickness. In a wall without a hole they are the door's or window's own size.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pbrs_farm.house import Box, Item, ItemKind, Opening, Surface
 
 _HOLE_MARGIN_M: Final = 0.10
-_SHRINK_M: Final = 0.0005
+_OVERLAP_M: Final = 0.002
 _REACH_M: Final = 0.02
 _NEAR_M: Final = 0.15
 _UP: Final = np.array([0.0, 1.0, 0.0])
@@ -83,15 +83,16 @@ def _opening(item: Item, box: Box, frames: Sequence[_WallFrame]) -> Opening | No
         return None
     middle = (low[2] + high[2]) / 2
     quad = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
-    inside = np.array([_SHRINK_M, _SHRINK_M, -_REACH_M])
+    grown = np.array([_OVERLAP_M, _OVERLAP_M, 0.0] if holes else [0.0, 0.0, _REACH_M])
     return Opening(
         id=f"{item.id}_hole",
         level_id=item.level_id,
         item_id=item.id,
         is_window=item.kind is ItemKind.WINDOW,
-        cutter=_solid(low + inside, high - inside, axes),
+        cutter=_solid(low - grown, high + grown, axes),
         quad=np.array([[s, y, middle] for s, y in quad]) @ axes.T,
         normal=normal,
+        is_cut=bool(holes),
     )
 
 

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from suncg_meshes import Hole, Obj, ball, mtl, slab_with_holes
+
+from tests.read.suncg_meshes import Hole, Obj, ball, mtl, slab_with_holes
 
 HOUSE = "0123456789abcdef0123456789abcdef"
 WALL_HEIGHT = 2.735

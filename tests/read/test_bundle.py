@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from small_houses import full_house
 
 from pbrs_farm.errors import BadHouse
 from pbrs_farm.house import House, geometry_from_house
 from pbrs_farm.read import glb
 from pbrs_farm.read.builtin import builtin_home
 from pbrs_farm.read.bundle import bundle_from_house, house_from_bundle
+from tests.read.small_houses import full_house
 
 
 def assert_same(a: Any, b: Any, place: str = "house") -> None:
