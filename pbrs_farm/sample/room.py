@@ -88,10 +88,14 @@ class RoomSampler:
         """Choose among a sector's candidates; writes their verdicts."""
         of_sector = np.flatnonzero(candidates.sector == sector)
         eligible = of_sector[verdict[of_sector] == Verdict.LOWER_SCORE]
+        coarse, share, largest = self._coarse(candidates, eligible)
+        filled = largest > self.fields.max_item_fraction
+        if filled.any():
+            verdict[eligible[filled]] = Verdict.FILLED_BY_ONE
+            eligible, share, coarse = eligible[~filled], share[~filled], coarse.only(~filled)
         full = choose.FullScores(
             self.fields.min_objects, lambda which: self._full(candidates, eligible[which])
         )
-        coarse, share = self._coarse(candidates, eligible)
         chosen = self._chosen(coarse, share, full)
 
         few = coarse.strict < self.fields.min_objects
@@ -108,8 +112,8 @@ class RoomSampler:
     def _chosen(
         self, coarse: choose.Coarse, share: NDArray[np.float32], full: choose.FullScores
     ) -> list[int]:
-        exact = self.fields.exact or self.fields.preset == "released"
-        best = choose.best_first(coarse, full, exact=exact)
+        margin = choose.COARSE_MARGIN_PX / self.fields.coarse_width_px
+        best = choose.best_first(coarse, full, margin=None if self._exact else margin)
         chosen = [] if best is None else [best]
         while chosen and len(chosen) < self.fields.per_sector:
             more = choose.next_diverse(coarse, share, chosen, full, self.fields.min_object_fraction)
@@ -120,22 +124,25 @@ class RoomSampler:
 
     def _coarse(
         self, candidates: Candidates, which: NDArray[np.intp]
-    ) -> tuple[choose.Coarse, NDArray[np.float32]]:
-        """Coarse scores; each object's share of the picture too when several views are wanted."""
+    ) -> tuple[choose.Coarse, NDArray[np.float32], NDArray[np.float64]]:
+        """Coarse scores, each object's share of the picture when several views are wanted, and
+        the largest share any one item has, walls included."""
         columns, fraction = self._columns(), self.fields.min_object_fraction
         keep = self.fields.per_sector > 1
         n = len(which)
         coarse = choose.Coarse(np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n))
         share = np.zeros((n, len(columns) if keep else 0), np.float32)
+        largest = np.zeros(n)
         cameras = candidates.cameras(which, self._intrinsics(coarse=True))
         for part, rows in counted(self.counter, cameras, len(self.house.items)):
             scored = self._scored(rows)
             coarse.strict[part], coarse.score[part] = scored.n_objects, scored.score
             lenient = paper_score(rows, columns, fraction * choose.COARSE_SLACK)
             coarse.lenient[part] = lenient.n_objects
+            largest[part] = rows[:, 1:].max(1, initial=0) / rows.sum(1)
             if keep:
                 share[part] = rows[:, columns] / rows.sum(1, keepdims=True)
-        return coarse, share
+        return coarse, share, largest
 
     def _full(
         self, candidates: Candidates, which: NDArray[np.intp]
@@ -160,10 +167,15 @@ class RoomSampler:
             return released.room_grid(self.house, self.room)
         return paper.room_grid(self.room)
 
+    @property
+    def _exact(self) -> bool:
+        # The released score jumps at whole multiples of its least count: coarse says too little.
+        return self.fields.exact or self.fields.preset == "released"
+
     def _intrinsics(self, *, coarse: bool) -> Intrinsics:
         f = self.fields
         full = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
-        if not coarse or f.exact or f.preset == "released":
+        if not coarse or self._exact:
             return full
         return full.resized(f.coarse_width_px, f.coarse_height_px)
 
