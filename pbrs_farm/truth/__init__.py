@@ -9,12 +9,24 @@ from pbrs_farm.truth.basic import (
     semantic_png,
     valid_png,
 )
-from pbrs_farm.truth.boundary import instance_boundary
-from pbrs_farm.truth.table import PixelsAlone, camera_table, is_truncated, view_table
+from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
+from pbrs_farm.truth.coverage import coverage
+from pbrs_farm.truth.more import (
+    OPTIONAL_NAMES,
+    Seen,
+    optional_layers,
+    optional_tables,
+    see_through_faces,
+    source_classes,
+)
+from pbrs_farm.truth.sensor import sensor_depth
+from pbrs_farm.truth.table import camera_table, is_truncated, view_table
 
 __all__ = [
-    "PixelsAlone",
+    "OPTIONAL_NAMES",
+    "Seen",
     "camera_table",
+    "coverage",
     "depth_mm",
     "instance_boundary",
     "instance_png",
@@ -22,7 +34,13 @@ __all__ = [
     "layers_from_hit",
     "normal_png",
     "nyu40_of_instance",
+    "optional_layers",
+    "optional_tables",
+    "see_through_faces",
     "semantic_png",
+    "sensor_depth",
+    "source_classes",
+    "typed_boundaries",
     "valid_png",
     "view_table",
 ]

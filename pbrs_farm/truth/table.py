@@ -5,7 +5,6 @@ The schema is written down in docs/formats.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,9 +17,7 @@ from pbrs_farm.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
 from pbrs_farm.frames import opencv_world_from_camera
 from pbrs_farm.house import House, Item
 from pbrs_farm.truth.basic import nyu40_of_instance
-
-PixelsAlone = Callable[[Sequence[int]], Sequence[int]]
-"""Instance ids -> pixels each covers in this picture when it is the only thing in the world."""
+from pbrs_farm.truth.coverage import coverage
 
 
 def camera_table(camera: Camera) -> dict[str, Any]:
@@ -39,13 +36,14 @@ def view_table(
     item_buffer: ItemBuffer,
     house: House,
     camera: Camera,
-    pixels_alone: PixelsAlone | None = None,
+    *,
+    with_visible_fraction: bool = True,
 ) -> dict[str, Any]:
     """The part of view.json that labels need: the camera's table and "instances".
 
     instances: a row for each instance id in item_buffer (H, W), by id: id, item, name, kind, nyu40,
     class, nyu13, class13, source_class, room, pixels, fraction (of the picture), visible_fraction
-    (pixels / pixels when alone in this picture; None without pixels_alone), truncated (part of
+    (pixels / pixels when alone in this picture; None unless with_visible_fraction), truncated (part of
     it lies outside the picture), box2d (x0, y0, x1, y1 in px, right and bottom exclusive, of the
     visible pixels) and box3d (centre, half, axes: rows are unit axes; world, metres).
     An empty view has an empty list.
@@ -54,7 +52,6 @@ def view_table(
     counts = np.bincount(item_buffer.reshape(-1), minlength=len(house.items) + 1)
     seen = [int(i) for i in np.nonzero(counts)[0] if i > 0]
     slices = ndimage.find_objects(item_buffer.astype(np.int32), max_label=len(house.items))
-    alone = dict(zip(seen, pixels_alone(seen), strict=True)) if pixels_alone else {}
 
     rows = []
     for instance in seen:
@@ -65,8 +62,8 @@ def view_table(
                 **_item_facts(item, int(classes[instance])),
                 "pixels": pixels,
                 "fraction": pixels / item_buffer.size,
-                "visible_fraction": min(1.0, pixels / max(alone[instance], pixels))
-                if alone
+                "visible_fraction": pixels / max(int(coverage(item, camera).sum()), pixels)
+                if with_visible_fraction
                 else None,
                 "truncated": is_truncated(item, camera),
                 "box2d": _box2d(slices[instance - 1]),

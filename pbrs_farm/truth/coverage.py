@@ -1,0 +1,97 @@
+"""Which pixels an item would cover if it were alone in the world; no effects.
+
+Exact at pixel centres: a ray through the eye meets a triangle where it lies on the same side of
+the three planes through the eye and the triangle's edges (Olano and Greer 1997), so nothing is
+clipped and nothing is divided by depth. On one row of pixels that is an interval.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.arrays import Mask
+from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.house import Item
+
+_CHUNK_ROWS = 500_000
+
+
+def coverage(item: Item, camera: Camera) -> Mask:
+    """(H, W) bool: the ray through the pixel's centre meets any triangle of item."""
+    i = camera.intrinsics
+    starts = np.zeros((i.height_px, i.width_px + 1), np.int32)
+    for s in item.surfaces:
+        if len(s.faces):
+            corners = _camera_space(s.positions, camera)[s.faces]
+            _add_triangles(starts, corners[np.isfinite(corners).all((1, 2))], i)
+    return np.cumsum(starts, axis=1)[:, :-1] > 0
+
+
+def _camera_space(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
+    """(V, 3) x right, y down, z forward."""
+    moved = points.astype(np.float64) - camera.eye
+    return np.asarray(moved @ camera.world_from_camera[:3, :3] * [1.0, -1.0, -1.0])
+
+
+def _add_triangles(starts: NDArray[np.int32], corners: NDArray[np.float64], i: Intrinsics) -> None:
+    """Add to starts, per row, +1 where a triangle (T, 3, 3) begins and -1 past where it ends."""
+    first, n_rows = _rows_of_triangles(corners, i)
+    kept = np.nonzero(n_rows)[0]
+    ends = np.cumsum(n_rows[kept])
+    begin = 0
+    while begin < len(kept):
+        done = ends[begin - 1] if begin else 0
+        stop = max(begin + 1, int(np.searchsorted(ends, done + _CHUNK_ROWS, side="right")))
+        chosen = kept[begin:stop]
+        _add_spans(starts, corners[chosen], first[chosen], n_rows[chosen], i)
+        begin = stop
+
+
+def _rows_of_triangles(
+    corners: NDArray[np.float64], i: Intrinsics
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(T,) first row whose pixel centres a triangle may cover, and how many rows follow from it."""
+    z = corners[..., 2]
+    ahead = (z > 1e-6).all(1)
+    y = i.fy * corners[..., 1] / np.where(z > 1e-6, z, 1.0) + i.cy - 0.5
+    first = np.where(ahead, np.ceil(y.min(1) - 1e-6), 0)
+    last = np.where(ahead, np.floor(y.max(1) + 1e-6), i.height_px - 1)
+    first, last = np.clip(first, 0, i.height_px), np.clip(last, -1, i.height_px - 1)
+    n_rows = np.where((z <= 0).all(1), 0, np.maximum(last - first + 1, 0))
+    return first.astype(np.int64), n_rows.astype(np.int64)
+
+
+def _add_spans(
+    starts: NDArray[np.int32],
+    corners: NDArray[np.float64],
+    first: NDArray[np.int64],
+    n_rows: NDArray[np.int64],
+    i: Intrinsics,
+) -> None:
+    owner = np.repeat(np.arange(len(corners)), n_rows)
+    row = np.arange(len(owner)) - np.repeat(np.cumsum(n_rows) - n_rows - first, n_rows)
+    y = (row + 0.5 - i.cy) / i.fy
+
+    # Planes through the eye and each edge, turned so that the triangle is where they are positive.
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    planes = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    determinant = np.einsum("ti,ti->t", a, planes[:, 0])
+    planes *= np.sign(determinant)[:, None, None]
+
+    # On a row, p x + q >= 0 bounds x from below (p > 0) or above (p < 0).
+    low = np.full(len(owner), -np.inf)
+    high = np.full(len(owner), np.inf)
+    for edge in range(3):
+        p, q = planes[owner, edge, 0], planes[owner, edge, 1] * y + planes[owner, edge, 2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            bound = -q / p
+        low = np.where(p > 0, np.maximum(low, bound), low)
+        high = np.where(p < 0, np.minimum(high, bound), high)
+        low = np.where((p == 0) & (q < 0), np.inf, low)
+
+    left = np.ceil(np.clip(i.fx * low + i.cx - 0.5, 0, i.width_px)).astype(np.int64)
+    right = np.floor(np.clip(i.fx * high + i.cx - 0.5, -1, i.width_px - 1)).astype(np.int64)
+    covers = (right >= left) & (determinant != 0)[owner]
+    np.add.at(starts, (row[covers], left[covers]), 1)
+    np.add.at(starts, (row[covers], right[covers] + 1), -1)

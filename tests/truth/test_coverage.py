@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from pbrs_farm import truth
+from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.house import Item, ItemKind, Surface
+from tests.truth.hits import camera, house
+
+
+def by_rays(points: np.ndarray, faces: np.ndarray, view: Camera) -> np.ndarray:
+    """Every ray against every triangle."""
+    origin, directions = view.rays()
+    origin, d = origin.astype(float), directions.reshape(-1, 3).astype(float)
+    hit = np.zeros(len(d), bool)
+    for face in faces:
+        a, b, c = points[face].astype(float)
+        p = np.cross(d, c - a)
+        det = p @ (b - a)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = p @ (origin - a) / det
+            q = np.cross(origin - a, b - a)
+            v, t = d @ q / det, q @ (c - a) / det
+            hit |= (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
+    return hit.reshape(directions.shape[:2])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_coverage_is_what_rays_hit_near_far_and_across_the_eye(seed):
+    rng = np.random.default_rng(seed)
+    points = rng.normal(0, 2, (30, 3)).astype(np.float32)
+    faces = rng.integers(0, 30, (6, 3)).astype(np.int32)
+    item = Item("x", "x", ItemKind.OBJECT, "0", (Surface("s", points, faces, 0),))
+    view = Camera.look(
+        Intrinsics(41, 33, 25.0, 30.0, 19.0, 17.5),
+        np.array([0.1, 0.2, 1.0]),
+        np.array([0.3, -0.2, -1.0]),
+    )
+    assert (truth.coverage(item, view) == by_rays(points, faces, view)).mean() > 0.998
+
+
+def test_visible_fraction_is_the_share_that_is_not_hidden():
+    # The square is 4 pixels wide (0.5 m of half width at 2 m, 8 pixels for 4 m) and half hidden.
+    scene = house(5, z=-2.0, half=1.0)
+    assert truth.coverage(scene.items[0], camera()).sum() == 16
+    ids = np.zeros((6, 8), np.uint32)
+    ids[1:5, 2:4] = 1
+    row = truth.view_table(ids, scene, camera())["instances"][0]
+    assert row["visible_fraction"] == pytest.approx(0.5)
+
+
+def test_an_item_without_faces_covers_nothing():
+    empty = Surface("s", np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), 0)
+    for surfaces in ((), (empty,)):
+        assert not truth.coverage(Item("x", "x", ItemKind.OBJECT, "0", surfaces), camera()).any()
+
+
+def test_a_triangle_with_nan_is_left_out():
+    points = np.array([[0, 0, -1], [1, 0, -1], [np.nan, 1, -1]], np.float32)
+    surface = Surface("s", points, np.array([[0, 1, 2]], np.int32), 0)
+    assert not truth.coverage(Item("x", "x", ItemKind.OBJECT, "0", (surface,)), camera()).any()

@@ -1,0 +1,222 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm import truth
+from pbrs_farm.arrays import HitRecord
+from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
+from pbrs_farm.house import House, Material, MaterialKind, geometry_from_house
+from pbrs_farm.layers import LAYER, LAYERS
+from pbrs_farm.read.builtin import builtin_home
+from pbrs_farm.transport.caster import Caster
+from tests.truth.hits import camera, hit, house, square
+
+
+def seen_of(home: House, view: Camera, textures: dict | None = None, seed: int = 0) -> truth.Seen:
+    geometry = geometry_from_house(home)
+    caster = Caster(geometry)
+    record = caster.hit_record(view)
+    return truth.Seen(
+        record,
+        home,
+        geometry,
+        view,
+        lambda skip: caster.hit_record(view, skip_faces=skip),
+        textures or {},
+        seed,
+    )
+
+
+def glazed() -> House:
+    """A pane at 2 m before a red wall at 3 m."""
+    home = house(9, 1)
+    items = tuple(
+        replace(i, surfaces=(replace(square(z, half), material=k),), source_class=name)
+        for k, (i, z, half, name) in enumerate(
+            zip(home.items, (-2.0, -3.0), (1.0, 10.0), ("windowSmall", "wall"), strict=True)
+        )
+    )
+    materials = (Material("pane", MaterialKind.PANE), Material("red", diffuse=(1.0, 0, 0)))
+    return replace(home, items=items, materials=materials)
+
+
+def test_the_table_of_layers_names_exactly_what_can_be_made():
+    assert set(truth.OPTIONAL_NAMES) == {x.name for x in LAYERS if x.optional and x.step == "truth"}
+
+
+def test_every_layer_has_the_shape_and_type_of_the_table():
+    home = builtin_home()
+    view = Camera.look(Intrinsics.from_hfov(64, 48), home.cameras[0].eye, home.cameras[0].towards)
+    for name, array in truth.optional_layers(truth.OPTIONAL_NAMES, seen_of(home, view)).items():
+        channels = LAYER[name].channels
+        n = 3 if channels in ("RGB", "X Y Z") else 1
+        assert array.shape == ((48, 64, 3) if n == 3 else (48, 64)), name
+        assert str(array.dtype) == LAYER[name].dtype, name
+
+
+def test_behind_glass_the_wall_is_seen_and_the_mask_says_where():
+    layers = truth.optional_layers(truth.OPTIONAL_NAMES, seen_of(glazed(), camera()))
+    assert layers["glass"][3, 4] == 255
+    assert layers["glass"][0, 0] == 0
+    assert (layers["depth_z"][3, 4], layers["behind_glass_depth"][3, 4]) == (2.0, 3000)
+    assert layers["behind_glass_semantic"][3, 4] == 1
+    assert (layers["behind_glass_instance"] == 2).all()
+    assert layers["material"][3, 4] == 1
+    assert layers["material"][0, 0] == 2
+
+
+def test_the_sources_classes_and_materials_are_named_in_the_table():
+    seen = seen_of(glazed(), camera())
+    ids = truth.optional_layers(["class_source", "material"], seen)
+    tables = truth.optional_tables(["class_source", "material"], seen.house)
+    assert tables["source_classes"][str(ids["class_source"][3, 4])] == "windowSmall"
+    assert tables["materials"][str(ids["material"][0, 0])] == {"name": "red", "kind": "opaque"}
+
+
+def test_a_house_without_glass_or_faces_needs_no_second_cast():
+    def never(_: object) -> HitRecord:
+        raise AssertionError
+
+    empty = house()
+    seen = truth.Seen(
+        hit(np.zeros((6, 8)), 0.0), empty, geometry_from_house(empty), camera(), never, {}
+    )
+    layers = truth.optional_layers(truth.OPTIONAL_NAMES, seen)
+    nothing = ("normal_shading", "normal_world", "behind_glass_normal")
+    assert not any(array.any() for name, array in layers.items() if name not in nothing)
+    assert all((layers[name] == 32768).all() for name in nothing)
+
+
+def test_each_of_the_forty_classes_has_one_of_the_thirteen():
+    assert len(NYU40_NAMES) == len(NYU13_FROM_NYU40) == 41
+    assert set(NYU13_FROM_NYU40[1:]) == set(range(1, 14))
+    by_name = {NYU40_NAMES[k]: NYU13_NAMES[NYU13_FROM_NYU40[k]] for k in range(41)}
+    assert by_name["night stand"] == "furniture"
+    assert by_name["desk"] == "table"
+    assert by_name["floor mat"] == "floor"
+    assert by_name["none"] == "none"
+
+
+def test_world_normals_do_not_turn_with_the_camera():
+    up = hit([[1]], 2.0, (0.0, 1.0, 0.0))
+    seen = truth.Seen(up, house(5), geometry_from_house(house(5)), camera(1, 1), lambda _: up, {})
+    assert truth.optional_layers(["normal_world"], seen)["normal_world"].tolist() == [
+        [[32768, 65535, 32768]]
+    ]
+
+
+def two_squares(near: float, far: float) -> truth.Seen:
+    home = house(5, 5)
+    items = (
+        replace(home.items[0], surfaces=(square(near, 1.0),)),
+        replace(home.items[1], surfaces=(square(far, 20.0),)),
+    )
+    return seen_of(replace(home, items=items), camera())
+
+
+def test_occlusion_belongs_to_the_nearer_side():
+    occlusion = truth.optional_layers(["boundary_occlusion"], two_squares(-2.0, -3.0))[
+        "boundary_occlusion"
+    ]
+    assert occlusion[2].tolist() == [0, 128, 255, 0, 0, 255, 128, 0]
+
+
+def test_a_poster_on_a_wall_is_an_instance_boundary_and_no_occlusion():
+    layers = truth.optional_layers(
+        ["boundary_occlusion", "boundary_crease"], two_squares(-2.99, -3.0)
+    )
+    assert not layers["boundary_occlusion"].any()
+    assert not layers["boundary_crease"].any()
+
+
+def room_corner(fall: float) -> HitRecord:
+    """A floor 1 m below, cut by a wall at 4 m that leans: fall 0 is upright."""
+    view = camera(40, 30)
+    _, rays = view.rays()
+    with np.errstate(divide="ignore"):
+        floor = np.where(rays[..., 1] < 0, -1.0 / rays[..., 1], np.inf)
+    wall = 4.0 / (1 - fall * rays[..., 1])
+    on_floor = floor < wall
+    depth_z = np.where(on_floor, floor, wall).astype(np.float32)
+    normal_wall = np.array([0, fall, 1.0]) / np.hypot(1, fall)
+    normal = np.where(on_floor[..., None], [0, 1.0, 0], normal_wall)
+    return hit(np.ones((30, 40)), depth_z, normal)
+
+
+def test_a_corner_of_ninety_degrees_is_a_crease_and_slanting_floors_are_no_occlusion():
+    occlusion, crease = truth.typed_boundaries(room_corner(0.0), camera(40, 30))
+    assert not occlusion.any()
+    assert ((crease > 0).sum(axis=0) == 1).all()
+
+
+def test_something_before_nothing_is_an_occlusion():
+    occlusion, _ = truth.typed_boundaries(hit([[0, 1, 1, 0]], 2.0), camera(4, 1))
+    assert occlusion.tolist() == [[128, 255, 255, 128]]
+
+
+def test_albedo_is_texture_times_colour_in_linear_light():
+    pixels = np.zeros((8, 8, 3), np.uint8)
+    pixels[:4] = 255
+    pixels[4:, :, 0] = 255
+    home = replace(
+        house(5, half=1.0), materials=(Material("m", diffuse=(1.0, 0.5, 1.0), texture_id="t"),)
+    )
+    uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+    textured = replace(home.items[0].surfaces[0], uvs=uvs)
+    home = home.with_items([replace(home.items[0], surfaces=(textured,))])
+    view = camera(64, 48)
+    albedo = truth.optional_layers(["albedo"], seen_of(home, view, {"t": pixels}))["albedo"]
+    assert albedo[20, 32].tolist() == [255, 128, 255]  # above the middle: the white row
+    assert albedo[28, 32].tolist() == [255, 0, 0]
+    plain = truth.optional_layers(["albedo"], seen_of(home, view))["albedo"]
+    assert plain[28, 32].tolist() == [255, 128, 255]
+    assert plain[0, 0].tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("normal", "angle"), [((0, 1, 0), 38), ((0, 0, 1), 128), ((0, -1, 0), 218)]
+)
+def test_hha_holds_disparity_height_and_the_angle_with_gravity(normal, angle):
+    record = hit([[1, 1, 0]], [[3.1, 6.2, 0.0]], normal)
+    position = np.array([[[0, -1.5, 0], [0, -0.5, 0], [0, 0, 0]]], np.float32)
+    record = replace(record, position_world=position)
+    seen = truth.Seen(
+        record, house(5), geometry_from_house(house(5)), camera(3, 1), lambda _: record, {}
+    )
+    hha = truth.optional_layers(["hha"], seen)["hha"]
+    assert hha[0].tolist() == [[100, 0, angle], [50, 100, angle], [0, 0, 0]]
+
+
+def test_a_sensor_measures_a_wall_with_noise_that_grows_with_distance():
+    errors = []
+    for z in (1.0, 3.0):
+        record = hit(np.ones((60, 80)), z)
+        noisy = truth.sensor_depth(record, camera(80, 60), seed=1)
+        measured = noisy[noisy > 0] / 1000
+        assert len(measured) > 0.9 * noisy.size
+        assert abs(np.median(measured) - z) < 0.02 * z
+        errors.append(measured.std())
+    # Disparity error is constant: depth error grows with the square of depth.
+    assert 6 < errors[1] / errors[0] < 12
+
+
+def test_a_sensor_is_the_same_for_the_same_seed_and_blind_out_of_range():
+    record = hit([[1] * 8] * 6, [[0.3, 0.3, 0.3, 0.3, 9.0, 9.0, 9.0, 9.0]] * 6)
+    assert not truth.sensor_depth(record, camera(), seed=3).any()
+    wall = hit([[1] * 8] * 6, 2.0)
+    same = [truth.sensor_depth(wall, camera(), seed=s) for s in (3, 3, 4)]
+    assert (same[0] == same[1]).all()
+    assert (same[0] != same[2]).any()
+
+
+def test_the_sensors_shadow_lies_left_of_what_is_near():
+    depth_z = np.full((40, 320), 3.0)
+    depth_z[:, 150:] = 1.0
+    noisy = truth.sensor_depth(hit(np.ones((40, 320)), depth_z), camera(320, 40), seed=0)
+    # fx = 160: 160 * 0.075 * (1 - 1 / 3) = 8 columns are hidden from the projector.
+    lost = (noisy == 0).mean(axis=0)
+    assert lost[144:148].min() > 0.9
+    assert lost[100:138].max() < 0.3
+    assert lost[153:300].max() < 0.3
