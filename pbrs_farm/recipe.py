@@ -26,6 +26,7 @@ class ReadFields(_Group):
     max_triangles: int = Field(5_000_000, gt=0, description="of a house; more is refused")
     max_model_triangles: int = Field(2_000_000, gt=0, description="of one model; more is refused")
     max_extent_m: float = Field(1_000.0, gt=0, description="a piece farther out is refused")
+    hidden_levels: bool = Field(False, description="Sweet Home 3D: read levels not shown, too")
     strict: bool = Field(False, description="recoverable faults of a source are errors")
 
 
@@ -56,6 +57,9 @@ class CameraFields(_Group):
     clearance_m: float = Field(0.10, ge=0, description="from any obstacle, in three dimensions")
     min_objects: int = Field(3, ge=0)
     min_object_fraction: float = Field(0.01, ge=0, le=1, description="of the picture, per object")
+    max_item_fraction: float = Field(
+        1.0, gt=0, le=1, description="of the picture, of any one item; 1 = off, as in the paper"
+    )
     hfov_rad: float = Field(2 * 0.5534, gt=0, lt=3.1, description="full horizontal field of view")
     score_width_px: int = Field(640, gt=0)
     score_height_px: int = Field(480, gt=0)
@@ -121,7 +125,10 @@ class ToneFields(_Group):
     preset: Literal["photo", "released"] = "photo"
     key: float = Field(0.18, gt=0)
     white_balance: float = Field(
-        0.7, ge=0, le=1, description="how far the light's colour is turned to white; 1 = all the way"
+        0.7,
+        ge=0,
+        le=1,
+        description="how far the light's colour is turned to white; 1 = all the way",
     )
 
 
@@ -198,8 +205,12 @@ class Recipe(_Group):
 
 
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "preview": {"image": {"width_px": 320, "height_px": 240}, "light": {"spp": 16}},
-    "fast": {},
+    "preview": {
+        "cameras": {"max_item_fraction": 0.45},
+        "image": {"width_px": 320, "height_px": 240},
+        "light": {"spp": 16},
+    },
+    "fast": {"cameras": {"max_item_fraction": 0.45}},
     "paper": {
         "light": {"integrator": "metropolis", "denoise": False},
         "sky": {"kind": "panorama"},

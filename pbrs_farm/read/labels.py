@@ -18,12 +18,13 @@ OTHERPROP: Final = 40
 
 # Words of English names, several words first; the first rule with all its words in the name wins.
 _WORDS: Final[tuple[tuple[str, str], ...]] = (
+    ("light switch|electrical outlet|socket|plug", "otherprop"),
+    ("glass door cabinet|wardrobe|cabinet|cupboard|sideboard|buffet|closet|locker", "cabinet"),
     ("night stand|bedside table|nightstand", "night stand"),
     ("shower curtain", "shower curtain"),
     ("floor mat|doormat|rug|carpet|mat", "floor mat"),
     ("tv unit|tv stand|tv bench|tv cabinet", "cabinet"),
     ("television|tv|flatscreen|monitor", "television"),
-    ("light switch|electrical outlet|socket|plug", "otherprop"),
     ("window|skylight|hatch|velux", "window"),
     ("door|doorway|gate", "door"),
     ("book shelf|book case|bookcase|bookshelf|bookshelves|library", "bookshelf"),
@@ -39,8 +40,8 @@ _WORDS: Final[tuple[tuple[str, str], ...]] = (
     ("washbasin|sink|basin|faucet", "sink"),
     ("fridge|refrigerator|freezer", "refrigerator"),
     ("dresser|chest of drawers|commode|chest", "dresser"),
-    ("counter|worktop|island|bar", "counter"),
-    ("wardrobe|cabinet|cupboard|closet|sideboard|buffet|locker|drawers|vanity", "cabinet"),
+    ("counter|worktop|island", "counter"),
+    ("drawers|vanity", "cabinet"),
     ("shelf|shelves|shelving|rack|etagere", "shelves"),
     ("mirror", "mirror"),
     ("picture|painting|poster|frame|photo|canvas", "picture"),
@@ -55,7 +56,7 @@ _WORDS: Final[tuple[tuple[str, str], ...]] = (
     ("clothes|shirt|jacket|coat|dress|shoes|hat", "clothes"),
     ("person|man|woman|girl|boy|child|people|mannequin|character", "person"),
     ("stairs|staircase|stairway|ladder|railing|banister|fireplace|column|pillar|fence|chimney|"
-     "balustrade|partition|wall", "otherstructure"),
+     "balustrade|partition|wall|beam|pole|roof|slope|gutter|bar", "otherstructure"),
     ("oven|cooker|stove|hob|dishwasher|washer|dryer|microwave|hood|piano|machine|radiator|"
      "heater|boiler|shower|furniture", "otherfurniture"),
     ("plant|flower|flowers|tree|vase|computer|laptop|keyboard|clock|plate|glass|cup|bottle|"
@@ -83,6 +84,10 @@ _PLANT: Final = frozenset(
         "hedge",
     ]
 )
+_PRIMITIVES: Final = frozenset(
+    {"eTeks#texturableBox", "eTeks#texturableCylinder", "eTeks#texturableTriangle"}
+)
+_PRIMITIVE_NAMES: Final = frozenset({"box", "cylinder", "triangle", ""})
 _STAIRS: Final = frozenset(["staircase", "stairs", "stairway", "ladder"])
 
 
@@ -112,12 +117,25 @@ def words_of(text: str) -> frozenset[str]:
     return frozenset(words) | {w[:-1] for w in words if len(w) > 3 and w.endswith("s")}
 
 
-def nyu40_of(catalogue_id: str, name: str) -> int | None:
-    """NYU40 id by catalogue id, else by the words of the name, else of the id; None = unmapped."""
+def nyu40_of(catalogue_id: str, name: str, group: str = "") -> int | None:
+    """NYU40 id by catalogue id, else by the words of the name, else of the id; None = unmapped.
+
+    A bare box, cylinder or triangle is what its name says, or its group's: people build with them.
+    """
     known = _table().get(catalogue_id)
+    if catalogue_id in _PRIMITIVES:
+        if name.lower() not in _PRIMITIVE_NAMES:
+            known = _by_words(name) or known
+        elif group:
+            known = _by_words(group) or known
+        return known
     if known is not None:
         return known
-    for text in (name, catalogue_id.partition("#")[2]):
+    return _by_words(name) or _by_words(catalogue_id.partition("#")[2])
+
+
+def _by_words(*texts: str) -> int | None:
+    for text in texts:
         words = words_of(text)
         for phrases, label in _rules():
             if any(phrase <= words for phrase in phrases):

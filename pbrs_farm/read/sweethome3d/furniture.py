@@ -86,7 +86,7 @@ def piece_item(
 
 def _label(piece: PlanPiece, model: Model, looks: Looks) -> tuple[int, tuple[str, ...]]:
     tags = ["mirrored"] if piece.is_mirrored else []
-    label = nyu40_of(piece.catalogue_id, piece.name)
+    label = nyu40_of(piece.catalogue_id, piece.name, piece.group)
     if piece.frame is not None and label not in (DOOR, WINDOW):
         has_pane = any(m.group == PANE for m in model.meshes)
         label = WINDOW if has_pane and piece.elevation > 0.3 else DOOR

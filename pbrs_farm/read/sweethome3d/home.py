@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import PurePath
 
 import shapely
@@ -46,6 +47,8 @@ def read_home(
     file = PurePath(name).name
     container = open_container(data, file, resources)
     plan = parse_plan(container.root, file, fields.max_extent_m)
+    if fields.hidden_levels:
+        plan = replace(plan, levels=tuple(replace(x, is_visible=True) for x in plan.levels))
     looks = Looks(container.contents)
     visible = [level for level in plan.levels if level.is_visible]
     house_level = {level.id: str(k) for k, level in enumerate(visible)} | {"": "0"}
@@ -98,7 +101,11 @@ def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:
 def _note_hidden_levels(plan: Plan, looks: Looks) -> None:
     for level in plan.levels:
         if not level.is_visible:
-            looks.note("hidden-level", f"level {level.id} '{level.name}'", "not visible: left out")
+            looks.note(
+                "hidden-level",
+                f"level {level.id} '{level.name}'",
+                "not visible: left out (read.hidden_levels)",
+            )
 
 
 def _furniture(

@@ -40,8 +40,8 @@ def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
         for k, e in enumerate(root.findall("room"))
     )
     pieces = tuple(
-        parse_piece(open_(e, f"{e.tag} #{k} '{e.get('name', '')}'"), level)
-        for k, (e, level) in enumerate(_furniture(root, file))
+        parse_piece(open_(e, f"{e.tag} #{k} '{e.get('name', '')}'"), level, group)
+        for k, (e, level, group) in enumerate(_furniture(root, file))
         if e.get("visible", "true") != "false"
     )
     cameras = tuple(
@@ -63,23 +63,22 @@ def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
     )
 
 
-def _furniture(root: Element, file: str) -> Iterator[tuple[Element, str]]:
-    # Pieces in document order with their level; a group's pieces have absolute coordinates.
+def _furniture(root: Element, file: str) -> Iterator[tuple[Element, str, str]]:
+    # Pieces in document order with level and group; a group's pieces have absolute coordinates.
     n = 0
-    stack = [(e, "") for e in reversed(list(root))]
+    stack = [(e, "", "") for e in reversed(list(root))]
     while stack:
-        element, level = stack.pop()
+        element, level, group = stack.pop()
+        level = element.get("level", level)
         if element.tag == "furnitureGroup":
             if element.get("visible", "true") != "false":
-                inherited = element.get("level", level)
-                stack += [(e, inherited) for e in reversed(list(element))]
+                inner = element.get("name", group)
+                stack += [(e, level, inner) for e in reversed(list(element))]
         elif element.tag in _PIECES:
             n += 1
             if n > MAX_PIECES:
                 raise BadHouse(file, "", f"more than {MAX_PIECES} pieces of furniture")
-            yield element, element.get("level", level)
-            if element.tag == "shelfUnit":
-                stack += [(e, element.get("level", level)) for e in reversed(list(element))]
+            yield element, level, group
 
 
 def _levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:

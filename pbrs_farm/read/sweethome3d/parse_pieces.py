@@ -9,8 +9,8 @@ from pbrs_farm.read.sweethome3d.plan import DoorFrame, Paint, PlanLight, PlanPie
 FULL_CUT_OUT = "M0,0 v1 h1 v-1 z"
 
 
-def parse_piece(a: Attributes, level: str) -> PlanPiece:
-    """One piece; level: of the piece or of the group that holds it."""
+def parse_piece(a: Attributes, level: str, group: str = "") -> PlanPiece:
+    """One piece; level: of the piece or of the group that holds it, group: that group's name."""
     element = a.element
     return PlanPiece(
         tag=element.tag,
@@ -36,6 +36,7 @@ def parse_piece(a: Attributes, level: str) -> PlanPiece:
         light_materials=tuple(e.get("name", "") for e in element.findall("lightSourceMaterial")),
         power=a.number("power", 0.5) if element.tag == "light" else 0.0,
         staircase_cut_out=a.text("staircaseCutOutShape"),
+        group=group,
     )
 
 

@@ -133,7 +133,7 @@ class DoorFrame:
 class PlanPiece:
     """A piece of furniture. centre, elevation: of its box's bottom above the level, metres.
 
-    place: what to call it in a message. rotation: 9 numbers row by row or None.
+    place: what to call it in a message. group: name of the group that holds it. rotation: 9 numbers row by row or None.
     transformations: (group name, 12 numbers row by row) of movable parts.
     """
 
@@ -160,6 +160,7 @@ class PlanPiece:
     light_materials: tuple[str, ...] = ()
     power: float = 0.0
     staircase_cut_out: str = ""
+    group: str = ""
 
 
 @dataclass(frozen=True, slots=True)
