@@ -125,7 +125,7 @@ def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]
     look: dict[str, Any] = {
         "baseColorFactor": [*_linear(material.diffuse), alpha],
         "metallicFactor": 1.0 if is_mirror else 0.0,
-        "roughnessFactor": 0.0 if is_mirror else (2.0 / (shininess + 2.0)) ** 0.5,
+        "roughnessFactor": 0.0 if is_mirror else (2.0 / (shininess + 2.0)) ** 0.25,
     }
     if material.texture_id in images:
         look["baseColorTexture"] = {"index": images[material.texture_id]}

@@ -12,19 +12,19 @@ import numpy as np
 
 from pbrs_farm.errors import BadHouse
 from pbrs_farm.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
-from pbrs_farm.read.notes import Notes
-from pbrs_farm.read.root_folder import RootFolder
-from pbrs_farm.read.suncg_items import Stock, box_item, ground_item, object_item, room_items
-from pbrs_farm.read.suncg_json import HouseRecord, Node, house_record
-from pbrs_farm.read.suncg_looks import Looks
-from pbrs_farm.read.suncg_models import Models
-from pbrs_farm.read.suncg_openings import openings
-from pbrs_farm.read.suncg_rooms import (
+from pbrs_farm.read.floors import (
     ceiling_height,
     enclosed_polygon,
     floor_height,
     floor_polygon,
 )
+from pbrs_farm.read.notes import Notes
+from pbrs_farm.read.openings import openings
+from pbrs_farm.read.root_folder import RootFolder
+from pbrs_farm.read.suncg_items import Stock, box_item, ground_item, object_item, room_items
+from pbrs_farm.read.suncg_json import HouseRecord, Node, house_record
+from pbrs_farm.read.suncg_looks import Looks
+from pbrs_farm.read.suncg_models import Models
 from pbrs_farm.read.suncg_tables import read_tables
 from pbrs_farm.recipe import ReadFields
 

@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.classes import NYU40_NAMES
-from pbrs_farm.house import Box, Item, ItemKind, LightPart, Material, MaterialKind, Surface
+from pbrs_farm.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
 from pbrs_farm.read.mtl import ObjMaterial
 from pbrs_farm.read.notes import Notes
+from pbrs_farm.read.placed import oriented_box, placed
 from pbrs_farm.read.root_folder import RootFolder
 from pbrs_farm.read.suncg_json import Node
 from pbrs_farm.read.suncg_lamps import lit, placed_light, separate_bulbs
 from pbrs_farm.read.suncg_looks import Looks
-from pbrs_farm.read.suncg_models import Model, Models, placed
+from pbrs_farm.read.suncg_models import Model, Models
 from pbrs_farm.read.suncg_tables import OTHERPROP, LampMaterials, ModelClass, Tables
 
 _T = TypeVar("_T")
@@ -85,7 +86,7 @@ def object_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
         source_class=node.model_id,
         room_id=room_id,
         lights=placed_lights,
-        box=_oriented_box(model, world_from_model),
+        box=oriented_box(model.meshes, world_from_model),
         tags=_tags(stock, node, seen, is_known=known is not None),
     )
 
@@ -150,19 +151,6 @@ def _tags(stock: Stock, node: Node, seen: ModelClass, *, is_known: bool) -> tupl
     tags += [] if is_known else ["unmapped"]
     tags += ["structure"] if seen.structure else []
     return tuple(tags)
-
-
-def _oriented_box(model: Model, world_from_model: NDArray[np.float64]) -> Box | None:
-    low = np.min([m.positions.min(0) for m in model.meshes], 0)
-    high = np.max([m.positions.max(0) for m in model.meshes], 0)
-    scale = np.linalg.norm(world_from_model[:3, :3], axis=0)
-    axes = world_from_model[:3, :3] / scale
-    if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-4):
-        return None
-    if np.linalg.det(axes) < 0:
-        axes = axes * np.array([-1.0, 1.0, 1.0])
-    centre = world_from_model[:3, :3] @ ((low + high) / 2) + world_from_model[:3, 3]
-    return Box(centre, scale * (high - low) / 2, axes)
 
 
 def box_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:

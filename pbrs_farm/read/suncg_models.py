@@ -5,11 +5,6 @@ from __future__ import annotations
 import posixpath
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pbrs_farm.frames import transform_points
-from pbrs_farm.house import Surface
 from pbrs_farm.read.mtl import ObjMaterial, parse_mtl
 from pbrs_farm.read.notes import Notes
 from pbrs_farm.read.obj import Mesh, parse_obj
@@ -17,7 +12,6 @@ from pbrs_farm.read.root_folder import RootFolder
 from pbrs_farm.recipe import ReadFields
 
 _MAX_MTL_BYTES = 4_000_000
-_MIN_TWICE_AREA_M2 = 1e-12
 _BYTES_PER_TRIANGLE = 150
 
 
@@ -78,41 +72,3 @@ class Models:
             replace(m, map_kd=self._folder.name_from(at, m.map_kd)) if m.map_kd else m
             for m in parse_mtl(data)
         )
-
-
-def placed(
-    mesh: Mesh, world_from_model: NDArray[np.float64], *, name: str, material: int
-) -> Surface | None:
-    """A mesh as a Surface in the world; None if no area is left.
-
-    A mirroring transform turns the winding, so that fronts stay in front. Degenerate faces go.
-    """
-    world = transform_points(world_from_model, mesh.positions).astype(np.float32)
-    faces = mesh.faces
-    if np.linalg.det(world_from_model[:3, :3]) < 0:
-        faces = faces[:, ::-1]
-    p = world[faces].astype(np.float64)
-    twice_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    faces = faces[twice_area > _MIN_TWICE_AREA_M2]
-    if not len(faces):
-        return None
-    return Surface(
-        name=name,
-        positions=world,
-        faces=np.ascontiguousarray(faces),
-        material=material,
-        uvs=None if mesh.uvs is None else mesh.uvs.astype(np.float32),
-        normals=_normals(mesh.normals, world_from_model),
-    )
-
-
-def _normals(
-    normals: NDArray[np.float64], world_from_model: NDArray[np.float64]
-) -> NDArray[np.float32] | None:
-    """Unit normals by the inverse transpose, or None (flat) if one is zero."""
-    n = normals @ np.linalg.inv(world_from_model[:3, :3])
-    length = np.linalg.norm(n, axis=1, keepdims=True)
-    if (length < 1e-12).any():
-        return None
-    unit: NDArray[np.float32] = (n / length).astype(np.float32)
-    return unit

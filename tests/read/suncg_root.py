@@ -26,8 +26,8 @@ def write_root(root: Path, *, pretty: bool = False) -> str:
     _write_models(root)
     _write_textures(root)
     _write_tables(root)
-    _write_room(root, "fr_0rm_0", "0_0", 0.0, 4.0, {2: WINDOW, 3: DOOR})
-    _write_room(root, "fr_0rm_1", "0_1", 4.095, 7.0, {})
+    write_room(root, "fr_0rm_0", "0_0", 0.0, 4.0, {2: WINDOW, 3: DOOR})
+    write_room(root, "fr_0rm_1", "0_1", 4.095, 7.0, {0: DOOR})
     _write_ground(root, "fr_0gd_12")
     write(
         root / f"house/{HOUSE}/house.json", json.dumps(house_json(), indent=2 if pretty else None)
@@ -227,7 +227,7 @@ def light(kind: str, position: list[float], power: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _write_room(
+def write_room(
     root: Path, model_id: str, node_id: str, x0: float, x1: float, holes: dict[int, Hole]
 ) -> None:
     """A room between x0 and x1, z 0..3, with walls, floor and ceiling as released."""
@@ -287,7 +287,7 @@ def write_large_root(
     _write_models(root)
     _write_tables(root)
     length = max(10.0, n_nodes / 8)
-    _write_room(root, "fr_0rm_0", "0_0", 0.0, length, {2: WINDOW})
+    write_room(root, "fr_0rm_0", "0_0", 0.0, length, {2: WINDOW})
     for k in range(n_models):
         obj = Obj(f"m{k}.mtl")
         obj.begin(material="material_0")

@@ -285,10 +285,19 @@ def test_openings_are_the_holes_of_the_walls(house: House) -> None:
     assert np.allclose(door.quad[:, 0], (4.0 + 4.095) / 2, atol=1e-4)  # between both rooms' walls
     assert outward_volume((door.cutter,)) > 0
     assert window.is_cut
+    assert door.is_cut
     plug = door.cutter.positions
     assert np.allclose([plug[:, 0].min(), plug[:, 0].max()], [4.0, 4.095], atol=1e-4)
     assert plug[:, 2].min() < 1.02
     assert plug[:, 2].max() > 1.98
+
+
+def test_a_wall_without_the_hole_is_left_for_repair_to_cut(tmp_path: Path) -> None:
+    suncg_root.write_root(tmp_path)
+    suncg_root.write_room(tmp_path, "fr_0rm_1", "0_1", 4.095, 7.0, {})
+    door = next(o for o in read_suncg(tmp_path, HOUSE, ReadFields()).openings if not o.is_window)
+    assert not door.is_cut
+    assert np.allclose(door.quad.min(0)[1:], [0.0, 1.02], atol=1e-4)
 
 
 def test_a_box_has_six_faces_with_materials_by_position(house: House) -> None:

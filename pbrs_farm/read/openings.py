@@ -19,12 +19,13 @@ _HOLE_MARGIN_M: Final = 0.10
 _OVERLAP_M: Final = 0.002
 _REACH_M: Final = 0.02
 _NEAR_M: Final = 0.15
+_LEAST_SHARE: Final = 0.02
 _UP: Final = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _WallFrame:
-    """A wall by its plan normal; points (V, 3): along the wall, up, across."""
+    """The upright faces of a wall that look one way, or back. normal: (3,), points: (V, 3) world."""
 
     level_id: str
     normal: NDArray[np.float64]
@@ -33,7 +34,7 @@ class _WallFrame:
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
     """An opening for every door and window that has a box and stands in a wall."""
-    frames = [f for item in items if item.kind is ItemKind.WALL for f in (_frame(item),) if f]
+    frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
     found = []
     for item in items:
         if item.kind in (ItemKind.DOOR, ItemKind.WINDOW) and item.box is not None:
@@ -43,18 +44,23 @@ def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
     return tuple(found)
 
 
-def _frame(item: Item) -> _WallFrame | None:
-    """The wall's frame across its largest vertical faces."""
+def _frames(item: Item) -> list[_WallFrame]:
+    """A frame for every direction that an item's larger upright faces have, to a degree."""
     corners = np.concatenate([s.positions[s.faces] for s in item.surfaces]).astype(np.float64)
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    upright = np.abs(n[:, 1]) < 0.01 * np.linalg.norm(n, axis=1)
-    if not upright.any():
-        return None
-    best = n[upright][np.linalg.norm(n[upright], axis=1).argmax()]
-    normal = best / np.linalg.norm(best)
-    normal[1] = 0.0
-    points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
-    return _WallFrame(item.level_id, normal, points @ _axes(normal))
+    area = np.linalg.norm(n, axis=1)
+    upright = (np.abs(n[:, 1]) < 0.01 * area) & (area > 0)
+    n, area, corners = n[upright], area[upright], corners[upright]
+    degree = np.rint(np.degrees(np.arctan2(n[:, 2], n[:, 0]))).astype(int) % 180
+    found = []
+    for d in np.unique(degree):
+        here = degree == d
+        if area[here].sum() < _LEAST_SHARE * area.sum():
+            continue
+        best = n[here][area[here].argmax()] * [1, 0, 1]
+        points = np.unique(corners[here].reshape(-1, 3), axis=0)
+        found.append(_WallFrame(item.level_id, best / np.linalg.norm(best), points))
+    return found
 
 
 def _axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,7 +98,7 @@ def _opening(item: Item, box: Box, frames: Sequence[_WallFrame]) -> Opening | No
         cutter=_solid(low - grown, high + grown, axes),
         quad=np.array([[s, y, middle] for s, y in quad]) @ axes.T,
         normal=normal,
-        is_cut=bool(holes),
+        is_cut=len(holes) == len(standing),
     )
 
 
@@ -105,10 +111,14 @@ def _wall(
     """The wall's points in axes, if it is the one (or one of those) that low..high stands in."""
     if abs(frame.normal @ axes[:, 2]) < 0.999:
         return []
-    points = frame.points @ _axes(frame.normal).T @ axes
+    points = frame.points @ axes
+    beside = (points[:, 2] > low[2] - _NEAR_M) & (points[:, 2] < high[2] + _NEAR_M)
+    points = points[beside]
+    if not len(points):
+        return []
     wall_low, wall_high = points.min(0), points.max(0)
-    apart = np.maximum(wall_low - high, low - wall_high)
-    return [points] if (apart < [-_NEAR_M, -_NEAR_M, _NEAR_M]).all() else []
+    overlap = np.minimum(wall_high - low, high - wall_low)[:2]
+    return [points] if (overlap > _NEAR_M).all() else []
 
 
 def _hole(
