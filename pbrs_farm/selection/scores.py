@@ -1,0 +1,163 @@
+"""Histograms -> scores against a reference, as tables that merge in any order; no effects.
+
+A score table is a pyarrow Table of SCORES, a row per view. Merging is associative and commutative,
+so houses can be scored anywhere and joined later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
+from pbrs_farm.selection.pack import QUALITIES, HistogramPack
+from pbrs_farm.selection.reference import Reference, check_comparable
+from pbrs_farm.selection.similarity import best_match
+
+SCORES: Final[Any] = pa.schema(
+    [
+        ("house", pa.string()),
+        ("view", pa.string()),
+        ("room", pa.string()),
+        ("room_type", pa.string()),
+        ("mode", pa.string()),
+        ("colour_score", pa.float64()),
+        ("depth_score", pa.float64()),
+        ("colour_reference", pa.string()),
+        ("depth_reference", pa.string()),
+        *((name, pa.float32()) for name in QUALITIES),
+        ("fault", pa.string()),
+        ("source", pa.string()),
+    ]
+)
+"""colour_score, depth_score: best intersection, null where the view is not scored.
+
+*_reference: id of the photograph that is most alike. mode: the lighting mode that was scored.
+fault: "", "unscored", or why the view cannot be read. source: digest of the house's histograms.
+"""
+
+BATCH_VIEWS: Final = 8192
+"""Views scored at once: bounds memory, and keeps the search efficient."""
+
+
+class Scorer:
+    """Scores packs against one reference; holds its normalised histograms."""
+
+    def __init__(self, reference: Reference, *, library: str | None = None) -> None:
+        """library: as similarity.best_match's."""
+        self._reference = reference
+        self._binning = reference.facts.binning
+        self._ids = np.array(reference.facts.ids, object)
+        self._colour = reference.colour_shares()
+        self._depth = reference.depth_shares()
+        self._library = library
+
+    def score(self, packs: Sequence[HistogramPack]) -> Any:
+        """The score table of the packs' views (SCORES).
+
+        Raises BadInput when they were made with settings the reference cannot be compared at.
+        """
+        packs = [p for p in packs if p.views]
+        if not packs:
+            return SCORES.empty_table()
+        for settings in {p.settings for p in packs}:
+            check_comparable(self._reference, settings, self._reference.facts.source)
+        modes = [m for p in packs for m in p.modes]
+        scored = np.array([bool(m) for m in modes])
+        colour = np.concatenate([coarser_colour(p.colour, self._binning.colour) for p in packs])
+        depth = np.concatenate([coarser_depth(p.depth, self._binning.depth) for p in packs])
+        c_score, c_best = self._best(colour, self._colour, scored)
+        d_score, d_best = self._best(depth, self._depth, scored)
+        quality = np.concatenate([p.quality for p in packs])
+        columns: dict[str, Any] = {
+            "house": [p.house for p in packs for _ in p.views],
+            "view": [v for p in packs for v in p.views],
+            "room": [r for p in packs for r in p.rooms],
+            "room_type": [r for p in packs for r in p.room_types],
+            "mode": modes,
+            "colour_score": _nullable(c_score),
+            "depth_score": _nullable(d_score),
+            "colour_reference": c_best,
+            "depth_reference": d_best,
+            "fault": [f for p in packs for f in p.faults],
+            "source": [p.source for p in packs for _ in p.views],
+        }
+        columns |= {name: _nullable(quality[:, k]) for k, name in enumerate(QUALITIES)}
+        return pa.table({f.name: columns[f.name] for f in SCORES}, schema=SCORES)
+
+    def score_all(
+        self, packs: Iterable[HistogramPack], batch_views: int = BATCH_VIEWS
+    ) -> Iterator[Any]:
+        """Score tables of a stream of packs, about batch_views rows each."""
+        held: list[HistogramPack] = []
+        n = 0
+        for pack in packs:
+            held.append(pack)
+            n += len(pack.views)
+            if n >= batch_views:
+                yield self.score(held)
+                held, n = [], 0
+        if held:
+            yield self.score(held)
+
+    def _best(
+        self,
+        counts: NDArray[np.generic],
+        references: NDArray[np.float32],
+        scored: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.float64], NDArray[Any]]:
+        """(n,) scores, NaN where not scored, and (n,) reference ids, None there."""
+        score = np.full(len(counts), np.nan)
+        best = np.full(len(counts), None, object)
+        if scored.any():
+            found, index = best_match(normalised(counts[scored]), references, library=self._library)
+            score[scored] = found
+            best[scored] = self._ids[index]
+        return score, best
+
+
+def score(
+    packs: Iterable[HistogramPack], reference: Reference, *, library: str | None = None
+) -> Any:
+    """One score table (SCORES) of the packs, sorted by house and view; see Scorer."""
+    return merged(*Scorer(reference, library=library).score_all(packs))
+
+
+def merged(*tables: Any) -> Any:
+    """One score table of several, sorted by house and view; a row in two of them is kept once.
+
+    Associative, commutative, and merging a table with itself gives that table. Raises ValueError
+    when two tables tell different things of one view.
+    """
+    joined = pa.concat_tables([SCORES.empty_table(), *(t.select(SCORES.names) for t in tables)])
+    joined = joined.sort_by([("house", "ascending"), ("view", "ascending")]).combine_chunks()
+    if joined.num_rows < 2:
+        return joined
+    again = _same_as_before(joined, "house") & _same_as_before(joined, "view")
+    if not again.any():
+        return joined
+    for name in SCORES.names:
+        same = _same_as_before(joined, name)
+        if not same[again].all():
+            row = int(np.nonzero(again & ~same)[0][0])
+            view = f"{joined['house'][row]} {joined['view'][row]}"
+            raise ValueError(f"view {view} has two different values of {name}")
+    return joined.filter(pa.array(~again)).combine_chunks()
+
+
+def _same_as_before(table: Any, name: str) -> NDArray[np.bool_]:
+    """(n,) bool: the row's value equals that of the row before; nulls are equal."""
+    column = table[name].combine_chunks()
+    values = column.to_numpy(zero_copy_only=False)
+    null = np.asarray(column.is_null())
+    same = np.zeros(len(values), bool)
+    same[1:] = (values[1:] == values[:-1]) & ~null[1:] & ~null[:-1] | (null[1:] & null[:-1])
+    return same
+
+
+def _nullable(values: NDArray[np.floating]) -> Any:
+    return pa.array(values, from_pandas=True)

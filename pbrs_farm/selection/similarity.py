@@ -1,0 +1,75 @@
+"""Histogram intersection, and the exact best match of many histograms against a set; no effects.
+
+For histograms that sum to 1, the sum of bin-wise minima is 1 - L1 / 2: the best match is the
+nearest neighbour under L1, which faiss finds exactly and fast; numpy does the same where faiss is
+not installed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Shares = NDArray[np.float32]
+"""(n, bins) float32, each row sums to 1, or to 0 where nothing was counted."""
+
+_BLOCK: Final = 32
+
+
+def intersection(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(...) sum over the last axis of bin-wise minima (paper section 3.3), in double precision."""
+    return np.asarray(np.minimum(a, b).sum(axis=-1, dtype=np.float64))
+
+
+def best_match(
+    queries: Shares, references: Shares, *, leave_out_self: bool = False, library: str | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """(n,) largest intersection of each query over all references, and (n,) that reference.
+
+    leave_out_self: queries are the references, and none may match itself (needs two at least).
+    library: "faiss" or "numpy"; faiss where it is installed when None. The score is computed
+    again in double precision for the match that was found. An empty query scores 0.
+    """
+    if len(references) <= leave_out_self or queries.shape[1] != references.shape[1]:
+        raise ValueError(f"cannot match {queries.shape} against {references.shape}")
+    library = library or ("faiss" if importlib.util.find_spec("faiss") else "numpy")
+    q, r = _on_support(queries, references)
+    search = _faiss_nearest if library == "faiss" else _numpy_nearest
+    nearest = np.empty(0, np.int64)
+    if len(q):
+        nearest = search(q, r, leave_out_self)
+    return intersection(queries, references[nearest]), nearest
+
+
+def _on_support(queries: Shares, references: Shares) -> tuple[Shares, Shares]:
+    """Both without the bins that no reference has: their minimum is 0 whatever the query holds."""
+    used = references.any(axis=0)
+    if used.all():
+        return np.ascontiguousarray(queries, np.float32), np.ascontiguousarray(references)
+    return np.ascontiguousarray(queries[:, used]), np.ascontiguousarray(references[:, used])
+
+
+def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int64]:
+    import faiss
+
+    knn: Any = faiss.knn
+    _distance, index = knn(q, r, 2 if leave_out_self else 1, metric=faiss.METRIC_L1)
+    if not leave_out_self:
+        return np.asarray(index[:, 0], np.int64)
+    # An image among its own two nearest is left out; a twin of it may stand before it.
+    first_is_self = index[:, 0] == np.arange(len(q))
+    return np.asarray(np.where(first_is_self, index[:, 1], index[:, 0]), np.int64)
+
+
+def _numpy_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int64]:
+    nearest = np.empty(len(q), np.int64)
+    for start in range(0, len(q), _BLOCK):
+        block = q[start : start + _BLOCK]
+        score = np.minimum(block[:, None], r[None]).sum(axis=2)
+        if leave_out_self:
+            score[np.arange(len(block)), np.arange(start, start + len(block))] = -1
+        nearest[start : start + len(block)] = score.argmax(axis=1)
+    return nearest

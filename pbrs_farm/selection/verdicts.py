@@ -1,0 +1,116 @@
+"""Scores -> which views are kept, and why the others are not; no effects.
+
+A verdict is a function of the scores and the thresholds alone: other thresholds need no histogram.
+Refused views are marked, never dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from pbrs_farm.recipe import SelectionFields
+
+REASONS: Final = (
+    "failed", "unscored", "too-dark", "blown", "one-surface", "inside-object", "too-few-objects",
+    "too-noisy", "missing-textures", "unlike-colour", "unlike-depth", "room-cap",
+)  # fmt: skip
+"""Why a view is refused, in the order in which the first is named."""
+
+
+def verdicts(scores: Any, fields: SelectionFields) -> Any:
+    """The table scores (SCORES) with columns kept (bool), reason (the first of REASONS that holds,
+    "" when kept) and reasons (all of them, with commas).
+
+    A view is kept when its colour and its depth score are both above their thresholds (paper
+    section 3.3) and no quality number is beyond its own. A number that is not known refuses nothing.
+    """
+    refused = _refusals(scores, fields)
+    table = np.stack([refused[name] for name in REASONS[:-1]], axis=1)
+    kept = np.asarray(~table.any(axis=1), np.bool_)
+    beyond = _beyond_cap(scores, kept, fields.per_room_cap)
+    table = np.column_stack([table, beyond])
+    kept &= ~beyond
+    first = np.where(kept, len(REASONS), table.argmax(axis=1))
+    names = np.array([*REASONS, ""], object)
+    added = {"kept": pa.array(kept), "reason": pa.array(names[first], pa.string())}
+    added["reasons"] = pa.array(_joined(table), pa.string())
+    for name, column in added.items():
+        scores = scores.append_column(name, column)
+    return scores
+
+
+def _refusals(scores: Any, fields: SelectionFields) -> Mapping[str, NDArray[np.bool_]]:
+    number = {name: _floats(scores, name) for name in _NUMBERS}
+    faults = scores["fault"].to_numpy()
+    unscored = np.asarray(faults == "unscored", bool)
+    failed = np.asarray(faults != "", bool) & ~unscored
+    told = ~(failed | unscored)
+    with np.errstate(invalid="ignore"):  # NaN: not known
+        return {
+            "failed": failed,
+            "unscored": unscored,
+            "too-dark": number["brightness"] < fields.min_brightness,
+            "blown": number["blown"] > fields.max_blown,
+            "one-surface": number["surface"] > fields.max_surface,
+            "inside-object": number["near"] > fields.max_near,
+            "too-few-objects": number["n_objects"] < fields.min_objects,
+            "too-noisy": number["noise"] > fields.max_noise,
+            "missing-textures": number["missing_textures"] > fields.max_missing_textures,
+            "unlike-colour": told & ~(number["colour_score"] > fields.min_colour),
+            "unlike-depth": told & ~(number["depth_score"] > fields.min_depth),
+        }
+
+
+_NUMBERS: Final = (
+    "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
+    "colour_score", "depth_score",
+)  # fmt: skip
+
+
+def _floats(scores: Any, name: str) -> NDArray[np.float64]:
+    """(n,) float64; NaN where null. float32 numbers are rounded back to what was stored."""
+    values = scores[name].to_numpy()
+    if values.dtype == np.float32:
+        return np.asarray(np.round(values.astype(np.float64), 6))
+    return np.asarray(values, np.float64)
+
+
+def _beyond_cap(scores: Any, kept: NDArray[np.bool_], cap: int) -> NDArray[np.bool_]:
+    """(n,) bool: kept views of a room that already has cap better ones (0 = no limit).
+
+    Better: the smaller of the two scores is larger; then the smaller view id.
+    """
+    beyond = np.zeros(len(kept), bool)
+    if cap <= 0 or not kept.any():
+        return beyond
+    rows = np.nonzero(kept)[0]
+    worse_score = np.minimum(_floats(scores, "colour_score"), _floats(scores, "depth_score"))[rows]
+    house, room, view = (_ranks(scores[name])[rows] for name in ("house", "room", "view"))
+    order = np.lexsort((view, -worse_score, room, house))
+    starts = np.ones(len(order), bool)
+    starts[1:] = (np.diff(house[order]) != 0) | (np.diff(room[order]) != 0)
+    first_of_room = np.maximum.accumulate(np.where(starts, np.arange(len(order)), 0))
+    beyond[rows[order]] = np.arange(len(order)) - first_of_room >= cap
+    return beyond
+
+
+def _ranks(column: Any) -> NDArray[np.int64]:
+    """(n,) the place of each row's text among all texts in order; equal texts share a place."""
+    return np.asarray(pc.rank(column.combine_chunks(), tiebreaker="dense"), np.int64)
+
+
+def _joined(table: NDArray[np.bool_]) -> list[str]:
+    """(n,) the names of the reasons that hold, with commas."""
+    weights = 1 << np.arange(len(REASONS))
+    codes = table @ weights
+    text = {
+        int(code): ",".join(name for k, name in enumerate(REASONS) if code >> k & 1)
+        for code in np.unique(codes)
+    }
+    return [text[int(code)] for code in codes]
