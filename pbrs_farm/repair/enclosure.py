@@ -28,14 +28,19 @@ _STEP_M = 0.05
 _OPEN_EDGE_M = 0.075
 _OPEN_AREA_M2 = 0.02
 _STOREY_GAP_M = 0.8
+_PROBES_M = (0.02, 0.12, 0.24)
 
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """Rooms (ids) that share their air. reasons: (room id, why it is open), empty if closed."""
+    """Rooms (ids) that share their air. reasons: (room id, why it is open), empty if closed.
+
+    wells: stairwells without a room (ids) that belong to it.
+    """
 
     rooms: tuple[str, ...]
     reasons: tuple[tuple[str, str], ...]
+    wells: tuple[str, ...] = ()
 
     @property
     def is_closed(self) -> bool:
@@ -52,9 +57,13 @@ class Space:
 
 
 def spaces_of_rooms(
-    rooms: Sequence[Room], walls: Sequence[Wall], lids: Sequence[Lid]
+    real: Sequence[Room], wells: Sequence[Room], walls: Sequence[Wall], lids: Sequence[Lid]
 ) -> tuple[Space, ...]:
-    """Rooms grouped by the air they share, in the order of their first room."""
+    """Rooms grouped by the air they share, in the order of their first room.
+
+    wells: stairwells that no room covers; a space of wells alone is left out.
+    """
+    rooms = (*real, *wells)
     areas = [plan.polygon_of_room(r.polygon) for r in rooms]
     links: list[tuple[int, int]] = []
     reasons: dict[int, str] = {}
@@ -74,10 +83,12 @@ def spaces_of_rooms(
     members = [np.flatnonzero(labels == k).tolist() for k in dict.fromkeys(labels.tolist())]
     return tuple(
         Space(
-            tuple(rooms[i].id for i in group),
+            tuple(rooms[i].id for i in group if i < len(real)),
             tuple((rooms[i].id, reasons[i]) for i in group if i in reasons),
+            tuple(rooms[i].id for i in group if i >= len(real)),
         )
         for group in members
+        if group[0] < len(real)
     )
 
 
@@ -103,7 +114,9 @@ def _edge(
         ):
             continue
         near = plan.grown(areas[j], GAP_M)
-        reached = bare & shapely.contains_xy(near, *(points + 0.02 * outward).T)
+        reached = np.zeros(len(points), np.bool_)
+        for step in _PROBES_M:
+            reached |= bare & shapely.contains_xy(near, *(points + step * outward).T)
         if reached.any():
             linked.append(j)
             bare &= ~reached
@@ -167,26 +180,40 @@ def _cover(
     above: bool,
 ) -> tuple[list[int], str]:
     """Rooms that room i opens into upwards (or downwards), and why it has no lid there, or ""."""
-    room = rooms[i]
-    near = [lid.area for lid in lids if _covers(room, lid, above=above)]
+    near = _lids_of(rooms[i], lids, above=above)
     bare = plan.without(areas[i], *(plan.grown(a, GAP_M) for a in near))
     linked = []
-    for j, other in enumerate(rooms):
-        gap = other.floor_y - room.ceiling_y if above else room.floor_y - other.ceiling_y
-        if j == i or not -GAP_M <= gap <= _STOREY_GAP_M:
-            continue
-        if _area(plan.common(bare, areas[j])) > _OPEN_AREA_M2:
+    for j in _storey_next(rooms[i], rooms, above=above):
+        if plan.common(bare, areas[j]).area > _OPEN_AREA_M2:
             linked.append(j)
             bare = plan.without(bare, plan.grown(areas[j], GAP_M))
     what = "ceiling" if above else "floor"
-    if _area(bare) <= _OPEN_AREA_M2:
+    if bare.area <= _OPEN_AREA_M2:
         return linked, ""
     exact = plan.common(plan.without(areas[i], *near), plan.grown(bare, 2 * GAP_M))
-    return linked, f"{_area(exact):.1f} m2 of it have no {what}"
+    return linked, f"{exact.area:.1f} m2 of it have no {what}"
 
 
-def _area(shape: plan.Shape) -> float:
-    return float(shapely.area(shape))
+def bare_area(room: Room, rooms: Sequence[Room], lids: Sequence[Lid], *, above: bool) -> plan.Shape:
+    """Plan area of room with neither a lid above (or below) it nor a room of the next storey."""
+    bare = plan.without(plan.polygon_of_room(room.polygon), *_lids_of(room, lids, above=above))
+    beyond = [rooms[j].polygon for j in _storey_next(room, rooms, above=above)]
+    return plan.without(bare, *(plan.grown(plan.polygon_of_room(p), GAP_M) for p in beyond))
+
+
+def _lids_of(room: Room, lids: Sequence[Lid], *, above: bool) -> list[plan.Shape]:
+    return [lid.area for lid in lids if _covers(room, lid, above=above)]
+
+
+def _storey_next(room: Room, rooms: Sequence[Room], *, above: bool) -> list[int]:
+    # Indices of the rooms one storey up (or down), wherever they lie in plan.
+    gaps = [
+        other.floor_y - room.ceiling_y if above else room.floor_y - other.ceiling_y
+        for other in rooms
+    ]
+    return [
+        j for j, gap in enumerate(gaps) if rooms[j] is not room and -GAP_M <= gap <= _STOREY_GAP_M
+    ]
 
 
 def _covers(room: Room, lid: Lid, *, above: bool) -> bool:

@@ -80,7 +80,8 @@ def leaks_of_house(
     rng = np.random.default_rng(0)
     found = []
     for space in closed:
-        origins, directions = _rays([a for r in space.rooms for a in airs[r]], meter, rng)
+        inside = [a for r in (*space.rooms, *space.wells) for a in airs[r]]
+        origins, directions = _rays(inside, meter, rng)
         assert occluder is not None
         found.append(_measured(space, origins, directions, normals, occluder, meter, rng))
     areas = {r.id: float(shapely.area(plan.polygon_of_room(r.polygon))) for r in house.rooms}
@@ -101,6 +102,8 @@ def plugged_shell(house: House, plugs: Sequence[Surface]) -> House:
 
 
 def _rays(airs: Sequence[RoomAir], meter: LeakMeter, rng: np.random.Generator) -> tuple[F64, F64]:
+    if not airs:
+        return np.zeros((0, 3)), np.zeros((0, 3))
     edges = np.concatenate([_edge_starts(a, meter.step_m, rng) for a in airs])
     areas = np.array([a.area.area for a in airs])
     shares = rng.multinomial(meter.n_inside, areas / areas.sum())

@@ -55,6 +55,11 @@ def closed(shape: Shape, gap_m: float) -> Shape:
     return union([grown(grown(shape, gap_m / 2), -gap_m / 2), shape])
 
 
+def opened(shape: Shape, width_m: float) -> Shape:
+    """shape without parts narrower than width_m; its other edges stay where they are."""
+    return common(grown(grown(shape, -width_m / 2), width_m / 2), shape)
+
+
 def without(shape: Shape, *others: Shape) -> Shape:
     """shape less all others."""
     for other in others:

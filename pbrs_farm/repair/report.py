@@ -13,7 +13,9 @@ Point = tuple[float, float, float]
 
 
 class Removed(_Record):
-    """An item that was taken out. reason: "person", "plant", "inside other walls", "no faces"."""
+    """An item that was taken out. reason: "person", "plant", or "nothing left of it": the
+    item lay wholly inside other walls and openings.
+    """
 
     item_id: str
     name: str
@@ -29,7 +31,9 @@ class LeftAsIs(_Record):
 
 
 class StructureReport(_Record):
-    """The geometry work. n_joints_closed: places where a wall was bridged to its neighbour."""
+    """The geometry work. n_joints_closed: places where a wall was bridged to its neighbour.
+    n_stairwells_closed: floors and ceilings carried on over stairwells that no room covers.
+    """
 
     n_walls: int = 0
     n_walls_thickened: int = 0
@@ -38,6 +42,7 @@ class StructureReport(_Record):
     n_ceilings_thickened: int = 0
     n_solid_before: int = 0
     n_joints_closed: int = 0
+    n_stairwells_closed: int = 0
     n_openings: int = 0
     n_openings_cut: int = 0
     left_as_is: tuple[LeftAsIs, ...] = ()

@@ -15,7 +15,7 @@ from pbrs_farm.repair.enclosure import Space, spaces_of_rooms
 from pbrs_farm.repair.joints import joints_between_walls, joints_with_sheet
 from pbrs_farm.repair.leaks import RoomAir
 from pbrs_farm.repair.patches import patch_from_surface, surface_from_patch
-from pbrs_farm.repair.prisms import level_plane
+from pbrs_farm.repair.prisms import level_plane, polygons_of
 from pbrs_farm.repair.report import LeftAsIs, Removed, StructureReport
 from pbrs_farm.repair.reveals import REVEAL, with_metric_uv
 from pbrs_farm.repair.sheets import Lid, Sheets, sheets_from_house
@@ -31,7 +31,10 @@ from pbrs_farm.repair.solids import (
     solid_from_patches,
     united,
 )
+from pbrs_farm.repair.stairwells import stairwells_of_house
 from pbrs_farm.repair.walls import Wall, walls_from_house
+
+_SLIVER_M = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,14 +57,18 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     """Thicken what is planar, join, cut, unite. Faces keep item, surface name, material and uv."""
     table = TagTable()
     rooms = plan.union([plan.polygon_of_room(r.polygon) for r in house.rooms])
-    walls, left = walls_from_house(house, table, rooms, thickness_m)
+    uprights, left = walls_from_house(house, table, rooms, thickness_m)
+    walls = [w for w in uprights if not w.is_board]
     sheets = sheets_from_house(house, table)
+    found = stairwells_of_house(house, walls, sheets.planar, _lids(sheets))
+    sheets.planar.extend(found.sheets)
+    lived = (*house.rooms, *found.wells)
     doors = _thresholds(house, walls)
 
     grounds = ground_of_sheets(sheets.planar, walls, doors, thickness_m)
-    airs = airs_of_rooms(house.rooms, sheets.planar, grounds)
+    airs = airs_of_rooms(lived, sheets.planar, grounds)
     slabs = _slabs(sheets, grounds, airs, thickness_m, table)
-    parts: list[tuple[Wall, Manifold]] = [(w, w.solid) for w in walls]
+    parts: list[tuple[Wall, Manifold]] = [(w, w.solid) for w in uprights]
     joints, n_gaps = joints_between_walls(walls, table)
     for sheet, ground in zip(sheets.planar, grounds, strict=True):
         joints += joints_with_sheet(sheet, ground, walls, doors, thickness_m, table)
@@ -70,7 +77,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     cut_parts, plugs, idle = _cut(house.openings, parts, table)
     bodies = [*cut_parts, *slabs, *(s for solids in sheets.solid.values() for s in solids)]
     surfaces = _surfaces(united(bodies), table) if bodies else {}
-    touched = {w.item for w in walls} | {s.item for s in sheets.planar} | set(sheets.solid)
+    touched = {w.item for w in uprights} | {s.item for s in sheets.planar} | set(sheets.solid)
     report = StructureReport(
         n_walls=len({w.item for w in walls}),
         n_walls_thickened=len({w.item for w in walls if w.thickened}),
@@ -78,6 +85,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
         n_ceilings_thickened=len({s.item for s in sheets.planar if s.is_ceiling}),
         n_solid_before=len({w.item for w in walls if not w.thickened} | set(sheets.solid)),
         n_joints_closed=n_gaps,
+        n_stairwells_closed=len(found.sheets),
         n_openings=len(house.openings),
         n_openings_cut=len(plugs),
         left_as_is=(
@@ -89,14 +97,13 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
         {i: surfaces.get(i, ()) for i in sorted(touched)},
         plugs,
         report,
-        spaces_of_rooms(house.rooms, walls, _lids(sheets, grounds)),
-        {r.id: _room_airs(r, walls, sheets) for r in house.rooms},
+        spaces_of_rooms(house.rooms, found.wells, walls, _lids(sheets)),
+        {r.id: _room_airs(r, walls, sheets) for r in lived},
     )
 
 
-def _lids(sheets: Sheets, grounds: Sequence[plan.Shape]) -> list[Lid]:
-    planar = zip(sheets.planar, grounds, strict=True)
-    return [Lid(s.is_ceiling, ground, s.plane) for s, ground in planar] + sheets.lids
+def _lids(sheets: Sheets) -> list[Lid]:
+    return [Lid(s.is_ceiling, s.area, s.plane) for s in sheets.planar] + sheets.lids
 
 
 def _room_airs(room: Room, walls: Sequence[Wall], sheets: Sheets) -> list[RoomAir]:
@@ -109,11 +116,13 @@ def _room_airs(room: Room, walls: Sequence[Wall], sheets: Sheets) -> list[RoomAi
     area = plan.without(plan.polygon_of_room(room.polygon), plan.union(feet))
     ceilings = [s for s in sheets.planar if s.is_ceiling and s.room_id == room.id]
     floor = level_plane(room.floor_y)
-    found = [RoomAir(plan.common(area, s.area), floor, s.plane) for s in ceilings]
-    found.append(
-        RoomAir(plan.without(area, *(s.area for s in ceilings)), floor, level_plane(room.ceiling_y))
-    )
-    return [a for a in found if a.area.area > 1e-3]
+    parts = [(plan.common(area, s.area), s.plane) for s in ceilings]
+    parts.append((plan.without(area, *(s.area for s in ceilings)), level_plane(room.ceiling_y)))
+    return [
+        RoomAir(p, floor, plane)
+        for shape, plane in parts
+        for p in polygons_of(plan.opened(shape, _SLIVER_M), min_area_m2=1e-3)
+    ]
 
 
 def _left(house: House, left: dict[int, str]) -> list[LeftAsIs]:
@@ -194,7 +203,7 @@ def with_structure(house: House, structure: Structure) -> tuple[House, list[Remo
     for index, item in enumerate(house.items):
         surfaces = structure.surfaces.get(index, item.surfaces)
         if index in structure.surfaces and not surfaces:
-            removed.append(Removed(item_id=item.id, name=item.name, reason="inside other walls"))
+            removed.append(Removed(item_id=item.id, name=item.name, reason="nothing left of it"))
         else:
             items.append(replace(item, surfaces=surfaces))
     return house.with_items(items), removed

@@ -16,13 +16,17 @@ from pbrs_farm.repair.patches import face_normals
 from pbrs_farm.repair.prisms import Plane, level_plane, plane_of_points, polygons_of, prism
 from pbrs_farm.repair.solids import F64, Patch, Tag, TagTable, bounds, solid_from_patches
 
+BASEBOARD = "baseboard"
+"""Tag of wall items that are baseboards."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wall:
     """A wall's solid, uncut. footprint: plan area; bottom_y, high_y: its lowest and
     highest point; top: its upper plane.
 
-    material: of parts repair adds to it. thickened: it was planar.
+    material: of parts repair adds to it. thickened: it was planar. is_board: a baseboard, which
+    bounds no room and is joined to nothing.
     """
 
     item: int
@@ -33,6 +37,7 @@ class Wall:
     top: Plane
     material: int
     thickened: bool = False
+    is_board: bool = False
 
     def tag(self, surface: str) -> Tag:
         """The tag of a surface that repair adds to this wall."""
@@ -78,6 +83,7 @@ def _wall(
         top=top,
         material=named.get("left", item.surfaces[0].material),
         thickened=thickened,
+        is_board=BASEBOARD in item.tags,
     )
 
 
