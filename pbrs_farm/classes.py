@@ -1,4 +1,4 @@
-"""The label sets NYU40 and NYU13: names, the map between them, legend colours; no effects.
+"""The label sets NYU40 and NYU13: names and the map between them; no effects.
 
 Ids start at 1; 0 is "nothing". NYU40: Gupta, Arbelaez, Malik 2013. NYU13: Couprie et al. 2013, by
 the usual 40 to 13 table (SceneNet). `TABLE_VERSION` changes when any row here does.
@@ -6,7 +6,6 @@ the usual 40 to 13 table (SceneNet). `TABLE_VERSION` changes when any row here d
 
 from __future__ import annotations
 
-import colorsys
 from typing import Final
 
 import numpy as np
@@ -37,17 +36,3 @@ NYU13_FROM_NYU40: Final[NDArray[np.uint8]] = np.array(
     np.uint8,
 )  # fmt: skip
 """(41,) NYU13 id of each NYU40 id."""
-
-
-def palette(n: int) -> NDArray[np.uint8]:
-    """(n, 3) sRGB colours, well apart for neighbouring ids; row 0 is black (nothing)."""
-    golden = 0.61803398875
-    colours = [
-        colorsys.hsv_to_rgb(
-            (0.13 + golden * i) % 1.0, (0.45, 0.75, 0.95)[i % 3], (0.95, 0.7)[i // 3 % 2]
-        )
-        for i in range(n)
-    ]
-    table: NDArray[np.uint8] = np.rint(np.array(colours).reshape(n, 3) * 255).astype(np.uint8)
-    table[:1] = 0
-    return table

@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.stored import StoredView
-from pbrs_farm.classes import NYU40_NAMES
+from pbrs_farm.classes import NYU13_FROM_NYU40, NYU40_NAMES
 from pbrs_farm.errors import BadInput
 from pbrs_farm.layers import LAYERS, Layer
 
@@ -24,26 +24,33 @@ def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | Non
     """The basic layers by name, None when one of them is missing, damaged or of a wrong shape."""
     arrays = {}
     for layer in LAYERS:
-        if layer.name in BASIC or (view.has(layer.file) and layer.file.endswith(".png")):
-            array = _read_png(view, layer, tally)
+        if layer.name in BASIC or (view.has(layer.file) and layer.name != "radiance"):
+            array = _read(view, layer, tally)
             if array is not None:
                 arrays[layer.name] = array
     return arrays if all(name in arrays for name in BASIC) else None
 
 
-def _read_png(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | None:
+def _read(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | None:
     place = f"{view.place}/{layer.file}"
     if not tally.expect("layers", place, view.has(layer.file), "is missing"):
         return None
     try:
-        array = view.png(layer.file)
-    except BadInput as error:
+        array = view.png(layer.file) if layer.file.endswith(".png") else _planes(view, layer)
+    except (BadInput, KeyError) as error:
         tally.expect("layers", place, False, str(error))
         return None
-    shape = (*view.size, 3) if layer.channels == "RGB" else view.size
+    shape = (*view.size, 3) if layer.channels in ("RGB", "X Y Z") else view.size
     fits = array.shape == shape and str(array.dtype) == layer.dtype
     what = f"{array.shape} {array.dtype}, expected {shape} {layer.dtype}"
     return array if tally.expect("layers", place, fits, what) else None
+
+
+def _planes(view: StoredView, layer: Layer) -> NDArray[np.float32]:
+    """The channels of an EXR layer, stacked when there are several."""
+    channels = view.exr(layer.file)
+    planes = [channels[name] for name in layer.channels.split()]
+    return planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
 
 
 def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
@@ -90,7 +97,37 @@ def check_consistency(view: StoredView, arrays: dict[str, NDArray[Any]], tally: 
         classes[instance_id] = nyu40
     _same(view, tally, "semantic = table", classes[instance] == arrays["semantic"])
     _same(view, tally, "boundary", arrays["boundary"] == np.where(_boundary(instance), 255, 0))
+    _check_optional(view, arrays, tally)
     _check_table(view, instance, tally)
+
+
+def _check_optional(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """Optional layers that other layers decide, or that hold few values."""
+    semantic = arrays["semantic"]
+    if "nyu13" in arrays:
+        _same(view, tally, "nyu13", arrays["nyu13"] == NYU13_FROM_NYU40[semantic.clip(0, 40)])
+    if "boundary_semantic" in arrays:
+        edges = np.where(_boundary(semantic), 255, 0)
+        _same(view, tally, "boundary_semantic", arrays["boundary_semantic"] == edges)
+    for name, values in (("boundary_occlusion", (0, 128, 255)), ("boundary_crease", (0, 255))):
+        if name in arrays:
+            _same(view, tally, name, np.isin(arrays[name], values))
+    if "normal_shading" in arrays:
+        length = np.linalg.norm(arrays["normal_shading"] * (2 / 65535) - 1, axis=-1)
+        unit = np.where(arrays["valid"] > 0, np.abs(length - 1) < 1e-3, length < 1e-4)
+        _same(view, tally, "normal_shading", unit)
+    if "class_source" in arrays:
+        _same(view, tally, "class_source", _source_class_is_right(view, arrays))
+
+
+def _source_class_is_right(view: StoredView, arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """(H, W) bool: the id's name in the table is the source class of the instance there."""
+    names = {int(k): name for k, name in view.table.get("source_classes", {}).items()}
+    number = {name: k for k, name in names.items()}
+    expected = np.zeros(65536, np.int64)
+    for row in view.table["instances"]:
+        expected[int(row["id"])] = number.get(row["source_class"], 0)
+    return np.asarray(arrays["class_source"] == expected[arrays["instance"]], bool)
 
 
 def _same(view: StoredView, tally: Tally, check: str, right: NDArray[np.bool_]) -> None:

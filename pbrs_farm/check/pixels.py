@@ -8,7 +8,9 @@ explains every layer at once the pixel is a tie, which is counted; otherwise it 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,28 +21,31 @@ from pbrs_farm.check.triangles import Triangles
 
 Bools = NDArray[np.bool_]
 
+RAY_LAYERS = (
+    "instance", "semantic", "depth", "normal", "valid",
+    "depth_z", "position", "normal_world", "material", "glass",
+)  # fmt: skip
+"""Layers that a ray through the pixel's centre decides."""
+
 DEPTH_TOLERANCE_MM = 0.51
 NORMAL_TOLERANCE_DEG = 0.02
 TIE_DEPTH_M = 1e-4
+METRES = 2e-4
+"""Tolerance of depths and positions stored as floats."""
+
 _JITTER_PX = 0.02
 _JITTER = _JITTER_PX * np.array(
     [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]], np.float64
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Labels:
-    """The stored layers at N pixels. normal: (N, 3) as stored; the rest (N,)."""
+Labels = dict[str, NDArray[Any]]
+"""Layer name -> what is stored at N pixels: (N,), normals and positions (N, 3)."""
 
-    depth: NDArray[np.int64]
-    normal: NDArray[np.int64]
-    valid: NDArray[np.int64]
-    semantic: NDArray[np.int64]
-    instance: NDArray[np.int64]
 
-    def at(self, index: NDArray[np.int64]) -> Labels:
-        """The labels of some of the pixels."""
-        return Labels(*(getattr(self, name)[index] for name in Labels.__slots__))
+def labels_at(labels: Labels, index: NDArray[np.int64]) -> Labels:
+    """The labels of some of the pixels."""
+    return {name: array[index] for name, array in labels.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,10 +77,12 @@ def judge(
         rays.first(origin, view.rays(rows[open_] + dy, columns[open_] + dx)[1])
         for dx, dy in _JITTER
     ]
-    candidates.append(_coincident(labels.at(open_), face[open_], origin, directions[open_], scene))
+    candidates.append(
+        _coincident(labels_at(labels, open_), face[open_], origin, directions[open_], scene)
+    )
     best = np.sum([~right[name][open_] for name in right], axis=0)
     for other in candidates:
-        trial = _explained(view, labels.at(open_), other, directions[open_], scene)
+        trial = _explained(view, labels_at(labels, open_), other, directions[open_], scene)
         wrong = np.sum([~ok for ok in trial.values()], axis=0)
         better = wrong < best
         best = np.where(better, wrong, best)
@@ -93,36 +100,63 @@ def _explained(
     directions: Floats,
     scene: tuple[Triangles, Rays],
 ) -> dict[str, Bools]:
-    """Per check whether hitting these faces explains the labels."""
+    """Per layer whether hitting these faces explains what is stored."""
     triangles, rays = scene
     hit = face >= 0
-    instance = np.where(hit, triangles.instance[face], 0) if len(triangles.faces) else 0 * face
-    origin = view.world_from_camera[:3, 3]
-    mm = np.clip(rays.distance(face, origin, directions) * 1000, 0.5, 65535)
-    classes = np.array(
-        [triangles.nyu40.get(int(i), 0) for i in range(int(instance.max(initial=0)) + 1)]
-    )
-    return {
-        "instance": labels.instance == instance,
-        "semantic": labels.semantic == classes[instance],
-        "depth": np.where(hit, np.abs(labels.depth - mm) <= DEPTH_TOLERANCE_MM, labels.depth == 0),
-        "normal": normal_is_right(labels.normal, rays.normal(face, directions), view),
-        "valid": labels.valid == np.where(hit, 255, 0),
+    instance = _of_face(triangles.instance, face)
+    z = rays.distance(face, view.world_from_camera[:3, 3], directions)
+    normal = rays.normal(face, directions)
+    classes = np.zeros(max(triangles.nyu40, default=0) + 1, np.int64)
+    classes[list(triangles.nyu40)] = list(triangles.nyu40.values())
+    mm = np.clip(z * 1000, 0.5, 65535)
+    point = view.world_from_camera[:3, 3] + directions * z[:, None]
+
+    checks: dict[str, Callable[[NDArray[Any]], Any]] = {
+        "instance": lambda stored: stored == instance,
+        "semantic": lambda stored: stored == classes[instance],
+        "depth": lambda stored: np.where(
+            hit, np.abs(stored - mm) <= DEPTH_TOLERANCE_MM, stored == 0
+        ),
+        "normal": lambda stored: normal_is_right(stored, published_axes(normal, view)),
+        "valid": lambda stored: stored == np.where(hit, 255, 0),
+        "depth_z": lambda stored: np.where(hit, np.abs(stored - z) <= METRES, stored == 0),
+        "position": lambda stored: np.where(
+            hit, np.abs(stored - point).max(axis=1) <= METRES, ~stored.any(axis=1)
+        ),
+        "normal_world": lambda stored: normal_is_right(stored, normal),
+        "material": lambda stored: (
+            stored == np.where(hit, _of_face(triangles.material, face) + 1, 0)
+        ),
+        "glass": lambda stored: (
+            stored == np.where(hit & _of_face(triangles.see_through, face), 255, 0)
+        ),
     }
+    return {name: np.asarray(checks[name](stored), bool) for name, stored in labels.items()}
 
 
-def normal_is_right(stored: NDArray[np.int64], world: Floats, view: StoredView) -> Bools:
-    """(N,) stored 16-bit camera normals decode to the world ones; where those are 0, to nothing."""
+def _of_face(table: NDArray[Any], face: Faces) -> NDArray[Any]:
+    """table[face], 0 where face is -1."""
+    if not len(table):
+        return np.zeros(len(face), table.dtype)
+    return np.where(face >= 0, table[face], table.dtype.type(0))
+
+
+def published_axes(world: Floats, view: StoredView) -> Floats:
+    """(N, 3) x right, y forward, z up from world directions."""
     camera = world @ view.world_from_camera[:3, :3]
-    published = np.stack([camera[:, 0], camera[:, 2], -camera[:, 1]], axis=1)
+    return np.stack([camera[:, 0], camera[:, 2], -camera[:, 1]], axis=1)
+
+
+def normal_is_right(stored: NDArray[np.int64], expected: Floats) -> Bools:
+    """(N,) stored 16-bit normals decode to the expected ones; where those are 0, to nothing."""
     decoded = stored * (2 / 65535) - 1
     length = np.linalg.norm(decoded, axis=1)
-    sine = np.linalg.norm(np.cross(decoded, published), axis=1)
-    close = (np.einsum("ni,ni->n", decoded, published) > 0) & (
+    sine = np.linalg.norm(np.cross(decoded, expected), axis=1)
+    close = (np.einsum("ni,ni->n", decoded, expected) > 0) & (
         sine <= np.radians(NORMAL_TOLERANCE_DEG) * length
     )
     nothing = (stored == 32768).all(axis=1)
-    right = np.where(published.any(axis=1), close & (np.abs(length - 1) < 1e-3), nothing)
+    right = np.where(expected.any(axis=1), close & (np.abs(length - 1) < 1e-3), nothing)
     return np.asarray(right, bool)
 
 
@@ -137,9 +171,9 @@ def _coincident(
     triangles, rays = scene
     found = np.full(len(face), -1, np.int64)
     first = rays.distance(face, origin, directions)
-    for instance in np.unique(labels.instance):
+    for instance in np.unique(labels["instance"]):
         own = np.nonzero(triangles.instance == instance)[0]
-        for pixel in np.nonzero(labels.instance == instance)[0]:
+        for pixel in np.nonzero(labels["instance"] == instance)[0]:
             t = _pierced(triangles, own, origin, directions[pixel])
             gap = np.abs(t - first[pixel])
             if len(own) and gap.min() <= TIE_DEPTH_M:

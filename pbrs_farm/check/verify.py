@@ -7,6 +7,7 @@ house.glb, cameras from view.json, hits from Embree.
 from __future__ import annotations
 
 import zlib
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.files import check_files, check_root_manifest
 from pbrs_farm.check.pictures import check_consistency, check_pictures, read_labels
-from pbrs_farm.check.pixels import Labels, judge
+from pbrs_farm.check.pixels import RAY_LAYERS, judge
 from pbrs_farm.check.poses import check_pose, check_reprojection
 from pbrs_farm.check.rays import Rays
 from pbrs_farm.check.stored import StoredView, views_of_house
@@ -29,6 +30,14 @@ SAMPLE = 2000
 
 MAX_TIES = 0.0002
 """Share of pixels whose instance may be the other of two right answers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scenes:
+    """What rays are cast into: every triangle, and those that are neither glass nor pane."""
+
+    all: tuple[Triangles, Rays]
+    opaque: tuple[Triangles, Rays]
 
 
 def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False) -> Certificate:
@@ -59,11 +68,13 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
         what = f"house.glb {error}" if isinstance(error, BadGlb) else str(error)
         tally.expect("layers", house.name, False, what)
         return 0
-    scene = (triangles, Rays(triangles))
+    scenes = Scenes(
+        (triangles, Rays(triangles)), (triangles, Rays(triangles, ~triangles.see_through))
+    )
     depths: list[tuple[StoredView, NDArray[Any]]] = []
     for view in views:
         try:
-            depth = _check_view(view, scene, n_pixels, tally)
+            depth = _check_view(view, scenes, n_pixels, tally)
         except (KeyError, TypeError, ValueError, IndexError, np.linalg.LinAlgError) as error:
             tally.expect(
                 "layers", f"{view.place}/view.json", False, f"{type(error).__name__}: {error}"
@@ -77,7 +88,7 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
 
 
 def _check_view(
-    view: StoredView, scene: tuple[Triangles, Rays], n_pixels: int | None, tally: Tally
+    view: StoredView, scenes: Scenes, n_pixels: int | None, tally: Tally
 ) -> NDArray[Any] | None:
     """Check one view; its depth picture, None when its labels cannot be read."""
     check_pose(view, tally)
@@ -86,14 +97,33 @@ def _check_view(
         return None
     check_pictures(view, arrays, tally)
     check_consistency(view, arrays, tally)
-    rows, columns = _chosen(view, n_pixels)
-    labels = Labels(*(arrays[name][rows, columns].astype(np.int64) for name in Labels.__slots__))
-    verdict = judge(view, labels, rows, columns, scene)
-    for check, right in verdict.right.items():
-        tally.add(f"ray: {check}", len(rows), ties=int(verdict.tied.sum()))
-        for k in np.nonzero(~right)[0]:
-            tally.fail(f"ray: {check}", view.place, f"row {rows[k]}, column {columns[k]}")
+    _check_rays(view, arrays, scenes, n_pixels, tally)
     return arrays["depth"]
+
+
+def _check_rays(
+    view: StoredView,
+    arrays: dict[str, NDArray[Any]],
+    scenes: Scenes,
+    n_pixels: int | None,
+    tally: Tally,
+) -> None:
+    rows, columns = _chosen(view, n_pixels)
+    behind = {name: f"behind_glass_{name}" for name in ("depth", "normal", "semantic", "instance")}
+    for scene, prefix, names in (
+        (scenes.all, "ray: ", {name: name for name in RAY_LAYERS}),
+        (scenes.opaque, "ray: behind glass ", behind),
+    ):
+        present = {name: file for name, file in names.items() if file in arrays}
+        if "instance" not in present:
+            continue
+        labels = {name: arrays[file][rows, columns] for name, file in present.items()}
+        labels = {k: a.astype(np.int64) if a.dtype.kind == "u" else a for k, a in labels.items()}
+        verdict = judge(view, labels, rows, columns, scene)
+        for check, right in verdict.right.items():
+            tally.add(f"{prefix}{check}", len(rows), ties=int(verdict.tied.sum()))
+            for k in np.nonzero(~right)[0]:
+                tally.fail(f"{prefix}{check}", view.place, f"row {rows[k]}, column {columns[k]}")
 
 
 def _chosen(view: StoredView, n_pixels: int | None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

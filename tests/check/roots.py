@@ -8,7 +8,7 @@ import numpy as np
 from pbrs_farm import keys, truth
 from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.house import House, geometry_from_house
-from pbrs_farm.images import png_from_array
+from pbrs_farm.images import exr_from_layers, png_from_array
 from pbrs_farm.keys import Marker, StoredFile
 from pbrs_farm.layers import LAYER
 from pbrs_farm.read.builtin import builtin_home
@@ -24,18 +24,39 @@ def views_of(home: House) -> dict[str, Camera]:
     return {f"v{k}": Camera.look(intrinsics, c.eye, c.towards) for k, c in enumerate(home.cameras)}
 
 
-def make_root(root: Path) -> Path:
+def encoded(name: str, array: np.ndarray) -> bytes:
+    """A layer's file."""
+    if LAYER[name].file.endswith(".png"):
+        return png_from_array(array)
+    names = LAYER[name].channels.split()
+    planes = [array] if len(names) == 1 else list(np.moveaxis(array, -1, 0))
+    return exr_from_layers({n: np.ascontiguousarray(p) for n, p in zip(names, planes, strict=True)})
+
+
+def make_root(root: Path, *, with_optional: bool = False) -> Path:
     """Write the root and return its house folder."""
     home = builtin_home()
     house = root / "houses" / home.id
-    caster = Caster(geometry_from_house(home))
+    geometry = geometry_from_house(home)
+    caster = Caster(geometry)
     glb, plain = bundle_from_house(home)
     files = {"house": {"house.glb": glb, "house.json": plain}}
     for name, camera in views_of(home).items():
         hit = caster.hit_record(camera)
         layers = truth.layers_from_hit(hit, home, camera)
         table = {"house": home.id, "view": name, **truth.view_table(hit.item, home, camera)}
-        made = {LAYER[k].file: png_from_array(v) for k, v in layers.items()}
+        seen = truth.Seen(
+            hit,
+            home,
+            geometry,
+            camera,
+            lambda skip, c=camera: caster.hit_record(c, skip_faces=skip),
+            {},
+        )
+        names = truth.OPTIONAL_NAMES if with_optional else ()
+        layers |= truth.optional_layers(names, seen)
+        table |= truth.optional_tables(names, home)
+        made = {LAYER[k].file: encoded(k, v) for k, v in layers.items()}
         made["view.json"] = json.dumps(table).encode()
         files[f"truth.{name}"] = {f"views/{name}/{k}": v for k, v in made.items()}
     for step, made in files.items():

@@ -169,3 +169,41 @@ def test_a_folder_that_is_no_output_root_is_told_so(tmp_path):
 def test_a_root_without_views_is_not_clean(tmp_path):
     (tmp_path / "houses/empty").mkdir(parents=True)
     assert not verify(tmp_path).is_clean
+
+
+@pytest.fixture(scope="module")
+def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("rich")
+    make_root(root, with_optional=True)
+    return root
+
+
+def test_optional_layers_are_checked_where_they_exist(rich):
+    certificate = verify(rich, all_pixels=True)
+    assert certificate.is_clean, certificate.text()
+    names = {"ray: depth_z", "ray: position", "ray: normal_world", "ray: material", "ray: glass"}
+    names |= {f"ray: behind glass {x}" for x in ("depth", "normal", "semantic", "instance")}
+    assert names | {"nyu13", "class_source", "boundary_semantic"} <= certificate.counts.keys()
+
+
+@pytest.mark.parametrize(
+    ("file", "check"),
+    [
+        ("normal_world.png", "ray: normal_world"),
+        ("material.png", "ray: material"),
+        ("glass.png", "ray: glass"),
+        ("behind_glass/depth.png", "ray: behind glass depth"),
+        ("behind_glass/instance.png", "ray: behind glass instance"),
+        ("nyu13.png", "nyu13"),
+        ("class_source.png", "class_source"),
+        ("boundary_semantic.png", "boundary_semantic"),
+        ("boundary_occlusion.png", "boundary_occlusion"),
+        ("normal_shading.png", "normal_shading"),
+    ],
+)
+def test_one_changed_pixel_of_an_optional_layer_is_caught(rich, tmp_path, file, check):
+    shutil.copytree(rich, tmp_path / "root")
+    house = house_of(tmp_path / "root")
+    changed_pixel(house / "views/v0" / file, 48, 64, 1 if "normal" not in file else 900)
+    sign(tmp_path / "root", house)
+    assert check in failed(tmp_path / "root")
