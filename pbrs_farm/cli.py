@@ -227,8 +227,14 @@ def _homes(args: argparse.Namespace) -> int:
     if args.json:
         _dump([asdict(row) for row in rows])
         return 0
+    package = homes.cached()
     for row in rows:
-        _say(str(row))
+        _say(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
+    _say()
+    _say(f"fetched: {package.label}" if package else "not fetched yet: pbrs-farm homes --fetch")
+    if package and package.note:
+        _say(package.note)
+    _say("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
     return 0
 
 

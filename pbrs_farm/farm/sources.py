@@ -68,9 +68,7 @@ def read_house(source: SourceRef, fields: ReadFields) -> House:
 
         return builtin_home()
     if source.kind == "example":
-        from pbrs_farm import homes
-
-        return homes.read_example(source.location, fields)
+        return _read_example(source.location, fields)
     if source.kind == "suncg":
         from pbrs_farm.read.suncg import read_suncg
 
@@ -85,16 +83,28 @@ def read_house(source: SourceRef, fields: ReadFields) -> House:
     from pbrs_farm import homes
     from pbrs_farm.read.sweethome3d import read_home
 
-    resources = homes.cached_resources()
+    package = homes.cached()
+    resources = package.resources() if package else None
     return read_home(data, path.name, resources=resources, fields=fields)
+
+
+def _read_example(name: str, fields: ReadFields) -> House:
+    from pbrs_farm import homes
+    from pbrs_farm.read.sweethome3d import read_home
+
+    package = homes.fetch()
+    data, file = package.home(name)
+    resources = package.resources()
+    return read_home(data, file, resources=resources, fields=fields, package=package.label)
 
 
 def _example(name: str) -> SourceRef:
     from pbrs_farm import homes
 
-    data = homes.example_bytes(name)
+    data, file = homes.fetch().home(name)
     sha = keys.sha256(data)
-    return SourceRef(kind="example", location=name, house_id=keys.house_id(name, sha), sha256=sha)
+    house_id = keys.house_id(Path(file).stem, sha)
+    return SourceRef(kind="example", location=name, house_id=house_id, sha256=sha)
 
 
 def _suncg(path: Path) -> SourceRef:
