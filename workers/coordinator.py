@@ -10,14 +10,18 @@ import logging
 import os
 import platform
 import secrets
+import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
-from workers.config import FarmConfig
+from pbrs_farm.errors import PbrsError
+from workers.config import FarmConfig, config_from_environment
 from workers.ids import STAGES, queue_of, task_from_text
 from workers.ledger import JobView, LedgerUnavailable
+from workers.logs import log_plainly
 from workers.rates import Rates
 from workers.redis_ledger import RedisLedger
 from workers.registry import Registry
@@ -163,3 +167,30 @@ def celery_sender(app: Any) -> Callable[[Iterable[tuple[str, str, str, str]]], N
             raise LedgerUnavailable(f"the broker took no message: {error}") from error
 
     return send
+
+
+def main() -> int:
+    """`python -m workers.coordinator`: lead, or stand by, until told to leave."""
+    from workers.app import make_app
+
+    log_plainly()
+    try:
+        config = config_from_environment()
+        ledger = RedisLedger(config)
+        ledger.ping()
+    except PbrsError as error:
+        sys.stderr.write(f"pbrs-farm: {error}\n")
+        return 1
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    if config.metrics_port:
+        from workers.metrics import serve_metrics
+
+        serve_metrics(config, ledger)
+    Coordinator(config, ledger, celery_sender(make_app(config))).run(stop)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

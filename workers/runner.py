@@ -7,7 +7,8 @@ at any time: a task that is run again finds its markers and does only what is mi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Literal, Protocol
 
@@ -15,6 +16,7 @@ from pydantic import BaseModel, ConfigDict
 
 from pbrs_farm.errors import BadInput
 from workers.config import FarmConfig
+from workers.job import JobSpec
 from workers.ledger import FaultClass
 
 Tell = Callable[[str], None]
@@ -52,11 +54,27 @@ class Reply(BaseModel):
     fingerprint: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """What storage says of a house. missing: unit -> first stage not done, "" when all are.
+
+    groups is None while the house's geometry is not done. reduced: the house is finished.
+    """
+
+    groups: tuple[tuple[str, ...], ...] | None = None
+    missing: Mapping[str, str] = field(default_factory=dict)
+    reduced: bool = False
+
+
 class StepRunner(Protocol):
     """Runs the steps of a task; raises the errors of pbrs_farm.errors."""
 
     def run(self, request: Request, tell: Tell) -> Result:
         """Do what the markers say is missing. tell: called with the name of each step begun."""
+        ...
+
+    def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
+        """How far the house is. done: names of its markers, "<step>" or "<step>.<view>"."""
         ...
 
 

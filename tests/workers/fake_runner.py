@@ -1,0 +1,152 @@
+"""A runner that makes small files instead of pictures, and misbehaves when a control file says so.
+
+Outputs depend on ids only, as the real steps' do. Every start is noted in `control/starts`, so that
+a test can tell what ran twice. Control files: crash.<house>, hang.<house>, bug.<house>,
+data.<house>, full (storage is full), away (storage does not answer), slow (seconds per view).
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from pbrs_farm import keys
+from pbrs_farm.errors import BadHouse, StoreUnavailable
+from pbrs_farm.store import Head, Store, store_from_url
+from pbrs_farm.store.patient import PatientStore
+from workers.config import FarmConfig
+from workers.job import JobSpec
+from workers.runner import Request, Result, Survey, Tell
+
+
+def control_folder() -> Path:
+    return Path(os.environ["PBRS_TEST_CONTROL"])
+
+
+def runner(config: FarmConfig, storage_waits: Tell) -> FakeRunner:
+    store = SickStore(store_from_url(config.store_url, config.store), control_folder())
+    return FakeRunner(
+        PatientStore(store, config.storage_patience_s, storage_waits), control_folder()
+    )
+
+
+class SickStore:
+    """The store, unless a control file says it is away or full."""
+
+    def __init__(self, store: Store, control: Path) -> None:
+        self._store = store
+        self._control = control
+
+    @property
+    def url(self) -> str:
+        return self._store.url
+
+    def put(self, key: str, data: bytes) -> None:
+        self._check(key, writing=True)
+        self._store.put(key, data)
+
+    def put_if_absent(self, key: str, data: bytes) -> bool:
+        self._check(key, writing=True)
+        return self._store.put_if_absent(key, data)
+
+    def get(self, key: str) -> bytes:
+        self._check(key)
+        return self._store.get(key)
+
+    def head(self, key: str) -> Head | None:
+        self._check(key)
+        return self._store.head(key)
+
+    def list(self, prefix: str = "") -> Iterator[str]:
+        self._check(prefix)
+        return self._store.list(prefix)
+
+    def delete(self, key: str) -> None:
+        self._check(key, writing=True)
+        self._store.delete(key)
+
+    def _check(self, key: str, *, writing: bool = False) -> None:
+        if (self._control / "away").exists():
+            raise StoreUnavailable(key, "does not answer")
+        if writing and (self._control / "full").exists():
+            raise StoreUnavailable(key, f"is full: {os.strerror(errno.ENOSPC)}")
+
+
+def groups_of(house: str) -> tuple[tuple[str, ...], ...]:
+    """Two or three groups of two views, by the house's name."""
+    return tuple((f"r{g}_0", f"r{g}_1") for g in range(2 + len(house) % 2))
+
+
+class FakeRunner:
+    """house, cameras; truth per view in gl, light per view in light; a manifest in reduce."""
+
+    def __init__(self, store: Store, control: Path) -> None:
+        self._store = store
+        self._control = control
+
+    def run(self, request: Request, tell: Tell) -> Result:
+        with (self._control / "starts").open("a") as file:
+            file.write(f"{request.house}/{request.unit}/{request.stage}\n")
+        self._misbehave(request)
+        if request.stage == "geometry":
+            for step in ("house", "cameras"):
+                self._step(request.house, step, None, tell)
+            return Result(groups=groups_of(request.house))
+        if request.stage in ("gl", "light"):
+            for view in request.views:
+                step = {"gl": "truth", "light": "light"}[request.stage]
+                self._step(request.house, step, view, tell)
+        elif request.stage == "reduce":
+            listed = sorted(self._store.list(keys.house_key(request.house, "views/")))
+            self._store.put(keys.house_key(request.house, "manifest.jsonl"), repr(listed).encode())
+        elif request.stage == "job":
+            listed = sorted(k for k in self._store.list("houses/") if k.endswith("manifest.jsonl"))
+            self._store.put("manifest.jsonl", repr(listed).encode())
+        return Result(n_views=len(request.views))
+
+    def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
+        if not done.issuperset({"house", "cameras"}):
+            return Survey()
+        missing = {}
+        for number, views in enumerate(groups_of(house)):
+            stages = {"gl": "truth", "light": "light"}
+            left = [
+                s for s in spec.group_stages if any(f"{stages[s]}.{v}" not in done for v in views)
+            ]
+            missing[str(number)] = left[0] if left else ""
+        reduced = not any(missing.values()) and (
+            self._store.head(keys.house_key(house, "manifest.jsonl")) is not None
+        )
+        return Survey(groups_of(house), missing, reduced)
+
+    def _step(self, house: str, step: str, view: str | None, tell: Tell) -> None:
+        tell(f"{step} {view}")
+        marker = keys.marker_key(house, step, view)
+        if self._store.head(marker) is not None:
+            return
+        self._work()
+        key = keys.view_key(house, view, f"{step}.png") if view else keys.house_key(house, step)
+        self._store.put(key, f"{house} {step} {view}".encode() * 10)
+        self._store.put_if_absent(marker, keys.digest(house, step, view).encode())
+
+    def _work(self) -> None:
+        slow = self._control / "slow"
+        if slow.exists():
+            time.sleep(float(slow.read_text() or 0))
+
+    def _misbehave(self, request: Request) -> None:
+        def told(what: str) -> bool:
+            return (self._control / f"{what}.{request.house}").exists() and request.stage == "gl"
+
+        if told("crash"):
+            print("about to crash", flush=True)  # noqa: T201
+            os.abort()
+        if told("hang"):
+            time.sleep(3600)
+        if told("bug"):
+            raise ValueError(f"something odd with {request.house}")
+        if told("data"):
+            raise BadHouse(request.house, "wall w3", "two walls in one place")

@@ -1,0 +1,193 @@
+"""A whole farm of real processes on one machine: Redis, coordinator, Celery workers, fake runner."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from pydantic import SecretStr
+
+from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.store import StoreSettings
+from pbrs_farm.store.folder import FolderStore
+from tests.workers.fake_runner import FakeRunner, groups_of
+from tests.workers.redis_server import RedisServer
+from workers.client import Farm, new_spec
+from workers.config import FarmConfig
+from workers.job import HouseEntry
+from workers.runner import Request
+
+REPO = Path(__file__).parents[2]
+
+
+class SmallFarm:
+    """Starts processes and ends every one of them; `control` steers the fake runner."""
+
+    def __init__(self, folder: Path, redis: RedisServer, **settings: object) -> None:
+        self.folder = folder
+        self.redis = redis
+        self.control = folder / "control"
+        self.control.mkdir(parents=True)
+        self.store = FolderStore(folder / "store")
+        self._settings = {
+            "lease_s": 3, "beat_s": 0.5, "retry_delay_s": 0.1, "resend_s": 3, "breaker_s": 2,
+            "grace_s": 30, "storage_patience_s": 60, "min_free_mb": 1, **settings,
+        }  # fmt: skip
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        self.farm = Farm(
+            FarmConfig(
+                redis_url=SecretStr(redis.url),
+                store_url=self.store.url,
+                store=StoreSettings(),
+                runner="tests.workers.fake_runner:runner",
+            )
+        )
+        os.environ["PBRS_TEST_CONTROL"] = str(self.control)
+        self.job = ""
+        self.houses: list[str] = []
+
+    def environment(self, worker: str, slots: int = 1) -> dict[str, str]:
+        env = {k: v for k, v in os.environ.items() if not k.startswith("PBRS_")}
+        env |= {f"PBRS_FARM_{k.upper()}": str(v) for k, v in self._settings.items()}
+        scratch = self.folder / "scratch"
+        scratch.mkdir(exist_ok=True)
+        return env | {
+            "PBRS_REDIS_URL": self.redis.url,
+            "PBRS_STORE": self.store.url,
+            "PBRS_FARM_RUNNER": "tests.workers.fake_runner:runner",
+            "PBRS_FARM_WORKER": worker,
+            "PBRS_FARM_SLOTS": str(slots),
+            "PBRS_FARM_SCRATCH": str(scratch),
+            "PBRS_TEST_CONTROL": str(self.control),
+            "PYTHONPATH": str(REPO),
+        }
+
+    def start(self, name: str, *words: str, slots: int = 1, prefix: tuple[str, ...] = ()) -> None:
+        """A process `python -m words...` of the farm, its output in <folder>/<name>.log."""
+        with (self.folder / f"{name}.log").open("ab") as log:
+            self.processes[name] = subprocess.Popen(
+                [*prefix, sys.executable, "-m", *words],
+                cwd=REPO,
+                env=self.environment(name, slots),
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+
+    def coordinator(self, name: str = "coordinator") -> None:
+        self.start(name, "workers.coordinator")
+
+    def worker(self, name: str, slots: int = 1, prefix: tuple[str, ...] = ()) -> None:
+        self.start(name, "workers.supervisor", slots=slots, prefix=prefix)
+
+    def submit(self, n_houses: int) -> None:
+        self.houses = [f"h{k:03d}" + "x" * (k % 2) for k in range(n_houses)]
+        houses = [HouseEntry(house_id=h) for h in self.houses]
+        spec = new_spec(recipe_from_name("preview"), rules={"shard_size": 5})
+        self.job = self.farm.submit(houses, spec).job_id
+
+    def kill(self, name: str, sign: signal.Signals = signal.SIGKILL) -> None:
+        """The process and all it started, as a node that loses power."""
+        process = self.processes.pop(name)
+        tree = descendants(process.pid)
+        for pid in (process.pid, *tree):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, sign)
+        process.wait(20)
+
+    def close(self) -> None:
+        for name in list(self.processes):
+            self.kill(name)
+        self.farm.ledger.client.close()
+
+    def wait(self, true: Callable[[], bool], seconds: float, what: str) -> float:
+        """Seconds until `true()`; fails with the farm's logs."""
+        began = time.monotonic()
+        while time.monotonic() - began < seconds:
+            if true():
+                return time.monotonic() - began
+            time.sleep(0.05)
+        logs = "\n".join(
+            f"--- {p.name}\n{p.read_text()[-3000:]}" for p in sorted(self.folder.glob("*.log"))
+        )
+        view = self.farm.ledger.view(self.job)
+        raise AssertionError(f"not within {seconds} s: {what}\n{view}\n{logs}")
+
+    def state(self) -> str:
+        view = self.farm.ledger.view(self.job)
+        return view.state if view is not None else ""
+
+    def wait_done(self, seconds: float = 60) -> float:
+        return self.wait(lambda: self.state() == "done", seconds, "the job is done")
+
+    def running(self) -> int:
+        """Tasks being run now."""
+        view = self.farm.view(self.job)
+        return int(sum(n for k, n in view.counts.items() if k.endswith(":r")))
+
+    def starts(self) -> Counter[str]:
+        """Task -> how often a runner began it."""
+        path = self.control / "starts"
+        return Counter(path.read_text().splitlines() if path.exists() else ())
+
+    def objects(self) -> dict[str, bytes]:
+        """What is stored, the farm's own jobs/ and the recipe apart."""
+        return {
+            key: self.store.get(key)
+            for key in self.store.list()
+            if not key.startswith("jobs/") and key != "recipe.json"
+        }
+
+    def expected(self, *, without: tuple[str, ...] = ()) -> dict[str, bytes]:
+        """What one process makes of the same houses, without a farm."""
+        folder = self.folder / "alone"
+        (folder / "control").mkdir(parents=True, exist_ok=True)
+        store = FolderStore(folder / "store")
+        runner = FakeRunner(store, folder / "control")
+
+        def run(house: str, unit: str, stage: str, views: tuple[str, ...] = ()) -> None:
+            request = Request(job_id="0" * 12, house=house, unit=unit, stage=stage, views=views)
+            runner.run(request, lambda _step: None)
+
+        for house in self.houses:
+            if house in without:
+                continue
+            run(house, "-", "geometry")
+            for number, views in enumerate(groups_of(house)):
+                run(house, str(number), "gl", views)
+                run(house, str(number), "light", views)
+            run(house, "-", "reduce")
+        run("-", "-", "job")
+        return {key: store.get(key) for key in store.list()}
+
+    def check_complete(self, *, n_repeats: int) -> int:
+        """Nothing lost, nothing else there, at most n_repeats starts beyond the first; how many."""
+        assert self.objects() == self.expected()
+        view = self.farm.view(self.job)
+        n_groups = sum(len(groups_of(h)) for h in self.houses)
+        n_markers = Counter(
+            key.rpartition("/")[2].partition(".")[0] for key in self.objects() if "/done/" in key
+        )
+        assert view.counts["done:gl"] == view.counts["done:light"] == n_groups
+        assert view.counts["done:geometry"] == n_markers["house"] == len(self.houses)
+        assert 2 * view.counts["done:light"] == n_markers["light"]
+        starts = self.starts()
+        n_extra = sum(n - 1 for n in starts.values())
+        assert n_extra <= n_repeats, [t for t, n in starts.items() if n > 1]
+        return n_extra
+
+
+def descendants(pid: int) -> list[int]:
+    """Process ids of all children, theirs included."""
+    try:
+        words = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        return []
+    return [p for word in words for p in (int(word), *descendants(int(word)))]
