@@ -104,7 +104,7 @@ class Emitters:
         cos = dr.abs(dr.dot(n, d))
         valid = active & (distance > 1e-5) & (cos > 1e-5)
         radiance, density = self._lamp(lamp, distance, cos, only, valid)
-        return Towards(d, distance * (1 - 1e-4), radiance, density, valid)
+        return Towards(d, distance, radiance, density, valid)
 
     def hit_lamp(
         self, lamp: Any, distance: Any, cos: Any, only: Any, active: Any

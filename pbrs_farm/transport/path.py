@@ -30,6 +30,7 @@ from pbrs_farm.transport.numbers import (
     stream_key,
 )
 from pbrs_farm.transport.surface import Hit, Stage, offset
+from pbrs_farm.transport.tables import NO_LAMP
 
 _MAX_NULLS = 32
 _LOBE, _SCATTER, _ROULETTE, _LAMP, _LAMP_UV, _OUT, _OUT_UV = 0, 1, 3, 4, 5, 7, 8
@@ -187,7 +188,14 @@ def direct(
         lit = to.valid & (side * wo.z > 0) & (dr.max(value) > 0) & (to.density > 0)
         weight = 1 / (to.density + density)
         start = offset(hit.p, dr.select(side > 0, hit.ng, -hit.ng))
-        clear = stage.transmittance(start, to.d, to.distance, lit)
+        # Aim again from the moved start: a lamp near by must not shadow itself.
+        aim = hit.p + to.d * to.distance - start
+        reach = dr.norm(aim)
+        is_near = to.distance < dr.inf
+        way = dr.select(is_near, aim / reach, to.d)
+        clear = stage.transmittance(
+            start, way, dr.select(is_near, reach * (1 - 1e-4), dr.inf), lit
+        )
         result.append(dr.select(lit, value * to.radiance * clear * weight, 0))
     return result[0], result[1]
 
@@ -255,7 +263,8 @@ def _trace(
             hit.lamp, distance, wi_cos, only_lamp, hit.valid & (only_lamp > -2)
         )
         lamp_weight = dr.select(by_scatter, last_density / (last_density + lamp_density), 1)
-        l_in += beta * glow * lamp_weight
+        met = hit.valid & (hit.lamp != NO_LAMP)
+        l_in += dr.select(met, beta * glow * lamp_weight, 0)
 
         # Kinds of surface.
         m = hit.scatter
