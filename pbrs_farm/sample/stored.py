@@ -15,7 +15,7 @@ from pbrs_farm.house import House, Room
 from pbrs_farm.recipe import CameraFields
 from pbrs_farm.sample.paper import room_shape
 from pbrs_farm.sample.probes import Counter, counted
-from pbrs_farm.sample.scores import object_columns, paper_score
+from pbrs_farm.sample.scores import object_columns
 
 OUTSIDE = "out"
 """Room id in the views of cameras that stand in no room."""
@@ -67,7 +67,7 @@ def views_from_cameras(
         k = used[place] = used.get(place, -1) + 1
         views.append(View(keys.view_id(*place, k), *place, camera, origin))
     for part, rows in counted(counter, [v.camera for v in views], len(house.items)):
-        score = paper_score(rows, columns, fields.min_object_fraction).score * rows.sum(1)
+        score = rows[:, columns].sum(1)
         for row, number in enumerate(range(part.start, part.stop)):
             objects = {int(i): int(rows[row, i]) for i in columns if rows[row, i]}
             views[number] = replace(views[number], score=float(score[row]), objects=objects)

@@ -1,0 +1,71 @@
+"""A user's camera file: JSON of ours, or a published room_camera.txt; text only, no effects."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+
+from pbrs_farm.camera import PAPER_HFOV_RAD, Camera, Intrinsics
+from pbrs_farm.errors import BadInput
+from pbrs_farm.sample.room_camera import cameras_from_text
+
+Vector = tuple[float, float, float]
+Row = tuple[float, float, float, float]
+
+
+class GivenCamera(BaseModel):
+    """One camera of the file: eye and towards (and up), or a 4x4 world_from_camera.
+
+    Metres, y up. world_from_camera has OpenGL axes (x right, y up, looking along -z), row by row.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    eye: Vector | None = None
+    towards: Vector | None = None
+    up: Vector = (0.0, 1.0, 0.0)
+    world_from_camera: tuple[Row, Row, Row, Row] | None = None
+    hfov_rad: Annotated[float, Field(gt=0, lt=3.1)] = PAPER_HFOV_RAD
+
+    @model_validator(mode="after")
+    def _has_one_pose(self) -> GivenCamera:
+        looks = self.eye is not None and self.towards is not None
+        if looks == (self.world_from_camera is not None):
+            raise ValueError("give eye and towards, or world_from_camera")
+        if looks and np.linalg.norm(np.cross(self.towards, self.up)) < 1e-9:  # type: ignore[arg-type]
+            raise ValueError("towards and up are parallel or zero")
+        if self.world_from_camera is not None:
+            rotation = np.array(self.world_from_camera)[:3, :3]
+            proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4)
+            if not proper or np.linalg.det(rotation) < 0:
+                raise ValueError("world_from_camera is no rigid pose")
+        return self
+
+    def camera(self, width_px: int, height_px: int) -> Camera:
+        """On a grid of that size."""
+        intrinsics = Intrinsics.from_hfov(width_px, height_px, self.hfov_rad)
+        if self.world_from_camera is not None:
+            return Camera(intrinsics, np.array(self.world_from_camera, np.float64))
+        return Camera.look(
+            intrinsics, np.array(self.eye, np.float64), np.array(self.towards, np.float64), self.up
+        )
+
+
+_CAMERAS: TypeAdapter[list[GivenCamera]] = TypeAdapter(list[GivenCamera])
+
+
+def cameras_from_file_text(text: str, file: str, width_px: int, height_px: int) -> list[Camera]:
+    """The cameras of a user's file, in order: a JSON list of GivenCamera, else room_camera.txt.
+
+    Raises BadInput with the file and the place.
+    """
+    if not text.lstrip().startswith("["):
+        return [line.camera for line in cameras_from_text(text, file, width_px, height_px)]
+    try:
+        given = _CAMERAS.validate_json(text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = "camera " + ".".join(str(part) for part in first["loc"])
+        raise BadInput(file, place, first["msg"]) from None
+    return [camera.camera(width_px, height_px) for camera in given]

@@ -1,0 +1,112 @@
+"""Published camera files and a user's own: read, written, refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pbrs_farm.camera import PAPER_HFOV_RAD, View
+from pbrs_farm.errors import BadInput
+from pbrs_farm.sample import room_camera, sample_cameras
+from pbrs_farm.sample.camera_file import cameras_from_file_text
+from tests.builders import builtin_home
+from tests.sample.rooms import QUICK, counter_of
+
+LINE = "1.5 1.55 2  0.6929 -0.19612 0.6929  0.1386 0.98058 0.1386  0.5534 0.433896  540"
+
+
+def test_a_published_line_gives_the_published_intrinsics_and_pose() -> None:
+    (line,) = room_camera.cameras_from_text(LINE + "\n\n", "room_camera.txt", 640, 480)
+    camera = line.camera
+    assert camera.intrinsics.fx == pytest.approx(517.97, abs=0.005)
+    assert camera.intrinsics.fy == camera.intrinsics.fx
+    assert line.score == 540
+    np.testing.assert_allclose(camera.eye, [1.5, 1.55, 2])
+    assert math.degrees(math.asin(-camera.towards[1])) == pytest.approx(11.31, abs=0.01)
+    rotation = camera.world_from_camera[:3, :3]
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(rotation) == pytest.approx(1)
+
+
+def test_what_is_written_is_read_back_to_six_digits() -> None:
+    (line,) = room_camera.cameras_from_text(LINE, "f", 640, 480)
+    view = View("0_3_2", "0_3", 2, line.camera, score=line.score)
+    text = room_camera.text_from_views([view])
+    assert text.endswith("  0.5534 0.433896  540\n")
+    (again,) = room_camera.cameras_from_text(text, "f", 640, 480)
+    np.testing.assert_allclose(
+        again.camera.world_from_camera, line.camera.world_from_camera, atol=2e-6
+    )
+    names = room_camera.names_from_views([view])
+    assert names == "Room#0_3_2\n"
+    assert room_camera.names_from_text(names, "f") == [("0_3", 2)]
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("1 2 3", "12 numbers"),
+        (LINE.replace("540", "many"), "expected numbers"),
+        (LINE.replace("1.5 ", "nan "), "finite"),
+        (LINE.replace("0.5534", "1.7"), "half angle"),
+        ("0 0 0  0 1 0  0 1 0  0.5 0.4  1", "parallel"),
+    ],
+)
+def test_a_line_that_is_no_camera_is_refused_with_its_number(line: str, why: str) -> None:
+    with pytest.raises(BadInput, match=why) as caught:
+        room_camera.cameras_from_text(f"{LINE}\n{line}\n", "room_camera.txt", 640, 480)
+    assert "room_camera.txt: line 2" in str(caught.value)
+
+
+def test_companions_are_read_and_bad_ones_refused() -> None:
+    assert room_camera.good_from_text("1\n0\n1\n", "f") == [True, False, True]
+    nodes = room_camera.nodes_from_text("1 0004dd3c\n2 Level#0\n3 Room#0_0\n", "f")
+    assert nodes == {1: "0004dd3c", 2: "Level#0", 3: "Room#0_0"}
+    for read, text in (
+        (room_camera.good_from_text, "2"),
+        (room_camera.names_from_text, "Hall"),
+        (room_camera.nodes_from_text, "x y"),
+    ):
+        with pytest.raises(BadInput, match="line 1"):
+            read(text, "f")
+
+
+def test_a_users_file_gives_cameras_by_look_or_by_matrix() -> None:
+    text = """[
+      {"eye": [1, 1.5, 2], "towards": [0, 0, -1], "hfov_rad": 1.2},
+      {"world_from_camera": [[1,0,0,1],[0,1,0,1.5],[0,0,1,2],[0,0,0,1]]}
+    ]"""
+    look, matrix = cameras_from_file_text(text, "cams.json", 320, 240)
+    np.testing.assert_allclose(look.world_from_camera, matrix.world_from_camera, atol=1e-12)
+    hfov = 2 * math.atan(0.5 * 320 / matrix.intrinsics.fx)
+    assert hfov == pytest.approx(PAPER_HFOV_RAD)
+    assert cameras_from_file_text(LINE, "room_camera.txt", 640, 480)[0].eye[0] == 1.5
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '[{"eye": [1, 2, 3]}]',
+        '[{"eye": [1, 2, 3], "towards": [0, 1, 0]}]',
+        '[{"eye": [1, 2], "towards": [0, 0, 1]}]',
+        '[{"world_from_camera": [[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]',
+        '[{"world_from_camera": [[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]',
+        '[{"eye": [1, 2, 3], "towards": [0, 0, 1], "fov": 3}]',
+        "[",
+    ],
+)
+def test_a_users_file_that_gives_no_pose_is_refused(text: str) -> None:
+    with pytest.raises(BadInput, match=r"cams\.json"):
+        cameras_from_file_text(text, "cams.json", 320, 240)
+
+
+def test_stored_cameras_become_views_of_the_rooms_they_stand_in() -> None:
+    house = builtin_home()
+    fields = QUICK.model_copy(update={"source": "stored"})
+    sampling = sample_cameras(house, fields, 0, counter_of(house))
+    assert [v.room_id for v in sampling.views] == ["0_0", "0_1"]
+    for view, stored in zip(sampling.views, house.cameras, strict=True):
+        assert view.origin == "stored"
+        np.testing.assert_allclose(view.camera.eye, stored.eye)
+        assert view.score == sum(view.objects.values()) > 0
+    assert len({v.id for v in sampling.views}) == 2
