@@ -64,21 +64,24 @@ class Scorer:
         packs = [p for p in packs if p.views]
         if not packs:
             return SCORES.empty_table()
-        for settings in {p.settings for p in packs}:
+        for settings in {p.settings for p in packs if any(p.modes)}:
             check_comparable(self._reference, settings, self._reference.facts.source)
-        modes = [m for p in packs for m in p.modes]
-        scored = np.array([bool(m) for m in modes])
-        colour = np.concatenate([coarser_colour(p.colour, self._binning.colour) for p in packs])
-        depth = np.concatenate([coarser_depth(p.depth, self._binning.depth) for p in packs])
-        c_score, c_best = self._best(colour, self._colour, scored)
-        d_score, d_best = self._best(depth, self._depth, scored)
+        with_views = [p for p in packs if any(p.modes)]
+        c_score, c_best = self._best(
+            [coarser_colour(p.colour, self._binning.colour) for p in with_views],
+            self._colour,
+            packs,
+        )
+        d_score, d_best = self._best(
+            [coarser_depth(p.depth, self._binning.depth) for p in with_views], self._depth, packs
+        )
         quality = np.concatenate([p.quality for p in packs])
         columns: dict[str, Any] = {
             "house": [p.house for p in packs for _ in p.views],
             "view": [v for p in packs for v in p.views],
             "room": [r for p in packs for r in p.rooms],
             "room_type": [r for p in packs for r in p.room_types],
-            "mode": modes,
+            "mode": [m for p in packs for m in p.modes],
             "colour_score": _nullable(c_score),
             "depth_score": _nullable(d_score),
             "colour_reference": c_best,
@@ -106,16 +109,21 @@ class Scorer:
 
     def _best(
         self,
-        counts: NDArray[np.generic],
+        counts: Sequence[NDArray[np.generic]],
         references: NDArray[np.float32],
-        scored: NDArray[np.bool_],
+        packs: Sequence[HistogramPack],
     ) -> tuple[NDArray[np.float64], NDArray[Any]]:
-        """(n,) scores, NaN where not scored, and (n,) reference ids, None there."""
-        score = np.full(len(counts), np.nan)
-        best = np.full(len(counts), None, object)
+        """(n,) scores, NaN where not scored, and (n,) reference ids, None there.
+
+        counts: of the packs that have a scored view; n counts the views of all packs.
+        """
+        scored = np.array([bool(m) for p in packs for m in p.modes])
+        score = np.full(len(scored), np.nan)
+        best = np.full(len(scored), None, object)
         if scored.any():
-            found, index = best_match(normalised(counts[scored]), references, library=self._library)
-            score[scored] = found
+            among = np.array([bool(m) for p in packs if any(p.modes) for m in p.modes])
+            shares = normalised(np.concatenate(counts)[among])
+            score[scored], index = best_match(shares, references, library=self._library)
             best[scored] = self._ids[index]
         return score, best
 
