@@ -30,6 +30,7 @@ from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD
 from workers.job import JobSpec, job_key
 from workers.merge import merge_job, merge_shard
 from workers.runner import Request, Result, Survey, Tell
+from workers.sources import FOLDER, fill_cache
 
 _HOUSE_STEPS: Final = ("house", "cameras")
 _LIGHT_STEPS: Final = ("light", "develop")
@@ -82,6 +83,7 @@ class HouseRunner:
         return Survey(groups=groups, missing=units, reduced=finished and has_manifest)
 
     def _geometry(self, request: Request, spec: JobSpec, tell: Tell) -> Result:
+        fill_cache(self._store)
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
             for step in _HOUSE_STEPS:
@@ -123,7 +125,7 @@ class HouseRunner:
     def _source(self, text: str, folder: Path) -> SourceRef:
         """The house's source; when it is kept in the store, on scratch under its own name."""
         source = SourceRef.model_validate_json(text)
-        if not source.location.startswith("jobs/"):
+        if not source.location.startswith(FOLDER):
             return source
         name = source.location.rpartition("/")[2]
         data = self._store.get(source.location)

@@ -1,0 +1,92 @@
+"""The farm's answers as text for people; pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def status_text(status: Mapping[str, Any]) -> str:
+    """A few lines: the job, a row per stage, what is wrong."""
+    houses = status["houses"]
+    lines = [
+        f"job {status['job']}  {status['state']}"
+        + (f": {status['reason']}" if status["reason"] else ""),
+        f"houses {houses['done']} done, {houses['open']} open, {houses['waiting']} waiting, "
+        f"{houses['quarantined']} quarantined, of {houses['total']};  "
+        f"{status['views_done']} views done;  {status['workers']} workers",
+        "",
+        f"{'stage':<10}{'done':>9}{'running':>9}{'queued':>8}{'failed':>8}{'of':>9}"
+        f"{'per h':>9}{'p50':>8}{'p90':>8}{'left':>9}",
+    ]
+    for stage in status["stages"]:
+        lines.append(
+            f"{stage['stage']:<10}{stage['done']:>9}{stage['running']:>9}{stage['queued']:>8}"
+            f"{stage['failed']:>8}{stage['total']:>9}{3600 * stage['per_s']:>9.0f}"
+            f"{duration_text(stage['p50_s']):>8}{duration_text(stage['p90_s']):>8}"
+            f"{duration_text(stage['eta_s']):>9}"
+        )
+    for name in ("failures", "handed_back"):
+        if status[name]:
+            told = ", ".join(f"{n} {k}" for k, n in sorted(status[name].items()))
+            lines.append(f"{name.replace('_', ' ')}: {told}")
+    lines += [f"refuses: {r['worker']}: {r['why']}" for r in status["refusing"]]
+    if status["storage"] != "ok":
+        lines.append(f"storage: {status['storage']}")
+    return "\n".join(lines)
+
+
+def why_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A task a line, and below it what is known."""
+    lines = []
+    for row in rows:
+        lines.append(f"{row['task']}: {row['state']}")
+        for name in ("views", "worker", "attempts", "tried"):
+            if name in row:
+                value = row[name]
+                lines.append(f"    {name}: {' '.join(value) if name == 'views' else value}")
+        if "fault" in row:
+            fault = row["fault"]
+            lines.append(f"    {fault['fault']} on {fault['worker']}: {fault['message']}")
+            lines += [f"    log: {fault['log']}"] if fault.get("log") else []
+    return "\n".join(lines)
+
+
+def failures_text(groups: Sequence[Mapping[str, Any]]) -> str:
+    """A group a paragraph, the most frequent first."""
+    if not groups:
+        return "nothing failed for good"
+    parts = []
+    for group in groups:
+        more = f" and {group['n'] - 5} more" if group["n"] > 5 else ""
+        parts.append(
+            f"{group['n']} x {group['fingerprint']}\n    {group['example']}\n"
+            f"    {' '.join(group['tasks'][:5])}{more}"
+        )
+    return "\n".join(parts)
+
+
+def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A worker a line."""
+    if not rows:
+        return "no workers"
+    lines = [f"{'worker':<32}{'seen':>8}{'slots':>6}  {'version':<9}queues"]
+    for row in rows:
+        state = " draining" if row.get("drain") == "1" else ""
+        why = f" refuses: {row['refuses']}" if row.get("refuses") else ""
+        lines.append(
+            f"{row['worker']:<32}{duration_text(row['age_s']):>8}{row.get('slots', '?'):>6}  "
+            f"{row.get('version', '?'):<9}{row.get('queues', '')}{state}{why}"
+        )
+    return "\n".join(lines)
+
+
+def duration_text(seconds: float | None) -> str:
+    """ "42s", "7m", "3.1h", "2.5d"; "-" when not known."""
+    if seconds is None:
+        return "-"
+    for unit, size, limit in (("s", 1, 120), ("m", 60, 120), ("h", 3600, 48)):
+        if seconds < limit * size:
+            value = seconds / size
+            return f"{value:.1f}{unit}" if value < 10 else f"{value:.0f}{unit}"
+    return f"{seconds / 86400:.1f}d"
