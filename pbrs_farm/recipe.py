@@ -206,11 +206,11 @@ class Recipe(_Group):
 
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "preview": {
-        "cameras": {"max_item_fraction": 0.45},
+        "cameras": {"max_item_fraction": 0.3},
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 16},
     },
-    "fast": {"cameras": {"max_item_fraction": 0.45}},
+    "fast": {"cameras": {"max_item_fraction": 0.3}},
     "paper": {
         "light": {"integrator": "metropolis", "denoise": False},
         "sky": {"kind": "panorama"},
