@@ -21,6 +21,7 @@ MAX_OUTLINE_FACES: Final = 20_000
 _SAME_HEIGHT_M: Final = 0.02
 _CRACK_M: Final = 1e-4
 _SLACK_M: Final = 0.002
+_TRACE_M: Final = 0.005
 
 
 def floor_height(surfaces: Sequence[Surface]) -> float | None:
@@ -48,6 +49,38 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> NDArray
     standing = _facing(walls, 1), _facing(walls, -1)
     between = shapely.difference(area, _outline(np.concatenate(standing)))
     return polygon_of(between if not between.is_empty else area)
+
+
+def floor_polygons(
+    floor: Sequence[Surface], walls: Sequence[Surface], *, min_area_m2: float, min_width_m: float
+) -> list[NDArray[np.float64]]:
+    """Every piece of floor between the walls, planar walls too, that is a room by its size.
+
+    Each as floor_polygon gives it, largest first.
+    """
+    corners = _facing(floor, 1)
+    if not len(corners):
+        return []
+    between = shapely.difference(_outline(corners), _outline(_facing(walls, 1)))
+    between = shapely.difference(between, _outline(_facing(walls, -1)))
+    pieces = shapely.get_parts(shapely.difference(between, _traces(walls)))
+    fit = [p for p in pieces if p.area >= min_area_m2 and not p.buffer(-min_width_m / 2).is_empty]
+    fit.sort(key=lambda p: (-p.area, p.bounds))
+    found = [polygon_of(p.buffer(_TRACE_M, join_style="mitre")) for p in fit]
+    return [p for p in found if p is not None]
+
+
+def _traces(walls: Sequence[Surface]) -> Any:
+    """Where upright faces stand, seen from above, as strips 2 _TRACE_M wide."""
+    found = []
+    for surface in walls:
+        p = surface.positions[surface.faces].astype(np.float64)
+        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        upright = np.abs(normal[:, 1]) < 0.3 * np.linalg.norm(normal, axis=1)
+        found.append(p[upright][:, :, [0, 2]])
+    plan = np.concatenate([np.zeros((0, 3, 2)), *found])[:MAX_OUTLINE_FACES]
+    lines: Any = shapely.linestrings(plan)
+    return shapely.union_all(shapely.buffer(lines, _TRACE_M, cap_style="square"))
 
 
 def enclosed_polygon(walls: Sequence[Surface]) -> NDArray[np.float64] | None:

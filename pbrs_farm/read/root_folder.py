@@ -63,6 +63,11 @@ class RootFolder:
         return data
 
     @property
+    def n_read(self) -> int:
+        """Files read so far."""
+        return len(self._read)
+
+    @property
     def sha256(self) -> str:
         """Hex digest over the names and the bytes of every file read so far."""
         lines = "".join(f"{digest}  {name}\n" for name, digest in sorted(self._read.items()))
