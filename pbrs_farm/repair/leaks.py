@@ -17,6 +17,7 @@ from pbrs_farm.repair import plan
 from pbrs_farm.repair.enclosure import Space
 from pbrs_farm.repair.occluder import Occluder
 from pbrs_farm.repair.patches import face_normals
+from pbrs_farm.repair.plan import Shape
 from pbrs_farm.repair.prisms import Plane, polygons_of
 from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
 from pbrs_farm.repair.solids import F64
@@ -27,9 +28,14 @@ _MAX_LEAKS = 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomAir:
-    """A part of a room between its floor and one plane of its ceiling; area: plan, walls left out."""
+    """A part of a room between its floor and one plane of its ceiling.
 
-    area: plan.Shape
+    area: plan, walls left out. foot: the same with baseboards left out too, up to foot_m.
+    """
+
+    area: Shape
+    foot: Shape
+    foot_m: float
     low: Plane
     high: Plane
 
@@ -38,10 +44,6 @@ class RoomAir:
         """Largest height over the area's corners, metres."""
         corners = shapely.get_coordinates(self.area)
         return float((self.high.at(corners) - self.low.at(corners)).max())
-
-    def lids(self, inset_m: float) -> tuple[tuple[Plane, float], tuple[Plane, float]]:
-        """Floor and ceiling, each with the step that leads inset_m into the air."""
-        return (self.low, inset_m), (self.high, -inset_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +91,7 @@ def leaks_of_house(
     return LeakReport(
         spaces=tuple(found),
         n_rays=sum(s.n_rays for s in found),
+        n_blind=sum(s.n_blind for s in found),
         n_sky=sum(s.n_sky for s in found),
         closed_share=round(in_closed / max(sum(areas.values()), 1e-9), 4),
     )
@@ -116,22 +119,45 @@ def _rays(airs: Sequence[RoomAir], meter: LeakMeter, rng: np.random.Generator) -
 
 def _edge_starts(air: RoomAir, step_m: float, rng: np.random.Generator) -> F64:
     """Points within 5 mm of the edges where walls, floor and ceiling meet, in the air."""
-    inner = shapely.buffer(air.area, -0.5 * WITHIN_M, join_style="mitre", mitre_limit=2.0)
-    found = [np.zeros((0, 3))]
-    for polygon in polygons_of(inner):
-        for ring in (polygon.exterior, *polygon.interiors):
-            n = max(int(ring.length / step_m), 8)
-            steps = ring.length * (np.arange(n) + rng.random()) / n
-            along = shapely.get_coordinates(shapely.line_interpolate_point(ring, steps))
-            corners = np.asarray(ring.coords)[:-1]
-            found += [_lifted(along, lid.at(along) + s) for lid, s in air.lids(0.5 * WITHIN_M)]
-            m = max(int(air.height / step_m), 8)
-            t = (np.arange(m) + rng.random()) / m
-            low, high = (lid.at(corners) + s for lid, s in air.lids(0.5 * WITHIN_M))
-            for corner, y0, y1 in zip(corners, low, high, strict=True):
-                found.append(_lifted(np.tile(corner, (m, 1)), y0 + t * (y1 - y0)))
-    points = np.concatenate(found)
+    inset = 0.5 * WITHIN_M
+    knee = air.low.raised(air.foot_m + inset)
+    found = [
+        *_along(air.foot, air.low.raised(inset), step_m, rng),
+        *_along(air.area, air.high.raised(-inset), step_m, rng),
+        *_upright(air.area, knee, air.high.raised(-inset), step_m, rng),
+    ]
+    if air.foot_m > 0:
+        found += _upright(air.foot, air.low.raised(inset), knee.raised(-2 * inset), step_m, rng)
+    points = np.concatenate([np.zeros((0, 3)), *found])
     return np.asarray(points + rng.uniform(-0.4, 0.4, points.shape) * WITHIN_M)
+
+
+def _rings(area: Shape) -> list[shapely.LinearRing]:
+    inner = shapely.buffer(area, -0.5 * WITHIN_M, join_style="mitre", mitre_limit=2.0)
+    return [r for p in polygons_of(inner) for r in (p.exterior, *p.interiors)]
+
+
+def _along(area: Shape, plane: Plane, step_m: float, rng: np.random.Generator) -> list[F64]:
+    found = []
+    for ring in _rings(area):
+        n = max(int(ring.length / step_m), 8)
+        steps = ring.length * (np.arange(n) + rng.random()) / n
+        points = shapely.get_coordinates(shapely.line_interpolate_point(ring, steps))
+        found.append(_lifted(points, plane.at(points)))
+    return found
+
+
+def _upright(
+    area: Shape, low: Plane, high: Plane, step_m: float, rng: np.random.Generator
+) -> list[F64]:
+    found = []
+    for ring in _rings(area):
+        corners = np.asarray(ring.coords)[:-1]
+        for corner, y0, y1 in zip(corners, low.at(corners), high.at(corners), strict=True):
+            n = max(int((y1 - y0) / step_m), 2)
+            y = y0 + (np.arange(n) + rng.random()) / n * (y1 - y0)
+            found.append(_lifted(np.tile(corner, (n, 1)), y))
+    return found
 
 
 def _lifted(plan_points: F64, y: F64) -> F64:
@@ -139,7 +165,7 @@ def _lifted(plan_points: F64, y: F64) -> F64:
 
 
 def _inside(air: RoomAir, n: int, rng: np.random.Generator) -> F64:
-    area = shapely.buffer(air.area, -0.02)
+    area = shapely.buffer(air.foot, -0.02)
     if n == 0 or shapely.is_empty(area):
         return np.zeros((0, 3))
     x0, z0, x1, z1 = area.bounds
@@ -148,7 +174,7 @@ def _inside(air: RoomAir, n: int, rng: np.random.Generator) -> F64:
         points = rng.uniform((x0, z0), (x1, z1), (4 * n, 2))
         found = np.concatenate([found, points[shapely.contains_xy(area, *points.T)]])
     found = found[:n]
-    low, high = (lid.at(found) + s for lid, s in air.lids(0.02))
+    low, high = air.low.at(found) + 0.02, air.high.at(found) - 0.02
     return _lifted(found, low + rng.random(n) * (high - low))
 
 
@@ -161,10 +187,10 @@ def _measured(
     meter: LeakMeter,
     rng: np.random.Generator,
 ) -> SpaceLeaks:
-    n_sky = 0
+    n_sky = n_blind = 0
     leaks: list[Leak] = []
     p, d = origins, directions
-    for _ in range(meter.n_bounces + 1):
+    for flight in range(meter.n_bounces + 1):
         distance, face = occluder.first_hit(p.astype(np.float32), d.astype(np.float32))
         gone = ~np.isfinite(distance)
         n_sky += int(gone.sum())
@@ -175,12 +201,18 @@ def _measured(
         # From the front of a face light goes on; behind one it is inside a solid, absorbed.
         lit = ~gone
         lit[lit] = (d[lit] * normals[face[lit]]).sum(1) < 0
+        if flight == 0:
+            n_blind = int((~gone & ~lit).sum())
         reached = p[lit] + d[lit] * distance[lit, None].astype(np.float64)
         n = normals[face[lit]]
         d = _unit(_unit(rng.normal(size=n.shape)) + n)
         p = reached + 1e-4 * n
     return SpaceLeaks(
-        rooms=space.rooms, n_rays=len(origins), n_sky=n_sky, leaks=tuple(leaks[:_MAX_LEAKS])
+        rooms=space.rooms,
+        n_rays=len(origins),
+        n_blind=n_blind,
+        n_sky=n_sky,
+        leaks=tuple(leaks[:_MAX_LEAKS]),
     )
 
 

@@ -89,10 +89,14 @@ class Leak(_Record):
 
 
 class SpaceLeaks(_Record):
-    """Leak meter of one closed space (rooms that share their air). leaks: the first 50."""
+    """Leak meter of one closed space (rooms that share their air). leaks: the first 50.
+
+    n_blind: rays that saw the back of a face first, so started inside a solid: they prove nothing.
+    """
 
     rooms: tuple[str, ...]
     n_rays: int
+    n_blind: int
     n_sky: int
     leaks: tuple[Leak, ...] = ()
 
@@ -102,6 +106,7 @@ class LeakReport(_Record):
 
     spaces: tuple[SpaceLeaks, ...] = ()
     n_rays: int = 0
+    n_blind: int = 0
     n_sky: int = 0
     closed_share: float = 0.0
 

@@ -98,7 +98,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
         plugs,
         report,
         spaces_of_rooms(house.rooms, found.wells, walls, _lids(sheets)),
-        {r.id: _room_airs(r, walls, sheets) for r in lived},
+        {r.id: _room_airs(r, uprights, sheets) for r in lived},
     )
 
 
@@ -106,20 +106,24 @@ def _lids(sheets: Sheets) -> list[Lid]:
     return [Lid(s.is_ceiling, s.area, s.plane) for s in sheets.planar] + sheets.lids
 
 
-def _room_airs(room: Room, walls: Sequence[Wall], sheets: Sheets) -> list[RoomAir]:
-    # Above a floor of its own shape, below each plane of the ceiling, between the walls.
-    feet = [
-        w.footprint
-        for w in walls
-        if w.bottom_y < room.ceiling_y - 0.1 and w.high_y > room.floor_y + 0.1
+def _room_airs(room: Room, uprights: Sequence[Wall], sheets: Sheets) -> list[RoomAir]:
+    # Between the walls, above the floor, below each plane of the ceiling.
+    near = [
+        w for w in uprights if w.bottom_y < room.ceiling_y - 0.1 and w.high_y > room.floor_y + 0.01
     ]
-    area = plan.without(plan.polygon_of_room(room.polygon), plan.union(feet))
+    walls = plan.union(w.footprint for w in near if not w.is_board)
+    boards = [w for w in near if w.is_board]
+    area = plan.without(plan.polygon_of_room(room.polygon), walls)
+    foot = plan.union(w.footprint for w in boards)
+    foot_m = max(
+        (w.high_y - room.floor_y for w in boards if w.footprint.distance(area) < 0.05), default=0.0
+    )
     ceilings = [s for s in sheets.planar if s.is_ceiling and s.room_id == room.id]
-    floor = level_plane(room.floor_y)
     parts = [(plan.common(area, s.area), s.plane) for s in ceilings]
     parts.append((plan.without(area, *(s.area for s in ceilings)), level_plane(room.ceiling_y)))
+    floor = level_plane(room.floor_y)
     return [
-        RoomAir(p, floor, plane)
+        RoomAir(p, plan.opened(plan.without(p, foot), _SLIVER_M), foot_m, floor, plane)
         for shape, plane in parts
         for p in polygons_of(plan.opened(shape, _SLIVER_M), min_area_m2=1e-3)
     ]

@@ -72,7 +72,7 @@ def test_the_meter_counts_the_open_share_of_a_box() -> None:
     faces = np.where((centre * normal).sum(1, keepdims=True) > 0, faces[:, [0, 2, 1]], faces)
     surface = replace(wall.surfaces[0], positions=corners, faces=faces, uvs=None)
     house = home.with_items([replace(wall, surfaces=(surface,))])
-    air = RoomAir(cube.buffer(-0.49), level_plane(0.49), level_plane(0.51))
+    air = RoomAir(cube.buffer(-0.49), cube.buffer(-0.49), 0.0, level_plane(0.49), level_plane(0.51))
     meter = LeakMeter(step_m=1.0, per_start=4_000, n_inside=0, n_bounces=0)
     report = leaks_of_house(house, [Space(("0_0",), ())], {"0_0": [air]}, (), EmbreeOccluder, meter)
     share = report.n_sky / report.n_rays
