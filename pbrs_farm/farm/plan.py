@@ -42,9 +42,13 @@ STEPS: Final = {
         Step("opengl_il", 1, ("image", "raster"), ("house", "cameras")),
         Step("light", 1, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
         Step("develop", 1, ("tone", "light"), ("truth", "light")),
-        Step("view", 1, ("selection",), _VIEW_READS),
+        Step("view", 1, ("histogram",), _VIEW_READS),
     )
 }
+
+
+PICTURE_GROUPS: Final = tuple(sorted({g for step in STEPS.values() for g in step.groups}))
+"""Every recipe group that something stored depends on (selection judges, it makes nothing)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,10 @@ from pbrs_farm.farm.loaded import LoadedHouse
 from pbrs_farm.farm.marked import Made, Outcome, Work, read_marker, required_source, run_marked
 from pbrs_farm.farm.records import json_bytes, plain_from_view, views_from_json
 from pbrs_farm.farm.sources import read_house
+from pbrs_farm.farm.view_histogram import histogram_json
 from pbrs_farm.house import House, geometry_from_house
 from pbrs_farm.layers import LAYER
+from pbrs_farm.lighting import ALL_MODES
 from pbrs_farm.recipe import Recipe
 
 
@@ -89,15 +91,41 @@ def _cameras(work: Work) -> Made:
 
 
 def _truth(work: Work) -> Made:
-    from pbrs_farm.images import png_from_array
-    from pbrs_farm.truth import layers_from_hit, view_table
+    from pbrs_farm import truth
 
     loaded = _loaded(work)
-    _view, camera = _view_at_size(work, loaded)
-    hit = loaded.caster.hit_record(camera)
-    arrays = layers_from_hit(hit, loaded.house, camera)
-    files = {LAYER[name].file: png_from_array(array) for name, array in arrays.items()}
-    return Made(files, {"table": view_table(hit.item, loaded.house, camera)})
+    view, camera = _view_at_size(work, loaded)
+    caster, house = loaded.caster, loaded.house
+    hit = caster.hit_record(camera)
+    arrays = truth.layers_from_hit(hit, house, camera)
+    table = truth.view_table(hit.item, house, camera)
+    if work.layers:
+        seen = truth.Seen(
+            hit,
+            house,
+            loaded.geometry,
+            camera,
+            lambda skip: caster.hit_record(camera, skip_faces=skip),
+            loaded.textures,
+            keys.seed(work.house_id, view.id, "truth", work.recipe.seed),
+        )
+        arrays |= truth.optional_layers(work.layers, seen)
+        table |= truth.optional_tables(work.layers, house)
+    files = {LAYER[name].file: layer_bytes(name, array) for name, array in arrays.items()}
+    return Made(files, {"table": table})
+
+
+def layer_bytes(name: str, array: NDArray[Any]) -> bytes:
+    """The file of a label layer: PNG, or an EXR whose channels are named as layers.py says."""
+    from pbrs_farm.images import exr_from_layers, png_from_array
+
+    layer = LAYER[name]
+    if layer.file.endswith(".png"):
+        return png_from_array(array)
+    channels = layer.channels.split()
+    planes = [array] if len(channels) == 1 else list(np.moveaxis(array, -1, 0))
+    named = zip(channels, planes, strict=True)
+    return exr_from_layers({c: np.ascontiguousarray(plane, np.float32) for c, plane in named})
 
 
 def _opengl(work: Work, mode: str) -> Made:
@@ -175,11 +203,23 @@ def _view(work: Work) -> Made:
         "origin": view.origin,
         "score": view.score,
         **facts.pop("truth", {}).get("table", {}),
-        "recipe": work.recipe.digest(),
+        "recipe": work.recipe.digest(*plan.PICTURE_GROUPS),
         "modes": facts,
         "versions": versions(),
     }
     files = {"view.json": json_bytes(sheet)}
+    rendered = [m for m in ALL_MODES if m.value in facts or (m.groups and "develop" in facts)]
+    if rendered:
+        house = _loaded(work).house
+        place = {
+            "house": work.house_id,
+            "view": view.id,
+            "room": view.room_id,
+            "room_type": house.room(view.room_id).name if view.room_id else "",
+        }
+        files["histogram.json"] = histogram_json(
+            work.store, place, rendered, sheet, house.notes, work.recipe.histogram
+        )
     return Made(files)
 
 

@@ -1,0 +1,87 @@
+"""Verbs that look: doctor, homes, recipes, layers. Effects: print; homes --fetch downloads."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from dataclasses import asdict
+
+from pbrs_farm.commands.words import Verb, dump, say
+from pbrs_farm.recipe import RECIPE_NAMES, Recipe, recipe_from_name
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add doctor, homes, recipes and layers."""
+    p = verb("doctor", _doctor, "what this machine can do, and what to do about what is missing")
+    p.add_argument("--json", action="store_true", help="for machines")
+    p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to try")
+    p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to try")
+    p = verb("homes", _homes, "list the example homes; fetch them from the Debian package")
+    p.add_argument("--fetch", action="store_true", help="download the package now")
+    p.add_argument("--json", action="store_true", help="for machines")
+    p = verb("recipes", _recipes, "every field of a recipe and its value")
+    p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES)
+    p = verb("layers", _layers, "the table of the files of a view")
+
+
+def _doctor(args: argparse.Namespace) -> int:
+    from pbrs_farm.farm.doctor import can_run, examine
+
+    findings = examine(args.store, args.redis)
+    fine = can_run(findings)
+    if args.json:
+        dump({"can_run": fine, "findings": [asdict(f) for f in findings]})
+        return 0 if fine else 1
+    for f in findings:
+        mark = {"ok": "ok      ", "degraded": "degraded", "missing": "MISSING "}[f.state]
+        say(f"{mark}  {f.part:<20} {f.text}")
+        if f.state != "ok" and f.remedy:
+            say(f"{'':<32}-> {f.remedy}")
+    say()
+    say(
+        "This machine can render." if fine else "This machine cannot render yet: see MISSING above."
+    )
+    return 0 if fine else 1
+
+
+def _homes(args: argparse.Namespace) -> int:
+    from pbrs_farm import homes
+
+    if args.fetch:
+        homes.fetch()
+    rows = homes.example_homes()
+    if args.json:
+        dump([asdict(row) for row in rows])
+        return 0
+    package = homes.cached()
+    for row in rows:
+        say(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
+    say()
+    say(f"fetched: {package.label}" if package else "not fetched yet: pbrs-farm homes --fetch")
+    if package and package.note:
+        say(package.note)
+    say("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
+    return 0
+
+
+def _recipes(args: argparse.Namespace) -> int:
+    recipe = recipe_from_name(args.name)
+    say(f"# recipe {args.name}; --set group.field=value overrides any field")
+    for group, info in Recipe.model_fields.items():
+        value = getattr(recipe, group)
+        if not hasattr(type(value), "model_fields"):
+            say(f"{group} = {json.dumps(value)}")
+            continue
+        say(f"\n# {info.annotation.__doc__ if info.annotation else ''}")
+        for name, field in type(value).model_fields.items():
+            text = f"{group}.{name} = {json.dumps(getattr(value, name))}"
+            say(f"{text:<48} # {field.description}" if field.description else text)
+    return 0
+
+
+def _layers(_args: argparse.Namespace) -> int:
+    from pbrs_farm.layers import table
+
+    say(table())
+    return 0

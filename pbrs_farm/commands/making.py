@@ -1,0 +1,190 @@
+"""Verbs that make: demo, run, step. Effects: those of the run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from pbrs_farm.commands.using import write_sheets
+from pbrs_farm.commands.words import Verb, add_recipe, complain, recipe_of, say
+from pbrs_farm.errors import BadInput, MachineFailed
+from pbrs_farm.recipe import Recipe
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add demo, run and step."""
+    p = verb("demo", _demo, "render an example home and lay out a sheet: out/demo/sheet.png")
+    p.add_argument(
+        "--home", default="Studio", help="example home, `builtin`, or a file (default Studio)"
+    )
+    p.add_argument("--out", default="out/demo", help="output folder")
+    add_recipe(p, "preview")
+    _add_run(p)
+    p = verb("run", _run, "houses -> repaired houses -> cameras -> pictures and labels")
+    p.add_argument(
+        "homes",
+        nargs="*",
+        metavar="HOME",
+        help="file, SUNCG house folder, example home's name, or `builtin`",
+    )
+    p.add_argument(
+        "--home", action="append", default=[], metavar="PATH", help="the same, repeatable"
+    )
+    p.add_argument(
+        "--houses", metavar="LIST", help="file with a SUNCG house id a line (HOME is the root)"
+    )
+    p.add_argument("--out", required=True, help="output folder or store URL")
+    p.add_argument(
+        "--cameras", choices=("sampled", "stored"), default=None, help="where viewpoints come from"
+    )
+    add_recipe(p)
+    _add_run(p)
+    p = verb("step", _step, "one step in this process: reproduces a failure")
+    p.add_argument("step")
+    p.add_argument("home")
+    p.add_argument("--out", required=True)
+    p.add_argument("--view", default=None)
+    p.add_argument("--layers", nargs="+", default=[])
+
+
+def _add_run(p: argparse.ArgumentParser) -> None:
+    p.add_argument(
+        "--modes",
+        nargs="+",
+        default=[],
+        metavar="MODE",
+        help="opengl_dl opengl_il mlt_ol mlt_il_ol (default all)",
+    )
+    p.add_argument(
+        "--layers", nargs="+", default=[], metavar="LAYER", help="optional layers to write too"
+    )
+    p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views a house")
+    p.add_argument(
+        "--jobs",
+        type=int,
+        default=1,
+        metavar="N",
+        help="processes (default 1; each view uses all cores)",
+    )
+    p.add_argument(
+        "--step-timeout", type=float, default=3600.0, metavar="S", help="seconds a step may take"
+    )
+    p.add_argument(
+        "--update",
+        action="store_true",
+        help="give the output folder this recipe, rendering again what differs",
+    )
+    p.add_argument("--json", action="store_true", help="a JSON line per event")
+
+
+def _words(args: argparse.Namespace) -> list[str]:
+    from pbrs_farm.farm.sources import suncg_list
+
+    words = [*args.homes, *args.home]
+    if args.houses:
+        if len(words) != 1:
+            raise BadInput("--houses", args.houses, "needs the SUNCG root as the one HOME")
+        words = suncg_list(Path(words[0]), Path(args.houses))
+    if not words:
+        raise BadInput(
+            "run", "", "no home given", hint="a file, an example home's name, or builtin"
+        )
+    return words
+
+
+def _run(args: argparse.Namespace) -> int:
+    return _run_words(args, _words(args))
+
+
+def _run_words(args: argparse.Namespace, words: list[str]) -> int:
+    from pbrs_farm.farm.local import Run, run_local
+    from pbrs_farm.farm.plan import wanted
+    from pbrs_farm.progress import teller
+    from pbrs_farm.settings import settings_from_environment
+
+    if args.jobs < 1 or args.views < 0:
+        raise BadInput("run", "--jobs/--views", "expected a positive number")
+    run = Run(
+        homes=words,
+        store_url=args.out,
+        recipe=recipe_of(args),
+        want=wanted(args.modes, args.layers, args.views),
+        n_jobs=args.jobs,
+        update=args.update,
+        step_timeout_s=args.step_timeout,
+        debug=args.debug,
+        store=settings_from_environment().store,
+    )
+    started = time.monotonic()
+    with teller(len(words), args.views, as_json=args.json) as tell:
+        summary = run_local(run, tell)
+    seconds = time.monotonic() - started
+    _report(args, summary, seconds)
+    return 1 if summary.failures else 0
+
+
+def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
+    if args.json:
+        row = {
+            "event": "summary", "houses": summary.houses, "views": summary.n_views,
+            "steps_done": summary.n_done, "steps_kept": summary.n_kept,
+            "seconds": round(seconds, 1), "peak_mb": round(summary.peak_mb),
+            "failures": [dict(zip(("what", "message", "command"), f, strict=True)) for f in summary.failures],
+        }  # fmt: skip
+        say(json.dumps(row))
+        return
+    say(
+        f"{len(summary.houses)} houses, {summary.n_views} views: {summary.n_done} steps done, "
+        f"{summary.n_kept} already there, {len(summary.failures)} failed; "
+        f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
+    )
+    for what, message, command in summary.failures:
+        complain(f"{what}: {message}")
+        if command:
+            complain(f"    reproduce: {command}")
+
+
+def _demo(args: argparse.Namespace) -> int:
+    words = [args.home]
+    if args.home not in ("builtin",) and not Path(args.home).exists():
+        from pbrs_farm import homes
+
+        try:
+            homes.fetch()
+        except (MachineFailed, BadInput) as error:
+            complain(f"the example homes cannot be fetched: {error}")
+            complain("going on with the built-in home")
+            words = ["builtin"]
+    code = _run_words(args, words)
+    folder = Path(args.out)
+    write_sheets(folder, 24)
+    return code
+
+
+def _step(args: argparse.Namespace) -> int:
+    from pbrs_farm.farm.loaded import Shelf
+    from pbrs_farm.farm.marked import Work
+    from pbrs_farm.farm.plan import STEPS
+    from pbrs_farm.farm.sources import resolve
+    from pbrs_farm.farm.steps import run_step
+    from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.store import store_from_url
+
+    if args.step not in STEPS:
+        raise BadInput("step", args.step, "no such step", hint=f"of {', '.join(STEPS)}")
+    store = store_from_url(args.out, settings_from_environment().store)
+    recipe = Recipe.model_validate_json(store.get("recipe.json"))
+    source = resolve(args.home)
+    work = Work(
+        store=store, recipe=recipe, house_id=source.house_id, shelf=Shelf(), source=source,
+        view_id=args.view, layers=tuple(args.layers),
+    )  # fmt: skip
+    outcome = run_step(args.step, work)
+    verdict = "already done" if outcome.was_done else f"done in {outcome.marker.seconds} s"
+    say(f"{args.step}: {verdict}")
+    for file in outcome.marker.files:
+        say(f"  {file.key}  {file.n_bytes} bytes")
+    return 0

@@ -1,0 +1,64 @@
+"""What the verbs share: how they print, and the words that name a recipe. Effects: prints."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from pbrs_farm.errors import BadInput
+from pbrs_farm.recipe import RECIPE_NAMES, Recipe, recipe_from_name
+
+Handler = Callable[[argparse.Namespace], int]
+Verb = Callable[[str, Handler, str], argparse.ArgumentParser]
+"""(name, handler, help) -> the verb's parser."""
+
+
+def complain(text: str) -> None:
+    """A line on standard error."""
+    sys.stderr.write(f"pbrs-farm: {text}\n")
+
+
+def say(text: str = "") -> None:
+    """A line on standard output."""
+    sys.stdout.write(text + "\n")
+
+
+def dump(value: Any) -> None:
+    """A value as JSON on standard output."""
+    say(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False))
+
+
+def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
+    """The words of a recipe."""
+    p.add_argument(
+        "--recipe", default=default, help=f"{', '.join(RECIPE_NAMES)} (default {default})"
+    )
+    p.add_argument(
+        "--set", action="append", default=[], metavar="GROUP.FIELD=VALUE", help="override a field"
+    )
+    p.add_argument("--seed", type=int, default=None, help="the recipe's seed (default 0)")
+    p.add_argument("--size", default=None, metavar="WxH", help="picture size, e.g. 640x480")
+    p.add_argument("--strict", action="store_true", help="recoverable faults of a home are errors")
+
+
+def recipe_of(args: argparse.Namespace) -> Recipe:
+    """The recipe named by the words of a command; raises BadRecipe."""
+    overrides: dict[str, str] = {}
+    for word in args.set:
+        path, equals, text = word.partition("=")
+        if not equals:
+            raise BadInput("--set", word, "expected group.field=value")
+        overrides[path] = text
+    if args.size is not None:
+        width, _, height = args.size.partition("x")
+        overrides |= {"image.width_px": width, "image.height_px": height}
+    if args.seed is not None:
+        overrides["seed"] = str(args.seed)
+    if args.strict:
+        overrides["read.strict"] = "true"
+    if getattr(args, "cameras", None):
+        overrides["cameras.source"] = args.cameras
+    return recipe_from_name(args.recipe, overrides)
