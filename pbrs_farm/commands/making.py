@@ -142,7 +142,7 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
     )
     for what, message, command in summary.failures:
-        complain(f"{what}: {message}")
+        complain(message if message.startswith(what) else f"{what}: {message}")
         if command:
             complain(f"    reproduce: {command}")
 

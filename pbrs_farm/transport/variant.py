@@ -78,11 +78,11 @@ def choose_variant() -> str:
         raise MachineFailed(
             f"Mitsuba cannot be imported: {error}", hint="pip install 'pbrs-farm[transport]'"
         ) from error
-    if dr.has_backend(dr.JitBackend.CUDA) and _traces_a_ray("cuda_ad_rgb"):
+    if dr.has_backend(dr.JitBackend.CUDA) and works("cuda_ad_rgb"):
         return "cuda_ad_rgb"
-    if library is not None and _has_good_llvm(dr) and _traces_a_ray("llvm_ad_rgb"):
+    if library is not None and _has_good_llvm(dr) and works("llvm_ad_rgb"):
         return "llvm_ad_rgb"
-    if _traces_a_ray("scalar_rgb"):
+    if works("scalar_rgb"):
         return "scalar_rgb"
     raise MachineFailed("no variant of Mitsuba works", hint="run `pbrs-farm doctor`")
 
@@ -114,7 +114,8 @@ def _has_good_llvm(dr: Any) -> bool:
     return bool(dr.detail.llvm_version()[0] >= MIN_LLVM)
 
 
-def _traces_a_ray(variant: str) -> bool:
+def works(variant: str) -> bool:
+    """The variant traces a ray on this machine."""
     try:
         mi = mitsuba(variant)
         scene = mi.load_dict({"type": "scene", "shape": {"type": "rectangle"}})
