@@ -7,7 +7,7 @@ import shapely
 
 from pbrs_farm.classes import NYU40_NAMES
 from pbrs_farm.house import Item, MaterialKind, Opening, Surface
-from pbrs_farm.read.labels import OTHERPROP, kind_of, nyu40_of
+from pbrs_farm.read.labels import kind_of, nyu40_of
 from pbrs_farm.read.sweethome3d.cutouts import StandingWall, opening_of
 from pbrs_farm.read.sweethome3d.finish import finish_of
 from pbrs_farm.read.sweethome3d.lamps import light_parts
@@ -23,7 +23,7 @@ from pbrs_farm.read.sweethome3d.plan import PlanLevel, PlanPiece
 from pbrs_farm.read.sweethome3d.rooms import ReadRoom
 
 DOOR, WINDOW = NYU40_NAMES.index("door"), NYU40_NAMES.index("window")
-LAMP = NYU40_NAMES.index("lamp")
+LAMP, OTHERPROP = NYU40_NAMES.index("lamp"), NYU40_NAMES.index("otherprop")
 NEAR_M = 0.5
 """A piece outside every room belongs to a room no farther than this."""
 
