@@ -111,8 +111,8 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
         levels=levels,
         rooms=numbered,
         items=tuple(items),
-        materials=looks.materials,
-        textures=looks.textures,
+        materials=looks.palette.materials,
+        textures=looks.palette.textures,
         openings=openings(items),
         notes=notes.all(),
     )

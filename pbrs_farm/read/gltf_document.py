@@ -41,6 +41,10 @@ UNDERSTOOD: Final = frozenset(
 """Extensions that a file may require."""
 
 
+class MissingFile(BadHouse):
+    """A file that a scene names does not exist; recoverable where it is a picture."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
     """A node of the scene. path: its index and those of its ancestors, outermost first."""
@@ -89,7 +93,10 @@ def _buffer(gltf: Gltf, index: int, fetch: Fetch) -> bytes:
 
 
 def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
-    """The bytes a uri means: a data URI's own, or those of a file beside the scene."""
+    """The bytes a uri means: a data URI's own, or those of a file beside the scene.
+
+    Raises MissingFile if there is no such file, BadHouse for a uri that is none.
+    """
     if not isinstance(uri, str):
         raise BadHouse(gltf.file, place, "uri is no text")
     if uri.startswith("data:"):
@@ -102,7 +109,7 @@ def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
         raise BadHouse(gltf.file, place, f"{uri[:80]!r} is on a network; only files are read")
     data = fetch(unquote(uri))
     if data is None:
-        raise BadHouse(gltf.file, place, f"{uri[:80]!r} does not exist")
+        raise MissingFile(gltf.file, place, f"{uri[:80]!r} does not exist")
     return data
 
 

@@ -130,7 +130,7 @@ def _item(
             material, emission = looks.material(number, clear=clear)
             emits = emission is not None and not kind.is_structure
             emits = emits and (emission != 0 or kind is ItemKind.LAMP)
-            index = looks.as_bulb(material) if emits else looks.index(material)
+            index = looks.as_bulb(material) if emits else looks.palette.index(material)
             name = material.name or f"part {len(surfaces)}"
             surface = placed(mesh, part.world_from_node, name=name, material=index)
             if surface is None:

@@ -7,13 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm.errors import BadHouse
 from pbrs_farm.frames import srgb_from_linear
 from pbrs_farm.house import Material, MaterialKind, Texture
 from pbrs_farm.read.glb import Gltf, entry
-from pbrs_farm.read.gltf_document import Fetch, image_bytes, numbers
+from pbrs_farm.read.gltf_document import Fetch, MissingFile, image_bytes, numbers
 from pbrs_farm.read.notes import Notes
-from pbrs_farm.read.textures import texture_from_bytes
+from pbrs_farm.read.palette import Palette
 
 F0: Final = 0.04
 """Reflectance of a dielectric at normal incidence, linear (glTF 2.0, appendix B)."""
@@ -22,30 +21,13 @@ MAX_SHININESS: Final = 10_000.0
 
 
 class Looks:
-    """The materials and textures of one scene, each once, in the order they first come up."""
+    """Resolves the materials of one scene into its palette."""
 
     def __init__(self, gltf: Gltf, fetch: Fetch, notes: Notes) -> None:
         self._gltf = gltf
         self._fetch = fetch
         self._notes = notes
-        self._materials: dict[Material, int] = {}
-        self._tried: dict[int, tuple[Texture, bool] | None] = {}
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """Every material; a Surface's material is an index into it."""
-        return tuple(self._materials)
-
-    @property
-    def textures(self) -> dict[str, Texture]:
-        """Every texture a material names, by id."""
-        used = {m.texture_id for m in self._materials}
-        found = (t[0] for t in self._tried.values() if t is not None)
-        return {t.id: t for t in found if t.id in used}
-
-    def index(self, material: Material) -> int:
-        """The material's index, the same for equal materials."""
-        return self._materials.setdefault(material, len(self._materials))
+        self.palette = Palette(notes)
 
     def material(self, number: int | None, *, clear: MaterialKind) -> tuple[Material, float | None]:
         """(materials[number], its emission in cd m-2 or None). None: glTF's default, white.
@@ -125,29 +107,25 @@ class Looks:
         if type(source) is not int:
             self._notes.add("unreadable-texture", place, "its picture is of an unknown kind")
             return None
-        if source not in self._tried:
-            self._tried[source] = self._decoded(source)
-        return self._tried[source]
-
-    def _decoded(self, source: int) -> tuple[Texture, bool] | None:
         image = entry(self._gltf, "images", source)
-        name = str(image.get("name") or image.get("uri") or f"image {source}")[:100]
-        place = f"images[{source}]"
+        key = f"images[{source}]"
+        name = str(image.get("name") or image.get("uri") or key)[:100]
+        return self.palette.texture(
+            key,
+            name=key if name.startswith("data:") else name,
+            place=place,
+            load=lambda: self._picture(source),
+        )
+
+    def _picture(self, source: int) -> bytes | None:
         try:
-            data = image_bytes(self._gltf, source, self._fetch)
-        except BadHouse as error:
-            self._notes.add("missing-texture", place, error.message)
+            return image_bytes(self._gltf, source, self._fetch)
+        except MissingFile:
             return None
-        try:
-            texture, has_holes = texture_from_bytes(data, name if name[:5] != "data:" else place)
-        except ValueError as error:
-            self._notes.add("unreadable-texture", place, str(error))
-            return None
-        return texture, has_holes
 
     def as_bulb(self, material: Material) -> int:
         """The index of the material as one that emits."""
-        return self.index(replace(material, kind=MaterialKind.BULB))
+        return self.palette.index(replace(material, kind=MaterialKind.BULB))
 
 
 def _object(holder: dict[str, Any], key: str) -> dict[str, Any]:

@@ -92,8 +92,8 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
         levels=_levels(record, rooms, items),
         rooms=tuple(rooms),
         items=tuple(items),
-        materials=stock.looks.materials,
-        textures=stock.looks.textures,
+        materials=stock.looks.palette.materials,
+        textures=stock.looks.palette.textures,
         openings=openings(items),
         notes=notes.all(),
     )

@@ -133,7 +133,9 @@ def _surfaces(
         elif slot in lamp.shades and look.kind is MaterialKind.OPAQUE:
             look = replace(look, kind=MaterialKind.SHADE)
         name = mesh.material or "grey"
-        surface = placed(mesh, world_from_model, name=name, material=stock.looks.index(look))
+        surface = placed(
+            mesh, world_from_model, name=name, material=stock.looks.palette.index(look)
+        )
         if surface is None:
             continue
         parts = separate_bulbs(surface) if is_bulb else (surface,)
@@ -161,7 +163,7 @@ def box_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
     for axis, sign, slot in BOX_FACES:
         override = node.overrides[slot] if slot < len(node.overrides) else None
         look = stock.looks.material(None, override, place=node.place, clear=MaterialKind.GLASS)
-        index = stock.looks.index(look)
+        index = stock.looks.palette.index(look)
         if np.count_nonzero(np.delete(half, axis)) == 2:
             surfaces.append(_box_face(half, axis, sign, world_from_box, index))
     if not surfaces:
@@ -218,7 +220,7 @@ def room_surfaces(
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         mtl = model.mtl[slot] if slot >= 0 else None
         look = _room_look(stock, node, mtl, default_walls=default_walls)
-        index = stock.looks.index(look)
+        index = stock.looks.palette.index(look)
         name = f"{mesh.group} {mesh.material}".strip()
         surface = placed(mesh, stock.world_from_house, name=name, material=index)
         if surface is not None:

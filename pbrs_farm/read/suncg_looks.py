@@ -8,9 +8,9 @@ from typing import Final
 from pbrs_farm.house import Material, MaterialKind, Texture
 from pbrs_farm.read.mtl import ObjMaterial
 from pbrs_farm.read.notes import Notes
+from pbrs_farm.read.palette import Palette
 from pbrs_farm.read.root_folder import RootFolder
 from pbrs_farm.read.suncg_json import Override
-from pbrs_farm.read.textures import texture_from_bytes
 
 MAX_TEXTURE_BYTES: Final = 64_000_000
 GREY: Final = (0.8, 0.8, 0.8)
@@ -20,29 +20,11 @@ DEFAULT_WALLS: Final = ("wallp_1_1", "wallp_1_2")
 
 
 class Looks:
-    """The materials and textures of one house, each once, in the order they first come up."""
+    """Resolves the materials of one house's models and nodes into its palette."""
 
     def __init__(self, folder: RootFolder, notes: Notes) -> None:
         self._folder = folder
-        self._notes = notes
-        self._materials: dict[Material, int] = {}
-        self._tried: dict[str, tuple[Texture, bool] | None] = {}
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """Every material; a Surface's material is an index into it."""
-        return tuple(self._materials)
-
-    @property
-    def textures(self) -> dict[str, Texture]:
-        """Every texture a material names, by id."""
-        used = {m.texture_id for m in self._materials}
-        found = (t[0] for t in self._tried.values() if t is not None)
-        return {t.id: t for t in found if t.id in used}
-
-    def index(self, material: Material) -> int:
-        """The material's index, the same for equal materials."""
-        return self._materials.setdefault(material, len(self._materials))
+        self.palette = Palette(notes)
 
     def material(
         self, mtl: ObjMaterial | None, override: Override | None, *, place: str, clear: MaterialKind
@@ -87,17 +69,9 @@ class Looks:
         return png if self._folder.path(png) is not None else f"texture/{name}.jpg"
 
     def _texture(self, name: str, place: str) -> tuple[Texture, bool] | None:
-        if name not in self._tried:
-            self._tried[name] = self._read(name, place)
-        return self._tried[name]
-
-    def _read(self, name: str, place: str) -> tuple[Texture, bool] | None:
-        data = self._folder.read(name, max_bytes=MAX_TEXTURE_BYTES)
-        if data is None:
-            self._notes.add("missing-texture", place, f"{name} does not exist; the colour is kept")
-            return None
-        try:
-            return texture_from_bytes(data, posixpath.basename(name))
-        except ValueError as error:
-            self._notes.add("unreadable-texture", place, f"{name}: {error}")
-            return None
+        return self.palette.texture(
+            name,
+            name=posixpath.basename(name),
+            place=place,
+            load=lambda: self._folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
+        )
