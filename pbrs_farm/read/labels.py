@@ -41,10 +41,19 @@ def _vocabulary() -> Mapping[str, str]:
     return {phrase: r["class"] for r in _rows("words.csv") for phrase in r["words"].split("|")}
 
 
+def words_of(text: str) -> frozenset[str]:
+    """Lower-case words of a name; camelCase and digits part words; a plural adds its singular."""
+    words = re.findall(r"[a-z]+", _parted(text))
+    return frozenset(words) | {w[:-1] for w in words if len(w) > 3 and w.endswith("s")}
+
+
+def _parted(name: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
+
+
 def _class_of(name: str) -> str | None:
     # The class or kind that the name's last known word (or two) before an aside stands for.
-    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    words = re.findall(r"\d+|[^\W\d_]+", parted.lower())
+    words = re.findall(r"\d+|[^\W\d_]+", _parted(name))
     aside = next((k for k, w in enumerate(words) if k and (w in _ASIDE or w.isdigit())), len(words))
     return _last_known(words[:aside]) or _last_known(words[aside:])
 
