@@ -1,20 +1,38 @@
-"""Verbs that use what was made: sheet. Effects: read and write an output folder."""
+"""Verbs that use what was made: sheet, verify, relight. Effects: read and write an output folder."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from pbrs_farm.commands.words import Verb, say
+from pbrs_farm.commands.words import Verb, dump, say
+from pbrs_farm.errors import BadInput
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add sheet."""
+    """Add sheet, verify and relight."""
     p = verb(
         "sheet", _sheet, "contact sheet (sheet.png) and gallery (index.html) of an output folder"
     )
     p.add_argument("folder", type=Path)
     p.add_argument("--views", type=int, default=24, help="rows of the contact sheet (default 24)")
+    p = verb(
+        "verify", _verify, "recompute labels from the stored files by another caster; a certificate"
+    )
+    p.add_argument("folder", type=Path)
+    p.add_argument("--all", action="store_true", help="every pixel instead of a sample")
+    p.add_argument("--sample", type=int, default=None, metavar="N", help="pixels a view")
+    p.add_argument("--json", action="store_true", help="the certificate as JSON")
+    p = verb(
+        "relight",
+        _relight,
+        "other strengths of lamps and daylight from a stored view, no rendering",
+    )
+    p.add_argument("view", type=Path, help="a view's folder: OUT/houses/<house>/views/<view>")
+    p.add_argument("--indoor", type=float, default=1.0, help="factor of the lamps (default 1)")
+    p.add_argument("--outdoor", type=float, default=1.0, help="factor of the sky (default 1)")
+    p.add_argument("--out", type=Path, default=None, help="PNG to write (default VIEW/relit.png)")
+    p.add_argument("--no-denoise", action="store_true", help="develop the raw radiance")
 
 
 def _sheet(args: argparse.Namespace) -> int:
@@ -23,6 +41,7 @@ def _sheet(args: argparse.Namespace) -> int:
 
 
 def write_sheets(folder: Path, max_views: int) -> None:
+    """Write sheet.png and index.html into an output folder and say where they are."""
     from pbrs_farm.farm.sheet import contact_sheet, gallery
     from pbrs_farm.store.folder import FolderStore
 
@@ -30,3 +49,29 @@ def write_sheets(folder: Path, max_views: int) -> None:
     store.put("sheet.png", contact_sheet(folder, max_views=max_views))
     store.put("index.html", gallery(folder).encode())
     say(f"{folder / 'sheet.png'}\n{folder / 'index.html'}")
+
+
+def _verify(args: argparse.Namespace) -> int:
+    from pbrs_farm.check import verify
+
+    if args.sample is not None and args.sample < 1:
+        raise BadInput("--sample", str(args.sample), "expected at least one pixel")
+    certificate = verify(args.folder, sample=args.sample, all_pixels=args.all)
+    if args.json:
+        dump(certificate.model_dump(mode="json"))
+    else:
+        say(certificate.text())
+    return 0 if certificate.is_clean else 1
+
+
+def _relight(args: argparse.Namespace) -> int:
+    from pbrs_farm.farm.relight import relit
+    from pbrs_farm.store.folder import FolderStore
+
+    if min(args.indoor, args.outdoor) < 0:
+        raise BadInput("--indoor/--outdoor", "", "light cannot be negative")
+    out = args.out or args.view / "relit.png"
+    png = relit(args.view, indoor=args.indoor, outdoor=args.outdoor, denoise=not args.no_denoise)
+    FolderStore(out.parent).put(out.name, png)
+    say(str(out))
+    return 0

@@ -169,25 +169,14 @@ def _light(work: Work) -> Made:
 
 
 def _develop(work: Work) -> Made:
-    from pbrs_farm.images import array_from_png, layers_from_exr, png_from_array
-    from pbrs_farm.transport.develop import Negative, develop
+    from pbrs_farm.farm.relight import negative_from_files
+    from pbrs_farm.images import png_from_array
+    from pbrs_farm.transport.develop import develop
 
-    get = work.store.get
-    view = work.view_id or ""
-    exr = layers_from_exr(get(keys.view_key(work.house_id, view, "radiance.exr")))
-    image = {
-        name: np.stack([exr[f"{name}.{c}"] for c in "RGB"], -1)
-        for name in ("outdoor", "indoor", "albedo")
-    }
-    normal = array_from_png(get(keys.view_key(work.house_id, view, "normal.png")))
-    negative = Negative(
-        image["outdoor"],
-        image["indoor"],
-        image["albedo"],
-        normal.astype(np.float32) * np.float32(2 / 65535) - 1,
-    )
-    light = work.recipe.light
-    pictures = develop(negative, work.recipe.tone, denoise=light.denoise)
+    folder = keys.view_key(work.house_id, work.view_id or "")
+    radiance, normal = (work.store.get(f"{folder}{f}") for f in ("radiance.exr", "normal.png"))
+    negative = negative_from_files(radiance, normal, folder.rstrip("/"))
+    pictures = develop(negative, work.recipe.tone, denoise=work.recipe.light.denoise)
     return Made({LAYER[mode].file: png_from_array(rgb) for mode, rgb in pictures.items()})
 
 

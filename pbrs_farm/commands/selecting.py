@@ -1,0 +1,140 @@
+"""Verbs of selection: reference build, select. Effects: read photographs, write the output root."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pbrs_farm.commands.words import Verb, dump, say
+from pbrs_farm.errors import BadInput
+from pbrs_farm.recipe import HistogramFields, Recipe, SelectionFields, recipe_from_name
+
+if TYPE_CHECKING:
+    from pbrs_farm.selection.reference import Reference
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add reference and select."""
+    p = verb("reference", _reference, "photographs -> a small reference file of histograms")
+    p.add_argument("action", choices=("build",))
+    p.add_argument("source", type=Path, help="folder of RGB-D pairs, or nyu_depth_v2_labeled.mat")
+    p.add_argument("--out", type=Path, required=True, help="the reference file to write")
+    p.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="FIELD=VALUE",
+        help="histogram.FIELD or selection.FIELD",
+    )
+    _add_photo_words(p)
+    p = verb("select", _select, "keep the views that look like photographs (paper section 3.3)")
+    p.add_argument("folder", help="output folder or store URL")
+    p.add_argument(
+        "--reference",
+        type=Path,
+        required=True,
+        help="a reference file, a folder of RGB-D pairs, or a .mat",
+    )
+    p.add_argument("--run", default="default", help="name of the selection's files")
+    p.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="FIELD=VALUE",
+        help="selection.FIELD, e.g. selection.min_depth=0.6",
+    )
+    p.add_argument("--score-mode", default=None, help="mode to score where a view lacks mlt_il_ol")
+    p.add_argument(
+        "--per-room-cap", type=int, default=None, metavar="N", help="best views kept per room"
+    )
+    p.add_argument("--report", action="store_true", help="write selection/<run>.html too")
+    p.add_argument("--json", action="store_true", help="the summary as JSON")
+    _add_photo_words(p)
+
+
+def _add_photo_words(p: argparse.ArgumentParser) -> None:
+    p.add_argument(
+        "--depth-scale",
+        type=float,
+        default=None,
+        help="depth units per metre (default by file kind)",
+    )
+    p.add_argument(
+        "--sun-rgbd", action="store_true", help="undo SUN RGB-D's rotation of depth bits"
+    )
+    p.add_argument("--no-crop", action="store_true", help="keep the registration border")
+
+
+def _overrides(words: list[str]) -> dict[str, str]:
+    pairs = {}
+    for word in words:
+        name, equals, text = word.partition("=")
+        if not equals or not name.startswith(("histogram.", "selection.")):
+            raise BadInput("--set", word, "expected histogram.FIELD=value or selection.FIELD=value")
+        pairs[name] = text
+    return pairs
+
+
+def _built(
+    args: argparse.Namespace, histogram: HistogramFields, selection: SelectionFields
+) -> Reference:
+    from pbrs_farm.farm.reference import PhotoOptions, build_reference
+
+    source = args.source if hasattr(args, "source") else args.reference
+    options = PhotoOptions(args.depth_scale, args.sun_rgbd, not args.no_crop)
+    return build_reference(source, histogram, selection, options)
+
+
+def _reference(args: argparse.Namespace) -> int:
+    from pbrs_farm.selection.binning import table_text
+    from pbrs_farm.selection.reference import bytes_from_reference
+    from pbrs_farm.store.folder import FolderStore
+
+    recipe = recipe_from_name("fast", _overrides(args.set))
+    reference = _built(args, recipe.histogram, recipe.selection)
+    FolderStore(args.out.parent).put(args.out.name, bytes_from_reference(reference))
+    say(table_text(reference.facts.table, reference.facts.binning))
+    say(f"{args.out}: {len(reference.facts.ids)} photographs")
+    return 0
+
+
+def _select(args: argparse.Namespace) -> int:
+    from pbrs_farm.farm.reference import read_reference
+    from pbrs_farm.farm.selecting import run_key, select
+    from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.store import store_from_url
+
+    if "://" not in args.folder and not Path(args.folder).is_dir():
+        raise BadInput(args.folder, "", "no such folder")
+    store = store_from_url(args.folder, settings_from_environment().store)
+    recipe = Recipe.model_validate_json(store.get("recipe.json"))
+    fields = _fields(recipe, args)
+    is_file = args.reference.is_file() and args.reference.suffix != ".mat"
+    reference = (
+        read_reference(args.reference) if is_file else _built(args, recipe.histogram, fields)
+    )
+    summary = select(store, reference, fields, reference_name=str(args.reference), run=args.run)
+    if args.report:
+        from pbrs_farm.farm.selection_report import selection_report
+
+        html = selection_report(store, reference, fields, run=args.run)
+        store.put(run_key(args.run, "html"), html.encode())
+    if args.json:
+        dump(summary.model_dump(mode="json"))
+        return 0
+    say(f"{summary.kept} of {summary.views} views kept, {summary.scored} scored")
+    for reason, n in summary.reasons.items():
+        say(f"  {n:>6}  {reason}")
+    say(run_key(args.run, "html" if args.report else "parquet"))
+    return 0
+
+
+def _fields(recipe: Recipe, args: argparse.Namespace) -> SelectionFields:
+    changed = _overrides(args.set)
+    if args.score_mode is not None:
+        changed["selection.score_mode"] = args.score_mode
+    if args.per_room_cap is not None:
+        changed["selection.per_room_cap"] = str(args.per_room_cap)
+    held = {f"selection.{k}": str(v) for k, v in recipe.selection.model_dump(mode="json").items()}
+    return recipe_from_name("fast", held | changed).selection
