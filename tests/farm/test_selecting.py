@@ -6,6 +6,7 @@ import io
 import json
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -223,3 +224,18 @@ def test_the_view_step_writes_what_selection_reads() -> None:
     assert read.colour[Mode.MLT_IL_OL].counts == (48,)
     assert read.depth.dense()[1500 * 128 // 10000] == 48
     assert fields != FIELDS
+
+
+def test_json_lines_are_the_rows_of_the_table() -> None:
+    values = {
+        "text": ['quote " and \\', None, "é"],
+        "number": [0.5, None, 1 / 3],
+        "small": [1e-6, 2.0, -0.25],
+        "kept": [True, False, True],
+    }
+    table = pa.table(values)
+    lines = [json.loads(x) for x in selecting.json_lines(table).splitlines()]
+    assert [x["text"] for x in lines] == values["text"]
+    assert [x["kept"] for x in lines] == values["kept"]
+    assert [x["number"] for x in lines] == [0.5, None, 0.333333]
+    assert [x["small"] for x in lines] == values["small"]

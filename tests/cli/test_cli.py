@@ -1,0 +1,96 @@
+"""The command line: wrong words and wrong files end in one clear line and a non-zero exit."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.cli import build_parser, main
+from pbrs_farm.layers import LAYERS
+
+
+def error_of(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    code = main(list(words))
+    captured = capsys.readouterr()
+    assert code == 1, captured
+    assert "Traceback" not in captured.err + captured.out
+    return captured.err
+
+
+def zipped(path: Path, **entries: str) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in entries.items():
+            archive.writestr(name.replace("__", "."), text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["run", "x.sh3d", "--out", "{out}"], "x.sh3d: no such file"),
+        (["run", "--out", "{out}"], "no home given"),
+        (["run", "builtin", "--out", "{out}", "--recipe", "grand"], "no recipe 'grand'"),
+        (["run", "builtin", "--out", "{out}", "--set", "light.spp=0"], "light.spp"),
+        (["run", "builtin", "--out", "{out}", "--set", "spp"], "expected group.field=value"),
+        (["run", "builtin", "--out", "{out}", "--modes", "mlt"], "no such lighting mode"),
+        (["run", "builtin", "--out", "{out}", "--layers", "smell"], "no such layer"),
+        (["run", "builtin", "--out", "{out}", "--size", "axb"], "image.width_px"),
+        (["run", "builtin", "--out", "/proc/nowhere"], "/proc/nowhere"),
+        (["verify", "{out}"], "no houses here"),
+        (["sheet", "{out}"], "{out}"),
+        (["select", "{out}", "--reference", "x"], "no such folder"),
+        (["relight", "{out}"], "cannot be read"),
+        (["step", "paint", "builtin", "--out", "{out}"], "no such step"),
+    ],
+)
+def test_wrong_words_are_told(
+    words: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    assert says.replace("{out}", out) in error_of(capsys, *(w.replace("{out}", out) for w in words))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("text.sh3d", b"no zip at all", "text.sh3d"),
+        ("cut.sh3d", b"PK\x03\x04\x14\x00", "cut.sh3d"),
+        ("bad.xml", b"<home version='7200'><wall", "bad.xml"),
+        ("bomb.xml", b"<!DOCTYPE h [<!ENTITY a 'x'>]><home>&a;</home>", "bomb.xml"),
+        ("empty.xml", b"<home version='7200' name='e'></home>", "empty.xml"),
+        ("cut.glb", b"glTF\x02\x00\x00\x00", "cut.glb"),
+    ],
+)
+def test_a_bad_home_is_named_and_the_next_one_is_done(
+    name: str, content: bytes, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    home = tmp_path / name
+    home.write_bytes(content)
+    error = error_of(capsys, "run", str(home), "--out", str(tmp_path / "out"))
+    assert says in error
+
+
+def test_a_home_without_home_xml_says_how_to_save_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    home = zipped(tmp_path / "old.sh3d", Home="java", ContentDigests="")
+    assert "5.3" in error_of(capsys, "run", str(home), "--out", str(tmp_path / "out"))
+
+
+def test_every_verb_has_a_help_line() -> None:
+    text = build_parser().format_help()
+    for verb in ("doctor", "homes", "run", "demo", "sheet", "verify", "select", "relight"):
+        assert verb in text
+
+
+def test_layers_prints_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layers"]) == 0
+    printed = capsys.readouterr().out
+    assert all(f"`{layer.file}`" in printed for layer in LAYERS)
+
+
+def test_no_verb_prints_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    assert "usage" in capsys.readouterr().out
