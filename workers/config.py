@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError
 from pbrs_farm.errors import BadInput
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store.url import StoreSettings
+from workers.alive import alive_file
 
 _PREFIX = "PBRS_FARM_"
 
@@ -79,7 +80,7 @@ class FarmConfig(BaseModel):
     @property
     def heartbeat_file(self) -> Path:
         """Touched by the worker's main loop; its age is the liveness probe."""
-        return self.scratch / f"pbrs-{self.worker}.alive"
+        return alive_file(self.scratch, self.worker)
 
 
 def config_from_environment(environment: Mapping[str, str] | None = None) -> FarmConfig:

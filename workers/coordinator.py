@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from pbrs_farm.errors import PbrsError
+from workers.alive import touch
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import STAGES, queue_of, task_from_text
 from workers.ledger import JobView, LedgerUnavailable
@@ -70,6 +71,8 @@ class Coordinator:
 
     def turn(self) -> float:
         """One round of duties; seconds to wait before the next."""
+        if self._is_due("alive", _REAP_EVERY_S):
+            touch(self._config.heartbeat_file)
         leading = self._ledger.lead(self._token)
         if leading != self.leading:
             _log.info("leading" if leading else "not leading; standing by")

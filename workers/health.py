@@ -1,20 +1,15 @@
-"""Signs of life of a worker's main loop, and leaving when drained. Effects: Redis, a file.
-
-`python -m workers.health` is the liveness probe: exit 1 when the main loop stands still.
-"""
+"""Signs of life of a worker's main loop, and leaving when drained. Effects: Redis, a file."""
 
 from __future__ import annotations
 
 import logging
 import os
-import sys
-import time
-from pathlib import Path
 from typing import Any, Final
 
 from celery import bootsteps
 from celery.worker import state
 
+from workers.alive import touch
 from workers.config import config_from_environment
 from workers.ledger import LedgerUnavailable
 from workers.redis_ledger import RedisLedger
@@ -22,7 +17,6 @@ from workers.registry import Registry
 
 _log = logging.getLogger("pbrs.worker")
 _EVERY_S: Final = 10.0
-_STALE_S: Final = 120.0
 
 
 class SignsOfLife(bootsteps.StartStopStep):  # type: ignore[misc]
@@ -57,26 +51,3 @@ class SignsOfLife(bootsteps.StartStopStep):  # type: ignore[misc]
                 state.should_stop = os.EX_OK
         except LedgerUnavailable as error:
             _log.warning("%s", error)
-
-
-def touch(path: Path) -> None:
-    """Set the file's time to now; it appears if need be."""
-    path.touch()
-    os.utime(path)
-
-
-def main() -> int:
-    """0 while the worker on this machine is alive; 1 and a line when not."""
-    path = config_from_environment().heartbeat_file
-    try:
-        age_s = time.time() - path.stat().st_mtime
-    except FileNotFoundError:
-        age_s = float("inf")
-    if age_s < _STALE_S:
-        return 0
-    sys.stderr.write(f"{path}: no sign of life for {age_s:.0f} s\n")
-    return 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

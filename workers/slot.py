@@ -169,7 +169,11 @@ class Slot:
         """Store a log or a record of failure; the work does not depend on it."""
         try:
             if self._store is None:
-                self._store = store_from_url(self._config.store_url, self._config.store)
+                settings = self._config.store
+                hasty = settings.s3.model_copy(update={"patience_s": 5.0})
+                self._store = store_from_url(
+                    self._config.store_url, settings.model_copy(update={"s3": hasty})
+                )
             self._store.put(key, text.encode())
         except (StoreFailed, PbrsError) as error:
             _log.warning("not stored: %s", error)

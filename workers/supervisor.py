@@ -22,8 +22,8 @@ from types import FrameType
 from typing import Final
 
 from pbrs_farm.errors import MachineFailed, PbrsError
+from workers.alive import touch
 from workers.config import FarmConfig, config_from_environment
-from workers.health import touch
 from workers.ids import QUEUES
 from workers.logs import log_plainly
 from workers.redis_ledger import RedisLedger

@@ -37,7 +37,7 @@ class SmallFarm:
         self.control.mkdir(parents=True)
         self.store = FolderStore(folder / "store")
         self._settings = {
-            "lease_s": 3, "beat_s": 0.5, "retry_delay_s": 0.1, "resend_s": 3, "breaker_s": 2,
+            "lease_s": 3, "beat_s": 0.5, "retry_delay_s": 0.1, "resend_s": 3, "breaker_s": 12,
             "grace_s": 30, "storage_patience_s": 60, "min_free_mb": 1, **settings,
         }  # fmt: skip
         self.processes: dict[str, subprocess.Popen[bytes]] = {}

@@ -1,0 +1,340 @@
+"""The farm's own cost: queue, ledger, coordinator; no pictures. FULL=1 runs the whole job.
+
+A simulated job of 45,622 houses is entered into the ledger with all its views; 100,000 of its
+tasks then run through coordinator, Redis, Celery, renderer processes and a folder store. Beside it,
+on a farm of its own, a worker is killed with the default settings and its task waited for.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pydantic import SecretStr
+
+from benchmarks.noop_runner import N_HOUSES, groups_of
+from benchmarks.report import write_report
+from pbrs_farm import keys
+from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.store.folder import FolderStore
+from workers.client import Farm, completed, new_spec
+from workers.config import FarmConfig
+from workers.job import HouseEntry, job_key, lines_from_houses
+from workers.ledger import HouseState
+
+FULL = os.environ.get("FULL") == "1"
+N_TASKS = 410_000 if FULL else 100_000
+SLOTS = int(os.environ.get("SLOTS", "2"))
+UNITS = {
+    "farm.task_overhead_ms": "ms of CPU a task, all processes",
+    "farm.tasks_per_s": "1/s",
+    "farm.redis_mb": "MB, largest",
+    "farm.redis_growth_mb": "MB over the last half",
+    "farm.coordinator_mb": "MB, largest",
+    "farm.coordinator_growth_mb": "MB over the last half",
+    "farm.status_read_s": "s, slowest during the job",
+    "farm.status_command_s": "s, slowest during the job",
+    "farm.load_s": "s to enter 45,622 houses",
+    "farm.recover_s": "s, 100,000 tasks from a folder store",
+    "farm.lost_worker_s": "s until a killed worker's task runs again, default settings",
+    "farm.tasks": "tasks run",
+    "farm.vs_local": "farm seconds / local seconds",
+}
+
+
+@dataclass
+class Bench:
+    """Redis, and the processes of a farm, in a folder of their own."""
+
+    folder: Path
+    env: dict[str, str] = field(default_factory=dict)
+    processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+
+    def start_redis(self) -> None:
+        with socket.socket() as s:
+            s.bind(("127.0.0.1", 0))
+            port = s.getsockname()[1]
+        (self.folder / "redis").mkdir(parents=True)
+        words = ["redis-server", "--port", str(port), "--bind", "127.0.0.1", "--save", ""]
+        words += ["--appendonly", "yes", "--dir", str(self.folder / "redis")]
+        self.env = {
+            "PBRS_REDIS_URL": f"redis://127.0.0.1:{port}/0",
+            "PBRS_STORE": (self.folder / "store").as_uri(),
+            "PBRS_FARM_SCRATCH": str(self.folder),
+            "PBRS_FARM_RUNNER": "benchmarks.noop_runner:runner",
+        }
+        self.start("redis", words)
+        time.sleep(0.5)
+
+    def start(self, name: str, words: list[str], **env: str) -> None:
+        with (self.folder / f"{name}.log").open("ab") as log:
+            self.processes[name] = subprocess.Popen(
+                words, env={**os.environ, **self.env, **env}, stdout=log, stderr=log,
+                start_new_session=True,
+            )  # fmt: skip
+
+    def python(self, name: str, *words: str, **env: str) -> None:
+        self.start(name, [sys.executable, "-m", *words], **env)
+
+    def farm(self) -> Farm:
+        return Farm(
+            FarmConfig(
+                redis_url=SecretStr(self.env["PBRS_REDIS_URL"]),
+                store_url=self.env["PBRS_STORE"],
+                runner=self.env["PBRS_FARM_RUNNER"],
+            )
+        )
+
+    def end(self, name: str, sign: signal.Signals = signal.SIGKILL) -> None:
+        process = self.processes.pop(name)
+        for pid in (process.pid, *descendants(process.pid)):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, sign)
+        process.wait(30)
+
+    def close(self) -> None:
+        for name in list(self.processes):
+            self.end(name)
+
+
+@contextlib.contextmanager
+def bench_farm() -> Iterator[Bench]:
+    """A fresh Redis and an empty store; everything is ended and removed afterwards."""
+    if shutil.which("redis-server") is None:
+        raise RuntimeError("redis-server is not installed")
+    with tempfile.TemporaryDirectory(prefix="pbrs-bench-") as name:
+        bench = Bench(Path(name))
+        bench.start_redis()
+        try:
+            yield bench
+        finally:
+            bench.close()
+
+
+def main() -> None:
+    """Measure and write out/bench/farm.json."""
+    figures: dict[str, Any] = {}
+    lost = threading.Thread(target=lambda: figures.update(lost_worker()))
+    lost.start()
+    figures |= throughput()
+    lost.join()
+    if os.environ.get("LOCAL") != "0":
+        figures |= against_local()
+    write_report("farm", figures, UNITS)
+
+
+def throughput() -> dict[str, Any]:
+    """Load the whole job, run N_TASKS of it, recover it."""
+    with bench_farm() as bench:
+        farm = bench.farm()
+        houses = [HouseEntry(house_id=f"h{k:05d}") for k in range(N_HOUSES)]
+        spec_houses, spec = completed(houses, new_spec(recipe_from_name("fast")))
+        began = time.monotonic()
+        farm.ledger.create(spec)
+        farm.ledger.load_houses(spec.job_id, map(_opened, range(N_HOUSES)))
+        farm.ledger.open(spec.job_id, 5)
+        load_s = time.monotonic() - began
+        farm.store.put(job_key(spec.job_id), spec.model_dump_json().encode())
+        farm.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(spec_houses))
+        print(f"   {N_HOUSES} houses entered in {load_s:.1f} s", flush=True)
+
+        bench.python("coordinator", "workers.coordinator")
+        bench.python("worker", "workers.supervisor", PBRS_FARM_SLOTS=str(SLOTS))
+        watch = Watch(bench, farm, spec.job_id)
+        watch.until(N_TASKS)
+        figures = watch.figures() | {"farm.load_s": round(load_s, 1)}
+        bench.end("worker")
+        bench.end("coordinator")
+        figures["farm.recover_s"] = recover_s(farm, spec.job_id)
+        farm.ledger.client.close()
+        return figures
+
+
+def _opened(index: int) -> HouseState:
+    groups = groups_of(f"h{index}")
+    units = {str(n): ("gl", "l") for n in range(len(groups))}
+    return HouseState(index, f"h{index:05d}", False, groups, {**units, "-": ("geometry", "d")})
+
+
+class Watch:
+    """Looks at a running job every two seconds: memory, times of reading, tasks done."""
+
+    def __init__(self, bench: Bench, farm: Farm, job: str) -> None:
+        self._bench, self._farm, self._job = bench, farm, job
+        self._samples: list[tuple[int, float, float]] = []
+        self._reads: list[float] = []
+        self._commands: list[float] = []
+        self._seconds = 0.0
+        self._cpu_s = 0.0
+        self._n = 0
+
+    def until(self, n_tasks: int) -> None:
+        while self._done() < 1:
+            time.sleep(0.05)
+        began, first, cpu = time.monotonic(), self._done(), self._cpu()
+        while (done := self._done()) < n_tasks:
+            self._sample(done)
+            if len(self._samples) % 15 == 1:
+                self._commands.append(self._command())
+                print(f"   {done} tasks, {self._rate(began, first, done):.0f}/s", flush=True)
+            time.sleep(2.0)
+        self._seconds = time.monotonic() - began
+        self._n = self._done() - first
+        self._cpu_s = self._cpu() - cpu
+
+    def figures(self) -> dict[str, Any]:
+        half = [s for s in self._samples if s[0] >= self._samples[-1][0] / 2]
+        redis, coordinator = [s[1] for s in self._samples], [s[2] for s in self._samples]
+        return {
+            "farm.tasks": self._n,
+            "farm.tasks_per_s": round(self._n / self._seconds, 1),
+            "farm.task_overhead_ms": round(1e3 * self._cpu_s / self._n, 2),
+            "farm.redis_mb": round(max(redis), 1),
+            "farm.redis_growth_mb": round(half[-1][1] - half[0][1], 2),
+            "farm.coordinator_mb": round(max(coordinator), 1),
+            "farm.coordinator_growth_mb": round(half[-1][2] - half[0][2], 2),
+            "farm.status_read_s": round(max(self._reads), 4),
+            "farm.status_command_s": round(max(self._commands), 2),
+        }
+
+    def _rate(self, began: float, first: int, done: int) -> float:
+        return (done - first) / max(1e-9, time.monotonic() - began)
+
+    def _done(self) -> int:
+        view = self._farm.view(self._job)
+        return int(sum(view.counts.get(f"done:{s}", 0) for s in ("gl", "light", "reduce")))
+
+    def _sample(self, done: int) -> None:
+        began = time.perf_counter()
+        self._farm.status(self._job)
+        self._reads.append(time.perf_counter() - began)
+        used = self._farm.ledger.client.info("memory")["used_memory"] / 1e6
+        pid = self._bench.processes["coordinator"].pid
+        self._samples.append((done, used, _resident_mb(pid)))
+
+    def _command(self) -> float:
+        began = time.perf_counter()
+        words = [sys.executable, "-m", "pbrs_farm.cli", "status", "--json", self._job]
+        env = {**os.environ, **self._bench.env}
+        subprocess.run(words, env=env, check=True, stdout=subprocess.DEVNULL)
+        return time.perf_counter() - began
+
+    def _cpu(self) -> float:
+        pids = [p.pid for p in self._bench.processes.values()]
+        return sum(_cpu_s(p) for pid in pids for p in (pid, *descendants(pid)))
+
+
+def recover_s(farm: Farm, job: str) -> float:
+    """Seconds to rebuild the ledger after FLUSHALL, from the store the job has filled."""
+    for index in range(N_HOUSES):
+        house = f"h{index:05d}"
+        if farm.store.head(keys.marker_key(house, "0_gl")) is None:
+            break
+        for step in ("house", "cameras"):
+            farm.store.put(keys.marker_key(house, step), b"{}")
+    farm.ledger.client.flushall()
+    began = time.monotonic()
+    view = farm.recover(job)
+    seconds = time.monotonic() - began
+    done = sum(view.counts.get(f"done:{s}", 0) for s in ("gl", "light", "reduce"))
+    print(f"   recovered {done:.0f} finished tasks in {seconds:.1f} s", flush=True)
+    assert done >= 0.99 * N_TASKS, done
+    return round(seconds, 1)
+
+
+def lost_worker() -> dict[str, Any]:
+    """Seconds from kill -9 of a worker to the second start of its task, with default settings."""
+    with bench_farm() as bench:
+        farm = bench.farm()
+        bench.python("coordinator", "workers.coordinator")
+        bench.python("w1", "workers.supervisor", PBRS_FARM_WORKER="w1", PBRS_BENCH_SLEEP="300")
+        houses = [HouseEntry(house_id="h00000")]
+        job = farm.submit(houses, new_spec(recipe_from_name("fast"))).job_id
+        while not _runner_of(farm, job):
+            time.sleep(0.1)
+        time.sleep(25)  # past its first beat
+        bench.python("w2", "workers.supervisor", PBRS_FARM_WORKER="w2", PBRS_BENCH_SLEEP="0")
+        bench.end("w1")
+        began = time.monotonic()
+        while farm.view(job).counts.get("done:geometry", 0) < 1:
+            time.sleep(0.1)
+        seconds = time.monotonic() - began
+        farm.ledger.client.close()
+    print(f"   a killed worker's task was done elsewhere after {seconds:.0f} s", flush=True)
+    return {"farm.lost_worker_s": round(seconds, 1)}
+
+
+def _runner_of(farm: Farm, job: str) -> str:
+    return farm.ledger.task_facts(job, "h00000/-/geometry").get("claim", "")
+
+
+def against_local() -> dict[str, Any]:
+    """Wall time of a preview job through the farm over that of `pbrs-farm run --jobs 2`."""
+    with bench_farm() as bench:
+        bench.env["PBRS_FARM_RUNNER"] = "workers.houses:runner"
+        run = [sys.executable, "-m", "pbrs_farm.cli"]
+        job = ["builtin", "--recipe", "preview"]
+        began = time.monotonic()
+        alone = bench.folder / "alone"
+        subprocess.run([*run, "run", *job, "--jobs", "2", "--out", str(alone)], check=True,
+                       stdout=subprocess.DEVNULL)  # fmt: skip
+        local_s = time.monotonic() - began
+        bench.python("coordinator", "workers.coordinator")
+        bench.python("worker", "workers.supervisor", PBRS_FARM_SLOTS="2")
+        farm = bench.farm()
+        while not farm.registry.slots():
+            time.sleep(0.1)
+        began = time.monotonic()
+        env = {**os.environ, **bench.env}
+        done = subprocess.run([*run, "submit", *job], env=env, check=True, capture_output=True)
+        name = done.stdout.decode().strip()
+        while farm.view(name).state != "done":
+            time.sleep(0.1)
+        farm_s = time.monotonic() - began
+        _same_pictures(FolderStore(alone), FolderStore(bench.folder / "store"))
+        farm.ledger.client.close()
+    print(f"   local {local_s:.1f} s, farm {farm_s:.1f} s", flush=True)
+    return {"farm.vs_local": round(farm_s / local_s, 3)}
+
+
+def _same_pictures(alone: FolderStore, farm: FolderStore) -> None:
+    """Every object the local run made is the farm's, byte for byte; markers hold clocks."""
+    for key in alone.list("houses/"):
+        if "/done/" not in key and farm.get(key) != alone.get(key):
+            raise AssertionError(f"{key} differs between local run and farm")
+
+
+def descendants(pid: int) -> list[int]:
+    """Process ids of all children, theirs included."""
+    try:
+        words = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        return []
+    return [p for word in words for p in (int(word), *descendants(int(word)))]
+
+
+def _cpu_s(pid: int) -> float:
+    """CPU seconds of a process and of its children that have ended."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+
+
+def _resident_mb(pid: int) -> float:
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
