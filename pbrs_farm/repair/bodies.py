@@ -43,6 +43,15 @@ def bodies_from_item(item: Item, index: int, table: TagTable) -> list[Body] | No
     return bodies
 
 
+def closed_bodies(item: Item, table: TagTable) -> list[Manifold]:
+    """Those connected parts of the item that are closed solids."""
+    patches = [patch_from_surface(s, 0) for s in item.surfaces if len(s.faces)]
+    if not patches:
+        return []
+    solids = (solid_from_patches(part, table) for part in _split(patches, components(patches)))
+    return [s for s in solids if s is not None]
+
+
 def components(patches: Sequence[Patch]) -> list[NDArray[np.int64]]:
     """For each patch the body (F,) of each face; bodies are faces joined at their corners."""
     positions = np.concatenate([p.positions for p in patches])

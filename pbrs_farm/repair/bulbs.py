@@ -19,7 +19,7 @@ from pbrs_farm.repair.solids import F64
 
 Faces = NDArray[np.int64]
 
-_CLEARANCE = 0.9
+_CLEARANCE = 0.97
 _LEAST_RADIUS_M = 0.004
 _N_MOVES = 400
 

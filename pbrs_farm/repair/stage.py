@@ -11,6 +11,7 @@ from dataclasses import replace
 from pbrs_farm.house import Enclosure, House, Room
 from pbrs_farm.recipe import RepairFields
 from pbrs_farm.repair import clean, plan
+from pbrs_farm.repair.audit import furniture_audit
 from pbrs_farm.repair.bulbs import with_bulbs
 from pbrs_farm.repair.enclosure import Space
 from pbrs_farm.repair.leaks import leaks_of_house
@@ -66,6 +67,7 @@ def repair(
         rooms=_audit(house.rooms, structure.spaces),
         is_leaking=None if leaks is None else leaks.n_sky > 0,
         leaks=leaks,
+        furniture=furniture_audit(house),
     )
     return house, report
 
