@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pbrs_farm.camera import Camera
 from pbrs_farm.recipe import LightFields
 from pbrs_farm.transport.bsdf import evaluate, luminance, sample, thin_glass_reflectance
-from pbrs_farm.transport.emitters import Emitters
+from pbrs_farm.transport.emitters import FIRST_PORTAL, Emitters
 from pbrs_farm.transport.materials import GLASS, MIRROR
 from pbrs_farm.transport.numbers import (
     CAMERA_DIMS,
@@ -179,6 +179,8 @@ def direct(
     lamp = emitters.sample_lamp(
         stage, hit.p, numbers.one(dim + _LAMP), numbers.two(dim + _LAMP_UV), only_lamp, active & (only_lamp > -2)
     )  # fmt: skip
+    # The pilot draws a portal's light through the portal alone.
+    alone = only_outdoor >= FIRST_PORTAL
     result = []
     for to in (out, lamp):
         wo = frame.to_local(to.d)
@@ -186,16 +188,14 @@ def direct(
         # Light may not come through the face when the shading normal says it does not.
         side = dr.dot(hit.ng, to.d)
         lit = to.valid & (side * wo.z > 0) & (dr.max(value) > 0) & (to.density > 0)
-        weight = 1 / (to.density + density)
+        weight = 1 / (to.density + dr.select(alone, 0, density))
         start = offset(hit.p, dr.select(side > 0, hit.ng, -hit.ng))
         # Aim again from the moved start: a lamp near by must not shadow itself.
         aim = hit.p + to.d * to.distance - start
         reach = dr.norm(aim)
         is_near = to.distance < dr.inf
         way = dr.select(is_near, aim / reach, to.d)
-        clear = stage.transmittance(
-            start, way, dr.select(is_near, reach * (1 - 1e-4), dr.inf), lit
-        )
+        clear = stage.transmittance(start, way, dr.select(is_near, reach * (1 - 1e-4), dr.inf), lit)
         result.append(dr.select(lit, value * to.radiance * clear * weight, 0))
     return result[0], result[1]
 
@@ -251,19 +251,23 @@ def _trace(
 
         # Emitters that the ray meets: weight 1 behind the camera, mirrors and glass.
         by_scatter = last_density > 0
+        # What the camera sees directly needs no choice: the pilot leaves it out.
+        counts = (only_lamp == -1) | by_scatter
         sun, sun_density = emitters.sun(d, only_outdoor)
         dome, dome_density = emitters.dome(last_p, d, only_outdoor, missed)
         sun_weight = dr.select(by_scatter, last_density / (last_density + sun_density), 1)
         dome_weight = dr.select(by_scatter, last_density / (last_density + dome_density), 1)
         # The pilot of a portal counts what is drawn through it only.
-        sees_sky = missed & emitters.has_sky & (only_outdoor > -2) & (only_outdoor < 2)
+        sees_sky = (
+            missed & counts & emitters.has_sky & (only_outdoor > -2) & (only_outdoor < FIRST_PORTAL)
+        )
         l_out += dr.select(sees_sky, beta * (sun * sun_weight + dome * dome_weight), 0)
         distance = dr.norm(hit.p - last_p)
         glow, lamp_density = emitters.hit_lamp(
             hit.lamp, distance, wi_cos, only_lamp, hit.valid & (only_lamp > -2)
         )
         lamp_weight = dr.select(by_scatter, last_density / (last_density + lamp_density), 1)
-        met = hit.valid & (hit.lamp != NO_LAMP)
+        met = hit.valid & counts & (hit.lamp != NO_LAMP)
         l_in += dr.select(met, beta * glow * lamp_weight, 0)
 
         # Kinds of surface.

@@ -16,13 +16,13 @@ from pbrs_farm.camera import Camera
 from pbrs_farm.frames import LUMINANCE
 from pbrs_farm.house import House, MaterialKind
 from pbrs_farm.recipe import LightFields
-from pbrs_farm.transport.emitters import FIRST_PORTAL, MAX_PORTALS, Emitters, Weights
+from pbrs_farm.transport.emitters import DOME, FIRST_PORTAL, MAX_PORTALS, SUN, Emitters, Weights
 from pbrs_farm.transport.path import Lanes, trace
 from pbrs_farm.transport.surface import Stage
 
 LAMP_FLOOR: Final = 0.01
 _SUN_FLOOR: Final = 0.1
-_DOME_FLOOR: Final = 0.1
+_DOME_FLOOR: Final = 0.05
 _PILOT_SIZE: Final = (64, 48)
 
 
@@ -55,13 +55,27 @@ def pilot_weights(
     bright = brought.sum(1, keepdims=True)
     relative = brought / (bright + max(float(bright.mean()), 1e-12))
     strength = np.sqrt((relative.astype(np.float64) ** 2).mean(0))
-    return Weights(
-        _with_floors(strength[:n_lamps], np.full(n_lamps, LAMP_FLOOR)),
-        _with_floors(
-            strength[n_lamps:],
-            np.array([_SUN_FLOOR, _DOME_FLOOR, *[LAMP_FLOOR] * n_portals]),
-        ),
-    )
+    lamps = _with_floors(strength[:n_lamps], np.full(n_lamps, LAMP_FLOOR))
+    return Weights(lamps, outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0)))
+
+
+def outdoor_weights(
+    strength: NDArray[np.float64], brought: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Shares of sun, dome and portals from each one's strength and mean contribution.
+
+    Dome and portals are techniques for one emitter, the sky: the better of the two tells how
+    strong it is, and portals take most of it where most of its light comes through them.
+    """
+    portal = strength[FIRST_PORTAL:]
+    by_portals = float(np.sqrt((portal**2).sum()))
+    light = float(brought[DOME])
+    through = min(float(brought[FIRST_PORTAL:].sum()) / light, 1.0) if light > 0 else 0.0
+    share = 0.85 * through if through > 0.5 else 0.0
+    sky = min(float(strength[DOME]), by_portals) if share > 0 else float(strength[DOME])
+    within = portal / portal.sum() if portal.sum() > 0 else np.zeros(len(portal))
+    raw = np.array([float(strength[SUN]), sky * (1 - share), *(sky * share * within)])
+    return _with_floors(raw, np.array([_SUN_FLOOR, _DOME_FLOOR, *[LAMP_FLOOR] * len(portal)]))
 
 
 def _with_floors(strength: NDArray[np.float64], floors: NDArray[np.float64]) -> NDArray[np.float64]:
