@@ -12,9 +12,14 @@ from pbrs_farm.house import Surface
 from pbrs_farm.read.planes import horizontal
 from pbrs_farm.read.sweethome3d.outlines import Outline
 from pbrs_farm.read.sweethome3d.plan import Plan, PlanLevel, level_of
+from pbrs_farm.read.sweethome3d.roofs import roof_over
 from pbrs_farm.read.sweethome3d.walls import top_heights
 
 F64 = NDArray[np.float64]
+KINK_M = 0.01
+TIE_M = 1e-3
+NEAR_M = 0.10
+"""A wall's corner this near to a room's edge can bend the ceiling there."""
 
 
 class CeilingHeights:
@@ -56,18 +61,60 @@ class CeilingHeights:
         self, level: PlanLevel, parts: Sequence[Sequence[Points2]], material: int, *, is_flat: bool
     ) -> Surface:
         """The ceiling over polygons (each an outline and its holes), facing down."""
-        flat = horizontal("ceiling", parts, level.elevation, material, up=False)
-        positions = flat.positions.astype(np.float64)
-        heights = self.heights(level, positions[:, [0, 2]], is_flat)
-        positions[:, 1] = level.elevation + heights
-        return Surface(flat.name, positions.astype(np.float32), flat.faces, flat.material, flat.uvs)
+        bent = [[self._with_kinks(level, ring, is_flat) for ring in rings] for rings in parts]
+        heights = [self.heights(level, np.concatenate(rings), is_flat) for rings in bent]
+        every = np.concatenate(heights)
+        if np.ptp(every) < 1e-4:
+            return horizontal("ceiling", parts, level.elevation + every[0], material, up=False)
+        positions, faces, n = [], [], 0
+        for rings, tops in zip(bent, heights, strict=True):
+            roof = roof_over(rings, tops)
+            plan = roof.points
+            positions.append(np.stack([plan[:, 0], level.elevation + roof.heights, plan[:, 1]], -1))
+            faces.append(roof.faces + n)
+            n += len(plan)
+        world = np.concatenate(positions)
+        return Surface(
+            "ceiling",
+            world.astype(np.float32),
+            np.concatenate(faces).astype(np.int32),
+            material,
+            world[:, [0, 2]].astype(np.float32),
+        )
+
+    def _with_kinks(self, level: PlanLevel, ring: Points2, is_flat: bool) -> Points2:
+        # The ring with the points where the walls' tops beside one of its edges bend.
+        edges = self._edges.get(level.id)
+        if level.index != self._top or edges is None or is_flat:
+            return ring
+        corners = np.unique(edges[0][:, :2], axis=0)
+        points: list[F64] = []
+        for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+            points.append(a)
+            d = b - a
+            length = float(np.linalg.norm(d))
+            t = (corners - a) @ d / max(length**2, 1e-18)
+            gap = np.linalg.norm(a + t[:, None] * d - corners, axis=1)
+            inside = (gap < NEAR_M) & (t * length > KINK_M) & ((1 - t) * length > KINK_M)
+            ends = self.heights(level, np.stack([a, b]), False)
+            last = 0.0
+            for where in np.sort(t[inside]):
+                if (where - last) * length < KINK_M:
+                    continue
+                spot = a + where * d
+                straight = ends[0] + where * (ends[1] - ends[0])
+                if abs(self.heights(level, spot[None], False)[0] - straight) > KINK_M:
+                    points.append(spot)
+                    last = float(where)
+        return np.array(points)
 
 
 def _nearest(point: Points2, segments: F64, tops: F64) -> float:
-    # Height of the top of the wall edge nearest to a plan point, at the nearest spot.
+    # Height of the top of the wall edge nearest to a plan point, at the nearest spot; the lowest
+    # of those equally near, so that no wall ends below the ceiling.
     a, d = segments[:, :2], segments[:, 2:] - segments[:, :2]
     t = ((point - a) * d).sum(1) / np.maximum((d * d).sum(1), 1e-18)
     t = np.clip(t, 0, 1)
     gap = np.linalg.norm(a + t[:, None] * d - point, axis=1)
-    k = int(gap.argmin())
-    return float(tops[k, 0] + t[k] * (tops[k, 1] - tops[k, 0]))
+    heights = tops[:, 0] + t * (tops[:, 1] - tops[:, 0])
+    return float(heights[gap <= gap.min() + TIE_M].min())

@@ -40,7 +40,7 @@ def piece_item(
 
     ids: of the item, of its level.
     """
-    model = models.get(piece.model, piece.place)
+    model = models.get(piece.model, piece.place, piece.transformations)
     if model is None:
         return None
     matrix = local_from_model(piece, model)

@@ -12,6 +12,7 @@ from pbrs_farm.errors import BadHouse
 from pbrs_farm.read.mtl import ObjMaterial, builtin_materials, parse_mtl
 from pbrs_farm.read.obj import Mesh, ObjModel, parse_obj
 from pbrs_farm.read.sweethome3d.looks import Looks
+from pbrs_farm.read.sweethome3d.moving_parts import Transformations, moved
 
 PANE, MIRROR, LIGHT = "pane", "mirror", "light"
 _ROLES = (
@@ -49,15 +50,24 @@ class Models:
         self._looks = looks
         self._file = file
         self._max_triangles = max_triangles
-        self._models: dict[str, Model | None] = {}
+        self._parsed: dict[str, ObjModel | None] = {}
+        self._models: dict[tuple[str, Transformations], Model] = {}
 
-    def get(self, name: str, place: str) -> Model | None:
-        """The model, or None (with a note) if it is missing or cannot be read."""
-        if name not in self._models:
-            self._models[name] = self._load(name, place)
-        return self._models[name]
+    def get(self, name: str, place: str, transformations: Transformations = ()) -> Model | None:
+        """The model, its parts moved, or None (with a note) if it is missing or cannot be read."""
+        if name not in self._parsed:
+            self._parsed[name] = self._load(name, place)
+        parsed = self._parsed[name]
+        if parsed is None:
+            return None
+        key = (name, transformations)
+        if key not in self._models:
+            if transformations:
+                parsed = replace(parsed, meshes=moved(parsed.meshes, transformations))
+            self._models[key] = self._model(parsed, name)
+        return self._models[key]
 
-    def _load(self, name: str, place: str) -> Model | None:
+    def _load(self, name: str, place: str) -> ObjModel | None:
         data = self._looks.contents.read(name)
         if data is None:
             self._looks.note("missing-model", place, f"no content {name[:120]!r}: left out")
@@ -81,7 +91,7 @@ class Models:
                 f"model {name}",
                 f"{parsed.n_dropped} faces without area dropped",
             )
-        return self._model(parsed, name)
+        return parsed
 
     def _model(self, parsed: ObjModel, name: str) -> Model:
         folder = posixpath.dirname(name)
