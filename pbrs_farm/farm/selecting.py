@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from pbrs_farm import keys
@@ -240,9 +241,26 @@ def _write(
 
 def json_lines(table: Any) -> bytes:
     """A line of JSON for each row; numbers with at most six decimals, null where not known."""
-    lines = []
-    for batch in table.to_batches(max_chunksize=4096):
-        for row in batch.to_pylist():
-            short = {k: round(v, 6) if isinstance(v, float) else v for k, v in row.items()}
-            lines.append(json.dumps(short, separators=(",", ":")) + "\n")
-    return "".join(lines).encode()
+    names = table.column_names
+    opened = [("{" if k == 0 else ",") + json.dumps(name) + ":" for k, name in enumerate(names)]
+    parts = []
+    for batch in table.to_batches(max_chunksize=65536):
+        pieces: list[Any] = []
+        for head, name in zip(opened, names, strict=True):
+            pieces += [head, _json_values(batch.column(name))]
+        lines = pc.binary_join_element_wise(*pieces, "}\n", "")
+        parts.append("".join(lines.to_pylist()))
+    return "".join(parts).encode()
+
+
+def _json_values(column: Any) -> Any:
+    """The column's values as the text that JSON has for them."""
+    if pa.types.is_string(column.type):
+        words = column.dictionary_encode()
+        texts = pa.array([json.dumps(w) for w in words.dictionary.to_pylist()], pa.string())
+        values = texts.take(words.indices)
+    elif pa.types.is_floating(column.type):
+        values = pc.round(column, ndigits=6).cast(pa.string())
+    else:
+        values = column.cast(pa.string())
+    return pc.fill_null(values, "null")

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
@@ -160,11 +161,10 @@ def merged(*tables: Any) -> Any:
 def _same_as_before(table: Any, name: str) -> NDArray[np.bool_]:
     """(n,) bool: the row's value equals that of the row before; nulls are equal."""
     column = table[name].combine_chunks()
-    values = column.to_numpy(zero_copy_only=False)
-    null = np.asarray(column.is_null())
-    same = np.zeros(len(values), bool)
-    same[1:] = (values[1:] == values[:-1]) & ~null[1:] & ~null[:-1] | (null[1:] & null[:-1])
-    return same
+    now, before = column[1:], column[:-1]
+    both_null = pc.and_(pc.is_null(now), pc.is_null(before))
+    same = pc.or_(pc.fill_null(pc.equal(now, before), False), both_null)
+    return np.concatenate([[False], np.asarray(same, bool)])
 
 
 def _nullable(values: NDArray[np.floating]) -> Any:

@@ -17,6 +17,7 @@ Shares = NDArray[np.float32]
 """(n, bins) float32, each row sums to 1, or to 0 where nothing was counted."""
 
 _BLOCK: Final = 32
+_CACHE_BYTES: Final = 512 * 1024
 
 
 def intersection(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -56,12 +57,22 @@ def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int
     import faiss
 
     knn: Any = faiss.knn
-    _distance, index = knn(q, r, 2 if leave_out_self else 1, metric=faiss.METRIC_L1)
-    if not leave_out_self:
-        return np.asarray(index[:, 0], np.int64)
-    # An image among its own two nearest is left out; a twin of it may stand before it.
-    first_is_self = index[:, 0] == np.arange(len(q))
-    return np.asarray(np.where(first_is_self, index[:, 1], index[:, 0]), np.int64)
+    if leave_out_self:
+        # An image among its own two nearest is left out; a twin of it may stand before it.
+        _, index = knn(q, r, 2, metric=faiss.METRIC_L1)
+        first_is_self = index[:, 0] == np.arange(len(q))
+        return np.asarray(np.where(first_is_self, index[:, 1], index[:, 0]), np.int64)
+
+    # Take the references in blocks that stay in the cache: each is read once for every query.
+    n_rows = max(_CACHE_BYTES // (4 * r.shape[1]), 1)
+    nearest = np.zeros(len(q), np.int64)
+    least = np.full(len(q), np.inf, np.float32)
+    for start in range(0, len(r), n_rows):
+        distance, index = knn(q, r[start : start + n_rows], 1, metric=faiss.METRIC_L1)
+        closer = distance[:, 0] < least
+        least[closer] = distance[closer, 0]
+        nearest[closer] = index[closer, 0] + start
+    return nearest
 
 
 def _numpy_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int64]:

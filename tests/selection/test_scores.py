@@ -77,6 +77,15 @@ def test_score_of_an_equal_histogram_is_one_and_of_a_disjoint_one_zero() -> None
     assert best_match(shares[3:], shares[:3])[0].tolist() == [0]
 
 
+def test_blocks_of_references_do_not_change_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    q, r = (normalised(rng.integers(0, 9, (k, 24))) for k in (50, 40))
+    whole = best_match(q, r, library="faiss")
+    monkeypatch.setattr("pbrs_farm.selection.similarity._CACHE_BYTES", 7 * 4 * 24)
+    blocks = best_match(q, r, library="faiss")
+    assert np.array_equal(whole[0], blocks[0])
+
+
 def test_an_empty_histogram_scores_zero() -> None:
     ref = normalised(np.ones((2, 4), np.uint32))
     assert best_match(np.zeros((1, 4), np.float32), ref)[0].tolist() == [0]
