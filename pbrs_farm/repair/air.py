@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -13,6 +13,7 @@ from pbrs_farm.house import Room
 from pbrs_farm.repair import plan
 from pbrs_farm.repair.prisms import Plane, level_plane, polygons_of, prism
 from pbrs_farm.repair.sheets import Sheet
+from pbrs_farm.repair.slabs import GAP_M
 from pbrs_farm.repair.solids import (
     F64,
     Tag,
@@ -22,14 +23,19 @@ from pbrs_farm.repair.solids import (
     reduced,
     solid_from_patches,
 )
+from pbrs_farm.repair.walls import Wall
 
 _MARGIN_M = 0.005
 _TOUCH_M = 0.002
+_COINCIDE_M = 0.001
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Air:
-    """A part of a room's air: plan area between two planes. items: the room's own sheets."""
+    """A part of a room's air: plan area between two planes.
+
+    items: the floors and ceilings that bound it, whichever room they are listed under.
+    """
 
     area: shapely.Polygon
     low: Plane
@@ -38,17 +44,15 @@ class Air:
     bounds: F64
 
 
-def airs_of_rooms(
-    rooms: Sequence[Room], sheets: Sequence[Sheet], grounds: Sequence[plan.Shape]
-) -> list[Air]:
+def airs_of_rooms(rooms: Sequence[Room], sheets: Sequence[Sheet]) -> list[Air]:
     """The air of every room, below each plane of its ceiling, a little of its floor and ceiling
     included, so that what is cut by it ends inside them.
     """
     margin = _margin(rooms)
     found = []
     for room in rooms:
-        own = frozenset(s.item for s in sheets if s.room_id == room.id)
         area = plan.polygon_of_room(room.polygon)
+        own = frozenset(s.item for s in sheets if _bounds_room(s, room, area))
         ceilings = [s for s in sheets if s.is_ceiling and s.room_id == room.id]
         floor = level_plane(room.floor_y - margin)
         parts = [(s.area, s.plane.raised(margin)) for s in ceilings]
@@ -57,6 +61,14 @@ def airs_of_rooms(
         for shape, high in parts:
             found += [_air(p, floor, high, own) for p in polygons_of(shape, min_area_m2=1e-3)]
     return found
+
+
+def _bounds_room(sheet: Sheet, room: Room, area: plan.Shape) -> bool:
+    if sheet.room_id == room.id:
+        return True
+    nominal = room.ceiling_y if sheet.is_ceiling else room.floor_y
+    heights = sheet.plane.at(shapely.get_coordinates(sheet.area))
+    return bool(np.abs(heights - nominal).max() < GAP_M and sheet.area.intersects(area))
 
 
 def _margin(rooms: Sequence[Room]) -> float:
@@ -92,3 +104,32 @@ def without_air(
         if cutter is not None:
             cutters.append(cutter)
     return reduced(solid, cutters)
+
+
+def own_sides_first(walls: Sequence[Wall], rooms: Sequence[Room], table: TagTable) -> list[Wall]:
+    """The walls, those of other rooms drawn back behind each room's own where the two coincide.
+
+    Where every room brings walls of its own (SUNCG), two rooms' walls lie in one plane: each room
+    then sees its own side. Walls that belong to no room stay as they are.
+    """
+    if all(w.room_id is None for w in walls):
+        return list(walls)
+    areas = [(r, plan.polygon_of_room(r.polygon)) for r in rooms]
+    found = []
+    for wall in walls:
+        cutters = []
+        for room, area in areas:
+            apart = room.floor_y > wall.high_y or room.ceiling_y < wall.bottom_y
+            if (
+                wall.room_id in (None, room.id)
+                or apart
+                or wall.footprint.distance(area) > _COINCIDE_M
+            ):
+                continue
+            low, high = level_plane(room.floor_y - GAP_M), level_plane(room.ceiling_y + GAP_M)
+            for polygon in polygons_of(plan.grown(area, _COINCIDE_M)):
+                patches = prism(polygon, low, high, (wall.tag("hidden"),) * 3)
+                cutters.append(solid_from_patches(patches, table))
+        solid = reduced(wall.solid, [c for c in cutters if c is not None])
+        found.append(replace(wall, solid=solid))
+    return found

@@ -34,7 +34,7 @@ def joints_between_walls(
     tree = shapely.STRtree([w.footprint for w in walls])
     for i, a in enumerate(walls):
         for j in sorted(tree.query(a.footprint, "dwithin", GAP_M).tolist()):
-            if j <= i:
+            if j <= i or walls[j].item == a.item:
                 continue
             solids = _joint(a, walls[j], table)
             found += [(a, s) for s in solids]

@@ -20,30 +20,11 @@ from pbrs_farm.repair.patches import face_normals
 from pbrs_farm.repair.plan import Shape
 from pbrs_farm.repair.prisms import Plane, polygons_of
 from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
+from pbrs_farm.repair.room_air import RoomAir
 from pbrs_farm.repair.solids import F64
 
 WITHIN_M = 0.005
 _MAX_LEAKS = 50
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RoomAir:
-    """A part of a room between its floor and one plane of its ceiling.
-
-    area: plan, walls left out. foot: the same with baseboards left out too, up to foot_m.
-    """
-
-    area: Shape
-    foot: Shape
-    foot_m: float
-    low: Plane
-    high: Plane
-
-    @property
-    def height(self) -> float:
-        """Largest height over the area's corners, metres."""
-        corners = shapely.get_coordinates(self.area)
-        return float((self.high.at(corners) - self.low.at(corners)).max())
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ class Wall:
     highest point; top: its upper plane.
 
     material: of parts repair adds to it. thickened: it was planar. is_board: a baseboard, which
-    bounds no room and is joined to nothing.
+    bounds no room and is joined to nothing. room_id: the one room it belongs to, if it does.
     """
 
     item: int
@@ -38,6 +38,7 @@ class Wall:
     material: int
     thickened: bool = False
     is_board: bool = False
+    room_id: str | None = None
 
     def tag(self, surface: str) -> Tag:
         """The tag of a surface that repair adds to this wall."""
@@ -84,6 +85,7 @@ def _wall(
         material=named.get("left", item.surfaces[0].material),
         thickened=thickened,
         is_board=BASEBOARD in item.tags,
+        room_id=item.room_id,
     )
 
 

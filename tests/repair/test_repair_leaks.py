@@ -13,8 +13,9 @@ from pbrs_farm.read.builtin import builtin_home
 from pbrs_farm.recipe import RepairFields
 from pbrs_farm.repair import repair, structure
 from pbrs_farm.repair.enclosure import Space
-from pbrs_farm.repair.leaks import LeakMeter, RoomAir, leaks_of_house
+from pbrs_farm.repair.leaks import LeakMeter, leaks_of_house
 from pbrs_farm.repair.prisms import level_plane
+from pbrs_farm.repair.room_air import RoomAir
 from tests.repair.embree import EmbreeOccluder
 
 GAP_M = 0.02
