@@ -21,7 +21,7 @@ def crease_normals(
 
     Two faces share a normal at a vertex if they meet in an edge there whose faces turn by less
     than crease_rad (or through a chain of such edges around the vertex). Faces are weighted by
-    area. Vertices at equal positions count as one.
+    their angle at the vertex. Vertices at equal positions count as one.
     """
     areas = face_normals(points, faces)
     length = np.linalg.norm(areas, axis=1, keepdims=True)
@@ -35,12 +35,22 @@ def crease_normals(
     n = 3 * n_faces
     links = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(n, n))
     n_normals, label = connected_components(links, directed=False)
+    angles = _corner_angles(points, faces)
     normals = np.zeros((n_normals, 3))
     for k in range(3):
-        normals[:, k] = np.bincount(label, np.repeat(areas[:, k], 3), n_normals)
+        normals[:, k] = np.bincount(label, (unit[:, k : k + 1] * angles).ravel(), n_normals)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(length > 0, length, 1)
     return normals, label.reshape(-1, 3).astype(np.int64)
+
+
+def _corner_angles(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    # (F, 3) radians.
+    corners = points[faces]
+    forward = np.roll(corners, -1, axis=1) - corners
+    backward = np.roll(corners, 1, axis=1) - corners
+    cross = np.linalg.norm(np.cross(forward, backward), axis=-1)
+    return np.asarray(np.arctan2(cross, (forward * backward).sum(-1)))
 
 
 def _smooth_links(

@@ -58,6 +58,14 @@ def sh3d(xml: bytes, contents: dict[str, bytes] | None = None) -> bytes:
 
 def piece(attributes: str, inner: str = "", tag: str = "pieceOfFurniture") -> str:
     """A piece 200 x 100 x 50 cm at (150, 100) unless attributes say otherwise."""
-    given = {"model": "1", "x": "150", "y": "100", "width": "200", "depth": "100", "height": "50"}
-    rest = "".join(f" {k}='{v}'" for k, v in given.items() if f"{k}=" not in attributes)
-    return f"<{tag} name='Thing' {attributes}{rest}>{inner}</{tag}>"
+    given = {
+        "name": "Thing",
+        "model": "1",
+        "x": "150",
+        "y": "100",
+        "width": "200",
+        "depth": "100",
+        "height": "50",
+    }
+    rest = "".join(f" {k}='{v}'" for k, v in given.items() if f" {k}=" not in f" {attributes}")
+    return f"<{tag} {attributes}{rest}>{inner}</{tag}>"
