@@ -22,6 +22,7 @@ from pbrs_farm.read.sweethome3d.svg import polygons_from_path
 F64 = NDArray[np.float64]
 MARGIN_M = 0.005
 REACH_M = 1.0
+MIN_HALF_M = 5e-4
 PARALLEL_SINE = math.sin(math.radians(20.0))
 
 
@@ -93,7 +94,9 @@ def _depth_span(
     # The range along the piece's depth in which the walls it stands in lie.
     half_x, half_y, half_z = frame.half
     low_y, high_y = frame.origin[1] - half_y, frame.origin[1] + half_y
-    piece = _rectangle(frame, half_x, half_z)
+    if min(half_x, half_y) < MIN_HALF_M:
+        return None
+    piece = _rectangle(frame, half_x, max(half_z, MIN_HALF_M))
     strip = _rectangle(frame, half_x * 0.98, half_z + REACH_M)
     spans = []
     for standing in walls:
@@ -101,7 +104,7 @@ def _depth_span(
             continue
         shared = shapely.intersection(piece, standing.polygon)
         smaller = min(piece.area, float(shapely.area(standing.polygon)))
-        if shared.area < 1e-4 * smaller:
+        if shared.is_empty or shared.area < 1e-4 * smaller:
             continue
         z = _depths(shared, frame)
         if _is_along(standing.wall, frame) and door.cuts_both_sides:

@@ -26,6 +26,9 @@ from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
 from pbrs_farm.read.sweethome3d.walls import wall_items
 from pbrs_farm.recipe import ReadFields
 
+HARMLESS = frozenset({"unmapped-class", "hidden-level", "degenerate-faces", "unknown-material"})
+"""Notes that are no faults: reading strictly passes over them."""
+
 ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
 
 
@@ -70,8 +73,9 @@ def read_home(
     if len(items) > MAX_INSTANCES:
         raise BadHouse(file, "", f"{len(items)} items, at most {MAX_INSTANCES} have instance ids")
     sha = keys.sha256(data)
-    if fields.strict and looks.notes:
-        note = looks.notes[0]
+    faults = [n for n in looks.notes if n.kind not in HARMLESS]
+    if fields.strict and faults:
+        note = faults[0]
         raise BadHouse(file, note.place, f"{note.text} ({note.kind})", hint="read without --strict")
     return House(
         id=keys.house_id(PurePath(file).stem, sha),
