@@ -1,0 +1,199 @@
+"""Camera sampling: candidates a second, against a moderngl loop and Mitsuba's bare ray rate.
+
+`python -m benchmarks.cameras --home NAME` samples one home in this process and prints JSON: the
+bench runs it in a process of its own, with an empty kernel cache.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.report import write_report
+from pbrs_farm import homes
+from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.farm.sources import read_house, resolve
+from pbrs_farm.house import Geometry, House, geometry_from_house
+from pbrs_farm.recipe import CameraFields, Recipe
+from pbrs_farm.repair import repair
+from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.probes import counted
+from pbrs_farm.sample.scores import object_columns, paper_score
+from pbrs_farm.sample.verdict import Verdict
+from pbrs_farm.transport.caster import Caster
+
+HOME = "2BedroomApartmentWithBowWindow"
+SIZE = (160, 120)
+N_CANDIDATES, N_GL, N_BARE = 3000, 300, 200
+
+
+def main() -> None:
+    """Measure, print the tables and write out/bench/cameras.json."""
+    house = _repaired(HOME)
+    geometry = geometry_from_house(house)
+    caster = Caster(geometry)
+    cameras = _eligible(house, caster)
+    columns = object_columns(house)
+
+    def score() -> None:
+        for _part, rows in counted(caster.item_counts, cameras, len(house.items)):
+            paper_score(rows, columns, 0.01)
+
+    seconds = _best(score)
+    per_s = len(cameras) / seconds
+    mrays = per_s * SIZE[0] * SIZE[1] / 1e6
+    bare = _bare_mrays(geometry, cameras[:N_BARE])
+    gl_per_s = _gl_per_s(geometry, cameras[:N_GL], len(house.items))
+    print(f"{HOME}: {len(geometry.faces)} triangles, {len(cameras)} candidates scored")
+    print(f"{'':<28}{'candidates/s':>14}{'Mrays/s':>10}")
+    print(f"{'item counts and scores':<28}{per_s:>14.0f}{mrays:>10.1f}")
+    print(f"{'Mitsuba, bare intersection':<28}{'':>14}{bare:>10.1f}")
+    print(f"{'moderngl loop':<28}{gl_per_s:>14.1f}")
+
+    rows = {home.name: _home_in_a_process(home.name) for home in homes.example_homes()}
+    print(f"\n{'home':<32}{'s':>7}{'candidates':>12}{'views':>7}{'peak MB':>9}")
+    for name, row in rows.items():
+        line = f"{row['seconds']:>7.1f}{row['candidates']:>12}{row['views']:>7}{row['peak_mb']:>9}"
+        print(f"{name:<32}{line}")
+    figures = {
+        "cameras.candidates_per_s": round(per_s, 1),
+        "cameras.vs_gl": round(per_s / gl_per_s, 1),
+        "cameras.gl_per_s": round(gl_per_s, 1),
+        "cameras.mrays_per_s": round(mrays, 2),
+        "cameras.bare_mrays_per_s": round(bare, 2),
+        "cameras.of_bare_rays": round(mrays / bare, 3),
+        "cameras.home_s": round(rows[HOME]["seconds"], 1),
+        "cameras.nine_homes_s": round(sum(row["seconds"] for row in rows.values()), 1),
+        "cameras.peak_mb": max(row["peak_mb"] for row in rows.values()),
+    }
+    units = dict.fromkeys(figures, "1/s") | {
+        "cameras.vs_gl": "times",
+        "cameras.mrays_per_s": "Mrays/s",
+        "cameras.bare_mrays_per_s": "Mrays/s",
+        "cameras.of_bare_rays": "fraction",
+        "cameras.home_s": "s",
+        "cameras.nine_homes_s": "s",
+        "cameras.peak_mb": "MB",
+    }
+    write_report("cameras", figures, units)
+
+
+def _repaired(name: str) -> House:
+    recipe = Recipe()
+    house = read_house(resolve(name), recipe.read)
+
+    def occluder_from(some: House) -> Caster:
+        return Caster(geometry_from_house(some))
+
+    return repair(house, recipe.repair, occluder_from=occluder_from)[0]
+
+
+def _eligible(house: House, caster: Caster) -> list[Camera]:
+    """Candidates that the rules of place keep, at the coarse size, spread over the rooms."""
+    sampling = sample_cameras(house, CameraFields(), 0, caster.item_counts)
+    full = Intrinsics.from_hfov(640, 480).resized(*SIZE)
+    cameras: list[Camera] = []
+    for trace in sampling.traces:
+        which = np.flatnonzero(trace.verdict >= Verdict.FILLED_BY_ONE)
+        cameras += trace.candidates.cameras(which, full)
+    step = max(1, len(cameras) // N_CANDIDATES)
+    return cameras[::step][:N_CANDIDATES]
+
+
+def _best(work: Callable[[], object], times: int = 3) -> float:
+    seconds = []
+    for _ in range(times):
+        started = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - started)
+    return min(seconds)
+
+
+def _bare_mrays(geometry: Geometry, cameras: list[Camera]) -> float:
+    """Mitsuba's own rate: a default scene, coherent rays that lie ready in memory, t alone."""
+    import drjit as dr
+
+    from pbrs_farm.transport.variant import choose_variant, mitsuba
+
+    mi = mitsuba(choose_variant())
+    mesh = mi.Mesh("house", len(geometry.positions), len(geometry.faces))
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = geometry.positions.ravel()
+    parameters["faces"] = geometry.faces.astype(np.uint32).ravel()
+    parameters.update()
+    scene = mi.load_dict({"type": "scene", "house": mesh})
+    pairs = [camera.rays() for camera in cameras]
+    directions = np.concatenate([d.reshape(-1, 3) for _o, d in pairs])
+    origins = np.repeat([o for o, _d in pairs], SIZE[0] * SIZE[1], axis=0)
+    ray = mi.Ray3f(
+        mi.Point3f(np.ascontiguousarray(origins.T)), mi.Vector3f(np.ascontiguousarray(directions.T))
+    )
+    dr.eval(ray)
+
+    def trace() -> None:
+        t = scene.ray_intersect_preliminary(ray, True).t
+        dr.eval(t)
+        dr.sync_thread()
+
+    trace()
+    return len(directions) / _best(trace) / 1e6
+
+
+def _gl_per_s(geometry: Geometry, cameras: list[Camera], n_items: int) -> float:
+    """Candidates a second of a loop that draws each one and counts its pixels on the CPU."""
+    from benchmarks.gl_items import GlItems
+
+    gl = GlItems(geometry, *SIZE)
+
+    def draw() -> None:
+        for camera in cameras:
+            np.bincount(gl.item_buffer(camera).ravel(), minlength=n_items + 1)
+
+    seconds = _best(draw, times=2)
+    gl.release()
+    return len(cameras) / seconds
+
+
+def _home_in_a_process(name: str) -> dict[str, float]:
+    """Sample a home in a fresh process that has no compiled kernel yet."""
+    with tempfile.TemporaryDirectory() as empty:
+        environment = os.environ | {"HOME": empty, "PBRS_CACHE": str(homes.cache_folder())}
+        done = subprocess.run(
+            [sys.executable, "-m", "benchmarks.cameras", "--home", name],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    row: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return row
+
+
+def _sample_home(name: str) -> None:
+    house = _repaired(name)
+    started = time.perf_counter()
+    caster = Caster(geometry_from_house(house))
+    report = sample_cameras(house, CameraFields(), 0, caster.item_counts).report
+    seconds = time.perf_counter() - started
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    row = {"seconds": seconds, "candidates": report.n_candidates, "views": report.n_views}
+    print(json.dumps(row | {"peak_mb": peak_mb}))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--home", default="")
+    given = parser.parse_args().home
+    if given:
+        _sample_home(given)
+    else:
+        main()
