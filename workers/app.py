@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from celery import Celery
 from celery.signals import setup_logging, worker_init
-from kombu import Queue
+from kombu import Exchange, Queue
 from kombu.serialization import register
 
 from pbrs_farm.store.s3 import forbid_in_this_process
@@ -51,7 +51,7 @@ def make_app(config: FarmConfig) -> Celery:
     app.conf.update(
         accept_content=["pbrs-json"],
         task_serializer="pbrs-json",
-        task_queues=[Queue(name) for name in QUEUES],
+        task_queues=[Queue(name, Exchange(name), routing_key=name) for name in QUEUES],
         task_default_queue=QUEUES[0],
         task_create_missing_queues=False,
         task_ignore_result=True,

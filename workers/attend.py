@@ -107,10 +107,17 @@ class Attendant:
         except (BrokenPipeError, ConnectionResetError):
             ended = self._buried(clock)
         self._n_tasks += 1
-        worn = self._n_tasks >= self._config.limits.tasks_per_renderer
-        if ended.fault == "resource" or worn:
+        if self._is_worn():
             self.stop()
         return ended
+
+    def _is_worn(self) -> bool:
+        """Many tasks, or more memory held between tasks than half of what is allowed."""
+        process = self._process
+        return process is not None and (
+            self._n_tasks >= self._config.limits.tasks_per_renderer
+            or resident_mb(process.pid) > 0.5 * self._limit_mb
+        )
 
     def stop(self) -> None:
         """Kill the renderer and whatever it started."""

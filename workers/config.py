@@ -32,7 +32,7 @@ class Limits(BaseModel):
     reduce_s: float = Field(3600.0, gt=0)
     silence_s: float = Field(1800.0, gt=0, description="without a step or a line in the log")
     memory_mb: int = Field(0, ge=0, description="of one renderer; 0 = share of the machine's")
-    tasks_per_renderer: int = Field(200, ge=1, description="then it starts afresh")
+    tasks_per_renderer: int = Field(2000, ge=1, description="then it starts afresh")
 
     def deadline_s(self, stage: str) -> float:
         """Seconds a task of the stage may take."""

@@ -160,7 +160,8 @@ def celery_sender(app: Any) -> Callable[[Iterable[tuple[str, str, str, str]]], N
 
     def send(messages: Iterable[tuple[str, str, str, str]]) -> None:
         try:
-            with app.producer_pool.acquire(block=True, timeout=10) as producer:
+            pool = app.producer_pool
+            with pool.acquire(block=True, timeout=10) as producer, producer.batch():
                 for queue, job, task, recipe in messages:
                     app.send_task(
                         "pbrs.run", args=(job, task, recipe), queue=queue, producer=producer

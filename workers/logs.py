@@ -10,7 +10,9 @@ from typing import Final
 _SECRETS: Final = re.compile(r"(rediss?://[^:/@\s]*:)[^@\s]+@")
 
 
-class _NoSecrets(logging.Formatter):
+class NoSecrets(logging.Formatter):
+    """Formats a record with the passwords of Redis URLs blotted out."""
+
     def format(self, record: logging.LogRecord) -> str:
         return _SECRETS.sub(r"\1***@", super().format(record))
 
@@ -18,7 +20,10 @@ class _NoSecrets(logging.Formatter):
 def log_plainly(level: int | str = "INFO") -> None:
     """Log to stderr with time, process and level; passwords in URLs are blotted out."""
     handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(_NoSecrets("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
+    handler.setFormatter(NoSecrets("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
     root = logging.getLogger()
     root.handlers[:] = [handler]
     root.setLevel(level)
+    # A line per message received and done would be most of what Celery's processes do.
+    for name in ("celery.worker.strategy", "celery.app.trace"):
+        logging.getLogger(name).setLevel(logging.WARNING)

@@ -18,7 +18,8 @@ from pathlib import Path
 import pytest
 
 from tests.workers.redis_server import RedisServer
-from tests.workers.small_farm import SmallFarm, descendants
+from tests.workers.small_farm import SmallFarm
+from tests.workers.test_farm import renderers
 
 pytestmark = pytest.mark.chaos
 
@@ -54,15 +55,6 @@ def begin(farm: SmallFarm, n_houses: int = 6, slow_s: float = 0.3) -> None:
     farm.worker("w2")
     farm.submit(n_houses)
     farm.wait(lambda: sum(farm.starts().values()) >= 4, 40, "tasks are being run")
-
-
-def renderers(farm: SmallFarm, worker: str) -> list[int]:
-    found = []
-    for pid in descendants(farm.processes[worker].pid):
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-        if b"workers.renderer" in words:
-            found.append(pid)
-    return found
 
 
 def pool_processes(farm: SmallFarm, worker: str) -> list[int]:

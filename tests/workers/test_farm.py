@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from pbrs_farm.errors import BadInput
 from tests.workers.redis_server import RedisServer
-from tests.workers.small_farm import SmallFarm
+from tests.workers.small_farm import SmallFarm, descendants
+from workers.config import config_from_environment
+from workers.logs import NoSecrets
+from workers.supervisor import command
 
 
 @pytest.fixture
@@ -28,13 +40,90 @@ def test_a_job_ends_with_the_same_objects_as_a_single_run(farm: SmallFarm) -> No
     farm.submit(8)
     farm.wait_done()
     farm.check_complete(n_repeats=0)
-    assert farm.farm.submit(*_again(farm)).was == "done"
+    farm.submit(8)
+    assert farm.state() == "done"
 
 
-def _again(farm: SmallFarm) -> tuple[list[object], object]:
-    from pbrs_farm.recipe import recipe_from_name
-    from workers.client import new_spec
-    from workers.job import HouseEntry
+def test_hostile_messages_are_dropped_and_a_killed_renderer_replaced(farm: SmallFarm) -> None:
+    (farm.control / "slow").write_text("0.2")
+    for body in hostile_messages():
+        farm.redis.client.lpush("pbrs:geometry", body)
+    farm.coordinator()
+    farm.worker("w1")
+    farm.submit(2)
+    farm.wait(lambda: len(renderers(farm, "w1")) == 1 and farm.running() == 1, 30, "a task runs")
+    os.kill(renderers(farm, "w1")[0], signal.SIGKILL)
+    farm.wait_done()
+    farm.check_complete(n_repeats=1)
+    log = (farm.folder / "w1.log").read_text()
+    assert "pbrs.evil" in log
+    assert not (farm.folder / "owned").exists()
+    assert farm.redis.client.llen("pbrs:geometry") == 0
 
-    houses = [HouseEntry(house_id=h) for h in farm.houses]
-    return houses, new_spec(recipe_from_name("preview"), rules={"shard_size": 5})
+
+def hostile_messages() -> list[str]:
+    """Raw broker messages: an unknown task, a giant one, a pickle, and ids that are none."""
+
+    def message(task: str, args: list[str], kind: str = "application/x-pbrs-json") -> str:
+        body = base64.b64encode(json.dumps([args, {}, {}]).encode()).decode()
+        headers = {"lang": "py", "task": task, "id": str(uuid.uuid4()), "root_id": None,
+                   "parent_id": None, "group": None, "retries": 0}  # fmt: skip
+        properties = {
+            "correlation_id": headers["id"], "delivery_mode": 2, "priority": 0,
+            "body_encoding": "base64", "delivery_tag": str(uuid.uuid4()),
+            "delivery_info": {"exchange": "", "routing_key": "geometry"},
+        }  # fmt: skip
+        return json.dumps(
+            {"body": body, "content-encoding": "utf-8", "content-type": kind,
+             "headers": headers, "properties": properties}
+        )  # fmt: skip
+
+    return [
+        message("pbrs.evil", ["x"]),
+        message("pbrs.run", ["f" * 12, "h/0/gl", "x" * 100_000]),
+        message("pbrs.run", ["f" * 12, "h/0/gl", "r"], kind="application/x-python-serialize"),
+        message("pbrs.run", ["../../etc", "h/0/gl", "r"]),
+        message("pbrs.run", ["f" * 12, "h/0/gl;FLUSHALL", "r"]),
+    ]
+
+
+def renderers(farm: SmallFarm, worker: str) -> list[int]:
+    """Process ids of a worker's renderers."""
+    found = []
+    for pid in descendants(farm.processes[worker].pid):
+        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+        if b"workers.renderer" in words:
+            found.append(pid)
+    return found
+
+
+def test_celerys_parent_process_is_kept_out_of_storage() -> None:
+    code = """
+from celery.signals import worker_init
+from pbrs_farm.store import store_from_url
+import workers.app
+worker_init.send(sender=None)
+store_from_url("s3://bucket/prefix").put("k", b"")
+"""
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+    assert "not to be used in this process" in done.stderr
+
+
+def test_no_secret_stands_on_a_command_line_or_in_a_log() -> None:
+    config = config_from_environment(
+        {"PBRS_REDIS_URL": "redis://redis:6379/0", "PBRS_REDIS_PASSWORD": "hu/sh"}
+    )
+    assert config.redis_url.get_secret_value() == "redis://:hu%2Fsh@redis:6379/0"
+    assert "hu" not in " ".join(command(config)) + repr(config)
+    record = logging.LogRecord("x", 20, "", 0, "to redis://farm:hush@h:1/0", (), None)
+    assert "hush" not in NoSecrets("%(message)s").format(record)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("PBRS_FARM_SLOTS", "many"), ("PBRS_FARM_NONSENSE", "1")]
+)
+def test_a_setting_that_is_none_is_one_line(name: str, value: str) -> None:
+    with pytest.raises(BadInput, match=name) as caught:
+        config_from_environment({name: value})
+    assert "\n" not in str(caught.value)
