@@ -58,6 +58,9 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
     Raises BadHouse for a number that is none or not finite, a face index out of range, or more
     than max_triangles triangles.
     """
+    for key, most in ((b"\nf", max_triangles), (b"\nv ", 3 * max_triangles)):
+        if data.count(key) > most:
+            raise _too_many(file, data.count(key), key, max_triangles)
     vertices: list[bytes] = []
     uvs: list[bytes] = []
     normals: list[bytes] = []
@@ -102,7 +105,7 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
     )
     n_triangles = sum(max(0, len(x.split()) - 2) for p in parts.values() for x in p.lines)
     if n_triangles > max_triangles:
-        raise BadHouse(file, "", f"{n_triangles} triangles, at most {max_triangles} are read")
+        raise _too_many(file, n_triangles, b"", max_triangles)
     meshes, n_dropped = [], 0
     for p in parts.values():
         mesh, dropped = _mesh(p, pools, file)
@@ -110,6 +113,13 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
         if mesh is not None:
             meshes.append(mesh)
     return ObjModel(tuple(meshes), tuple(libraries), n_dropped)
+
+
+def _too_many(file: str, n: int, key: bytes, most: int) -> BadHouse:
+    what = "vertices" if key.startswith(b"\nv") else "triangles or more"
+    return BadHouse(
+        file, "", f"{n} {what}, at most {most} triangles are read", hint="read.max_model_triangles"
+    )
 
 
 def _text(rest: bytes) -> str:
@@ -151,7 +161,7 @@ def _indices(part: _Part, pools: tuple[NDArray[np.float64], ...], file: str) -> 
         flat = [c or b"0" for t in tokens for c in [*t.split(b"/"), b"0", b"0"][:3]]
     try:
         given = np.array(flat).astype(np.int64).reshape(len(tokens), columns)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise BadHouse(file, "an `f` line", f"not an index: {error}") from None
     indices = np.zeros((len(tokens), 3), np.int64)
     indices[:, :columns] = given
@@ -214,6 +224,9 @@ def _mesh(
 def _unique_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     # The distinct rows, in sorted order, and for each row its place among them.
     spans = rows.max(0) + 1
+    if float(spans[0]) * float(spans[1]) * float(spans[2]) > 2.0**62:
+        unique, inverse = np.unique(rows, axis=0, return_inverse=True)
+        return unique, inverse.reshape(-1)
     code = (rows[:, 0] * spans[1] + rows[:, 1]) * spans[2] + rows[:, 2]
     _, first, inverse = np.unique(code, return_index=True, return_inverse=True)
     return rows[first], inverse.reshape(-1)

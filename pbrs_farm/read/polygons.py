@@ -6,6 +6,9 @@ import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
+MAX_EAR_CUT = 5_000
+"""Polygons of more corners become fans: ear cutting may take the square of their number."""
+
 
 def triangle_corners(positions: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
     """(T, 3) corner numbers of the triangles that polygons are cut into, in the polygons' order.
@@ -33,7 +36,7 @@ def triangle_corners(positions: NDArray[np.float64], sizes: NDArray[np.int64]) -
             triangles.append(fans.reshape(-1, 3))
             owners.append(which)
             continue
-        is_convex = _convex(positions[corners])
+        is_convex = _convex(positions[corners]) | (n > MAX_EAR_CUT)
         triangles.append(fans[is_convex].reshape(-1, 3))
         owners.append(np.repeat(which[is_convex], n - 2))
         for polygon in np.flatnonzero(~is_convex):

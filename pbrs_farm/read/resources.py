@@ -13,7 +13,7 @@ from typing import Protocol
 
 from pbrs_farm.errors import BadHouse
 
-MAX_ENTRY_BYTES = 512 * 2**20
+MAX_ENTRY_BYTES = 256 * 2**20
 MAX_TOTAL_BYTES = 2 * 2**30
 MAX_ENTRIES = 50_000
 

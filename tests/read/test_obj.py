@@ -134,7 +134,7 @@ def test_a_texture_index_out_of_range_costs_only_the_texture() -> None:
 
 
 def test_more_triangles_than_allowed_are_refused_before_they_are_built() -> None:
-    with pytest.raises(BadHouse, match="5 triangles, at most 4"):
+    with pytest.raises(BadHouse, match="5 triangles or more, at most 4"):
         parse_obj((QUAD + "f 1 2 3\n" * 5).encode(), "m.obj", max_triangles=4)
 
 

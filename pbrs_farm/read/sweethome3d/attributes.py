@@ -51,6 +51,10 @@ class Attributes:
             raise self.fail(f"attribute {name} is missing")
         return default
 
+    def within(self, name: str, default: float, low: float, high: float) -> float:
+        """A finite number, drawn into low..high."""
+        return min(max(self.number(name, default), low), high)
+
     def metres(self, name: str, default_m: float | None = None) -> float:
         """A length or coordinate given in centimetres, in metres, within the largest extent."""
         value = self.optional_metres(name)
@@ -86,7 +90,7 @@ class Attributes:
         return default if text is None else text.strip().lower() == "true"
 
     def numbers(self, name: str, count: int) -> tuple[float, ...] | None:
-        """count finite numbers separated by spaces, or None if missing."""
+        """count numbers of at most 1e6 separated by spaces, or None if missing."""
         text = self.element.get(name)
         if text is None:
             return None
@@ -94,7 +98,7 @@ class Attributes:
             values = tuple(float(w) for w in text.split())
         except ValueError:
             values = ()
-        if len(values) != count or not all(map(math.isfinite, values)):
+        if len(values) != count or not all(abs(v) <= 1e6 for v in values):
             raise self.fail(f"{name} must be {count} finite numbers")
         return values
 

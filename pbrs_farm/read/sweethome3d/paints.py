@@ -53,7 +53,7 @@ def picture_of(parent: Attributes, element: Element) -> Picture:
         name=name,
         width=width if width > 1e-4 else 1.0,
         height=height if height > 1e-4 else 1.0,
-        offset=(a.number("xOffset", 0.0), a.number("yOffset", 0.0)),
+        offset=(a.number("xOffset", 0.0) % 1.0, a.number("yOffset", 0.0) % 1.0),
         angle=a.number("angle", 0.0),
         scale=scale if scale > 1e-4 else 1.0,
         is_fitting=a.flag("fittingArea", False),

@@ -19,6 +19,9 @@ from pbrs_farm.read.sweethome3d.plan import (
 )
 
 MAX_PIECES = 20_000
+MAX_WALLS = 10_000
+MAX_ROOMS = 5_000
+MAX_ROOM_POINTS = 100_000
 _PIECES = frozenset({"pieceOfFurniture", "doorOrWindow", "light", "shelfUnit"})
 FALLBACK_HEIGHT_M = 2.5
 
@@ -26,6 +29,9 @@ FALLBACK_HEIGHT_M = 2.5
 def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
     """Read every element the pipeline uses; BadHouse names the element that is wrong."""
     home = Attributes(file, "home", root, max_extent_m)
+    for tag, most in (("wall", MAX_WALLS), ("room", MAX_ROOMS), ("room/point", MAX_ROOM_POINTS)):
+        if len(root.findall(tag)) > most:
+            raise BadHouse(file, "", f"more than {most} <{tag}> elements")
     wall_height = home.length("wallHeight", FALLBACK_HEIGHT_M)
 
     def open_(element: Element, place: str) -> Attributes:

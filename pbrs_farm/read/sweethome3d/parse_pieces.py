@@ -34,7 +34,7 @@ def parse_piece(a: Attributes, level: str, group: str = "") -> PlanPiece:
         frame=_frame(a) if _is_opening(a) else None,
         lights=_lights(a) if element.tag == "light" else (),
         light_materials=tuple(e.get("name", "") for e in element.findall("lightSourceMaterial")),
-        power=a.number("power", 0.5) if element.tag == "light" else 0.0,
+        power=a.within("power", 0.5, 0.0, 10.0) if element.tag == "light" else 0.0,
         staircase_cut_out=a.text("staircaseCutOutShape"),
         group=group,
     )
@@ -67,14 +67,18 @@ def _transformations(a: Attributes) -> tuple[tuple[str, tuple[float, ...]], ...]
 def _frame(a: Attributes) -> DoorFrame:
     return DoorFrame(
         cut_out=a.text("cutOutShape", FULL_CUT_OUT),
-        wall_thickness=a.number("wallThickness", 1.0),
-        wall_distance=a.number("wallDistance", 0.0),
-        wall_width=a.number("wallWidth", 1.0),
-        wall_left=a.number("wallLeft", 0.0),
-        wall_height=a.number("wallHeight", 1.0),
-        wall_top=a.number("wallTop", 0.0),
+        wall_thickness=a.within("wallThickness", 1.0, -1.0, 2.0),
+        wall_distance=a.within("wallDistance", 0.0, -1.0, 2.0),
+        wall_width=a.within("wallWidth", 1.0, -1.0, 2.0),
+        wall_left=a.within("wallLeft", 0.0, -1.0, 2.0),
+        wall_height=a.within("wallHeight", 1.0, -1.0, 2.0),
+        wall_top=a.within("wallTop", 0.0, -1.0, 2.0),
         cuts_both_sides=a.flag("wallCutOutOnBothSides", False),
     )
+
+
+def _fraction(a: Attributes, name: str) -> float:
+    return a.within(name, 0.5, -10.0, 10.0)
 
 
 def _lights(a: Attributes) -> tuple[PlanLight, ...]:
@@ -84,9 +88,9 @@ def _lights(a: Attributes) -> tuple[PlanLight, ...]:
         colour = inner.argb("color")
         lights.append(
             PlanLight(
-                (inner.number("x", 0.5), inner.number("y", 0.5), inner.number("z", 0.5)),
+                (_fraction(inner, "x"), _fraction(inner, "y"), _fraction(inner, "z")),
                 (1.0, 1.0, 1.0) if colour is None else colour[1],
-                inner.optional("diameter"),
+                None if inner.optional("diameter") is None else inner.within("diameter", 0, 0, 2),
             )
         )
     return tuple(lights)

@@ -74,7 +74,7 @@ def room_nouns(rooms: list[ReadRoom], ceilings: CeilingHeights) -> tuple[Room, .
     """The Room of each; its polygon without what later rooms take, if that leaves one piece."""
     nouns = []
     for k, room in enumerate(rooms):
-        taken = [r.outline for r in rooms[k + 1 :] if r.level_id == room.level_id]
+        taken = [r.outline for r in _later(rooms, k)]
         rest = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
         outline = room.outline
         if len(rest) == 1 and not rest[0].interiors:
@@ -97,6 +97,13 @@ def room_nouns(rooms: list[ReadRoom], ceilings: CeilingHeights) -> tuple[Room, .
     return tuple(nouns)
 
 
+def _later(rooms: list[ReadRoom], k: int) -> list[ReadRoom]:
+    # The rooms of the same level that come after the k-th and touch it.
+    after = [r for r in rooms[k + 1 :] if r.level_id == rooms[k].level_id]
+    touch = shapely.intersects(rooms[k].outline, [r.outline for r in after])
+    return [r for r, touches in zip(after, touch, strict=True) if touches]
+
+
 def plane_items(
     rooms: list[ReadRoom],
     ceilings: CeilingHeights,
@@ -107,7 +114,7 @@ def plane_items(
     """Floor and ceiling items. *_cuts: by level id, what staircases take."""
     items = []
     for k, room in enumerate(rooms):
-        later = [r for r in rooms[k + 1 :] if r.level_id == room.level_id]
+        later = _later(rooms, k)
         if room.plan.has_floor:
             taken: list[shapely.Geometry] = [r.outline for r in later if r.plan.has_floor]
             taken.append(floor_cuts.get(room.level_id, shapely.Polygon()))
