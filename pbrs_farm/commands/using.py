@@ -31,7 +31,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("view", type=Path, help="a view's folder: OUT/houses/<house>/views/<view>")
     p.add_argument("--indoor", type=float, default=1.0, help="factor of the lamps (default 1)")
     p.add_argument("--outdoor", type=float, default=1.0, help="factor of the sky (default 1)")
-    p.add_argument("--out", type=Path, default=None, help="PNG to write (default VIEW/relit.png)")
+    p.add_argument("--out", type=Path, default=None, help="PNG to write (default VIEW_relit.png here)")
     p.add_argument("--no-denoise", action="store_true", help="develop the raw radiance")
 
 
@@ -70,7 +70,7 @@ def _relight(args: argparse.Namespace) -> int:
 
     if min(args.indoor, args.outdoor) < 0:
         raise BadInput("--indoor/--outdoor", "", "light cannot be negative")
-    out = args.out or args.view / "relit.png"
+    out = args.out or Path(f"{args.view.resolve().name}_relit.png")
     png = relit(args.view, indoor=args.indoor, outdoor=args.outdoor, denoise=not args.no_denoise)
     FolderStore(out.parent).put(out.name, png)
     say(str(out))
