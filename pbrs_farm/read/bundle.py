@@ -155,6 +155,9 @@ def _textures_with_data(gltf: glb.Gltf, textures: list[dict[str, Any]]) -> dict[
 def _check_references(house: House) -> None:
     levels = {level.id for level in house.levels}
     rooms = {room.id for room in house.rooms}
+    for i, room in enumerate(house.rooms):
+        if len(room.polygon) < 3:
+            raise BadHouse("house.json", f"rooms[{i}].polygon", "has fewer than three corners")
     for i, item in enumerate(house.items):
         if item.level_id not in levels:
             raise BadHouse("house.json", f"items[{i}].level_id", f"no level {item.level_id!r}")

@@ -103,7 +103,7 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
         for item in items
     ]
     sha256 = keys.sha256(data)
-    copyright_line = gltf.document.get("asset", {}).get("copyright", "")
+    copyright_line = gltf.document["asset"].get("copyright", "")
     return House(
         id=keys.house_id(stem, sha256),
         name=stem,

@@ -64,9 +64,9 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
         gltf = gltf_from_glb(data, file)
     else:
         document = json_from_bytes(data, file)
-        if not isinstance(document, dict) or not isinstance(document.get("asset"), dict):
-            raise BadHouse(file, "asset", "is missing; this is no glTF file")
-        gltf = Gltf(document, (), file)
+        gltf = Gltf(document if isinstance(document, dict) else {}, (), file)
+    if not isinstance(gltf.document.get("asset"), dict):
+        raise BadHouse(file, "asset", "is missing; this is no glTF file")
     required = gltf.document.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else []:
         if name not in UNDERSTOOD:

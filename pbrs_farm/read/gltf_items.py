@@ -119,6 +119,7 @@ def _item(
         if abs(np.linalg.det(part.world_from_node[:3, :3])) < 1e-12:
             notes.add("flat-node", place, "its scale is 0; left out")
             continue
+        entry(gltf, "meshes", node["mesh"])
         if node["mesh"] not in known:
             known[node["mesh"]] = meshes_of(
                 gltf, node["mesh"], max_triangles=fields.max_model_triangles
