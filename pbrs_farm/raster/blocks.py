@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,13 +16,13 @@ LAMP_TRANSMISSION = 0.1
 _GLOW = {MaterialKind.BULB: 1.0, MaterialKind.SHADE: 0.5}
 
 
-def looks(house: House, textures: Mapping[str, NDArray[np.uint8]]) -> NDArray[np.float32]:
-    """(n_materials, 16) the Look block of each material; untextured where no pixels are given."""
-    rows = [_look(m, m.texture_id in textures) for m in house.materials]
+def looks(house: House) -> NDArray[np.float32]:
+    """(n_materials, 16) the Look block of each material."""
+    rows = [_look(m) for m in house.materials]
     return np.array(rows, np.float32).reshape(-1, LOOK_FLOATS)
 
 
-def _look(material: Material, is_textured: bool) -> list[float]:
+def _look(material: Material) -> list[float]:
     diffuse = linear_from_srgb(np.array(material.diffuse))
     specular = linear_from_srgb(np.array(material.specular))
     glow = _GLOW.get(material.kind, 0.0) * diffuse
@@ -34,7 +32,7 @@ def _look(material: Material, is_textured: bool) -> list[float]:
         *diffuse, material.opacity,
         *specular, exponent,
         *glow, 0.0,
-        float(is_textured), float(is_pane), 0.0, 0.0,
+        float(is_pane), 0.0, 0.0, 0.0,
     ]  # fmt: skip
 
 

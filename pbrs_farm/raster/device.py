@@ -19,6 +19,11 @@ _SRGB8_ALPHA8: Final = 0x8C43
 _MAX_TEXTURE_PX: Final = 4096
 
 
+def n_samples(context: Any, wanted: int) -> int:
+    """Samples a pixel that the context can give: 2 at least, so that pictures are multisampled."""
+    return max(2, min(wanted, int(context.max_samples)))
+
+
 def open_context() -> Any:
     """A headless OpenGL 3.3 context through EGL; raises MachineFailed when there is none."""
     try:
@@ -51,22 +56,30 @@ def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
 
 
 class Target:
-    """What is drawn into: "colour" (half floats, multisampled, resolved on read) or "ids"."""
+    """What is drawn into: colour in half floats, multisampled, resolved on read; or ids.
+
+    nearest: for colour, the depth texture that a first pass over the house fills.
+    """
 
     def __init__(self, context: Any, size: tuple[int, int], kind: str, samples: int) -> None:
         self._context, self._size = context, size
-        samples = min(samples, context.max_samples)
-        samples = samples if samples > 1 else 0
-        depth = context.depth_renderbuffer(size, samples=samples)
+        self.nearest: Any = None
         if kind == "ids":
             planes = [context.renderbuffer(size, 1, dtype=t) for t in ("f4", "u4")]
-            self._drawn = self._resolved = context.framebuffer(planes, depth)
+            self._drawn = context.framebuffer(planes, context.depth_renderbuffer(size))
+            self._resolved = self._drawn
             return
         plane = context.renderbuffer(size, 4, dtype="f2", samples=samples)
-        self._drawn = self._resolved = context.framebuffer([plane], depth)
-        if samples:
-            flat = context.renderbuffer(size, 4, dtype="f2")
-            self._resolved = context.framebuffer([flat])
+        depth = context.depth_renderbuffer(size, samples=samples)
+        self._drawn = context.framebuffer([plane], depth)
+        self._resolved = context.framebuffer([context.renderbuffer(size, 4, dtype="f2")])
+        self.nearest = context.depth_texture(size, samples=samples)
+        self._depths = context.framebuffer([], self.nearest)
+
+    def begin_depths(self) -> None:
+        """Draw depth into nearest from now on."""
+        self._depths.use()
+        self._depths.clear(depth=1.0)
 
     def begin(self, colour: tuple[float, ...]) -> None:
         """Draw here from now on, over this colour."""

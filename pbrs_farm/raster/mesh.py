@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.house import House, MaterialKind, Surface
+from pbrs_farm.house import House, Surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,14 +108,3 @@ def _face_normals(points: NDArray[np.float32], faces: NDArray[np.int64]) -> NDAr
     length = np.linalg.norm(cross, axis=1, keepdims=True)
     unit = np.where(length > 0, cross / np.maximum(length, 1e-300), [0.0, 1.0, 0.0])
     return unit.astype(np.float32)
-
-
-def is_see_through(house: House) -> NDArray[np.bool_]:
-    """(n_materials,) bool: drawn blended, after everything opaque: glass, panes, opacity below 1."""
-    return np.array(
-        [
-            m.kind in (MaterialKind.GLASS, MaterialKind.PANE) or m.opacity < 1
-            for m in house.materials
-        ],
-        bool,
-    )

@@ -5,6 +5,7 @@ Effects: reads package resources, compiles on the given context.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib.resources import files
 from typing import Any
 
@@ -26,11 +27,12 @@ GLASS_MIRROR = 0.7
 _VERSION = "#version 330\n"
 
 
-def surface_program(context: Any, mode: str, kind: str, n_lights: int) -> Any:
-    """Program that lights surfaces: mode "dl" or "il"; kind "plain", "cutout" or "see_through"."""
+def surface_program(context: Any, features: Iterable[str], n_lights: int, n_samples: int) -> Any:
+    """Program that lights surfaces. features: one of MODE_DL, MODE_IL; then any of GLOSSY, CUTOUT,
+    SEE_THROUGH, WITH_SPOTS, WITH_LINES: on a CPU what is not needed must not be there."""
     defines = {
-        f"MODE_{mode.upper()}": 1,
         "N_LIGHTS": n_lights,
+        "N_SAMPLES": n_samples,
         "SOFT2": SOFT_M**2,
         "DL_SCALE": DL_SCALE,
         "WHITE": IL_WHITE,
@@ -39,8 +41,7 @@ def surface_program(context: Any, mode: str, kind: str, n_lights: int) -> Any:
         "PANE_MIRROR": PANE_MIRROR,
         "GLASS_MIRROR": GLASS_MIRROR,
     }
-    if kind != "plain":
-        defines[kind.upper()] = 1
+    defines |= dict.fromkeys(features, 1)
     head = _VERSION + "".join(f"#define {name} {value}\n" for name, value in defines.items())
     return context.program(
         vertex_shader=_VERSION + _source("surface.vert.glsl"),
@@ -48,11 +49,11 @@ def surface_program(context: Any, mode: str, kind: str, n_lights: int) -> Any:
     )
 
 
-def ids_program(context: Any) -> Any:
-    """Program that writes depth_z and the item's id at pixel centres."""
+def plain_program(context: Any, name: str) -> Any:
+    """Program "ids" (writes depth_z and the item's id at pixel centres) or "depth" (only depth)."""
     return context.program(
         vertex_shader=_VERSION + _source("surface.vert.glsl"),
-        fragment_shader=_VERSION + _source("ids.frag.glsl"),
+        fragment_shader=_VERSION + _source(f"{name}.frag.glsl"),
     )
 
 

@@ -19,10 +19,17 @@ from pbrs_farm.camera import Camera
 from pbrs_farm.frames import linear_from_srgb
 from pbrs_farm.house import House
 from pbrs_farm.raster.blocks import LOOK_FLOATS, aligned_rows, item_lights, looks
-from pbrs_farm.raster.device import Target, encoded, open_context, texture_from_pixels
+from pbrs_farm.raster.device import Target, encoded, n_samples, open_context, texture_from_pixels
+from pbrs_farm.raster.kinds import (
+    CUTOUT,
+    SEE_THROUGH,
+    features_of_kind,
+    kind_of_material,
+    light_features,
+)
 from pbrs_farm.raster.lights import LIGHT_FLOATS, brightness_scale
-from pbrs_farm.raster.mesh import is_see_through, mesh_from_house
-from pbrs_farm.raster.programs import ids_program, surface_program
+from pbrs_farm.raster.mesh import mesh_from_house
+from pbrs_farm.raster.programs import plain_program, surface_program
 from pbrs_farm.raster.projection import boxes_in_view, clip_from_world, distance_to_boxes, far_plane
 from pbrs_farm.recipe import RasterFields
 
@@ -46,12 +53,17 @@ class Rasterizer:
         self._fields = fields or RasterFields()
         n_lights = self._fields.lights_per_object
         self._context = open_context()
+        self._samples = n_samples(self._context, self._fields.samples)
         self._mesh = mesh_from_house(house)
         self._white_per_lx = brightness_scale(house, n_lights)
-        self._see_through = is_see_through(house)
-        self._cutout = np.array([m.alpha_cutout for m in house.materials], bool)
         self._sky = tuple(linear_from_srgb(np.array(SKY_SRGB)))
-        self._programs: dict[tuple[str, str], tuple[Any, Any]] = {}
+        self._kind = np.array(
+            [kind_of_material(m, is_textured=m.texture_id in textures) for m in house.materials],
+            int,
+        )
+        self._light_features = light_features(house)
+        self._programs: dict[tuple[str, int], tuple[Any, Any]] = {}
+        self._queries = [self._context.query(samples=True) for _ in range(self._mesh.n_draws)]
         self._targets: dict[tuple[int, int, str], Target] = {}
         self._upload(house, textures, n_lights)
 
@@ -61,7 +73,7 @@ class Rasterizer:
         gl, alignment = self._context, self._context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
         self._vertices = gl.buffer(self._mesh.vertices.tobytes() or bytes(32))
         self._indices = gl.buffer(self._mesh.indices.tobytes() or bytes(12))
-        look_rows = aligned_rows(looks(house, textures), alignment)
+        look_rows = aligned_rows(looks(house), alignment)
         light_rows = aligned_rows(item_lights(house, n_lights), alignment)
         self._looks, self._look_step = (
             gl.buffer(look_rows.tobytes() or bytes(4)),
@@ -117,7 +129,7 @@ class Rasterizer:
             target = self._target(camera, "ids")
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))
             target.begin((0.0, 0.0, 0.0, 0.0))
-            program, vao = self._program("ids", "plain")
+            program, vao = self._program("ids", 0)
             _set(program, clip_from_world=clip)
             for draw in self._near_to_far(camera, clip):
                 program["item"] = int(self._mesh.draw_item[draw])
@@ -129,20 +141,20 @@ class Rasterizer:
         with self._context:
             target = self._target(camera, "colour")
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))
-            target.begin((*self._sky, 1.0))
             order = self._near_to_far(camera, clip)
-            material = self._mesh.draw_material[order]
-            glass, cutout = (
-                self._see_through[material],
-                self._cutout[material] & ~self._see_through[material],
-            )
-            for kind, chosen in (("plain", order[~glass & ~cutout]), ("cutout", order[cutout])):
-                if len(chosen):
-                    self._begin_surfaces(mode, kind, camera, clip)
-                    self._draw_surfaces(mode, kind, chosen)
-            if glass.any():
-                self._begin_surfaces(mode, "see_through", camera, clip)
-                self._draw_glass(mode, order[glass], camera)
+            if mode == "il":
+                order = self._unhidden(target, order, clip)
+            kind = self._kind[self._mesh.draw_material[order]]
+            target.begin((*self._sky, 1.0))
+            for number in np.unique(kind):
+                self._begin_surfaces(mode, int(number), camera, clip)
+                if number & SEE_THROUGH:
+                    continue
+                for draw in order[kind == number]:
+                    self._bind(mode, int(draw))
+                    self._draw(self._program(mode, int(number))[1], int(draw))
+            if (kind & SEE_THROUGH).any():
+                self._draw_glass(mode, order[(kind & SEE_THROUGH) > 0], camera)
             return encoded(target.read("f2", 0, 3))
 
     @property
@@ -155,24 +167,36 @@ class Rasterizer:
         low, high = self._boxes
         return seen[np.argsort(distance_to_boxes(camera.eye, low[seen], high[seen]), kind="stable")]
 
+    def _unhidden(
+        self, target: Target, draws: NDArray[np.int64], clip: NDArray[np.float64]
+    ) -> NDArray[np.int64]:
+        """The draws of which any sample is seen, after a first pass that draws nothing but depth.
+
+        A software renderer pays for light on all that is hidden when samples are several.
+        """
+        program, vao = self._program("depth", 0)
+        _set(program, clip_from_world=clip)
+        is_solid = (self._kind[self._mesh.draw_material[draws]] & (SEE_THROUGH | CUTOUT)) == 0
+        target.begin_depths()
+        for draw in draws[is_solid]:
+            with self._queries[draw]:
+                self._draw(vao, int(draw))
+        target.nearest.use(1)
+        kept = ~is_solid
+        kept[is_solid] = [self._queries[draw].samples > 0 for draw in draws[is_solid]]
+        return np.asarray(draws[kept])
+
     def _begin_surfaces(
-        self, mode: str, kind: str, camera: Camera, clip: NDArray[np.float64]
+        self, mode: str, kind: int, camera: Camera, clip: NDArray[np.float64]
     ) -> None:
-        program, _vao = self._program(mode, kind)
         _set(
-            program,
+            self._program(mode, kind)[0],
             clip_from_world=clip,
             eye=camera.eye,
             forward=camera.towards,
             sky=self._sky,
             white_per_lx=self._white_per_lx,
         )
-
-    def _draw_surfaces(self, mode: str, kind: str, draws: NDArray[np.int64]) -> None:
-        _program, vao = self._program(mode, kind)
-        for draw in draws:
-            self._bind(mode, draw)
-            self._draw(vao, draw)
 
     def _bind(self, mode: str, draw: int) -> None:
         material = int(self._mesh.draw_material[draw])
@@ -202,25 +226,35 @@ class Rasterizer:
         triangle, owner = triangle[order], owner[order]
 
         indices = gl.buffer(np.ascontiguousarray(mesh.indices[triangle]).tobytes())
-        vao = self._vao(self._program(mode, "see_through")[0], indices)
+        kinds = self._kind[mesh.draw_material[owner]]
+        vaos = {
+            int(k): self._vao(self._program(mode, int(k))[0], indices) for k in np.unique(kinds)
+        }
         gl.enable(gl.BLEND)
         gl.blend_func = gl.ONE, gl.ONE_MINUS_SRC_ALPHA
         gl.depth_mask = False
         starts = np.nonzero(np.diff(owner, prepend=-1))[0]
         for start, end in zip(starts, [*starts[1:], len(owner)], strict=True):
             self._bind(mode, int(owner[start]))
-            vao.render(vertices=3 * int(end - start), first=3 * int(start))
+            vaos[int(kinds[start])].render(vertices=3 * int(end - start), first=3 * int(start))
         gl.depth_mask = True
         gl.disable(gl.BLEND)
-        vao.release()
+        for vao in vaos.values():
+            vao.release()
         indices.release()
 
-    def _program(self, mode: str, kind: str) -> tuple[Any, Any]:
+    def _program(self, mode: str, kind: int) -> tuple[Any, Any]:
+        """Program and vertex array of a mode ("dl", "il", "ids") for a kind of material."""
         if (mode, kind) not in self._programs:
-            if mode == "ids":
-                program = ids_program(self._context)
+            if mode in ("ids", "depth"):
+                program = plain_program(self._context, mode)
             else:
-                program = surface_program(self._context, mode, kind, self._fields.lights_per_object)
+                features = [f"MODE_{mode.upper()}", *features_of_kind(kind)]
+                features += self._light_features if mode == "il" else []
+                n_lights = self._fields.lights_per_object
+                program = surface_program(self._context, features, n_lights, self._samples)
+                if "nearest" in program:
+                    program["nearest"] = 1
                 for block, binding in (("Look", 0), ("Lights", 1)):
                     if block in program:
                         program[block].binding = binding
@@ -241,8 +275,8 @@ class Rasterizer:
         i = camera.intrinsics
         key = (i.width_px, i.height_px, kind)
         if key not in self._targets:
-            samples = self._fields.samples if kind == "colour" else 0
-            self._targets[key] = Target(self._context, (i.width_px, i.height_px), kind, samples)
+            size = (i.width_px, i.height_px)
+            self._targets[key] = Target(self._context, size, kind, self._samples)
         return self._targets[key]
 
 
