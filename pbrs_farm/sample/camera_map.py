@@ -1,0 +1,196 @@
+"""The floor plan with every candidate, why it was refused, and the winners; no effects.
+
+One panel per level, then a legend with counts and, room by room, the reason of each sector that
+has no camera.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.camera import View
+from pbrs_farm.house import House, Item, ItemKind
+from pbrs_farm.sample.drawing import Drawing, Mark
+from pbrs_farm.sample.paper import room_shape
+from pbrs_farm.sample.report import RoomReport
+from pbrs_farm.sample.sampler import Sampling
+from pbrs_farm.sample.verdict import Verdict
+
+COLOURS: Final = {
+    Verdict.OUTSIDE_ROOM: "#d9d9d9",
+    Verdict.NEAR_OBSTACLE: "#e6701d",
+    Verdict.NOT_ABOVE_FLOOR: "#7b3ff2",
+    Verdict.ENCLOSED: "#000000",
+    Verdict.FILLED_BY_ONE: "#c2a500",
+    Verdict.FEW_OBJECTS: "#d7263d",
+    Verdict.LOWER_SCORE: "#5aa469",
+    Verdict.WINNER: "#0b5fff",
+}
+"""Colour of each verdict's dots."""
+
+_PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0
+_ROW, _LETTERS, _WORDS_PX = 16.0, 12.0, 620.0
+_ROOM, _FURNITURE, _WALL, _INK = "#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222"
+
+
+def camera_map_svg(house: House, sampling: Sampling) -> str:
+    """The map as SVG; candidates and winners carry titles a browser shows."""
+    return camera_map(house, sampling).svg()
+
+
+def camera_map_rgb(house: House, sampling: Sampling) -> NDArray[np.uint8]:
+    """The map as (H, W, 3) uint8 sRGB."""
+    return camera_map(house, sampling).rgb()
+
+
+def camera_map(house: House, sampling: Sampling) -> Drawing:
+    """The map of a house's sampling; x of the world to the right, z down."""
+    marks: list[Mark] = []
+    left, bottom = _MARGIN, _MARGIN
+    for level in house.levels:
+        rooms = [room for room in house.rooms if room.level_id == level.id]
+        shapes = [s for s in map(room_shape, rooms) if not shapely.is_empty(s)]
+        if not shapes:
+            continue
+        x0, z0, x1, z1 = shapely.total_bounds(shapes)
+        scale = min(_PX_PER_M, _MAX_PX / max(x1 - x0, z1 - z0, 1e-6))
+        panel = _Panel(left - scale * x0, 2 * _MARGIN - scale * z0, scale)
+        marks.append(_words(left, _MARGIN, f"Level {level.name or level.id}", 14.0))
+        marks += _level_marks(house, sampling, level.id, panel)
+        left += scale * (x1 - x0) + 2 * _MARGIN
+        bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
+    notes = _notes(sampling)
+    marks += [_shifted(mark, left) for mark in notes]
+    height = max(bottom, *(mark.points[0][1] for mark in notes)) + _MARGIN
+    return Drawing(math.ceil(left + _WORDS_PX), math.ceil(height), tuple(marks))
+
+
+class _Panel:
+    """Plan metres to pixels of one level's panel."""
+
+    def __init__(self, x: float, y: float, scale: float) -> None:
+        self.x, self.y, self.scale = x, y, scale
+
+    def __call__(self, x: float, z: float) -> tuple[float, float]:
+        return self.x + self.scale * float(x), self.y + self.scale * float(z)
+
+
+def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel) -> list[Mark]:
+    rooms = {room.id: room for room in house.rooms if room.level_id == level_id}
+    marks = [
+        Mark("polygon", tuple(panel(x, z) for x, z in room.polygon), _ROOM, title=room.name)
+        for room in rooms.values()
+        if len(room.polygon) >= 3
+    ]
+    items = [item for item in house.items if item.level_id == level_id]
+    for item in items:
+        marks += _footprint(item, panel)
+    for trace in sampling.traces:
+        if trace.room_id in rooms:
+            for eye, verdict in zip(trace.candidates.eye, trace.verdict, strict=True):
+                kind = Verdict(verdict)
+                if kind is not Verdict.WINNER:
+                    point = panel(eye[0], eye[2])
+                    marks.append(Mark("dot", (point,), COLOURS[kind], 1.4, title=kind.word))
+    marks += [
+        _words(*panel(*_middle(room.polygon)), f"{room.id} {room.name}", _LETTERS)
+        for room in rooms.values()
+        if len(room.polygon)
+    ]
+    for view in sampling.views:
+        if view.room_id in rooms:
+            marks += _winner(view, panel)
+    return marks
+
+
+def _footprint(item: Item, panel: _Panel) -> list[Mark]:
+    """Furniture: its hull seen from above. Walls: their level faces, tops and bottoms."""
+    if item.kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND) or not item.n_faces:
+        return []
+    if item.kind is ItemKind.WALL:
+        marks = []
+        for surface in item.surfaces:
+            corners = surface.positions[surface.faces].astype(np.float64)
+            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            level = np.abs(normal[:, 1]) > 0.5 * np.linalg.norm(normal, axis=1)
+            for triangle in corners[level]:
+                points = tuple(panel(x, z) for x, _y, z in triangle)
+                marks.append(Mark("polygon", points, _WALL))
+        return marks
+    plan = np.concatenate([s.positions[:, [0, 2]] for s in item.surfaces])
+    hull = shapely.convex_hull(shapely.multipoints(plan))
+    if not isinstance(hull, shapely.Polygon):
+        return []
+    points = tuple(panel(x, z) for x, z in hull.exterior.coords)
+    return [Mark("polygon", points, _FURNITURE, title=item.name)]
+
+
+def _winner(view: View, panel: _Panel) -> list[Mark]:
+    """A wedge of the camera's field of view, half a metre long, and the view's id."""
+    camera = view.camera
+    half = math.atan(0.5 * camera.intrinsics.width_px / camera.intrinsics.fx)
+    heading = math.atan2(camera.towards[2], camera.towards[0])
+    x, _y, z = camera.eye
+    wedge = [panel(x, z)]
+    for angle in (heading - half, heading + half):
+        wedge.append(panel(x + 0.5 * math.cos(angle), z + 0.5 * math.sin(angle)))
+    title = f"{view.id}: score {view.score:.0f}"
+    colour = COLOURS[Verdict.WINNER]
+    label = panel(x + 0.6 * math.cos(heading), z + 0.6 * math.sin(heading))
+    return [
+        Mark("line", (*wedge, wedge[0]), colour, 2.0, title=title),
+        Mark("dot", (wedge[0],), colour, 4.0, title=title),
+        _words(*label, view.id.removeprefix(f"{view.room_id}_"), _LETTERS, colour),
+    ]
+
+
+def _notes(sampling: Sampling) -> list[Mark]:
+    """Legend and reasons, as marks whose x counts from 0."""
+    counts = np.zeros(len(Verdict), np.int64)
+    for trace in sampling.traces:
+        counts += np.bincount(trace.verdict, minlength=len(Verdict))
+    rows: list[tuple[str, str | None]] = []
+    for verdict in Verdict:
+        text = f"{verdict.word.replace('_', ' ')}: {counts[verdict]}"
+        rows.append((text, COLOURS[verdict]))
+    rows.append(("", None))
+    for room in sampling.report.rooms:
+        rows += [(line, None) for line in _room_lines(room)]
+    rows += [(note, None) for note in sampling.report.notes]
+    marks = []
+    for k, (text, colour) in enumerate(rows):
+        y = _MARGIN + k * _ROW
+        if colour:
+            marks.append(Mark("dot", ((6.0, y),), colour, 4.0))
+        marks.append(_words(16.0 if colour else 0.0, y, text, _LETTERS))
+    return marks
+
+
+def _room_lines(room: RoomReport) -> list[str]:
+    name = f"{room.room_id} {room.name}".strip()
+    if room.reason:
+        return [f"{name}: no camera: {room.reason}"]
+    views = sum(len(s.views) for s in room.sectors)
+    lines = [f"{name}: {views} views of {sum(s.n_candidates for s in room.sectors)} candidates"]
+    lines += [f"    sector {s.sector}: {s.reason}" for s in room.sectors if s.reason]
+    return lines
+
+
+def _middle(polygon: NDArray[np.float64]) -> tuple[float, float]:
+    """Where a room's name begins: a little left of its box's middle."""
+    x, z = (polygon.min(0) + polygon.max(0)) / 2
+    return float(x) - 0.4, float(z)
+
+
+def _words(x: float, y: float, text: str, size: float = _LETTERS, colour: str = _INK) -> Mark:
+    return Mark("words", ((x, y),), colour, size, words=text)
+
+
+def _shifted(mark: Mark, dx: float) -> Mark:
+    points = tuple((x + dx, y) for x, y in mark.points)
+    return Mark(mark.shape, points, mark.colour, mark.size, mark.words, mark.title)

@@ -1,0 +1,97 @@
+"""A drawing of polygons, lines, dots and words, as SVG text or as an RGB array; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+from xml.sax.saxutils import escape
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+Shape = Literal["polygon", "line", "dot", "words"]
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """One shape. points: pixels, x right, y down; one point for a dot or words (left, middle).
+
+    colour: "#rrggbb". size: line width, dot radius or letter height, px. title: shown by a
+    browser over the shape.
+    """
+
+    shape: Shape
+    points: tuple[tuple[float, float], ...]
+    colour: str
+    size: float = 1.0
+    words: str = ""
+    title: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """Marks on a white sheet of width x height px, later ones on top."""
+
+    width: int
+    height: int
+    marks: tuple[Mark, ...]
+
+    def svg(self) -> str:
+        """The drawing as a whole SVG file."""
+        lines = [
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{self.width}" '
+            f'height="{self.height}" viewBox="0 0 {self.width} {self.height}" '
+            'font-family="sans-serif">',
+            '<rect width="100%" height="100%" fill="#ffffff"/>',
+            *(_svg(mark) for mark in self.marks),
+            "</svg>",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def rgb(self) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8 sRGB, drawn at twice the size and halved."""
+        big = Image.new("RGB", (2 * self.width, 2 * self.height), "#ffffff")
+        pen = ImageDraw.Draw(big)
+        for mark in self.marks:
+            if mark.shape != "words":
+                _paint(pen, mark)
+        image = big.resize((self.width, self.height), Image.Resampling.BOX)
+        pen = ImageDraw.Draw(image)
+        for mark in self.marks:
+            if mark.shape == "words":
+                font = ImageFont.load_default(mark.size)
+                pen.text(mark.points[0], mark.words, fill=mark.colour, font=font, anchor="lm")
+        return np.asarray(image, np.uint8)
+
+
+def _svg(mark: Mark) -> str:
+    title = f"<title>{escape(mark.title)}</title>" if mark.title else ""
+    x, y = mark.points[0]
+    if mark.shape == "dot":
+        attributes = f'circle cx="{x:.1f}" cy="{y:.1f}" r="{mark.size:.1f}" fill="{mark.colour}"'
+    elif mark.shape == "words":
+        size = f'font-size="{mark.size:.0f}" dominant-baseline="middle" fill="{mark.colour}"'
+        return f'<text x="{x:.1f}" y="{y:.1f}" {size}>{escape(mark.words)}</text>'
+    elif mark.shape == "polygon":
+        attributes = f'polygon points="{_path(mark.points)}" fill="{mark.colour}"'
+    else:
+        stroke = f'fill="none" stroke="{mark.colour}" stroke-width="{mark.size:.1f}"'
+        attributes = f'polyline points="{_path(mark.points)}" {stroke}'
+    return f"<{attributes}>{title}</{attributes.split()[0]}>"
+
+
+def _path(points: Sequence[tuple[float, float]]) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+
+
+def _paint(pen: ImageDraw.ImageDraw, mark: Mark) -> None:
+    points = [(2 * x, 2 * y) for x, y in mark.points]
+    if mark.shape == "polygon" and len(points) >= 3:
+        pen.polygon(points, fill=mark.colour)
+    elif mark.shape == "line":
+        pen.line(points, fill=mark.colour, width=max(1, round(2 * mark.size)), joint="curve")
+    elif mark.shape == "dot":
+        (x, y), r = points[0], 2 * mark.size
+        pen.ellipse((x - r, y - r, x + r, y + r), fill=mark.colour)
