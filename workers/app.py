@@ -8,17 +8,19 @@ stands in docs/farm.md.
 from __future__ import annotations
 
 import json
+import signal
 import ssl
 from typing import Any, Final
 
 from celery import Celery
-from celery.signals import setup_logging, worker_init
+from celery.signals import setup_logging, worker_init, worker_process_init
 from kombu import Exchange, Queue
 from kombu.serialization import register
 
 from pbrs_farm.store.s3 import forbid_in_this_process
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES
+from workers.renderer import die_with_parent
 
 MAX_MESSAGE: Final = 2048
 _VISIBILITY_S: Final = 6 * 3600
@@ -99,6 +101,13 @@ def make_app(config: FarmConfig) -> Celery:
 def _keep_storage_out(**_: object) -> None:
     """Celery's parent process forks; obstore used before a fork hangs in every child."""
     forbid_in_this_process()
+
+
+@worker_process_init.connect  # type: ignore[untyped-decorator]
+def _leave_signals_to_the_parent(**_: object) -> None:
+    """Slurm signals every process of a step: only the supervisor decides what TERM means."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    die_with_parent()
 
 
 @setup_logging.connect  # type: ignore[untyped-decorator]

@@ -61,7 +61,8 @@ def serve(runner: StepRunner, requests: BinaryIO, tell: Tell, reply: Tell) -> No
 def main() -> int:
     """Serve the runner this machine's configuration names."""
     die_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
     requests, replies = _own_pipes()
 
     def reply(line: str) -> None:

@@ -31,6 +31,8 @@ from workers.renderer import die_with_parent
 
 _log = logging.getLogger("pbrs.supervisor")
 _HANDBACK_S: Final = 20.0
+# On scratch when a signal made the worker leave: deploy/slurm/worker.sbatch asks for it.
+PREEMPTED: Final = "preempted"
 
 
 @dataclass(slots=True)
@@ -38,10 +40,12 @@ class _Orders:
     """What signals asked for. leave_at: when TERM came."""
 
     leave_at: float | None = None
+    was_told: bool = False
     at_once: bool = False
     told: set[str] = field(default_factory=set)
 
     def on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self.was_told = True
         self.leave_at = self.leave_at or time.monotonic()
         self.at_once = self.at_once or number in (signal.SIGINT, signal.SIGQUIT)
 
@@ -96,6 +100,8 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
             return code
         if until_s is not None and time.monotonic() - began > until_s - config.grace_s:
             orders.leave_at = orders.leave_at or time.monotonic()
+        if orders.was_told:
+            touch(config.scratch / PREEMPTED)
         if orders.leave_at is not None:
             _leave(config, celery, orders, time.monotonic() - orders.leave_at)
         time.sleep(0.2)
