@@ -93,6 +93,11 @@ class Camera:
 
         Directions have unit length along the optical axis, so that t along a ray is depth_z.
         """
+        origin, directions = self.exact_rays()
+        return origin.astype(np.float32), directions.astype(np.float32)
+
+    def exact_rays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As rays, in float64."""
         i = self.intrinsics
         x = (np.arange(i.width_px) + 0.5 - i.cx) / i.fx
         y = -(np.arange(i.height_px) + 0.5 - i.cy) / i.fy
@@ -100,8 +105,7 @@ class Camera:
         grid[..., 0] = x[None, :]
         grid[..., 1] = y[:, None]
         grid[..., 2] = -1.0
-        directions = grid @ self.world_from_camera[:3, :3].T
-        return self.eye.astype(np.float32), directions.astype(np.float32)
+        return self.eye, grid @ self.world_from_camera[:3, :3].T
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,11 +21,11 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: NDArray[np.i
     turned towards the camera; shading normals lie on the geometric normal's side. Faces must
     have an area.
     """
-    origin, directions = camera.rays()
+    origin, directions = camera.exact_rays()
     pixels = np.flatnonzero(face.ravel() >= 0)
-    d = directions.reshape(-1, 3)[pixels].astype(np.float64)
+    d = directions.reshape(-1, 3)[pixels]
     f, local = _numbered(face.ravel()[pixels], len(geometry.faces))
-    planes = _planes(geometry, f, origin.astype(np.float64))
+    planes = _planes(geometry, f, origin)
 
     t, weights = _meet(planes, local, d, -camera.world_from_camera[:3, 2])
     normal = planes.normal[local]

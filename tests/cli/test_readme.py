@@ -1,0 +1,26 @@
+"""README shows what is true: the layers' table, and verbs that exist."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pbrs_farm.cli import build_parser
+from pbrs_farm.layers import table
+
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_layers_table_is_the_one_of_layers_py() -> None:
+    assert table() in README
+
+
+def test_every_verb_shown_exists() -> None:
+    known = build_parser().format_help()
+    for verb in set(re.findall(r"pbrs-farm ([a-z]+)", README)):
+        assert re.search(rf"^\s+{verb}\b", known, re.MULTILINE), verb
+
+
+def test_every_linked_file_exists() -> None:
+    for link in re.findall(r"\]\(([^)#:]+)\)", README):
+        assert (Path(__file__).parents[2] / link).exists(), link
