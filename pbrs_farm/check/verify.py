@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -82,8 +81,7 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
             continue
         if depth is not None:
             depths.append((view, depth))
-    for (a, depth_a), (b, depth_b) in pairwise([*depths, *depths[:1]] if len(depths) > 1 else []):
-        check_reprojection(a, b, (depth_a, depth_b), tally)
+    check_reprojection(depths, tally)
     return len(views)
 
 

@@ -33,15 +33,21 @@ def encoded(name: str, array: np.ndarray) -> bytes:
     return exr_from_layers({n: np.ascontiguousarray(p) for n, p in zip(names, planes, strict=True)})
 
 
-def make_root(root: Path, *, with_optional: bool = False) -> Path:
-    """Write the root and return its house folder."""
-    home = builtin_home()
+def make_root(
+    root: Path,
+    home: House | None = None,
+    cameras: dict[str, Camera] | None = None,
+    *,
+    with_optional: bool = False,
+) -> Path:
+    """Write the root and return its house folder; of the small home when none is given."""
+    home = home or builtin_home()
     house = root / "houses" / home.id
     geometry = geometry_from_house(home)
     caster = Caster(geometry)
     glb, plain = bundle_from_house(home)
     files = {"house": {"house.glb": glb, "house.json": plain}}
-    for name, camera in views_of(home).items():
+    for name, camera in (cameras or views_of(home)).items():
         hit = caster.hit_record(camera)
         layers = truth.layers_from_hit(hit, home, camera)
         table = {"house": home.id, "view": name, **truth.view_table(hit.item, home, camera)}

@@ -2,11 +2,14 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.check import verify
 from pbrs_farm.errors import BadInput
-from tests.check.roots import changed_pixel, make_root, sign
+from pbrs_farm.read.builtin import builtin_home
+from tests.check.roots import SIZE, changed_pixel, make_root, sign
 
 
 @pytest.fixture(scope="module")
@@ -207,3 +210,26 @@ def test_one_changed_pixel_of_an_optional_layer_is_caught(rich, tmp_path, file, 
     changed_pixel(house / "views/v0" / file, 48, 64, 1 if "normal" not in file else 900)
     sign(tmp_path / "root", house)
     assert check in failed(tmp_path / "root")
+
+
+def test_two_views_of_one_room_must_agree_where_things_are(tmp_path):
+    home = builtin_home()
+    eye, intrinsics = home.cameras[0].eye, Intrinsics.from_hfov(*SIZE)
+    towards = home.cameras[0].towards
+    cameras = {
+        "v0": Camera.look(intrinsics, eye, towards),
+        "v1": Camera.look(intrinsics, eye + np.array([0.3, 0.1, 0.2]), towards),
+    }
+    house = make_root(tmp_path, home, cameras)
+    assert verify(tmp_path).is_clean
+    assert verify(tmp_path).counts["reprojection"].checked > 20
+
+    def forward(table):
+        for name in ("world_from_camera_opengl", "world_from_camera_opencv"):
+            for row in range(3):
+                table[name][row][3] += 0.5 * towards[row]
+
+    edit_table(tmp_path, forward)
+    certificate = verify(tmp_path, sample=0)
+    assert certificate.counts["reprojection"].failed > 0
+    assert house.name in certificate.text()
