@@ -15,6 +15,8 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
+from pbrs_farm.repair.seams import sealed
+
 F64 = NDArray[np.float64]
 
 _WELD_M = 1e-5
@@ -142,21 +144,29 @@ def overlap_of_bounds(a: F64, b: F64) -> F64:
 
 
 def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
-    """The solid's surface by tag, tags in the order they first come up."""
+    """The solid's surface by tag, in order of item and surface; positions are float32 values."""
     mesh = solid.simplify(_SIMPLIFY_M).to_mesh64()
     vertices = np.asarray(mesh.vert_properties, np.float64)
     if vertices.shape[1] < _NUMBER_OF_PROPERTIES:
         pad = np.zeros((len(vertices), _NUMBER_OF_PROPERTIES - vertices.shape[1]))
         vertices = np.concatenate([vertices, pad], 1)
     triangles = np.asarray(mesh.tri_verts, np.int64)
+    tags, tag_of_face = _tags_of_faces(mesh, table)
+    vertices, triangles, tag_of_face = sealed(vertices, triangles, tag_of_face)
+    found = [
+        _compact(tag, vertices, triangles[tag_of_face == k])
+        for k, tag in enumerate(tags)
+        if (tag_of_face == k).any()
+    ]
+    return sorted(found, key=lambda p: (p.tag.item, p.tag.surface, p.tag.material))
+
+
+def _tags_of_faces(mesh: manifold3d.Mesh64, table: TagTable) -> tuple[list[Tag], NDArray[np.int64]]:
+    # Several runs may have one tag: a wall cut by two openings has two runs of reveals.
     run_index = np.asarray(mesh.run_index, np.int64) // 3
-    faces_of_tag: dict[Tag, list[NDArray[np.int64]]] = {}
-    for k, original_id in enumerate(mesh.run_original_id):
-        faces = triangles[run_index[k] : run_index[k + 1]]
-        if len(faces):
-            faces_of_tag.setdefault(table[int(original_id)], []).append(faces)
-    ordered = sorted(faces_of_tag.items(), key=lambda entry: (entry[0].item, entry[0].surface))
-    return [_compact(tag, vertices, np.concatenate(parts)) for tag, parts in ordered]
+    tags: dict[Tag, int] = {}
+    of_run = [tags.setdefault(table[int(i)], len(tags)) for i in mesh.run_original_id]
+    return list(tags), np.repeat(np.array(of_run, np.int64), np.diff(run_index)[: len(of_run)])
 
 
 def _compact(tag: Tag, vertices: F64, faces: NDArray[np.int64]) -> Patch:

@@ -1,0 +1,113 @@
+"""Closed in double precision, closed in single precision: slivers dissolved; no effects.
+
+Rounded to float32, thin triangles of a boolean result lose their area. Left out, they would leave
+a vertex in the middle of another triangle's edge, and rays may slip through such a seam. Here
+each is dissolved instead: the triangle across its longest edge is split at that vertex.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+Faces = NDArray[np.int64]
+
+MIN_AREA_M2 = 1e-12
+_MAX_ROUNDS = 8
+
+
+def sealed(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Faces, Faces]:
+    """The mesh with float32 positions and no face without area, its edges still in pairs.
+
+    vertices: (V, P) positions and properties, those of one position possibly several times.
+    faces: (F, 3); labels: (F,), kept with each face. New vertices get properties in between.
+    """
+    vertices = vertices.copy()
+    vertices[:, :3] = vertices[:, :3].astype(np.float32)
+    _, place = np.unique(vertices[:, :3], axis=0, return_inverse=True)
+    mesh = _Mesh(vertices, np.ravel(place), faces, labels)
+    for _ in range(_MAX_ROUNDS):
+        if not mesh.dissolve():
+            break
+    return mesh.result()
+
+
+class _Mesh:
+    """Faces that can be replaced, with the faces at each directed edge between positions."""
+
+    def __init__(self, vertices: F64, place: Faces, faces: Faces, labels: Faces) -> None:
+        self._vertices = list(vertices)
+        self._place = place.tolist()
+        self._faces: list[tuple[int, int, int]] = [(a, b, c) for a, b, c in faces.tolist()]
+        self._labels = labels.tolist()
+        self._alive = [True] * len(self._faces)
+        self._at_edge: dict[tuple[int, int], list[int]] = {}
+        for f in range(len(self._faces)):
+            self._enter(f)
+
+    def dissolve(self) -> int:
+        """Dissolve every sliver once; how many there were."""
+        slivers = self._slivers()
+        for f in slivers:
+            if self._alive[f]:
+                self._dissolve_one(f)
+        return len(slivers)
+
+    def result(self) -> tuple[F64, Faces, Faces]:
+        """Vertices, living faces, their labels."""
+        kept = [f for f, alive in enumerate(self._alive) if alive]
+        faces = np.array([self._faces[f] for f in kept], np.int64).reshape(-1, 3)
+        return np.array(self._vertices), faces, np.array([self._labels[f] for f in kept], np.int64)
+
+    def _slivers(self) -> list[int]:
+        vertices = np.array(self._vertices)[:, :3]
+        a, b, c = (vertices[np.array(self._faces, np.int64)[:, k]] for k in range(3))
+        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        return np.flatnonzero((area <= MIN_AREA_M2) & np.array(self._alive)).tolist()
+
+    def _dissolve_one(self, f: int) -> None:
+        places = [self._place[v] for v in self._faces[f]]
+        if len(set(places)) < 3:
+            self._leave(f)
+            return
+        corners = np.array([self._vertices[v][:3] for v in self._faces[f]])
+        longest = int(np.linalg.norm(corners - np.roll(corners, -1, 0), axis=1).argmax())
+        a, c, b = (self._faces[f][(longest + k) % 3] for k in range(3))
+        across = self._at_edge.get((self._place[c], self._place[a]))
+        if across:
+            self._leave(f)
+            self._split(across[0], self._place[c], self._place[a], b)
+
+    def _split(self, f: int, c: int, a: int, b: int) -> None:
+        # Face f has the edge from place c to place a: put the position of vertex b into it.
+        face = self._faces[f]
+        k = next(k for k in range(3) if self._place[face[k]] == c and self._place[face[(k + 1) % 3]] == a)  # fmt: skip
+        first, second, third = (face[(k + j) % 3] for j in range(3))
+        start, end, at = self._vertices[first], self._vertices[second], self._vertices[b]
+        along = end[:3] - start[:3]
+        t = float(np.clip((at[:3] - start[:3]) @ along / max(along @ along, 1e-300), 0.0, 1.0))
+        middle = start + t * (end - start)
+        middle[:3] = at[:3]
+        new = len(self._vertices)
+        self._vertices.append(middle)
+        self._place.append(self._place[b])
+        self._leave(f)
+        for part in ((first, new, third), (new, second, third)):
+            self._faces.append(part)
+            self._labels.append(self._labels[f])
+            self._alive.append(True)
+            self._enter(len(self._faces) - 1)
+
+    def _edges(self, f: int) -> list[tuple[int, int]]:
+        a, b, c = (self._place[v] for v in self._faces[f])
+        return [(a, b), (b, c), (c, a)]
+
+    def _enter(self, f: int) -> None:
+        for edge in self._edges(f):
+            self._at_edge.setdefault(edge, []).append(f)
+
+    def _leave(self, f: int) -> None:
+        self._alive[f] = False
+        for edge in self._edges(f):
+            self._at_edge[edge].remove(f)
