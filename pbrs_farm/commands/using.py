@@ -31,7 +31,9 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("view", type=Path, help="a view's folder: OUT/houses/<house>/views/<view>")
     p.add_argument("--indoor", type=float, default=1.0, help="factor of the lamps (default 1)")
     p.add_argument("--outdoor", type=float, default=1.0, help="factor of the sky (default 1)")
-    p.add_argument("--out", type=Path, default=None, help="PNG to write (default VIEW_relit.png here)")
+    p.add_argument(
+        "--out", type=Path, default=None, help="PNG to write (default VIEW_relit.png here)"
+    )
     p.add_argument("--no-denoise", action="store_true", help="develop the raw radiance")
 
 

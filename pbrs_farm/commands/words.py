@@ -61,4 +61,8 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
         overrides["read.strict"] = "true"
     if getattr(args, "cameras", None):
         overrides["cameras.source"] = args.cameras
+    if getattr(args, "per_sector", None):
+        overrides["cameras.per_sector"] = str(args.per_sector)
+    if getattr(args, "exact", False):
+        overrides["cameras.exact"] = "true"
     return recipe_from_name(args.recipe, overrides)

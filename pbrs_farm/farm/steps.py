@@ -8,7 +8,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,15 @@ from pbrs_farm.farm import plan
 from pbrs_farm.farm.loaded import LoadedHouse
 from pbrs_farm.farm.marked import Made, Outcome, Work, read_marker, required_source, run_marked
 from pbrs_farm.farm.records import json_bytes, plain_from_view, views_from_json
-from pbrs_farm.farm.sources import read_house
+from pbrs_farm.farm.sources import SourceRef, read_house
 from pbrs_farm.farm.view_histogram import histogram_json
 from pbrs_farm.house import House, geometry_from_house
 from pbrs_farm.layers import LAYER
 from pbrs_farm.lighting import ALL_MODES
 from pbrs_farm.recipe import Recipe
+
+if TYPE_CHECKING:
+    from pbrs_farm.repair import RepairReport
 
 
 def _loaded(work: Work) -> LoadedHouse:
@@ -47,19 +50,11 @@ def _view_at_size(work: Work, loaded: LoadedHouse) -> tuple[View, Camera]:
 
 def _house(work: Work) -> Made:
     from pbrs_farm.read.bundle import bundle_from_house
-    from pbrs_farm.repair import repair
-    from pbrs_farm.transport.caster import Caster
 
     source = required_source(work)
-    house = read_house(source, work.recipe.read)
-    if house.id != work.house_id:
-        raise BadInput(source.location, house.id, f"expected house {work.house_id}")
-    _check_strict(house, work.recipe)
-
-    def occluder_from(some: House) -> Caster:
-        return Caster(geometry_from_house(some))
-
-    repaired, report = repair(house, work.recipe.repair, occluder_from=occluder_from)
+    repaired, report = repaired_house(source, work.recipe)
+    if repaired.id != work.house_id:
+        raise BadInput(source.location, repaired.id, f"expected house {work.house_id}")
     glb, description = bundle_from_house(repaired)
     files = {"house.glb": glb, "house.json": description, "repair.json": json_bytes(report)}
     facts = {
@@ -68,6 +63,20 @@ def _house(work: Work) -> Made:
         "notes": len(repaired.notes),
     }
     return Made(files, facts)
+
+
+def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
+    """The house of a source, read and repaired, and what was changed. Raises BadHouse."""
+    from pbrs_farm.repair import repair
+    from pbrs_farm.transport.caster import Caster
+
+    house = read_house(source, recipe.read)
+    _check_strict(house, recipe)
+
+    def occluder_from(some: House) -> Caster:
+        return Caster(geometry_from_house(some))
+
+    return repair(house, recipe.repair, occluder_from=occluder_from)
 
 
 def _check_strict(house: House, recipe: Recipe) -> None:
@@ -81,13 +90,18 @@ def _cameras(work: Work) -> Made:
     from pbrs_farm.sample import cameras
 
     loaded = _loaded(work)
-    seed = keys.seed(work.house_id, "cameras", work.recipe.digest("cameras"))
+    seed = camera_seed(work.house_id, work.recipe)
     views, report = cameras(
         loaded.house, work.recipe.cameras, seed=seed, counter=loaded.caster.item_counts
     )
     plain = {"views": [plain_from_view(v) for v in views], "report": report.model_dump(mode="json")}
     facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
     return Made({"cameras.json": json_bytes(plain)}, facts)
+
+
+def camera_seed(house_id: str, recipe: Recipe) -> int:
+    """The sampler's seed for a house under a recipe."""
+    return keys.seed(house_id, "cameras", recipe.digest("cameras"))
 
 
 def _truth(work: Work) -> Made:

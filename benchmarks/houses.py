@@ -1,0 +1,115 @@
+"""Reading and repairing: each example home on one core, a 300-node SUNCG house, and the leak meter."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.report import write_report
+
+SUNCG = "suncg300"
+
+
+def main() -> None:
+    """Measure every home in a process of its own and write out/bench/houses.json."""
+    from pbrs_farm import homes
+
+    homes.fetch()
+    names = [home.name for home in homes.example_homes()]
+    print(
+        f"{'home':<34}{'read s':>8}{'repair s':>9}{'all s':>7}{'MB':>6}{'triangles':>11}{'leaks':>7}{'closed':>8}"
+    )
+    rows = [_measured(name) for name in [*names, SUNCG]]
+    real, suncg = rows[:-1], rows[-1]
+    figures = {
+        "houses.worst_s": max(r["seconds"] for r in real),
+        "houses.worst_mb": max(r["mb"] for r in real),
+        "houses.suncg300_s": suncg["seconds"],
+        "houses.leak_max": max(r["n_sky"] for r in real),
+        "houses.leak_rays": sum(r["n_rays"] for r in real),
+        "houses.closed_share_min": min(r["closed_share"] for r in real),
+    }
+    units = {
+        "houses.worst_s": "s, one core, read + repair + leak meter",
+        "houses.worst_mb": "MB resident, one process",
+        "houses.suncg300_s": "s, one core, 300 nodes, built in code",
+        "houses.leak_max": "rays that reach the sky, of the worst home",
+        "houses.leak_rays": "rays over all homes",
+        "houses.closed_share_min": "share of the floor area in closed rooms, of the worst home",
+    }
+    write_report("houses", figures, units)
+
+
+def _measured(name: str) -> dict[str, Any]:
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.houses", name], capture_output=True, text=True
+    )
+    if done.returncode:
+        raise RuntimeError(f"{name}: {done.stderr.strip().splitlines()[-1:]}")
+    row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    print(
+        f"{name:<34}{row['read_s']:>8.2f}{row['repair_s']:>9.2f}{row['seconds']:>7.2f}{row['mb']:>6}"
+        f"{row['triangles']:>11}{row['n_sky']:>7}{row['closed_share']:>8.2f}",
+        flush=True,
+    )
+    return row
+
+
+def measure(name: str) -> dict[str, Any]:
+    """Read and repair one home on one core of this process."""
+    import resource
+
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    from pbrs_farm.farm.sources import read_house
+    from pbrs_farm.house import geometry_from_house
+    from pbrs_farm.recipe import Recipe
+    from pbrs_farm.repair import repair
+    from pbrs_farm.transport.caster import Caster
+    from pbrs_farm.transport.variant import set_threads
+
+    recipe = Recipe()
+    with tempfile.TemporaryDirectory() as folder:
+        source = _source(name, Path(folder))
+        set_threads(1)
+        started = time.perf_counter()
+        house = read_house(source, recipe.read)
+        read_s = time.perf_counter() - started
+        repaired, report = repair(
+            house, recipe.repair, occluder_from=lambda h: Caster(geometry_from_house(h))
+        )
+        seconds = time.perf_counter() - started
+    leaks = report.leaks
+    return {
+        "read_s": round(read_s, 2),
+        "repair_s": round(seconds - read_s, 2),
+        "seconds": round(seconds, 2),
+        "mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000),
+        "triangles": sum(item.n_faces for item in repaired.items),
+        "n_sky": leaks.n_sky if leaks else -1,
+        "n_rays": leaks.n_rays if leaks else 0,
+        "closed_share": round(leaks.closed_share, 3) if leaks else 0.0,
+    }
+
+
+def _source(name: str, folder: Path) -> Any:
+    from pbrs_farm.farm.sources import resolve
+
+    if name != SUNCG:
+        return resolve(name)
+    from tests.read.suncg_root import write_large_root
+
+    house_id = write_large_root(folder, n_nodes=300)
+    return resolve(str(folder / "house" / house_id))
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        print(json.dumps(measure(sys.argv[1])))
+    else:
+        main()
