@@ -83,6 +83,17 @@ def test_a_mitre_stops_at_twice_the_thickness() -> None:
     assert reach <= 2.0 + 2 * 0.1 + 1e-5
 
 
+def test_a_wall_shorter_than_its_neighbours_are_thick_stays_sound() -> None:
+    house = read(
+        "<wall id='a' wallAtEnd='b' xStart='-200' yStart='0' xEnd='0' yEnd='0' thickness='60'/>"
+        "<wall id='b' wallAtStart='a' wallAtEnd='c' xStart='0' yStart='0' xEnd='5' yEnd='5' thickness='10'/>"
+        "<wall id='c' wallAtStart='b' xStart='5' yStart='5' xEnd='-60' yEnd='200' thickness='60'/>"
+    )
+    mesh = solid(item(house, "wall_b").surfaces)
+    assert mesh.is_watertight
+    assert mesh.volume > 0
+
+
 def test_an_arc_wall_bulges_to_its_left_and_keeps_its_ends() -> None:
     extent = math.pi / 2
     house = read(
@@ -226,6 +237,11 @@ def test_pieces_of_a_group_keep_their_own_coordinates() -> None:
     group = f"<furnitureGroup name='Set' x='999' y='999' angle='1' width='1' depth='1' height='1'>{piece('')}</furnitureGroup>"
     low, high = item(read(group), "piece_0").bounds
     assert (low + high) / 2 == pytest.approx([1.5, 0.25, 1.0], abs=1e-5)
+
+
+def test_a_shelf_unit_is_a_piece_like_any_other() -> None:
+    shelf = piece("", "<shelf elevation='0.5'/>", tag="shelfUnit")
+    assert item(read(shelf), "piece_0").bounds[1] == pytest.approx([2.5, 0.5, 1.5], abs=1e-5)
 
 
 def test_invisible_pieces_and_groups_are_left_out() -> None:

@@ -86,5 +86,10 @@ def _texture(
         return texture, looks.has_alpha(texture), paint.picture if texture else None
     if paint.colour is not None or not base.map_kd or mesh.uvs is None:
         return None, False, None
-    texture = looks.texture_id(content_name(model.folder, base.map_kd), f"material {base.name}")
+    place = f"material {base.name}"
+    texture = looks.texture_id(content_name(model.folder, base.map_kd), place)
+    if base.map_d and base.map_d != base.map_kd:
+        looks.note(
+            "unused-opacity-map", place, f"{base.map_d[:80]!r} is not the colour map's alpha"
+        )
     return texture, looks.has_alpha(texture), None

@@ -26,7 +26,9 @@ from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
 from pbrs_farm.read.sweethome3d.walls import wall_items
 from pbrs_farm.recipe import ReadFields
 
-HARMLESS = frozenset({"unmapped-class", "hidden-level", "degenerate-faces", "unknown-material"})
+HARMLESS = frozenset(
+    {"unmapped-class", "hidden-level", "degenerate-faces", "unknown-material", "unused-opacity-map"}
+)
 """Notes that are no faults: reading strictly passes over them."""
 
 ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from pbrs_farm.arrays import Points2
 from pbrs_farm.read.sweethome3d.plan import PlanWall
@@ -46,8 +47,15 @@ def outlines_of(walls: tuple[PlanWall, ...]) -> dict[str, Outline]:
             if other is None or other_id not in bare or other_id == wall_id:
                 continue
             _join(wall, other, at_start, (left, right), bare, order)
-        joined[wall_id] = Outline(left, right, outline.along)
+        mitred = Outline(left, right, outline.along)
+        joined[wall_id] = mitred if _is_sound(mitred, outline) else outline
     return joined
+
+
+def _is_sound(mitred: Outline, bare: Outline) -> bool:
+    # Mitres of a wall shorter than its neighbours are thick can cross each other.
+    a, b = shapely.Polygon(mitred.polygon), shapely.Polygon(bare.polygon)
+    return bool(a.is_valid and (a.exterior.is_ccw == b.exterior.is_ccw or not b.is_valid))
 
 
 def _has_size(wall: PlanWall) -> bool:

@@ -15,7 +15,7 @@ from pbrs_farm.arrays import Points2
 
 MAX_TEXT = 100_000
 MAX_POINTS = 20_000
-CURVE_STEPS = 12
+CURVE_STEPS = 16
 ARC_STEP_RAD = math.radians(7.5)
 
 _TOKEN = re.compile(r"([MmLlHhVvCcSsQqTtAaZz])|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
