@@ -24,6 +24,9 @@ SURFACE, MIRROR, GLASS, HOLE = 0, 1, 2, 3
 
 _MIRROR_REFLECTANCE: Final = 0.9
 _MIN_ALPHA: Final = 0.05
+MAX_ALBEDO: Final = 0.9
+"""Of any diffuse surface in the preset `physical`: the whitest paints reach it, 1 never ends."""
+
 _MAX_TEXTURE_PX: Final = 2048
 
 
@@ -86,6 +89,7 @@ def _physical(material: Material, recipe: Recipe) -> tuple[NDArray[np.float32], 
     """
     row = np.zeros(MATERIAL_FLOATS, np.float32)
     kd = linear_from_srgb(np.clip(np.nan_to_num(material.diffuse), 0, 1))
+    kd = np.minimum(kd, MAX_ALBEDO)
     ks_encoded = np.clip(np.nan_to_num(material.specular), 0, 1)
     ks = linear_from_srgb(ks_encoded)
     row[11] = SURFACE

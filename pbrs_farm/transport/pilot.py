@@ -1,7 +1,7 @@
 """Weights of lamps and outdoor techniques for one view, from a small picture per emitter.
 
 No effects. A home has 12 to 18 lamps and most shadow rays of a uniform choice go to other rooms.
-The pilot renders 64x48 pixels with each emitter alone, in one launch, and chooses in proportion to
+The pilot renders 32x24 pixels with each emitter alone, in one launch, and chooses in proportion to
 the root of the mean square that a path brings from it, with a floor so that nothing is forgotten.
 """
 
@@ -23,7 +23,7 @@ from pbrs_farm.transport.surface import Stage
 LAMP_FLOOR: Final = 0.01
 _SUN_FLOOR: Final = 0.1
 _DOME_FLOOR: Final = 0.05
-_PILOT_SIZE: Final = (64, 48)
+_PILOT_SIZE: Final = (32, 24)
 
 
 def uniform_weights(n_lamps: int, n_portals: int) -> Weights:

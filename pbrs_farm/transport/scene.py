@@ -84,7 +84,7 @@ class LightScene:
             n = min(per_launch, fields.spp - first)
             lanes = Lanes(i.width_px, i.height_px, first, n, seed)
             sums = trace(self._stage, emitters, camera, lanes, fields)
-            total = sums if total is None else _added(total, sums)
+            total = sums if total is None else total + sums
         if total is None:
             raise RenderFailed("no samples", view=room_id, mode="light", seed=seed)
         facts: dict[str, Any] = {"integrator": "path", "seed": seed, "lamp_weights": weights}
@@ -107,20 +107,6 @@ class LightScene:
             emitters.with_weights(weights)
         names = [lamp.name for lamp in self.tables.lamps]
         return emitters, {n: float(w) for n, w in zip(names, weights.lamps, strict=True)}
-
-
-def _added(a: Any, b: Any) -> Any:
-    from pbrs_farm.transport.path import Sums
-
-    return Sums(
-        a.outdoor + b.outdoor,
-        a.indoor + b.indoor,
-        a.outdoor_even + b.outdoor_even,
-        a.indoor_even + b.indoor_even,
-        a.albedo + b.albedo,
-        a.normal + b.normal,
-        a.n_bad + b.n_bad,
-    )
 
 
 def _result(sums: Any, camera: Camera, spp: int, facts: dict[str, Any]) -> LightResult:

@@ -1,0 +1,277 @@
+"""One step of a path through the scene, shared by `path` and `metropolis`; kernels, no effects.
+
+At each vertex one shadow ray goes to the sky and one to a lamp, weighted against the scattered
+ray by the balance heuristic; an emitter that is met counts to its own group.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from pbrs_farm.camera import Camera
+from pbrs_farm.recipe import LightFields
+from pbrs_farm.transport.bsdf import Scatter, evaluate, sample, thin_glass_reflectance
+from pbrs_farm.transport.emitters import FIRST_PORTAL, Emitters
+from pbrs_farm.transport.materials import GLASS, MIRROR
+from pbrs_farm.transport.numbers import CAMERA_DIMS, VERTEX_DIMS, Numbers, opaque3
+from pbrs_farm.transport.surface import Hit, Stage, offset
+from pbrs_farm.transport.tables import NO_LAMP
+
+MAX_NULLS = 32
+_LOBE, _SCATTER, _ROULETTE, _LAMP, _LAMP_UV, _OUT, _OUT_UV = 0, 1, 3, 4, 5, 7, 8
+
+
+class CameraRow(NamedTuple):
+    """A camera as opaque device values: another camera is no new kernel."""
+
+    eye: Any
+    d0: Any
+    du: Any
+    dv: Any
+
+
+class FieldsRow(NamedTuple):
+    """The recipe's numbers as opaque device values."""
+
+    max_depth: Any
+    rr_depth: Any
+    is_tent: Any
+
+
+class Only(NamedTuple):
+    """Which emitters count: -1 all of the group, -2 none, else that lamp or technique alone."""
+
+    lamp: Any
+    outdoor: Any
+
+
+@dataclass
+class Walk:
+    """A path under way.
+
+    o, d: its ray. beta: throughput. depth: vertices so far, glass passed and holes not counted;
+    nulls: those. last_p, last_density: where and with which density the direction was drawn, 0
+    = behind the camera, a mirror or glass.
+    """
+
+    o: mi.Point3f
+    d: mi.Vector3f
+    beta: mi.Color3f
+    depth: mi.UInt32
+    nulls: mi.UInt32
+    last_p: mi.Point3f
+    last_density: mi.Float
+
+
+class Found(NamedTuple):
+    """What one step brought, throughput included.
+
+    met_*: from an emitter the ray met, by `segments` = the walk's depth before + 1 segments;
+    lit_*: from shadow rays at the new vertex, one segment more than its depth.
+    is_rough: the vertex is neither mirror nor glass; albedo, normal: of it. missed: no surface.
+    """
+
+    met_outdoor: Any
+    met_indoor: Any
+    lit_outdoor: Any
+    lit_indoor: Any
+    is_rough: Any
+    missed: Any
+    albedo: Any
+    normal: Any
+
+
+def camera_row(camera: Camera) -> CameraRow:
+    """Device values: the direction at pixel coordinates (u, v) is d0 + u du + v dv."""
+    i, r = camera.intrinsics, camera.world_from_camera[:3, :3]
+    d0 = r @ np.array([-i.cx / i.fx, i.cy / i.fy, -1.0])
+    return CameraRow(
+        opaque3(mi.Point3f, camera.eye),
+        opaque3(mi.Vector3f, d0),
+        opaque3(mi.Vector3f, r[:, 0] / i.fx),
+        opaque3(mi.Vector3f, -r[:, 1] / i.fy),
+    )
+
+
+def fields_row(fields: LightFields, *, max_depth: int | None = None) -> FieldsRow:
+    """Device values of the fields the kernels use; max_depth replaces the fields' own."""
+    return FieldsRow(
+        dr.opaque(mi.UInt32, fields.max_depth if max_depth is None else max_depth),
+        dr.opaque(mi.UInt32, fields.rr_depth),
+        dr.opaque(mi.Bool, fields.filter == "tent"),
+    )
+
+
+def film_position(u: Any, is_tent: Any) -> Any:
+    """Position relative to a pixel's corner, spread by the reconstruction filter."""
+    tent = mi.Point2f(_tent(u.x), _tent(u.y)) + 0.5
+    return dr.select(is_tent, tent, u)
+
+
+def start(camera: CameraRow, x: Any, y: Any) -> Walk:
+    """The walk that leaves the camera through film position (x, y), in pixels."""
+    d = dr.normalize(camera.d0 + x * camera.du + y * camera.dv)
+    return Walk(
+        mi.Point3f(camera.eye),
+        mi.Vector3f(d),
+        mi.Color3f(1),
+        mi.UInt32(0),
+        mi.UInt32(0),
+        mi.Point3f(camera.eye),
+        mi.Float(0),
+    )
+
+
+def advance(
+    stage: Stage,
+    emitters: Emitters,
+    fields: FieldsRow,
+    numbers: Numbers,
+    walk: Walk,
+    only: Only,
+    active: Any,
+) -> tuple[Walk, Found, Any]:
+    """(the walk one vertex on, what that brought, whether it goes on)."""
+    hit = stage.hit(walk.o, walk.d, active)
+    missed = active & ~hit.valid
+    met_outdoor, met_indoor = _met(emitters, walk, hit, only, missed)
+
+    # Kinds of surface.
+    m = hit.scatter
+    solid = hit.valid & ~hit.is_hole
+    glass, mirror = solid & (m.kind == GLASS), solid & (m.kind == MIRROR)
+    rough = solid & ~glass & ~mirror
+    depth = walk.depth + dr.select(solid & ~glass, mi.UInt32(1), 0)
+    dim = CAMERA_DIMS + VERTEX_DIMS * dr.minimum(depth + walk.nulls, 64)
+    frame = mi.Frame3f(hit.n)
+    wi = frame.to_local(-walk.d)
+    wi.z = dr.maximum(wi.z, 1e-4)
+
+    # Light that comes straight from an emitter.
+    go_on = rough & (depth < fields.max_depth)
+    lit_outdoor, lit_indoor = direct(stage, emitters, hit, frame, wi, numbers, dim, only, go_on)
+    found = Found(
+        met_outdoor,
+        met_indoor,
+        walk.beta * lit_outdoor,
+        walk.beta * lit_indoor,
+        rough,
+        missed,
+        dr.minimum(m.kd + m.f0 + m.tau, 1),
+        hit.n,
+    )
+
+    # Scatter. Glass and mirrors keep one direction; what passes glass straight is no vertex.
+    lobe = numbers.one(dim + _LOBE)
+    wo = sample(m, wi, lobe, numbers.two(dim + _SCATTER))
+    value, density = evaluate(m, wi, wo)
+    ahead = mi.Vector3f(frame.to_world(wo))
+    bounced = go_on & (dr.dot(hit.ng, ahead) * wo.z > 0) & (density > 0)
+    reflected = mirror | (glass & (lobe < thin_glass_reflectance(wi.z)))
+    bent = walk.d - 2 * dr.dot(hit.n, walk.d) * hit.n
+    may_pass = walk.nulls < MAX_NULLS
+    mirrored = reflected & may_pass & (depth < fields.max_depth) & (dr.dot(bent, hit.ng) > 0)
+    passed = ((glass & ~reflected) | (hit.valid & hit.is_hole)) & may_pass
+    beta = walk.beta * _factor(m, value, density, rough, mirror, glass & passed)
+
+    # Roulette.
+    q = dr.minimum(dr.max(beta), 0.95)
+    tested = bounced & (depth >= fields.rr_depth)
+    survives = ~tested | (numbers.one(dim + _ROULETTE) < q)
+    alive = (bounced | mirrored | passed) & survives & (dr.max(beta) > 0)
+    beta = dr.select(tested, beta * dr.rcp(dr.maximum(q, 1e-6)), beta)
+
+    d = dr.select(bounced, ahead, dr.select(mirrored, mi.Vector3f(bent), walk.d))
+    outward = dr.select(dr.dot(d, hit.ng) > 0, hit.ng, -hit.ng)
+    following = Walk(
+        o=offset(hit.p, outward),
+        d=d,
+        beta=beta,
+        depth=depth,
+        nulls=walk.nulls + dr.select(passed | (glass & mirrored), mi.UInt32(1), 0),
+        last_p=dr.select(bounced, hit.p, walk.last_p),
+        last_density=dr.select(bounced, density, dr.select(mirrored, 0, walk.last_density)),
+    )
+    return following, found, alive
+
+
+def direct(
+    stage: Stage,
+    emitters: Emitters,
+    hit: Hit,
+    frame: Any,
+    wi: Any,
+    numbers: Numbers,
+    dim: Any,
+    only: Only,
+    active: Any,
+) -> tuple[Any, Any]:
+    """(outdoor, indoor) light scattered towards wi, one shadow ray each, before throughput."""
+    uv_out, uv_lamp = numbers.two(dim + _OUT_UV), numbers.two(dim + _LAMP_UV)
+    out = emitters.sample_outdoor(
+        hit.p, numbers.one(dim + _OUT), uv_out, only.outdoor, active & (only.outdoor > -2)
+    )
+    lamp = emitters.sample_lamp(
+        stage, hit.p, numbers.one(dim + _LAMP), uv_lamp, only.lamp, active & (only.lamp > -2)
+    )
+    # The pilot draws a portal's light through the portal alone.
+    alone = only.outdoor >= FIRST_PORTAL
+    result = []
+    for to in (out, lamp):
+        wo = frame.to_local(to.d)
+        value, density = evaluate(hit.scatter, wi, wo)
+        # Light may not come through the face when the shading normal says it does not.
+        side = dr.dot(hit.ng, to.d)
+        lit = to.valid & (side * wo.z > 0) & (dr.max(value) > 0) & (to.density > 0)
+        weight = 1 / (to.density + dr.select(alone, 0, density))
+        begin = offset(hit.p, dr.select(side > 0, hit.ng, -hit.ng))
+        # Aim again from the moved start: a lamp near by must not shadow itself.
+        aim = hit.p + to.d * to.distance - begin
+        reach = dr.norm(aim)
+        is_near = to.distance < dr.inf
+        way = dr.select(is_near, aim / reach, to.d)
+        far = dr.select(is_near, reach * (1 - 1e-4), dr.inf)
+        clear = stage.transmittance(begin, way, far, lit)
+        result.append(dr.select(lit, value * to.radiance * clear * weight, 0))
+    return result[0], result[1]
+
+
+def _met(emitters: Emitters, walk: Walk, hit: Hit, only: Only, missed: Any) -> tuple[Any, Any]:
+    """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled."""
+    by_scatter = walk.last_density > 0
+    # What the camera sees directly needs no choice: the pilot leaves it out.
+    counts = (only.lamp == -1) | (only.outdoor == -1) | by_scatter
+
+    def weight(density: Any) -> Any:
+        return dr.select(by_scatter, walk.last_density / (walk.last_density + density), 1)
+
+    sun, sun_density = emitters.sun(walk.d, only.outdoor)
+    dome, dome_density = emitters.dome(walk.last_p, walk.d, only.outdoor, missed)
+    # The pilot of a portal counts what is drawn through it only.
+    wanted = (only.outdoor > -2) & (only.outdoor < FIRST_PORTAL)
+    sees_sky = missed & counts & emitters.has_sky & wanted
+    sky = sun * weight(sun_density) + dome * weight(dome_density)
+    glows = hit.valid & counts & (only.lamp > -2) & (hit.lamp != NO_LAMP)
+    glow, lamp_density = emitters.hit_lamp(
+        hit.lamp, dr.norm(hit.p - walk.last_p), dr.dot(walk.d, hit.ng), only.lamp, glows
+    )
+    return (
+        dr.select(sees_sky, walk.beta * sky, 0),
+        dr.select(glows, walk.beta * glow * weight(lamp_density), 0),
+    )
+
+
+def _factor(m: Scatter, value: Any, density: Any, rough: Any, mirror: Any, passed: Any) -> Any:
+    """What the throughput is multiplied by."""
+    factor = dr.select(rough, value / density, mi.Color3f(1))
+    factor = dr.select(mirror, m.f0, factor)
+    return dr.select(passed, m.tau, factor)
+
+
+def _tent(u: Any) -> Any:
+    return dr.select(u < 0.5, dr.sqrt(2 * u) - 1, 1 - dr.sqrt(dr.maximum(2 - 2 * u, 0)))
