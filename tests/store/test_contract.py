@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.errors import ObjectMissing, StoreFailed
-from pbrs_farm.store import MemoryStore, Store, StoreSettings, store_from_url
+from pbrs_farm.settings import settings_from_environment
+from pbrs_farm.store import MemoryStore, Store, store_from_url
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.store.s3 import S3Settings
 
 
 def s3_store() -> Store:
@@ -21,15 +21,10 @@ def s3_store() -> Store:
     endpoint = os.environ.get("PBRS_S3_ENDPOINT")
     if not endpoint:
         pytest.skip("PBRS_S3_ENDPOINT is not set")
-    settings = S3Settings(
-        endpoint=endpoint,
-        access_key=os.environ.get("AWS_ACCESS_KEY_ID", ""),
-        secret_key=os.environ.get("AWS_SECRET_ACCESS_KEY", ""),  # type: ignore[arg-type]
-        allow_http=endpoint.startswith("http:"),
-        patience_s=5.0,
-    )
+    found = settings_from_environment().store
+    settings = found.model_copy(update={"s3": found.s3.model_copy(update={"patience_s": 5.0})})
     bucket = os.environ.get("PBRS_S3_BUCKET", "pbrs")
-    return store_from_url(f"s3://{bucket}/t-{secrets.token_hex(4)}", StoreSettings(s3=settings))
+    return store_from_url(f"s3://{bucket}/t-{secrets.token_hex(4)}", settings)
 
 
 @pytest.fixture(params=["memory", "folder", "fsync", pytest.param("s3", marks=pytest.mark.infra)])

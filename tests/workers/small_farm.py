@@ -15,7 +15,8 @@ from pathlib import Path
 from pydantic import SecretStr
 
 from pbrs_farm.recipe import recipe_from_name
-from pbrs_farm.store import StoreSettings
+from pbrs_farm.settings import settings_from_environment
+from pbrs_farm.store import Store, StoreSettings
 from pbrs_farm.store.folder import FolderStore
 from tests.workers.fake_runner import FakeRunner, groups_of
 from tests.workers.redis_server import RedisServer
@@ -30,12 +31,14 @@ REPO = Path(__file__).parents[2]
 class SmallFarm:
     """Starts processes and ends every one of them; `control` steers the fake runner."""
 
-    def __init__(self, folder: Path, redis: RedisServer, **settings: object) -> None:
+    def __init__(
+        self, folder: Path, redis: RedisServer, *, s3: Store | None = None, **settings: object
+    ) -> None:
         self.folder = folder
         self.redis = redis
         self.control = folder / "control"
         self.control.mkdir(parents=True)
-        self.store = FolderStore(folder / "store")
+        self.store: Store = s3 or FolderStore(folder / "store")
         self._settings = {
             "lease_s": 3, "beat_s": 0.5, "retry_delay_s": 0.1, "resend_s": 3, "breaker_s": 12,
             "grace_s": 30, "storage_patience_s": 60, "min_free_mb": 1, **settings,
@@ -45,7 +48,7 @@ class SmallFarm:
             FarmConfig(
                 redis_url=SecretStr(redis.url),
                 store_url=self.store.url,
-                store=StoreSettings(),
+                store=settings_from_environment().store if s3 else StoreSettings(),
                 runner="tests.workers.fake_runner:runner",
             )
         )
@@ -54,7 +57,10 @@ class SmallFarm:
         self.houses: list[str] = []
 
     def environment(self, worker: str, slots: int = 1) -> dict[str, str]:
-        env = {k: v for k, v in os.environ.items() if not k.startswith("PBRS_")}
+        keep = ("PBRS_S3_",) if self.store.url.startswith("s3:") else ()
+        env = {
+            k: v for k, v in os.environ.items() if not k.startswith("PBRS_") or k.startswith(keep)
+        }
         env |= {f"PBRS_FARM_{k.upper()}": str(v) for k, v in self._settings.items()}
         scratch = self.folder / "scratch"
         scratch.mkdir(exist_ok=True)

@@ -1,0 +1,156 @@
+"""The farm from outside: submitting, looking, what bad input says, metrics, merging."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.errors import BadInput, BadRecipe, MachineFailed
+from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.store import MemoryStore
+from tests.workers.drive import Drive
+from tests.workers.redis_server import free_port
+from workers.cli import add_verbs
+from workers.client import Farm, completed, new_spec
+from workers.config import FarmConfig
+from workers.job import HouseEntry, JobSpec, job_key, lines_from_houses
+from workers.ledger import Fault
+from workers.merge import merge_job, merge_shard
+from workers.metrics import serve_metrics
+
+HOUSES = [HouseEntry(house_id=f"h{k}", source="{}") for k in range(3)]
+
+
+@pytest.fixture
+def farm(config: FarmConfig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Farm:
+    monkeypatch.setenv("PBRS_TEST_CONTROL", str(tmp_path))
+    return Farm(config.model_copy(update={"runner": "tests.workers.fake_runner:runner"}))
+
+
+def submit(farm: Farm) -> Drive:
+    job = farm.submit(HOUSES, new_spec(recipe_from_name("preview")))
+    return Drive(farm.ledger, farm.spec(job.job_id))
+
+
+def test_a_job_submitted_twice_is_one_job(farm: Farm) -> None:
+    first = farm.submit(HOUSES, new_spec(recipe_from_name("preview")))
+    again = farm.submit(HOUSES[::-1], new_spec(recipe_from_name("preview")))
+    assert (first.was, again.was) == ("", "running")
+    assert first.job_id == again.job_id == farm.newest_job()
+    assert farm.view(first.job_id).n_waiting_houses == 3
+
+
+def test_another_recipe_in_the_same_store_is_refused_with_what_differs(farm: Farm) -> None:
+    submit(farm)
+    with pytest.raises(BadRecipe, match=r"light\.spp: 16 -> 64"):
+        farm.submit(HOUSES, new_spec(recipe_from_name("fast")))
+    assert len(farm.jobs()) == 1
+
+
+def test_status_counts_what_runs_and_why_says_what_waits(farm: Farm) -> None:
+    d = submit(farm)
+    tasks = d.feed()
+    d.run(tasks[0])
+    d.claim(tasks[1])
+    status = farm.status(d.job.job_id)
+    geometry = status["stages"][0]
+    assert (geometry["done"], geometry["running"], geometry["queued"]) == (1, 1, 1)
+    json.dumps(status)
+    (row,) = farm.why(d.job.job_id, tasks[1])
+    assert row["state"] == "running"
+    assert row["worker"] == "w1"
+    assert farm.why(d.job.job_id, "h0/a")[0]["views"] == ["a", "b"]
+    with pytest.raises(BadInput, match="no such house"):
+        farm.why(d.job.job_id, "nobody")
+    with pytest.raises(BadInput, match="no such task or view"):
+        farm.why(d.job.job_id, "h0/zzz")
+
+
+def test_failures_alike_stand_together(farm: Farm) -> None:
+    d = submit(farm)
+    for number, task in enumerate(d.feed()):
+        fault = Fault(fault="data", fingerprint="data: wall w#", message=f"wall w{number}")
+        farm.ledger.fail(d.job.job_id, task, d.claim(task).token, fault, delay_s=0)
+    (group,) = farm.failures(d.job.job_id)
+    assert group["n"] == 3
+    assert group["tasks"] == ["h0/-/geometry", "h1/-/geometry", "h2/-/geometry"]
+    assert len(farm.retry(d.job.job_id)) == 3
+    assert farm.failures(d.job.job_id) == []
+
+
+def test_what_is_not_there_is_one_line(farm: Farm) -> None:
+    with pytest.raises(BadInput, match="no job in the ledger"):
+        farm.newest_job()
+    with pytest.raises(BadInput, match="not in the ledger"):
+        farm.status("0" * 12)
+    with pytest.raises(BadInput, match="not a job"):
+        farm.status("nonsense")
+    with pytest.raises(BadInput, match="no such worker"):
+        farm.drain("nobody")
+    with pytest.raises(MachineFailed, match="no store"):
+        _ = Farm(farm.config.model_copy(update={"store_url": ""})).store
+
+
+def test_recover_takes_up_a_cancelled_job(farm: Farm) -> None:
+    d = submit(farm)
+    d.feed()
+    farm.cancel(d.job.job_id)
+    farm.submit(HOUSES, new_spec(recipe_from_name("preview")))
+    assert d.state == "running"
+    d.run_all()
+    assert d.state == "done"
+
+
+def test_the_metrics_endpoint_counts_without_naming_houses(farm: Farm) -> None:
+    d = submit(farm)
+    d.run(d.feed()[0])
+    port = free_port()
+    server, thread = serve_metrics(
+        farm.config.model_copy(update={"metrics_port": port}), farm.ledger
+    )
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
+            text = answer.read().decode()
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+    labels = f'{{job="{d.job.job_id}",stage="geometry"}}'
+    assert f"pbrs_tasks_done_total{labels} 1.0" in text
+    assert f"pbrs_task_seconds_count{labels} 1.0" in text
+    assert "pbrs_up 1.0" in text
+    assert "h0" not in text
+
+
+def test_merging_goes_upward_twice_the_same_and_says_what_is_missing() -> None:
+    store = MemoryStore()
+    spec: JobSpec
+    houses, spec = completed(HOUSES, new_spec(recipe_from_name("preview"), rules={"shard_size": 2}))
+    store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
+    for house in ("h0", "h2", "other"):
+        line = json.dumps({"key": f"houses/{house}/house.glb"}) + "\n"
+        store.put(f"houses/{house}/manifest.jsonl", line.encode())
+    store.put("manifest.jsonl", store.get("houses/other/manifest.jsonl"))
+    for _ in range(2):
+        merge_shard(store, spec, 0, lambda _step: None)
+        merge_job(store, spec, lambda _step: None)
+        report = json.loads(store.get(job_key(spec.job_id, "report.json")))
+        assert report["houses_missing"] == ["h1"]
+        rows = [json.loads(x)["key"] for x in store.get("manifest.jsonl").splitlines()]
+        assert rows == [f"houses/{h}/house.glb" for h in ("h0", "h2", "other")]
+
+
+def test_the_verbs_parse_and_dry_run_touches_nothing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    parser = argparse.ArgumentParser()
+    add_verbs(parser.add_subparsers(), argparse.ArgumentParser(add_help=False))
+    words = ["submit", "builtin", "--recipe", "preview", "--dry-run", "--json"]
+    args = parser.parse_args([*words, "--store", str(tmp_path / "none")])
+    assert args.handler(args) == 0
+    assert json.loads(capsys.readouterr().out)["houses"] == 1
+    assert not (tmp_path / "none").exists()

@@ -1,0 +1,162 @@
+"""The parts of the farm that only compute: groups, rates, faults, limits, texts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pbrs_farm.errors import (
+    BadHouse,
+    BadInput,
+    MachineFailed,
+    ObjectMissing,
+    StoreFailed,
+    StoreUnavailable,
+)
+from pbrs_farm.recipe import recipe_from_name
+from tests.workers.conftest import spec
+from workers.client import completed, new_spec
+from workers.estimate import estimate, seconds_per_view
+from workers.faults import class_of, fingerprint, without_numbers
+from workers.groups import groups_from_views
+from workers.houses import steps_of_stage
+from workers.ids import check_job_id, queue_of, stages_of_queue, task_from_text
+from workers.job import HouseEntry
+from workers.ledger import JobView
+from workers.memory import machine_mb, memory_limit_mb
+from workers.rates import Rates, quantile_s, stage_views
+from workers.show import duration_text
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 4), st.integers(0, 99)), unique=True, max_size=40),
+    st.floats(0.5, 1000),
+)
+def test_groups_hold_every_view_once_and_no_group_is_too_long(
+    pairs: list[tuple[int, int]], seconds: float
+) -> None:
+    views = [(f"r{room}_{k}", f"r{room}") for room, k in pairs]
+    groups = groups_from_views(views, seconds)
+    assert sorted(v for g in groups for v in g) == sorted(v for v, _room in views)
+    assert all(len(g) == 1 or len(g) * seconds <= 300 + 1e-6 for g in groups)
+
+
+def test_a_rooms_views_stay_together() -> None:
+    views = [(f"a{k}", "a") for k in range(6)] + [(f"b{k}", "b") for k in range(6)]
+    assert [len(g) for g in groups_from_views(views, 30.0)] == [6, 6]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a/b", "a/b/c", "a/0/gl/x", "../x/gl", "a/0/rm -rf", "a\n/0/gl", "a/0/gl\n"]
+)
+def test_a_task_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(BadInput, match="not a task"):
+        task_from_text(text)
+
+
+def test_ids_read_back() -> None:
+    assert str(task_from_text("studio-1a2b/3/light")) == "studio-1a2b/3/light"
+    assert str(task_from_text("-/s3/shard")) == "-/s3/shard"
+    with pytest.raises(BadInput):
+        check_job_id("../../etc")
+
+
+def test_every_stage_has_a_queue_and_back() -> None:
+    for stage in ("geometry", "gl", "light", "reduce", "shard", "job"):
+        for gpu in (False, True):
+            assert stage in stages_of_queue(queue_of(stage, gpu=gpu))
+    assert queue_of("light", gpu=True) == "light.gpu"
+
+
+def test_the_last_stage_of_a_group_writes_the_view() -> None:
+    both = spec(1)
+    assert steps_of_stage(both, "gl") == ("truth", "opengl_dl", "opengl_il")
+    assert steps_of_stage(both, "light")[-1] == "view"
+    only_gl = both.model_copy(update={"modes": ("opengl_dl",), "group_stages": ("gl",)})
+    assert steps_of_stage(only_gl, "gl") == ("truth", "opengl_dl", "view")
+
+
+@pytest.mark.parametrize(
+    ("error", "kind"),
+    [
+        (BadHouse("f", "p", "m"), "data"),
+        (StoreUnavailable("k", "m"), "storage"),
+        (StoreFailed("k", "m"), "storage"),
+        (ObjectMissing("k", "m"), "bug"),
+        (MachineFailed("m"), "machine"),
+        (MemoryError(), "resource"),
+        (KeyError("x"), "bug"),
+    ],
+)
+def test_errors_have_their_class(error: Exception, kind: str) -> None:
+    assert class_of(error) == kind
+
+
+def test_faults_alike_have_one_fingerprint() -> None:
+    one, other = ValueError("view 12 at 0x7f00 in /a/b.png"), ValueError("view 7 at 0x10 in /c.png")
+    assert fingerprint(one) == fingerprint(other)
+    assert fingerprint(one) != fingerprint(KeyError("view 12"))
+    assert len(without_numbers("x" * 1000)) == 160
+
+
+def test_rates_and_time_left_follow_the_counts() -> None:
+    fields = {"n_houses": "10", "stages": "gl,light", "shard_size": "500"}
+
+    def view(done: int, rates: dict[str, float]) -> JobView:
+        counts = {"done:geometry": 4.0, "groups": 8.0, "done:gl": float(done), "took:gl:3": 5.0}
+        return JobView("j", fields, counts, rates, 0)
+
+    rates = Rates()
+    rates.update(view(0, {}), 0.0)
+    now = rates.update(view(20, {}), 10.0)
+    assert now["gl"] == pytest.approx(2.0)
+    gl = next(s for s in stage_views(view(4, now), {"gl": 2}) if s.stage == "gl")
+    assert gl.total == 20  # 8 groups of 4 houses, 2 a house for the 6 to come
+    assert gl.eta_s == pytest.approx(16 / 2.0)
+    assert gl.p50_s == 8.0
+
+
+def test_a_quantile_is_the_upper_end_of_its_bucket() -> None:
+    assert quantile_s({0: 5, 3: 5}, 0.5) == 1.0
+    assert quantile_s({0: 5, 3: 5}, 0.9) == 8.0
+    assert quantile_s({}, 0.5) == 0.0
+
+
+def test_memory_is_the_containers_when_it_has_a_limit(tmp_path: Path) -> None:
+    limit = tmp_path / "memory.max"
+    limit.write_text("1073741824\n")
+    assert machine_mb((limit,)) == 1024
+    limit.write_text("max\n")
+    assert machine_mb((limit,)) == machine_mb(())
+    assert memory_limit_mb(2) == pytest.approx(memory_limit_mb(1) / 2)
+
+
+def test_an_estimate_grows_with_the_job() -> None:
+    small = estimate(spec(10), 2)
+    large = estimate(spec(1000), 2)
+    assert float(large["slot_hours"]) == pytest.approx(100 * float(small["slot_hours"]), rel=0.05)
+    assert seconds_per_view(recipe_from_name("fast")) > seconds_per_view(
+        recipe_from_name("preview")
+    )
+
+
+def test_a_job_is_the_same_job_in_any_order_and_another_with_another_recipe() -> None:
+    houses = [HouseEntry(house_id=h, sha256=h * 8) for h in "abc"]
+    preview = new_spec(recipe_from_name("preview"))
+    one = completed(houses, preview)[1].job_id
+    assert completed(houses[::-1], preview)[1].job_id == one
+    assert completed(houses, new_spec(recipe_from_name("fast")))[1].job_id != one
+    changed = [*houses[:2], HouseEntry(house_id="c", sha256="changed")]
+    assert completed(changed, preview)[1].job_id != one
+    with pytest.raises(BadInput, match="named twice"):
+        completed([*houses, houses[0]], preview)
+    with pytest.raises(BadInput, match="no house"):
+        completed([], preview)
+
+
+def test_durations_read_well() -> None:
+    told = [duration_text(s) for s in (None, 0.5, 42, 600, 7200, 200_000)]
+    assert told == ["-", "0.5s", "42s", "10m", "2.0h", "2.3d"]
