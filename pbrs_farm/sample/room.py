@@ -22,6 +22,7 @@ from pbrs_farm.sample.probes import Counter, counted
 from pbrs_farm.sample.report import RoomReport, SectorReport
 from pbrs_farm.sample.scores import (
     Scored,
+    is_filled_by_one,
     object_columns,
     paper_score,
     released_columns,
@@ -88,8 +89,7 @@ class RoomSampler:
         """Choose among a sector's candidates; writes their verdicts."""
         of_sector = np.flatnonzero(candidates.sector == sector)
         eligible = of_sector[verdict[of_sector] == Verdict.LOWER_SCORE]
-        coarse, share, largest = self._coarse(candidates, eligible)
-        filled = largest > self.fields.max_item_fraction
+        coarse, share, filled = self._coarse(candidates, eligible)
         if filled.any():
             verdict[eligible[filled]] = Verdict.FILLED_BY_ONE
             eligible, share, coarse = eligible[~filled], share[~filled], coarse.only(~filled)
@@ -124,25 +124,25 @@ class RoomSampler:
 
     def _coarse(
         self, candidates: Candidates, which: NDArray[np.intp]
-    ) -> tuple[choose.Coarse, NDArray[np.float32], NDArray[np.float64]]:
+    ) -> tuple[choose.Coarse, NDArray[np.float32], NDArray[np.bool_]]:
         """Coarse scores, each object's share of the picture when several views are wanted, and
-        the largest share any one item has, walls included."""
+        whether one object or one wall fills more of it than it may."""
         columns, fraction = self._columns(), self.fields.min_object_fraction
         keep = self.fields.per_sector > 1
         n = len(which)
         coarse = choose.Coarse(np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n))
         share = np.zeros((n, len(columns) if keep else 0), np.float32)
-        largest = np.zeros(n)
+        filled = np.zeros(n, bool)
         cameras = candidates.cameras(which, self._intrinsics(coarse=True))
         for part, rows in counted(self.counter, cameras, len(self.house.items)):
             scored = self._scored(rows)
             coarse.strict[part], coarse.score[part] = scored.n_objects, scored.score
             lenient = paper_score(rows, columns, fraction * choose.COARSE_SLACK)
             coarse.lenient[part] = lenient.n_objects
-            largest[part] = rows[:, 1:].max(1, initial=0) / rows.sum(1)
+            filled[part] = is_filled_by_one(rows, columns, self.fields)
             if keep:
                 share[part] = rows[:, columns] / rows.sum(1, keepdims=True)
-        return coarse, share, largest
+        return coarse, share, filled
 
     def _full(
         self, candidates: Candidates, which: NDArray[np.intp]

@@ -12,7 +12,7 @@ class Verdict(IntEnum):
     NEAR_OBSTACLE = 1  # closer to a triangle than the clearance
     NOT_ABOVE_FLOOR = 2  # a wall or a ceiling is below: inside a wall, or above a sloped ceiling
     ENCLOSED = 3  # inside a piece of furniture or a wall
-    FILLED_BY_ONE = 4  # one item covers more of the picture than max_item_fraction
+    FILLED_BY_ONE = 4  # one object or wall covers more of the picture than it may
     FEW_OBJECTS = 5  # too few objects cover enough of the picture
     LOWER_SCORE = 6  # kept every rule; another one of its sector scored higher
     WINNER = 7
