@@ -243,14 +243,14 @@ def json_lines(table: Any) -> bytes:
     """A line of JSON for each row; numbers with at most six decimals, null where not known."""
     names = table.column_names
     opened = [("{" if k == 0 else ",") + json.dumps(name) + ":" for k, name in enumerate(names)]
-    parts = []
-    for batch in table.to_batches(max_chunksize=65536):
+    file = io.BytesIO()  # getvalue does not copy: at the paper's scale this is 300 MB
+    for batch in table.to_batches(max_chunksize=16384):
         pieces: list[Any] = []
         for head, name in zip(opened, names, strict=True):
             pieces += [head, _json_values(batch.column(name))]
         lines = pc.binary_join_element_wise(*pieces, "}\n", "")
-        parts.append("".join(lines.to_pylist()))
-    return "".join(parts).encode()
+        file.write("".join(lines.to_pylist()).encode())
+    return file.getvalue()
 
 
 def _json_values(column: Any) -> Any:

@@ -115,4 +115,11 @@ def table_text(rows: Sequence[BinningRow], chosen: Binning) -> str:
             f"{r.colour_median:>6.3f}  {d} {r.binning.depth:>8} {100 * r.depth_passing:>5.1f} % "
             f"{r.depth_median:>6.3f}"
         )
+    coarsest = rows[0]
+    for name, passing in (
+        ("colour", coarsest.colour_passing),
+        ("depth", coarsest.depth_passing),
+    ):
+        if passing < MIN_PASSING:
+            lines.append(f"no binning lets {MIN_PASSING:.0%} pass by {name}: the coarsest is taken")
     return "\n".join(lines)

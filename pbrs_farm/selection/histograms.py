@@ -83,6 +83,8 @@ def coarser_colour(counts: NDArray[np.generic], shape: tuple[int, int, int]) -> 
     n = round(counts.shape[-1] ** (1 / 3))
     if n**3 != counts.shape[-1] or any(n % k for k in shape):
         raise ValueError(f"{counts.shape[-1]} colour bins cannot be summed to {shape}")
+    if shape == (n, n, n):
+        return counts
     a, b, c = shape
     cube = counts.reshape(*counts.shape[:-1], a, n // a, b, n // b, c, n // c)
     return np.asarray(cube.sum(axis=(-5, -3, -1))).reshape(*counts.shape[:-1], a * b * c)
@@ -92,6 +94,8 @@ def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generi
     """(..., n_bins) sums of neighbouring depth bins; ValueError if n_bins does not divide them."""
     if counts.shape[-1] % n_bins:
         raise ValueError(f"{counts.shape[-1]} depth bins cannot be summed to {n_bins}")
+    if n_bins == counts.shape[-1]:
+        return counts
     pairs = counts.reshape(*counts.shape[:-1], n_bins, counts.shape[-1] // n_bins)
     return np.asarray(pairs.sum(axis=-1))
 
@@ -99,4 +103,5 @@ def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generi
 def normalised(counts: NDArray[np.generic]) -> NDArray[np.float32]:
     """(..., bins) float32 shares that sum to 1; all zero where nothing was counted."""
     total = counts.sum(axis=-1, keepdims=True, dtype=np.float64)
-    return np.asarray(counts / np.where(total > 0, total, 1.0), np.float32)
+    total[total == 0] = 1.0
+    return np.asarray(np.divide(counts, total, dtype=np.float32, casting="same_kind"))

@@ -116,7 +116,11 @@ def test_the_finest_binning_that_95_percent_pass_is_chosen_for_each() -> None:
 
 
 def test_where_none_passes_the_coarsest_is_taken() -> None:
-    assert finest_passing([row(b, 0.5, 0.5) for b in BINNINGS]) == BINNINGS[0]
+    rows = [row(b, 0.5, 1.0) for b in BINNINGS]
+    chosen = finest_passing(rows)
+    assert (chosen.colour, chosen.depth) == ((2, 2, 2), 128)
+    assert "no binning lets 95% pass by colour" in table_text(rows, chosen)
+    assert "by depth" not in table_text(rows, chosen)
 
 
 def test_an_empty_a_single_and_a_blind_set_are_refused() -> None:
