@@ -110,11 +110,14 @@ def wall_prism(
     left_top_y: F64,
     right_top_y: F64,
     materials: tuple[int, int, int],
+    *,
+    top: int | None = None,
 ) -> tuple[Surface, ...]:
     """A wall as a closed solid: surfaces left, right, top, bottom, start, end.
 
     left, right: (N, 2) plan points from the wall's start to its end. *_top_y: (N,) heights.
-    materials: of the left side, of the right side, of all the rest. u runs to the right of who
+    materials: of the left side, the right side, and the rest (with the top, unless top is
+    given). u runs to the right of who
     looks at the side, v is the height above the wall's bottom.
     """
     left_low, right_low = _lifted(left, bottom_y), _lifted(right, bottom_y)
@@ -125,7 +128,7 @@ def wall_prism(
     return (
         _side("left", left_low[::-1], left_high[::-1], materials[0]),
         _side("right", right_low, right_high, materials[1]),
-        quads_surface("top", _strip(right_high, left_high), rest),
+        quads_surface("top", _strip(right_high, left_high), rest if top is None else top),
         quads_surface("bottom", _strip(left_low, right_low), rest),
         quads_surface("start", start, rest),
         quads_surface("end", end, rest),

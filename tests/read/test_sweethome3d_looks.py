@@ -215,3 +215,12 @@ def test_movable_parts_stand_as_the_home_keeps_them() -> None:
     back = item(house, "piece_0").surfaces[0].positions
     moved = back[np.isclose(back[:, 2], 0.5)]
     assert moved[:, 0].max() == pytest.approx(2.5)
+
+
+def test_a_walls_ends_wear_its_sides_colour_and_not_its_tops() -> None:
+    colours = "leftSideColor='FFFF0000' rightSideColor='FF0000FF' topColor='FF101010'"
+    house = read(WALLS.replace("id='a'", f"id='a' {colours}"))
+    names = [s.name for s in item(house, "wall_a").surfaces]
+    for name in ("start", "end", "bottom"):
+        assert look(house, "wall_a", names.index(name))[1].diffuse == (1.0, 0.0, 0.0)
+    assert look(house, "wall_a", names.index("top"))[1].diffuse == pytest.approx((16 / 255,) * 3)

@@ -15,7 +15,7 @@ from defusedxml.ElementTree import fromstring
 from pbrs_farm.errors import BadHouse
 from pbrs_farm.read.resources import Layered, Resources, ZipResources
 
-MAX_XML_BYTES = 128 * 2**20
+MAX_XML_BYTES = 16 * 2**20
 MAX_DEPTH = 200
 _RESAVE = "open it in Sweet Home 3D 5.3 or later and save it again"
 

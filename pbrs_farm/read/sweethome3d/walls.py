@@ -74,7 +74,7 @@ def _wall_item(
     materials = (
         looks.painted(wall.left, "wall", f"{place} left"),
         looks.painted(wall.right, "wall", f"{place} right"),
-        looks.painted(wall.top, "wall top", f"{place} top"),
+        looks.painted(wall.right if wall.left.is_empty else wall.left, "wall", place),
     )
     foot = level.elevation - level.reach_down
     left_top = level.elevation + top_heights(wall, outline.left, outline.along)
@@ -82,6 +82,7 @@ def _wall_item(
     surfaces = wall_prism(
         outline.left, outline.right, foot,
         np.maximum(left_top, foot + 1e-3), np.maximum(right_top, foot + 1e-3), materials,
+        top=looks.painted(wall.top, "wall top", f"{place} top"),
     )  # fmt: skip
     painted = tuple(
         _textured(s, paint, level.elevation)
