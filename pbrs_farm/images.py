@@ -25,8 +25,10 @@ MAX_PIXELS: Final = 16384 * 16384
 
 _FIXED_DATE: Final = "2000:01:01 00:00:00"
 
-# (libpng filter, zlib level), measured at 640x480 (python benchmarks/images.py): rows of labels
-# repeat the row above; photographs shrink best against the mean of left and above.
+# (libpng filter, zlib level), the best of those measured at 640x480 (18 combinations, busy
+# machine). Labels repeat the row above: 16-bit depth takes 5 ms and 10 kB, normals 11 ms and 4 kB
+# (libpng's own choice: 10 to 20 ms, same size). Photographs go by the mean of left and above:
+# 18 ms and 536 kB with noise of 3 levels (its own choice at level 6: 94 ms, 518 kB).
 _PNG_LABELS: Final = (32, 4)
 _PNG_PHOTO: Final = (64, 2)
 
