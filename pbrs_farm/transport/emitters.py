@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from pbrs_farm.frames import LUMINANCE
 from pbrs_farm.transport.numbers import device_array, opaque3
+from pbrs_farm.transport.portals import MAX_PORTALS
 from pbrs_farm.transport.sky import Sky, solid_angles
 from pbrs_farm.transport.surface import Stage
 from pbrs_farm.transport.tables import NO_LAMP, SceneTables
 
-MAX_PORTALS: Final = 6
 SUN, DOME, FIRST_PORTAL = 0, 1, 2
 
 

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from pbrs_farm.camera import Camera
 from pbrs_farm.frames import LUMINANCE
-from pbrs_farm.house import House, MaterialKind
 from pbrs_farm.recipe import LightFields
-from pbrs_farm.transport.emitters import DOME, FIRST_PORTAL, MAX_PORTALS, SUN, Emitters, Weights
+from pbrs_farm.transport.emitters import DOME, FIRST_PORTAL, SUN, Emitters, Weights
 from pbrs_farm.transport.path import Lanes, trace
 from pbrs_farm.transport.surface import Stage
 
@@ -86,39 +85,3 @@ def _with_floors(strength: NDArray[np.float64], floors: NDArray[np.float64]) -> 
     floored = np.maximum(share, floors)
     # Round, so that the last bits of a sum never change a picture.
     return np.asarray(np.round(floored / floored.sum(), 6))
-
-
-def portals_of_house(house: House) -> NDArray[np.float64]:
-    """(K, 4, 3) rectangles through which daylight enters: windows, and doors with panes."""
-    glazed = {
-        item.id
-        for item in house.items
-        if any(house.materials[s.material].kind is MaterialKind.PANE for s in item.surfaces)
-    }
-    quads = [
-        np.asarray(o.quad, np.float64)
-        for o in house.openings
-        if (o.is_window or o.item_id in glazed) and _is_rectangle(np.asarray(o.quad))
-    ]
-    return np.array(quads).reshape(-1, 4, 3)
-
-
-def nearest_portals(portals: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
-    """At most MAX_PORTALS of them, those that subtend most at the camera."""
-    if len(portals) <= MAX_PORTALS:
-        return portals
-    area = np.linalg.norm(
-        np.cross(portals[:, 1] - portals[:, 0], portals[:, 3] - portals[:, 0]), axis=1
-    )
-    distance = np.linalg.norm(portals.mean(1) - camera.eye, axis=1)
-    order = np.argsort(-area / np.maximum(distance, 0.1) ** 2, kind="stable")
-    return np.asarray(portals[np.sort(order[:MAX_PORTALS])])
-
-
-def _is_rectangle(quad: NDArray[np.floating]) -> bool:
-    if quad.shape != (4, 3) or not np.isfinite(quad).all():
-        return False
-    a, b = quad[1] - quad[0], quad[3] - quad[0]
-    size = np.linalg.norm(a) * np.linalg.norm(b)
-    closes = np.linalg.norm(quad[0] + a + b - quad[2]) < 1e-3 * (1 + np.sqrt(size))
-    return bool(size > 1e-4 and abs(a @ b) < 1e-2 * size and closes)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.arrays import RadianceImage, UnitVectors
+from pbrs_farm.camera import Camera
 from pbrs_farm.frames import LUMINANCE
 from pbrs_farm.lighting import GROUPS_OF_MODE, Group, Mode
+from pbrs_farm.recipe import LightFields
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,3 +66,88 @@ def relative_noise(half_a: NDArray[np.floating], half_b: NDArray[np.floating]) -
     error = np.sort(((0.5 * (a - b)) / (mean + 0.1 * level)).ravel() ** 2)
     kept = error[: max(int(len(error) * 0.999), 1)]
     return float(np.sqrt(kept.mean()))
+
+
+class GroupSums(Protocol):
+    """Sums over n samples of each pixel, row by row, (N, 3); *_even: of every second sample."""
+
+    outdoor: NDArray[np.float32]
+    indoor: NDArray[np.float32]
+    outdoor_even: NDArray[np.float32]
+    indoor_even: NDArray[np.float32]
+    albedo: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    n_bad: int
+
+
+def result_from_sums(
+    sums: GroupSums, camera: Camera, spp: int, facts: dict[str, Any]
+) -> LightResult:
+    """Means of spp samples per pixel, with the noise that even and odd samples tell."""
+    shape = (camera.intrinsics.height_px, camera.intrinsics.width_px, 3)
+    n_even = max((spp + 1) // 2, 1)
+    n_odd = max(spp - n_even, 1)
+
+    def picture(values: NDArray[np.float32], n: int) -> NDArray[np.float32]:
+        return np.ascontiguousarray((values / np.float32(n)).reshape(shape))
+
+    even = picture(sums.outdoor_even, n_even), picture(sums.indoor_even, n_even)
+    odd = (
+        picture(sums.outdoor - sums.outdoor_even, n_odd),
+        picture(sums.indoor - sums.indoor_even, n_odd),
+    )
+    normal = picture(sums.normal, spp)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    return LightResult(
+        picture(sums.outdoor, spp),
+        picture(sums.indoor, spp),
+        np.clip(picture(sums.albedo, spp), 0, 1),
+        np.where(length > 0, normal / np.maximum(length, 1e-6), 0).astype(np.float32),
+        _noises(even, odd),
+        spp,
+        sums.n_bad,
+        facts,
+    )
+
+
+def joined_result(
+    direct: LightResult | None,
+    guides: LightResult,
+    halves: Mapping[Group, tuple[RadianceImage, ...]],
+    n_bad: int,
+    facts: dict[str, Any],
+    fields: LightFields,
+) -> LightResult:
+    """Two half buffers of each group, plus direct light when it is separate.
+
+    guides: whose albedo and normal are kept. The noise is that of the halves; direct light's own
+    is left out (it has many more samples).
+    """
+    base = {
+        Group.OUTDOOR: direct.outdoor if direct else np.float32(0),
+        Group.INDOOR: direct.indoor if direct else np.float32(0),
+    }
+    a = [np.asarray(base[g] + halves[g][0], np.float32) for g in Group]
+    b = [np.asarray(base[g] + halves[g][1], np.float32) for g in Group]
+    outdoor, indoor = (np.float32(0.5) * (x + y) for x, y in zip(a, b, strict=True))
+    spp = fields.mutations_per_pixel if fields.integrator == "metropolis" else fields.spp
+    return LightResult(
+        outdoor,
+        indoor,
+        guides.albedo,
+        guides.normal,
+        _noises((a[0], a[1]), (b[0], b[1])),
+        spp,
+        n_bad,
+        facts,
+    )
+
+
+def _noises(
+    a: tuple[RadianceImage, RadianceImage], b: tuple[RadianceImage, RadianceImage]
+) -> dict[str, float]:
+    return {
+        "outdoor": relative_noise(a[0], b[0]),
+        "indoor": relative_noise(a[1], b[1]),
+        "sum": relative_noise(a[0] + a[1], b[0] + b[1]),
+    }

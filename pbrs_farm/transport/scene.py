@@ -5,6 +5,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
+import time
 from typing import Any, Final
 
 import numpy as np
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 from pbrs_farm.camera import Camera
 from pbrs_farm.errors import RenderFailed
 from pbrs_farm.house import House
+from pbrs_farm.lighting import Group
 from pbrs_farm.recipe import LightFields, Recipe
-from pbrs_farm.transport.result import LightResult, relative_noise
+from pbrs_farm.transport.result import LightResult, joined_result, result_from_sums
 from pbrs_farm.transport.sky import Sky
 from pbrs_farm.transport.tables import SceneTables, tables_from_house
 from pbrs_farm.transport.variant import choose_variant, mitsuba
@@ -37,9 +39,11 @@ class LightScene:
         self.notes = tables.notes
         self._portals = portals
         mitsuba(variant)
-        from pbrs_farm.transport.surface import Stage
+        self._stage: Any = None
+        if not variant.startswith("scalar"):
+            from pbrs_farm.transport.surface import Stage
 
-        self._stage = Stage(tables)
+            self._stage = Stage(tables)
 
     @staticmethod
     def load(
@@ -57,7 +61,7 @@ class LightScene:
         """
         name = choose_variant() if variant is None else variant
         mitsuba(name)
-        from pbrs_farm.transport.pilot import portals_of_house
+        from pbrs_farm.transport.portals import portals_of_house
 
         tables = tables_from_house(house, textures, recipe)
         return LightScene(tables, sky, portals_of_house(house), name)
@@ -68,34 +72,137 @@ class LightScene:
         return len(self.tables.lamps)
 
     def render(self, camera: Camera, room_id: str, fields: LightFields, seed: int) -> LightResult:
-        """Both light groups as a camera sees them, with fields.spp samples per pixel.
+        """Both light groups as a camera sees them, by the integrator that fields name.
 
-        room_id names the view in errors. Equal arguments give equal bits on one machine.
+        `path`: fields.spp samples per pixel, again and again until fields.noise is reached when
+        it is given. `metropolis`: direct light by fields.direct_spp samples, the rest by
+        mutations. room_id names the view in errors. Equal arguments give equal bits on one
+        machine (Metropolis: equal to 1e-5, it splats in parallel; with a time budget: similar).
         """
+        if self.variant.startswith("scalar"):
+            return self._render_scalar(camera, fields, seed)
         mitsuba(self.variant)
-        from pbrs_farm.transport.path import Lanes, Sums, trace
+        emitters, weights = self._emitters(camera, fields, seed)
+        facts: dict[str, Any] = {"seed": seed, "lamp_weights": weights}
+        if fields.integrator == "metropolis":
+            return self._render_metropolis(camera, room_id, fields, seed, emitters, facts)
+        sums, spp = self._path_sums(camera, fields, seed, emitters)
+        facts["integrator"] = "path"
+        return result_from_sums(sums, camera, spp, facts)
+
+    def _path_sums(
+        self,
+        camera: Camera,
+        fields: LightFields,
+        seed: int,
+        emitters: Any,
+        *,
+        max_depth: int | None = None,
+    ) -> tuple[Any, int]:
+        """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached."""
+        from pbrs_farm.transport.path import Lanes, trace
 
         i = camera.intrinsics
-        emitters, weights = self._emitters(camera, fields, seed)
-        n_pixels = i.width_px * i.height_px
-        per_launch = max(_SAMPLES_PER_LAUNCH // n_pixels, 1)
-        total: Sums | None = None
-        for first in range(0, fields.spp, per_launch):
-            n = min(per_launch, fields.spp - first)
-            lanes = Lanes(i.width_px, i.height_px, first, n, seed)
-            sums = trace(self._stage, emitters, camera, lanes, fields)
+        per_launch = max(_SAMPLES_PER_LAUNCH // (i.width_px * i.height_px), 1)
+        total: Any = None
+        spp, wanted = 0, fields.spp
+        while spp < wanted:
+            n = min(per_launch, wanted - spp)
+            lanes = Lanes(i.width_px, i.height_px, spp, n, seed)
+            sums = trace(self._stage, emitters, camera, lanes, fields, max_depth=max_depth)
             total = sums if total is None else total + sums
-        if total is None:
-            raise RenderFailed("no samples", view=room_id, mode="light", seed=seed)
-        facts: dict[str, Any] = {"integrator": "path", "seed": seed, "lamp_weights": weights}
-        return _result(total, camera, fields.spp, facts)
+            spp += n
+            if spp == wanted and fields.noise > 0 and wanted < fields.max_spp:
+                noisy = result_from_sums(total, camera, spp, {}).noise["sum"] > fields.noise
+                wanted = min(wanted + fields.spp, fields.max_spp) if noisy else wanted
+        return total, spp
+
+    def _render_metropolis(
+        self,
+        camera: Camera,
+        room_id: str,
+        fields: LightFields,
+        seed: int,
+        emitters: Any,
+        facts: dict[str, Any],
+    ) -> LightResult:
+        """Direct light by `path` with two segments, the rest by Metropolis, group by group."""
+        from pbrs_farm.transport.metropolis import metropolis
+
+        began = time.monotonic()
+        is_separate = fields.direct_spp > 0
+        plain = fields.model_copy(update={"spp": max(fields.direct_spp, 1), "noise": 0.0})
+        sums, spp = self._path_sums(
+            camera, plain, seed, emitters, max_depth=2 if is_separate else 1
+        )
+        direct = result_from_sums(sums, camera, spp, {})
+        halves: dict[Group, tuple[Any, Any]] = {}
+        n_bad = direct.n_nonfinite
+        budget = max(fields.time_budget_s - (time.monotonic() - began), 0.0)
+        for k, group in enumerate(Group):
+            deadline = time.monotonic() + budget / 2 if fields.time_budget_s > 0 else None
+            rest = metropolis(
+                self._stage,
+                emitters,
+                camera,
+                group,
+                fields,
+                seed + k,
+                min_segments=3 if is_separate else 1,
+                deadline=deadline,
+            )
+            halves[group] = rest.halves
+            n_bad += rest.n_bad
+            facts[group.value] = {
+                "mean_luminance": rest.b,
+                "acceptance": round(rest.acceptance, 4),
+                "mutations": rest.n_mutations,
+            }
+        if not self._is_lit(direct, halves):
+            raise RenderFailed(
+                f"no light found in room {room_id}: {self._what_emits()}",
+                view=room_id,
+                mode="light",
+                seed=seed,
+            )
+        facts |= {"integrator": "pssmlt-camera", "large_step": fields.large_step}
+        return joined_result(direct if is_separate else None, direct, halves, n_bad, facts, fields)
+
+    def _is_lit(self, direct: LightResult, halves: dict[Group, tuple[Any, Any]]) -> bool:
+        if direct.outdoor.any() or direct.indoor.any():
+            return True
+        return any(half.any() for pair in halves.values() for half in pair)
+
+    def _what_emits(self) -> str:
+        n = self.n_lamps
+        sky = "a sky" if self.sky.dome.any() or self.sky.sun_irradiance.any() else "no sky"
+        return f"{sky} and {n} lamp{'s' * (n != 1)} in the house, none reaches this view"
+
+    def _render_scalar(self, camera: Camera, fields: LightFields, seed: int) -> LightResult:
+        """By Mitsuba's own plugins: scalar variants have no arrays for our kernels."""
+        from pbrs_farm.transport.reference import ReferenceScene
+
+        scene = ReferenceScene(self.tables, self.sky, self.variant)
+        half = fields.model_copy(update={"spp": max(fields.spp // 2, 1)})
+        halves = {
+            g: tuple(scene.render(camera, g, half, seed + 2 * k + j) for j in range(2))
+            for k, g in enumerate(Group)
+        }
+        i = camera.intrinsics
+        plain = np.zeros((i.height_px, i.width_px, 3), np.float32)
+        guides = LightResult(plain, plain, np.ones_like(plain), plain, {}, 0, 0, {})
+        facts = {"integrator": "mitsuba path", "seed": seed}
+        return joined_result(
+            None, guides, halves, 0, facts, half.model_copy(update={"spp": 2 * half.spp})
+        )
 
     def _emitters(
         self, camera: Camera, fields: LightFields, seed: int
     ) -> tuple[Any, dict[str, float]]:
         """Emitters with the weights of this view, and the lamps' weights by name."""
         from pbrs_farm.transport.emitters import Emitters
-        from pbrs_farm.transport.pilot import nearest_portals, pilot_weights, uniform_weights
+        from pbrs_farm.transport.pilot import pilot_weights, uniform_weights
+        from pbrs_farm.transport.portals import nearest_portals
 
         portals = nearest_portals(self._portals, camera)
         weights = uniform_weights(self.n_lamps, len(portals))
@@ -107,29 +214,3 @@ class LightScene:
             emitters.with_weights(weights)
         names = [lamp.name for lamp in self.tables.lamps]
         return emitters, {n: float(w) for n, w in zip(names, weights.lamps, strict=True)}
-
-
-def _result(sums: Any, camera: Camera, spp: int, facts: dict[str, Any]) -> LightResult:
-    shape = (camera.intrinsics.height_px, camera.intrinsics.width_px, 3)
-    n_even = max(-(-spp // 2), 1)
-    n_odd = max(spp - n_even, 1)
-
-    def picture(values: NDArray[np.float32], n: int) -> NDArray[np.float32]:
-        return np.ascontiguousarray((values / np.float32(n)).reshape(shape))
-
-    outdoor, indoor = picture(sums.outdoor, spp), picture(sums.indoor, spp)
-    even = picture(sums.outdoor_even, n_even), picture(sums.indoor_even, n_even)
-    odd = (
-        picture(sums.outdoor - sums.outdoor_even, n_odd),
-        picture(sums.indoor - sums.indoor_even, n_odd),
-    )
-    noise = {
-        "outdoor": relative_noise(even[0], odd[0]),
-        "indoor": relative_noise(even[1], odd[1]),
-        "sum": relative_noise(even[0] + even[1], odd[0] + odd[1]),
-    }
-    normal = picture(sums.normal, spp)
-    length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    normal = np.where(length > 0, normal / np.maximum(length, 1e-6), 0).astype(np.float32)
-    albedo = np.clip(picture(sums.albedo, spp), 0, 1)
-    return LightResult(outdoor, indoor, albedo, normal, noise, spp, sums.n_bad, facts)
