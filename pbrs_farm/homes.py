@@ -123,10 +123,16 @@ def fetch(cache: Path | None = None) -> Package:
 
     Raises MachineFailed, with the command to type, where apt cannot give it.
     """
-    found = cached(cache)
-    if found is not None:
-        return found
     folder = cache or cache_folder()
+    try:
+        return cached(folder) or _fetched(folder)
+    except OSError as error:
+        raise MachineFailed(
+            f"{folder}: {error.strerror or error}", hint="set PBRS_CACHE to a folder of yours"
+        ) from None
+
+
+def _fetched(folder: Path) -> Package:
     folder.mkdir(parents=True, exist_ok=True)
     if shutil.which("apt-get") is None:
         raise MachineFailed(

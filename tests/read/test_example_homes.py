@@ -144,6 +144,12 @@ def test_without_apt_lists_the_command_to_type_is_named(
         homes.fetch(tmp_path)
 
 
+def test_a_cache_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(MachineFailed, match=r"file/cache.*PBRS_CACHE"):
+        homes.fetch(tmp_path / "file" / "cache")
+
+
 def test_without_apt_the_file_to_get_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
