@@ -22,13 +22,17 @@ from pbrs_farm import images
 from pbrs_farm.arrays import Srgb8Image
 from pbrs_farm.classes import NYU40_NAMES
 from pbrs_farm.farm.colours import NYU40_COLOURS
-from pbrs_farm.farm.output import ViewEntry, views_of
+from pbrs_farm.farm.output import ViewEntry, reasons_of, views_of
 from pbrs_farm.farm.tiles import TILES, Tile, tiles_of
 
 THUMBNAIL_PX: Final = 320
 MAX_TILE_BYTES: Final = 11_000
 """Of a thumbnail: 200 views of 9 tiles stay under 30 MB with base64's third on top."""
 
+_VERDICTS: Final = (
+    '<select id="verdict" aria-label="Selection"><option value="">Kept and refused</option>'
+    '<option value="kept">Kept</option><option value="refused">Refused</option></select>'
+)
 _FLAT: Final = frozenset({"semantic", "instance", "boundary"})
 
 
@@ -38,6 +42,7 @@ def gallery(folder: Path) -> str:
     Raises BadInput if folder is no output folder. Full pictures are linked, never embedded.
     """
     views = views_of(folder)
+    reasons = reasons_of(folder)
     cards: list[str] = []
     aspect = "4 / 3"
     for view in views:
@@ -45,7 +50,7 @@ def gallery(folder: Path) -> str:
         shape = next((t.pixels.shape for t in tiles if t.pixels is not None), None)
         if not cards and shape is not None:
             aspect = f"{shape[1]} / {shape[0]}"
-        cards.append(_card(folder, view, tiles))
+        cards.append(_card(folder, view, tiles, reasons.get((view.house.id, view.id))))
 
     n_houses = len({view.house.id for view in views})
     template = resources.files("pbrs_farm.farm").joinpath("gallery.html").read_text("utf-8")
@@ -54,6 +59,7 @@ def gallery(folder: Path) -> str:
         "ASPECT": aspect,
         "HOUSES": _options((view.house.id, view.house.name) for view in views),
         "ROOMS": _options((view.room_name, view.room_name) for view in views),
+        "VERDICTS": _VERDICTS if reasons else "",
         "LAYERS": "".join(
             f'<button type="button" data-layer="{kind.layer}" aria-pressed="true">'
             f"{escape(kind.title)}</button>"
@@ -77,15 +83,20 @@ def _options(pairs: Iterable[tuple[str, str]]) -> str:
     return "".join(f'<option value="{escape(v)}">{escape(t)}</option>' for v, t in unique)
 
 
-def _card(root: Path, view: ViewEntry, tiles: Sequence[Tile]) -> str:
+def _card(root: Path, view: ViewEntry, tiles: Sequence[Tile], reason: str | None) -> str:
+    """reason: why selection refused the view, "" where it is kept, None where nobody judged it."""
     link = quote(view.folder.relative_to(root).as_posix())
     classes = next((tile.classes for tile in tiles if tile.classes), ())
     names = " ".join(NYU40_NAMES[i] for i, _share in classes)
     words = f"{view.house.id} {view.house.name} {view.room_name} {view.id} {names}".lower()
     figures = "".join(_figure(link, view, tile) for tile in tiles)
+    verdict, badge = "", ""
+    if reason is not None:
+        verdict = "refused" if reason else "kept"
+        badge = f'<b class="{verdict}">{escape(reason or "kept")}</b>'
     return (
         f'<article data-house="{escape(view.house.id)}" data-room="{escape(view.room_name)}" '
-        f'data-words="{escape(words)}"><h2>{escape(view.room_name)}'
+        f'data-verdict="{verdict}" data-words="{escape(words)}"><h2>{escape(view.room_name)}{badge}'
         f"<span>{escape(view.house.name)}, view {escape(view.id)}</span>"
         f'<a href="{link}/view.json">view.json</a></h2>'
         f'<div class="tiles">{figures}</div>{_legend(classes)}</article>'

@@ -89,6 +89,22 @@ def _room_id(view_id: str, facts: dict[str, Any], house: HouseEntry) -> str:
     return max(owners, key=len) if owners else view_id.rpartition("_")[0]
 
 
+def reasons_of(root: Path) -> dict[tuple[str, str], str]:
+    """(house id, view id) -> "" where kept, else why refused, of the last selection; {} if none.
+
+    Raises BadInput when the selection's files are damaged.
+    """
+    run = json_object(root / "selection.json").get("run")
+    path = root / "selection" / f"{run}.jsonl"
+    if not run or not path.is_file():
+        return {}
+    try:
+        rows = [json.loads(line) for line in path.read_bytes().splitlines()]
+        return {(row["house"], row["view"]): str(row["reason"]) for row in rows}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BadInput(path, "", f"not the lines of a selection: {error}") from None
+
+
 def json_object(path: Path) -> dict[str, Any]:
     """The JSON object in a file; {} if there is no such file; BadInput if it holds something else."""
     try:

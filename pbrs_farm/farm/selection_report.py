@@ -60,6 +60,7 @@ def selection_report(
     colour, depth = (scored[k].to_numpy() for k in ("colour_score", "depth_score"))
     kept = scored["kept"].to_numpy(zero_copy_only=False).astype(bool)
     examples = _Examples(store, reference, fields)
+    good, bad = _spread(scored.filter(scored["kept"]), n_examples), _refused(scored, n_examples)
     template = resources.files("pbrs_farm.farm").joinpath("selection_report.html")
     limits = fields.min_colour, fields.min_depth
     parts = {
@@ -81,11 +82,11 @@ def selection_report(
         "REASONS": _reasons(summary),
         "ROOMS": _tallies(summary.room_types),
         "HOUSES": _tallies(summary.houses),
-        "KEPT": examples.cards(_spread(scored.filter(scored["kept"]), n_examples)),
-        "REFUSED": examples.cards(_refused(scored, n_examples)),
+        "KEPT": examples.cards(good),
+        "REFUSED": examples.cards(bad),
         "REFERENCE": _reference(summary),
         "BINNINGS": _binnings(summary),
-        "CREDITS": "<br>".join(escape(x) for x in _credits(store, summary.houses)),
+        "CREDITS": "<br>".join(escape(x) for x in _credits(store, good, bad)),
     }
     return filled(template.read_text("utf-8"), parts)
 
@@ -196,12 +197,12 @@ def _binnings(summary: SelectionSummary) -> str:
     return f"<table>{head}{''.join(rows)}</table>"
 
 
-def _credits(store: Store, houses: Sequence[Tally]) -> list[str]:
-    """The attribution lines of the first houses, each once."""
+def _credits(store: Store, *shown: Any) -> list[str]:
+    """The attribution lines of the houses whose pictures are shown, each once."""
     lines: dict[str, None] = {}
-    for house in houses[:MAX_ROWS]:
+    for house in dict.fromkeys(h for table in shown for h in table["house"].to_pylist()):
         try:
-            facts = json.loads(store.get(keys.house_key(house.name, "house.json")))
+            facts = json.loads(store.get(keys.house_key(house, "house.json")))
             line = (facts.get("source") or {}).get("attribution")
         except (ObjectMissing, ValueError, AttributeError):
             continue

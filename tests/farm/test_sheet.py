@@ -177,3 +177,22 @@ def test_names_are_drawn_with_letters_the_font_has(tmp_path: Path) -> None:
     write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – 中")
     assert sheet._drawable("Modèle d’Élise – 中") == "Modele d'Elise - ?"
     assert "Modèle d’Élise – 中" in gallery(tmp_path)
+
+
+def test_gallery_shows_what_selection_kept_and_refused(root: Path) -> None:
+    assert 'id="verdict"' not in gallery(root)
+    (root / "selection").mkdir()
+    (root / "selection.json").write_text('{"run": "nyu"}')
+    rows = [
+        {"house": "a", "view": "0_0_1", "reason": ""},
+        {"house": "a", "view": "0_0_2", "reason": "unlike-depth"},
+    ]
+    (root / "selection/nyu.jsonl").write_text("\n".join(json.dumps(r) for r in rows))
+    html = gallery(root)
+    assert 'id="verdict"' in html
+    assert html.count('data-verdict="kept"') == html.count('data-verdict="refused"') == 1
+    assert '<b class="refused">unlike-depth</b>' in html
+    assert html.count('data-verdict=""') == 2
+    (root / "selection/nyu.jsonl").write_text("{")
+    with pytest.raises(BadInput, match=r"nyu\.jsonl"):
+        gallery(root)
