@@ -169,7 +169,7 @@ def metropolis(
         steps = dr.opaque(mi.UInt32, done), dr.opaque(mi.UInt32, done + n)
         p_large = dr.opaque(mi.Float, fields.large_step)
         chains, sums = _mutate(*scene, film, segments, chains, steps, p_large, seed_of(seed))
-        dr.eval(chains, sums, film.splats)
+        dr.eval(*chains, sums, film.splats)
         total += float(np.sum(sums[0].numpy(), dtype=np.float64))
         n_total += float(np.sum(sums[1].numpy(), dtype=np.float64))
         accepted += float(np.sum(sums[2].numpy(), dtype=np.float64))
@@ -321,7 +321,7 @@ def _chains_at(chosen: Any, key: Any, light: Any, level: Any, pixel: Any) -> Cha
         dr.gather(mi.Float, level, chosen),
         dr.gather(mi.UInt32, pixel, chosen),
     )
-    dr.eval(chains)
+    dr.eval(*chains)
     return chains
 
 
