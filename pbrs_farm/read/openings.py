@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.house import Box, Item, ItemKind, Opening, Surface
+from pbrs_farm.read.solids import box
 
 _HOLE_MARGIN_M: Final = 0.10
 _OVERLAP_M: Final = 0.002
@@ -68,13 +69,13 @@ def _axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.cross(_UP, normal), _UP, normal], 1)
 
 
-def _opening(item: Item, box: Box, frames: Sequence[_WallFrame]) -> Opening | None:
-    normal = box.axes[:, 2] * [1, 0, 1]  # a model's front is +z, whatever its leaf does
+def _opening(item: Item, body: Box, frames: Sequence[_WallFrame]) -> Opening | None:
+    normal = body.axes[:, 2] * [1, 0, 1]  # a model's front is +z, whatever its leaf does
     if np.linalg.norm(normal) < 0.5:
         return None  # lies flat: a roof window, which no wall holds
     normal = normal / np.linalg.norm(normal)
     axes = _axes(normal)
-    corners = box.corners @ axes
+    corners = body.corners @ axes
     low, high = corners.min(0), corners.max(0)
     standing = [p for f in frames if f.level_id == item.level_id for p in _wall(f, axes, low, high)]
     if not standing:
@@ -95,7 +96,7 @@ def _opening(item: Item, box: Box, frames: Sequence[_WallFrame]) -> Opening | No
         level_id=item.level_id,
         item_id=item.id,
         is_window=item.kind is ItemKind.WINDOW,
-        cutter=_solid(low - grown, high + grown, axes),
+        cutter=box_between(low - grown, high + grown, axes),
         quad=np.array([[s, y, middle] for s, y in quad]) @ axes.T,
         normal=normal,
         is_cut=len(holes) == len(standing),
@@ -135,13 +136,8 @@ def _hole(
     return rim.min(0), rim.max(0)
 
 
-def _solid(
+def box_between(
     low: NDArray[np.float64], high: NDArray[np.float64], axes: NDArray[np.float64]
 ) -> Surface:
-    """A closed box low..high in the frame axes, outward faces."""
-    corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
-    faces = [
-        [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
-        [2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5],
-    ]  # fmt: skip
-    return Surface("cutter", (corners @ axes.T).astype(np.float32), np.array(faces, np.int32), 0)
+    """A closed box; low, high: (3,) along axes, the (3, 3) unit columns along, up, across."""
+    return box("cutter", axes @ ((low + high) / 2), (high - low) / 2, 0, axes=axes)

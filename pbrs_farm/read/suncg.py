@@ -1,4 +1,4 @@
-"""A SUNCG house (v1) -> House, after spec/suncg sections 1 and 2. Effect: reads files below root."""
+"""A SUNCG house (v1, or v2 by its arch.json) -> House, after spec/suncg sections 1 and 2. Effect: reads files below root."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from pbrs_farm.read.floors import (
 from pbrs_farm.read.notes import Notes
 from pbrs_farm.read.openings import openings
 from pbrs_farm.read.root_folder import RootFolder
+from pbrs_farm.read.suncg_arch import Arch, arch_from_json, arch_openings
 from pbrs_farm.read.suncg_items import Stock, box_item, ground_item, object_item, room_items
 from pbrs_farm.read.suncg_json import HouseRecord, Node, house_record
 from pbrs_farm.read.suncg_looks import Looks
@@ -72,7 +73,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     notes = Notes(file, strict=fields.strict)
     if record.id and record.id != house_id:
         notes.add("id-differs", "id", f"house.json calls itself {record.id[:64]!r}")
-    _require_rooms(folder, house_id, record)
+    arch = _arch(folder, house_id, record)
     stock = Stock(
         house=house_id,
         folder=folder,
@@ -81,6 +82,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
         models=Models(folder, notes, fields),
         notes=notes,
         world_from_house=record.world_from_house,
+        arch=arch,
     )
     rooms, items = _contents(stock, record, fields, file)
     if not rooms:
@@ -94,20 +96,30 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
         items=tuple(items),
         materials=stock.looks.palette.materials,
         textures=stock.looks.palette.textures,
-        openings=openings(items),
+        openings=openings(items)
+        if arch is None
+        else arch_openings(arch, _room_nodes(record), items),
         notes=notes.all(),
     )
 
 
-def _require_rooms(folder: RootFolder, house_id: str, record: HouseRecord) -> None:
+def _arch(folder: RootFolder, house_id: str, record: HouseRecord) -> Arch | None:
+    """None where the house's rooms have meshes (v1), else v2's structure; BadHouse without both."""
     wants = any(n.kind == "Room" for _, nodes in record.levels for n in nodes)
     if not wants or folder.has_folder(f"room/{house_id}"):
-        return
+        return None
+    name = f"wall/{house_id}/{house_id}.arch.json"
+    data = folder.read(name, max_bytes=MAX_HOUSE_BYTES)
+    if data is not None:
+        return arch_from_json(data, name)
     if folder.has_folder("room"):
         text, hint = f"room/{house_id} does not exist", "this house's walls and floors are missing"
     else:
         text = "room/ does not exist: there are no walls, floors and ceilings"
-        hint = "SUNCG v1 keeps them in a separate archive, room.zip; unpack it beside house/"
+        hint = (
+            "SUNCG v1 keeps them in a separate archive, room.zip; unpack it beside house/. "
+            f"v2 keeps them in {name}, which does not exist either"
+        )
     raise BadHouse(folder.root, f"house/{house_id}/house.json", text, hint=hint)
 
 
@@ -169,6 +181,11 @@ def _level_contents(
 
 def _room_id(number: int, node: Node) -> str:
     return node.id if _ROOM_ID.fullmatch(node.id) else f"{number}_{node.index}"
+
+
+def _room_nodes(record: HouseRecord) -> Iterator[tuple[Node, str]]:
+    for number, (_, nodes) in enumerate(record.levels):
+        yield from ((node, _room_id(number, node)) for node in nodes if node.kind == "Room")
 
 
 def _room_of_index(stock: Stock, number: int, nodes: tuple[Node, ...]) -> dict[int, str]:

@@ -19,6 +19,7 @@ from pbrs_farm.read.mtl import ObjMaterial
 from pbrs_farm.read.notes import Notes
 from pbrs_farm.read.placed import oriented_box, placed
 from pbrs_farm.read.root_folder import RootFolder
+from pbrs_farm.read.suncg_arch import Arch, arch_items
 from pbrs_farm.read.suncg_json import Node
 from pbrs_farm.read.suncg_lamps import lit, placed_light, separate_bulbs
 from pbrs_farm.read.suncg_looks import Looks
@@ -41,7 +42,10 @@ GAPS exchanges the materials of -x and +x (suncg section 1.5).
 
 @dataclass(frozen=True, slots=True)
 class Stock:
-    """What nodes are built from. house: its id. world_from_house: (4, 4) scale and axes."""
+    """What nodes are built from. house: its id. world_from_house: (4, 4) scale and axes.
+
+    arch: v2's structure; None where the rooms have meshes (v1).
+    """
 
     house: str
     folder: RootFolder
@@ -50,6 +54,7 @@ class Stock:
     models: Models
     notes: Notes
     world_from_house: NDArray[np.float64]
+    arch: Arch | None = None
 
 
 def object_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
@@ -200,6 +205,8 @@ def ground_item(stock: Stock, node: Node) -> Item | None:
     """A Ground node: `room/<house>/<modelId>f.obj`, already in house coordinates."""
     if "Floor" in node.hidden:
         return None
+    if stock.arch is not None:
+        return next(arch_items(stock.arch, node, node.id, stock.looks), None)
     surfaces = room_surfaces(stock, node, "f", default_walls=False)
     if not surfaces:
         return None
@@ -239,6 +246,9 @@ def _room_look(
 
 def room_items(stock: Stock, node: Node, room_id: str) -> Iterator[Item]:
     """Floor, ceiling and one item per wall of a Room node; hidden parts are left out."""
+    if stock.arch is not None:
+        yield from arch_items(stock.arch, node, room_id, stock.looks)
+        return
     parts = (("Floor", "f", ItemKind.FLOOR), ("Ceiling", "c", ItemKind.CEILING))
     for hidden, part, kind in parts:
         surfaces = [] if hidden in node.hidden else _part(stock, node, part)

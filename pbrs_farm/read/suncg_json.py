@@ -70,7 +70,7 @@ def house_record(data: bytes, file: str) -> HouseRecord:
     plain = json_from_bytes(data, file)
     if not isinstance(plain, dict):
         raise BadHouse(file, "", "expected an object; this is no SUNCG house.json")
-    reader = _Reader(file)
+    reader = JsonReader(file)
     raw_levels = reader.items(plain, "levels", "")
     levels: list[tuple[str, tuple[Node, ...]]] = []
     n_nodes = 0
@@ -93,12 +93,13 @@ def house_record(data: bytes, file: str) -> HouseRecord:
     return HouseRecord(
         id=house_id if isinstance(house_id, str) else "",
         version=str(plain.get("version", ""))[:80],
-        world_from_house=_world_from_house(reader, plain),
+        world_from_house=world_from_house_of(reader, plain),
         levels=tuple(levels),
     )
 
 
-def _world_from_house(reader: _Reader, plain: dict[str, Any]) -> NDArray[np.float64]:
+def world_from_house_of(reader: JsonReader, plain: dict[str, Any]) -> NDArray[np.float64]:
+    """(4, 4) metres, y up, z front <- the file's scaleToMeters, up and front."""
     scale = reader.numbers([plain.get("scaleToMeters", 1)], 1, "scaleToMeters")[0]
     if not 1e-6 < scale < 1e6:
         raise BadHouse(reader.file, "scaleToMeters", f"{scale} is no scale")
@@ -119,12 +120,13 @@ def _flag(value: Any) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class _Reader:
+class JsonReader:
     """Reads values of one file, so that every refusal names it."""
 
     file: str
 
     def items(self, holder: dict[str, Any], key: str, place: str) -> list[Any]:
+        """holder[key] as a list, or BadHouse."""
         value = holder.get(key)
         if not isinstance(value, list):
             where = f"{place}, {key}" if place else key
@@ -143,6 +145,7 @@ class _Reader:
         return np.array(value, np.float64)
 
     def node(self, raw: Any, level_id: str, i: int, index: int) -> Node | None:
+        """The node, or None if it is invalid or of no known type."""
         place = f"level {i} node {index}"
         if not isinstance(raw, dict):
             raise BadHouse(self.file, place, "expected an object")
@@ -162,7 +165,7 @@ class _Reader:
             model_id=self._model_id(raw, kind, place),
             house_from_model=self._matrix(raw, kind, place),
             bbox=self._bbox(raw.get("bbox"), place),
-            overrides=self._overrides(raw.get("materials"), place),
+            overrides=self.overrides(raw.get("materials"), place),
             state=self._state(raw.get("state"), place),
             is_mirrored=_flag(raw["isMirrored"]) if "isMirrored" in raw else None,
             dimensions=self._dimensions(raw, kind, place),
@@ -194,7 +197,8 @@ class _Reader:
             return None
         return np.array([self.numbers(raw[k], 3, f"{place}, bbox.{k}") for k in ("min", "max")])
 
-    def _overrides(self, raw: Any, place: str) -> tuple[Override, ...]:
+    def overrides(self, raw: Any, place: str) -> tuple[Override, ...]:
+        """The entries of `materials`, none if there are none."""
         entries = _list(raw)
         if not all(isinstance(e, dict) for e in entries):
             raise BadHouse(self.file, f"{place}, materials", "expected a list of objects")

@@ -174,7 +174,7 @@ _FORMS: Final = {
 
 
 def _light(plain: Any, file: str, place: str) -> LightPart:
-    if not isinstance(plain, dict) or plain.get("type") not in _FORMS:
+    if not isinstance(plain, dict) or str(plain.get("type")) not in _FORMS:
         raise BadHouse(file, place, f"expected one of {', '.join(_FORMS)}")
     form = _FORMS[plain["type"]]
     end = plain.get("position2") if form is LightForm.LINE else None

@@ -118,6 +118,7 @@ def test_house_json_cut_anywhere_is_refused(root: Path) -> None:
         ("metadata/light_geometry_compact.txt", "lamp 3 1\n", "line 1"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": "Sun"}]}', r"lamp\[0\]"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": "PointLight", "power": 3}]}', "position"),
+        ("metadata/suncgModelLights.json", '{"lamp": [{"type": []}]}', r"lamp\[0\]"),
         ("metadata/suncgModelLights.json", "{", "no valid JSON"),
     ],
 )  # fmt: skip
