@@ -25,7 +25,21 @@ LAMP = "<lightSource x='0.5' y='0.5' z='0.5' color='00FFFFFF' diameter='0.1'/>"
 DOOR = piece(
     "x='200' y='0' depth='20' height='200' cutOutShape='M0,0 v1 h1 v-1 z'", tag="doorOrWindow"
 )
-FULL = WALLS + piece("catalogId='eTeks#bed'") + piece("power='0.5'", LAMP, tag="light") + DOOR
+TEXTURE = "<texture name='T' width='20' height='20' angle='1' scale='2' xOffset='.1' image='t'/>"
+MOVED = "<transformation name='sweethome3d_hinge_1' matrix='1 0 0 0 0 1 0 0 0 0 1 0'/>"
+STAIRS = piece("height='250' staircaseCutOutShape='M0,0 v1 h1 v-1 z' pitch='.1'", TEXTURE + MOVED)
+SLOPED = (
+    "<wall id='s' xStart='0' yStart='150' xEnd='400' yEnd='150' thickness='10' heightAtEnd='100'"
+    " arcExtent='0.5'><baseboard attribute='leftSideBaseboard' thickness='1' height='7'/></wall>"
+)
+FULL = (
+    SLOPED
+    + STAIRS
+    + WALLS
+    + piece("catalogId='eTeks#bed'")
+    + piece("power='0.5'", LAMP, tag="light")
+    + DOOR
+)
 
 
 def refused(data: bytes, match: str, fields: ReadFields | None = None) -> None:

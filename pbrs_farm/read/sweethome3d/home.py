@@ -27,7 +27,14 @@ from pbrs_farm.read.sweethome3d.walls import wall_items
 from pbrs_farm.recipe import ReadFields
 
 HARMLESS = frozenset(
-    {"unmapped-class", "hidden-level", "degenerate-faces", "unknown-material", "unused-opacity-map"}
+    {
+        "unmapped-class",
+        "hidden-level",
+        "degenerate-faces",
+        "unknown-material",
+        "unused-opacity-map",
+        "package-version",
+    }
 )
 """Notes that are no faults: reading strictly passes over them."""
 
@@ -41,12 +48,13 @@ def read_home(
     resources: Resources | None = None,
     fields: ReadFields | None = None,
     package: str = "",
+    package_note: str = "",
 ) -> House:
     """The house in a .sh3d archive or a bare Home.xml, unrepaired.
 
     data: the file's bytes. name: the file's name, for messages and the house's id. resources: the
     program's own models (homes.fetch), for files that refer to them. package: where the file came
-    from. The same bytes give the same House. Raises BadHouse, which names the file and the place.
+    from; package_note: what is odd about it (homes.Package.note). The same bytes give the same House. Raises BadHouse, which names the file and the place.
     """
     fields = fields or ReadFields()
     file = PurePath(name).name
@@ -55,6 +63,8 @@ def read_home(
     if fields.hidden_levels:
         plan = replace(plan, levels=tuple(replace(x, is_visible=True) for x in plan.levels))
     looks = Looks(container.contents)
+    if package_note:
+        looks.note("package-version", package, package_note)
     visible = [level for level in plan.levels if level.is_visible]
     house_level = {level.id: str(k) for k, level in enumerate(visible)} | {"": "0"}
     _note_hidden_levels(plan, looks)
