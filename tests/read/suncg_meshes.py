@@ -68,33 +68,23 @@ def mtl(*materials: dict[str, str]) -> str:
 
 
 def ball(obj: Obj, centre: Triple, radius: float, n: int) -> None:
-    """A ball of n x n quads (its poles are quads without area at one edge)."""
-    polar = np.linspace(0, np.pi, n + 1)
-    around = np.linspace(0, 2 * np.pi, n + 1)
-
-    def point(a: float, b: float) -> Triple:
-        x, y, z = centre
-        ring = radius * np.sin(a)
-        return (x + ring * np.sin(b), y - radius * np.cos(a), z + ring * np.cos(b))
-
+    """A ball of n x n quads over shared vertices, smooth (quads at the poles are triangles)."""
+    first = obj.n + 1
+    for i in range(n + 1):
+        polar = np.pi * i / n
+        for j in range(n + 1):
+            around = 2 * np.pi * j / n
+            ring = np.sin(polar)
+            normal = np.array([ring * np.sin(around), -np.cos(polar), ring * np.cos(around)])
+            obj.lines.append("v {:.9g} {:.9g} {:.9g}".format(*(normal * radius + centre)))
+            obj.lines.append(f"vt {j / n:.6g} {i / n:.6g}")
+            obj.lines.append("vn {:.6g} {:.6g} {:.6g}".format(*normal))
+            obj.n += 1
     for i in range(n):
         for j in range(n):
-            corners = [
-                point(polar[i], around[j]),
-                point(polar[i], around[j + 1]),
-                point(polar[i + 1], around[j + 1]),
-                point(polar[i + 1], around[j]),
-            ]
-            p = np.array(corners)
-            middle = p.mean(0)
-            normal = (middle - np.array(centre)) / np.linalg.norm(middle - np.array(centre))
-            for corner in corners:
-                obj.lines.append("v {:.9g} {:.9g} {:.9g}".format(*corner))
-                obj.lines.append("vt 0 0")
-                obj.lines.append("vn {:.6g} {:.6g} {:.6g}".format(*normal))
-            k = obj.n
-            obj.lines.append("f " + " ".join(f"{k + c}/{k + c}/{k + c}" for c in (1, 2, 3, 4)))
-            obj.n += 4
+            k = first + i * (n + 1) + j
+            corners = (k, k + 1, k + n + 2, k + n + 1)
+            obj.lines.append("f " + " ".join(f"{c}/{c}/{c}" for c in corners))
 
 
 Hole = tuple[float, float, float, float]
