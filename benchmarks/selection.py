@@ -90,23 +90,25 @@ def write_packs(folder: Path, n_views: int) -> int:
 
 def score_folder(folder: Path) -> dict[str, float]:
     """Score, merge and judge every pack of folder in this process; seconds and peak memory."""
-    reading = 0.0
+    reading = reading_cpu = 0.0
 
     def packs() -> Iterator[HistogramPack]:
-        nonlocal reading
+        nonlocal reading, reading_cpu
         for path in sorted(folder.iterdir()):
-            started = time.perf_counter()
+            started, started_cpu = time.perf_counter(), time.process_time()
             pack = pack_from_bytes(path.read_bytes(), path.name)
             reading += time.perf_counter() - started
+            reading_cpu += time.process_time() - started_cpu
             yield pack
 
     scorer = Scorer(synthetic_reference())
-    started = time.perf_counter()
+    started, started_cpu = time.perf_counter(), time.process_time()
     tables = list(scorer.score_all(packs()))
     scoring = time.perf_counter() - started - reading
     started = time.perf_counter()
     judged = verdicts(merged(*tables), SelectionFields())
     judging = time.perf_counter() - started
+    cpu = time.process_time() - started_cpu - reading_cpu
     started = time.perf_counter()
     n_bytes = len(json_lines(judged))
     assert n_bytes > judged.num_rows
@@ -115,6 +117,7 @@ def score_folder(folder: Path) -> dict[str, float]:
         "read_s": reading,
         "score_s": scoring,
         "judge_s": judging,
+        "cpu_s": cpu,
         "json_lines_s": time.perf_counter() - started,
         "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
@@ -200,6 +203,7 @@ def main(n_views: int = PAPER_VIEWS) -> None:
     figures = {
         "selection.views": n_views,
         "selection.paper_scale_s": round(scale * (part["score_s"] + part["judge_s"]), 1),
+        "selection.cpu_s": round(scale * part["cpu_s"], 1),
         "selection.read_s": round(part["read_s"], 1),
         "selection.json_lines_s": round(part["json_lines_s"], 1),
         "selection.peak_mb": round(part["peak_mb"]),
@@ -210,6 +214,7 @@ def main(n_views: int = PAPER_VIEWS) -> None:
     units = {
         "selection.views": "views scored",
         "selection.paper_scale_s": "s, scoring and judging, reading apart",
+        "selection.cpu_s": "s of processor time for the same, all threads",
         "selection.read_s": "s, reading and unpacking the houses' files",
         "selection.json_lines_s": "s, the run as JSON lines",
         "selection.peak_mb": "MB of the scoring process",
