@@ -145,11 +145,11 @@ class S3Store:
             stream = self._obstore.list(self._client, prefix=prefix.rstrip("/") or None, **options)
             return tuple(str(entry["path"]) for entry in next(iter(stream), ()))
 
-        return self._call(prefix or "x", first_chunk)
+        return self._call(prefix.rstrip("/") or "root", first_chunk)
 
     def _call(self, key: str, act: Callable[[int], T]) -> T:
         """act(number of earlier tries) until it does not fail transiently, with full jitter."""
-        check_key(key.rstrip("/"))
+        check_key(key)
         _guard.enter(key)
         give_up = time.monotonic() + self._patience_s
         n_tries = 0
