@@ -138,8 +138,8 @@ def test_without_apt_lists_the_command_to_type_is_named(
     def refuse(*_: object, **__: object) -> subprocess.CompletedProcess[str]:
         return subprocess.CompletedProcess([], 100, "", "E: Unable to locate package sweethome3d\n")
 
-    monkeypatch.setattr(homes.shutil, "which", lambda _: "/usr/bin/apt-get")
-    monkeypatch.setattr(homes.subprocess, "run", refuse)
+    monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/apt-get")
+    monkeypatch.setattr("subprocess.run", refuse)
     with pytest.raises(MachineFailed, match=r"Unable to locate.*apt-get update"):
         homes.fetch(tmp_path)
 
@@ -153,6 +153,6 @@ def test_a_cache_that_cannot_be_made_is_named(tmp_path: Path) -> None:
 def test_without_apt_the_file_to_get_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(homes.shutil, "which", lambda _: None)
+    monkeypatch.setattr("shutil.which", lambda _: None)
     with pytest.raises(MachineFailed, match="sweethome3d_7"):
         homes.fetch(tmp_path)
