@@ -14,8 +14,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.sample.scores import Scored
-
 COARSE_MARGIN_PX: Final = 0.8
 """A coarse score may fall short of the full one by this over the coarse picture's width.
 
@@ -28,33 +26,29 @@ COARSE_SLACK: Final = 0.8
 
 _BATCH: Final = 4
 
-Rescore = Callable[[NDArray[np.intp]], tuple[Scored, NDArray[np.uint32]]]
-"""Full-size scores and item counts of the candidates of those numbers."""
+Rescore = Callable[
+    [NDArray[np.intp]], tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.uint32]]
+]
+"""Of the candidates of those numbers, at full size: who keeps the rules, scores, item counts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coarse:
-    """Coarse scores of a sector's N candidates.
+    """Coarse pictures of a sector's N candidates.
 
-    strict, lenient: objects large enough by the rule, and by the rule with COARSE_SLACK.
+    possible: (N,) bool, may keep the rules at full size. score: (N,) float64.
     """
 
-    strict: NDArray[np.int64]
-    lenient: NDArray[np.int64]
+    possible: NDArray[np.bool_]
     score: NDArray[np.float64]
-
-    def only(self, kept: NDArray[np.bool_]) -> Coarse:
-        """The scores of the kept candidates."""
-        return Coarse(self.strict[kept], self.lenient[kept], self.score[kept])
 
 
 @dataclass(slots=True, eq=False)
 class FullScores:
-    """Full-size results so far: candidate -> objects large enough, score, item counts."""
+    """Full-size results so far: candidate -> whether it keeps the rules, score, item counts."""
 
-    min_objects: int
     rescore: Rescore
-    n_objects: dict[int, int] = field(default_factory=dict)
+    kept: dict[int, bool] = field(default_factory=dict)
     score: dict[int, float] = field(default_factory=dict)
     counts: dict[int, NDArray[np.uint32]] = field(default_factory=dict)
 
@@ -63,20 +57,19 @@ class FullScores:
         new = np.array([c for c in candidates.tolist() if c not in self.score], np.intp)
         if not len(new):
             return
-        scored, rows = self.rescore(new)
+        kept, score, rows = self.rescore(new)
         for k, candidate in enumerate(new.tolist()):
-            self.n_objects[candidate] = int(scored.n_objects[k])
-            self.score[candidate] = float(scored.score[k])
+            self.kept[candidate] = bool(kept[k])
+            self.score[candidate] = float(score[k])
             self.counts[candidate] = rows[k]
 
     def keeps(self, candidate: int) -> bool:
-        """It was scored at full size, keeps the rule of the objects and scores above nothing."""
-        enough = self.n_objects.get(candidate, -1) >= self.min_objects
-        return enough and self.score[candidate] > 0
+        """It was scored at full size, keeps the rules and scores above nothing."""
+        return self.kept.get(candidate, False) and self.score[candidate] > 0
 
     @property
     def ranking(self) -> list[int]:
-        """Candidates that keep the rule, best first; equal scores in order of number."""
+        """Candidates that keep the rules, best first; equal scores in order of number."""
         kept = [c for c in self.score if self.keeps(c)]
         return sorted(kept, key=lambda c: (-self.score[c], c))
 
@@ -90,7 +83,7 @@ def best_first(coarse: Coarse, full: FullScores, *, margin: float | None) -> int
     if margin is None:
         full.ask(order)
     else:
-        order = order[coarse.lenient[order] >= full.min_objects]
+        order = order[coarse.possible[order]]
         for start in range(0, len(order), _BATCH):
             batch = order[start : start + _BATCH]
             ranking = full.ranking
@@ -121,7 +114,7 @@ def next_diverse(
     gain = np.maximum(share - seen, 0).sum(1)
     order = np.lexsort((-gain, -new_objects))
     for candidate in order.tolist():
-        if candidate in chosen or coarse.lenient[candidate] < full.min_objects:
+        if candidate in chosen or not coarse.possible[candidate]:
             continue
         full.ask(np.array([candidate]))
         if full.keeps(candidate):

@@ -22,8 +22,8 @@ from pbrs_farm.sample.probes import Counter, counted
 from pbrs_farm.sample.report import RoomReport, SectorReport
 from pbrs_farm.sample.scores import (
     Scored,
-    is_filled_by_one,
     object_columns,
+    overfill,
     paper_score,
     released_columns,
     released_score,
@@ -89,20 +89,15 @@ class RoomSampler:
         """Choose among a sector's candidates; writes their verdicts."""
         of_sector = np.flatnonzero(candidates.sector == sector)
         eligible = of_sector[verdict[of_sector] == Verdict.LOWER_SCORE]
-        coarse, share, filled = self._coarse(candidates, eligible)
-        if filled.any():
-            verdict[eligible[filled]] = Verdict.FILLED_BY_ONE
-            eligible, share, coarse = eligible[~filled], share[~filled], coarse.only(~filled)
-        full = choose.FullScores(
-            self.fields.min_objects, lambda which: self._full(candidates, eligible[which])
-        )
+        full = choose.FullScores(lambda which: self._full(candidates, eligible[which]))
+        coarse, share, judged = self._coarse(candidates, eligible)
         chosen = self._chosen(coarse, share, full)
 
-        few = coarse.strict < self.fields.min_objects
-        for k in full.score:
-            few[k] = not full.keeps(k)
-        verdict[eligible[few]] = Verdict.FEW_OBJECTS
-        verdict[eligible[chosen]] = Verdict.WINNER
+        # What was seen at full size is judged by that, the others by their coarse picture.
+        for k, rows in full.counts.items():
+            judged[k] = self._judged(rows[None])[0]
+        judged[chosen] = Verdict.WINNER
+        verdict[eligible] = judged
         views = [
             self._view(sector, k, candidates, int(eligible[c]), full.counts[c], full.score[c])
             for k, c in enumerate(chosen)
@@ -112,8 +107,7 @@ class RoomSampler:
     def _chosen(
         self, coarse: choose.Coarse, share: NDArray[np.float32], full: choose.FullScores
     ) -> list[int]:
-        margin = choose.COARSE_MARGIN_PX / self.fields.coarse_width_px
-        best = choose.best_first(coarse, full, margin=None if self._exact else margin)
+        best = choose.best_first(coarse, full, margin=None if self._exact else self._margin)
         chosen = [] if best is None else [best]
         while chosen and len(chosen) < self.fields.per_sector:
             more = choose.next_diverse(coarse, share, chosen, full, self.fields.min_object_fraction)
@@ -124,33 +118,49 @@ class RoomSampler:
 
     def _coarse(
         self, candidates: Candidates, which: NDArray[np.intp]
-    ) -> tuple[choose.Coarse, NDArray[np.float32], NDArray[np.bool_]]:
+    ) -> tuple[choose.Coarse, NDArray[np.float32], NDArray[np.uint8]]:
         """Coarse scores, each object's share of the picture when several views are wanted, and
-        whether one object or one wall fills more of it than it may."""
+        the verdicts that the coarse pictures give."""
         columns, fraction = self._columns(), self.fields.min_object_fraction
         keep = self.fields.per_sector > 1
         n = len(which)
-        coarse = choose.Coarse(np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n))
+        coarse = choose.Coarse(np.zeros(n, np.bool_), np.zeros(n))
         share = np.zeros((n, len(columns) if keep else 0), np.float32)
-        filled = np.zeros(n, bool)
+        judged = np.zeros(n, np.uint8)
         cameras = candidates.cameras(which, self._intrinsics(coarse=True))
         for part, rows in counted(self.counter, cameras, len(self.house.items)):
-            scored = self._scored(rows)
-            coarse.strict[part], coarse.score[part] = scored.n_objects, scored.score
             lenient = paper_score(rows, columns, fraction * choose.COARSE_SLACK)
-            coarse.lenient[part] = lenient.n_objects
-            filled[part] = is_filled_by_one(rows, columns, self.fields)
+            enough = lenient.n_objects >= self.fields.min_objects
+            over = overfill(rows, columns, self.fields)
+            coarse.possible[part] = enough & (over <= self._margin)
+            coarse.score[part] = self._scored(rows).score
+            judged[part] = self._judged(rows)
             if keep:
                 share[part] = rows[:, columns] / rows.sum(1, keepdims=True)
-        return coarse, share, filled
+        return coarse, share, judged
 
     def _full(
         self, candidates: Candidates, which: NDArray[np.intp]
-    ) -> tuple[Scored, NDArray[np.uint32]]:
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.uint32]]:
         cameras = candidates.cameras(which, self._intrinsics(coarse=False))
         parts = [rows for _part, rows in counted(self.counter, cameras, len(self.house.items))]
         rows = np.concatenate(parts)
-        return self._scored(rows), rows
+        return self._judged(rows) == Verdict.LOWER_SCORE, self._scored(rows).score, rows
+
+    def _judged(self, rows: NDArray[np.uint32]) -> NDArray[np.uint8]:
+        """(N,) the verdict of the rules about the picture, before any comparison of scores."""
+        scored = self._scored(rows)
+        judged = np.full(len(rows), Verdict.LOWER_SCORE, np.uint8)
+        judged[(scored.n_objects < self.fields.min_objects) | (scored.score <= 0)] = (
+            Verdict.FEW_OBJECTS
+        )
+        judged[overfill(rows, self._columns(), self.fields) > 0] = Verdict.FILLED_BY_ONE
+        return judged
+
+    @property
+    def _margin(self) -> float:
+        """By how much a share of the picture may differ between the sizes."""
+        return choose.COARSE_MARGIN_PX / self.fields.coarse_width_px
 
     def _scored(self, rows: NDArray[np.uint32]) -> Scored:
         if self.fields.preset == "released":

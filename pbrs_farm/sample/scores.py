@@ -57,19 +57,20 @@ def paper_score(
     return Scored(n_objects, objects.sum(1, dtype=np.int64) / np.maximum(pixels, 1))
 
 
-def is_filled_by_one(
+def overfill(
     counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: CameraFields
-) -> NDArray[np.bool_]:
-    """(N,) one object covers more than max_item_fraction, or one wall (floor, ceiling) more than
-    max_wall_fraction. counts: (N, n_items + 1) pixels. Beyond the paper; 1 switches a rule off.
+) -> NDArray[np.float64]:
+    """(N,) by how much of the picture one item covers more than it may; above 0 is a refusal.
+
+    An object may cover max_item_fraction, a wall (floor, ceiling) max_wall_fraction. counts:
+    (N, n_items + 1) pixels. Beyond the paper; 1 switches a rule off.
     """
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
     others = np.delete(counts, np.append(columns, 0), axis=1)
     object_share = counts[:, columns].max(1, initial=0) / pixels
     wall_share = others.max(1, initial=0) / pixels
-    return np.asarray(
-        (object_share > fields.max_item_fraction) | (wall_share > fields.max_wall_fraction)
-    )
+    over_object = object_share - fields.max_item_fraction
+    return np.asarray(np.maximum(over_object, wall_share - fields.max_wall_fraction))
 
 
 def released_score(

@@ -8,9 +8,8 @@ from pbrs_farm.recipe import CameraFields
 from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.choose import Coarse, FullScores, best_first
 from pbrs_farm.sample.probes import Counter
-from pbrs_farm.sample.scores import Scored
 from tests.builders import builtin_home
-from tests.sample.rooms import QUICK, counter_of, furnished
+from tests.sample.rooms import QUICK, IndependentLook, counter_of, furnished
 
 
 def winners(
@@ -33,9 +32,13 @@ def differing(house: House, fields: CameraFields, seeds: range) -> tuple[int, in
     return n_differ, n_sectors
 
 
-def test_coarse_first_finds_the_winner_of_full_size_in_99_of_100_sectors() -> None:
+@pytest.mark.parametrize("rules", [{}, {"max_item_fraction": 0.35, "max_wall_fraction": 0.55}])
+def test_coarse_first_finds_the_winner_of_full_size_in_99_of_100_sectors(
+    rules: dict[str, float],
+) -> None:
     sizes = {"coarse_width_px": 20, "coarse_height_px": 15, "cell_m": 0.7}
-    n_differ, n_sectors = differing(furnished(), QUICK.model_copy(update=sizes), range(17))
+    fields = QUICK.model_copy(update=sizes | rules)
+    n_differ, n_sectors = differing(furnished(), fields, range(17))
     assert n_sectors == 102
     assert n_differ <= 1
 
@@ -46,6 +49,21 @@ def test_coarse_first_finds_the_winner_at_the_papers_sizes_in_99_of_100_sectors(
     n_differ, n_sectors = differing(builtin_home(), fields, range(9))
     assert n_sectors == 108
     assert n_differ <= 1
+
+
+def test_no_winner_is_filled_by_one_object_or_wall_beyond_its_bound() -> None:
+    house = furnished()
+    rules = {"max_item_fraction": 0.3, "max_wall_fraction": 0.5}
+    fields = QUICK.model_copy(update=rules)
+    look = IndependentLook(house)
+    sampling = sample_cameras(house, fields, 0, counter_of(house))
+    assert sampling.views
+    assert sampling.report.refused["filled_by_one"] > 0
+    n_pixels = fields.score_width_px * fields.score_height_px
+    for view in sampling.views:
+        for instance, n in look.pixels(view.camera).items():
+            most = 0.5 if house.items[instance - 1].kind.is_structure else 0.3
+            assert n / n_pixels <= most + 4 / n_pixels  # rays through an edge
 
 
 def test_several_views_of_a_sector_show_objects_the_first_does_not() -> None:
@@ -72,21 +90,20 @@ def test_several_views_of_a_sector_show_objects_the_first_does_not() -> None:
 
 
 def test_equal_scores_go_to_the_first_candidate() -> None:
-    def rescore(which: np.ndarray) -> tuple[Scored, np.ndarray]:
-        return Scored(np.full(len(which), 5), np.full(len(which), 0.5)), np.zeros((len(which), 2))
+    def rescore(which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return np.ones(len(which), bool), np.full(len(which), 0.5), np.zeros((len(which), 2))
 
-    coarse = Coarse(np.full(9, 5), np.full(9, 5), np.full(9, 0.5))
-    assert best_first(coarse, FullScores(3, rescore), margin=0.01) == 0
+    coarse = Coarse(np.ones(9, bool), np.full(9, 0.5))
+    assert best_first(coarse, FullScores(rescore), margin=0.01) == 0
 
 
 def test_a_candidate_that_fails_at_full_size_gives_way_to_the_next() -> None:
-    n_objects = np.array([2, 2, 2, 2, 2, 2, 3, 2])
+    keeps = np.arange(8) == 6
 
-    def rescore(which: np.ndarray) -> tuple[Scored, np.ndarray]:
-        score = np.linspace(0.9, 0.2, 8)[which]
-        return Scored(n_objects[which], score), np.zeros((len(which), 2))
+    def rescore(which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return keeps[which], np.linspace(0.9, 0.2, 8)[which], np.zeros((len(which), 2))
 
-    coarse = Coarse(np.full(8, 3), np.full(8, 3), np.linspace(0.9, 0.2, 8))
-    assert best_first(coarse, FullScores(3, rescore), margin=0.01) == 6
-    n_objects[6] = 2
-    assert best_first(coarse, FullScores(3, rescore), margin=0.01) is None
+    coarse = Coarse(np.ones(8, bool), np.linspace(0.9, 0.2, 8))
+    assert best_first(coarse, FullScores(rescore), margin=0.01) == 6
+    keeps[6] = False
+    assert best_first(coarse, FullScores(rescore), margin=0.01) is None
