@@ -107,7 +107,9 @@ class SkyFields(_Group):
     """Outdoor light (spec/sky.md)."""
 
     kind: Literal["sunsky", "panorama"] = "sunsky"
-    panoramas: str = Field("", description="folder of latitude-longitude HDR pictures")
+    panoramas: str = Field(
+        "", description="folder of latitude-longitude HDR pictures; empty = `pbrs-farm skies`"
+    )
 
 
 class EmissionFields(_Group):
@@ -181,6 +183,10 @@ class SelectionFields(_Group):
         "mlt_il_ol", description="scored where a view lacks mlt_il_ol"
     )
     per_room_cap: int = Field(0, ge=0, description="best views kept per room; 0 = all")
+    balance: Literal["none", "classes"] = Field(
+        "none", description="take of the kept views those that balance the classes"
+    )
+    balance_share: float = Field(0.5, gt=0, le=1, description="share of the kept views taken")
     min_brightness: float = Field(0.06, ge=0, le=1, description="median sRGB luma; too dark below")
     max_blown: float = Field(0.50, ge=0, le=1, description="share of saturated pixels")
     max_surface: float = Field(0.85, ge=0, le=1, description="share of the largest instance")

@@ -20,7 +20,8 @@ from pbrs_farm.lighting import Mode
 from pbrs_farm.recipe import HistogramFields
 from pbrs_farm.selection.record import SCORED_MODE, ViewRecord
 
-_FORMAT: Final = "pbrs_farm pack 1"
+_FORMAT: Final = "pbrs_farm pack 2"
+_TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes")
 
 QUALITIES: Final = (
     "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
@@ -32,8 +33,9 @@ QUALITIES: Final = (
 class HistogramPack:
     """The views of one house as arrays.
 
-    source: digest of what the pack was made from. views, rooms, room_types, modes, faults: (n,)
-    text; modes "" and the fault's text where a view cannot be scored. colour: (n, colour bins) and
+    source: digest of what the pack was made from. views, rooms, room_types, modes, faults,
+    classes: (n,) text; modes "" and the fault's text where a view cannot be scored; classes
+    "1:0.53 2:0.21", the share of the picture of each NYU40 class. colour: (n, colour bins) and
     depth: (n, depth bins) uint32 counts, zero where there are none. quality: (n, len(QUALITIES))
     float32, NaN where not known.
     """
@@ -46,6 +48,7 @@ class HistogramPack:
     room_types: tuple[str, ...]
     modes: tuple[str, ...]
     faults: tuple[str, ...]
+    classes: tuple[str, ...]
     colour: NDArray[np.uint32]
     depth: NDArray[np.uint32]
     quality: NDArray[np.float32]
@@ -93,10 +96,15 @@ def pack_house(
         room_types=(*(r.room_type for r in rows), *("" for _ in lost)),
         modes=(*(str(m or "") for m in modes), *("" for _ in lost)),
         faults=(*("" if m else "unscored" for m in modes), *(why for _view, why in lost)),
+        classes=(*(_classes(r) for r in rows), *("" for _ in lost)),
         colour=colour,
         depth=depth,
         quality=quality,
     )
+
+
+def _classes(record: ViewRecord) -> str:
+    return " ".join(f"{nyu40}:{share:g}" for nyu40, share in record.scene.classes.items())
 
 
 def _mode(record: ViewRecord, score_mode: Mode) -> Mode | None:
@@ -118,6 +126,7 @@ def bytes_from_pack(pack: HistogramPack) -> bytes:
         "room_types": pack.room_types,
         "modes": pack.modes,
         "faults": pack.faults,
+        "classes": pack.classes,
     }
     body = b"".join(
         np.ascontiguousarray(a, kind).tobytes()
@@ -136,7 +145,7 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
             raise ValueError("another format")
         settings = HistogramFields.model_validate(head.pop("settings"))
         body = zlib.decompress(rest)
-        text = {k: tuple(head[k]) for k in ("views", "rooms", "room_types", "modes", "faults")}
+        text = {k: tuple(head[k]) for k in _TEXTS}
         n = len(text["views"])
         widths = settings.colour_bins**3, settings.depth_bins, len(QUALITIES)
         if len(body) != 4 * n * sum(widths) or any(len(t) != n for t in text.values()):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from pbrs_farm.arrays import Srgb8Image
+from pbrs_farm.classes import NYU40_NAMES
 from pbrs_farm.house import ItemKind
 from pbrs_farm.recipe import HistogramFields
 
@@ -30,7 +31,7 @@ class SceneQuality(BaseModel):
     surface: share of the largest instance. near: share nearer than near_m (a camera inside an
     object sees little else). n_objects: objects (no walls, floors, ceilings) of object_fraction.
     noise: relative error of the raw light, None where none was traced. missing_textures: of the
-    house.
+    house. classes: NYU40 id (1..40) -> its share.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -39,6 +40,7 @@ class SceneQuality(BaseModel):
     n_objects: int
     noise: float | None = None
     missing_textures: int = 0
+    classes: dict[int, float] = {}
 
 
 def picture_quality(rgb_srgb8: Srgb8Image) -> PictureQuality:
@@ -62,9 +64,15 @@ def scene_quality(
 ) -> SceneQuality:
     """Numbers of a view from its depth (H, W) in mm and the rows "instances" of its view.json.
 
-    Of a row only "kind" (house.ItemKind) and "fraction" are read.
+    Of a row "kind" (house.ItemKind), "fraction" and, if there, "nyu40" are read.
     """
-    rows = [(str(row["kind"]), float(row["fraction"])) for row in instances]
+    classes: dict[int, float] = {}
+    rows = []
+    for row in instances:
+        share, nyu40 = float(row["fraction"]), int(row.get("nyu40", 0))
+        rows.append((str(row["kind"]), share))
+        if 0 < nyu40 < len(NYU40_NAMES):
+            classes[nyu40] = classes.get(nyu40, 0.0) + share
     objects = [share for kind, share in rows if not ItemKind(kind).is_structure]
     near = (depth_mm > 0) & (depth_mm < settings.near_m * 1000.0)
     return SceneQuality(
@@ -73,4 +81,5 @@ def scene_quality(
         n_objects=sum(share >= settings.object_fraction for share in objects),
         noise=None if noise is None else round(noise, 5),
         missing_textures=missing_textures,
+        classes={nyu40: round(classes[nyu40], 4) for nyu40 in sorted(classes)},
     )

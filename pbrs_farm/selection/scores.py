@@ -31,6 +31,7 @@ SCORES: Final[Any] = pa.schema(
         ("colour_reference", pa.string()),
         ("depth_reference", pa.string()),
         *((name, pa.float32()) for name in QUALITIES),
+        ("classes", pa.string()),
         ("fault", pa.string()),
         ("source", pa.string()),
     ]
@@ -87,6 +88,7 @@ class Scorer:
             "depth_score": _nullable(d_score),
             "colour_reference": c_best,
             "depth_reference": d_best,
+            "classes": [c for p in packs for c in p.classes],
             "fault": [f for p in packs for f in p.faults],
             "source": [p.source for p in packs for _ in p.views],
         }

@@ -15,10 +15,12 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from pbrs_farm.recipe import SelectionFields
+from pbrs_farm.selection.balance import balanced, class_shares
 
 REASONS: Final = (
     "failed", "unscored", "too-dark", "blown", "one-surface", "inside-object", "too-few-objects",
     "too-noisy", "missing-textures", "unlike-colour", "unlike-depth", "room-cap",
+    "class-balance",
 )  # fmt: skip
 """Why a view is refused, in the order in which the first is named."""
 
@@ -31,11 +33,13 @@ def verdicts(scores: Any, fields: SelectionFields) -> Any:
     section 3.3) and no quality number is beyond its own. A number that is not known refuses nothing.
     """
     refused = _refusals(scores, fields)
-    table = np.stack([refused[name] for name in REASONS[:-1]], axis=1)
+    table = np.stack(list(refused.values()), axis=1)
     kept = np.asarray(~table.any(axis=1), np.bool_)
     beyond = _beyond_cap(scores, kept, fields.per_room_cap)
-    table = np.column_stack([table, beyond])
     kept &= ~beyond
+    surplus = _surplus(scores, kept, fields)
+    kept &= ~surplus
+    table = np.column_stack([table, beyond, surplus])
     first = np.where(kept, len(REASONS), table.argmax(axis=1))
     names = np.array([*REASONS, ""], object)
     added = {"kept": pa.array(kept), "reason": pa.array(names[first], pa.string())}
@@ -98,6 +102,19 @@ def _beyond_cap(scores: Any, kept: NDArray[np.bool_], cap: int) -> NDArray[np.bo
     first_of_room = np.maximum.accumulate(np.where(starts, np.arange(len(order)), 0))
     beyond[rows[order]] = np.arange(len(order)) - first_of_room >= cap
     return beyond
+
+
+def _surplus(scores: Any, kept: NDArray[np.bool_], fields: SelectionFields) -> NDArray[np.bool_]:
+    """(n,) bool: kept views that are left out so that the classes of the others are balanced."""
+    surplus = np.zeros(len(kept), bool)
+    if fields.balance == "none" or not kept.any():
+        return surplus
+    rows = np.nonzero(kept)[0]
+    order = rows[np.lexsort((_ranks(scores["view"])[rows], _ranks(scores["house"])[rows]))]
+    shares = class_shares(scores["classes"].take(pa.array(order)).to_pylist())
+    taken = balanced(shares, round(fields.balance_share * len(order)))
+    surplus[order[~taken]] = True
+    return surplus
 
 
 def _ranks(column: Any) -> NDArray[np.int64]:

@@ -177,7 +177,9 @@ def test_quality_numbers_are_those_of_the_definition() -> None:
         {"kind": "lamp", "fraction": 0.01},
         {"kind": "door", "fraction": 0.009},
     ]
+    rows[0]["nyu40"], rows[1]["nyu40"], rows[2]["nyu40"] = 1, 5, 5
     scene = selection.scene_quality(depth, rows, FIELDS, noise=0.25, missing_textures=2)
+    assert scene.classes == {1: 0.6, 5: 0.03}
     assert (scene.surface, scene.near, scene.n_objects) == (0.6, 0.05, 2)
     assert (scene.noise, scene.missing_textures) == (0.25, 2)
 

@@ -156,7 +156,7 @@ def test_a_pack_survives_its_bytes() -> None:
 
 def test_a_damaged_pack_is_named() -> None:
     data = bytes_from_pack(pack("a", 3))
-    for wrong in (b"", b"{}\n", data[:-9], data.replace(b"pack 1", b"pack 9"), data[:40]):
+    for wrong in (b"", b"{}\n", data[:-9], data.replace(b"pack 2", b"pack 9"), data[:40]):
         with pytest.raises(BadInput, match="house a"):
             pack_from_bytes(wrong, "house a")
 

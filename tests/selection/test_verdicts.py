@@ -10,6 +10,7 @@ import pyarrow as pa
 import pytest
 
 from pbrs_farm.recipe import SelectionFields
+from pbrs_farm.selection.balance import balanced, class_shares
 from pbrs_farm.selection.scores import SCORES, merged, score
 from pbrs_farm.selection.verdicts import REASONS, verdicts
 from tests.selection.histogram_sets import pack, reference
@@ -18,7 +19,7 @@ GOOD: dict[str, Any] = {
     "house": "a", "view": "0_0_0", "room": "0_0", "room_type": "Kitchen", "mode": "mlt_il_ol",
     "colour_score": 0.8, "depth_score": 0.9, "colour_reference": "p", "depth_reference": "q",
     "brightness": 0.5, "blown": 0.0, "surface": 0.4, "near": 0.0, "n_objects": 4.0, "noise": 0.1,
-    "missing_textures": 0.0, "fault": "", "source": "s",
+    "missing_textures": 0.0, "classes": "1:0.5 5:0.1", "fault": "", "source": "s",
 }  # fmt: skip
 
 
@@ -113,3 +114,51 @@ def test_verdicts_of_merged_houses_are_the_merged_verdicts() -> None:
 
 def test_no_views_no_verdicts() -> None:
     assert verdicts(SCORES.empty_table(), SelectionFields()).num_rows == 0
+
+
+def slow_balance(shares: np.ndarray, n_views: int) -> np.ndarray:
+    """Plain greedy: the view that gains most, again and again."""
+    taken, total = np.zeros(len(shares), bool), np.full(shares.shape[1], 0.01)
+    for _ in range(n_views):
+        gains = np.log1p(shares / total).sum(axis=1)
+        gains[taken] = -1
+        taken[gains.argmax()] = True
+        total += shares[gains.argmax()]
+    return taken
+
+
+def test_lazy_balance_takes_what_plain_greedy_takes() -> None:
+    rng = np.random.default_rng(0)
+    shares = rng.dirichlet(np.full(41, 0.1), 60).astype(np.float32)
+    for n_views in (0, 1, 7, 30, 60):
+        assert np.array_equal(balanced(shares, n_views), slow_balance(shares, n_views))
+    assert balanced(shares, 99).all()
+
+
+def test_balance_keeps_the_rare_classes() -> None:
+    rng = np.random.default_rng(1)
+    common = [f"1:0.6 2:{0.3 + 0.01 * rng.random():.4f}" for _ in range(20)]
+    rare = ["1:0.8 33:0.05", "1:0.8 36:0.1"]
+    rows = [
+        {"view": f"0_0_{k:02d}", "classes": text} for k, text in enumerate([*common[:10], *rare])
+    ]
+    fields = SelectionFields(balance="classes", balance_share=0.25)
+    judged = verdicts(table(*rows), fields).to_pylist()
+    kept = [r["classes"] for r in judged if r["kept"]]
+    assert len(kept) == 3
+    assert set(rare) <= set(kept)
+    assert {r["reason"] for r in judged if not r["kept"]} == {"class-balance"}
+
+
+def test_balance_does_not_depend_on_the_order_of_rows() -> None:
+    rows = [{"view": f"0_0_{k}", "classes": f"1:0.5 {3 + k % 3}:0.1"} for k in range(9)]
+    fields = SelectionFields(balance="classes")
+    there = verdicts(table(*rows), fields).to_pylist()
+    back = verdicts(table(*reversed(rows)), fields).to_pylist()
+    assert [r["kept"] for r in there] == [r["kept"] for r in reversed(back)]
+
+
+def test_class_shares_are_read_back() -> None:
+    shares = class_shares(["", "1:0.5 40:0.25"])
+    assert shares.sum() == 0.75
+    assert (shares[1, 1], shares[1, 40]) == (0.5, 0.25)
