@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm import homes
+from pbrs_farm.debian import cache_folder
 from pbrs_farm.farm.sources import SourceRef, resolve
 from pbrs_farm.store.interface import Store
 from workers.job import HouseEntry
@@ -45,7 +46,7 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
             store.put_if_absent(placed.location, Path(ref.location).read_bytes())
     package = homes.cached()
     if package is not None and any(ref.kind in ("example", "sweethome3d") for ref in refs):
-        for deb in sorted(homes.cache_folder().glob(f"{homes.PACKAGE}_*.deb")):
+        for deb in sorted(cache_folder().glob(f"{homes.PACKAGE}_*.deb")):
             if store.head(FOLDER + _key_name(deb.name)) is None:
                 store.put_if_absent(FOLDER + _key_name(deb.name), deb.read_bytes())
 
@@ -57,7 +58,7 @@ def fill_cache(store: Store) -> None:
     for key in store.list(FOLDER):
         name = key.removeprefix(FOLDER)
         if name.startswith(f"{homes.PACKAGE}_") and name.endswith(".deb"):
-            folder = homes.cache_folder()
+            folder = cache_folder()
             folder.mkdir(parents=True, exist_ok=True)
             part = folder / f".{name}.part"
             part.write_bytes(store.get(key))

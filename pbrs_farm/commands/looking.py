@@ -1,4 +1,4 @@
-"""Verbs that look: doctor, homes, recipes, layers. Effects: print; homes --fetch downloads."""
+"""Verbs that look: doctor, homes, skies, recipes, layers. Effects: print; homes --fetch and skies download."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pbrs_farm.recipe import RECIPE_NAMES, Recipe, recipe_from_name
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add doctor, homes, recipes and layers."""
+    """Add doctor, homes, skies, recipes and layers."""
     p = verb("doctor", _doctor, "what this machine can do, and what to do about what is missing")
     p.add_argument("--json", action="store_true", help="for machines")
     p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to try")
@@ -20,6 +20,7 @@ def add_verbs(verb: Verb) -> None:
     p = verb("homes", _homes, "list the example homes; fetch them from the Debian package")
     p.add_argument("--fetch", action="store_true", help="download the package now")
     p.add_argument("--json", action="store_true", help="for machines")
+    p = verb("skies", _skies, "fetch four outdoor panoramas (CC0) from Debian's blender-data")
     p = verb("recipes", _recipes, "every field of a recipe and its value")
     p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES)
     p = verb("layers", _layers, "the table of the files of a view")
@@ -62,6 +63,16 @@ def _homes(args: argparse.Namespace) -> int:
     if package and package.note:
         say(package.note)
     say("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
+    return 0
+
+
+def _skies(_args: argparse.Namespace) -> int:
+    from pbrs_farm.skies import fetch_skies
+
+    folder = fetch_skies()
+    for path in sorted(folder.glob("*.exr")):
+        say(str(path))
+    say(f"use them with: --set sky.kind=panorama --set sky.panoramas={folder}")
     return 0
 
 

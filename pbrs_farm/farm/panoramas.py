@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from pbrs_farm.errors import BadRecipe
 from pbrs_farm.recipe import Recipe
+from pbrs_farm.skies import fetch_skies
 
 SUFFIXES = (".exr", ".hdr")
 
 
 def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.floating]] | None:
     """(name, (H, W, 3) linear radiance) of a house's sky; None when the recipe wants no panorama.
+
+    Without a folder in the recipe those of Debian's blender-data are taken (skies.py).
 
     Raises BadRecipe when the folder is missing or holds no outdoor panorama.
     """
@@ -26,11 +29,11 @@ def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.f
     from pbrs_farm.images import decode_radiance
     from pbrs_farm.transport.sky import choose_panorama
 
-    folder = Path(recipe.sky.panoramas)
-    if not recipe.sky.panoramas or not folder.is_dir():
+    folder = Path(recipe.sky.panoramas) if recipe.sky.panoramas else fetch_skies()
+    if not folder.is_dir():
         raise BadRecipe(
-            f"sky.panoramas: {recipe.sky.panoramas or 'no folder'!r} is no folder of panoramas",
-            hint="`pbrs-farm skies --fetch` gets four from Debian's blender-data; or --set sky.kind=sunsky",
+            f"sky.panoramas: {folder} is no folder of panoramas",
+            hint="`pbrs-farm skies` fetches four; or --set sky.kind=sunsky",
         )
     files = {p.name: p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES}
     name = choose_panorama(list(files), house_id, recipe.seed)
