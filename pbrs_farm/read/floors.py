@@ -51,6 +51,13 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> NDArray
     return polygon_of(between if not between.is_empty else area)
 
 
+def coverage(surface: Surface, polygon: NDArray[np.float64]) -> float:
+    """Share of a plan polygon (N, 2) that lies under or over the surface's level faces."""
+    both = np.concatenate([_facing([surface], 1), _facing([surface], -1)])
+    area: Any = shapely.Polygon(polygon)
+    return float(shapely.area(shapely.intersection(_outline(both), area)) / max(area.area, 1e-9))
+
+
 def floor_polygons(
     floor: Sequence[Surface], walls: Sequence[Surface], *, min_area_m2: float, min_width_m: float
 ) -> list[NDArray[np.float64]]:

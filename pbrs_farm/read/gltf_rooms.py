@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.errors import BadHouse
 from pbrs_farm.house import Item, ItemKind, Level, Room, Surface
-from pbrs_farm.read.floors import ceiling_height, floor_height, floor_polygons, polygon_of
+from pbrs_farm.read.floors import ceiling_height, coverage, floor_height, floor_polygons, polygon_of
 from pbrs_farm.read.plain import json_from_bytes
 
 MIN_ROOM_M2: Final = 1.0
@@ -24,6 +24,8 @@ MAX_ROOMS: Final = 1000
 _STOREY_M: Final = 2.5
 _SAME_LEVEL_M: Final = 0.5
 _SLACK_M: Final = 0.3
+_NEXT_ROOM: Final = 0.05
+"""A ceiling that covers less of a room than this share is the next room's."""
 
 
 def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]:
@@ -103,6 +105,8 @@ def _with_heights(
     low = floor_height(floors) if floor_y is None else floor_y
     low = 0.0 if low is None else low
     above = [s for s in _over(items, ItemKind.CEILING, polygon) if s.positions[:, 1].min() > low]
+    shares = [coverage(s, polygon) for s in above]
+    above = [s for s, share in zip(above, shares, strict=True) if share > _NEXT_ROOM]
     ceiling = ceiling_height(above)
     if ceiling is None and above:
         ceiling = min(float(s.positions[:, 1].min()) for s in above)  # planar, looking up
@@ -118,7 +122,7 @@ def _with_heights(
         ceiling_y=high if high > low + 0.5 else low + _STOREY_M,
         types=types,
         has_floor=bool(floors),
-        has_ceiling=bool(above),
+        has_ceiling=sum(shares) > 0.5,
     )
 
 

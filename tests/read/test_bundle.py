@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 import trimesh
 
+from pbrs_farm import homes
 from pbrs_farm.errors import BadHouse
+from pbrs_farm.farm.sources import read_house, resolve
 from pbrs_farm.house import House, geometry_from_house
 from pbrs_farm.read import glb
 from pbrs_farm.read.builtin import builtin_home
 from pbrs_farm.read.bundle import bundle_from_house, house_from_bundle
+from pbrs_farm.recipe import ReadFields
 from tests.read.small_houses import full_house
 
 
@@ -191,4 +194,12 @@ def test_the_glb_follows_the_container_rules() -> None:
 
 def test_the_builtin_home_survives_the_bundle() -> None:
     house = builtin_home()
+    assert_same(house, house_from_bundle(*bundle_from_house(house)))
+
+
+@pytest.mark.homes
+def test_an_example_home_survives_the_bundle() -> None:
+    if homes.cached() is None:
+        pytest.skip("example homes not fetched: pbrs-farm homes fetch")
+    house = read_house(resolve("Studio"), ReadFields())
     assert_same(house, house_from_bundle(*bundle_from_house(house)))

@@ -61,6 +61,14 @@ def test_rooms_are_the_pieces_of_floor_that_walls_part() -> None:
     assert house.rooms[0].has_ceiling
 
 
+def test_a_room_beside_a_ceiling_has_none_and_takes_its_height_from_the_walls() -> None:
+    s = two_rooms()
+    s.nodes[1]["mesh"] = s.mesh([[[0, 2.4, 0], [4.05, 2.4, 0], [4.05, 2.4, 3], [0, 2.4, 3]]])
+    large, small = read(s).rooms
+    assert (large.has_ceiling, small.has_ceiling) == (True, False)
+    assert (large.ceiling_y, small.ceiling_y) == pytest.approx((2.4, 2.6))
+
+
 def test_rooms_of_the_polygon_file_win() -> None:
     rooms = {
         "rooms": [{"name": "Hall", "polygon": [[0, 0], [0, 3], [6, 3], [6, 0]], "ceiling_y": 2.4}]
