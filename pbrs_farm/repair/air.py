@@ -13,7 +13,7 @@ from pbrs_farm.house import Room
 from pbrs_farm.repair import plan
 from pbrs_farm.repair.prisms import Plane, level_plane, polygons_of, prism
 from pbrs_farm.repair.sheets import Sheet
-from pbrs_farm.repair.slabs import GAP_M
+from pbrs_farm.repair.slabs import GAP_M, SAME_HEIGHT_M
 from pbrs_farm.repair.solids import (
     F64,
     Tag,
@@ -45,30 +45,33 @@ class Air:
 
 
 def airs_of_rooms(rooms: Sequence[Room], sheets: Sequence[Sheet]) -> list[Air]:
-    """The air of every room, below each plane of its ceiling, a little of its floor and ceiling
-    included, so that what is cut by it ends inside them.
+    """The air of every room, below each plane of its ceiling, and a little of what bounds it.
+
+    What is cut by it then ends inside walls, floor and ceiling, flush with none of them.
     """
     margin = _margin(rooms)
     found = []
     for room in rooms:
         area = plan.polygon_of_room(room.polygon)
-        own = frozenset(s.item for s in sheets if _bounds_room(s, room, area))
+        own = frozenset(s.item for s in sheets if _bounds_room(s, room))
         ceilings = [s for s in sheets if s.is_ceiling and s.room_id == room.id]
         floor = level_plane(room.floor_y - margin)
         parts = [(s.area, s.plane.raised(margin)) for s in ceilings]
         bare = plan.without(area, *(s.area for s in ceilings))
         parts.append((bare, level_plane(room.ceiling_y + margin)))
         for shape, high in parts:
-            found += [_air(p, floor, high, own) for p in polygons_of(shape, min_area_m2=1e-3)]
+            wide = plan.grown(shape, margin)
+            found += [_air(p, floor, high, own) for p in polygons_of(wide, min_area_m2=1e-3)]
     return found
 
 
-def _bounds_room(sheet: Sheet, room: Room, area: plan.Shape) -> bool:
+def _bounds_room(sheet: Sheet, room: Room) -> bool:
+    # At the room's own height whatever it shows is settled in plan (slabs.own_areas).
     if sheet.room_id == room.id:
         return True
     nominal = room.ceiling_y if sheet.is_ceiling else room.floor_y
     heights = sheet.plane.at(shapely.get_coordinates(sheet.area))
-    return bool(np.abs(heights - nominal).max() < GAP_M and sheet.area.intersects(area))
+    return bool(np.abs(heights - nominal).max() < SAME_HEIGHT_M)
 
 
 def _margin(rooms: Sequence[Room]) -> float:

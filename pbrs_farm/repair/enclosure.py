@@ -161,7 +161,7 @@ def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> NDArray[
     spans = []
     for wall in walls:
         inside = shapely.contains_xy(
-            plan.grown(wall.footprint, 0.6 * GAP_M), points[:, 0], points[:, 1]
+            plan.grown(wall.footprint, GAP_M), points[:, 0], points[:, 1]
         )
         if inside.any():
             spans.append((inside, wall.bottom_y, wall.top.at(points)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import shapely
 from manifold3d import Manifold
 
@@ -23,9 +24,11 @@ _OVERLAP_M = 0.01
 
 
 def joints_between_walls(
-    walls: Sequence[Wall], table: TagTable
+    walls: Sequence[Wall], rooms: plan.Shape, table: TagTable
 ) -> tuple[list[tuple[Wall, Manifold]], int]:
     """A solid across each place where two walls come within GAP_M, with the wall it belongs to.
+
+    rooms: plan area of all rooms, into which no corner is filled.
 
     Second: how many of them bridge a gap (the others lie inside walls that touch).
     """
@@ -36,15 +39,17 @@ def joints_between_walls(
         for j in sorted(tree.query(a.footprint, "dwithin", GAP_M).tolist()):
             if j <= i or walls[j].item == a.item:
                 continue
-            solids = _joint(a, walls[j], table)
+            solids = _joint(a, walls[j], rooms, table)
             found += [(a, s) for s in solids]
             n_gaps += bool(solids) and a.footprint.distance(walls[j].footprint) > 1e-4
     return found, n_gaps
 
 
-def _joint(a: Wall, b: Wall, table: TagTable) -> list[Manifold]:
+def _joint(a: Wall, b: Wall, rooms: plan.Shape, table: TagTable) -> list[Manifold]:
     both = plan.union([a.footprint, b.footprint])
     near = plan.common(plan.grown(a.footprint, GAP_M), plan.grown(b.footprint, GAP_M))
+    if a.thickened and b.thickened:
+        both, near = _outer_corner(a, b, rooms)
     inner = plan.grown(plan.closed(both, GAP_M), -_RECESS_M)
     solids = []
     for polygon in polygons_of(plan.common(near, inner)):
@@ -58,6 +63,26 @@ def _joint(a: Wall, b: Wall, table: TagTable) -> list[Manifold]:
         if solid is not None:
             solids.append(solid)
     return solids
+
+
+def _outer_corner(a: Wall, b: Wall, rooms: plan.Shape) -> tuple[plan.Shape, plan.Shape]:
+    # Walls thickened outward touch at an outer corner's edge only: both run on to fill the corner.
+    strips = [_run_on(w) for w in (a, b)]
+    corner = plan.without(plan.common(*strips), rooms)
+    whole = plan.union([a.footprint, b.footprint, corner])
+    return whole, plan.grown(corner, 2 * _OVERLAP_M)
+
+
+def _run_on(wall: Wall) -> plan.Shape:
+    # The wall's footprint made longer at both ends by its own thickness.
+    box = shapely.minimum_rotated_rectangle(wall.footprint)
+    corners = shapely.get_coordinates(box)[:4]
+    sides = np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1)
+    thickness, k = float(sides.min()), int(sides.argmax())
+    along = (corners[(k + 1) % 4] - corners[k]) / max(float(sides.max()), 1e-9)
+    middle = corners.mean(0)
+    outward = np.sign((corners - middle) @ along)[:, None]
+    return plan.on_grid(shapely.Polygon(corners + outward * along * thickness))
 
 
 def joints_with_sheet(

@@ -21,9 +21,11 @@ from pbrs_farm.repair.walls import Wall
 GAP_M = 0.05
 """A gap narrower than this between rooms, walls and floors is a fault of the drawing, and closed."""
 
+SAME_HEIGHT_M = 0.01
+"""Floors (or ceilings) nearer in height than this are one level, told apart in plan."""
+
 _FACE_M = 0.02
 _BASE_BEHIND_M = 0.01
-_SAME_HEIGHT_M = 0.01
 
 
 def ground_of_sheets(
@@ -84,7 +86,7 @@ def _same_height(a: Sheet, b: Sheet) -> bool:
     if a.is_ceiling != b.is_ceiling or a.area.distance(b.area) > 1.0:
         return False
     corners = shapely.get_coordinates(b.area)
-    return bool(abs(a.plane.at(corners) - b.plane.at(corners)).min() < _SAME_HEIGHT_M)
+    return bool(abs(a.plane.at(corners) - b.plane.at(corners)).min() < SAME_HEIGHT_M)
 
 
 def slab(

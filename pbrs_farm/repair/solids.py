@@ -20,7 +20,6 @@ from pbrs_farm.repair.seams import sealed
 F64 = NDArray[np.float64]
 
 _WELD_M = 1e-5
-_SIMPLIFY_M = 2e-5
 _NUMBER_OF_PROPERTIES = 8
 
 
@@ -145,7 +144,7 @@ def overlap_of_bounds(a: F64, b: F64) -> F64:
 
 def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
     """The solid's surface by tag, in order of item and surface; positions are float32 values."""
-    mesh = solid.simplify(_SIMPLIFY_M).to_mesh64()
+    mesh = solid.to_mesh64()
     vertices = np.asarray(mesh.vert_properties, np.float64)
     if vertices.shape[1] < _NUMBER_OF_PROPERTIES:
         pad = np.zeros((len(vertices), _NUMBER_OF_PROPERTIES - vertices.shape[1]))

@@ -60,7 +60,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     airs = airs_of_rooms(lived, sheets.planar)
     slabs = _slabs(sheets, grounds, airs, thickness_m, table)
     wholes = own_sides_first(uprights, house.rooms, table)
-    joints, n_gaps = joints_between_walls(walls, table)
+    joints, n_gaps = joints_between_walls(walls, rooms, table)
     for sheet, ground in zip(sheets.planar, grounds, strict=True):
         joints += joints_with_sheet(sheet, ground, walls, doors, thickness_m, table)
     parts = [WallPart(w, w.solid, is_joint=False) for w in wholes]

@@ -44,7 +44,7 @@ def test_a_wall_that_misses_its_neighbours_is_joined_to_them() -> None:
 def test_without_the_joints_the_meter_counts_and_says_where(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(structure, "joints_between_walls", lambda walls, table: ([], 0))
+    monkeypatch.setattr(structure, "joints_between_walls", lambda *_: ([], 0))
     _, report = repair(_home_with_a_gap(), RepairFields(), occluder_from=EmbreeOccluder)
     assert report.is_leaking
     assert report.leaks is not None

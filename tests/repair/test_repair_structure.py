@@ -1,0 +1,214 @@
+"""Walls, floors and ceilings of small houses after repair: solid, joined, nothing coincides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pbrs_farm.house import Enclosure, House, Item, ItemKind, Opening
+from pbrs_farm.read.solids import box
+from pbrs_farm.recipe import RepairFields
+from pbrs_farm.repair import RepairReport, repair
+from tests.repair.embree import EmbreeOccluder
+from tests.repair.rooms import house, lids, planar_walls, room, turned, wall, walls_around
+from tests.repair.shells import (
+    coinciding_from,
+    leaning_area,
+    seen_from,
+    structure_of,
+    unpaired_edges,
+)
+
+RECT = (0.0, 0.0, 4.0, 3.0)
+MIDDLE = (2.0, 1.3, 1.5)
+
+
+def _repaired(source: House) -> tuple[House, RepairReport]:
+    after, report = repair(source, RepairFields(fallback_light=False), occluder_from=EmbreeOccluder)
+    assert leaning_area(after) == 0.0
+    return after, report
+
+
+def _sky(report: RepairReport) -> int:
+    assert report.leaks is not None
+    assert report.leaks.spaces
+    assert report.leaks.n_blind < 0.01 * report.leaks.n_rays
+    return report.leaks.n_sky
+
+
+def test_planar_walls_become_solids_of_ten_centimetres_away_from_the_room() -> None:
+    r = room("0_0", RECT)
+    after, report = _repaired(house([*planar_walls(RECT), *lids(r)], [r]))
+    assert report.structure.n_walls_thickened == 4
+    assert len(unpaired_edges(after)) == 0
+    assert _sky(report) == 0
+    assert after.rooms[0].enclosure is Enclosure.CLOSED
+    bounds = np.array([i.bounds for i in after.items if i.kind is ItemKind.WALL])
+    assert bounds[:, 0].min(0)[[0, 2]] == pytest.approx([-0.1, -0.1], abs=1e-5)
+    assert bounds[:, 1].max(0)[[0, 2]] == pytest.approx([4.1, 3.1], abs=1e-5)
+    # From outside, no way into the corner between two walls.
+    outside = seen_from(after, (-1.0, 1.3, -1.0))
+    assert "joint" in {name for _, name in outside}
+    assert {name for _, name in seen_from(after, MIDDLE)} == {"plane", "floor", "ceiling"}
+
+
+def test_a_wall_that_is_no_closed_solid_is_left_as_it_is_and_told() -> None:
+    r = room("0_0", RECT)
+    first, *others = walls_around(RECT)
+    gap = replace(first, surfaces=first.surfaces[:-1])
+    after, report = _repaired(house([gap, *others, *lids(r)], [r]))
+    assert [(x.what, x.id) for x in report.structure.left_as_is] == [("wall", "w0")]
+    assert after.items[0].surfaces == gap.surfaces
+
+
+def test_walls_drawn_twice_leave_one_face() -> None:
+    r = room("0_0", RECT)
+    twice = [*walls_around(RECT), *walls_around(RECT, "again")]
+    after, report = _repaired(house([*twice, *lids(r)], [r]))
+    assert len(unpaired_edges(after)) == 0
+    assert coinciding_from(after, MIDDLE) > 0.05
+    assert _sky(report) == 0
+
+
+def test_neighbouring_slabs_show_each_room_its_own_floor() -> None:
+    a, b = room("0_0", RECT), room("0_1", (4.1, 0.0, 8.0, 3.0))
+    walls = [
+        *walls_around((0.0, 0.0, 8.0, 3.0)),
+        wall("between", (4.05, 0.0), (4.05, 3.0), thickness=0.1),
+    ]
+    after, report = _repaired(house([*walls, *lids(a), *lids(b)], [a, b]))
+    assert len(unpaired_edges(after)) == 0
+    assert _sky(report) == 0
+    for origin, own in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
+        lids_seen = {i for i, _ in seen_from(after, origin) if not i.startswith(("w", "between"))}
+        assert lids_seen == {f"floor_{own}", f"ceiling_{own}"}
+        assert coinciding_from(after, origin) > 0.005  # fmt: skip
+
+
+def test_a_floor_goes_on_through_a_doorway() -> None:
+    a, b = room("0_0", RECT), room("0_1", (4.3, 0.0, 8.0, 3.0))
+    walls = [
+        *walls_around((0.0, 0.0, 8.0, 3.0)),
+        wall("between", (4.15, 0.0), (4.15, 3.0), thickness=0.3),
+    ]
+    cutter = box("cutter", np.array([4.15, 1.0, 1.5]), np.array([0.2, 1.0, 0.45]), 0)
+    quad = np.array([[4.15, 0, 1.05], [4.15, 0, 1.95], [4.15, 2, 1.95], [4.15, 2, 1.05]])
+    door = Opening("door", "0", None, False, cutter, quad, np.array([1.0, 0, 0]))
+    source = replace(house([*walls, *lids(a), *lids(b)], [a, b]), openings=(door,))
+    after, report = _repaired(source)
+    # Straight down anywhere in the doorway: one of the two floors, at floor height.
+    shell = structure_of(after)
+    x = np.linspace(4.01, 4.29, 29)
+    origins = np.stack([x, np.full(29, 1.0), np.full(29, 1.5)], 1).astype(np.float32)
+    down = np.tile(np.array([0, -1, 0], np.float32), (29, 1))
+    distance, _ = EmbreeOccluder(shell).first_hit(origins, down)
+    assert distance == pytest.approx(1.0, abs=1e-5)
+    assert _sky(report) == 0
+    assert sum(n for (i, _), n in seen_from(after, (4.15, 1.0, 1.5)).items() if i == "between") > 0  # fmt: skip
+
+
+def test_a_slab_never_sticks_into_a_neighbour_at_another_height() -> None:
+    # The second room's floor lies 4 cm lower, and a wall of 5 cm stands between.
+    a = room("0_0", RECT)
+    b = room("0_1", (4.05, 0.0, 8.0, 3.0), floor_y=-0.04, ceiling_y=2.46)
+    walls = [
+        *walls_around((0.0, 0.0, 8.0, 3.0), bottom=-0.04),
+        wall("between", (4.025, 0.0), (4.025, 3.0), thickness=0.05, bottom=-0.04),
+    ]
+    after, report = _repaired(house([*walls, *lids(a), *lids(b)], [a, b]))
+    assert _sky(report) == 0
+    for origin, own in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
+        lids_seen = {i for i, _ in seen_from(after, origin) if not i.startswith(("w", "between"))}
+        assert lids_seen == {f"floor_{own}", f"ceiling_{own}"}
+
+
+def test_a_slab_of_an_upper_room_leaves_the_room_below_its_height() -> None:
+    # The floors are 3 cm apart: a slab of 10 cm would come through the ceiling.
+    a, b = room("0_0", RECT), room("1_0", RECT, floor_y=2.53, ceiling_y=5.0)
+    walls = [*walls_around(RECT), *walls_around(RECT, "up", bottom=2.5, top=5.0)]
+    after, report = _repaired(house([*walls, *lids(a), *lids(b)], [a, b]))
+    assert len(unpaired_edges(after)) == 0
+    assert _sky(report) == 0
+    assert ("ceiling_0_0", "ceiling") in seen_from(after, MIDDLE)
+    assert ("floor_1_0", "floor") in seen_from(after, (2.0, 3.8, 1.5))
+    assert not any(i == "floor_1_0" for i, _ in seen_from(after, MIDDLE))
+
+
+def test_a_stairwell_that_no_room_covers_gets_the_lid_it_lacks() -> None:
+    # Below a room of the whole plan; above it a room that leaves out the stairwell: x > 3.
+    a = room("0_0", RECT)
+    b = room("1_0", (0.0, 0.0, 3.0, 3.0), floor_y=2.6, ceiling_y=5.1)
+    walls = [*walls_around(RECT), *walls_around(RECT, "up", bottom=2.5, top=5.1)]
+    below = replace(a, polygon=np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]))
+    ceiling = lids(below, floor=False)
+    stairs = Item(
+        "stairs", "stairs", ItemKind.STAIRS, "0",
+        (box("steps", np.array([3.5, 1.3, 1.5]), np.array([0.4, 1.3, 1.0]), 0),),
+    )  # fmt: skip
+    items = [*walls, *lids(a, ceiling=False), *ceiling, *lids(b), stairs]
+    after, report = _repaired(house(items, [a, b]))
+    assert report.structure.n_stairwells_closed == 1
+    assert {x.space for x in report.rooms} == {("0_0", "1_0")}
+    assert {r.enclosure for r in after.rooms} == {Enclosure.CLOSED}
+    assert _sky(report) == 0
+
+
+def test_uv_of_a_source_is_carried_to_the_new_solid() -> None:
+    # A plank pattern turned by 30 degrees and scaled by 3: an affine map of the plan.
+    r = room("0_0", RECT)
+    floor, ceiling = lids(r)
+    c, s = 3 * np.cos(np.pi / 6), 3 * np.sin(np.pi / 6)
+    plan = floor.surfaces[0].positions[:, [0, 2]]
+    uvs = (plan @ np.array([[c, s], [-s, c]]) + [0.3, 0.7]).astype(np.float32)
+    floor = replace(floor, surfaces=(replace(floor.surfaces[0], uvs=uvs),))
+    after, _ = _repaired(house([*walls_around(RECT), floor, ceiling], [r]))
+    face = next(s for i in after.items for s in i.surfaces if s.name == "floor")
+    assert face.uvs is not None
+    want = face.positions[:, [0, 2]] @ np.array([[c, s], [-s, c]]) + [0.3, 0.7]
+    assert face.uvs == pytest.approx(want, abs=1e-4)
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    angle=st.floats(0.0, 3.14),
+    gaps=st.tuples(*[st.floats(0.0, 0.04)] * 4),
+    slack=st.floats(0.0, 0.04),
+    thickness=st.floats(0.03, 0.4),
+    lifts=st.tuples(st.floats(0.0, 0.04), st.floats(0.0, 0.04)),
+)
+def test_badly_drawn_rooms_are_tight_after_repair(
+    angle: float,
+    gaps: tuple[float, ...],
+    slack: float,
+    thickness: float,
+    lifts: tuple[float, float],
+) -> None:
+    # Walls up to 4 cm from where they should stand, floor and ceiling, at any angle.
+    x0, z0, x1, z1 = RECT
+    rect = (x0 - gaps[0], z0 - gaps[1], x1 + gaps[2], z1 + gaps[3])
+    walls = walls_around(rect, thickness=thickness, bottom=lifts[0], top=2.5 - lifts[1])
+    shorter = [_shortened(w, slack) for w in walls]
+    r = room("0_0", RECT)
+    after, report = _repaired(turned(house([*shorter, *lids(r)], [r]), angle))
+    assert after.rooms[0].enclosure is Enclosure.CLOSED
+    assert _sky(report) == 0
+    assert unpaired_edges(after) == pytest.approx(0.0, abs=1e-5)
+    again, _ = repair(after, RepairFields())
+    assert again is after
+
+
+def _shortened(source: Item, by_m: float) -> Item:
+    """The wall with both ends drawn back, so that it may miss its neighbours."""
+    low, high = source.bounds
+    axis = int(np.argmax((high - low)[[0, 2]])) * 2
+    middle = 0.5 * (low[axis] + high[axis])
+    surfaces = []
+    for s in source.surfaces:
+        positions = s.positions.copy()
+        positions[:, axis] -= (np.sign(positions[:, axis] - middle) * by_m).astype(np.float32)
+        surfaces.append(replace(s, positions=positions))
+    return replace(source, surfaces=tuple(surfaces))
