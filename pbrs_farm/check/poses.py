@@ -5,6 +5,7 @@ No effects but reading what it is given.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ SLACK_M = 0.02
 MAX_SEEN_PAST = 0.002
 """Share of points that a thin thing between two pixels may cost; a wrong pose costs far more."""
 
+_MIN_COSINE = 0.5
+_MIN_NEARER = 0.7
 _STEP_PX = 16
 _MAX_PARTNERS = 40
 
@@ -40,41 +43,72 @@ def check_pose(view: StoredView, tally: Tally) -> None:
     tally.expect("pose", view.place, bool(pinhole), "K is no pinhole camera's")
 
 
-def check_reprojection(views: list[tuple[StoredView, NDArray[Any]]], tally: Tally) -> None:
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenView:
+    """A view with the layers that reprojection needs: depth.png and normal.png as stored."""
+
+    view: StoredView
+    depth: NDArray[Any]
+    normal: NDArray[Any]
+
+
+def check_reprojection(views: list[SeenView], tally: Tally) -> None:
     """Points that one view sees are nowhere in front of what another view of the house sees.
 
-    views: views of one house with their depth.png. A point at depth z in another view is right
-    when that view's surface there is at most z + SLACK_M away (it may be nearer: the point is then
-    hidden). Of a pixel and its neighbours the nearest counts, since points do not fall on pixel
-    centres; up to MAX_SEEN_PAST of a pair's points may be wrong, and are counted as ties. Every
-    view is held against every other one, or against _MAX_PARTNERS of them.
+    views: of one house. A point at depth z in another view is right when that view's surface
+    there is at most z + SLACK_M away (it may be nearer: the point is then hidden). Of a pixel and
+    its neighbours the nearest counts, since points do not fall on pixel centres. Points of narrow
+    surfaces, or that the other view sees from the side or from much farther, are left out, since
+    they may fall between its pixels; up to MAX_SEEN_PAST of a pair's points may still be wrong,
+    and are counted as ties. Every view is held against every other, or _MAX_PARTNERS of them.
     """
-    points = [_points(view, depth) for view, depth in views]
-    nearest = [_nearest(depth) for _, depth in views]
+    points = [_points(seen) for seen in views]
+    nearest = [_nearest(seen.depth) for seen in views]
     rng = np.random.default_rng(0)
-    for a, (view_a, _) in enumerate(views):
+    for a, seen in enumerate(views):
         others = np.array([b for b in range(len(views)) if b != a], np.int64)
-        for b in others if len(others) <= _MAX_PARTNERS else rng.choice(others, _MAX_PARTNERS):
-            view_b = views[b][0]
-            n, wrong = _seen_past(points[a], view_b, nearest[b])
+        if len(others) > _MAX_PARTNERS:
+            others = rng.choice(others, _MAX_PARTNERS, replace=False)
+        for b in others:
+            n, wrong = _seen_past(points[a], views[b].view, nearest[b])
             if wrong > max(2, MAX_SEEN_PAST * n):
                 tally.add("reprojection", n)
-                place = f"{view_a.place} in {view_b.place}"
-                tally.fail(
-                    "reprojection", place, f"{wrong} of {n} points lie before surfaces", wrong
-                )
+                place = f"{seen.view.place} in {views[b].view.place}"
+                what = f"{wrong} of {n} points lie before what is seen there"
+                tally.fail("reprojection", place, what, wrong)
             else:
                 tally.add("reprojection", n, ties=wrong)
 
 
-def _points(view: StoredView, depth: NDArray[Any]) -> NDArray[np.float64]:
-    """(N, 3) world positions of a grid of the view's pixels."""
-    height, width = view.size
+def _points(seen: SeenView) -> NDArray[np.float64]:
+    """(N, 3, 3) world positions, normals and eye of a grid of the view's pixels.
+
+    Only pixels amid a flat patch of 5 x 5: what is thinner here may be thinner than a pixel there.
+    """
+    view, (height, width) = seen.view, seen.view.size
     grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
     rows, columns = (g.reshape(-1) for g in grid)
-    z = depth[rows, columns] / 1000
-    origin, directions = view.rays(rows, columns)
-    return np.asarray((origin + directions * z[:, None])[(z > 0) & (z < 65)])
+    published = seen.normal[rows, columns] * (2 / 65535) - 1
+    # Published axes are x right, y forward, z up; the pose's are x right, y down, z forward.
+    camera = np.stack([published[:, 0], -published[:, 2], published[:, 1]], axis=1)
+    normal = camera @ view.world_from_camera[:3, :3].T
+
+    centre, eye = _positions(seen, rows, columns), view.world_from_camera[:3, 3]
+    z = seen.depth[rows, columns] / 1000
+    flat = (z > 0) & (z < 65)
+    for dy, dx in np.ndindex(5, 5):
+        r, c = (rows + dy - 2).clip(0, height - 1), (columns + dx - 2).clip(0, width - 1)
+        off = np.einsum("ni,ni->n", _positions(seen, r, c) - centre, normal)
+        flat &= np.abs(off) < SLACK_M / 2
+    rows_of = np.stack([centre, normal, np.broadcast_to(eye, centre.shape)], axis=1)
+    return np.asarray(rows_of[flat])
+
+
+def _positions(
+    seen: SeenView, rows: NDArray[np.int64], columns: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    origin, directions = seen.view.rays(rows, columns)
+    return np.asarray(origin + directions * (seen.depth[rows, columns] / 1000)[:, None])
 
 
 def _nearest(depth: NDArray[Any]) -> NDArray[np.float64]:
@@ -84,10 +118,15 @@ def _nearest(depth: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _seen_past(
-    world: NDArray[np.float64], view: StoredView, nearest: NDArray[np.float64]
+    points: NDArray[np.float64], view: StoredView, nearest: NDArray[np.float64]
 ) -> tuple[int, int]:
     """How many of the points lie in the view's picture, and in front of all it sees there."""
-    camera = (world - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]
+    towards = points[:, 0] - view.world_from_camera[:3, 3]
+    distance = np.linalg.norm(towards, axis=1)
+    own_distance = np.linalg.norm(points[:, 0] - points[:, 2], axis=1)
+    broad = np.abs(np.einsum("ni,ni->n", points[:, 1], towards)) > _MIN_COSINE * distance
+    broad &= own_distance > _MIN_NEARER * distance
+    camera = towards[broad] @ view.world_from_camera[:3, :3]
     camera = camera[camera[:, 2] > 0.05]
     pixel = camera @ view.k.T
     x, y = np.floor(pixel[:, :2] / pixel[:, 2:]).astype(np.int64).T

@@ -18,7 +18,7 @@ from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.files import check_files, check_root_manifest
 from pbrs_farm.check.pictures import check_consistency, check_pictures, read_labels
 from pbrs_farm.check.pixels import RAY_LAYERS, judge
-from pbrs_farm.check.poses import check_pose, check_reprojection
+from pbrs_farm.check.poses import SeenView, check_pose, check_reprojection
 from pbrs_farm.check.rays import Rays
 from pbrs_farm.check.stored import StoredView, views_of_house
 from pbrs_farm.check.triangles import BadGlb, Triangles, triangles_from_glb
@@ -70,25 +70,25 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
     scenes = Scenes(
         (triangles, Rays(triangles)), (triangles, Rays(triangles, ~triangles.see_through))
     )
-    depths: list[tuple[StoredView, NDArray[Any]]] = []
+    seen: list[SeenView] = []
     for view in views:
         try:
-            depth = _check_view(view, scenes, n_pixels, tally)
+            arrays = _check_view(view, scenes, n_pixels, tally)
         except (KeyError, TypeError, ValueError, IndexError, np.linalg.LinAlgError) as error:
             tally.expect(
                 "layers", f"{view.place}/view.json", False, f"{type(error).__name__}: {error}"
             )
             continue
-        if depth is not None:
-            depths.append((view, depth))
-    check_reprojection(depths, tally)
+        if arrays is not None:
+            seen.append(SeenView(view, arrays["depth"], arrays["normal"]))
+    check_reprojection(seen, tally)
     return len(views)
 
 
 def _check_view(
     view: StoredView, scenes: Scenes, n_pixels: int | None, tally: Tally
-) -> NDArray[Any] | None:
-    """Check one view; its depth picture, None when its labels cannot be read."""
+) -> dict[str, NDArray[Any]] | None:
+    """Check one view; its layers by name, None when its labels cannot be read."""
     check_pose(view, tally)
     arrays = read_labels(view, tally)
     if arrays is None:
@@ -96,7 +96,7 @@ def _check_view(
     check_pictures(view, arrays, tally)
     check_consistency(view, arrays, tally)
     _check_rays(view, arrays, scenes, n_pixels, tally)
-    return arrays["depth"]
+    return arrays
 
 
 def _check_rays(

@@ -233,3 +233,12 @@ def test_two_views_of_one_room_must_agree_where_things_are(tmp_path):
     certificate = verify(tmp_path, sample=0)
     assert certificate.counts["reprojection"].failed > 0
     assert house.name in certificate.text()
+
+
+def test_a_view_that_sees_nothing_is_clean(tmp_path):
+    home = builtin_home()
+    away = Camera.look(Intrinsics.from_hfov(*SIZE), np.array([0, 50.0, 0]), np.array([0, 1.0, 0.1]))
+    make_root(tmp_path, home, {"v0": away}, with_optional=True)
+    certificate = verify(tmp_path, all_pixels=True)
+    assert certificate.is_clean, certificate.text()
+    assert certificate.counts["ray: valid"].checked == SIZE[0] * SIZE[1]

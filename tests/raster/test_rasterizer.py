@@ -4,11 +4,12 @@ import pytest
 from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.errors import MachineFailed
 from pbrs_farm.frames import srgb_from_linear
-from pbrs_farm.house import LightPart, Material, MaterialKind, geometry_from_house
-from pbrs_farm.lighting import PowerUnit
+from pbrs_farm.house import LightPart, Material, MaterialKind, Surface, geometry_from_house
+from pbrs_farm.lighting import LightForm, PowerUnit
 from pbrs_farm.raster import Rasterizer, device
 from pbrs_farm.raster.programs import DL_SCALE, PANE_OPACITY
 from pbrs_farm.read.builtin import builtin_home
+from pbrs_farm.recipe import RasterFields
 from pbrs_farm.transport.caster import Caster
 from tests.raster.raster_scenes import camera, house, item, square
 
@@ -163,3 +164,67 @@ def test_a_machine_without_egl_is_told_what_to_install(monkeypatch):
     monkeypatch.setattr(device.moderngl, "create_context", refuse)
     with pytest.raises(MachineFailed, match="libegl1"):
         Rasterizer(house((), ()), {})
+
+
+def test_triangles_that_are_not_finite_or_without_area_are_drawn_as_if_not_there():
+    good = square(-2.0, 0)
+    points = np.concatenate([good.positions, [[np.nan, 0, -1], [0, 0, -1], [0.1, 0, -1]]])
+    faces = np.concatenate([good.faces, [[0, 1, 4], [5, 6, 6], [5, 5, 5]]]).astype(np.int32)
+    bad = Surface("bad", points.astype(np.float32), faces, 0, normals=None)
+    pictures = []
+    for surface in (Surface("good", good.positions, good.faces, 0), bad):
+        with Rasterizer(house((item(surface),), (WHITE,)), {}) as raster:
+            pictures.append(raster.render_dl(camera()))
+            _, items = raster.depth_and_items(camera())
+            assert (items == 1).all()
+    assert (pictures[0] == pictures[1]).all()
+
+
+def test_shading_normals_that_are_nan_or_zero_are_replaced_by_the_faces_own():
+    good = square(-2.0, 0)
+    normals = np.array([[0, 0, 1], [np.nan, 0, 0], [0, 0, 0], [0, 0, 1]], np.float32)
+    bad = Surface("bad", good.positions, good.faces, 0, normals=normals)
+    with Rasterizer(house((item(bad),), (WHITE,)), {}) as raster:
+        picture = raster.render_dl(camera())
+    assert np.abs(picture.astype(float) - byte(DL_SCALE * (0.5 + 5 / np.sqrt(50)))).max() <= 1
+
+
+def test_a_light_that_no_floor_sees_and_a_line_of_no_length_do_no_harm():
+    lights = (
+        LightPart((0, 0, -1), 0.03, 0.0, PowerUnit.SWEETHOME3D),
+        LightPart(
+            (0, 0, -1),
+            0.03,
+            0.5,
+            PowerUnit.SWEETHOME3D,
+            form=LightForm.LINE,
+            position_end=(0, 0, -1),
+        ),
+        LightPart(
+            (0, 0, -1), 0.03, 0.5, PowerUnit.SWEETHOME3D, form=LightForm.SPOT, direction=(0, 0, 0)
+        ),
+    )
+    with Rasterizer(
+        house((item(square(-2.0, 0, half=2.0), lights=lights),), (WHITE,)), {}
+    ) as raster:
+        picture = raster.render_il(camera())
+    assert 30 < picture.mean() < 255
+
+
+def test_a_line_of_light_is_as_bright_as_many_points_along_it():
+    ends = (-1.0, 0.0, -1.5), (1.0, 0.0, -1.5)
+    line = LightPart(
+        ends[0], 0.03, 800.0, PowerUnit.LUMEN, form=LightForm.LINE, position_end=ends[1]
+    )
+    points = tuple(
+        LightPart((x, 0.0, -1.5), 0.03, 800.0, PowerUnit.LUMEN, share=1 / 64)
+        for x in np.linspace(-1, 1, 129)[1::2]
+    )
+    pictures = []
+    for lights in ((line,), points):
+        scene = house((item(square(-2.0, 0, half=2.0), lights=lights),), (WHITE,))
+        with Rasterizer(scene, {}, RasterFields(lights_per_object=64)) as raster:
+            pictures.append(raster.render_il(camera())[..., 0].astype(float))
+    # Each is scaled to its own house's median: compare shapes where both are well lit.
+    ratio = pictures[0][6:18, 4:28] / pictures[1][6:18, 4:28]
+    assert np.abs(ratio / np.median(ratio) - 1).max() < 0.12
