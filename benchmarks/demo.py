@@ -17,7 +17,17 @@ OUT = Path("out/bench/demo")
 def main() -> None:
     """Run the demo into an empty folder and write out/bench/demo.json."""
     shutil.rmtree(OUT, ignore_errors=True)
-    command = [sys.executable, "-m", "pbrs_farm.cli", "demo", "--out", str(OUT), "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "pbrs_farm.cli",
+        "demo",
+        "--views",
+        "10",
+        "--out",
+        str(OUT),
+        "--json",
+    ]
     started = time.monotonic()
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     seconds = time.monotonic() - started

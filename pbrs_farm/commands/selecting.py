@@ -48,6 +48,9 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument(
         "--per-room-cap", type=int, default=None, metavar="N", help="best views kept per room"
     )
+    p.add_argument(
+        "--balance", choices=("none", "classes"), default=None, help="keep classes in balance"
+    )
     p.add_argument("--report", action="store_true", help="write selection/<run>.html too")
     p.add_argument("--json", action="store_true", help="the summary as JSON")
     _add_photo_words(p)
@@ -134,6 +137,8 @@ def _fields(recipe: Recipe, args: argparse.Namespace) -> SelectionFields:
     changed = _overrides(args.set)
     if args.score_mode is not None:
         changed["selection.score_mode"] = args.score_mode
+    if args.balance is not None:
+        changed["selection.balance"] = args.balance
     if args.per_room_cap is not None:
         changed["selection.per_room_cap"] = str(args.per_room_cap)
     held = {f"selection.{k}": str(v) for k, v in recipe.selection.model_dump(mode="json").items()}

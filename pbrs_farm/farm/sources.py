@@ -95,7 +95,14 @@ def _read_example(name: str, fields: ReadFields) -> House:
     package = homes.fetch()
     data, file = package.home(name)
     resources = package.resources()
-    return read_home(data, file, resources=resources, fields=fields, package=package.label)
+    return read_home(
+        data,
+        file,
+        resources=resources,
+        fields=fields,
+        package=package.label,
+        package_note=package.note,
+    )
 
 
 def _example(name: str) -> SourceRef:
