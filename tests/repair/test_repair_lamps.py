@@ -60,7 +60,7 @@ def test_the_bulb_has_the_sources_radius_where_there_is_room() -> None:
     assert face_areas(bulb.positions, bulb.faces).sum() == pytest.approx(4 * np.pi * 0.03**2, rel=0.03)  # fmt: skip
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     st.tuples(*[st.floats(-0.05, 0.05)] * 3),
     st.floats(0.01, 0.06),
