@@ -57,7 +57,7 @@ STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 9
 _SMALLEST, _LARGEST = 1 / 1024, 1 / 64
 _STEPS_PER_LAUNCH: Final = 32
 _MIN_STEPS: Final = 64
-_BOOTSTRAP: Final = 1 << 18
+_BOOTSTRAP: Final = (1 << 14, 1 << 18)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,7 +147,8 @@ def metropolis(
     segments = dr.opaque(mi.UInt32, min_segments)
 
     # Bootstrap: independent paths; chains start at some of them, drawn in proportion to I.
-    key = stream_key(dr.arange(mi.UInt32, _BOOTSTRAP), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+    n_bootstrap = int(np.clip(wanted // 4, *_BOOTSTRAP))
+    key = stream_key(dr.arange(mi.UInt32, n_bootstrap), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     light, pixel = _paths(*scene, film, segments, HashedNumbers(key, mi.UInt32(0)))
     level = luminance(light)
     level = dr.select(dr.isfinite(level), level, 0)
@@ -158,11 +159,11 @@ def metropolis(
         return Estimate((black, black), 0.0, 0.0, 0, 0)
     offsets = (np.arange(n_chains) + np.random.default_rng(seed).random()) / n_chains
     chosen = np.searchsorted(np.cumsum(levels) / levels.sum(), offsets)
-    chosen = np.random.default_rng(seed + 1).permutation(np.minimum(chosen, _BOOTSTRAP - 1))
+    chosen = np.random.default_rng(seed + 1).permutation(np.minimum(chosen, n_bootstrap - 1))
     chains = _chains_at(mi.UInt32(chosen.astype(np.uint32)), key, light, level, pixel)
 
     n_steps = -(-wanted // n_chains)
-    total, n_total = levels.sum(), float(_BOOTSTRAP)
+    total, n_total = levels.sum(), float(n_bootstrap)
     accepted, n_bad, done = 0.0, 0, 0
     while done < n_steps if deadline is None else (done == 0 or time.monotonic() < deadline):
         n = min(_STEPS_PER_LAUNCH, n_steps - done) if deadline is None else _STEPS_PER_LAUNCH

@@ -56,7 +56,6 @@ class ReferenceScene:
 
     def _shapes(self, mi: Any, group: Group) -> dict[str, Any]:
         t = self._tables
-        lamp, material = t.face_tags >> 16, t.face_tags & 0xFFFF
         shapes: dict[str, Any] = {}
         for tag in np.unique(t.face_tags):
             faces = t.faces[t.face_tags == tag]
@@ -68,7 +67,6 @@ class ReferenceScene:
                 radiance = [float(v) for v in t.lamp_rows[int(tag >> 16), :3]]
                 fields["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
             shapes[f"mesh_{tag}"] = _mesh(mi, t.positions, faces, fields)
-        assert len(lamp) == len(material)
         return shapes
 
 
@@ -115,15 +113,9 @@ def _bsdf(row: NDArray[np.float32]) -> dict[str, Any]:
 
 
 def _outdoor(mi: Any, sky: Sky) -> dict[str, Any]:
-    # Mitsuba's envmap looks along +z in the middle of the picture; ours along -z at its edge.
-    picture = np.asarray(sky.dome, np.float32)[:, ::-1]
-    picture = np.roll(picture, 0, axis=1)
+    # Mitsuba's envmap has our axes: azimuth atan2(x, -z), row 0 up.
     emitters: dict[str, Any] = {
-        "dome": {
-            "type": "envmap",
-            "bitmap": mi.Bitmap(np.ascontiguousarray(picture)),
-            "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180),
-        }
+        "dome": {"type": "envmap", "bitmap": mi.Bitmap(np.asarray(sky.dome, np.float32))}
     }
     if sky.sun_irradiance.max() > 0:
         emitters["sun"] = {

@@ -1,0 +1,87 @@
+"""Rooms in which light is hard to find, for the Metropolis tests and benchmarks/light.py."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbrs_farm.camera import Camera
+from pbrs_farm.house import House, Material, MaterialKind, Surface
+from tests.transport.rooms import (
+    BULB,
+    Triple,
+    box,
+    bulb,
+    camera,
+    house,
+    matte,
+    panel,
+    shell,
+    sphere,
+)
+
+
+def door_ajar(gap: float = 0.06) -> tuple[House, Camera]:
+    """Two rooms, a lamp in the far one, a doorway whose door leaves a gap of some centimetres.
+
+    No lamp is seen from the near room: all its light comes through the gap off the far walls.
+    """
+    size = (4.0, 2.5, 8.2)
+    surfaces = shell(size, 0)
+    doorway = (1.5, 0.0, 2.4, 2.05)
+    surfaces += panel((0.0, 0.0, 4.05), (4.0, 2.5, 4.15), doorway, 0)
+    surfaces.append(box((1.5 + gap, 0.0, 4.08), (2.4, 2.05, 4.12), 1, "door"))
+    surfaces.append(box((2.6, 0.0, 1.2), (3.4, 0.5, 2.2), 2, "block"))
+    materials = [
+        matte("wall", 0.75),
+        matte("door", 0.5, 0.35, 0.2),
+        matte("block", 0.2, 0.3, 0.7),
+        BULB,
+    ]
+    lamp = bulb((3.2, 1.2, 6.5), 3, 1600.0)
+    return house(surfaces, materials, lamps=[lamp], size=size), camera(
+        (0.6, 1.5, 0.5), (2.4, 0.9, 4.0)
+    )
+
+
+def glass_globe(radius: float = 0.12) -> tuple[House, Camera]:
+    """A bulb inside two globes of thin glass in a closed room."""
+    surfaces = shell((4.0, 2.5, 4.0), 0)
+    surfaces.append(sphere((2.0, 1.9, 2.0), radius, 2, n=32))
+    surfaces.append(box((2.4, 0.0, 2.4), (3.2, 0.6, 3.2), 1, "block"))
+    glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
+    materials = [matte("wall", 0.7), matte("block", 0.6, 0.2, 0.15), glass, BULB]
+    return (
+        house(surfaces, materials, lamps=[bulb((2.0, 1.9, 2.0), 3, 800.0, radius=0.03)]),
+        camera((0.5, 1.5, 0.5), (2.4, 1.0, 2.4)),
+    )
+
+
+def open_shade() -> tuple[House, Camera]:
+    """A bulb deep in an opaque shade, open above and below, in a room with a window."""
+    surfaces = shell((4.0, 2.5, 4.0), 0, front=False)
+    surfaces += panel((0, 0, -0.1), (4.0, 2.5, 0.0), (1.5, 1.0, 2.5, 2.0), 0)
+    surfaces.append(cylinder((2.0, 1.3, 2.2), 0.12, 0.35, 1))
+    surfaces.append(box((2.6, 0.0, 2.4), (3.4, 0.6, 3.2), 2, "block"))
+    materials = [matte("wall", 0.7), matte("shade", 0.5), matte("block", 0.2, 0.5, 0.3), BULB]
+    lamp = bulb((2.0, 1.45, 2.2), 3, 800.0, radius=0.03)
+    return house(surfaces, materials, lamps=[lamp]), camera((0.5, 1.5, 3.6), (2.4, 0.9, 1.8))
+
+
+def sunlit() -> tuple[House, Camera]:
+    """A room with one window and nothing else; the sky decides."""
+    from tests.transport.rooms import window_room
+
+    return window_room(0.7)
+
+
+def cylinder(base: Triple, radius: float, height: float, material: int, *, n: int = 32) -> Surface:
+    """An open tube around +y."""
+    angle = np.arange(n) / n * 2 * np.pi
+    ring = np.stack([radius * np.cos(angle), np.zeros(n), radius * np.sin(angle)], -1)
+    points = np.concatenate([ring, ring + np.array([0.0, height, 0.0])]) + np.array(base)
+    faces = [
+        f
+        for i in range(n)
+        for f in ((i, i + n, (i + 1) % n + n), (i, (i + 1) % n + n, (i + 1) % n))
+    ]
+    return Surface("tube", points.astype(np.float32), np.array(faces, np.int32), material)

@@ -1,0 +1,93 @@
+"""Metropolis against closed forms and against path tracing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbrs_farm.errors import RenderFailed
+from pbrs_farm.frames import LUMINANCE
+from pbrs_farm.lighting import Group
+from pbrs_farm.recipe import LightFields
+from pbrs_farm.transport.scene import LightScene
+from pbrs_farm.transport.sky import dark_sky, sunsky, uniform_sky
+from pbrs_farm.transport.variant import choose_variant
+from tests.transport import hard_rooms, rooms
+from tests.transport.test_path import FIELDS, RECIPE, blocks, furnace, rendered, z_scores
+
+pytestmark = pytest.mark.skipif(
+    choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
+)
+
+METROPOLIS: LightFields = FIELDS.model_copy(
+    update={
+        "integrator": "metropolis",
+        "direct_spp": 32,
+        "mutations_per_pixel": 128,
+        "chains": 2048,
+        "pilot_spp": 4,
+    }
+)
+
+
+@pytest.mark.parametrize("albedo", [0.3, 0.8])
+def test_a_furnace_room_has_the_radiance_of_the_geometric_series(albedo: float) -> None:
+    house, camera = furnace(albedo)
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    means = [
+        float((scene.render(camera, "0_0", METROPOLIS, seed).indoor @ LUMINANCE).mean())
+        for seed in range(6)
+    ]
+    expected = sum(albedo**k for k in range(METROPOLIS.max_depth))
+    error = max(float(np.std(means, ddof=1)) / np.sqrt(6), 1e-3 * expected)
+    assert abs(np.mean(means) - expected) < 4 * error
+    assert np.mean(means) == pytest.approx(expected, rel=0.01)
+
+
+SCENES = {
+    "window": lambda: (*rooms.window_room(0.7, lumen=800), sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.35)),
+    "door ajar": lambda: (*hard_rooms.door_ajar(), dark_sky()),
+    "glass globe": lambda: (*hard_rooms.glass_globe(), dark_sky()),
+    "open shade": lambda: (*hard_rooms.open_shade(), uniform_sky((1, 1, 1))),
+}  # fmt: skip
+
+SLOW = ("glass globe", "open shade")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in SCENES]
+)
+def test_metropolis_and_path_have_one_mean(name: str) -> None:
+    # Significance: 16 blocks of each group, |z| < 5: missed by chance once in 50,000 runs.
+    house, camera, sky = SCENES[name]()
+    scene = LightScene.load(house, {}, RECIPE, sky)
+    camera = camera.with_size(32, 24)
+    plain = FIELDS.model_copy(update={"spp": 256, "pilot_spp": 4})
+    paths = [scene.render(camera, "0_0", plain, 10 + k) for k in range(4)]
+    chains = [scene.render(camera, "0_0", METROPOLIS, 50 + k) for k in range(4)]
+    for group in Group:
+        ours = [blocks(r.group(group)) for r in chains]
+        theirs = [blocks(r.group(group)) for r in paths]
+        if np.mean(theirs) == 0:
+            assert np.mean(ours) == 0
+            continue
+        lit = np.mean(theirs, 0) > 0
+        z = z_scores([x[lit] for x in ours], [x[lit] for x in theirs])
+        assert np.abs(z).max() < 5
+        assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.1)
+
+
+def test_no_light_at_all_is_an_error_that_says_what_there_is() -> None:
+    house = rooms.house(rooms.shell((4, 2.5, 4), 0), [rooms.matte("wall", 0.9)])
+    camera = rooms.camera((0.5, 1.5, 0.5), (3.9, 0.2, 3.9))
+    with pytest.raises(RenderFailed, match="a sky and 0 lamps in the house"):
+        rendered(house, camera, uniform_sky((1, 1, 1)), **METROPOLIS.model_dump())
+
+
+def test_a_time_budget_ends_the_mutations() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    fields = {**METROPOLIS.model_dump(), "time_budget_s": 0.2, "mutations_per_pixel": 100_000}
+    result = rendered(house, camera, dark_sky(), **fields)
+    wanted = 100_000 * 32 * 24
+    assert 0 < result.facts["indoor"]["mutations"] < wanted
+    assert result.indoor.mean() > 0

@@ -1,0 +1,267 @@
+"""Path tracing: closed forms, exact facts, and Mitsuba's own integrator as a second opinion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbrs_farm.camera import Camera
+from pbrs_farm.frames import LUMINANCE
+from pbrs_farm.house import House, Item, ItemKind, LightPart, Material, MaterialKind
+from pbrs_farm.lighting import Group, Mode, PowerUnit
+from pbrs_farm.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.transport.reference import ReferenceScene
+from pbrs_farm.transport.result import LightResult
+from pbrs_farm.transport.scene import LightScene
+from pbrs_farm.transport.sky import Sky, dark_sky, sunsky, uniform_sky
+from pbrs_farm.transport.variant import choose_variant
+from tests.transport import rooms
+
+pytestmark = pytest.mark.skipif(
+    choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
+)
+
+RECIPE: Recipe = recipe_from_name("fast")
+FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "pilot_spp": 0})
+
+
+def rendered(
+    house: House,
+    camera: Camera,
+    sky: Sky,
+    *,
+    seed: int = 1,
+    recipe: Recipe = RECIPE,
+    **fields: object,
+) -> LightResult:
+    scene = LightScene.load(house, {}, recipe, sky)
+    return scene.render(camera, "0_0", FIELDS.model_copy(update=fields), seed)
+
+
+def furnace(albedo: float) -> tuple[House, Camera]:
+    """A closed box whose walls all shine with luminance 1 and reflect albedo."""
+    walls = rooms.box((0, 0, 0), (4, 2.5, 4), 0)
+    area = 2 * (4 * 2.5 + 4 * 2.5 + 4 * 4)
+    part = LightPart(
+        (0, 0, 0), 1, 179 * math.pi * area, PowerUnit.LUMEN, rgb_linear=(1, 0.5, 0.2), emitting=(0,)
+    )
+    lamp = Item("walls", "walls", ItemKind.LAMP, "0", (walls,), lights=(part,))
+    house = rooms.house([], [rooms.matte("wall", albedo)]).with_items([lamp])
+    return house, rooms.camera((1, 1, 1), (3, 1.5, 3), 16, 12)
+
+
+@pytest.mark.parametrize("albedo", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize("depth", [1, 2, 5, 12])
+def test_a_furnace_room_has_the_radiance_of_the_geometric_series(albedo: float, depth: int) -> None:
+    house, camera = furnace(albedo)
+    result = rendered(house, camera, dark_sky(), spp=256, max_depth=depth)
+    expected = sum(albedo**k for k in range(depth))
+    luminance = result.indoor @ LUMINANCE
+    error = max(float(luminance.std()) / math.sqrt(luminance.size), 1e-6)
+    assert abs(float(luminance.mean()) - expected) < 4 * error
+    assert not result.outdoor.any()
+    assert result.n_nonfinite == 0
+
+
+def test_a_floor_under_a_uniform_sky_reflects_its_albedo() -> None:
+    floor = rooms.quad([(-50, 0, -50), (-50, 0, 50), (50, 0, 50), (50, 0, -50)], 0)
+    house = rooms.house([floor], [rooms.matte("floor", 0.2, 0.5, 0.8)])
+    result = rendered(house, rooms.camera((0, 1, 3), (0, 0, 0)), uniform_sky((1, 2, 3)), spp=256)
+    np.testing.assert_allclose(result.outdoor[14:].mean((0, 1)), [0.2, 1.0, 2.4], rtol=2e-3)
+    np.testing.assert_allclose(result.outdoor[0, 0], [1, 2, 3], rtol=1e-5)
+
+
+@pytest.mark.parametrize("x", [0.0, 1.0, 2.0])
+def test_a_bulb_lights_a_floor_by_its_flux_and_the_cube_of_the_cosine(x: float) -> None:
+    floor = rooms.quad([(-50, 0, -50), (-50, 0, 50), (50, 0, 50), (50, 0, -50)], 0)
+    house = rooms.house(
+        [floor], [rooms.matte("floor", 0.5), rooms.BULB], lamps=[rooms.bulb((0, 1, 0), 1, 1000.0)]
+    )
+    camera = rooms.camera((x + 0.5, 0.3, 0), (x, 0, 0), 8, 8, 0.01)
+    luminance = rendered(house, camera, dark_sky(), spp=1024).indoor @ LUMINANCE
+    lux = 1000.0 / (4 * math.pi) / (1 + x * x) ** 1.5
+    assert float(luminance.mean()) == pytest.approx(0.5 / math.pi * lux / 179, rel=0.01)
+
+
+def test_a_bulb_a_hand_from_the_ceiling_does_not_shadow_itself() -> None:
+    # The shadow ray's start moves off its surface; it must still end before the bulb.
+    ceiling = rooms.quad([(-9, 1, -9), (-9, 1, 9), (9, 1, 9), (9, 1, -9)], 0)
+    bulb = rooms.bulb((0, 0.7, 0), 1, 1000.0)
+    house = rooms.house([ceiling], [rooms.matte("ceiling", 0.5), rooms.BULB], lamps=[bulb])
+    camera = rooms.camera((0.3, 0.5, 0.6), (0, 1, 0.6), 8, 8, 0.01)
+    luminance = rendered(house, camera, dark_sky(), spp=2048).indoor @ LUMINANCE
+    d2 = 0.3**2 + 0.6**2
+    lux = 1000.0 / (4 * math.pi * d2) * 0.3 / math.sqrt(d2)
+    assert float(luminance.mean()) == pytest.approx(0.5 / math.pi * lux / 179, rel=0.01)
+
+
+def test_a_sealed_room_under_a_bright_sky_is_exactly_black() -> None:
+    house = rooms.house(rooms.shell((4, 2.5, 4), 0), [rooms.matte("wall", 0.9)])
+    sky = sunsky(RECIPE, elevation_rad=0.8, azimuth_rad=0.4)
+    result = rendered(house, rooms.camera((0.5, 1.5, 0.5), (3.9, 0.2, 3.9)), sky, spp=64)
+    assert not result.outdoor.any()
+    assert not result.indoor.any()
+    assert result.noise == {"outdoor": 0.0, "indoor": 0.0, "sum": 0.0}
+
+
+def test_a_pane_in_the_window_changes_neither_radiance_nor_noise() -> None:
+    sky = sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.3)
+    house, camera = rooms.window_room()
+    glazed, _camera = rooms.window_room(pane=True)
+    a, b = rendered(house, camera, sky, spp=16), rendered(glazed, camera, sky, spp=16)
+    np.testing.assert_array_equal(a.outdoor, b.outdoor)
+    assert a.noise == b.noise
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_does_not() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
+    a, b, c = (scene.render(camera, "0_0", RECIPE.light, seed) for seed in (7, 7, 8))
+    np.testing.assert_array_equal(a.outdoor, b.outdoor)
+    np.testing.assert_array_equal(a.indoor, b.indoor)
+    assert (a.indoor != c.indoor).any()
+
+
+def test_modes_are_exact_sums_of_groups() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    result = rendered(house, camera, uniform_sky((1, 1, 1)), spp=4)
+    np.testing.assert_array_equal(result.mode(Mode.MLT_OL), result.outdoor)
+    np.testing.assert_array_equal(result.mode(Mode.MLT_IL_OL), result.outdoor + result.indoor)
+
+
+def test_twice_the_emitters_give_twice_the_radiance() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    bright, _camera = rooms.window_room(lumen=1600)
+    a = rendered(house, camera, uniform_sky((1, 1, 1)), spp=8)
+    b = rendered(bright, camera, uniform_sky((2, 2, 2)), spp=8)
+    np.testing.assert_allclose(b.outdoor, 2 * a.outdoor, rtol=1e-5)
+    np.testing.assert_allclose(b.indoor, 2 * a.indoor, rtol=1e-5)
+
+
+def test_each_group_holds_its_own_light_alone() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    both = rendered(house, camera, uniform_sky((1, 1, 1)), spp=8)
+    lamps = rendered(house, camera, dark_sky(), spp=8)
+    dark, _camera = rooms.window_room()
+    day = rendered(dark, camera, uniform_sky((1, 1, 1)), spp=8)
+    assert not lamps.outdoor.any()
+    assert not day.indoor.any()
+    # The bulb's body stops a little daylight, so only the lamps' group is the same bits.
+    np.testing.assert_array_equal(lamps.indoor, both.indoor)
+
+
+def blocks(picture: NDArray[np.float32], n: int = 4) -> NDArray[np.float64]:
+    luminance = picture @ LUMINANCE
+    h, w = luminance.shape
+    return luminance.reshape(n, h // n, n, w // n).mean((1, 3)).astype(np.float64)
+
+
+def z_scores(a: list[NDArray[np.float64]], b: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """z of the difference of means, one per block, the variance pooled over all blocks' ratios."""
+    x, y = np.array(a), np.array(b)
+    scale = 0.5 * (x.mean(0) + y.mean(0))
+    x, y = x / scale, y / scale
+    error = np.sqrt(x.var(0, ddof=1).mean() / len(x) + y.var(0, ddof=1).mean() / len(y))
+    return np.asarray((x.mean(0) - y.mean(0)) / error)
+
+
+@pytest.mark.parametrize("group", list(Group))
+def test_pictures_agree_with_mitsubas_own_path_integrator(group: Group) -> None:
+    # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
+    house, camera = rooms.window_room(0.6, lumen=800)
+    sky = sunsky(RECIPE, elevation_rad=0.7, azimuth_rad=2.0)
+    scene = LightScene.load(house, {}, RECIPE, replace(sky, sun_irradiance=np.zeros(3)))
+    other = ReferenceScene(scene.tables, scene.sky, scene.variant)
+    fields = FIELDS.model_copy(update={"spp": 128, "pilot_spp": 4})
+    ours = [blocks(scene.render(camera, "0_0", fields, k).group(group)) for k in range(4)]
+    theirs = [blocks(other.render(camera, group, fields, 100 + k)) for k in range(4)]
+    assert np.abs(z_scores(ours, theirs)).max() < 4.5
+    assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.03)
+
+
+def test_weights_of_the_pilot_leave_the_mean_alone_and_cut_the_noise() -> None:
+    # Twelve lamps behind a wall and one in the room: uniform choice wastes 12 of 13 shadow rays.
+    house, camera = rooms.window_room(lumen=800)
+    far = [rooms.bulb((1 + 0.2 * k, 1.0, 9.0), 1, 800.0) for k in range(12)]
+    house = house.with_items([*house.items, *far])
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    means = {}
+    noise = {}
+    for pilot_spp in (0, 4):
+        fields = FIELDS.model_copy(update={"spp": 32, "pilot_spp": pilot_spp})
+        results = [scene.render(camera, "0_0", fields, 10 + k) for k in range(4)]
+        means[pilot_spp] = [blocks(r.indoor) for r in results]
+        noise[pilot_spp] = float(np.mean([r.noise["indoor"] for r in results]))
+    assert np.abs(z_scores(means[0], means[4])).max() < 4.5
+    assert noise[4] ** 2 < 0.4 * noise[0] ** 2
+
+
+def test_thin_glass_dims_a_bulb_by_what_it_reflects_and_no_more() -> None:
+    glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
+    floor = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
+    sheet = rooms.quad([(-9, 0.5, -9), (-9, 0.5, 9), (9, 0.5, 9), (9, 0.5, -9)], 2)
+    materials = [rooms.matte("floor", 0.5), rooms.BULB, glass]
+    lamps = [rooms.bulb((0, 1, 0), 1, 1000.0)]
+    camera = rooms.camera((0.1, 0.3, 0), (0, 0, 0), 8, 8, 0.01)
+    clear = rendered(
+        rooms.house([floor], materials, lamps=lamps), camera, dark_sky(), spp=512, max_depth=2
+    )
+    glazed = rendered(
+        rooms.house([floor, sheet], materials, lamps=lamps),
+        camera,
+        dark_sky(),
+        spp=512,
+        max_depth=2,
+    )
+    # A pane of index 1.5 passes 92 % straight on (both faces, all inner reflections).
+    assert glazed.indoor.mean() / clear.indoor.mean() == pytest.approx(0.923, rel=0.01)
+
+
+def test_a_cut_out_leaf_lets_light_through_its_holes() -> None:
+    half = np.full((8, 8, 4), 255, np.uint8)
+    half[:, :4, 3] = 0
+    leaf = Material("leaf", texture_id="leaf", alpha_cutout=True, diffuse=(0, 0, 0))
+    floor = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
+    sheet = rooms.quad([(-1, 0.5, -1), (1, 0.5, -1), (1, 0.5, 1), (-1, 0.5, 1)], 2)
+    materials = [rooms.matte("floor", 0.5), rooms.BULB, leaf]
+    house = rooms.house([floor, sheet], materials, lamps=[rooms.bulb((0, 2, 0), 1, 1000.0)])
+    scene = LightScene.load(house, {"leaf": half}, RECIPE, dark_sky())
+    seen = {}
+    for x in (-0.8, 0.8):
+        camera = rooms.camera((x, 0.3, 0.1), (x, 0, 0), 4, 4, 0.01)
+        fields = FIELDS.model_copy(update={"spp": 64, "max_depth": 2})
+        seen[x] = float(scene.render(camera, "0_0", fields, 1).indoor.mean())
+    assert seen[0.8] == 0
+    assert seen[-0.8] > 1e-3
+
+
+def test_another_camera_compiles_nothing() -> None:
+    import drjit as dr
+
+    house, camera = rooms.window_room(lumen=800)
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
+    scene.render(camera, "0_0", RECIPE.light, 1)
+    other = rooms.camera((2.0, 1.2, 3.0), (1.0, 0.5, 0.5))
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        scene.render(other, "0_0", RECIPE.light, 2)
+        kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+    assert kernels
+    assert all(k["cache_hit"] for k in kernels)
+
+
+def test_more_passes_are_made_until_the_noise_is_reached() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
+    fields = FIELDS.model_copy(update={"spp": 8})
+    once = scene.render(camera, "0_0", fields, 1)
+    target = once.noise["sum"] / 3
+    result = scene.render(camera, "0_0", fields.model_copy(update={"noise": target}), 1)
+    assert result.noise["sum"] <= target
+    assert result.spp > 8
+    capped = fields.model_copy(update={"noise": 1e-6, "max_spp": 32})
+    assert scene.render(camera, "0_0", capped, 1).spp == 32
