@@ -27,7 +27,11 @@ RAY_LAYERS = (
 )  # fmt: skip
 """Layers that a ray through the pixel's centre decides."""
 
-DEPTH_TOLERANCE_MM = 0.51
+ROUNDING_MM = 0.505
+RAY_ERROR_MM = 2e-4
+"""Per metre of depth, over the cosine: rays with float32 directions, magnified by a slanting face."""
+
+MAX_RAY_ERROR_MM = 5.0
 NORMAL_TOLERANCE_DEG = 0.02
 TIE_DEPTH_M = 1e-4
 METRES = 2e-4
@@ -110,13 +114,14 @@ def _explained(
     classes[list(triangles.nyu40)] = list(triangles.nyu40.values())
     mm = np.clip(z * 1000, 0.5, 65535)
     point = view.world_from_camera[:3, 3] + directions * z[:, None]
+    cosine = np.abs(np.einsum("ni,ni->n", normal, directions))
+    slant_mm = RAY_ERROR_MM * z / np.maximum(cosine, 1e-9)
+    tolerance_mm = ROUNDING_MM + np.minimum(slant_mm, MAX_RAY_ERROR_MM)
 
     checks: dict[str, Callable[[NDArray[Any]], Any]] = {
         "instance": lambda stored: stored == instance,
         "semantic": lambda stored: stored == classes[instance],
-        "depth": lambda stored: np.where(
-            hit, np.abs(stored - mm) <= DEPTH_TOLERANCE_MM, stored == 0
-        ),
+        "depth": lambda stored: np.where(hit, np.abs(stored - mm) <= tolerance_mm, stored == 0),
         "normal": lambda stored: normal_is_right(stored, published_axes(normal, view)),
         "valid": lambda stored: stored == np.where(hit, 255, 0),
         "depth_z": lambda stored: np.where(hit, np.abs(stored - z) <= METRES, stored == 0),

@@ -8,6 +8,7 @@ import pytest
 from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.check import verify
 from pbrs_farm.errors import BadInput
+from pbrs_farm.images import png_from_array
 from pbrs_farm.read.builtin import builtin_home
 from tests.check.roots import SIZE, changed_pixel, make_root, sign
 
@@ -242,3 +243,16 @@ def test_a_view_that_sees_nothing_is_clean(tmp_path):
     certificate = verify(tmp_path, all_pixels=True)
     assert certificate.is_clean, certificate.text()
     assert certificate.counts["ray: valid"].checked == SIZE[0] * SIZE[1]
+
+
+def test_a_black_picture_by_outdoor_light_is_noted_and_one_by_opengl_fails(root):
+    black = png_from_array(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    house = house_of(root)
+    for name in ("mlt_ol.png", "opengl_dl.png"):
+        (house / "views/v0" / name).write_bytes(black)
+        (house / f"done/{name}.v0.json").write_text(json.dumps({"files": [f"views/v0/{name}"]}))
+    sign(root, house)
+    certificate = verify(root, sample=10)
+    assert certificate.counts["pictures"].failed == 1
+    assert any("opengl_dl.png: is one colour" in f for f in certificate.failures)
+    assert any("mlt_ol.png is one colour" in n for n in certificate.notes)
