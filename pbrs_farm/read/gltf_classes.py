@@ -90,13 +90,19 @@ _COLLECTIONS: Final = frozenset(
 )
 
 
-def is_collection(name: str) -> bool:
-    """Whether the name of a node without a mesh means several things: "Chairs", "Furniture"."""
+def collection_of(name: str, seen: NodeClass) -> NodeClass | None:
+    """What the members of a node without a mesh are, where its name means several things.
+
+    None: the node is one thing ("Chair"). "Chairs": chairs. "Furniture", "Ground floor" (a storey):
+    no class that members would share, nyu40 0.
+    """
     words = words_of(name)
-    if words & _COLLECTIONS:
-        return True
-    plurals = {w for w in words if w.endswith("s") and w[:-1] in words}
-    return any(nyu40_of("", w[:-1]) is not None or w[:-1] in _STRUCTURE_WORDS for w in plurals)
+    plurals = {w[:-1] for w in words if w.endswith("s") and w[:-1] in words}
+    if words & _COLLECTIONS or seen.kind in (ItemKind.FLOOR, ItemKind.GROUND):
+        return NodeClass(0, ItemKind.OBJECT, is_tagged=False)
+    if any(nyu40_of("", w) is not None or w in _STRUCTURE_WORDS for w in plurals):
+        return seen
+    return None
 
 
 def _tagged(plain: dict[str, Any]) -> NodeClass | None:

@@ -16,7 +16,7 @@ from pbrs_farm.read.gltf_classes import (
     Mapping,
     NodeClass,
     class_of_node,
-    is_collection,
+    collection_of,
 )
 from pbrs_farm.read.gltf_document import Placed, placed_nodes
 from pbrs_farm.read.gltf_lights import assumed_light, emitted, punctual_light
@@ -73,19 +73,27 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
     """The scene's nodes gathered by the item they are part of.
 
     A node belongs to the nearest node above it (or itself) that is an item: the outermost whose
-    class is known, and below it those that are tagged.
+    class is known, and below it those that are tagged. Members of a collection ("Chairs") that
+    have no class of their own have the collection's.
     """
     owner: dict[tuple[int, ...], _Thing] = {}
+    members: dict[tuple[int, ...], NodeClass] = {}
     found: list[_Thing] = []
     for node in placed_nodes(gltf):
         plain = entry(gltf, "nodes", node.index)
         name = str(plain.get("name", ""))[:200]
         extras = plain["extras"] if isinstance(plain.get("extras"), dict) else {}
         above = owner.get(node.path[:-1])
-        seen = class_of_node(name, extras, mapping)
-        if seen and not seen.is_tagged and "mesh" not in plain and is_collection(name):
-            seen = None
-        has_part = "mesh" in plain or "KHR_lights_punctual" in (plain.get("extensions") or {})
+        seen = class_of_node(name, extras, mapping) or members.get(node.path[:-1])
+        if seen and not seen.is_tagged and "mesh" not in plain:
+            grouped = collection_of(name, seen)
+            if grouped is not None:
+                seen = None
+                if grouped.nyu40 and above is None:
+                    members[node.path] = grouped
+        extensions = plain.get("extensions")
+        has_light = isinstance(extensions, dict) and "KHR_lights_punctual" in extensions
+        has_part = "mesh" in plain or has_light
         if (seen and (above is None or seen.is_tagged)) or (above is None and has_part):
             above = _Thing(node, name, seen or _UNMAPPED, extras)
             found.append(above)

@@ -176,7 +176,7 @@ def box_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
         return None
     return Item(
         node.id, "box", ItemKind.OBJECT, node.level_id, tuple(surfaces), UNLABELLED, "Box", room_id,
-        tags=("unmapped",),
+        tags=("box", "unmapped"),
     )  # fmt: skip
 
 

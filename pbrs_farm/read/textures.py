@@ -13,21 +13,22 @@ from pbrs_farm.house import Texture
 
 MAX_EDGE_PX: Final = 16384
 MAX_PIXELS: Final = 64_000_000
-_KEPT: Final = {"PNG": "image/png", "JPEG": "image/jpeg"}
-_CONVERTED: Final = ("GIF", "BMP", "TIFF", "WEBP", "TGA", "MPO")
+_KEPT: Final = {"PNG": "image/png", "JPEG": "image/jpeg", "MPO": "image/jpeg"}
+_TRIED: Final = ("PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP")
 _HOLE_BELOW: Final = 128
 
 
 def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
-    """(the texture, whether its alpha has holes). PNG and JPEG keep their bytes; GIF, BMP, TIFF,
-    WebP and TGA become PNG.
+    """(the texture, whether its alpha has holes). PNG and JPEG keep their bytes; GIF, BMP, TIFF
+    and WebP become PNG.
 
     Raises ValueError with the reason for a picture that cannot be decoded or is too large.
     """
     try:
         with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of odd metadata in a picture that decodes
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            picture = Image.open(io.BytesIO(data), formats=[*_KEPT, *_CONVERTED])
+            picture = Image.open(io.BytesIO(data), formats=_TRIED)
             return _texture(picture, data, name)
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         raise ValueError("the picture is too large") from None

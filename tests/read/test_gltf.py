@@ -118,7 +118,7 @@ def test_a_group_is_one_item_unless_its_name_means_several() -> None:
     cube = s.box([0, 0, 0], [0.2, 0.2, 0.2])
     legs = [s.node(f"leg {k}", mesh=cube, translation=[k, 0, 0]) for k in range(3)]
     s.node("Table", children=legs)
-    chairs = [s.node(f"Chair.{k:03}", mesh=cube) for k in range(2)]
+    chairs = [s.node(f"Cube.{k:03}", mesh=cube) for k in range(2)]
     s.node("Chairs", children=chairs)
     lamp = s.node("Lamp", mesh=cube)
     vase = s.node("Vase", mesh=cube, extras={"class": "otherprop"})
@@ -126,9 +126,49 @@ def test_a_group_is_one_item_unless_its_name_means_several() -> None:
     house = read(s)
     assert item(house, "Table").n_faces == 36
     names = [i.name for i in house.items][4:]
-    assert names == ["Table", "Chair.000", "Chair.001", "Desk", "Vase"]
+    assert names == ["Table", "Cube.000", "Cube.001", "Desk", "Vase"]
+    assert item(house, "Cube.001").nyu40 == 5
     assert item(house, "Desk").n_faces == 24  # its lamp, untagged, is a part of it
     assert not house.notes
+
+
+def test_a_storey_named_floor_is_no_floor() -> None:
+    s = two_rooms()
+    cube = s.node("Cube", mesh=s.box([1, 0, 1], [1.5, 0.5, 1.5]))
+    chair = s.node("Chair", mesh=s.box([2, 0, 1], [2.5, 0.5, 1.5]))
+    s.node("Ground floor", children=[0, 1, 2, 3, cube, chair])
+    house = read(s)
+    assert [i.name for i in house.items if i.kind is ItemKind.FLOOR] == ["Floor"]
+    assert item(house, "Cube").tags == ("unmapped",)
+    assert item(house, "Chair").nyu40 == 5
+    assert len(house.rooms) == 2
+
+
+def test_interleaved_and_quantized_arrays_read_as_the_plain_ones() -> None:
+    s = two_rooms()
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+    rows = np.zeros(4, [("p", "<i2", 3), ("pad", "<u2"), ("uv", "<u1", 2), ("end", "<u2")])
+    rows["p"] = np.rint(corners * 32767)
+    rows["uv"] = corners[:, :2] * 255
+    view = s.writer.add_bytes(rows.tobytes())
+    s.writer._views[view]["byteStride"] = rows.itemsize
+    indices = s.writer.add_bytes(np.array([0, 1, 2, 0, 2, 3], "<u2").tobytes())
+    first = len(s.writer._accessors)
+    s.writer._accessors += [
+        {"bufferView": view, "componentType": 5122, "count": 4, "type": "VEC3", "normalized": True},
+        {"bufferView": view, "byteOffset": 8, "componentType": 5121, "count": 4, "type": "VEC2",
+         "normalized": True},
+        {"bufferView": indices, "componentType": 5123, "count": 6, "type": "SCALAR"},
+    ]  # fmt: skip
+    attributes = {"POSITION": first, "TEXCOORD_0": first + 1}
+    s.meshes.append({"primitives": [{"attributes": attributes, "indices": first + 2}]})
+    s.more["extensionsRequired"] = ["KHR_mesh_quantization"]
+    s.node("Chair", mesh=len(s.meshes) - 1, scale=[2, 2, 2])
+    (surface,) = item(read(s), "Chair").surfaces
+    assert np.allclose(surface.positions, 2 * corners)
+    assert surface.uvs is not None
+    assert np.allclose(surface.uvs, corners[:, :2] * [1, -1] + [0, 1])
+    assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
 def test_transforms_compose_down_the_tree() -> None:
