@@ -18,6 +18,7 @@ from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.files import check_files, check_root_manifest
 from pbrs_farm.check.pictures import check_consistency, check_pictures, read_labels
 from pbrs_farm.check.pixels import RAY_LAYERS, judge
+from pbrs_farm.check.planes import check_planes
 from pbrs_farm.check.poses import SeenView, check_pose, check_reprojection
 from pbrs_farm.check.rays import Rays
 from pbrs_farm.check.stored import StoredView, views_of_house
@@ -95,6 +96,7 @@ def _check_view(
         return None
     check_pictures(view, arrays, tally)
     check_consistency(view, arrays, tally)
+    check_planes(view, arrays, tally)
     _check_rays(view, arrays, scenes, n_pixels, tally)
     return arrays
 

@@ -8,7 +8,7 @@ import pytest
 from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.check import verify
 from pbrs_farm.errors import BadInput
-from pbrs_farm.images import png_from_array
+from pbrs_farm.images import array_from_png, png_from_array
 from pbrs_farm.read.builtin import builtin_home
 from tests.check.roots import SIZE, changed_pixel, make_root, sign
 
@@ -256,3 +256,25 @@ def test_a_black_picture_by_outdoor_light_is_noted_and_one_by_opengl_fails(root)
     assert certificate.counts["pictures"].failed == 1
     assert any("opengl_dl.png: is one colour" in f for f in certificate.failures)
     assert any("mlt_ol.png is one colour" in n for n in certificate.notes)
+
+
+def replaced(file: Path, change) -> None:  # type: ignore[no-untyped-def]
+    file.write_bytes(png_from_array(change(array_from_png(file.read_bytes()))))
+
+
+def test_depth_along_the_ray_does_not_lie_on_the_normals_planes(root):
+    view = house_of(root) / "views/v0"
+    intrinsics = Intrinsics.from_hfov(*SIZE)
+    x = (np.arange(SIZE[0]) + 0.5 - intrinsics.cx) / intrinsics.fx
+    y = (np.arange(SIZE[1]) + 0.5 - intrinsics.cy) / intrinsics.fy
+    longer = np.sqrt(1 + x[None, :] ** 2 + y[:, None] ** 2)
+    replaced(view / "depth.png", lambda depth: np.rint(depth * longer).astype(np.uint16))
+    sign(root, house_of(root))
+    assert verify(root, sample=0).counts["depth on planes"].failed > 1000
+
+
+def test_normals_in_another_frame_do_not_fit_the_depth(root):
+    view = house_of(root) / "views/v0"
+    replaced(view / "normal.png", lambda normal: np.ascontiguousarray(normal[..., [0, 2, 1]]))
+    sign(root, house_of(root))
+    assert verify(root, sample=0).counts["depth on planes"].failed > 1000
