@@ -1,0 +1,63 @@
+"""Verbs that hand labels on: export, classes, label-sheet. Effects: read a folder, write files."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from pbrs_farm.commands.words import Verb, dump, say
+from pbrs_farm.errors import BadInput
+
+FORMS = ("coco", "hdf5", "webdataset", "released")
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add export, classes and label-sheet."""
+    p = verb("export", _export, "finished views in the form another tool reads")
+    p.add_argument("folder", type=Path)
+    p.add_argument("--to", required=True, choices=FORMS, help="docs/formats.md tells the forms")
+    p.add_argument("--out", type=Path, default=None, help="new folder (default FOLDER_<form>)")
+    p.add_argument("--selection", default=None, metavar="RUN", help="only what this run keeps")
+    p = verb("classes", _classes, "how often each class is seen, and what has no class")
+    p.add_argument("folder", type=Path)
+    p.add_argument("--json", action="store_true", help="as JSON")
+    p = verb("label-sheet", _label_sheet, "a view's labels over its picture, an edge magnified")
+    p.add_argument("view", type=Path, help="a view's folder: OUT/houses/<house>/views/<view>")
+    p.add_argument("--out", type=Path, default=None, help="PNG (default VIEW_labels.png here)")
+
+
+def _export(args: argparse.Namespace) -> int:
+    from pbrs_farm.farm.export import export
+
+    out = args.out or Path(f"{args.folder.resolve().name}_{args.to}")
+    n_views, n_files = export(args.folder, out, args.to, selection=args.selection)
+    say(f"{out}: {n_views} views, {n_files} files")
+    return 0
+
+
+def _classes(args: argparse.Namespace) -> int:
+    from pbrs_farm.farm.class_statistics import class_statistics
+
+    statistics = class_statistics(args.folder)
+    if args.json:
+        dump(statistics.model_dump(mode="json"))
+    else:
+        say(statistics.text())
+    return 0
+
+
+def _label_sheet(args: argparse.Namespace) -> int:
+    from pbrs_farm.farm.label_sheet import label_sheet
+    from pbrs_farm.farm.output import views_of
+    from pbrs_farm.images import png_from_array
+    from pbrs_farm.store.folder import FolderStore
+
+    folder = args.view.resolve()
+    root = folder.parents[3] if len(folder.parents) > 3 else folder
+    view = next((v for v in views_of(root) if v.folder.resolve() == folder), None)
+    if view is None:
+        raise BadInput(args.view, "", "no view's folder", hint="OUT/houses/<house>/views/<view>")
+    out = args.out or Path(f"{folder.name}_labels.png")
+    FolderStore(out.parent).put(out.name, png_from_array(label_sheet(view)))
+    say(str(out))
+    return 0
