@@ -11,6 +11,7 @@ from pbrs_farm.truth.basic import (
 )
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
 from pbrs_farm.truth.coverage import coverage
+from pbrs_farm.truth.layout import layout_table
 from pbrs_farm.truth.more import (
     OPTIONAL_NAMES,
     Seen,
@@ -32,6 +33,7 @@ __all__ = [
     "instance_png",
     "is_truncated",
     "layers_from_hit",
+    "layout_table",
     "normal_png",
     "nyu40_of_instance",
     "optional_layers",
