@@ -23,7 +23,7 @@ def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, 
     picture and nothing in depth_z (H, W) hides it. A sloped or stepped ceiling is not followed.
     """
     i = camera.intrinsics
-    camera_from_world = np.linalg.inv(camera.world_from_camera)
+    camera_from_world = np.asarray(np.linalg.inv(camera.world_from_camera), np.float64)
     rows = []
     for at, y in (("floor", room.floor_y), ("ceiling", room.ceiling_y)):
         corners = np.insert(room.polygon, 1, y, axis=1)
