@@ -60,6 +60,7 @@ def add_verbs(
     p.add_argument("--modes", nargs="+", default=[], metavar="MODE", help="default: all four")
     p.add_argument("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers")
     p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views a house")
+    p.add_argument("--reference", type=Path, help="reference file: select when the job ends")
     p.add_argument("--gpu", action="store_true", help="light goes to the queue light.gpu")
     p.add_argument("--priority", type=int, default=5, choices=range(10), help="0 goes first")
     p.add_argument("--update", action="store_true", help="give the store this recipe")
@@ -152,7 +153,7 @@ def _submitter(recipe_of: RecipeOf) -> Handler:
         from workers.client import completed, new_spec
         from workers.estimate import estimate, seconds_per_view
         from workers.houses import group_stages
-        from workers.sources import entries_from_words, upload
+        from workers.sources import entries_from_words, placed_reference, upload
 
         words = args.homes
         if args.houses:
@@ -160,11 +161,13 @@ def _submitter(recipe_of: RecipeOf) -> Handler:
         want = wanted(args.modes, args.layers, args.views)
         recipe = recipe_of(args)
         found = entries_from_words(words)
+        reference = placed_reference(args.reference) if args.reference else ("", b"")
         spec = new_spec(
             recipe,
             modes=tuple(m.value for m in want.modes),
             layers=want.layers,
             n_views=want.n_views,
+            reference=reference[0],
             gpu=args.gpu,
             priority=args.priority,
             group_stages=group_stages(want),
@@ -179,6 +182,8 @@ def _submitter(recipe_of: RecipeOf) -> Handler:
         farm = _farm(args)
         farm.ledger.ping()
         upload(farm.store, [ref for _entry, ref in found])
+        if reference[0]:
+            farm.store.put_if_absent(*reference)
         job = farm.submit(houses, spec, update=args.update)
         if job.was and not args.json:
             sys.stderr.write(f"pbrs-farm: this job is there already, {job.was}\n")

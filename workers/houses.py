@@ -64,9 +64,13 @@ class HouseRunner:
         elif request.stage == REDUCE:
             tell("finish")
             finish_house(self._store, request.house)
+            if spec.reference:
+                self._pack_histograms(request.house, spec, tell)
         elif request.stage == SHARD:
             merge_shard(self._store, spec, int(request.unit.removeprefix("s")), tell)
         elif request.stage == JOB:
+            if spec.reference:
+                self._select(spec, tell)
             merge_job(self._store, spec, tell)
         return Result(n_views=len(request.views))
 
@@ -89,6 +93,29 @@ class HouseRunner:
             for step in _HOUSE_STEPS:
                 self._step(request, spec, tell, step, source=source)
         return Result(groups=self._groups(spec, request.house))
+
+    def _pack_histograms(self, house: str, spec: JobSpec, tell: Tell) -> None:
+        """The house's histograms in one object, so that the job's selection reads one a house."""
+        from pbrs_farm.farm.selecting import house_pack
+        from pbrs_farm.lighting import Mode
+
+        tell("histograms")
+        house_pack(self._store, house, Mode(spec.recipe.selection.score_mode))
+
+    def _select(self, spec: JobSpec, tell: Tell) -> None:
+        """Selection over the views there are; a run of the job's name, so that it adds up."""
+        from pbrs_farm.farm.selecting import select
+        from pbrs_farm.selection.reference import reference_from_bytes
+
+        reference = reference_from_bytes(self._store.get(spec.reference), spec.reference)
+        select(
+            self._store,
+            reference,
+            spec.recipe.selection,
+            reference_name=spec.reference,
+            run=spec.job_id,
+            progress=lambda done, n: tell(f"select {done} of {n}"),
+        )
 
     def _groups(self, spec: JobSpec, house: str) -> tuple[tuple[str, ...], ...]:
         marker = read_marker(self._store, keys.marker_key(house, "cameras"))

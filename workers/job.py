@@ -49,7 +49,7 @@ class JobSpec(BaseModel):
     priority: int = Field(5, ge=0, le=9, description="0 goes first")
     group_stages: tuple[str, ...] = (GL, LIGHT)
     seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the groups")
-    reference: str = Field("", description="folder of reference pairs for selection, or none")
+    reference: str = Field("", description="key of the reference selection scores against, or none")
     rules: JobRules = JobRules()
     n_houses: int = 0
 

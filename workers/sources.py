@@ -11,7 +11,9 @@ from typing import Final
 
 from pbrs_farm import homes
 from pbrs_farm.debian import cache_folder
+from pbrs_farm.farm.reference import read_reference
 from pbrs_farm.farm.sources import SourceRef, resolve
+from pbrs_farm.selection.reference import bytes_from_reference
 from pbrs_farm.store.interface import Store
 from workers.job import HouseEntry
 
@@ -49,6 +51,12 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
         for deb in sorted(cache_folder().glob(f"{homes.PACKAGE}_*.deb")):
             if store.head(FOLDER + _key_name(deb.name)) is None:
                 store.put_if_absent(FOLDER + _key_name(deb.name), deb.read_bytes())
+
+
+def placed_reference(path: Path) -> tuple[str, bytes]:
+    """Key and bytes of the reference file a job is to be selected against; BadInput if none."""
+    reference = read_reference(path)
+    return f"{FOLDER}references/{reference.digest}.npz", bytes_from_reference(reference)
 
 
 def fill_cache(store: Store) -> None:
