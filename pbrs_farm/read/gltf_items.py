@@ -25,6 +25,7 @@ from pbrs_farm.read.gltf_meshes import meshes_of
 from pbrs_farm.read.notes import Notes
 from pbrs_farm.read.obj import Mesh
 from pbrs_farm.read.placed import oriented_box, placed
+from pbrs_farm.read.sheets import planar_parts
 from pbrs_farm.recipe import ReadFields
 
 _UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)
@@ -56,17 +57,19 @@ def items_of_scene(
         if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
             text = f"stands farther than {fields.max_extent_m:g} m from the origin"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_extent_m")
-        n_faces, n_items = n_faces + item.n_faces, n_items + 1
-        if n_faces > fields.max_triangles or n_items > MAX_INSTANCES:
+        n_faces += item.n_faces
+        if n_faces > fields.max_triangles or n_items >= MAX_INSTANCES:
             text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_triangles")
-        unique, k = item.id, 2
-        while unique in taken:
-            unique, k = f"{item.id}.{k}", k + 1
-        taken.add(unique)
         if "unmapped" in item.tags:
             notes.add("unmapped-class", place, "names no class; it is otherprop")
-        yield replace(item, id=unique)
+        for part in planar_parts(item):
+            unique, k = part.id, 2
+            while unique in taken:
+                unique, k = f"{part.id}.{k}", k + 1
+            taken.add(unique)
+            n_items += 1
+            yield replace(part, id=unique)
 
 
 def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:

@@ -24,6 +24,7 @@ MAX_ROOMS: Final = 1000
 _STOREY_M: Final = 2.5
 _SAME_LEVEL_M: Final = 0.5
 _SLACK_M: Final = 0.3
+_EDGE_M: Final = 0.1
 _NEXT_ROOM: Final = 0.05
 """A ceiling that covers less of a room than this share is the next room's."""
 
@@ -80,10 +81,12 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
     found: list[Room] = []
     for item in items:
         height = floor_height(item.surfaces) if item.kind is ItemKind.FLOOR else None
-        if height is None:
+        if height is None or len(found) >= MAX_ROOMS:
             continue
         standing = [w for w in walls if w.positions[:, 1].max() > height + 1.0]
         standing = [w for w in standing if w.positions[:, 1].min() < height + 1.0]
+        low, high = item.bounds[:, [0, 2]]
+        standing = _within(standing, low - _EDGE_M, high + _EDGE_M)
         pieces = floor_polygons(
             item.surfaces, standing, min_area_m2=MIN_ROOM_M2, min_width_m=MIN_ROOM_WIDTH_M
         )
@@ -110,7 +113,7 @@ def _with_heights(
     ceiling = ceiling_height(above)
     if ceiling is None and above:
         ceiling = min(float(s.positions[:, 1].min()) for s in above)  # planar, looking up
-    walls = [float(s.positions[:, 1].max()) for s in _over(items, ItemKind.WALL, polygon)]
+    walls = [float(s.positions[:, 1].max()) for s in _over(items, ItemKind.WALL, polygon, _EDGE_M)]
     nominal = max((y for y in walls if low + 1.0 < y < low + 10.0), default=low + _STOREY_M)
     high = given["ceiling_y"] or ceiling or nominal
     return Room(
@@ -130,15 +133,20 @@ def _surfaces(items: Sequence[Item], kind: ItemKind) -> list[Surface]:
     return [s for item in items if item.kind is kind for s in item.surfaces]
 
 
-def _over(items: Sequence[Item], kind: ItemKind, polygon: NDArray[np.float64]) -> list[Surface]:
+def _over(
+    items: Sequence[Item], kind: ItemKind, polygon: NDArray[np.float64], slack_m: float = 0.0
+) -> list[Surface]:
     """The surfaces of a kind whose bounds meet the polygon's in plan."""
-    low, high = polygon.min(0), polygon.max(0)
-    found = []
-    for surface in _surfaces(items, kind):
-        plan = surface.positions[:, [0, 2]]
-        if (plan.max(0) > low).all() and (plan.min(0) < high).all():
-            found.append(surface)
-    return found
+    low, high = polygon.min(0) - slack_m, polygon.max(0) + slack_m
+    return _within(_surfaces(items, kind), low, high)
+
+
+def _within(
+    surfaces: Sequence[Surface], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> list[Surface]:
+    """The surfaces whose plan bounds meet low..high."""
+    plans = [(s, s.positions[:, [0, 2]]) for s in surfaces]
+    return [s for s, p in plans if (p.max(0) > low).all() and (p.min(0) < high).all()]
 
 
 def levels_of(rooms: Sequence[Room]) -> tuple[tuple[Level, ...], tuple[Room, ...]]:

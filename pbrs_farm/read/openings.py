@@ -20,6 +20,8 @@ _HOLE_MARGIN_M: Final = 0.10
 _OVERLAP_M: Final = 0.002
 _REACH_M: Final = 0.02
 _NEAR_M: Final = 0.15
+_PLANAR_M: Final = 0.01
+_THICKER_M: Final = 0.15
 _LEAST_SHARE: Final = 0.02
 _UP: Final = np.array([0.0, 1.0, 0.0])
 
@@ -86,6 +88,8 @@ def _opening(item: Item, body: Box, frames: Sequence[_WallFrame]) -> Opening | N
         high[:2] = np.min([h[1] for h in holes], 0)
     low[2] = min(p[:, 2].min() for p in standing)
     high[2] = max(p[:, 2].max() for p in standing)
+    if high[2] - low[2] < _PLANAR_M:  # repair makes it a solid, to either side
+        low[2], high[2] = low[2] - _THICKER_M, high[2] + _THICKER_M
     if (high - low)[:2].min() < 0.05:
         return None
     middle = (low[2] + high[2]) / 2

@@ -97,7 +97,7 @@ def value_from_plain(hint: Any, plain: Any, file: str, place: str) -> Any:
     origin = typing.get_origin(hint)
     if origin is np.ndarray:
         dtype = typing.get_args(typing.get_args(hint)[1])[0]
-        return _array(dtype, plain, None, file, place)
+        return _array(dtype, plain, file, place)
     if origin in (typing.Union, types.UnionType):
         kinds = [a for a in typing.get_args(hint) if a is not type(None)]
         return None if plain is None else value_from_plain(kinds[0], plain, file, place)
@@ -137,14 +137,15 @@ def _dataclass(cls: type, plain: Any, file: str, place: str) -> Any:
     return cls(**found)
 
 
-def _array(dtype: Any, plain: Any, shape: None, file: str, place: str) -> np.ndarray[Any, Any]:
+def _array(dtype: Any, plain: Any, file: str, place: str) -> np.ndarray[Any, Any]:
     if isinstance(plain, np.ndarray):
         if plain.dtype != dtype:
             raise BadHouse(file, place, f"expected {np.dtype(dtype)}, got {plain.dtype}")
         return plain
     try:
         wide = np.array(plain, np.int64 if np.issubdtype(dtype, np.integer) else np.float64)
-        array = wide.astype(dtype)
+        with np.errstate(over="ignore"):  # what overflows is told below
+            array = wide.astype(dtype)
     except (ValueError, TypeError, OverflowError):
         raise _misfit(file, place, f"an array of {np.dtype(dtype)}", plain) from None
     if not np.isfinite(array).all() or (wide.dtype.kind == "i" and (array != wide).any()):

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from pbrs_farm.frames import transform_points
 from pbrs_farm.house import LightPart, Surface
 from pbrs_farm.lighting import PowerUnit
+from pbrs_farm.read.placed import part_of
 
 ASSUMED_WATT = 60.0
 """Power of a lamp that has bulbs but no row in suncgModelLights.json; shared by its bulbs."""
@@ -51,20 +52,8 @@ def separate_bulbs(bulb: Surface) -> tuple[Surface, ...]:
     if len(parts) == 1:
         return (bulb,)
     return tuple(
-        _part(bulb, bulb.faces[part_of_face == part], f"{bulb.name}_{k}")
+        part_of(bulb, bulb.faces[part_of_face == part], f"{bulb.name}_{k}")
         for k, part in enumerate(parts)
-    )
-
-
-def _part(surface: Surface, faces: NDArray[np.int32], name: str) -> Surface:
-    used, numbers = np.unique(faces, return_inverse=True)
-    return Surface(
-        name=name,
-        positions=surface.positions[used],
-        faces=numbers.reshape(-1, 3).astype(np.int32),
-        material=surface.material,
-        uvs=None if surface.uvs is None else surface.uvs[used],
-        normals=None if surface.normals is None else surface.normals[used],
     )
 
 

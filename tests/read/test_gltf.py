@@ -15,7 +15,8 @@ from pbrs_farm.lighting import LightForm, flux_lm
 from pbrs_farm.read.builtin import builtin_home
 from pbrs_farm.read.bundle import bundle_from_house, house_from_bundle
 from pbrs_farm.read.gltf import Beside, read_gltf, read_gltf_file
-from pbrs_farm.recipe import ReadFields
+from pbrs_farm.recipe import ReadFields, RepairFields
+from pbrs_farm.repair.stage import repair
 from tests.read.gltf_scenes import Scene, two_rooms
 from tests.read.small_houses import png
 
@@ -67,6 +68,25 @@ def test_a_room_beside_a_ceiling_has_none_and_takes_its_height_from_the_walls() 
     large, small = read(s).rooms
     assert (large.has_ceiling, small.has_ceiling) == (True, False)
     assert (large.ceiling_y, small.ceiling_y) == pytest.approx((2.4, 2.6))
+
+
+def test_a_shell_of_planar_walls_becomes_walls_that_repair_can_thicken() -> None:
+    s = two_rooms()
+    s.node("Window", mesh=s.box([1, 1, -0.05], [2, 2, 0.05]))
+    s.node("Door", mesh=s.box([3.97, 0, 1], [4.03, 2, 2]))
+    house = read(s)
+    outer = [i for i in house.items if i.name == "Walls outer"]
+    assert [i.n_faces for i in outer] == [2, 2, 2, 2]
+    assert len({i.id for i in house.items}) == len(house.items)
+    window, door = sorted(house.openings, key=lambda o: not o.is_window)
+    assert (window.is_cut, door.is_cut) == (False, True)
+    repaired, report = repair(house, RepairFields())
+    assert report.structure.n_walls_thickened == 5
+    assert report.structure.n_openings_cut == 2
+    assert not report.structure.left_as_is
+    assert [r.enclosure for r in report.rooms] == ["closed", "closed"]
+    wall = next(i for i in repaired.items if i.id == outer[0].id)
+    assert np.ptp(wall.bounds[:, 2]) == pytest.approx(0.1, abs=0.02)
 
 
 def test_rooms_of_the_polygon_file_win() -> None:
@@ -125,7 +145,7 @@ def test_a_group_is_one_item_unless_its_name_means_several() -> None:
     s.node("Furniture", children=[s.node("Desk", mesh=cube, children=[lamp, vase])])
     house = read(s)
     assert item(house, "Table").n_faces == 36
-    names = [i.name for i in house.items][4:]
+    names = [i.name for i in house.items][7:]
     assert names == ["Table", "Cube.000", "Cube.001", "Desk", "Vase"]
     assert item(house, "Cube.001").nyu40 == 5
     assert item(house, "Desk").n_faces == 24  # its lamp, untagged, is a part of it
