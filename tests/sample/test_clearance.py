@@ -1,0 +1,60 @@
+"""Point-to-triangle distance against closed forms, and near_any_triangle against brute force."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pbrs_farm.sample.clearance import near_any_triangle, squared_distance
+from tests.transport.scenes import geometry, soup
+
+TRIANGLE = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]])
+
+
+@pytest.mark.parametrize(
+    ("point", "distance"),
+    [
+        ((0.5, 0.5, 0.3), 0.3),  # above the inside
+        ((0.5, 0.5, 0.0), 0.0),  # in it
+        ((-3.0, -4.0, 0.0), 5.0),  # nearest to a corner
+        ((1.0, -0.7, 0.0), 0.7),  # nearest to an edge
+        ((2.0, 2.0, 0.0), np.sqrt(2.0)),  # nearest to the slanted edge
+        ((3.0, 0.0, 1.0), np.sqrt(2.0)),  # nearest to a corner, off the plane
+    ],
+)
+def test_the_distance_is_that_of_geometry(point: tuple[float, ...], distance: float) -> None:
+    squared = squared_distance(np.array([point]), TRIANGLE[None])
+    assert np.sqrt(squared[0]) == pytest.approx(distance, abs=1e-12)
+
+
+def test_a_triangle_without_area_is_a_segment_or_a_point() -> None:
+    segment = np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
+    assert squared_distance(np.array([[1.5, 3.0, 4.0]]), segment)[0] == pytest.approx(25)
+    dot = np.zeros((1, 3, 3))
+    assert squared_distance(np.array([[0.0, 3.0, 4.0]]), dot)[0] == pytest.approx(25)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10_000), reach=st.floats(0.01, 0.5))
+def test_points_are_near_exactly_when_the_nearest_triangle_is(seed: int, reach: float) -> None:
+    g = soup(40, seed)
+    points = np.random.default_rng(seed).uniform(-3, 3, (60, 3))
+    triangles = g.positions[g.faces].astype(np.float64)
+    every = [
+        np.linalg.norm(
+            trimesh.triangles.closest_point(triangles, np.broadcast_to(p, (40, 3))) - p, axis=1
+        ).min()
+        for p in points
+    ]
+    near = near_any_triangle(points, g, reach)
+    decided = np.abs(np.array(every) - reach) > 1e-9
+    np.testing.assert_array_equal(near[decided], (np.array(every) <= reach)[decided])
+
+
+def test_no_clearance_or_no_triangle_means_nothing_is_near() -> None:
+    points = np.zeros((2, 3))
+    assert not near_any_triangle(points, geometry(np.zeros((0, 3, 3))), 0.1).any()
+    assert not near_any_triangle(points, geometry(np.zeros((1, 3, 3))), 0.0).any()
+    broken = geometry(np.full((1, 3, 3), np.nan))
+    assert not near_any_triangle(points, broken, 0.1).any()
