@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import pbrs_farm
-from pbrs_farm.commands import looking, making, selecting, stages, using
+from pbrs_farm.commands import labelling, looking, making, selecting, stages, using
 from pbrs_farm.commands.words import Handler, add_recipe, complain, recipe_of
 from pbrs_farm.errors import PbrsError
 
@@ -63,6 +63,7 @@ def build_parser() -> argparse.ArgumentParser:
     making.add_verbs(verb)
     stages.add_verbs(verb)
     using.add_verbs(verb)
+    labelling.add_verbs(verb)
     selecting.add_verbs(verb)
     _add_farm(verbs, common)
     return parser

@@ -1,4 +1,4 @@
-"""Verbs that use what was made: sheet, verify, export, relight. Effects: read and write an output folder."""
+"""Verbs that use what was made: sheet, verify, relight. Effects: read and write an output folder."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pbrs_farm.errors import BadInput
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add sheet, verify, export and relight."""
+    """Add sheet, verify and relight."""
     p = verb(
         "sheet", _sheet, "contact sheet (sheet.png) and gallery (index.html) of an output folder"
     )
@@ -23,11 +23,6 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--all", action="store_true", help="every pixel instead of a sample")
     p.add_argument("--sample", type=int, default=None, metavar="N", help="pixels a view")
     p.add_argument("--json", action="store_true", help="the certificate as JSON")
-    p = verb("export", _export, "the finished views in a form other tools read (docs/formats.md)")
-    p.add_argument("folder", type=Path)
-    p.add_argument("--to", required=True, help="coco, hdf5, webdataset or released")
-    p.add_argument("--out", type=Path, required=True, help="folder to write; must be new or empty")
-    p.add_argument("--selection", default=None, metavar="RUN", help="only views this run keeps")
     p = verb(
         "relight",
         _relight,
@@ -69,14 +64,6 @@ def _verify(args: argparse.Namespace) -> int:
     else:
         say(certificate.text())
     return 0 if certificate.is_clean else 1
-
-
-def _export(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.export import export
-
-    n_views, n_files = export(args.folder, args.out, args.to, selection=args.selection)
-    say(f"{args.out}: {n_views} views, {n_files} files")
-    return 0
 
 
 def _relight(args: argparse.Namespace) -> int:
