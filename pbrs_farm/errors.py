@@ -6,7 +6,8 @@ PbrsError                 every error a user can meet; one clear line, no traceb
 │   └── BadRecipe         a recipe, a preset's name or a --set
 ├── RenderFailed          a picture could not be made: view, mode and seed reproduce it
 ├── StoreFailed           an object could not be read or written: its key
-│   └── ObjectMissing     there is no object under that key
+│   ├── ObjectMissing     there is no object under that key
+│   └── StoreRefused      the whole store is closed to us: credentials, bucket, read-only
 └── MachineFailed         this machine lacks something: LLVM, EGL, a package
 
 Transient                 a second base; only errors that carry it are worth another try
@@ -98,6 +99,10 @@ class StoreFailed(PbrsError):
 
 class ObjectMissing(StoreFailed):
     """There is no object under that key."""
+
+
+class StoreRefused(StoreFailed):
+    """The whole store is closed to us: wrong credentials, no such bucket, a read-only folder."""
 
 
 class StoreUnavailable(StoreFailed, Transient):

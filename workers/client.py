@@ -252,9 +252,11 @@ class Farm:
         view = self.ledger.view(spec.job_id)
         if view is not None:
             was = view.state
+            if was == "loading" and self.ledger.age_s(view) < _LOADING_S:
+                raise BadInput(spec.job_id, "", "is being submitted by somebody else", hint=_WAIT)
             self.ledger.forget(spec.job_id)
         if self.ledger.create(spec) != "":
-            raise BadInput(spec.job_id, "", "is being submitted by somebody else at this moment")
+            raise BadInput(spec.job_id, "", "is being submitted by somebody else", hint=_WAIT)
         runner = runner_maker(self.config.runner)(self.config, lambda _reason: None)
         rebuild(self.ledger, self.store, runner, spec, houses, tell)
         self.ledger.open(spec.job_id, spec.priority)
@@ -291,6 +293,9 @@ class Farm:
         return row
 
 
+# A submission that takes longer has died; the next one starts afresh.
+_LOADING_S = 900.0
+_WAIT = "wait for it; after 15 minutes it counts as dead"
 _HOUSE_STATES = ("open", "done", "quarantined")
 
 

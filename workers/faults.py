@@ -10,8 +10,8 @@ from pbrs_farm.errors import (
     BadInput,
     BadRecipe,
     MachineFailed,
-    ObjectMissing,
     StoreFailed,
+    StoreRefused,
     Transient,
 )
 from workers.ledger import FaultClass
@@ -22,9 +22,7 @@ _PATHS: Final = re.compile(r"(/[\w.\-+]+)+/?")
 
 def class_of(error: BaseException) -> FaultClass:
     """data: the input's fault, no other try. storage: nobody's, not counted. Else: try again."""
-    if isinstance(error, ObjectMissing):
-        return "bug"
-    if isinstance(error, StoreFailed | Transient):
+    if isinstance(error, StoreRefused | Transient):
         return "storage"
     if isinstance(error, BadInput | BadRecipe):
         return "data"

@@ -238,6 +238,11 @@ class RedisLedger:
         numbers = {k: float(v) for k, v in counts.items()}
         return JobView(job, fields, numbers, {k: float(v) for k, v in rates.items()}, n_waiting)
 
+    def age_s(self, view: JobView) -> float:
+        """Seconds since the job was entered, by Redis' clock."""
+        with self._errors():
+            return self._now() - float(view.fields.get("created", 0.0))
+
     def active_jobs(self) -> list[str]:
         """Jobs that may have work, most urgent first."""
         with self._errors():

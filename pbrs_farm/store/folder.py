@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, TypeVar
 
-from pbrs_farm.errors import ObjectMissing, StoreFailed, StoreUnavailable
+from pbrs_farm.errors import ObjectMissing, StoreFailed, StoreRefused, StoreUnavailable
 from pbrs_farm.store.interface import Head, check_key, check_prefix
 
 T = TypeVar("T")
@@ -152,7 +152,7 @@ class FolderStore:
         if code in _FULL:
             return StoreUnavailable(key, f"{self.root} is full: {reason}", hint="free some space")
         if code in _FORBIDDEN:
-            return StoreFailed(key, f"{self.root} cannot be written: {reason}")
+            return StoreRefused(key, f"{self.root} cannot be written: {reason}")
         if code in _SICK:
             return StoreUnavailable(key, f"{self.root} does not answer: {reason}")
         return StoreFailed(key, f"{self.root}: {reason}")

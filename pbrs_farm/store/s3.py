@@ -17,7 +17,13 @@ from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, SecretStr
 
-from pbrs_farm.errors import MachineFailed, ObjectMissing, StoreFailed, StoreUnavailable
+from pbrs_farm.errors import (
+    MachineFailed,
+    ObjectMissing,
+    StoreFailed,
+    StoreRefused,
+    StoreUnavailable,
+)
 from pbrs_farm.store.interface import Head, check_key, check_prefix, content_type
 
 T = TypeVar("T")
@@ -172,10 +178,10 @@ class S3Store:
         text = " ".join(str(error).split())
         if isinstance(error, FileNotFoundError | kinds.NotFoundError):
             if "NoSuchBucket" in text:
-                return StoreFailed(key, f"no bucket {self._bucket!r}")
+                return StoreRefused(key, f"no bucket {self._bucket!r}")
             return ObjectMissing(key, f"no such object in {self.url}")
         if isinstance(error, kinds.UnauthenticatedError | kinds.PermissionDeniedError):
-            return StoreFailed(key, f"{self.url} refuses these credentials", hint=_short(text))
+            return StoreRefused(key, f"{self.url} refuses these credentials", hint=_short(text))
         if isinstance(error, kinds.GenericError | OSError):
             return StoreUnavailable(key, f"{self.url} does not answer", hint=_short(text))
         return StoreFailed(key, f"{self.url}: {_short(text)}")

@@ -14,6 +14,7 @@ from pbrs_farm.errors import (
     MachineFailed,
     ObjectMissing,
     StoreFailed,
+    StoreRefused,
     StoreUnavailable,
 )
 from pbrs_farm.recipe import recipe_from_name
@@ -84,7 +85,8 @@ def test_the_last_stage_of_a_group_writes_the_view() -> None:
     [
         (BadHouse("f", "p", "m"), "data"),
         (StoreUnavailable("k", "m"), "storage"),
-        (StoreFailed("k", "m"), "storage"),
+        (StoreRefused("k", "m"), "storage"),
+        (StoreFailed("k", "a damaged marker must not stop the farm"), "bug"),
         (ObjectMissing("k", "m"), "bug"),
         (MachineFailed("m"), "machine"),
         (MemoryError(), "resource"),
