@@ -54,6 +54,9 @@ class CameraFields(_Group):
     height_min_m: float = Field(1.5, gt=0, description="eye above the floor's surface")
     height_max_m: float = Field(1.6, gt=0)
     tilt_deg: float = Field(11.0, description="downwards")
+    tilt_sd_deg: float = Field(
+        0.0, ge=0, le=30, description="of a normal spread about tilt_deg; 0 = fixed, as in the paper"
+    )
     clearance_m: float = Field(0.10, ge=0, description="from any obstacle, in three dimensions")
     min_objects: int = Field(3, ge=0)
     min_object_fraction: float = Field(0.01, ge=0, le=1, description="of the picture, per object")

@@ -68,28 +68,28 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
     """One random viewpoint in each cell for each sector (paper section 3.1).
 
     Position uniform in the cell, azimuth uniform in the sector (measured from +x towards +z),
-    height uniform between the fields' bounds above the grid's base, a fixed tilt downwards.
+    height uniform between the fields' bounds above the grid's base, a fixed tilt downwards (or a
+    normal one about it, held to two standard deviations, when tilt_sd_deg is above 0).
     names: what the randomness is hashed from besides sector and cell.
     """
     n_x, n_z = n_cells(grid, fields.cell_m)
     row, column = np.divmod(np.arange(n_x * n_z, dtype=np.int64), n_x)
     cell = np.stack([column, row], axis=1).astype(np.int32)
     step = 2 * np.pi / fields.n_sectors
-    tilt = np.deg2rad(fields.tilt_deg)
-
     eyes, directions = [], []
     for sector in range(fields.n_sectors):
-        u = uniforms(int(keys.digest(*names, sector)[:16], 16), cell, 4)
+        u = uniforms(int(keys.digest(*names, sector)[:16], 16), cell, 6)
         x = grid.x_min + (column + u[:, 0]) * fields.cell_m
         z = grid.z_min + (row + u[:, 1]) * fields.cell_m
         height = fields.height_min_m + u[:, 3] * (fields.height_max_m - fields.height_min_m)
         azimuth = (sector + u[:, 2]) * step
+        tilt = np.deg2rad(fields.tilt_deg + fields.tilt_sd_deg * _normal(u[:, 4], u[:, 5]))
         eyes.append(np.stack([x, grid.base_y + height, z], axis=1))
         directions.append(
             np.stack(
                 [
                     np.cos(azimuth) * np.cos(tilt),
-                    np.full(len(cell), -np.sin(tilt)),
+                    -np.sin(tilt),
                     np.sin(azimuth) * np.cos(tilt),
                 ],
                 axis=1,
@@ -121,6 +121,11 @@ def uniforms(key: int, cell: NDArray[np.int32], n: int) -> NDArray[np.float64]:
         state = _mixed(state ^ part.astype(np.int64).astype(np.uint64))
     numbers = [_mixed(state ^ np.uint64(k)) for k in range(n)]
     return np.stack([(x >> np.uint64(11)).astype(np.float64) * 2.0**-53 for x in numbers], axis=1)
+
+
+def _normal(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard normal numbers from two uniform ones (Box and Muller 1958), held to -2..2."""
+    return np.asarray(np.clip(np.sqrt(-2 * np.log1p(-u)) * np.cos(2 * np.pi * v), -2.0, 2.0))
 
 
 def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -71,3 +71,17 @@ def test_a_cell_keeps_its_candidate_when_the_grid_grows() -> None:
 def test_seed_house_and_room_each_change_every_candidate(other: tuple[int, str, str]) -> None:
     a, b = grid_candidates(GRID, FIELDS, (0, "h", "r")), grid_candidates(GRID, FIELDS, other)
     assert (a.eye != b.eye).all()
+
+
+def test_a_spread_of_tilts_is_normal_about_the_given_one_and_moves_nothing_else() -> None:
+    spread = FIELDS.model_copy(update={"tilt_deg": 8.0, "tilt_sd_deg": 5.0})
+    fixed, c = (grid_candidates(GRID, f, (0, "h", "r")) for f in (FIELDS, spread))
+    tilt = np.rad2deg(np.arcsin(-c.towards[:, 1]))
+    assert np.median(tilt) == pytest.approx(8, abs=0.6)
+    assert tilt.min() >= -2 - 1e-9
+    assert tilt.max() <= 18 + 1e-9
+    inside = np.abs(tilt - 8) < 9.9
+    assert stats.kstest(tilt[inside], stats.truncnorm(-1.98, 1.98, 8, 5).cdf).pvalue > 1e-3
+    np.testing.assert_array_equal(c.eye, fixed.eye)
+    azimuth, same = (np.arctan2(x.towards[:, 2], x.towards[:, 0]) for x in (c, fixed))
+    np.testing.assert_allclose(azimuth, same)
