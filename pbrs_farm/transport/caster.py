@@ -8,6 +8,7 @@ the same bits for every variant and as exact as the geometry.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from pbrs_farm.transport.hits import hit_record_from_faces
 from pbrs_farm.transport.rays import JitTracer, RayTracer
 from pbrs_farm.transport.scalar_rays import ScalarTracer
 from pbrs_farm.transport.variant import choose_variant
+
+_FACES_AT_ONCE: Final = 1 << 18
 
 
 class Caster:
@@ -111,11 +114,15 @@ def _tracer(variant: str, geometry: Geometry, keep: NDArray[np.bool_]) -> RayTra
 
 def _hittable(geometry: Geometry) -> NDArray[np.bool_]:
     """(F,) bool: finite vertices and an area above what float32 can tell from none."""
-    corners = geometry.positions[geometry.faces].astype(np.float64)
-    with np.errstate(invalid="ignore", over="ignore"):
-        edges = corners[:, [1, 2]] - corners[:, :1]
-        twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-        return np.asarray(np.isfinite(corners).all((1, 2)) & (twice_area > 1e-12))
+    keep = np.zeros(len(geometry.faces), np.bool_)
+    for start in range(0, len(keep), _FACES_AT_ONCE):
+        part = slice(start, start + _FACES_AT_ONCE)
+        corners = geometry.positions[geometry.faces[part]].astype(np.float64)
+        with np.errstate(invalid="ignore", over="ignore"):
+            edges = corners[:, [1, 2]] - corners[:, :1]
+            twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+            keep[part] = np.isfinite(corners).all((1, 2)) & (twice_area > 1e-12)
+    return keep
 
 
 def _faces(tracer: RayTracer | None, camera: Camera) -> NDArray[np.int32]:
