@@ -27,6 +27,14 @@ def house_id(file_stem: str, source_sha256: str) -> str:
     return f"{slug(file_stem)}-{source_sha256[:8]}"
 
 
+OBJECT_PREFIX: Final = "object_"
+"""Ids of objects without context begin so; no house's id can (a slug has no underscore)."""
+
+
+def _root(house: str) -> str:
+    return f"{'objects' if house.startswith(OBJECT_PREFIX) else 'houses'}/{house}"
+
+
 def view_id(room_id: str, sector: int, k: int | None = None) -> str:
     """`<room>_<sector>`, `_<k>` when a sector has several."""
     return f"{room_id}_{sector}" if k is None else f"{room_id}_{sector}_{k}"
@@ -34,18 +42,18 @@ def view_id(room_id: str, sector: int, k: int | None = None) -> str:
 
 def house_key(house: str, file: str = "") -> str:
     """Key of a house's file; of its folder, with a trailing slash, when file is ""."""
-    return f"houses/{house}/{file}"
+    return f"{_root(house)}/{file}"
 
 
 def view_key(house: str, view: str, file: str = "") -> str:
     """Key of a view's file; of its folder, with a trailing slash, when file is ""."""
-    return f"houses/{house}/views/{view}/{file}"
+    return f"{_root(house)}/views/{view}/{file}"
 
 
 def marker_key(house: str, step: str, view: str | None = None) -> str:
     """Key of the marker that says a step is done."""
     name = step if view is None else f"{step}.{view}"
-    return f"houses/{house}/done/{name}.json"
+    return f"{_root(house)}/done/{name}.json"
 
 
 def canonical_json(value: Any) -> str:

@@ -1,21 +1,25 @@
-"""Verbs that make: demo, run, step. Effects: those of the run."""
+"""Verbs that make: demo, run, objects, step. Effects: those of the run."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.commands.words import Verb, add_recipe, complain, recipe_of, say
 from pbrs_farm.errors import BadInput, MachineFailed
 from pbrs_farm.recipe import Recipe
 
+if TYPE_CHECKING:
+    from pbrs_farm.farm.sources import SourceRef
+
 
 def add_verbs(verb: Verb) -> None:
-    """Add demo, run and step."""
+    """Add demo, run, objects and step."""
     p = verb("demo", _demo, "render an example home and lay out a sheet: out/demo/sheet.png")
     p.add_argument(
         "--home", default="Studio", help="example home, `builtin`, or a file (default Studio)"
@@ -40,6 +44,29 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument(
         "--cameras", choices=("sampled", "stored"), default=None, help="where viewpoints come from"
     )
+    add_recipe(p)
+    _add_run(p)
+    p = verb(
+        "objects", _objects, "single models without context: 20 views each (paper section 4.1)"
+    )
+    p.add_argument(
+        "models",
+        nargs="+",
+        type=Path,
+        metavar="MODELS",
+        help="folders of OBJ or GLB (ShapeNet's layout too), .sh3f libraries",
+    )
+    p.add_argument(
+        "--categories", default="", metavar="A,B", help="e.g. bed,chair,cabinet (default all)"
+    )
+    p.add_argument(
+        "--count",
+        type=int,
+        default=3500,
+        metavar="N",
+        help="models picked at random (default 3500)",
+    )
+    p.add_argument("--out", required=True, help="output folder or store URL")
     add_recipe(p)
     _add_run(p)
     p = verb("step", _step, "one step in this process: reproduces a failure")
@@ -99,7 +126,9 @@ def _run(args: argparse.Namespace) -> int:
     return _run_words(args, _words(args))
 
 
-def _run_words(args: argparse.Namespace, words: list[str]) -> int:
+def _run_words(
+    args: argparse.Namespace, words: list[str], sources: Sequence[SourceRef] = ()
+) -> int:
     from pbrs_farm.farm.local import Run, run_local
     from pbrs_farm.farm.plan import wanted
     from pbrs_farm.progress import teller
@@ -117,9 +146,10 @@ def _run_words(args: argparse.Namespace, words: list[str]) -> int:
         step_timeout_s=args.step_timeout,
         debug=args.debug,
         store=settings_from_environment().store,
+        sources=sources,
     )
     started = time.monotonic()
-    with teller(len(words), args.views, as_json=args.json) as tell:
+    with teller(len(words) + len(sources), args.views, as_json=args.json) as tell:
         summary = run_local(run, tell)
     seconds = time.monotonic() - started
     _report(args, summary, seconds)
@@ -188,3 +218,15 @@ def _step(args: argparse.Namespace) -> int:
     for file in outcome.marker.files:
         say(f"  {file.key}  {file.n_bytes} bytes")
     return 0
+
+
+def _objects(args: argparse.Namespace) -> int:
+    from pbrs_farm.farm.sources import object_source
+    from pbrs_farm.read.object_models import find_models, pick_models
+
+    if args.count < 1:
+        raise BadInput("--count", str(args.count), "expected at least one model")
+    categories = args.categories.split(",") if args.categories else []
+    models = find_models(args.models)
+    chosen = pick_models(models, categories, args.count, recipe_of(args).seed)
+    return _run_words(args, [], [object_source(model) for model in chosen])

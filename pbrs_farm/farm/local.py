@@ -26,7 +26,7 @@ Observer = Callable[[Event], None]
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What is asked of a local run. homes: words as sources.resolve takes them."""
+    """What is asked of a local run. homes: words as sources.resolve takes them, sources: resolved."""
 
     homes: Sequence[str]
     store_url: str
@@ -37,6 +37,7 @@ class Run:
     step_timeout_s: float = 3600.0
     debug: bool = False
     store: StoreSettings = field(default_factory=StoreSettings)
+    sources: Sequence[SourceRef] = ()
 
 
 @dataclass(slots=True)
@@ -67,13 +68,13 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
         _Schedule(run, sources, summary, observe).drive(pool)
     for house_id in summary.houses:
         finish_house(store, house_id)
-    manifests = [k for k in store.list("houses/") if k.endswith("/manifest.jsonl")]
-    merge_manifests(store, [key.split("/")[1] for key in manifests])
+    below = [*store.list("houses/"), *store.list("objects/")]
+    merge_manifests(store, [k.split("/")[1] for k in below if k.endswith("/manifest.jsonl")])
     return summary
 
 
 def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
-    sources: dict[str, SourceRef] = {}
+    sources = {s.house_id: s for s in run.sources}
     for word in run.homes:
         try:
             source = resolve(word)

@@ -37,7 +37,7 @@ STEPS: Final = {
     for step in (
         Step("house", 1, ("read", "repair"), per_view=False),
         Step("cameras", 1, ("cameras",), ("house",), per_view=False),
-        Step("truth", 2, ("image",), ("house", "cameras")),
+        Step("truth", 3, ("image",), ("house", "cameras")),
         Step("opengl_dl", 1, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 1, ("image", "raster"), ("house", "cameras")),
         Step("light", 1, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),

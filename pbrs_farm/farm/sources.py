@@ -6,21 +6,26 @@ Effects: reads files, and the example homes' package from the cache (or through 
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from pbrs_farm import keys
 from pbrs_farm.errors import BadHouse
 from pbrs_farm.house import House
 from pbrs_farm.recipe import ReadFields
 
-Kind = Literal["builtin", "example", "sweethome3d", "suncg", "gltf"]
+if TYPE_CHECKING:
+    from pbrs_farm.read.object_models import ObjectModel
+
+Kind = Literal["builtin", "example", "sweethome3d", "suncg", "gltf", "object"]
 
 
 class SourceRef(BaseModel):
-    """A house before it is read. location: a path, an example home's name, or "builtin".
+    """A house before it is read. location: a path, an example home's name, or "builtin"; of an
+    object without context the JSON of its ObjectModel.
 
     sha256: of the source's bytes, "" where the source is a folder (SUNCG: of its house.json).
     """
@@ -34,6 +39,8 @@ class SourceRef(BaseModel):
 
 def resolve(word: str) -> SourceRef:
     """The source a word names: "builtin", an example home's name, or a path. Raises BadHouse."""
+    if word.startswith("{"):
+        return object_source(_object_model(word))
     path = Path(word)
     if word == "builtin":
         from pbrs_farm.read.builtin import builtin_home
@@ -62,6 +69,8 @@ def suncg_list(root: Path, list_file: Path) -> list[str]:
 
 def read_house(source: SourceRef, fields: ReadFields) -> House:
     """The house as its source gives it, unrepaired. Raises BadHouse with the place."""
+    if source.kind == "object":
+        return _read_object(source, fields)
     path = Path(source.location)
     if source.kind == "builtin":
         from pbrs_farm.read.builtin import builtin_home
@@ -86,6 +95,31 @@ def read_house(source: SourceRef, fields: ReadFields) -> House:
     package = homes.cached()
     resources = package.resources() if package else None
     return read_home(data, path.name, resources=resources, fields=fields)
+
+
+def object_source(model: ObjectModel) -> SourceRef:
+    """The source of an object without context."""
+    location = TypeAdapter(type(model)).dump_json(model).decode()
+    house_id = keys.OBJECT_PREFIX + model.id
+    return SourceRef(
+        kind="object", location=location, house_id=house_id, sha256=_sha256(model.path)
+    )
+
+
+def _object_model(location: str) -> ObjectModel:
+    from pbrs_farm.read.object_models import ObjectModel
+
+    try:
+        return TypeAdapter(ObjectModel).validate_json(location)
+    except ValidationError:
+        raise BadHouse(location[:80], "", "not a model's description") from None
+
+
+def _read_object(source: SourceRef, fields: ReadFields) -> House:
+    from pbrs_farm.read.objects import read_object
+
+    house = read_object(_object_model(source.location), fields)
+    return replace(house, id=source.house_id, is_repaired=True)
 
 
 def _read_example(name: str, fields: ReadFields) -> House:

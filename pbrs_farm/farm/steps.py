@@ -6,7 +6,7 @@ Effects: reads the store; farm/marked.py writes what a step made and its marker.
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import pbrs_farm
 from pbrs_farm import keys
-from pbrs_farm.camera import Camera, View
+from pbrs_farm.camera import Camera, Intrinsics, View
 from pbrs_farm.errors import BadHouse, BadInput
 from pbrs_farm.farm import plan
 from pbrs_farm.farm.loaded import LoadedHouse
@@ -67,11 +67,13 @@ def _house(work: Work) -> Made:
 
 def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
     """The house of a source, read and repaired, and what was changed. Raises BadHouse."""
-    from pbrs_farm.repair import repair
+    from pbrs_farm.repair import RepairReport, repair
     from pbrs_farm.transport.caster import Caster
 
     house = read_house(source, recipe.read)
     _check_strict(house, recipe)
+    if source.kind == "object":
+        return house, RepairReport(house_id=house.id, was_repaired=True)
 
     def occluder_from(some: House) -> Caster:
         return Caster(geometry_from_house(some))
@@ -90,13 +92,32 @@ def _cameras(work: Work) -> Made:
     from pbrs_farm.sample import cameras
 
     loaded = _loaded(work)
+    house, fields = loaded.house, work.recipe.cameras
     seed = camera_seed(work.house_id, work.recipe)
-    views, report = cameras(
-        loaded.house, work.recipe.cameras, seed=seed, counter=loaded.caster.item_counts
-    )
-    plain = {"views": [plain_from_view(v) for v in views], "report": report.model_dump(mode="json")}
+    if is_object(work):
+        return _object_cameras(work, house, seed)
+    views, report = cameras(house, fields, seed=seed, counter=loaded.caster.item_counts)
+    return _made_cameras(views, report.model_dump(mode="json"))
+
+
+def _object_cameras(work: Work, house: House, seed: int) -> Made:
+    from pbrs_farm.sample.objects import object_views
+
+    f = work.recipe.cameras
+    intrinsics = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
+    views = object_views(house.items[0].bounds, intrinsics, seed, (house.id,))
+    return _made_cameras(views, {"preset": "objects", "n_views": len(views)})
+
+
+def _made_cameras(views: Sequence[View], report: dict[str, Any]) -> Made:
+    plain = {"views": [plain_from_view(v) for v in views], "report": report}
     facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
     return Made({"cameras.json": json_bytes(plain)}, facts)
+
+
+def is_object(work: Work) -> bool:
+    """The work is on an object without context (paper section 4.1), not on a house."""
+    return work.house_id.startswith(keys.OBJECT_PREFIX)
 
 
 def camera_seed(house_id: str, recipe: Recipe) -> int:
@@ -113,6 +134,8 @@ def _truth(work: Work) -> Made:
     hit = caster.hit_record(camera)
     arrays = truth.layers_from_hit(hit, house, camera)
     table = truth.view_table(hit.item, house, camera)
+    if view.room_id:
+        table["layout"] = truth.layout_table(house.room(view.room_id), camera, hit.depth_z)
     if work.layers:
         seen = truth.Seen(
             hit,
@@ -149,7 +172,15 @@ def _opengl(work: Work, mode: str) -> Made:
     _view, camera = _view_at_size(work, loaded)
     rasterizer = loaded.rasterizer
     draw = rasterizer.render_dl if mode == "opengl_dl" else rasterizer.render_il
-    return Made({LAYER[mode].file: png_from_array(draw(camera))}, {"renderer": rasterizer.name})
+    rgb = draw(camera)
+    if is_object(work):
+        rgb = np.where(_missed(loaded, camera), np.uint8(0), rgb)
+    return Made({LAYER[mode].file: png_from_array(rgb)}, {"renderer": rasterizer.name})
+
+
+def _missed(loaded: LoadedHouse, camera: Camera) -> NDArray[np.bool_]:
+    """(H, W, 1) bool: nothing is seen; of an object without context such pixels are 0."""
+    return np.asarray(loaded.caster.item_buffer(camera) == 0)[..., None]
 
 
 def _opengl_dl(work: Work) -> Made:
@@ -171,6 +202,8 @@ def _light(work: Work) -> Made:
     layers: dict[str, NDArray[np.float32]] = {}
     for name in ("outdoor", "indoor", "albedo"):
         image: NDArray[np.float32] = getattr(result, name)
+        if is_object(work):
+            image = np.where(_missed(loaded, camera), np.float32(0), image)
         layers |= {f"{name}.{c}": image[..., k] for k, c in enumerate("RGB")}
     facts = {
         **result.facts,
@@ -179,6 +212,8 @@ def _light(work: Work) -> Made:
         "n_nonfinite": result.n_nonfinite,
         "sky": loaded.sky.facts(),
     }
+    if loaded.light_scene.n_lamps == 0:
+        facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
     return Made({"radiance.exr": exr_from_layers(layers)}, facts)
 
 
