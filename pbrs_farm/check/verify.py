@@ -47,7 +47,8 @@ def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False)
     one. Checks on files, tables and whole pictures are always complete. Raises BadInput when
     folder is no output root.
     """
-    houses = sorted(p for p in (folder / "houses").glob("*") if p.is_dir())
+    found = [p for name in ("houses", "objects") for p in (folder / name).glob("*") if p.is_dir()]
+    houses = sorted(found, key=lambda p: p.name)
     if not houses:
         raise BadInput(folder, "houses/", "no houses here", hint="give the folder of --out")
     tally, n_views = Tally(), 0

@@ -42,16 +42,17 @@ class ViewEntry:
 
 
 def views_of(root: Path) -> tuple[ViewEntry, ...]:
-    """Every view below root/houses, by house and view id.
+    """Every view below root/houses, then root/objects, by house and view id.
 
     Raises BadInput if root is no output folder or a JSON file in it cannot be read.
     """
-    houses = root / "houses"
-    if not houses.is_dir():
+    roots = [root / name for name in ("houses", "objects") if (root / name).is_dir()]
+    if not roots:
         raise BadInput(
-            root, "", "not an output folder of pbrs-farm: it has no houses/", hint="see --out"
+            root, "", "not an output folder of pbrs-farm: it has no houses", hint="see --out"
         )
-    return tuple(view for folder in sorted(houses.iterdir()) for view in _views(folder))
+    folders = [folder for below in roots for folder in sorted(below.iterdir())]
+    return tuple(view for folder in folders for view in _views(folder))
 
 
 def _views(folder: Path) -> Iterator[ViewEntry]:

@@ -41,7 +41,7 @@ STEPS: Final = {
         Step("opengl_dl", 1, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 1, ("image", "raster"), ("house", "cameras")),
         Step("light", 1, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
-        Step("develop", 1, ("tone", "light"), ("truth", "light")),
+        Step("develop", 2, ("tone", "light"), ("truth", "light")),
         Step("view", 1, ("histogram",), _VIEW_READS),
     )
 }

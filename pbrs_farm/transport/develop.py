@@ -45,8 +45,11 @@ def develop(
         Group.INDOOR: negative.indoor * np.float32(indoor),
     }
     if denoise:
+        # What sees nothing stays black: the denoiser would smear light over it.
+        light = negative.outdoor + negative.indoor
+        seen = (light.any(-1) | negative.albedo.any(-1))[..., None]
         groups = {
-            name: denoise_radiance(radiance, negative.albedo, negative.normal)
+            name: denoise_radiance(radiance, negative.albedo, negative.normal) * seen
             for name, radiance in groups.items()
         }
     pictures = {}

@@ -51,7 +51,8 @@ def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
     luminance = rgb @ LUMINANCE
     if luminance.max() <= 0:
         return 1.0
-    bright = float(np.percentile(luminance, 98)) or float(luminance.max())
+    luminance = luminance[luminance > 0]  # pixels that see nothing say nothing of the light
+    bright = float(np.percentile(luminance, 98))
     clipped = np.clip(luminance, bright / 1000, bright)
     return fields.key / float(np.exp(np.mean(np.log(clipped))))
 

@@ -160,7 +160,7 @@ def test_depth_runs_from_pale_near_to_dark_far_and_marks_nothing() -> None:
 
 
 def test_a_folder_that_is_no_output_is_named(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="no houses/"):
+    with pytest.raises(BadInput, match="has no houses"):
         sheet.contact_sheet(tmp_path)
     (tmp_path / "houses").mkdir()
     with pytest.raises(BadInput, match="no view yet"):
