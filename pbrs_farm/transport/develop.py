@@ -47,7 +47,7 @@ def develop(
     if denoise:
         # What sees nothing stays black: the denoiser would smear light over it.
         light = negative.outdoor + negative.indoor
-        seen = (light.any(-1) | negative.albedo.any(-1))[..., None]
+        seen = np.any(light > 0, -1, keepdims=True) | np.any(negative.albedo > 0, -1, keepdims=True)
         groups = {
             name: denoise_radiance(radiance, negative.albedo, negative.normal) * seen
             for name, radiance in groups.items()
