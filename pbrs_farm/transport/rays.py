@@ -19,7 +19,7 @@ from pbrs_farm.transport.variant import mitsuba
 
 _RAYS_PER_LAUNCH: Final = 1 << 22
 _COUNTS_PER_LAUNCH: Final = 1 << 24
-_TILE: Final = 8
+_TILE: Final = 4
 
 
 class RayTracer(Protocol):
