@@ -93,7 +93,7 @@ class RedisLedger:
     def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None:
         """Append fresh houses to the job's order; `first` is the index of the first of them."""
         p = self._p(job)
-        with self._errors():
+        with self.errors():
             for start in range(0, len(houses), _CHUNK):
                 chunk = houses[start : start + _CHUNK]
                 pipe = self.client.pipeline(transaction=True)
@@ -109,7 +109,7 @@ class RedisLedger:
         """Enter houses as storage tells them, in the job's order; how many were new."""
         n_new = 0
         script, keys = self._scripts["load"], self._keys(job)
-        with self._errors():
+        with self.errors():
             for chunk in _chunks(houses):
                 pipe = self.client.pipeline(transaction=False)
                 for house in chunk:
@@ -123,16 +123,16 @@ class RedisLedger:
 
     def open(self, job: str, priority: int) -> None:
         """The job is loaded; the coordinator may feed it."""
-        with self._errors():
+        with self.errors():
             pipe = self.client.pipeline(transaction=True)
             pipe.hset(f"{self._p(job)}job", "state", "running")
             pipe.zadd(f"{self._g}jobs", {job: priority})
-            pipe.zadd(f"{self._g}known", {job: self._now()})
+            pipe.zadd(f"{self._g}known", {job: self.now()})
             pipe.execute()
 
     def forget(self, job: str) -> None:
         """Remove all the ledger knows of the job; storage is not touched."""
-        with self._errors():
+        with self.errors():
             self.client.zrem(f"{self._g}jobs", job)
             self.client.zrem(f"{self._g}known", job)
             for stage in STAGES:
@@ -194,7 +194,7 @@ class RedisLedger:
 
     def resign(self, token: str) -> None:
         """Give up the lead, if it is ours."""
-        with self._errors():
+        with self.errors():
             if self.client.get(f"{self._g}leader") == token:
                 self.client.delete(f"{self._g}leader")
 
@@ -216,12 +216,12 @@ class RedisLedger:
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
         """Keep stage -> tasks per second for whoever asks."""
         if rates:
-            with self._errors():
+            with self.errors():
                 self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
 
     def queue_length(self, queue: str) -> int:
         """Messages waiting on a queue of the broker."""
-        with self._errors():
+        with self.errors():
             return int(self.client.llen(f"{self._g}{queue}"))
 
     # Reading
@@ -229,7 +229,7 @@ class RedisLedger:
     def view(self, job: str) -> JobView | None:
         """The job as it is now; a handful of O(1) reads whatever its size."""
         p = self._p(job)
-        with self._errors():
+        with self.errors():
             pipe = self.client.pipeline(transaction=False)
             pipe.hgetall(f"{p}job").hgetall(f"{p}n").hgetall(f"{p}rate").llen(f"{p}order")
             fields, counts, rates, n_waiting = pipe.execute()
@@ -240,33 +240,33 @@ class RedisLedger:
 
     def age_s(self, view: JobView) -> float:
         """Seconds since the job was entered, by Redis' clock."""
-        with self._errors():
-            return self._now() - float(view.fields.get("created", 0.0))
+        with self.errors():
+            return self.now() - float(view.fields.get("created", 0.0))
 
     def active_jobs(self) -> list[str]:
         """Jobs that may have work, most urgent first."""
-        with self._errors():
+        with self.errors():
             return list(self.client.zrange(f"{self._g}jobs", 0, -1))
 
     def known_jobs(self) -> list[str]:
         """Every job in the ledger, oldest first."""
-        with self._errors():
+        with self.errors():
             return list(self.client.zrange(f"{self._g}known", 0, -1))
 
     def unit_states(self, job: str, house: str) -> dict[str, str]:
         """The house's hash: unit -> "<stage>:<letter>", and s (state), n, left, nf, i."""
-        with self._errors():
+        with self.errors():
             return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
 
     def groups(self, job: str, house: str) -> tuple[tuple[str, ...], ...]:
         """The house's groups of views, () before they are known."""
-        with self._errors():
+        with self.errors():
             return groups_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
 
     def task_facts(self, job: str, task: str) -> dict[str, str]:
         """What is known of one task beside its state: claim, attempts, tried, not before, fault."""
         p = self._p(job)
-        with self._errors():
+        with self.errors():
             pipe = self.client.pipeline(transaction=False)
             for name in ("claims", "attempts", "tried", "failed"):
                 pipe.hget(p + name, task)
@@ -277,16 +277,17 @@ class RedisLedger:
 
     def faults(self, job: str) -> Iterator[tuple[str, Fault]]:
         """Every task that failed for good."""
-        with self._errors():
+        with self.errors():
             for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
                 yield task, Fault.model_validate_json(text)
 
     def ping(self) -> None:
         """Raises LedgerUnavailable when Redis does not answer or refuses us."""
-        with self._errors():
+        with self.errors():
             self.client.ping()
 
-    def _now(self) -> float:
+    def now(self) -> float:
+        """Redis' own clock, the only one the farm goes by."""
         seconds, micros = self.client.time()
         return float(seconds) + float(micros) / 1e6
 
@@ -297,11 +298,12 @@ class RedisLedger:
         return [self._p(job), self._g]
 
     def _run(self, name: str, job: str, *args: object) -> Any:
-        with self._errors():
+        with self.errors():
             return self._scripts[name](keys=self._keys(job), args=list(args))
 
     @contextmanager
-    def _errors(self) -> Iterator[None]:
+    def errors(self) -> Iterator[None]:
+        """Inside: whatever Redis refuses or fails at becomes LedgerUnavailable, one clear line."""
         where = shown_url(self.config.redis_url.get_secret_value())
         try:
             yield

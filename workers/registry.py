@@ -27,8 +27,8 @@ class Registry:
         """This worker is alive; True when it is asked to leave."""
         config, client = self._ledger.config, self._ledger.client
         key = f"{self._g}worker:{config.worker}"
-        with self._ledger._errors():
-            now = self._ledger._now()
+        with self._ledger.errors():
+            now = self._ledger.now()
             pipe = client.pipeline(transaction=False)
             pipe.zadd(f"{self._g}workers", {config.worker: now})
             for stage in {s for q in config.queues or QUEUES for s in stages_of_queue(q)}:
@@ -47,14 +47,14 @@ class Registry:
     def leave(self) -> None:
         """This worker is gone on purpose."""
         config, client = self._ledger.config, self._ledger.client
-        with self._ledger._errors():
+        with self._ledger.errors():
             for name in ("workers", *(f"workers:{s}" for q in QUEUES for s in stages_of_queue(q))):
                 client.zrem(f"{self._g}{name}", config.worker)
             client.delete(f"{self._g}worker:{config.worker}")
 
     def drain(self, worker: str, *, undo: bool = False) -> bool:
         """Ask a worker to finish what it runs and leave; False when there is no such worker."""
-        with self._ledger._errors():
+        with self._ledger.errors():
             if self._ledger.client.zscore(f"{self._g}workers", worker) is None:
                 return False
             self._ledger.client.hset(f"{self._g}worker:{worker}", "drain", "0" if undo else "1")
@@ -62,15 +62,15 @@ class Registry:
 
     def refused(self, reason: str) -> None:
         """This worker refused a task of another version; `workers` and `status` show it."""
-        with self._ledger._errors():
+        with self._ledger.errors():
             key = f"{self._g}worker:{self._ledger.config.worker}"
             self._ledger.client.hset(key, mapping={"refuses": reason})
 
     def workers(self) -> list[WorkerView]:
         """Every worker seen in the last hour, by name."""
         client = self._ledger.client
-        with self._ledger._errors():
-            now = self._ledger._now()
+        with self._ledger.errors():
+            now = self._ledger.now()
             client.zremrangebyscore(f"{self._g}workers", "-inf", now - _GONE_S)
             seen = client.zrange(f"{self._g}workers", 0, -1, withscores=True)
             pipe = client.pipeline(transaction=False)
@@ -97,12 +97,12 @@ class Registry:
 
     def storage_sick(self, reason: str) -> None:
         """Open the breaker: no claims and no feeding until it runs out by itself."""
-        with self._ledger._errors():
+        with self._ledger.errors():
             self._ledger.client.set(
                 f"{self._g}breaker", reason[:300], ex=self._ledger.config.breaker_s
             )
 
     def breaker(self) -> str:
         """Why the farm holds its breath, "" when storage is well."""
-        with self._ledger._errors():
+        with self._ledger.errors():
             return str(self._ledger.client.get(f"{self._g}breaker") or "")
