@@ -43,8 +43,12 @@ _MAGIC: Final = (
 _TEXTURE_KINDS: Final = (".png", ".jpg", ".gif", ".bmp", ".tga")
 
 
-def png_from_array(array: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+def png_from_array(
+    array: NDArray[np.uint8] | NDArray[np.uint16], *, attribution: str = ""
+) -> bytes:
     """PNG bytes of (H, W) or (H, W, 3 or 4) uint8 or uint16; no alpha is added, no clock written.
+
+    attribution: written as the file's copyright.
 
     Colour of 8 bits is marked sRGB; everything else is data and carries no colour space.
     """
@@ -58,6 +62,8 @@ def png_from_array(array: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     spec["png:filter"] = png_filter
     spec["png:compressionLevel"] = level
     spec["oiio:UnassociatedAlpha"] = 1
+    if attribution:
+        spec["Copyright"] = attribution
     return _encoded(array, spec, ".png")
 
 
@@ -109,11 +115,15 @@ def resized(
 
 
 def exr_from_layers(
-    layers: Mapping[str, NDArray[np.float32]], *, half: bool = False, compression: str = "zip"
+    layers: Mapping[str, NDArray[np.float32]],
+    *,
+    half: bool = False,
+    compression: str = "zip",
+    attribution: str = "",
 ) -> bytes:
     """OpenEXR bytes of named channels ("outdoor.R": (H, W) float32), all of one size.
 
-    half: 16-bit floats instead of 32. compression: OpenEXR's name ("zip", "zips", "piz", "none").
+    half: 16-bit floats instead of 32. attribution: the file's copyright. compression: OpenEXR's name ("zip", "zips", "piz", "none").
     Not handled: channels of unequal type.
     """
     if not layers:
@@ -128,6 +138,8 @@ def exr_from_layers(
     spec.channelnames = tuple(names)
     spec["Compression"] = compression
     spec["DateTime"] = _FIXED_DATE
+    if attribution:
+        spec["Copyright"] = attribution
     return _encoded(pixels, spec, ".exr")
 
 

@@ -52,7 +52,7 @@ def _manifest(file: Path, house: str, tally: Tally) -> dict[str, dict[str, Any]]
         try:
             row = json.loads(line)
             key = str(row["key"])
-            if not {"n_bytes", "sha256"} <= row.keys() or ".." in key.split("/") or key[:1] == "/":
+            if not {"bytes", "sha256"} <= row.keys() or ".." in key.split("/") or key[:1] == "/":
                 raise ValueError
         except (ValueError, KeyError, TypeError):
             tally.expect("files", f"{house}/manifest.jsonl line {number}", False, "is no row")
@@ -67,9 +67,7 @@ def _check_row(root: Path, key: str, row: dict[str, Any], tally: Tally) -> None:
     if not tally.expect("files", key, file.is_file(), "is missing"):
         return
     data = file.read_bytes()
-    tally.expect(
-        "files", key, len(data) == row["n_bytes"], f"{len(data)} bytes, not {row['n_bytes']}"
-    )
+    tally.expect("files", key, len(data) == row["bytes"], f"{len(data)} bytes, not {row['bytes']}")
     digest = hashlib.sha256(data).hexdigest()
     tally.expect("hashes", key, digest == row["sha256"], "content differs from its sha256")
 
@@ -85,5 +83,5 @@ def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -
             continue
         for key, sha256, n_bytes in pairs:
             row = rows.get(key, {})
-            same = row.get("sha256") == sha256 and row.get("n_bytes") == n_bytes
+            same = row.get("sha256") == sha256 and row.get("bytes") == n_bytes
             tally.expect("markers", place, same, f"{key} is not as in manifest.jsonl")

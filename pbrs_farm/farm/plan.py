@@ -37,11 +37,11 @@ STEPS: Final = {
     for step in (
         Step("house", 1, ("read", "repair"), per_view=False),
         Step("cameras", 1, ("cameras",), ("house",), per_view=False),
-        Step("truth", 3, ("image",), ("house", "cameras")),
-        Step("opengl_dl", 1, ("image", "raster"), ("house", "cameras")),
-        Step("opengl_il", 1, ("image", "raster"), ("house", "cameras")),
-        Step("light", 1, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
-        Step("develop", 2, ("tone", "light"), ("truth", "light")),
+        Step("truth", 4, ("image",), ("house", "cameras")),
+        Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
+        Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
+        Step("light", 2, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
+        Step("develop", 3, ("tone", "light"), ("truth", "light")),
         Step("view", 1, ("histogram",), _VIEW_READS),
     )
 }

@@ -10,22 +10,49 @@ from pbrs_farm import keys
 from pbrs_farm.errors import BadRecipe
 from pbrs_farm.farm.marked import read_marker
 from pbrs_farm.farm.records import json_bytes
+from pbrs_farm.keys import StoredFile
 from pbrs_farm.recipe import Recipe, differences
 from pbrs_farm.store.interface import Store
 
 
 def manifest(store: Store, house_id: str) -> bytes:
-    """manifest.jsonl of a house from its markers: key, bytes, sha256, step, digest; sorted by key."""
-    rows = []
+    """manifest.jsonl of a house from its markers, sorted by key.
+
+    A row an object: key, bytes, sha256, step, digest, and the attribution its source asks for.
+    """
+    credit = attribution(store, house_id)
+    rows: list[dict[str, object]] = []
     for key in store.list(keys.house_key(house_id, "done/")):
         marker = read_marker(store, key)
         if marker is not None:
             rows += [
-                {**f.model_dump(), "step": marker.step, "digest": marker.digest}
-                for f in marker.files
+                manifest_row(file, marker.step, marker.digest, credit) for file in marker.files
             ]
     rows.sort(key=lambda r: str(r["key"]))
     return "".join(keys.canonical_json(r) + "\n" for r in rows).encode()
+
+
+def manifest_row(file: StoredFile, step: str, digest: str, credit: str) -> dict[str, object]:
+    """One object's line of a manifest."""
+    row: dict[str, object] = {
+        "key": file.key,
+        "bytes": file.n_bytes,
+        "sha256": file.sha256,
+        "step": step,
+        "digest": digest,
+    }
+    return {**row, "attribution": credit} if credit else row
+
+
+def attribution(store: Store, house_id: str) -> str:
+    """The line every product of the house must carry, "" if its source asks for none."""
+    key = keys.house_key(house_id, "house.json")
+    if store.head(key) is None:
+        return ""
+    try:
+        return str(json.loads(store.get(key))["source"]["attribution"])
+    except (ValueError, KeyError, TypeError):
+        return ""
 
 
 def finish_house(store: Store, house_id: str) -> int:

@@ -21,6 +21,7 @@ from pbrs_farm.farm import plan
 from pbrs_farm.farm.loaded import LoadedHouse
 from pbrs_farm.farm.marked import Made, Outcome, Work, read_marker, required_source, run_marked
 from pbrs_farm.farm.records import json_bytes, plain_from_view, views_from_json
+from pbrs_farm.farm.root import attribution
 from pbrs_farm.farm.sources import SourceRef, read_house
 from pbrs_farm.farm.view_histogram import histogram_json
 from pbrs_farm.house import House, geometry_from_house
@@ -148,21 +149,26 @@ def _truth(work: Work) -> Made:
         )
         arrays |= truth.optional_layers(work.layers, seen)
         table |= truth.optional_tables(work.layers, house)
-    files = {LAYER[name].file: layer_bytes(name, array) for name, array in arrays.items()}
+    credit = house.source.attribution
+    files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
     return Made(files, {"table": table})
 
 
-def layer_bytes(name: str, array: NDArray[Any]) -> bytes:
-    """The file of a label layer: PNG, or an EXR whose channels are named as layers.py says."""
+def layer_bytes(name: str, array: NDArray[Any], credit: str = "") -> bytes:
+    """The file of a label layer: PNG, or an EXR whose channels are named as layers.py says.
+
+    credit: the attribution the file carries.
+    """
     from pbrs_farm.images import exr_from_layers, png_from_array
 
     layer = LAYER[name]
     if layer.file.endswith(".png"):
-        return png_from_array(array)
+        return png_from_array(array, attribution=credit)
     channels = layer.channels.split()
     planes = [array] if len(channels) == 1 else list(np.moveaxis(array, -1, 0))
     named = zip(channels, planes, strict=True)
-    return exr_from_layers({c: np.ascontiguousarray(plane, np.float32) for c, plane in named})
+    layers = {c: np.ascontiguousarray(plane, np.float32) for c, plane in named}
+    return exr_from_layers(layers, attribution=credit)
 
 
 def _opengl(work: Work, mode: str) -> Made:
@@ -175,7 +181,8 @@ def _opengl(work: Work, mode: str) -> Made:
     rgb = draw(camera)
     if is_object(work):
         rgb = np.where(_missed(loaded, camera), np.uint8(0), rgb)
-    return Made({LAYER[mode].file: png_from_array(rgb)}, {"renderer": rasterizer.name})
+    png = png_from_array(rgb, attribution=loaded.house.source.attribution)
+    return Made({LAYER[mode].file: png}, {"renderer": rasterizer.name})
 
 
 def _missed(loaded: LoadedHouse, camera: Camera) -> NDArray[np.bool_]:
@@ -214,7 +221,8 @@ def _light(work: Work) -> Made:
     }
     if loaded.light_scene.n_lamps == 0:
         facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
-    return Made({"radiance.exr": exr_from_layers(layers)}, facts)
+    exr = exr_from_layers(layers, attribution=loaded.house.source.attribution)
+    return Made({"radiance.exr": exr}, facts)
 
 
 def _develop(work: Work) -> Made:
@@ -226,7 +234,13 @@ def _develop(work: Work) -> Made:
     radiance, normal = (work.store.get(f"{folder}{f}") for f in ("radiance.exr", "normal.png"))
     negative = negative_from_files(radiance, normal, folder.rstrip("/"))
     pictures = develop(negative, work.recipe.tone, denoise=work.recipe.light.denoise)
-    return Made({LAYER[mode].file: png_from_array(rgb) for mode, rgb in pictures.items()})
+    credit = attribution(work.store, work.house_id)
+    return Made(
+        {
+            LAYER[mode].file: png_from_array(rgb, attribution=credit)
+            for mode, rgb in pictures.items()
+        }
+    )
 
 
 def _view(work: Work) -> Made:

@@ -7,6 +7,7 @@ import numpy as np
 
 from pbrs_farm import keys, truth
 from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.farm.root import manifest_row
 from pbrs_farm.house import House, geometry_from_house
 from pbrs_farm.images import exr_from_layers, png_from_array
 from pbrs_farm.keys import Marker, StoredFile
@@ -91,7 +92,7 @@ def sign(root: Path, house: Path) -> None:
             step=step, house_id=house.name, view_id=view or None, digest="0", files=tuple(stored)
         )
         marker.write_text(whole.model_dump_json())
-        rows += [{**f.model_dump(), "step": step, "digest": "0"} for f in stored]
+        rows += [manifest_row(f, step, "0", "") for f in stored]
     lines = "".join(keys.canonical_json(r) + "\n" for r in sorted(rows, key=lambda r: r["key"]))
     (house / "manifest.jsonl").write_text(lines)
     (root / "manifest.jsonl").write_text(lines)
