@@ -53,8 +53,10 @@ from pbrs_farm.transport.walk import (
     start,
 )
 
-STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 9
+STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 7
 _SMALLEST, _LARGEST = 1 / 1024, 1 / 64
+_FILM_STEP: Final = 2.0
+_RR_DEPTH: Final = 4
 _STEPS_PER_LAUNCH: Final = 32
 _MIN_STEPS: Final = 64
 _BOOTSTRAP: Final = (1 << 14, 1 << 18)
@@ -91,7 +93,8 @@ class MutatedNumbers:
         # Kelemen's step: between the smallest and the largest, small ones more often.
         up = fresh < 0.5
         v = dr.select(up, 2 * fresh, 2 * fresh - 1)
-        step = _LARGEST * dr.exp2(v * float(np.log2(_SMALLEST / _LARGEST)))
+        reach = dr.select(dim < CAMERA_DIMS, _FILM_STEP, 1.0)
+        step = reach * _LARGEST * dr.exp2(v * float(np.log2(_SMALLEST / _LARGEST)))
         moved = old + dr.select(up, step, -step)
         moved = moved - dr.floor(moved)
         return dr.minimum(dr.select(self._is_large | ~stored, fresh, moved), 1 - 2**-24)
@@ -143,7 +146,9 @@ def metropolis(
     off = dr.opaque(mi.Int32, -2)
     on = dr.opaque(mi.Int32, -1)
     only = Only(on, off) if group is Group.INDOOR else Only(off, on)
-    scene = (stage, emitters, camera_row(camera), fields_row(fields), only)
+    # Roulette late: where it ends a path early, the path's neighbours are lost to the chain too.
+    late = fields.model_copy(update={"rr_depth": max(fields.rr_depth, _RR_DEPTH)})
+    scene = (stage, emitters, camera_row(camera), fields_row(late), only)
     segments = dr.opaque(mi.UInt32, min_segments)
 
     # Bootstrap: independent paths; chains start at some of them, drawn in proportion to I.

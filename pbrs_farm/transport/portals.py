@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.camera import Camera
 from pbrs_farm.house import House, MaterialKind
 
 MAX_PORTALS: Final = 6
@@ -28,14 +27,14 @@ def portals_of_house(house: House) -> NDArray[np.float64]:
     return np.array(quads).reshape(-1, 4, 3)
 
 
-def nearest_portals(portals: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
-    """At most MAX_PORTALS of them, those that subtend most at the camera."""
+def nearest_portals(portals: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
+    """At most MAX_PORTALS of them, those that subtend most at eye (3,)."""
     if len(portals) <= MAX_PORTALS:
         return portals
     area = np.linalg.norm(
         np.cross(portals[:, 1] - portals[:, 0], portals[:, 3] - portals[:, 0]), axis=1
     )
-    distance = np.linalg.norm(portals.mean(1) - camera.eye, axis=1)
+    distance = np.linalg.norm(portals.mean(1) - eye, axis=1)
     order = np.argsort(-area / np.maximum(distance, 0.1) ** 2, kind="stable")
     return np.asarray(portals[np.sort(order[:MAX_PORTALS])])
 

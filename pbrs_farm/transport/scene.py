@@ -168,6 +168,29 @@ class LightScene:
         facts |= {"integrator": "pssmlt-camera", "large_step": fields.large_step}
         return joined_result(direct if is_separate else None, direct, halves, n_bad, facts, fields)
 
+    def floor_lux(self, house: House, *, seed: int = 0) -> dict[str, dict[str, float]]:
+        """Room id -> mean illuminance of its floor in lx by "outdoor" and "indoor" light.
+
+        256 points 5 cm above the floor, 32 paths each, furniture and all. {} for scalar variants.
+        """
+        if self.variant.startswith("scalar"):
+            return {}
+        mitsuba(self.variant)
+        from pbrs_farm.transport.emitters import Emitters
+        from pbrs_farm.transport.illuminance import floor_points, illuminance_lx
+        from pbrs_farm.transport.pilot import uniform_weights
+        from pbrs_farm.transport.portals import nearest_portals
+
+        lux: dict[str, dict[str, float]] = {}
+        for room in house.rooms:
+            points = floor_points(room, 256, seed)
+            portals = nearest_portals(self._portals, points.mean(0))
+            weights = uniform_weights(self.n_lamps, len(portals))
+            emitters = Emitters(self.tables, self.sky, portals, weights)
+            outdoor, indoor = illuminance_lx(self._stage, emitters, points, seed)
+            lux[room.id] = {"outdoor": round(outdoor, 2), "indoor": round(indoor, 2)}
+        return lux
+
     def _is_lit(self, direct: LightResult, halves: dict[Group, tuple[Any, Any]]) -> bool:
         if direct.outdoor.any() or direct.indoor.any():
             return True
@@ -204,7 +227,7 @@ class LightScene:
         from pbrs_farm.transport.pilot import pilot_weights, uniform_weights
         from pbrs_farm.transport.portals import nearest_portals
 
-        portals = nearest_portals(self._portals, camera)
+        portals = nearest_portals(self._portals, camera.eye)
         weights = uniform_weights(self.n_lamps, len(portals))
         emitters = Emitters(self.tables, self.sky, portals, weights)
         if fields.pilot_spp > 0:

@@ -1,0 +1,129 @@
+"""Illuminance of a room's floor by each light group; kernels, no effects."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.frames import LM_PER_W, LUMINANCE
+from pbrs_farm.house import Room
+from pbrs_farm.recipe import LightFields
+from pbrs_farm.transport.bsdf import Scatter
+from pbrs_farm.transport.emitters import Emitters
+from pbrs_farm.transport.numbers import CAMERA_DIMS, SobolNumbers, device_array, stream_key
+from pbrs_farm.transport.surface import Hit, Stage, offset
+from pbrs_farm.transport.tables import NO_LAMP
+from pbrs_farm.transport.walk import Only, Walk, advance, direct, fields_row
+
+LAMPS_LX: Final = (30.0, 1000.0)
+DAYLIGHT_LX: Final = (20.0, 5000.0)
+"""Where the mean floor illuminance of a home should land (spec/sky.md); outside = a warning."""
+
+_SPP: Final = 32
+_ABOVE_FLOOR_M: Final = 0.05
+
+
+def photometric_warnings(
+    lux: dict[str, dict[str, float]], lit_by: dict[str, tuple[str, ...]]
+) -> list[str]:
+    """One line for each room whose floor is lit outside the expected range.
+
+    lux: as LightScene.floor_lux gives it. lit_by: Room.lit_by of each room; a group that lights
+    nothing there is not expected to.
+    """
+    lines = []
+    for room_id, values in lux.items():
+        sources = lit_by.get(room_id, ())
+        wanted = [("outdoor", "windows" in sources, DAYLIGHT_LX)]
+        wanted.append(("indoor", "lamps" in sources or "fallback" in sources, LAMPS_LX))
+        for group, is_expected, (low, high) in wanted:
+            value = values[group]
+            if (is_expected and value < low) or value > high:
+                lines.append(
+                    f"room {room_id}: {group} light gives {value:g} lx on the floor,"
+                    f" expected {low:g} to {high:g}"
+                )
+    return lines
+
+
+def floor_points(room: Room, n: int, seed: int) -> NDArray[np.float64]:
+    """(n, 3) points uniform over a room's floor polygon, 5 cm above it."""
+    rng = np.random.default_rng(seed)
+    low, high = room.polygon.min(0), room.polygon.max(0)
+    kept: list[NDArray[np.float64]] = []
+    for _attempt in range(200):
+        tried = low + (high - low) * rng.random((4 * n, 2))
+        kept.append(tried[_inside(tried, room.polygon)])
+        if sum(len(k) for k in kept) >= n:
+            break
+    plan = np.concatenate([*kept, np.repeat(room.polygon.mean(0)[None], n, 0)])[:n]
+    return np.stack([plan[:, 0], np.full(n, room.floor_y + _ABOVE_FLOOR_M), plan[:, 1]], 1)
+
+
+def illuminance_lx(
+    stage: Stage, emitters: Emitters, points: NDArray[np.float64], seed: int
+) -> tuple[float, float]:
+    """(outdoor, indoor) mean illuminance of level surfaces at points (N, 3), facing up."""
+    fields = fields_row(LightFields())
+    p = mi.Point3f(*(device_array(mi.Float, points[:, k].astype(np.float32)) for k in range(3)))
+    lane = dr.arange(mi.UInt32, len(points))
+    key = stream_key(lane, dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+    outdoor, indoor = _radiosity(stage, emitters, fields, p, key, dr.opaque(mi.UInt32, _SPP))
+    dr.eval(outdoor, indoor)
+    lumens = [
+        float((v.numpy().T.astype(np.float64) @ LUMINANCE).mean()) * LM_PER_W * math.pi / _SPP
+        for v in (outdoor, indoor)
+    ]
+    return lumens[0], lumens[1]
+
+
+@dr.syntax
+def _radiosity(
+    stage: Stage, emitters: Emitters, fields: Any, p: Any, key: Any, spp: Any
+) -> tuple[Any, Any]:
+    """Sums of what a white matte surface at p would send back: irradiance / pi a sample."""
+    up = mi.Vector3f(0, 1, 0)
+    frame = mi.Frame3f(up)
+    white = Scatter(mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.UInt32(0))
+    here = Hit(mi.Bool(True), p, up, up, mi.UInt32(NO_LAMP), white, mi.Bool(False))
+    only = Only(mi.Int32(-1), mi.Int32(-1))
+    outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
+    s = mi.UInt32(0)
+    while s < spp:
+        numbers = SobolNumbers(key, s)
+        dim = mi.UInt32(CAMERA_DIMS)
+        lit_out, lit_in = direct(
+            stage, emitters, here, frame, mi.Vector3f(0, 0, 1), numbers, dim, only, mi.Bool(True)
+        )
+        wo = mi.warp.square_to_cosine_hemisphere(numbers.two(dim + 1))
+        d = mi.Vector3f(frame.to_world(wo))
+        density = wo.z * dr.inv_pi
+        walk = Walk(
+            offset(p, up), d, mi.Color3f(1), mi.UInt32(1), mi.UInt32(0), mi.Point3f(p), density
+        )
+        active = mi.Bool(True)
+        while active:
+            walk, found, alive = advance(stage, emitters, fields, numbers, walk, only, active)
+            lit_out += dr.select(active, found.met_outdoor + found.lit_outdoor, 0)
+            lit_in += dr.select(active, found.met_indoor + found.lit_indoor, 0)
+            active = active & alive
+        outdoor += lit_out
+        indoor += lit_in
+        s += 1
+    return outdoor, indoor
+
+
+def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(N,) bool by the crossing rule."""
+    inside = np.zeros(len(points), bool)
+    for a, b in zip(polygon, np.roll(polygon, -1, 0), strict=True):
+        crosses = (a[1] > points[:, 1]) != (b[1] > points[:, 1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = a[0] + (points[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+        inside ^= crosses & (points[:, 0] < x)
+    return inside

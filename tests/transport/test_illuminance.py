@@ -1,0 +1,50 @@
+"""Floor illuminance against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.transport.illuminance import photometric_warnings
+from pbrs_farm.transport.scene import LightScene
+from pbrs_farm.transport.sky import dark_sky, sunsky
+from pbrs_farm.transport.variant import choose_variant
+from tests.transport import rooms
+
+RECIPE = recipe_from_name("fast")
+
+pytestmark = pytest.mark.skipif(
+    choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
+)
+
+
+def test_open_ground_has_the_illuminance_of_the_recipe() -> None:
+    ground = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
+    house = rooms.house([ground], [rooms.matte("ground", 0.2)], size=(2.0, 2.5, 2.0))
+    sky = sunsky(RECIPE, elevation_rad=math.radians(40), azimuth_rad=0.5)
+    lux = LightScene.load(house, {}, RECIPE, sky).floor_lux(house)["0_0"]
+    assert lux["outdoor"] == pytest.approx(sky.sky_lx + sky.sun_lx, rel=0.02)
+    assert sky.sky_lx == pytest.approx(10_000, rel=1e-3)
+    assert 20_000 < sky.sun_lx < 60_000
+    assert lux["indoor"] == 0
+
+
+def test_a_black_room_has_the_direct_light_of_its_bulb_alone() -> None:
+    surfaces = rooms.shell((4.0, 2.5, 4.0), 0)
+    bulb = rooms.bulb((2.0, 2.05, 2.0), 1, 1000.0)
+    house = rooms.house(surfaces, [rooms.matte("wall", 0.0), rooms.BULB], lamps=[bulb])
+    lux = LightScene.load(house, {}, RECIPE, dark_sky()).floor_lux(house)["0_0"]
+    # Flux through a square of half edge 2 m, 2 m below an isotropic source: one face of a cube.
+    assert lux["indoor"] == pytest.approx(1000 / 6 / 16, rel=0.03)
+    assert lux["outdoor"] == 0
+
+
+def test_rooms_outside_the_range_are_named_and_unlit_groups_are_not() -> None:
+    lux = {"0_0": {"outdoor": 3.0, "indoor": 100.0}, "0_1": {"outdoor": 0.0, "indoor": 2000.0}}
+    lit_by = {"0_0": ("windows", "lamps"), "0_1": ("lamps",)}
+    lines = photometric_warnings(lux, lit_by)
+    assert len(lines) == 2
+    assert "room 0_0: outdoor light gives 3 lx" in lines[0]
+    assert "room 0_1: indoor light gives 2000 lx" in lines[1]
