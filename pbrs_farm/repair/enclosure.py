@@ -160,9 +160,7 @@ def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> NDArray[
     reached = low + 2 * GAP_M
     spans = []
     for wall in walls:
-        inside = shapely.contains_xy(
-            plan.grown(wall.footprint, GAP_M), points[:, 0], points[:, 1]
-        )
+        inside = shapely.contains_xy(plan.grown(wall.footprint, GAP_M), points[:, 0], points[:, 1])
         if inside.any():
             spans.append((inside, wall.bottom_y, wall.top.at(points)))
     for inside, bottom, top in sorted(spans, key=lambda s: s[1]):

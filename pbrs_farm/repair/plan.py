@@ -37,12 +37,20 @@ def polygon_of_room(outline: Points2) -> Shape:
 
 def on_grid(shape: Shape) -> Shape:
     """shape with coordinates rounded to GRID_M, valid."""
-    return shapely.set_precision(shape, GRID_M)
+    return _areal(shapely.set_precision(shape, GRID_M))
+
+
+def _areal(shape: Shape) -> Shape:
+    # Overlays leave lines and points where areas only touch; GEOS refuses them as input.
+    if shape.geom_type in ("Polygon", "MultiPolygon"):
+        return shape
+    parts = shapely.get_parts(shapely.get_parts(shape))
+    return shapely.MultiPolygon([p for p in parts.tolist() if p.geom_type == "Polygon"])
 
 
 def union(shapes: Iterable[Shape]) -> Shape:
     """The plan area any of shapes covers; empty for none."""
-    return shapely.union_all(list(shapes), grid_size=GRID_M)
+    return _areal(shapely.union_all(list(shapes), grid_size=GRID_M))
 
 
 def grown(shape: Shape, by_m: float) -> Shape:
@@ -64,10 +72,10 @@ def without(shape: Shape, *others: Shape) -> Shape:
     """shape less all others."""
     for other in others:
         if not shapely.is_empty(other):
-            shape = shapely.difference(shape, other, grid_size=GRID_M)
+            shape = _areal(shapely.difference(shape, other, grid_size=GRID_M))
     return shape
 
 
 def common(a: Shape, b: Shape) -> Shape:
     """The area both cover."""
-    return shapely.intersection(a, b, grid_size=GRID_M)
+    return _areal(shapely.intersection(a, b, grid_size=GRID_M))

@@ -14,17 +14,22 @@ F64 = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 MIN_AREA_M2 = 1e-12
+_MERGE_M = 4e-6
 _MAX_ROUNDS = 8
 
 
 def sealed(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Faces, Faces]:
     """The mesh with float32 positions and no face without area, its edges still in pairs.
 
+    Points nearer than a few micrometres, which differ by noise, become one.
+
     vertices: (V, P) positions and properties, those of one position possibly several times.
     faces: (F, 3); labels: (F,), kept with each face. New vertices get properties in between.
     """
+    cells = np.round(vertices[:, :3] / _MERGE_M)
+    _, first, place = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     vertices = vertices.copy()
-    vertices[:, :3] = vertices[:, :3].astype(np.float32)
+    vertices[:, :3] = vertices[first[np.ravel(place)], :3].astype(np.float32)
     _, place = np.unique(vertices[:, :3], axis=0, return_inverse=True)
     mesh = _Mesh(vertices, np.ravel(place), faces, labels)
     for _ in range(_MAX_ROUNDS):

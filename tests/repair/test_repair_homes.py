@@ -34,9 +34,7 @@ def _check(house: House, report: RepairReport) -> None:
     assert report.structure.left_as_is == ()
     assert report.structure.n_openings_cut == report.structure.n_openings
 
-    # What float32 leaves open lies around triangles of micrometres.
-    edges = unpaired_edges(house)
-    assert len(edges) <= 12
+    assert len(unpaired_edges(house)) == 0
     assert not any(i.kind in (ItemKind.PERSON, ItemKind.PLANT) for i in house.items)
     for item in house.items:
         glows = [house.materials[s.material].kind is MaterialKind.BULB for s in item.surfaces]
