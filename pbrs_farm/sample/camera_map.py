@@ -34,7 +34,7 @@ COLOURS: Final = {
 """Colour of each verdict's dots."""
 
 _PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0
-_ROW, _LETTERS, _WORDS_PX = 16.0, 12.0, 620.0
+_ROW, _LETTERS, _LETTER_WIDTH, _WORDS_PX = 16.0, 12.0, 0.56, 200.0
 _ROOM, _FURNITURE, _WALL, _INK = "#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222"
 
 
@@ -60,14 +60,16 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
         x0, z0, x1, z1 = shapely.total_bounds(shapes)
         scale = min(_PX_PER_M, _MAX_PX / max(x1 - x0, z1 - z0, 1e-6))
         panel = _Panel(left - scale * x0, 2 * _MARGIN - scale * z0, scale)
-        marks.append(_words(left, _MARGIN, f"Level {level.name or level.id}", 14.0))
+        marks.append(_words(left, _MARGIN, level.name or f"Level {level.id}", 14.0))
         marks += _level_marks(house, sampling, level.id, panel)
         left += scale * (x1 - x0) + 2 * _MARGIN
         bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
     notes = _notes(sampling)
     marks += [_shifted(mark, left) for mark in notes]
     height = max(bottom, *(mark.points[0][1] for mark in notes)) + _MARGIN
-    return Drawing(math.ceil(left + _WORDS_PX), math.ceil(height), tuple(marks))
+    letters = max(len(mark.words) for mark in notes)
+    width = left + max(_WORDS_PX, _LETTER_WIDTH * _LETTERS * letters) + _MARGIN
+    return Drawing(math.ceil(width), math.ceil(height), tuple(marks))
 
 
 class _Panel:
