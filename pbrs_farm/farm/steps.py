@@ -219,10 +219,21 @@ def _light(work: Work) -> Made:
         "n_nonfinite": result.n_nonfinite,
         "sky": loaded.sky.facts(),
     }
+    if view.room_id:
+        facts["floor_lux"] = loaded.floor_lux.get(view.room_id)
+        facts["warnings"] = _light_warnings(loaded, view.room_id)
     if loaded.light_scene.n_lamps == 0:
         facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
     exr = exr_from_layers(layers, attribution=loaded.house.source.attribution)
     return Made({"radiance.exr": exr}, facts)
+
+
+def _light_warnings(loaded: LoadedHouse, room_id: str) -> list[str]:
+    """Whether the room's floor is lit as floors of homes are (spec: one photometric scale)."""
+    from pbrs_farm.transport.illuminance import photometric_warnings
+
+    lux = {k: v for k, v in loaded.floor_lux.items() if k == room_id}
+    return photometric_warnings(lux, {room_id: loaded.house.room(room_id).lit_by})
 
 
 def _develop(work: Work) -> Made:
