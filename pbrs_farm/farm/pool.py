@@ -16,9 +16,14 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
+from typing import Final
 
 from pbrs_farm.farm.tasks import Event, Setting, Task
 from pbrs_farm.farm.worker import last_lines, work_forever
+
+
+_START_S: Final = 60.0
+"""What a process may take to start before its first step's time begins to count."""
 
 
 @dataclass(slots=True)
@@ -93,7 +98,7 @@ class Pool:
         else:
             worker = idle[0]
         worker.task, worker.step, worker.done = task, task.steps[0], []
-        worker.since, worker.held_house = time.monotonic(), task.house_id
+        worker.since, worker.held_house = time.monotonic() + _START_S, task.house_id
         with contextlib.suppress(OSError):  # it died while idle: events() finds that out
             worker.pipe.send(task)
 
@@ -146,7 +151,8 @@ class Pool:
             self._workers.append(replacement)
             rest = Task(task.house_id, left, task.source, task.view_id, task.layers)
             replacement.task, replacement.step = rest, left[0]
-            replacement.since, replacement.held_house = time.monotonic(), task.house_id
+            replacement.since = time.monotonic() + _START_S
+            replacement.held_house = task.house_id
             replacement.pipe.send(rest)
         else:
             yield Event("end", task.house_id, task.view_id, task.steps[-1])
