@@ -28,6 +28,7 @@ class LightScene:
     """The light of one house under one sky.
 
     tables: geometry, materials and lamps as numbers. notes: what had to be changed or left out.
+    stage: the same on the device; None for scalar variants.
     """
 
     def __init__(
@@ -39,11 +40,11 @@ class LightScene:
         self.notes = tables.notes
         self._portals = portals
         mitsuba(variant)
-        self._stage: Any = None
+        self.stage: Any = None
         if not variant.startswith("scalar"):
             from pbrs_farm.transport.surface import Stage
 
-            self._stage = Stage(tables)
+            self.stage = Stage(tables)
 
     @staticmethod
     def load(
@@ -82,7 +83,7 @@ class LightScene:
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
         mitsuba(self.variant)
-        emitters, weights = self._emitters(camera, fields, seed)
+        emitters, weights = self.emitters(camera, fields, seed)
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": weights}
         if fields.integrator == "metropolis":
             return self._render_metropolis(camera, room_id, fields, seed, emitters, facts)
@@ -109,7 +110,7 @@ class LightScene:
         while spp < wanted:
             n = min(per_launch, wanted - spp)
             lanes = Lanes(i.width_px, i.height_px, spp, n, seed)
-            sums = trace(self._stage, emitters, camera, lanes, fields, max_depth=max_depth)
+            sums = trace(self.stage, emitters, camera, lanes, fields, max_depth=max_depth)
             total = sums if total is None else total + sums
             spp += n
             if spp == wanted and fields.noise > 0 and wanted < fields.max_spp:
@@ -142,7 +143,7 @@ class LightScene:
         for k, group in enumerate(Group):
             deadline = time.monotonic() + budget / 2 if fields.time_budget_s > 0 else None
             rest = metropolis(
-                self._stage,
+                self.stage,
                 emitters,
                 camera,
                 group,
@@ -187,7 +188,7 @@ class LightScene:
             portals = nearest_portals(self._portals, points.mean(0))
             weights = uniform_weights(self.n_lamps, len(portals))
             emitters = Emitters(self.tables, self.sky, portals, weights)
-            outdoor, indoor = illuminance_lx(self._stage, emitters, points, seed)
+            outdoor, indoor = illuminance_lx(self.stage, emitters, points, seed)
             lux[room.id] = {"outdoor": round(outdoor, 2), "indoor": round(indoor, 2)}
         return lux
 
@@ -219,7 +220,7 @@ class LightScene:
             None, guides, halves, 0, facts, half.model_copy(update={"spp": 2 * half.spp})
         )
 
-    def _emitters(
+    def emitters(
         self, camera: Camera, fields: LightFields, seed: int
     ) -> tuple[Any, dict[str, float]]:
         """Emitters with the weights of this view, and the lamps' weights by name."""
@@ -232,7 +233,7 @@ class LightScene:
         emitters = Emitters(self.tables, self.sky, portals, weights)
         if fields.pilot_spp > 0:
             weights = pilot_weights(
-                self._stage, emitters, camera, self.n_lamps, len(portals), fields, seed ^ 0x5EED
+                self.stage, emitters, camera, self.n_lamps, len(portals), fields, seed ^ 0x5EED
             )
             emitters.with_weights(weights)
         names = [lamp.name for lamp in self.tables.lamps]
