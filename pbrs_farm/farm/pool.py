@@ -21,7 +21,6 @@ from typing import Final
 from pbrs_farm.farm.tasks import Event, Setting, Task
 from pbrs_farm.farm.worker import last_lines, work_forever
 
-
 _START_S: Final = 60.0
 """What a process may take to start before its first step's time begins to count."""
 

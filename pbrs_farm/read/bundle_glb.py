@@ -142,7 +142,7 @@ def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]
 
 
 def _linear(rgb: tuple[float, float, float]) -> list[float]:
-    return [float(c) for c in np.clip(linear_from_srgb(np.array(rgb)), 0, 1)]
+    return [float(c) for c in linear_from_srgb(np.clip(np.array(rgb), 0, 1))]
 
 
 def _alpha(material: Material) -> tuple[float, str]:
