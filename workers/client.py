@@ -10,6 +10,7 @@ Effects: Redis and the store. Needs neither celery nor mitsuba to look at a job.
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -89,6 +90,10 @@ class Farm:
         view = self.ledger.view(spec.job_id)
         if view is not None and view.state in ("running", "paused", "done"):
             return Submitted(spec.job_id, len(houses), view.state)
+        n_slots = max(self.registry.slots().values(), default=_SLOTS_UNKNOWN)
+        spec = spec.model_copy(
+            update={"min_groups": math.ceil(_GROUPS_PER_SLOT * n_slots / len(houses))}
+        )
         claim_root(self.store, spec.recipe, update=update)
         self.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
         self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
@@ -295,6 +300,9 @@ class Farm:
 
 # A submission that takes longer has died; the next one starts afresh.
 _LOADING_S = 900.0
+# A small job is cut finer, so that its last group does not leave the other slots idle.
+_GROUPS_PER_SLOT = 4
+_SLOTS_UNKNOWN = 2
 _WAIT = "wait for it; after 15 minutes it counts as dead"
 _HOUSE_STATES = ("open", "done", "quarantined")
 

@@ -11,14 +11,18 @@ MAX_S: Final = 300.0
 
 
 def groups_from_views(
-    views: Sequence[tuple[str, str]], seconds_per_view: float
+    views: Sequence[tuple[str, str]], seconds_per_view: float, min_groups: int = 1
 ) -> tuple[tuple[str, ...], ...]:
     """(view id, room id) in order -> groups of view ids, each of about TARGET_S of work.
 
     A room's views stay together as long as they take at most MAX_S; small rooms share a group.
+    min_groups: about as many at least, so that a job of few houses keeps every slot busy.
     """
     per_group = max(1, round(TARGET_S / seconds_per_view))
     most = max(1, math.floor(MAX_S / seconds_per_view))
+    if min_groups > 1:
+        per_group = min(per_group, math.ceil(len(views) / min_groups)) or 1
+        most = min(most, per_group)
     groups: list[list[str]] = []
     for room_views in _rooms(views):
         for part in _parts(room_views, most, per_group):

@@ -124,7 +124,8 @@ class HouseRunner:
         rows = [(str(v), str(room), float(score)) for v, room, score in marker.facts["views"]]
         rooms = {view: room for view, room, _score in rows}
         chosen = plan.spread(rows, spec.n_views)
-        return groups_from_views([(v, rooms[v]) for v in chosen], spec.seconds_per_view)
+        placed = [(v, rooms[v]) for v in chosen]
+        return groups_from_views(placed, spec.seconds_per_view, spec.min_groups)
 
     def _step(
         self,

@@ -49,14 +49,19 @@ class JobSpec(BaseModel):
     priority: int = Field(5, ge=0, le=9, description="0 goes first")
     group_stages: tuple[str, ...] = (GL, LIGHT)
     seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the groups")
+    min_groups: int = Field(1, ge=1, description="of a house, about; by slots at submission")
     reference: str = Field("", description="key of the reference selection scores against, or none")
     rules: JobRules = JobRules()
     n_houses: int = 0
 
 
+# What is decided when a job is entered and changes nothing of what it makes.
+_NOT_WORK = {"job_id", "priority", "rules", "n_houses", "min_groups", "seconds_per_view"}
+
+
 def job_id(spec: JobSpec, houses: Iterable[HouseEntry]) -> str:
     """The id of a job: equal for equal work, so that submitting twice is submitting once."""
-    plain = spec.model_dump(mode="json", exclude={"job_id", "priority", "rules", "n_houses"})
+    plain = spec.model_dump(mode="json", exclude=_NOT_WORK)
     plain["recipe"] = spec.recipe.digest()
     return keys.digest(plain, [[h.house_id, h.sha256] for h in houses])[:12]
 

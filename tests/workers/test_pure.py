@@ -50,6 +50,14 @@ def test_a_rooms_views_stay_together() -> None:
     assert [len(g) for g in groups_from_views(views, 30.0)] == [6, 6]
 
 
+def test_a_small_job_is_cut_into_enough_groups_for_the_slots() -> None:
+    views = [(f"a{k}", "a") for k in range(10)]
+    assert [len(g) for g in groups_from_views(views, 1.5)] == [10]
+    assert [len(g) for g in groups_from_views(views, 1.5, 8)] == [2] * 5
+    assert [len(g) for g in groups_from_views(views, 1.5, 100)] == [1] * 10
+    assert groups_from_views([], 1.5, 8) == ()
+
+
 @pytest.mark.parametrize(
     "text", ["", "a/b", "a/b/c", "a/0/gl/x", "../x/gl", "a/0/rm -rf", "a\n/0/gl", "a/0/gl\n"]
 )
