@@ -50,9 +50,9 @@ LAYERS: Final[tuple[Layer, ...]] = (
     Layer(
         "radiance",
         "radiance.exr",
-        "outdoor.{R,G,B} indoor.{R,G,B} albedo.{R,G,B}",
+        "outdoor.{R,G,B} indoor.{R,G,B} albedo.{R,G,B} normal.{X,Y,Z}",
         "float32",
-        "W m-2 sr-1, linear sRGB primaries; albedo 0..1",
+        "W m-2 sr-1, linear sRGB primaries; albedo 0..1; normal: the pixel's mean, world, guides the denoiser",
         "-",
         "light",
         "finite, >= 0",

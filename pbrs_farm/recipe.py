@@ -50,12 +50,15 @@ class CameraFields(_Group):
 
     preset: Literal["paper", "released"] = "paper"
     n_sectors: int = Field(6, ge=1, description="per room, 60 degrees each")
-    cell_m: float = Field(0.25, gt=0, description="edge of the viewpoint grid")
+    cell_m: float = Field(0.25, ge=0.02, description="edge of the viewpoint grid")
     height_min_m: float = Field(1.5, gt=0, description="eye above the floor's surface")
     height_max_m: float = Field(1.6, gt=0)
     tilt_deg: float = Field(11.0, description="downwards")
     tilt_sd_deg: float = Field(
-        0.0, ge=0, le=30, description="of a normal spread about tilt_deg; 0 = fixed, as in the paper"
+        0.0,
+        ge=0,
+        le=30,
+        description="of a normal spread about tilt_deg; 0 = fixed, as in the paper",
     )
     clearance_m: float = Field(0.10, ge=0, description="from any obstacle, in three dimensions")
     min_objects: int = Field(3, ge=0)
@@ -123,6 +126,7 @@ class EmissionFields(_Group):
     sun_lx: float = Field(60_000.0, ge=0, description="the sun's share, at most")
     lamp_lm: float = Field(800.0, gt=0, description="a Sweet Home 3D lamp of power 0.5")
     lm_per_watt: float = Field(13.0, gt=0, description="SUNCG's watts")
+    compensate_shades: bool = Field(True, description="flux is what leaves the lamp, shade and all")
     lamp_kelvin_min: float = 2700.0
     lamp_kelvin_max: float = 3000.0
     released_bulb: float = 400.0

@@ -77,7 +77,8 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
         tally.expect(
             "radiance", view.place, names <= channels.keys(), f"lacks {names - channels.keys()}"
         )
-        for name, plane in channels.items():
+        for name in sorted(names & channels.keys()):
+            plane = channels[name]
             bad = int((~(np.isfinite(plane) & (plane >= 0))).sum())
             tally.add("radiance", plane.size)
             if bad or plane.shape != view.size:

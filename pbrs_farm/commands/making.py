@@ -134,8 +134,9 @@ def _run_words(
     from pbrs_farm.progress import teller
     from pbrs_farm.settings import settings_from_environment
 
-    if args.jobs < 1 or args.views < 0:
-        raise BadInput("run", "--jobs/--views", "expected a positive number")
+    for name, value, least in (("--jobs", args.jobs, 1), ("--views", args.views, 0)):
+        if value < least:
+            raise BadInput(name, str(value), f"expected {least} or more")
     run = Run(
         homes=words,
         store_url=args.out,
@@ -153,7 +154,7 @@ def _run_words(
         summary = run_local(run, tell)
     seconds = time.monotonic() - started
     _report(args, summary, seconds)
-    return 1 if summary.failures else 0
+    return 1 if summary.failures or summary.n_views == 0 else 0
 
 
 def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
@@ -162,6 +163,7 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
             "event": "summary", "houses": summary.houses, "views": summary.n_views,
             "steps_done": summary.n_done, "steps_kept": summary.n_kept,
             "seconds": round(seconds, 1), "peak_mb": round(summary.peak_mb),
+            "without_views": [list(pair) for pair in summary.without_views],
             "failures": [dict(zip(("what", "message", "command"), f, strict=True)) for f in summary.failures],
         }  # fmt: skip
         say(json.dumps(row))
@@ -171,6 +173,8 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         f"{summary.n_kept} already there, {len(summary.failures)} failed; "
         f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
     )
+    for house, why in summary.without_views:
+        complain(f"{house}: no view: {why}")
     for what, message, command in summary.failures:
         complain(message if message.startswith(what) else f"{what}: {message}")
         if command:

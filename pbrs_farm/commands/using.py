@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from pbrs_farm.commands.words import Verb, dump, say
@@ -70,8 +71,9 @@ def _relight(args: argparse.Namespace) -> int:
     from pbrs_farm.farm.relight import relit
     from pbrs_farm.store.folder import FolderStore
 
-    if min(args.indoor, args.outdoor) < 0:
-        raise BadInput("--indoor/--outdoor", "", "light cannot be negative")
+    for name, factor in (("--indoor", args.indoor), ("--outdoor", args.outdoor)):
+        if not 0 <= factor < math.inf:
+            raise BadInput(name, str(factor), "expected a number that is finite and not negative")
     out = args.out or Path(f"{args.view.resolve().name}_relit.png")
     png = relit(args.view, indoor=args.indoor, outdoor=args.outdoor, denoise=not args.no_denoise)
     FolderStore(out.parent).put(out.name, png)

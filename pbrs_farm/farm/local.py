@@ -42,7 +42,10 @@ class Run:
 
 @dataclass(slots=True)
 class Summary:
-    """What came of a run. failures: (what, message, command that reproduces it)."""
+    """What came of a run. failures: (what, message, command that reproduces it).
+
+    without_views: (house id, why none of its rooms has a view).
+    """
 
     houses: list[str] = field(default_factory=list)
     n_views: int = 0
@@ -50,6 +53,7 @@ class Summary:
     n_kept: int = 0
     peak_mb: float = 0.0
     failures: list[tuple[str, str, str]] = field(default_factory=list)
+    without_views: list[tuple[str, str]] = field(default_factory=list)
 
 
 def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
@@ -58,9 +62,11 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     Raises BadRecipe when the root holds another recipe, StoreFailed when it cannot be written.
     """
     store = store_from_url(run.store_url, run.store)
-    claim_root(store, run.recipe, update=run.update)
     summary = Summary()
     sources = _resolved(run, summary)
+    if not sources:
+        return summary
+    claim_root(store, run.recipe, update=run.update)
     n_jobs = max(1, run.n_jobs)
     n_threads = max(1, (os.cpu_count() or 1) // n_jobs)
     setting = Setting(run.store_url, run.recipe, n_threads, run.debug, run.store)
@@ -138,6 +144,9 @@ class _Schedule:
         rows = [(str(v), str(room), float(score)) for v, room, score in event.facts["views"]]
         views = plan.spread(rows, self._run.want.n_views)
         self._summary.n_views += len(views)
+        if not views:
+            why = str(event.facts.get("why_none", ""))
+            self._summary.without_views.append((event.house_id, why))
         source = self._sources[event.house_id]
         tasks = [
             Task(event.house_id, plan.view_steps(self._run.want), source, v, self._run.want.layers)

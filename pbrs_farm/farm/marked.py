@@ -116,7 +116,7 @@ def _inputs(step: plan.Step, work: Work) -> dict[str, str]:
     return digests
 
 
-_NEEDED: Final = {"develop": ("light", "truth"), "view": ("truth",)}
+_NEEDED: Final = {"develop": ("light",), "view": ("truth",)}
 
 
 def _extra(name: str, work: Work) -> object:

@@ -40,8 +40,8 @@ STEPS: Final = {
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
-        Step("light", 3, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
-        Step("develop", 3, ("tone", "light"), ("truth", "light")),
+        Step("light", 4, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
+        Step("develop", 4, ("tone", "light"), ("light",)),
         Step("view", 1, ("histogram",), _VIEW_READS),
     )
 }

@@ -154,7 +154,7 @@ class Pool:
             replacement.held_house = task.house_id
             replacement.pipe.send(rest)
         else:
-            yield Event("end", task.house_id, task.view_id, task.steps[-1])
+            yield Event("end", task.house_id, task.view_id, "")
 
 
 def _death(exitcode: int | None, lines: str) -> str:

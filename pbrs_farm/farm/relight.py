@@ -12,21 +12,20 @@ from pbrs_farm.recipe import Recipe
 from pbrs_farm.transport.develop import Negative, develop
 
 
-def negative_from_files(radiance_exr: bytes, normal_png: bytes, place: str) -> Negative:
-    """What `light` and `truth` stored of a view; BadInput names the place when a layer is missing."""
-    from pbrs_farm.images import array_from_png, layers_from_exr
+def negative_from_exr(radiance_exr: bytes, place: str) -> Negative:
+    """What `light` stored of a view; BadInput names the place when a layer is missing."""
+    from pbrs_farm.images import layers_from_exr
 
     exr = layers_from_exr(radiance_exr, f"{place}/radiance.exr")
     try:
-        groups = [
+        outdoor, indoor, albedo = (
             np.stack([exr[f"{name}.{c}"] for c in "RGB"], -1)
             for name in ("outdoor", "indoor", "albedo")
-        ]
+        )
+        normal = np.stack([exr[f"normal.{c}"] for c in "XYZ"], -1)
     except KeyError as error:
         raise BadInput(f"{place}/radiance.exr", str(error), "no such layer") from None
-    encoded = array_from_png(normal_png, f"{place}/normal.png").astype(np.float32)
-    outdoor, indoor, albedo = groups
-    return Negative(outdoor, indoor, albedo, encoded * np.float32(2 / 65535) - 1)
+    return Negative(outdoor, indoor, albedo, normal)
 
 
 def relit(view: Path, *, indoor: float, outdoor: float, denoise: bool) -> bytes:
@@ -37,12 +36,10 @@ def relit(view: Path, *, indoor: float, outdoor: float, denoise: bool) -> bytes:
     from pbrs_farm.images import png_from_array
 
     root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
-    negative = negative_from_files(
-        _read(view / "radiance.exr"), _read(view / "normal.png"), str(view)
-    )
+    negative = negative_from_exr(_read(view / "radiance.exr"), str(view))
     tone = Recipe.model_validate_json(_read(root / "recipe.json")).tone
-    pictures = develop(negative, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
-    return png_from_array(pictures[Mode.MLT_IL_OL.value])
+    prints = develop(negative, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
+    return png_from_array(prints[Mode.MLT_IL_OL.value].rgb_srgb8)
 
 
 def _read(path: Path) -> bytes:

@@ -31,6 +31,7 @@ from pbrs_farm.recipe import Recipe
 
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
+    from pbrs_farm.sample import CameraReport
 
 
 def _loaded(work: Work) -> LoadedHouse:
@@ -98,7 +99,20 @@ def _cameras(work: Work) -> Made:
     if is_object(work):
         return _object_cameras(work, house, seed)
     views, report = cameras(house, fields, seed=seed, counter=loaded.caster.item_counts)
-    return _made_cameras(views, report.model_dump(mode="json"))
+    made = _made_cameras(views, report.model_dump(mode="json"))
+    return made if views else Made(made.files, {**made.facts, "why_none": why_none(report)})
+
+
+def why_none(report: CameraReport) -> str:
+    """One line that says why no room of a house has a view."""
+    if not report.rooms:
+        return "; ".join(report.notes) or "the house has no rooms"
+    reasons = [
+        f"{room.room_id}: {room.reason or (room.sectors[0].reason if room.sectors else 'no sector')}"
+        for room in report.rooms
+    ]
+    more = f" and {len(reasons) - 3} more rooms" if len(reasons) > 3 else ""
+    return "; ".join(reasons[:3]) + more
 
 
 def _object_cameras(work: Work, house: House, seed: int) -> Made:
@@ -209,14 +223,17 @@ def _light(work: Work) -> Made:
     layers: dict[str, NDArray[np.float32]] = {}
     for name in ("outdoor", "indoor", "albedo"):
         image: NDArray[np.float32] = getattr(result, name)
-        if is_object(work):
-            image = np.where(_missed(loaded, camera), np.float32(0), image)
         layers |= {f"{name}.{c}": image[..., k] for k, c in enumerate("RGB")}
+    layers |= {f"normal.{c}": result.normal[..., k] for k, c in enumerate("XYZ")}
+    if is_object(work):
+        missed = _missed(loaded, camera)[..., 0]
+        layers = {name: np.where(missed, np.float32(0), plane) for name, plane in layers.items()}
     facts = {
         **result.facts,
         "noise": result.noise,
         "spp": result.spp,
         "n_nonfinite": result.n_nonfinite,
+        "variant": loaded.light_scene.variant,
         "sky": loaded.sky.facts(),
     }
     if view.room_id:
@@ -237,20 +254,21 @@ def _light_warnings(loaded: LoadedHouse, room_id: str) -> list[str]:
 
 
 def _develop(work: Work) -> Made:
-    from pbrs_farm.farm.relight import negative_from_files
+    from pbrs_farm.farm.relight import negative_from_exr
     from pbrs_farm.images import png_from_array
     from pbrs_farm.transport.develop import develop
 
     folder = keys.view_key(work.house_id, work.view_id or "")
-    radiance, normal = (work.store.get(f"{folder}{f}") for f in ("radiance.exr", "normal.png"))
-    negative = negative_from_files(radiance, normal, folder.rstrip("/"))
-    pictures = develop(negative, work.recipe.tone, denoise=work.recipe.light.denoise)
+    negative = negative_from_exr(work.store.get(f"{folder}radiance.exr"), folder.rstrip("/"))
+    denoise = work.recipe.light.denoise
+    prints = develop(negative, work.recipe.tone, denoise=denoise)
     credit = attribution(work.store, work.house_id)
     return Made(
         {
-            LAYER[mode].file: png_from_array(rgb, attribution=credit)
-            for mode, rgb in pictures.items()
-        }
+            LAYER[mode].file: png_from_array(made.rgb_srgb8, attribution=credit)
+            for mode, made in prints.items()
+        },
+        {"denoised": denoise} | {mode: made.facts() for mode, made in prints.items()},
     )
 
 

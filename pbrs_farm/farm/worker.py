@@ -10,6 +10,7 @@ import os
 import resource
 import signal
 import sys
+import threading
 import time
 import traceback
 from multiprocessing.connection import Connection
@@ -30,12 +31,20 @@ def work_forever(pipe: Connection, setting: Setting, log: str) -> None:
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
     os.environ.setdefault("LP_NUM_THREADS", str(setting.n_threads))
+    threading.Thread(target=_leave_with_parent, args=(os.getppid(),), daemon=True).start()
     shelf = Shelf()
     try:
         while True:
             do_task(pipe, setting, shelf, pipe.recv())
     except (EOFError, BrokenPipeError, ConnectionResetError):
         shelf.clear()
+
+
+def _leave_with_parent(parent: int) -> None:
+    """End this process when its parent is gone, however it went: nobody waits for its work."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
 
 
 def do_task(pipe: Connection, setting: Setting, shelf: Shelf, task: Task) -> None:
@@ -59,7 +68,7 @@ def do_task(pipe: Connection, setting: Setting, shelf: Shelf, task: Task) -> Non
             continue
         if not _do_step(pipe, setting, name, work):
             failed.add(name)
-    pipe.send(Event("end", task.house_id, task.view_id, task.steps[-1], peak_mb=peak_mb()))
+    pipe.send(Event("end", task.house_id, task.view_id, "", peak_mb=peak_mb()))
 
 
 def _do_step(pipe: Connection, setting: Setting, name: str, work: Work) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from pbrs_farm.frames import LUMINANCE
 from pbrs_farm.lighting import GROUPS_OF_MODE, Group
 from pbrs_farm.recipe import ToneFields
 from pbrs_farm.transport.denoise import denoise_radiance
-from pbrs_farm.transport.tone import tone
+from pbrs_farm.transport.tone import exposure_of, tone
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +29,22 @@ class Negative:
     normal: UnitVectors
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Print:
+    """A developed picture: rgb_srgb8 = tone(radiance * gains * exposure).
+
+    gains: (3,) of the white balance. exposure: what radiance was multiplied by before the curve.
+    """
+
+    rgb_srgb8: Srgb8Image
+    gains: NDArray[np.float32]
+    exposure: float
+
+    def facts(self) -> dict[str, Any]:
+        """For view.json."""
+        return {"gains": [round(float(g), 6) for g in self.gains], "exposure": self.exposure}
+
+
 def develop(
     negative: Negative,
     fields: ToneFields,
@@ -35,8 +52,8 @@ def develop(
     denoise: bool,
     indoor: float = 1.0,
     outdoor: float = 1.0,
-) -> dict[str, Srgb8Image]:
-    """Mode name -> (H, W, 3) uint8 sRGB of every mode that is a sum of light groups.
+) -> dict[str, Print]:
+    """Mode name -> picture of every mode that is a sum of light groups.
 
     Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors.
     """
@@ -52,13 +69,15 @@ def develop(
             name: denoise_radiance(radiance, negative.albedo, negative.normal) * seen
             for name, radiance in groups.items()
         }
-    pictures = {}
+    prints = {}
     for mode, names in GROUPS_OF_MODE.items():
         if names:
             total = sum((groups[name] for name in names), np.zeros_like(negative.outdoor))
             gains = white_balance(total, negative.albedo, fields.white_balance)
-            pictures[mode.value] = tone(total * gains, fields)
-    return pictures
+            exposure = exposure_of(total * gains, fields)
+            rgb = tone(total * gains, fields, exposure=exposure)
+            prints[mode.value] = Print(rgb, gains, exposure)
+    return prints
 
 
 def white_balance(
