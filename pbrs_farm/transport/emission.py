@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from pbrs_farm.house import Geometry, House, Item, LightPart, MaterialKind
 from pbrs_farm.lighting import flux_lm
 from pbrs_farm.recipe import EmissionFields, Recipe
 from pbrs_farm.transport.colour import rgb_from_kelvin
+
+_MIN_ESCAPE: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,9 +87,14 @@ def _faces_by_surface(geometry: Geometry, keep: NDArray[np.bool_]) -> dict[int, 
 def _radiated(
     house: House, part: LightPart, k: int, item: Item, recipe: Recipe
 ) -> tuple[float, NDArray[np.float64]]:
-    """(flux in lm, colour of luminance 1) of a light part."""
+    """(flux in lm, colour of luminance 1) of a light part.
+
+    The source's number is what leaves the lamp: a bulb deep in its shade shines stronger.
+    """
     e = recipe.emission
     flux = flux_lm(part.power, part.unit, part.share, lamp_lm=e.lamp_lm, lm_per_watt=e.lm_per_watt)
+    if e.compensate_shades and part.escape is not None:
+        flux /= min(max(part.escape, _MIN_ESCAPE), 1.0)
     return max(flux, 0.0), lamp_rgb(part.rgb_linear, f"{house.id}/{item.id}/{k}", e, recipe.seed)
 
 
