@@ -21,6 +21,7 @@ from pbrs_farm.repair.walls import Wall
 
 _RECESS_M = 0.001
 _OVERLAP_M = 0.01
+_GAP_SEEN_M = 1e-4
 
 
 def joints_between_walls(
@@ -41,7 +42,7 @@ def joints_between_walls(
                 continue
             solids = _joint(a, walls[j], rooms, table)
             found += [(a, s) for s in solids]
-            n_gaps += bool(solids) and a.footprint.distance(walls[j].footprint) > 1e-4
+            n_gaps += bool(solids) and a.footprint.distance(walls[j].footprint) > _GAP_SEEN_M
     return found, n_gaps
 
 
@@ -51,11 +52,16 @@ def _joint(a: Wall, b: Wall, rooms: plan.Shape, table: TagTable) -> list[Manifol
     if a.thickened and b.thickened:
         both, near = _outer_corner(a, b, rooms)
     inner = plan.grown(plan.closed(both, GAP_M), -_RECESS_M)
+    areas = polygons_of(plan.common(near, inner))
+    if not any(_touches(p, a) and _touches(p, b) for p in areas):
+        areas += polygons_of(_bridge(a, b, rooms))
+    # Across a gap a joint runs on into the slabs below and above.
+    beyond = GAP_M if a.footprint.distance(b.footprint) > _GAP_SEEN_M else -_RECESS_M
     solids = []
-    for polygon in polygons_of(plan.common(near, inner)):
+    for polygon in areas:
         corners = shapely.get_coordinates(polygon)
-        low = max(a.bottom_y, b.bottom_y) + _RECESS_M
-        high = min(float(a.top.at(corners).min()), float(b.top.at(corners).min())) - _RECESS_M
+        low = max(a.bottom_y, b.bottom_y) - beyond
+        high = min(float(a.top.at(corners).min()), float(b.top.at(corners).min())) + beyond
         if high - low < _OVERLAP_M:
             continue
         tags = (a.tag("joint"),) * 3
@@ -63,6 +69,18 @@ def _joint(a: Wall, b: Wall, rooms: plan.Shape, table: TagTable) -> list[Manifol
         if solid is not None:
             solids.append(solid)
     return solids
+
+
+def _touches(area: shapely.Polygon, wall: Wall) -> bool:
+    return bool(area.distance(wall.footprint) < _RECESS_M)
+
+
+def _bridge(a: Wall, b: Wall, rooms: plan.Shape) -> plan.Shape:
+    # Two walls that both end short of their corner: a block from end to end, outside the rooms.
+    ends = [
+        plan.common(x.footprint, plan.grown(y.footprint, 1.5 * GAP_M)) for x, y in ((a, b), (b, a))
+    ]
+    return plan.without(shapely.convex_hull(plan.union(ends)), plan.grown(rooms, _RECESS_M))
 
 
 def _outer_corner(a: Wall, b: Wall, rooms: plan.Shape) -> tuple[plan.Shape, plan.Shape]:

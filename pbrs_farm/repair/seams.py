@@ -9,6 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 F64 = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -26,16 +29,23 @@ def sealed(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Faces, Face
     vertices: (V, P) positions and properties, those of one position possibly several times.
     faces: (F, 3); labels: (F,), kept with each face. New vertices get properties in between.
     """
-    cells = np.round(vertices[:, :3] / _MERGE_M)
-    _, first, place = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     vertices = vertices.copy()
-    vertices[:, :3] = vertices[first[np.ravel(place)], :3].astype(np.float32)
+    vertices[:, :3] = vertices[_representatives(vertices[:, :3]), :3].astype(np.float32)
     _, place = np.unique(vertices[:, :3], axis=0, return_inverse=True)
     mesh = _Mesh(vertices, np.ravel(place), faces, labels)
     for _ in range(_MAX_ROUNDS):
         if not mesh.dissolve():
             break
     return mesh.result()
+
+
+def _representatives(positions: F64) -> NDArray[np.int64]:
+    # For each point the first of those that are linked to it by steps below _MERGE_M.
+    n = len(positions)
+    pairs = KDTree(positions).query_pairs(_MERGE_M, output_type="ndarray").reshape(-1, 2)
+    graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    cluster = connected_components(graph, directed=False)[1]
+    return np.unique(cluster, return_index=True)[1].astype(np.int64)[cluster]
 
 
 class _Mesh:

@@ -54,8 +54,11 @@ def seen_from(house: House, origin: tuple[float, float, float]) -> dict[tuple[st
     return found  # fmt: skip
 
 
-def coinciding_from(house: House, origin: tuple[float, float, float]) -> float:
-    """Least distance in metres, along the rays from origin, of the first face and the one behind."""
+def coinciding_share(house: House, origin: tuple[float, float, float]) -> float:
+    """Share of rays from origin behind whose first face another one lies within half a millimetre.
+
+    Where faces coincide it is their share of the view; at edges seen from outside it is a sliver.
+    """
     shell = structure_of(house)
     occluder = EmbreeOccluder(shell)
     g = geometry_from_house(shell)
@@ -65,7 +68,7 @@ def coinciding_from(house: House, origin: tuple[float, float, float]) -> float:
     hit = (face >= 0) & ((directions * normals[face]).sum(1) < -0.2)
     start = (origins + directions * (first[:, None] + 2e-5))[hit]
     second, _ = occluder.first_hit(start.astype(np.float32), directions[hit].astype(np.float32))
-    return float(second.min())
+    return float((second < 5e-4).mean())
 
 
 def leaning_area(house: House) -> float:

@@ -16,7 +16,7 @@ from pbrs_farm.repair import RepairReport, repair
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.rooms import house, lids, planar_walls, room, turned, wall, walls_around
 from tests.repair.shells import (
-    coinciding_from,
+    coinciding_share,
     leaning_area,
     seen_from,
     structure_of,
@@ -70,7 +70,7 @@ def test_walls_drawn_twice_leave_one_face() -> None:
     twice = [*walls_around(RECT), *walls_around(RECT, "again")]
     after, report = _repaired(house([*twice, *lids(r)], [r]))
     assert len(unpaired_edges(after)) == 0
-    assert coinciding_from(after, MIDDLE) > 0.05
+    assert coinciding_share(after, MIDDLE) < 1e-3
     assert _sky(report) == 0
 
 
@@ -86,7 +86,7 @@ def test_neighbouring_slabs_show_each_room_its_own_floor() -> None:
     for origin, own in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
         lids_seen = {i for i, _ in seen_from(after, origin) if not i.startswith(("w", "between"))}
         assert lids_seen == {f"floor_{own}", f"ceiling_{own}"}
-        assert coinciding_from(after, origin) > 0.005  # fmt: skip
+        assert coinciding_share(after, origin) < 1e-3  # fmt: skip
 
 
 def test_a_floor_goes_on_through_a_doorway() -> None:

@@ -10,7 +10,7 @@ from pbrs_farm.recipe import ReadFields, RepairFields
 from pbrs_farm.repair import RepairReport, repair
 from tests.read.suncg_root import write_root
 from tests.repair.embree import EmbreeOccluder
-from tests.repair.shells import coinciding_from, seen_from
+from tests.repair.shells import coinciding_share, seen_from
 
 Repaired = tuple[House, RepairReport]
 
@@ -37,7 +37,7 @@ def test_each_room_sees_its_own_side_where_walls_coincide(suncg: Repaired) -> No
         # Outside faces are the neighbour's; only reveals of its slabs show, in the doorway.
         assert not [key for key in seen if key[1].endswith(" out")]
         assert seen[f"{room}w{x}", f"WallInside#{room}_{x} in"] > 500
-        assert coinciding_from(suncg[0], origin) > 0.0002
+        assert coinciding_share(suncg[0], origin) < 1e-3
 
 
 def test_windows_that_are_cut_already_stay_open_and_are_plugged_for_the_meter(
