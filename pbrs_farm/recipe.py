@@ -75,7 +75,8 @@ class CameraFields(_Group):
     coarse_width_px: int = Field(160, gt=0)
     coarse_height_px: int = Field(120, gt=0)
     per_sector: int = Field(1, ge=1)
-    source: Literal["sampled", "stored"] = "sampled"
+    source: Literal["sampled", "stored", "file"] = "sampled"
+    file: str = Field("", description="camera file of the user's, for source file")
     exact: bool = Field(False, description="score every candidate at full size")
 
 

@@ -44,6 +44,9 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument(
         "--cameras", choices=("sampled", "stored"), default=None, help="where viewpoints come from"
     )
+    p.add_argument(
+        "--camera-file", type=Path, default=None, help="your own: JSON list, or room_camera.txt"
+    )
     add_recipe(p)
     _add_run(p)
     p = verb(

@@ -61,6 +61,8 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
         overrides["read.strict"] = "true"
     if getattr(args, "cameras", None):
         overrides["cameras.source"] = args.cameras
+    if getattr(args, "camera_file", None):
+        overrides |= {"cameras.source": "file", "cameras.file": json.dumps(str(args.camera_file))}
     if getattr(args, "per_sector", None):
         overrides["cameras.per_sector"] = str(args.per_sector)
     if getattr(args, "exact", False):

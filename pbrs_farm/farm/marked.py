@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any, Final
 
 from pydantic import ValidationError
@@ -23,7 +24,7 @@ from pbrs_farm.farm.loaded import Shelf
 from pbrs_farm.farm.records import json_bytes
 from pbrs_farm.farm.sources import SourceRef
 from pbrs_farm.keys import Marker, StoredFile
-from pbrs_farm.recipe import Recipe
+from pbrs_farm.recipe import CameraFields, Recipe
 from pbrs_farm.store.interface import Store
 
 
@@ -125,7 +126,17 @@ def _extra(name: str, work: Work) -> object:
         return required_source(work).sha256
     if name == "truth":
         return work.layers
+    if name == "cameras" and work.recipe.cameras.source == "file":
+        return keys.sha256(camera_file_text(work.recipe.cameras).encode())
     return None
+
+
+def camera_file_text(fields: CameraFields) -> str:
+    """The user's camera file; BadInput if it cannot be read."""
+    try:
+        return Path(fields.file).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(fields.file or "cameras.file", "", f"cannot be read: {error}") from None
 
 
 def required_source(work: Work) -> SourceRef:

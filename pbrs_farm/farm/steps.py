@@ -19,15 +19,23 @@ from pbrs_farm.camera import Camera, Intrinsics, View
 from pbrs_farm.errors import BadHouse, BadInput
 from pbrs_farm.farm import plan
 from pbrs_farm.farm.loaded import LoadedHouse
-from pbrs_farm.farm.marked import Made, Outcome, Work, read_marker, required_source, run_marked
+from pbrs_farm.farm.marked import (
+    Made,
+    Outcome,
+    Work,
+    camera_file_text,
+    read_marker,
+    required_source,
+    run_marked,
+)
 from pbrs_farm.farm.records import json_bytes, plain_from_view, views_from_json
 from pbrs_farm.farm.root import attribution
 from pbrs_farm.farm.sources import SourceRef, read_house
 from pbrs_farm.farm.view_histogram import histogram_json
-from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm.house import House, Room, geometry_from_house
 from pbrs_farm.layers import LAYER
 from pbrs_farm.lighting import ALL_MODES
-from pbrs_farm.recipe import Recipe
+from pbrs_farm.recipe import CameraFields, Recipe
 
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
@@ -98,6 +106,8 @@ def _cameras(work: Work) -> Made:
     seed = camera_seed(work.house_id, work.recipe)
     if is_object(work):
         return _object_cameras(work, house, seed)
+    if fields.source == "file":
+        return _file_cameras(loaded, fields)
     views, report = cameras(house, fields, seed=seed, counter=loaded.caster.item_counts)
     made = _made_cameras(views, report.model_dump(mode="json"))
     return made if views else Made(made.files, {**made.facts, "why_none": why_none(report)})
@@ -124,10 +134,27 @@ def _object_cameras(work: Work, house: House, seed: int) -> Made:
     return _made_cameras(views, {"preset": "objects", "n_views": len(views)})
 
 
+def _file_cameras(loaded: LoadedHouse, fields: CameraFields) -> Made:
+    from pbrs_farm.sample.camera_file import cameras_from_file_text
+    from pbrs_farm.sample.stored import views_from_cameras
+
+    given = cameras_from_file_text(
+        camera_file_text(fields), fields.file, fields.score_width_px, fields.score_height_px
+    )
+    counter = loaded.caster.item_counts
+    views = views_from_cameras(loaded.house, given, fields, counter, origin="file")
+    return _made_cameras(views, {"source": "file", "n_views": len(views)})
+
+
 def _made_cameras(views: Sequence[View], report: dict[str, Any]) -> Made:
     plain = {"views": [plain_from_view(v) for v in views], "report": report}
     facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
     return Made({"cameras.json": json_bytes(plain)}, facts)
+
+
+def room_of(house: House, view: View) -> Room | None:
+    """The room a view belongs to; None for a camera outside every room, or around an object."""
+    return next((room for room in house.rooms if room.id == view.room_id), None)
 
 
 def is_object(work: Work) -> bool:
@@ -149,8 +176,9 @@ def _truth(work: Work) -> Made:
     hit = caster.hit_record(camera)
     arrays = truth.layers_from_hit(hit, house, camera)
     table = truth.view_table(hit.item, house, camera)
-    if view.room_id:
-        table["layout"] = truth.layout_table(house.room(view.room_id), camera, hit.depth_z)
+    room = room_of(house, view)
+    if room is not None:
+        table["layout"] = truth.layout_table(room, camera, hit.depth_z)
     if work.layers:
         seen = truth.Seen(
             hit,
@@ -236,21 +264,22 @@ def _light(work: Work) -> Made:
         "variant": loaded.light_scene.variant,
         "sky": loaded.sky.facts(),
     }
-    if view.room_id:
-        facts["floor_lux"] = loaded.floor_lux.get(view.room_id)
-        facts["warnings"] = _light_warnings(loaded, view.room_id)
+    room = room_of(loaded.house, view)
+    if room is not None:
+        facts["floor_lux"] = loaded.floor_lux.get(room.id)
+        facts["warnings"] = _light_warnings(loaded, room)
     if loaded.light_scene.n_lamps == 0:
         facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
     exr = exr_from_layers(layers, attribution=loaded.house.source.attribution)
     return Made({"radiance.exr": exr}, facts)
 
 
-def _light_warnings(loaded: LoadedHouse, room_id: str) -> list[str]:
+def _light_warnings(loaded: LoadedHouse, room: Room) -> list[str]:
     """Whether the room's floor is lit as floors of homes are (spec: one photometric scale)."""
     from pbrs_farm.transport.illuminance import photometric_warnings
 
-    lux = {k: v for k, v in loaded.floor_lux.items() if k == room_id}
-    return photometric_warnings(lux, {room_id: loaded.house.room(room_id).lit_by})
+    lux = {k: v for k, v in loaded.floor_lux.items() if k == room.id}
+    return photometric_warnings(lux, {room.id: room.lit_by})
 
 
 def _develop(work: Work) -> Made:
@@ -292,11 +321,12 @@ def _view(work: Work) -> Made:
     rendered = [m for m in ALL_MODES if m.value in facts or (m.groups and "develop" in facts)]
     if rendered:
         house = _loaded(work).house
+        room = room_of(house, view)
         place = {
             "house": work.house_id,
             "view": view.id,
             "room": view.room_id,
-            "room_type": house.room(view.room_id).name if view.room_id else "",
+            "room_type": room.name if room is not None else "",
         }
         files["histogram.json"] = histogram_json(
             work.store, place, rendered, sheet, house.notes, work.recipe.histogram
