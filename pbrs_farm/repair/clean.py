@@ -11,6 +11,7 @@ from pbrs_farm.house import House, Item, ItemKind, Surface
 from pbrs_farm.recipe import RepairFields
 from pbrs_farm.repair.patches import face_areas, face_normals
 from pbrs_farm.repair.report import FacesReport, Removed
+from pbrs_farm.repair.walls import BASEBOARD
 
 _MIN_AREA_M2 = 1e-12
 
@@ -31,7 +32,7 @@ def without_living(house: House, fields: RepairFields) -> tuple[House, list[Remo
 
 
 def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[House, int]:
-    """Walls whose source names no colour painted rgb (sRGB), and how many there were."""
+    """Walls whose source names no colour painted rgb (sRGB); and how many, baseboards aside."""
     materials = list(house.materials)
     white: dict[int, int] = {}
     items: list[Item] = []
@@ -50,7 +51,8 @@ def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[Hou
                 white[s.material] = len(materials)
                 materials.append(replace(material, name=f"{material.name}_wall", diffuse=rgb, texture_id=None))  # fmt: skip
             surfaces.append(replace(s, material=white[s.material]))
-        n += any(house.materials[s.material].is_default for s in item.surfaces)
+        is_board = BASEBOARD in item.tags
+        n += not is_board and any(house.materials[s.material].is_default for s in item.surfaces)
         items.append(replace(item, surfaces=tuple(surfaces)))
     return replace(house, items=tuple(items), materials=tuple(materials)), n
 
