@@ -23,6 +23,7 @@ from tests.workers.redis_server import RedisServer
 from workers.client import Farm, new_spec
 from workers.config import FarmConfig
 from workers.job import HouseEntry
+from workers.renderer import die_with_parent
 from workers.runner import Request
 
 REPO = Path(__file__).parents[2]
@@ -85,6 +86,7 @@ class SmallFarm:
                 stdout=log,
                 stderr=log,
                 start_new_session=True,
+                preexec_fn=die_with_parent,
             )
 
     def coordinator(self, name: str = "coordinator") -> None:
