@@ -12,6 +12,7 @@ has_lib() { PATH=$PATH:/sbin:/usr/sbin ldconfig -p | grep -q "$1"; }
 
 missing_packages() {
   has_lib 'libLLVM\(-19\.so\|\.so\.19\|-20\.so\|\.so\.2[0-9]\|-1[78]\.so\|\.so\.18\)' || echo libllvm19
+  has_lib 'libatomic\.so\.1' || echo libatomic1
   has_lib 'libEGL\.so\.1' || echo libegl1
   has_lib 'libGL\.so\.1' || echo libgl1
   has_lib 'libEGL_mesa\.so\.0' || [ -e /proc/driver/nvidia ] || echo libegl-mesa0
