@@ -152,12 +152,24 @@ def _run_words(
         store=settings_from_environment().store,
         sources=sources,
     )
+    _warn_of_slowness()
     started = time.monotonic()
     with teller(len(words) + len(sources), args.views, as_json=args.json) as tell:
         summary = run_local(run, tell)
     seconds = time.monotonic() - started
     _report(args, summary, seconds)
     return 1 if summary.failures or summary.n_views == 0 else 0
+
+
+def _warn_of_slowness() -> None:
+    """Say it when only the scalar variant is left."""
+    from pbrs_farm.transport.variant import MIN_LLVM, find_llvm
+
+    if find_llvm() is None and not Path("/proc/driver/nvidia").exists():
+        complain(
+            f"no LLVM of version {MIN_LLVM} or later: going on with Mitsuba's scalar_rgb, several"
+            " times slower (sudo apt-get install -y libllvm19)"
+        )
 
 
 def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
