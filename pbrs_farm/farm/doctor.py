@@ -79,9 +79,7 @@ def _llvm() -> Finding:
         return Finding("LLVM", "ok", str(library))
     old = ", ".join(".".join(map(str, v)) for v, _path in llvm_libraries())
     text = f"only {old}; 14 to 16 crash inside Dr.Jit" if old else "no libLLVM found"
-    text += (
-        f"; {MIN_LLVM} or later is needed (19 is what we test); running with scalar_rgb, 3x slower"
-    )
+    text += f"; {MIN_LLVM} or later is needed (19 is what we test); running with scalar_rgb, several times slower"
     return Finding("LLVM", "degraded", text, remedy)
 
 
