@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.report import write_report
 from pbrs_farm import homes
 from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.debian import cache_folder
 from pbrs_farm.farm.sources import read_house, resolve
 from pbrs_farm.house import Geometry, House, geometry_from_house
 from pbrs_farm.recipe import CameraFields, Recipe
@@ -166,7 +167,7 @@ def _gl_per_s(geometry: Geometry, cameras: list[Camera], n_items: int) -> float:
 def _home_in_a_process(name: str) -> dict[str, float]:
     """Sample a home in a fresh process that has no compiled kernel yet."""
     with tempfile.TemporaryDirectory() as empty:
-        environment = os.environ | {"HOME": empty, "PBRS_CACHE": str(homes.cache_folder())}
+        environment = os.environ | {"HOME": empty, "PBRS_CACHE": str(cache_folder())}
         done = subprocess.run(
             [sys.executable, "-m", "benchmarks.cameras", "--home", name],
             env=environment,
