@@ -95,7 +95,7 @@ class LightFields(_Group):
     direct_spp: int = Field(512, ge=0, description="direct samples beside Metropolis")
     mutations_per_pixel: int = Field(1024, ge=1)
     max_depth: int = Field(12, ge=1, description="path segments; Russian roulette from rr_depth")
-    rr_depth: int = Field(2, ge=1, description="docs/light.md: measured the best of 2, 3, 4, 6")
+    rr_depth: int = Field(1, ge=1, description="docs/light.md: measured the best of 1 to 6")
     filter: Literal["box", "tent"] = Field("tent", description="of a pixel's samples")
     pilot_spp: int = Field(4, ge=0, description="32x24 pixels per emitter; 0 = uniform choice")
     noise: float = Field(

@@ -63,11 +63,7 @@ class Emitters:
     ) -> None:
         self._set_lamps(tables, weights.lamps)
         self._set_dome(sky)
-        rows = np.zeros((MAX_PORTALS, 12), np.float32)
-        rows[: len(portals), 0:3] = portals[:, 0]
-        rows[: len(portals), 4:7] = portals[:, 1] - portals[:, 0]
-        rows[: len(portals), 8:11] = portals[:, 3] - portals[:, 0]
-        self._portals = device_array(mi.Float, rows.ravel())
+        self._set_portals(portals)
         self._set_outdoor_weights(weights.outdoor)
         s = sky.sun_direction
         self._sun_frame = mi.Frame3f(opaque3(mi.Vector3f, s))
@@ -79,6 +75,11 @@ class Emitters:
         self._sun_density = dr.opaque(mi.Float, 1 / solid)
         self._sun_rgb = opaque3(mi.Color3f, sky.sun_irradiance / projected)
         self.has_sky = dr.opaque(mi.Bool, bool(sky.dome.max() > 0 or sky.sun_irradiance.max() > 0))
+
+    def aim(self, portals: NDArray[np.float64], weights: Weights) -> None:
+        """Set the portals and weights of another view; lamps and sky stay."""
+        self._set_portals(portals)
+        self.with_weights(weights)
 
     def with_weights(self, weights: Weights) -> None:
         """Set other weights; the scene stays."""
@@ -241,6 +242,13 @@ class Emitters:
             mi.Float, np.concatenate([*alias, np.ones((1, 2), np.float32)]).ravel()
         )
         self._set_lamp_weights(weights)
+
+    def _set_portals(self, portals: NDArray[np.float64]) -> None:
+        rows = np.zeros((MAX_PORTALS, 12), np.float32)
+        rows[: len(portals), 0:3] = portals[:, 0]
+        rows[: len(portals), 4:7] = portals[:, 1] - portals[:, 0]
+        rows[: len(portals), 8:11] = portals[:, 3] - portals[:, 0]
+        self._portals = device_array(mi.Float, rows.ravel())
 
     def _set_lamp_weights(self, weights: NDArray[np.float64]) -> None:
         padded = weights if len(weights) else np.ones(1)

@@ -41,6 +41,7 @@ class LightScene:
         self._portals = portals
         mitsuba(variant)
         self.stage: Any = None
+        self._emitters: Any = None
         if not variant.startswith("scalar"):
             from pbrs_farm.transport.surface import Stage
 
@@ -177,7 +178,6 @@ class LightScene:
         if self.variant.startswith("scalar"):
             return {}
         mitsuba(self.variant)
-        from pbrs_farm.transport.emitters import Emitters
         from pbrs_farm.transport.illuminance import floor_points, illuminance_lx
         from pbrs_farm.transport.pilot import uniform_weights
         from pbrs_farm.transport.portals import nearest_portals
@@ -187,7 +187,7 @@ class LightScene:
             points = floor_points(room, 256, seed)
             portals = nearest_portals(self._portals, points.mean(0))
             weights = uniform_weights(self.n_lamps, len(portals))
-            emitters = Emitters(self.tables, self.sky, portals, weights)
+            emitters = self._aimed(portals, weights)
             outdoor, indoor = illuminance_lx(self.stage, emitters, points, seed)
             lux[room.id] = {"outdoor": round(outdoor, 2), "indoor": round(indoor, 2)}
         return lux
@@ -224,13 +224,12 @@ class LightScene:
         self, camera: Camera, fields: LightFields, seed: int
     ) -> tuple[Any, dict[str, float]]:
         """Emitters with the weights of this view, and the lamps' weights by name."""
-        from pbrs_farm.transport.emitters import Emitters
         from pbrs_farm.transport.pilot import pilot_weights, uniform_weights
         from pbrs_farm.transport.portals import nearest_portals
 
         portals = nearest_portals(self._portals, camera.eye)
         weights = uniform_weights(self.n_lamps, len(portals))
-        emitters = Emitters(self.tables, self.sky, portals, weights)
+        emitters = self._aimed(portals, weights)
         if fields.pilot_spp > 0:
             weights = pilot_weights(
                 self.stage, emitters, camera, self.n_lamps, len(portals), fields, seed ^ 0x5EED
@@ -238,3 +237,13 @@ class LightScene:
             emitters.with_weights(weights)
         names = [lamp.name for lamp in self.tables.lamps]
         return emitters, {n: float(w) for n, w in zip(names, weights.lamps, strict=True)}
+
+    def _aimed(self, portals: NDArray[np.float64], weights: Any) -> Any:
+        """The emitters, their tables built once, with the portals and weights of a view."""
+        from pbrs_farm.transport.emitters import Emitters
+
+        if self._emitters is None:
+            self._emitters = Emitters(self.tables, self.sky, portals, weights)
+        else:
+            self._emitters.aim(portals, weights)
+        return self._emitters
