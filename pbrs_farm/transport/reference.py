@@ -59,7 +59,7 @@ class ReferenceScene:
         shapes: dict[str, Any] = {}
         for tag in np.unique(t.face_tags):
             faces = t.faces[t.face_tags == tag]
-            row = t.material_rows[int(tag & 0xFFFF)]
+            row = _untextured(t.material_rows[int(tag & 0xFFFF)], t.texels)
             if int(row[11]) == HOLE:
                 continue
             fields: dict[str, Any] = {"bsdf": _bsdf(row)}
@@ -68,6 +68,19 @@ class ReferenceScene:
                 fields["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
             shapes[f"mesh_{tag}"] = _mesh(mi, t.positions, faces, fields)
         return shapes
+
+
+def _untextured(row: NDArray[np.float32], texels: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """The material with its texture's mean colour in place of the texture."""
+    first = int(row[12:13].view(np.uint32)[0])
+    if first == 0 or int(row[11]) == MIRROR:
+        return row
+    bits = texels[first : first + int(row[13]) * int(row[14])]
+    mean = [np.mean(((bits >> shift & 1023) / 1023) ** 2) for shift in (0, 10, 20)]
+    plain = row.copy()
+    plain[0:3] *= mean
+    plain[8:11] *= mean
+    return plain
 
 
 def _mesh(
