@@ -90,7 +90,7 @@ def white_balance(
     1 makes the light neutral. Ones when there is nothing to go by.
     """
     level = radiance @ LUMINANCE
-    usable = (level > 0) & (albedo.min(-1) > 0.02) & (radiance.min(-1) > 0)
+    usable = (level > 0) & np.all(albedo > 0.02, -1) & np.all(radiance > 0, -1)
     if strength == 0 or usable.sum() < 16:
         return np.ones(3, np.float32)
     low, high = np.percentile(level[usable], [10, 90])

@@ -74,7 +74,7 @@ def _rolled_off(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
 
     It works on the largest component and keeps the hue; what is far beyond white fades to white.
     """
-    top = rgb.max(-1, keepdims=True)
+    top = np.maximum(np.maximum(rgb[..., :1], rgb[..., 1:2]), rgb[..., 2:3])
     over = np.maximum(top - _SHOULDER, 0.0)
     room = 1 - _SHOULDER
     rise = np.log1p(over / room) / np.log1p((_SPAN - _SHOULDER) / room)

@@ -242,3 +242,21 @@ def test_the_denoiser_removes_noise_and_keeps_black_pictures() -> None:
     assert clean.std() < 0.2 * noisy.std()
     assert clean.mean() == pytest.approx(noisy.mean(), rel=0.05)
     assert not denoise_radiance(np.zeros((8, 8, 3), np.float32), grey(0)[:8, :8], up[:8, :8]).any()
+
+
+def test_one_denoiser_serves_all_pictures_of_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    pyoidn = pytest.importorskip("pyoidn")
+    rng = np.random.default_rng(3)
+    noisy = rng.lognormal(0, 1, (48, 64, 3)).astype(np.float32)
+    up = np.zeros_like(noisy)
+    up[..., 1] = 1
+    first = denoise_radiance(noisy, np.full_like(noisy, 0.5), up)
+
+    def refuse(*_words: object, **_named: object) -> None:
+        raise AssertionError("another device")
+
+    monkeypatch.setattr(pyoidn.Device, "__init__", refuse)
+    other = denoise_radiance(noisy[:32, :32], np.full((32, 32, 3), 0.5, np.float32), up[:32, :32])
+    assert other.shape == (32, 32, 3)
+    # After a picture of another size the first one is the same bits again.
+    np.testing.assert_array_equal(first, denoise_radiance(noisy, np.full_like(noisy, 0.5), up))
