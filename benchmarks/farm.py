@@ -23,16 +23,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pydantic import SecretStr
-
 from benchmarks.noop_runner import N_HOUSES, groups_of
 from benchmarks.report import write_report
 from pbrs_farm import keys
 from pbrs_farm.recipe import recipe_from_name
 from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.secret import Secret
 from workers.client import Farm, completed, new_spec
 from workers.config import FarmConfig
-from workers.job import HouseEntry, job_key, lines_from_houses
+from workers.ids import job_key
+from workers.job import HouseEntry, lines_from_houses
 from workers.ledger import HouseState
 from workers.renderer import die_with_parent
 
@@ -95,7 +95,7 @@ class Bench:
     def farm(self) -> Farm:
         return Farm(
             FarmConfig(
-                redis_url=SecretStr(self.env["PBRS_REDIS_URL"]),
+                redis_url=Secret(self.env["PBRS_REDIS_URL"]),
                 store_url=self.env["PBRS_STORE"],
                 runner=self.env["PBRS_FARM_RUNNER"],
             )

@@ -1,6 +1,7 @@
 """The `pbrs-farm` command: words -> one verb's handler -> exit code. Effects: the verb's.
 
-Exit codes: 0 done; 1 something failed, the rest was done; 2 the words are wrong; 130 interrupted.
+A command imports the module of its own verb only. Exit codes: 0 done; 1 something failed, the rest
+was done; 2 the words are wrong; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -10,18 +11,42 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
-from typing import Any
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Final
 
 import pbrs_farm
-from pbrs_farm.commands import labelling, looking, making, selecting, stages, using
-from pbrs_farm.commands.words import Handler, add_recipe, complain, recipe_of
+from pbrs_farm.commands.words import Handler, complain
 from pbrs_farm.errors import PbrsError
+
+MODULES: Final = {
+    "looking": ("doctor", "homes", "skies", "recipes", "layers"),
+    "making": ("demo", "run", "objects", "step"),
+    "stages": ("repair", "cameras"),
+    "using": ("sheet", "verify", "relight"),
+    "labelling": ("export", "classes", "label-sheet"),
+    "selecting": ("reference", "select"),
+    "submitting": ("submit",),
+    "steering": (
+        "status", "why", "logs", "failures", "retry", "pause", "resume", "cancel", "reduce",
+        "drain", "workers", "recover", "coordinator", "worker",
+    ),
+}  # fmt: skip
+"""Module of pbrs_farm.commands -> the verbs it adds."""
+
+_OF_THE_FARM: Final = ("submitting", "steering")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code."""
-    parser = build_parser()
-    args = parser.parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    verb = words[0] if words else ""
+    module = next((name for name, verbs in MODULES.items() if verb in verbs), None)
+    if module in _OF_THE_FARM and not _has_farm():
+        complain(f'{verb} needs celery and redis: pip install "pbrs-farm[workers]"')
+        return 1
+    parser = build_parser(module)
+    args = parser.parse_args(words)
     if not hasattr(args, "handler"):
         parser.print_help()
         return 2
@@ -40,8 +65,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """All verbs; the farm's are added when their packages are installed."""
+def build_parser(module: str | None = None) -> argparse.ArgumentParser:
+    """The verbs of one module, or all of them; the farm's where celery and redis are installed."""
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument("--debug", action="store_true", help="show tracebacks")
     parser = argparse.ArgumentParser(
@@ -59,23 +84,14 @@ def build_parser() -> argparse.ArgumentParser:
         sub.set_defaults(handler=handler)
         return sub
 
-    looking.add_verbs(verb)
-    making.add_verbs(verb)
-    stages.add_verbs(verb)
-    using.add_verbs(verb)
-    labelling.add_verbs(verb)
-    selecting.add_verbs(verb)
-    _add_farm(verbs, common)
+    for name in [module] if module else MODULES:
+        if name not in _OF_THE_FARM or _has_farm():
+            import_module(f"pbrs_farm.commands.{name}").add_verbs(verb)
     return parser
 
 
-def _add_farm(verbs: Any, common: argparse.ArgumentParser) -> None:
-    """The farm's verbs: only where celery and redis are installed."""
-    try:
-        from workers.cli import add_verbs
-    except ImportError:
-        return
-    add_verbs(verbs, common, add_recipe=add_recipe, recipe_of=recipe_of)
+def _has_farm() -> bool:
+    return all(find_spec(package) is not None for package in ("celery", "redis"))
 
 
 if __name__ == "__main__":

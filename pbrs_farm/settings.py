@@ -7,21 +7,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-
-from pydantic import BaseModel, ConfigDict, SecretStr
+from typing import Final
 
 from pbrs_farm.errors import BadInput
 from pbrs_farm.store.s3 import S3Settings
+from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings
 
+DEFAULT_REDIS: Final = "redis://127.0.0.1:6379/0"
 
-class Settings(BaseModel):
+
+@dataclass(frozen=True, slots=True)
+class Settings:
     """What the environment says. redis_url: of the farm's broker and ledger."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    store: StoreSettings = StoreSettings()
-    redis_url: SecretStr = SecretStr("redis://127.0.0.1:6379/0")
+    store: StoreSettings = field(default_factory=StoreSettings)
+    redis_url: Secret = field(default_factory=lambda: Secret(DEFAULT_REDIS))
 
 
 def settings_from_environment(environment: Mapping[str, str] | None = None) -> Settings:
@@ -35,13 +38,13 @@ def settings_from_environment(environment: Mapping[str, str] | None = None) -> S
         endpoint=_value(env, "PBRS_S3_ENDPOINT"),
         region=_value(env, "PBRS_S3_REGION") or "us-east-1",
         access_key=_value(env, "PBRS_S3_ACCESS_KEY"),
-        secret_key=SecretStr(_value(env, "PBRS_S3_SECRET_KEY")),
+        secret_key=Secret(_value(env, "PBRS_S3_SECRET_KEY")),
         allow_http=_value(env, "PBRS_S3_ALLOW_HTTP") == "1",
     )
-    redis_url = _value(env, "PBRS_REDIS_URL") or "redis://127.0.0.1:6379/0"
+    redis_url = _value(env, "PBRS_REDIS_URL") or DEFAULT_REDIS
     return Settings(
         store=StoreSettings(fsync=_value(env, "PBRS_FSYNC") == "1", s3=s3),
-        redis_url=SecretStr(redis_url),
+        redis_url=Secret(redis_url),
     )
 
 

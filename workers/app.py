@@ -48,7 +48,7 @@ register(
 
 def make_app(config: FarmConfig) -> Celery:
     """A Celery application for this farm."""
-    url = config.redis_url.get_secret_value()
+    url = config.redis_url.reveal()
     app = Celery("pbrs_farm", broker=url, include=["workers.tasks"], set_as_current=False)
     app.conf.update(
         accept_content=["pbrs-json"],

@@ -1,6 +1,7 @@
 """The farm from outside: submit, watch, steer. What the command line calls, in the same words.
 
-Effects: Redis and the store. Needs neither celery nor mitsuba to look at a job.
+Effects: Redis and the store. To look at a job it imports neither numpy nor celery nor mitsuba, nor
+the recipe's models: `status` is asked often, of machines that are busy.
 
     farm = Farm(config_from_environment())
     job = farm.submit(houses, recipe).job_id
@@ -15,31 +16,29 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pbrs_farm
 from pbrs_farm.errors import BadInput, MachineFailed, ObjectMissing
-from pbrs_farm.farm.root import claim_root
-from pbrs_farm.recipe import Recipe
 from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig
-from workers.ids import WHOLE, TaskId, check_job_id, task_from_text
-from workers.job import (
-    HouseEntry,
-    JobSpec,
+from workers.ids import (
+    WHOLE,
+    TaskId,
+    check_job_id,
     failed_key,
-    houses_from_lines,
-    job_id,
     job_key,
-    lines_from_houses,
     log_key,
+    task_from_text,
 )
 from workers.ledger import JobView
 from workers.rates import stage_views
-from workers.recover import rebuild
 from workers.redis_ledger import RedisLedger
 from workers.registry import Registry
-from workers.runner import runner_maker
+
+if TYPE_CHECKING:
+    from pbrs_farm.recipe import Recipe
+    from workers.job import HouseEntry, JobSpec
 
 _LETTERS = {
     "l": "loaded, its house not admitted yet", "w": "ready", "q": "queued", "r": "running",
@@ -85,6 +84,9 @@ class Farm:
         may be replaced. Raises BadRecipe when the root holds another recipe, BadInput when two
         houses share an id.
         """
+        from pbrs_farm.farm.root import claim_root
+        from workers.job import lines_from_houses
+
         houses, spec = completed(houses, spec)
         self.ledger.ping()
         view = self.ledger.view(spec.job_id)
@@ -101,6 +103,8 @@ class Farm:
 
     def recover(self, job: str, tell: Callable[[str], None] = lambda _line: None) -> JobView:
         """Rebuild the ledger of a job from storage, whatever Redis held of it."""
+        from workers.job import houses_from_lines
+
         spec = self.spec(job)
         houses = [*houses_from_lines(self.store.get(job_key(job, "houses.jsonl")))]
         self._load(spec, houses, tell)
@@ -110,6 +114,8 @@ class Farm:
 
     def spec(self, job: str) -> JobSpec:
         """What the job was submitted with; BadInput when the store knows no such job."""
+        from workers.job import JobSpec
+
         try:
             return JobSpec.model_validate_json(self.store.get(job_key(check_job_id(job))))
         except ObjectMissing:
@@ -253,6 +259,9 @@ class Farm:
 
     def _load(self, spec: JobSpec, houses: list[HouseEntry], tell: Callable[[str], None]) -> str:
         """Enter the job into the ledger, as far along as storage says it is."""
+        from workers.recover import rebuild
+        from workers.runner import runner_maker
+
         was = ""
         view = self.ledger.view(spec.job_id)
         if view is not None:
@@ -274,6 +283,8 @@ class Farm:
         return state
 
     def _why_not_admitted(self, job: str, house: str) -> list[dict[str, Any]]:
+        from workers.job import houses_from_lines
+
         data = self.store.get(job_key(check_job_id(job), "houses.jsonl"))
         if all(entry.house_id != house for entry in houses_from_lines(data)):
             raise BadInput(house, "", "the job has no such house")
@@ -311,6 +322,8 @@ def completed(
     houses: Sequence[HouseEntry], spec: JobSpec
 ) -> tuple[tuple[HouseEntry, ...], JobSpec]:
     """Houses sorted and the spec with its id; BadInput for no house or one named twice."""
+    from workers.job import job_id
+
     if not houses:
         raise BadInput("submit", "", "no house")
     twice = [h for h, n in Counter(h.house_id for h in houses).items() if n > 1]
@@ -323,6 +336,8 @@ def completed(
 
 def new_spec(recipe: Recipe, **fields: Any) -> JobSpec:
     """A JobSpec of this version; its id is set by submit."""
+    from workers.job import JobSpec
+
     return JobSpec.model_validate(
         {"job_id": "", "version": pbrs_farm.__version__, "recipe": recipe, **fields}
     )

@@ -8,31 +8,48 @@ from __future__ import annotations
 import os
 import platform
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any, Final
 from urllib.parse import quote, urlsplit, urlunsplit
-
-from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError
 
 from pbrs_farm.errors import BadInput
 from pbrs_farm.settings import settings_from_environment
+from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings
 from workers.alive import alive_file
+from workers.ids import QUEUES
 
-_PREFIX = "PBRS_FARM_"
+_PREFIX: Final = "PBRS_FARM_"
 
 
-class Limits(BaseModel):
-    """When a renderer is killed. A stage's deadline is for one task of it."""
+def _above(default: float, limit: float = 0.0) -> Any:
+    return field(default=default, metadata={"above": limit})
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    geometry_s: float = Field(1800.0, gt=0)
-    gl_s: float = Field(1800.0, gt=0)
-    light_s: float = Field(4 * 3600.0, gt=0)
-    reduce_s: float = Field(3600.0, gt=0)
-    silence_s: float = Field(1800.0, gt=0, description="without a step or a line in the log")
-    memory_mb: int = Field(0, ge=0, description="of one renderer; 0 = share of the machine's")
-    tasks_per_renderer: int = Field(2000, ge=1, description="then it starts afresh")
+
+def _least(default: int, limit: int) -> Any:
+    return field(default=default, metadata={"above": limit - 1})
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When a renderer is killed. A stage's deadline is for one task of it.
+
+    silence_s: without a step or a line in the log. memory_mb: of one renderer; 0 = share of the
+    machine's. tasks_per_renderer: then it starts afresh.
+    """
+
+    geometry_s: float = _above(1800.0)
+    gl_s: float = _above(1800.0)
+    light_s: float = _above(4 * 3600.0)
+    reduce_s: float = _above(3600.0)
+    silence_s: float = _above(1800.0)
+    memory_mb: int = _least(0, 0)
+    tasks_per_renderer: int = _least(2000, 1)
+
+    def __post_init__(self) -> None:
+        _check(self, f"{_PREFIX}LIMITS_")
 
     def deadline_s(self, stage: str) -> float:
         """Seconds a task of the stage may take."""
@@ -41,36 +58,50 @@ class Limits(BaseModel):
         )
 
 
-class FarmConfig(BaseModel):
-    """Everything a coordinator, a worker or a client needs to know."""
+@dataclass(frozen=True, slots=True)
+class FarmConfig:
+    """Everything a coordinator, a worker or a client needs to know. Raises BadInput.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    redis_url: SecretStr
-    redis_ca: str = Field("", description="file of the CA for rediss://; empty = the system's")
+    redis_ca: file of the CA for rediss://, "" = the system's. sticky_s: a task this long takes
+    another of its house with it. breaker_s: claims stop this long after a storage failure.
+    forgive_s: a worker suspected of being sick rests this long. grace_s: from TERM to having handed
+    everything back. min_free_mb: scratch space a worker wants before it starts. window_min: tasks in
+    flight per stage, at least. metrics_port: of the coordinator's Prometheus endpoint, 0 = off.
+    """
+
+    redis_url: Secret
+    redis_ca: str = ""
     store_url: str = ""
-    store: StoreSettings = StoreSettings()
+    store: StoreSettings = field(default_factory=StoreSettings)
     prefix: str = "pbrs:"
     worker: str = ""
-    slots: int = Field(1, ge=1)
+    slots: int = _least(1, 1)
     queues: tuple[str, ...] = ()
     scratch: Path = Path("/tmp")
     runner: str = "workers.houses:runner"
-    lease_s: float = Field(120.0, gt=0)
-    beat_s: float = Field(20.0, gt=0)
-    sticky_s: float = Field(2.0, description="a task this long takes another of its house with it")
-    retry_delay_s: float = Field(10.0, ge=0)
-    storage_patience_s: float = Field(600.0, ge=0)
-    breaker_s: int = Field(30, ge=1, description="claims stop this long after a storage failure")
-    forgive_s: float = Field(600.0, description="a worker suspected of being sick rests this long")
-    grace_s: float = Field(600.0, gt=0, description="from TERM to having handed everything back")
-    min_free_mb: int = Field(500, ge=0, description="scratch space a worker wants before it starts")
-    window_per_slot: int = Field(4, ge=1)
-    window_min: int = Field(128, ge=1, description="tasks in flight per stage, at least")
-    resend_s: float = Field(60.0, gt=0)
-    metrics_port: int = Field(
-        0, ge=0, description="of the coordinator's Prometheus endpoint; 0 = off"
-    )
-    limits: Limits = Limits()
+    lease_s: float = _above(120.0)
+    beat_s: float = _above(20.0)
+    sticky_s: float = 2.0
+    retry_delay_s: float = 10.0
+    storage_patience_s: float = 600.0
+    breaker_s: int = _least(30, 1)
+    forgive_s: float = 600.0
+    grace_s: float = _above(600.0)
+    min_free_mb: int = _least(500, 0)
+    window_per_slot: int = _least(4, 1)
+    window_min: int = _least(128, 1)
+    resend_s: float = _above(60.0)
+    metrics_port: int = _least(0, 0)
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        _check(self, _PREFIX)
+        unknown = sorted(set(self.queues) - set(QUEUES))
+        if unknown:
+            known = f"of {', '.join(QUEUES)}"
+            raise BadInput(
+                "environment", f"{_PREFIX}QUEUES", f"no queue {unknown[0]!r}", hint=known
+            )
 
     @property
     def handback_file(self) -> Path:
@@ -90,30 +121,54 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
     """
     env = dict(os.environ if environment is None else environment)
     settings = settings_from_environment(env)
-    fields: dict[str, object] = {"worker": platform.node(), "scratch": tempfile.gettempdir()}
-    limits: dict[str, str] = {}
-    for name, text in env.items():
-        if name.startswith(f"{_PREFIX}LIMITS_"):
-            limits[name.removeprefix(f"{_PREFIX}LIMITS_").lower()] = text
-        elif name.startswith(_PREFIX):
-            fields[name.removeprefix(_PREFIX).lower()] = text
-    if isinstance(fields.get("queues"), str):
-        fields["queues"] = tuple(q for q in str(fields["queues"]).split(",") if q)
-    url = _with_password(settings.redis_url.get_secret_value(), _secret(env, "PBRS_REDIS_PASSWORD"))
-    try:
-        return FarmConfig.model_validate(
-            fields
-            | {
-                "redis_url": url,
-                "store_url": env.get("PBRS_STORE", ""),
-                "store": settings.store,
-                "limits": limits,
-            }
-        )
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = "_".join(str(p) for p in first["loc"]).upper()
-        raise BadInput("environment", f"{_PREFIX}{name}", str(first["msg"])) from None
+    password = _secret(env, "PBRS_REDIS_PASSWORD")
+    limits = f"{_PREFIX}LIMITS_"
+    of_limits = {n: text for n, text in env.items() if n.startswith(limits)}
+    of_farm = {n: text for n, text in env.items() if n.startswith(_PREFIX) and n not in of_limits}
+    given: dict[str, Any] = {"worker": platform.node(), "scratch": Path(tempfile.gettempdir())}
+    given |= _read(FarmConfig, of_farm, _PREFIX)
+    return FarmConfig(
+        **given,
+        redis_url=Secret(_with_password(settings.redis_url.reveal(), password)),
+        store_url=env.get("PBRS_STORE", ""),
+        store=settings.store,
+        limits=Limits(**_read(Limits, of_limits, limits)),
+    )
+
+
+_READERS: Final[Mapping[str, Callable[[str], object]]] = {
+    "int": int,
+    "float": float,
+    "str": str,
+    "Path": Path,
+    "tuple[str, ...]": lambda text: tuple(x for x in text.split(",") if x),
+}
+_ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits"}
+
+
+def _read(cls: type[FarmConfig | Limits], words: Mapping[str, str], prefix: str) -> dict[str, Any]:
+    """Field -> its value from its variable's text; BadInput for what is none."""
+    kinds = {f.name: str(f.type) for f in fields(cls) if f.name not in _ELSEWHERE}
+    values = {}
+    for name, text in words.items():
+        kind = kinds.get(name.removeprefix(prefix).lower())
+        if kind is None:
+            raise BadInput("environment", name, "no such setting", hint="docs/farm.md lists them")
+        try:
+            values[name.removeprefix(prefix).lower()] = _READERS[kind](text)
+        except ValueError:
+            raise BadInput("environment", name, f"{text!r} is not of type {kind}") from None
+    return values
+
+
+def _check(config: FarmConfig | Limits, prefix: str) -> None:
+    for f in fields(config):
+        value, above = getattr(config, f.name), f.metadata.get("above")
+        if above is not None and not value > above:
+            name = f"{prefix}{f.name.upper()}"
+            raise BadInput(
+                "environment", name, f"{value} is too little, more than {above:g} is not"
+            )
 
 
 def _secret(env: Mapping[str, str], name: str) -> str:

@@ -26,8 +26,8 @@ from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.patient import PatientStore
 from workers.config import FarmConfig
 from workers.groups import groups_from_views
-from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD
-from workers.job import JobSpec, job_key
+from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
+from workers.job import JobSpec
 from workers.merge import merge_job, merge_shard
 from workers.runner import Request, Result, Survey, Tell
 from workers.sources import FOLDER, fill_cache

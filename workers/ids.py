@@ -1,4 +1,4 @@
-"""Names of the farm's tasks, stages and queues; no effects.
+"""Names of the farm's tasks, stages, queues and of what a job stores; no effects.
 
 A task is `<house>/<unit>/<stage>`. Unit "-" is the house as a whole, "0", "1", ... its groups of
 views. House "-" is the job: `-/s3/shard` merges shard 3, `-/-/job` ends the job.
@@ -65,3 +65,22 @@ def queue_of(stage: str, *, gpu: bool) -> str:
 def stages_of_queue(queue: str) -> tuple[str, ...]:
     """The stages whose tasks a queue carries."""
     return tuple(s for s in STAGES if queue in (queue_of(s, gpu=False), queue_of(s, gpu=True)))
+
+
+def job_key(job: str, file: str = "job.json") -> str:
+    """Key of one of the job's own objects: job.json, houses.jsonl, logs/..., failed/..."""
+    return f"jobs/{job}/{file}"
+
+
+def log_key(job: str, task: str, attempt: int) -> str:
+    """Key of a task's log: of a failed attempt, and of a long one while it runs."""
+    return job_key(job, f"logs/{_flat(task)}.{attempt}.txt")
+
+
+def failed_key(job: str, task: str) -> str:
+    """Key of the record of a task that failed for good; survives the loss of Redis."""
+    return job_key(job, f"failed/{_flat(task)}.json")
+
+
+def _flat(task: str) -> str:
+    return task.replace("-/", "whole/", 1) if task.startswith("-/") else task

@@ -66,25 +66,6 @@ def job_id(spec: JobSpec, houses: Iterable[HouseEntry]) -> str:
     return keys.digest(plain, [[h.house_id, h.sha256] for h in houses])[:12]
 
 
-def job_key(job: str, file: str = "job.json") -> str:
-    """Key of one of the job's own objects: job.json, houses.jsonl, logs/..., failed/..."""
-    return f"jobs/{job}/{file}"
-
-
-def log_key(job: str, task: str, attempt: int) -> str:
-    """Key of a task's log: of a failed attempt, and of a long one while it runs."""
-    return job_key(job, f"logs/{_flat(task)}.{attempt}.txt")
-
-
-def failed_key(job: str, task: str) -> str:
-    """Key of the record of a task that failed for good; survives the loss of Redis."""
-    return job_key(job, f"failed/{_flat(task)}.json")
-
-
-def _flat(task: str) -> str:
-    return task.replace("-/", "whole/", 1) if task.startswith("-/") else task
-
-
 def lines_from_houses(houses: Iterable[HouseEntry]) -> bytes:
     """houses.jsonl: a house a line, in the job's order."""
     return "".join(house.model_dump_json() + "\n" for house in houses).encode()

@@ -6,14 +6,15 @@ a cache of the truth in storage: `recover` rebuilds it. Another backend replaces
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal, Protocol
-
-from pydantic import BaseModel, ConfigDict
+from dataclasses import asdict, dataclass, field, fields
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from pbrs_farm.errors import PbrsError, Transient
-from workers.job import HouseEntry, JobSpec
+
+if TYPE_CHECKING:
+    from workers.job import HouseEntry, JobSpec
 
 Verdict = Literal[
     "run", "done", "failed", "leased", "early", "cancelled", "paused", "held", "version", "recipe",
@@ -39,10 +40,10 @@ class Claim:
     token: str = ""
 
 
-class Fault(BaseModel):
+@dataclass(frozen=True, slots=True)
+class Fault:
     """A task that ended badly, as the ledger keeps it. log: key of the log object, or ""."""
 
-    model_config = ConfigDict(frozen=True, extra="ignore")
     fault: FaultClass
     fingerprint: str
     message: str
@@ -50,6 +51,16 @@ class Fault(BaseModel):
     attempt: int = 0
     log: str = ""
     tail: str = ""
+
+    def json(self) -> str:
+        """The fault as fault_from_json reads it."""
+        return json.dumps(asdict(self))
+
+
+def fault_from_json(text: str) -> Fault:
+    """The fault a JSON object tells of; names it does not know are left out."""
+    known = {f.name for f in fields(Fault)}
+    return Fault(**{name: value for name, value in json.loads(text).items() if name in known})
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ from typing import Any
 from pbrs_farm import keys
 from pbrs_farm.errors import ObjectMissing
 from pbrs_farm.store.interface import Store
-from workers.job import JobSpec, houses_from_lines, job_key
+from workers.ids import job_key
+from workers.job import JobSpec, houses_from_lines
 from workers.runner import Tell
 
 

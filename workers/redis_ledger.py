@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib.resources import files
-from typing import Any, Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import redis
 from redis.backoff import ExponentialWithJitterBackoff
@@ -18,8 +18,18 @@ from redis.retry import Retry
 import pbrs_farm
 from workers.config import FarmConfig, shown_url
 from workers.ids import STAGES
-from workers.job import HouseEntry, JobSpec
-from workers.ledger import Claim, Fault, Finished, HouseState, JobView, LedgerUnavailable
+from workers.ledger import (
+    Claim,
+    Fault,
+    Finished,
+    HouseState,
+    JobView,
+    LedgerUnavailable,
+    fault_from_json,
+)
+
+if TYPE_CHECKING:
+    from workers.job import HouseEntry, JobSpec
 
 _SCRIPTS: Final = (
     "claim", "beat", "finish", "fail", "reap", "feed", "resend", "create", "load", "retry",
@@ -35,7 +45,7 @@ def redis_client(config: FarmConfig) -> Any:
 
     Typed Any: redis-py types every answer as str, bytes, None or an awaitable.
     """
-    url = config.redis_url.get_secret_value()
+    url = config.redis_url.reveal()
     options: dict[str, Any] = {}
     if url.startswith("rediss:"):
         options["ssl_cert_reqs"] = "required"
@@ -62,7 +72,7 @@ class RedisLedger:
         self.config = config
         self.client = client or redis_client(config)
         self._g = config.prefix
-        folder = files("workers") / "lua"
+        folder = Path(__file__).with_name("lua")
         common = (folder / "common.lua").read_text()
         self._scripts: dict[str, Any] = {
             name: self.client.register_script(common + (folder / f"{name}.lua").read_text())
@@ -182,7 +192,7 @@ class RedisLedger:
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str:
         """Ended badly: stale, handed back, retry, failed (for good) or cancelled."""
         blocking = int(fault.fault in _AGAINST_WORKER)
-        args = (fault.fault, fault.fingerprint, fault.model_dump_json(), self.config.worker)
+        args = (fault.fault, fault.fingerprint, fault.json(), self.config.worker)
         rest = (delay_s, blocking, self.config.forgive_s)
         return str(self._run("fail", job, task, token, *args, *rest))
 
@@ -279,7 +289,7 @@ class RedisLedger:
         """Every task that failed for good."""
         with self.errors():
             for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
-                yield task, Fault.model_validate_json(text)
+                yield task, fault_from_json(text)
 
     def ping(self) -> None:
         """Raises LedgerUnavailable when Redis does not answer or refuses us."""
@@ -304,7 +314,7 @@ class RedisLedger:
     @contextmanager
     def errors(self) -> Iterator[None]:
         """Inside: whatever Redis refuses or fails at becomes LedgerUnavailable, one clear line."""
-        where = shown_url(self.config.redis_url.get_secret_value())
+        where = shown_url(self.config.redis_url.reveal())
         try:
             yield
         except redis.AuthenticationError as error:

@@ -14,6 +14,7 @@ import random
 import secrets
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
 
@@ -22,8 +23,7 @@ from pbrs_farm.store import Store, store_from_url
 from workers.attend import Attendant, Ended, Watch
 from workers.config import FarmConfig
 from workers.faults import without_numbers
-from workers.ids import WHOLE, TaskId, task_from_text
-from workers.job import failed_key, log_key
+from workers.ids import WHOLE, TaskId, failed_key, log_key, task_from_text
 from workers.ledger import Claim, Fault, FaultClass, Finished, LedgerUnavailable
 from workers.redis_ledger import RedisLedger, groups_from_text
 from workers.registry import Registry
@@ -130,7 +130,7 @@ class Slot:
             "%s attempt %d: %s (%s): %s", task, attempt, fault_class, verdict, fault.message
         )
         if verdict == "failed":
-            self._put(failed_key(job, str(task)), fault.model_dump_json())
+            self._put(failed_key(job, str(task)), fault.json())
 
     def _refused(self, job: str, task: TaskId, claim: Claim) -> None:
         _log.log(
@@ -170,10 +170,8 @@ class Slot:
         try:
             if self._store is None:
                 settings = self._config.store
-                hasty = settings.s3.model_copy(update={"patience_s": 5.0})
-                self._store = store_from_url(
-                    self._config.store_url, settings.model_copy(update={"s3": hasty})
-                )
+                hasty = replace(settings, s3=replace(settings.s3, patience_s=5.0))
+                self._store = store_from_url(self._config.store_url, hasty)
             self._store.put(key, text.encode())
         except (StoreFailed, PbrsError) as error:
             _log.warning("not stored: %s", error)

@@ -1,4 +1,7 @@
-"""What the verbs share: how they print, and the words that name a recipe. Effects: prints."""
+"""What the verbs share: how they print, and the words that name a recipe or a farm. Effects: prints.
+
+Imports little, for every command does: a recipe's models only where a recipe is asked for.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,15 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.errors import BadInput
-from pbrs_farm.recipe import RECIPE_NAMES, Recipe, recipe_from_name
+
+if TYPE_CHECKING:
+    from pbrs_farm.recipe import Recipe
+    from workers.client import Farm
 
 Handler = Callable[[argparse.Namespace], int]
 Verb = Callable[[str, Handler, str], argparse.ArgumentParser]
@@ -33,6 +41,8 @@ def dump(value: Any) -> None:
 
 def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
     """The words of a recipe."""
+    from pbrs_farm.recipe import RECIPE_NAMES
+
     p.add_argument(
         "--recipe", default=default, help=f"{', '.join(RECIPE_NAMES)} (default {default})"
     )
@@ -46,6 +56,8 @@ def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
 
 def recipe_of(args: argparse.Namespace) -> Recipe:
     """The recipe named by the words of a command; raises BadRecipe."""
+    from pbrs_farm.recipe import recipe_from_name
+
     overrides: dict[str, str] = {}
     for word in args.set:
         path, equals, text = word.partition("=")
@@ -68,3 +80,21 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
     if getattr(args, "exact", False):
         overrides["cameras.exact"] = "true"
     return recipe_from_name(args.recipe, overrides)
+
+
+def add_farm(p: argparse.ArgumentParser) -> None:
+    """The words every verb of the farm takes."""
+    p.add_argument("--store", default="", metavar="URL", help="default: $PBRS_STORE")
+    p.add_argument("--json", action="store_true", help="for machines")
+
+
+def farm_of(args: argparse.Namespace) -> Farm:
+    """The farm the environment and --store name; raises BadInput, touches nothing yet."""
+    from workers.client import Farm
+    from workers.config import config_from_environment
+
+    config = config_from_environment()
+    if args.store:
+        url = args.store if "://" in args.store else Path(args.store).absolute().as_uri()
+        config = replace(config, store_url=url)
+    return Farm(config)

@@ -2,6 +2,7 @@
 
 from pbrs_farm.store.interface import Head, Store
 from pbrs_farm.store.memory import MemoryStore
+from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings, store_from_url
 
-__all__ = ["Head", "MemoryStore", "Store", "StoreSettings", "store_from_url"]
+__all__ = ["Head", "MemoryStore", "Secret", "Store", "StoreSettings", "store_from_url"]

@@ -11,11 +11,8 @@ import os
 import random
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from datetime import timedelta
+from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
-
-from pydantic import BaseModel, ConfigDict, Field, SecretStr
 
 from pbrs_farm.errors import (
     MachineFailed,
@@ -25,24 +22,29 @@ from pbrs_farm.errors import (
     StoreUnavailable,
 )
 from pbrs_farm.store.interface import Head, check_key, check_prefix, content_type
+from pbrs_farm.store.secret import Secret
 
 T = TypeVar("T")
 _LIST_CHUNK: Final = 1000
 
 
-class S3Settings(BaseModel):
-    """How an S3 store is reached; empty credentials mean the environment's own (AWS_*, IAM)."""
+@dataclass(frozen=True, slots=True)
+class S3Settings:
+    """How an S3 store is reached; empty credentials mean the environment's own (AWS_*, IAM).
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    path_style: https://endpoint/bucket/key, which most vendors want. timeout_s: of one request.
+    patience_s: how long one call is tried again.
+    """
+
     endpoint: str = ""
     region: str = "us-east-1"
     access_key: str = ""
-    secret_key: SecretStr = SecretStr("")
-    session_token: SecretStr = SecretStr("")
+    secret_key: Secret = field(default_factory=Secret)
+    session_token: Secret = field(default_factory=Secret)
     allow_http: bool = False
-    path_style: bool = Field(True, description="https://endpoint/bucket/key; most vendors want it")
-    timeout_s: float = Field(120.0, gt=0, description="of one request")
-    patience_s: float = Field(60.0, ge=0, description="how long one call is tried again")
+    path_style: bool = True
+    timeout_s: float = 120.0
+    patience_s: float = 60.0
 
 
 @dataclass(slots=True)
@@ -188,6 +190,8 @@ class S3Store:
 
 
 def _client_options(prefix: str, settings: S3Settings) -> dict[str, Any]:
+    from datetime import timedelta
+
     options: dict[str, Any] = {
         "region": settings.region,
         "virtual_hosted_style_request": not settings.path_style,
@@ -203,8 +207,8 @@ def _client_options(prefix: str, settings: S3Settings) -> dict[str, Any]:
         "prefix": prefix,
         "endpoint": settings.endpoint,
         "access_key_id": settings.access_key,
-        "secret_access_key": settings.secret_key.get_secret_value(),
-        "session_token": settings.session_token.get_secret_value(),
+        "secret_access_key": settings.secret_key.reveal(),
+        "session_token": settings.session_token.reveal(),
     }
     return options | {name: value for name, value in secrets.items() if value}
 

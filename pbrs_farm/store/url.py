@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
-
-from pydantic import BaseModel, ConfigDict
 
 from pbrs_farm.errors import BadInput
 from pbrs_farm.store.folder import FolderStore
@@ -14,12 +13,12 @@ from pbrs_farm.store.memory import MemoryStore
 from pbrs_farm.store.s3 import S3Settings, S3Store
 
 
-class StoreSettings(BaseModel):
+@dataclass(frozen=True, slots=True)
+class StoreSettings:
     """How stores behave; the URL says where they are."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     fsync: bool = False
-    s3: S3Settings = S3Settings()
+    s3: S3Settings = field(default_factory=S3Settings)
 
 
 def store_from_url(url: str, settings: StoreSettings | None = None) -> Store:

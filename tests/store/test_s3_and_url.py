@@ -7,19 +7,19 @@ import os
 from pathlib import Path
 
 import pytest
-from pydantic import SecretStr
 
 from pbrs_farm.errors import BadInput, StoreFailed, StoreUnavailable
 from pbrs_farm.store import MemoryStore, StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.interface import content_type
 from pbrs_farm.store.s3 import S3Settings, _ForkGuard
+from pbrs_farm.store.secret import Secret
 
 DEAD = StoreSettings(
     s3=S3Settings(
         endpoint="http://127.0.0.1:9",
         access_key="AKIA",
-        secret_key=SecretStr("verysecret"),
+        secret_key=Secret("verysecret"),
         allow_http=True,
         patience_s=0.3,
     )

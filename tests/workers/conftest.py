@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from pydantic import SecretStr
 
 from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.store.secret import Secret
 from tests.workers.redis_server import RedisServer
 from workers.config import FarmConfig
 from workers.job import JobRules, JobSpec
@@ -27,7 +27,7 @@ def redis_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RedisServ
 @pytest.fixture
 def config(redis_server: RedisServer, tmp_path: Path) -> FarmConfig:
     return FarmConfig(
-        redis_url=SecretStr(redis_server.url),
+        redis_url=Secret(redis_server.url),
         store_url=(tmp_path / "store").as_uri(),
         prefix=f"t{secrets.token_hex(3)}:",
         worker="w1",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from tests.workers.conftest import spec
 from workers.config import FarmConfig
@@ -32,7 +32,7 @@ class Drive:
         return tasks
 
     def claim(self, task: str, worker: str = "w1", *, direct: bool = False) -> Claim:
-        config = self.ledger.config.model_copy(update={"worker": worker})
+        config = replace(self.ledger.config, worker=worker)
         other = RedisLedger(config, self.ledger.client)
         return other.claim(
             self.job.job_id, task, token=f"{worker}:{task}:{self.ran[task]}",
@@ -53,7 +53,7 @@ class Drive:
 
     def fail(self, task: str, claim: Claim, kind: FaultClass = "crash", worker: str = "w1") -> str:
         fault = Fault(fault=kind, fingerprint=kind, message=kind, worker=worker)
-        config = self.ledger.config.model_copy(update={"worker": worker})
+        config = replace(self.ledger.config, worker=worker)
         other = RedisLedger(config, self.ledger.client)
         return other.fail(self.job.job_id, task, claim.token, fault, delay_s=0.0)
 
@@ -88,5 +88,5 @@ def drive(ledger: RedisLedger, n_houses: int, **rules: object) -> Drive:
 
 
 def with_config(ledger: RedisLedger, **changes: object) -> RedisLedger:
-    config: FarmConfig = ledger.config.model_copy(update=changes)
+    config: FarmConfig = replace(ledger.config, **changes)  # type: ignore[arg-type]
     return RedisLedger(config, ledger.client)

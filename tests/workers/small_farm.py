@@ -12,12 +12,11 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from pydantic import SecretStr
-
 from pbrs_farm.recipe import recipe_from_name
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store import Store, StoreSettings
 from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.secret import Secret
 from tests.workers.fake_runner import FakeRunner, groups_of
 from tests.workers.redis_server import RedisServer
 from workers.client import Farm, new_spec
@@ -47,7 +46,7 @@ class SmallFarm:
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self.farm = Farm(
             FarmConfig(
-                redis_url=SecretStr(redis.url),
+                redis_url=Secret(redis.url),
                 store_url=self.store.url,
                 store=settings_from_environment().store if s3 else StoreSettings(),
                 runner="tests.workers.fake_runner:runner",

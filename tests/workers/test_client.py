@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from pbrs_farm.cli import main
 from pbrs_farm.errors import BadInput, BadRecipe, MachineFailed
 from pbrs_farm.recipe import recipe_from_name
 from pbrs_farm.store import MemoryStore
 from tests.workers.drive import Drive
 from tests.workers.redis_server import free_port
-from workers.cli import add_verbs
 from workers.client import Farm, completed, new_spec
 from workers.config import FarmConfig
-from workers.job import HouseEntry, JobSpec, job_key, lines_from_houses
+from workers.ids import job_key
+from workers.job import HouseEntry, JobSpec, lines_from_houses
 from workers.ledger import Fault
 from workers.merge import merge_job, merge_shard
 from workers.metrics import serve_metrics
@@ -28,7 +29,7 @@ HOUSES = [HouseEntry(house_id=f"h{k}", source="{}") for k in range(3)]
 @pytest.fixture
 def farm(config: FarmConfig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Farm:
     monkeypatch.setenv("PBRS_TEST_CONTROL", str(tmp_path))
-    return Farm(config.model_copy(update={"runner": "tests.workers.fake_runner:runner"}))
+    return Farm(replace(config, runner="tests.workers.fake_runner:runner"))
 
 
 def submit(farm: Farm) -> Drive:
@@ -92,7 +93,7 @@ def test_what_is_not_there_is_one_line(farm: Farm) -> None:
     with pytest.raises(BadInput, match="no such worker"):
         farm.drain("nobody")
     with pytest.raises(MachineFailed, match="no store"):
-        _ = Farm(farm.config.model_copy(update={"store_url": ""})).store
+        _ = Farm(replace(farm.config, store_url="")).store
 
 
 def test_recover_takes_up_a_cancelled_job(farm: Farm) -> None:
@@ -109,9 +110,7 @@ def test_the_metrics_endpoint_counts_without_naming_houses(farm: Farm) -> None:
     d = submit(farm)
     d.run(d.feed()[0])
     port = free_port()
-    server, thread = serve_metrics(
-        farm.config.model_copy(update={"metrics_port": port}), farm.ledger
-    )
+    server, thread = serve_metrics(replace(farm.config, metrics_port=port), farm.ledger)
     try:
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
             text = answer.read().decode()
@@ -147,10 +146,7 @@ def test_merging_goes_upward_twice_the_same_and_says_what_is_missing() -> None:
 def test_the_verbs_parse_and_dry_run_touches_nothing(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    parser = argparse.ArgumentParser()
-    add_verbs(parser.add_subparsers(), argparse.ArgumentParser(add_help=False))
     words = ["submit", "builtin", "--recipe", "preview", "--dry-run", "--json"]
-    args = parser.parse_args([*words, "--store", str(tmp_path / "none")])
-    assert args.handler(args) == 0
+    assert main([*words, "--store", str(tmp_path / "none")]) == 0
     assert json.loads(capsys.readouterr().out)["houses"] == 1
     assert not (tmp_path / "none").exists()

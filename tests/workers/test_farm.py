@@ -114,7 +114,7 @@ def test_no_secret_stands_on_a_command_line_or_in_a_log() -> None:
     config = config_from_environment(
         {"PBRS_REDIS_URL": "redis://redis:6379/0", "PBRS_REDIS_PASSWORD": "hu/sh"}
     )
-    assert config.redis_url.get_secret_value() == "redis://:hu%2Fsh@redis:6379/0"
+    assert config.redis_url.reveal() == "redis://:hu%2Fsh@redis:6379/0"
     assert "hu" not in " ".join(command(config)) + repr(config)
     record = logging.LogRecord("x", 20, "", 0, "to redis://farm:hush@h:1/0", (), None)
     assert "hush" not in NoSecrets("%(message)s").format(record)

@@ -12,11 +12,12 @@ import shutil
 import signal
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from pydantic import SecretStr
 
+from pbrs_farm.store.secret import Secret
 from tests.store.test_contract import s3_store
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import REPO, SmallFarm
@@ -58,9 +59,9 @@ def test_s3_refuses_wrong_credentials_and_a_missing_bucket_in_one_line() -> None
 
     s3_store()
     settings = settings_from_environment().store
-    bad = settings.s3.model_copy(update={"secret_key": SecretStr("wrong"), "patience_s": 1.0})
+    bad = replace(settings.s3, secret_key=Secret("wrong"), patience_s=1.0)
     for url, chosen, text in (
-        ("s3://pbrs/x", settings.model_copy(update={"s3": bad}), "refuses these credentials"),
+        ("s3://pbrs/x", replace(settings, s3=bad), "refuses these credentials"),
         ("s3://no-such-bucket-here/x", settings, "no bucket"),
     ):
         with pytest.raises(StoreFailed, match=text) as caught:
@@ -73,7 +74,7 @@ def test_redis_with_tls_and_an_acl_user() -> None:
     url = os.environ.get("PBRS_TEST_TLS_REDIS")
     if not url:
         pytest.skip("PBRS_TEST_TLS_REDIS is not set")
-    config = FarmConfig(redis_url=SecretStr(url), redis_ca=os.environ["PBRS_FARM_REDIS_CA"])
+    config = FarmConfig(redis_url=Secret(url), redis_ca=os.environ["PBRS_FARM_REDIS_CA"])
     farm = Farm(config)
     farm.ledger.ping()
     assert farm.ledger.lead("test")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import pytest
-from pydantic import SecretStr
 
+from pbrs_farm.store.secret import Secret
 from tests.workers.conftest import spec
 from tests.workers.drive import GROUPS, ROOM, drive, with_config
 from workers.config import FarmConfig
@@ -398,7 +399,7 @@ def test_forgetting_leaves_no_key(ledger: RedisLedger) -> None:
 
 
 def test_redis_away_or_wrong_password_is_one_line_without_it(config: FarmConfig) -> None:
-    away = config.model_copy(update={"redis_url": SecretStr("redis://:hush@127.0.0.1:1/0")})
+    away = replace(config, redis_url=Secret("redis://:hush@127.0.0.1:1/0"))
     with pytest.raises(LedgerUnavailable, match="no Redis at redis://127") as caught:
         RedisLedger(away).ping()
     assert "hush" not in str(caught.value)

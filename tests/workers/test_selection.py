@@ -12,7 +12,8 @@ from tests.farm.test_selecting import put_house
 from tests.selection.histogram_sets import reference
 from workers.client import completed, new_spec
 from workers.houses import HouseRunner
-from workers.job import HouseEntry, job_key, lines_from_houses
+from workers.ids import job_key
+from workers.job import HouseEntry, lines_from_houses
 from workers.runner import Request
 
 KEY = "jobs/sources/references/r.npz"

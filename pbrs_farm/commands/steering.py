@@ -1,0 +1,169 @@
+"""The farm's verbs that look and steer, and its two services. Effects: Redis, the store, stdout.
+
+Imports little: `status` is asked often, on machines that are busy. None of these verbs imports
+numpy, celery or mitsuba (coordinator and worker do, when they start).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from pbrs_farm.commands.words import Handler, Verb, add_farm, dump, farm_of, say
+from workers.show import failures_text, status_text, why_text, workers_text
+
+if TYPE_CHECKING:
+    from workers.client import Farm
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add status, why, logs, failures, retry, pause ... reduce, drain, workers, recover; services."""
+
+    def farm_verb(name: str, handler: Handler, text: str) -> argparse.ArgumentParser:
+        p = verb(name, handler, text)
+        add_farm(p)
+        return p
+
+    p = farm_verb("status", _status, "how far a job is: stages, rate, time left, workers")
+    _add_job(p)
+    p.add_argument("--watch", action="store_true", help="again every two seconds, to the end")
+    p = farm_verb("why", _why, "what a task, a house or a view waits for")
+    p.add_argument("task", help="HOUSE, HOUSE/VIEW or HOUSE/UNIT/STAGE")
+    _add_job(p, flag=True)
+    p = farm_verb("logs", _logs, "the log of a failed or long task")
+    p.add_argument("task", help="HOUSE/UNIT/STAGE")
+    p.add_argument("--attempt", type=int, default=None)
+    _add_job(p, flag=True)
+    _add_job(farm_verb("failures", _failures, "what failed for good, alike together"))
+    p = farm_verb("retry", _retry, "fresh attempts for failed tasks (all, unless named)")
+    p.add_argument("tasks", nargs="*", metavar="TASK")
+    _add_job(p, flag=True)
+    for name, text in _STEERING.items():
+        p = farm_verb(name, _steer, text)
+        p.set_defaults(what=name)
+        _add_job(p)
+    p = farm_verb("drain", _drain, "a worker finishes what it runs and leaves")
+    p.add_argument("worker")
+    p.add_argument("--undo", action="store_true", help="let it stay")
+    farm_verb("workers", _workers, "the farm's workers")
+    p = farm_verb("recover", _recover, "rebuild the ledger of a job from storage")
+    p.add_argument("job")
+    verb("coordinator", _coordinator, "lead the farm, or stand by")
+    p = verb("worker", _worker, "work for the farm until told to leave")
+    p.add_argument("--until", type=float, default=None, metavar="S", help="leave after S seconds")
+
+
+_STEERING = {
+    "pause": "start nothing more; what runs, ends",
+    "resume": "go on with a paused job",
+    "cancel": "stop a job; what is stored stays",
+    "reduce": "merge what is there, of a finished or running job",
+}
+
+
+def _add_job(p: argparse.ArgumentParser, *, flag: bool = False) -> None:
+    text = "job id (default: the newest)"
+    if flag:
+        p.add_argument("--job", default="", help=text)
+    else:
+        p.add_argument("job", nargs="?", default="", help=text)
+
+
+def _farm_and_job(args: argparse.Namespace) -> tuple[Farm, str]:
+    farm = farm_of(args)
+    return farm, args.job or farm.newest_job()
+
+
+def _show(args: argparse.Namespace, value: Any, text: Callable[[], str]) -> None:
+    """value as JSON when asked, else the text for people; at once, for who watches a pipe."""
+    if args.json:
+        dump(value)
+    else:
+        say(text())
+    sys.stdout.flush()
+
+
+def _status(args: argparse.Namespace) -> int:
+    farm, job = _farm_and_job(args)
+    while True:
+        status = farm.status(job)
+        if args.watch and sys.stdout.isatty():
+            sys.stdout.write("\x1b[H\x1b[2J")
+        _show(args, status, lambda s=status: status_text(s))  # type: ignore[misc]
+        if not args.watch or status["state"] in ("done", "cancelled"):
+            return 0
+        time.sleep(2.0)
+
+
+def _why(args: argparse.Namespace) -> int:
+    farm, job = _farm_and_job(args)
+    rows = farm.why(job, args.task)
+    _show(args, rows, lambda: why_text(rows))
+    return 0
+
+
+def _logs(args: argparse.Namespace) -> int:
+    farm, job = _farm_and_job(args)
+    text = farm.logs(job, args.task, args.attempt)
+    _show(args, {"task": args.task, "log": text}, lambda: text)
+    return 0
+
+
+def _failures(args: argparse.Namespace) -> int:
+    farm, job = _farm_and_job(args)
+    groups = farm.failures(job)
+    _show(args, groups, lambda: failures_text(groups))
+    return 0
+
+
+def _retry(args: argparse.Namespace) -> int:
+    farm, job = _farm_and_job(args)
+    tasks = farm.retry(job, args.tasks)
+    _show(args, tasks, lambda: f"{len(tasks)} tasks get fresh attempts")
+    return 0
+
+
+def _steer(args: argparse.Namespace) -> int:
+    farm, job = _farm_and_job(args)
+    state: str = getattr(farm, args.what)(job)
+    _show(args, {"job": job, "state": state}, lambda: f"{job} {state}")
+    return 0
+
+
+def _drain(args: argparse.Namespace) -> int:
+    farm_of(args).drain(args.worker, undo=args.undo)
+    _show(args, {"worker": args.worker, "drain": not args.undo}, lambda: f"{args.worker} told")
+    return 0
+
+
+def _workers(args: argparse.Namespace) -> int:
+    rows = farm_of(args).workers()
+    _show(args, rows, lambda: workers_text(rows))
+    return 0
+
+
+def _recover(args: argparse.Namespace) -> int:
+    farm = farm_of(args)
+
+    def tell(line: str) -> None:
+        sys.stderr.write(f"recover: {line}\n")
+
+    farm.recover(args.job, tell)
+    status = farm.status(args.job)
+    _show(args, status, lambda: status_text(status))
+    return 0
+
+
+def _coordinator(_args: argparse.Namespace) -> int:
+    from workers.coordinator import main
+
+    return main()
+
+
+def _worker(args: argparse.Namespace) -> int:
+    from workers.supervisor import main
+
+    return main([] if args.until is None else ["--until", str(args.until)])

@@ -1,0 +1,108 @@
+"""The verb that puts houses on the farm: submit. Effects: reads homes; the store, Redis, stdout."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pbrs_farm.commands.words import (
+    Verb,
+    add_farm,
+    add_recipe,
+    complain,
+    dump,
+    farm_of,
+    recipe_of,
+    say,
+)
+from pbrs_farm.errors import BadInput
+
+if TYPE_CHECKING:
+    from workers.job import JobSpec
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add submit."""
+    p = verb("submit", _submit, "put houses on the farm")
+    add_farm(p)
+    p.add_argument("homes", nargs="+", metavar="HOME", help="files, folders, example homes")
+    p.add_argument(
+        "--houses", metavar="LIST", help="file with a SUNCG house id a line (HOME: root)"
+    )
+    add_recipe(p)
+    p.add_argument("--modes", nargs="+", default=[], metavar="MODE", help="default: all four")
+    p.add_argument("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers")
+    p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views a house")
+    p.add_argument("--reference", type=Path, help="reference file: select when the job ends")
+    p.add_argument("--gpu", action="store_true", help="light goes to the queue light.gpu")
+    p.add_argument("--priority", type=int, default=5, choices=range(10), help="0 goes first")
+    p.add_argument("--update", action="store_true", help="give the store this recipe")
+    p.add_argument("--dry-run", action="store_true", help="print tasks, hours, storage; do nothing")
+    p.add_argument("--slots", type=int, default=2, help="for --dry-run: tasks at once")
+
+
+def _submit(args: argparse.Namespace) -> int:
+    from workers.client import completed
+    from workers.estimate import estimate
+    from workers.sources import entries_from_words, placed_reference, upload
+
+    spec = _spec(args)
+    found = entries_from_words(_words(args))
+    reference = placed_reference(args.reference) if args.reference else ("", b"")
+    spec = spec.model_copy(update={"reference": reference[0]})
+    houses = [entry for entry, _ref in found]
+    if args.dry_run:
+        plan = estimate(completed(houses, spec)[1], args.slots)
+        if args.json:
+            dump(plan)
+        else:
+            say("\n".join(f"{k:<14}{v}" for k, v in plan.items()))
+        return 0
+    farm = farm_of(args)
+    farm.ledger.ping()
+    upload(farm.store, [ref for _entry, ref in found])
+    if reference[0]:
+        farm.store.put_if_absent(*reference)
+    job = farm.submit(houses, spec, update=args.update)
+    if args.json:
+        dump({"job": job.job_id, "houses": job.n_houses, "was": job.was})
+        return 0
+    if job.was:
+        complain(f"this job is there already, {job.was}")
+    say(job.job_id)
+    return 0
+
+
+def _words(args: argparse.Namespace) -> list[str]:
+    from pbrs_farm.farm.sources import suncg_list
+
+    if not args.houses:
+        return list(args.homes)
+    if len(args.homes) != 1:
+        raise BadInput("--houses", args.houses, "needs the SUNCG root as the one HOME")
+    return suncg_list(Path(args.homes[0]), Path(args.houses))
+
+
+def _spec(args: argparse.Namespace) -> JobSpec:
+    """What the job is made with, its houses apart; raises BadInput, BadRecipe."""
+    from pbrs_farm.farm.plan import wanted
+    from workers.client import new_spec
+    from workers.estimate import seconds_per_view
+    from workers.houses import group_stages
+
+    for name, value, least in (("--views", args.views, 0), ("--slots", args.slots, 1)):
+        if value < least:
+            raise BadInput(name, str(value), f"expected {least} or more")
+    want = wanted(args.modes, args.layers, args.views)
+    recipe = recipe_of(args)
+    return new_spec(
+        recipe,
+        modes=tuple(m.value for m in want.modes),
+        layers=want.layers,
+        n_views=want.n_views,
+        gpu=args.gpu,
+        priority=args.priority,
+        group_stages=group_stages(want),
+        seconds_per_view=seconds_per_view(recipe),
+    )
