@@ -89,6 +89,7 @@ class Attendant:
         self._process: subprocess.Popen[bytes] | None = None
         self._buffer = b""
         self._n_tasks = 0
+        self._weigh_at = 0.0
         self._limit_mb = config.limits.memory_mb or memory_limit_mb(config.slots)
         folder = config.scratch / f"pbrs-{config.worker}-{os.getpid()}"
         folder.mkdir(parents=True, exist_ok=True)
@@ -114,10 +115,14 @@ class Attendant:
     def _is_worn(self) -> bool:
         """Many tasks, or more memory held between tasks than half of what is allowed."""
         process = self._process
-        return process is not None and (
-            self._n_tasks >= self._config.limits.tasks_per_renderer
-            or resident_mb(process.pid) > 0.5 * self._limit_mb
-        )
+        if process is None:
+            return False
+        if self._n_tasks >= self._config.limits.tasks_per_renderer:
+            return True
+        if time.monotonic() < self._weigh_at:
+            return False
+        self._weigh_at = time.monotonic() + _TICK_S
+        return resident_mb(process.pid) > 0.5 * self._limit_mb
 
     def stop(self) -> None:
         """Kill the renderer and whatever it started."""

@@ -29,7 +29,8 @@ from workers.registry import Registry
 
 _log = logging.getLogger("pbrs.coordinator")
 _BUSY_PAUSE_S: Final = 0.05
-_IDLE_PAUSE_S: Final = 0.25
+_IDLE_PAUSE_S: Final = 0.5
+_STANDBY_PAUSE_S: Final = 1.0
 _REAP_EVERY_S: Final = 5.0
 _RESEND_EVERY_S: Final = 15.0
 _RATES_EVERY_S: Final = 10.0
@@ -58,19 +59,23 @@ class Coordinator:
         """Turn after turn until told to stop; Redis may go away and come back."""
         while not stop.is_set():
             try:
-                pause_s = self.turn()
+                if self.turn():
+                    stop.wait(_BUSY_PAUSE_S)
+                elif self.leading:
+                    self._ledger.rest(_IDLE_PAUSE_S)
+                else:
+                    stop.wait(_STANDBY_PAUSE_S)
             except LedgerUnavailable as error:
                 _log.warning("%s; trying again", error)
                 self.leading = False
-                pause_s = 2.0
-            stop.wait(pause_s)
+                stop.wait(2.0)
         try:
             self._ledger.resign(self._token)
         except LedgerUnavailable as error:
             _log.warning("%s", error)
 
-    def turn(self) -> float:
-        """One round of duties; seconds to wait before the next."""
+    def turn(self) -> int:
+        """One round of duties; how many messages were sent."""
         if self._is_due("alive", _REAP_EVERY_S):
             touch(self._config.heartbeat_file)
         leading = self._ledger.lead(self._token)
@@ -78,7 +83,7 @@ class Coordinator:
             _log.info("leading" if leading else "not leading; standing by")
             self.leading = leading
         if not leading:
-            return 1.0
+            return 0
         if self._is_due("slots", _REAP_EVERY_S):
             self._slots = self._registry.slots()
             self._ledger.reap(self._token)
@@ -87,11 +92,11 @@ class Coordinator:
             for view in views:
                 self._ledger.set_rates(view.job_id, self._rates.update(view, time.monotonic()))
         if self._registry.breaker():
-            return _IDLE_PAUSE_S
+            return 0
         n_sent = self._feed(views)
         if self._is_due("resend", _RESEND_EVERY_S):
             n_sent += self._resend(views)
-        return _BUSY_PAUSE_S if n_sent else _IDLE_PAUSE_S
+        return n_sent
 
     def _feed(self, views: list[JobView]) -> int:
         room = self._room(views)
@@ -154,6 +159,10 @@ class Coordinator:
         return True
 
 
+# Nothing to be declared (a message goes to a queue by its name), and no repr of its words.
+_PLAIN: Final[dict[str, Any]] = {"declare": (), "argsrepr": "", "kwargsrepr": ""}
+
+
 def celery_sender(app: Any) -> Callable[[Iterable[tuple[str, str, str, str]]], None]:
     """send for a Coordinator, through a Celery application."""
     from kombu.exceptions import OperationalError
@@ -164,8 +173,9 @@ def celery_sender(app: Any) -> Callable[[Iterable[tuple[str, str, str, str]]], N
             with pool.acquire(block=True, timeout=10) as producer, producer.batch():
                 for queue, job, task, recipe in messages:
                     app.send_task(
-                        "pbrs.run", args=(job, task, recipe), queue=queue, producer=producer
-                    )
+                        "pbrs.run", args=(job, task, recipe), queue=queue, producer=producer,
+                        **_PLAIN,
+                    )  # fmt: skip
         except (OperationalError, OSError) as error:
             # What was not sent stays "q" in the ledger, and is sent again when it is old.
             raise LedgerUnavailable(f"the broker took no message: {error}") from error

@@ -138,6 +138,7 @@ class RedisLedger:
             pipe.hset(f"{self._p(job)}job", "state", "running")
             pipe.zadd(f"{self._g}jobs", {job: priority})
             pipe.zadd(f"{self._g}known", {job: self.now()})
+            pipe.lpush(f"{self._g}wake", "1")
             pipe.execute()
 
     def forget(self, job: str) -> None:
@@ -228,6 +229,11 @@ class RedisLedger:
         if rates:
             with self.errors():
                 self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
+
+    def rest(self, seconds: float) -> None:
+        """Wait so long at most, less when a task becomes ready meanwhile."""
+        with self.errors():
+            self.client.blpop([f"{self._g}wake"], timeout=seconds)
 
     def queue_length(self, queue: str) -> int:
         """Messages waiting on a queue of the broker."""

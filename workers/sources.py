@@ -11,9 +11,7 @@ from typing import Final
 
 from pbrs_farm import homes
 from pbrs_farm.debian import cache_folder
-from pbrs_farm.farm.reference import read_reference
 from pbrs_farm.farm.sources import SourceRef, resolve
-from pbrs_farm.selection.reference import bytes_from_reference
 from pbrs_farm.store.interface import Store
 from workers.job import HouseEntry
 
@@ -55,6 +53,9 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
 
 def placed_reference(path: Path) -> tuple[str, bytes]:
     """Key and bytes of the reference file a job is to be selected against; BadInput if none."""
+    from pbrs_farm.farm.reference import read_reference
+    from pbrs_farm.selection.reference import bytes_from_reference
+
     reference = read_reference(path)
     return f"{FOLDER}references/{reference.digest}.npz", bytes_from_reference(reference)
 

@@ -30,10 +30,12 @@ local function set_unit(house, unit, stage, letter)
   bump(stage .. ':' .. letter, 1)
 end
 
--- The transactional outbox: whoever finishes a step puts what follows here, in the same script.
+-- The transactional outbox: whoever finishes a step puts what follows here, in the same script, and
+-- wakes the coordinator if it rests.
 local function ready(house, unit, stage, push)
   set_unit(house, unit, stage, 'w')
   redis.call(push, P .. 'out:' .. stage, task_of(house, unit, stage))
+  if redis.call('LLEN', G .. 'wake') == 0 then redis.call('LPUSH', G .. 'wake', '1') end
 end
 
 local function ready_later(house, unit, stage, at)
