@@ -18,12 +18,20 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("folder", type=Path)
     p.add_argument("--views", type=int, default=24, help="rows of the contact sheet (default 24)")
     p = verb(
-        "verify", _verify, "recompute labels from the stored files by another caster; a certificate"
+        "verify",
+        _verify,
+        "recompute labels from the stored files by another caster: a certificate; --light: prove"
+        " the light transport on rooms with known answers",
     )
-    p.add_argument("folder", type=Path)
+    p.add_argument("folder", type=Path, nargs="?", default=None, help="the folder of --out")
+    p.add_argument(
+        "--light",
+        action="store_true",
+        help="no files: furnace rooms, Metropolis against path, exact facts; under a minute",
+    )
     p.add_argument("--all", action="store_true", help="every pixel instead of a sample")
     p.add_argument("--sample", type=int, default=None, metavar="N", help="pixels a view")
-    p.add_argument("--json", action="store_true", help="the certificate as JSON")
+    p.add_argument("--json", action="store_true", help="certificate or claims as JSON")
     p = verb(
         "relight",
         _relight,
@@ -55,6 +63,14 @@ def write_sheets(folder: Path, max_views: int) -> None:
 
 
 def _verify(args: argparse.Namespace) -> int:
+    if args.folder is None and not args.light:
+        raise BadInput("verify", "", "nothing to verify", hint="give a FOLDER, or --light")
+    if args.folder is not None and args.light:
+        raise BadInput("verify", str(args.folder), "--light looks at no folder: one at a time")
+    return _verify_light(args) if args.light else _verify_folder(args)
+
+
+def _verify_folder(args: argparse.Namespace) -> int:
     from pbrs_farm.check import verify
 
     if args.sample is not None and args.sample < 1:
@@ -65,6 +81,31 @@ def _verify(args: argparse.Namespace) -> int:
     else:
         say(certificate.text())
     return 0 if certificate.is_clean else 1
+
+
+def _verify_light(args: argparse.Namespace) -> int:
+    from dataclasses import asdict
+
+    from pbrs_farm.transport.proof.claims import light_claims
+    from pbrs_farm.transport.variant import choose_variant
+
+    variant, claims = choose_variant(), []
+    if not args.json:
+        say(f"{'':<5}{'claim':<63}{'measured':<34}expected")
+    for claim in light_claims(variant):
+        claims.append(claim)
+        if not args.json:
+            verdict = "ok" if claim.passed else "FAIL"
+            say(f"{verdict:<5}{claim.text:<63}{claim.measured:<34}{claim.expected}")
+    n_failed = sum(not claim.passed for claim in claims)
+    if args.json:
+        rows = [asdict(claim) for claim in claims]
+        dump({"variant": variant, "claims": rows, "n_failed": n_failed})
+    else:
+        seconds = sum(claim.seconds for claim in claims)
+        failed = f"{n_failed} FAILED" if n_failed else "all hold"
+        say(f"{len(claims)} claims in {variant}, {failed}, {seconds:.0f} s")
+    return 1 if n_failed else 0
 
 
 def _relight(args: argparse.Namespace) -> int:

@@ -12,6 +12,7 @@ from tests.transport.rooms import (
     box,
     bulb,
     camera,
+    door_ajar,
     house,
     matte,
     panel,
@@ -19,28 +20,7 @@ from tests.transport.rooms import (
     sphere,
 )
 
-
-def door_ajar(gap: float = 0.06) -> tuple[House, Camera]:
-    """Two rooms, a lamp in the far one, a doorway whose door leaves a gap of some centimetres.
-
-    No lamp is seen from the near room: all its light comes through the gap off the far walls.
-    """
-    size = (4.0, 2.5, 8.2)
-    surfaces = shell(size, 0)
-    doorway = (1.5, 0.0, 2.4, 2.05)
-    surfaces += panel((0.0, 0.0, 4.05), (4.0, 2.5, 4.15), doorway, 0)
-    surfaces.append(box((1.5 + gap, 0.0, 4.08), (2.4, 2.05, 4.12), 1, "door"))
-    surfaces.append(box((2.6, 0.0, 1.2), (3.4, 0.5, 2.2), 2, "block"))
-    materials = [
-        matte("wall", 0.75),
-        matte("door", 0.5, 0.35, 0.2),
-        matte("block", 0.2, 0.3, 0.7),
-        BULB,
-    ]
-    lamp = bulb((3.2, 1.2, 6.5), 3, 1600.0)
-    return house(surfaces, materials, lamps=[lamp], size=size), camera(
-        (0.6, 1.5, 0.5), (2.4, 0.9, 4.0)
-    )
+__all__ = ["door_ajar", "glass_globe", "open_shade", "sunlit"]
 
 
 def glass_globe(radius: float = 0.12) -> tuple[House, Camera]:

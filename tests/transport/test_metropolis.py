@@ -9,11 +9,13 @@ from pbrs_farm.errors import RenderFailed
 from pbrs_farm.frames import LUMINANCE
 from pbrs_farm.lighting import Group
 from pbrs_farm.recipe import LightFields
+from pbrs_farm.transport.proof.rooms import furnace
+from pbrs_farm.transport.proof.statistics import blocks, z_scores
 from pbrs_farm.transport.scene import LightScene
 from pbrs_farm.transport.sky import dark_sky, sunsky, uniform_sky
 from pbrs_farm.transport.variant import choose_variant
 from tests.transport import hard_rooms, rooms
-from tests.transport.test_path import FIELDS, RECIPE, blocks, furnace, rendered, z_scores
+from tests.transport.test_path import FIELDS, RECIPE, rendered
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"

@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from pbrs_farm.camera import Camera
 from pbrs_farm.frames import LUMINANCE
-from pbrs_farm.house import House, Item, ItemKind, LightPart, Material, MaterialKind
-from pbrs_farm.lighting import Group, Mode, PowerUnit
+from pbrs_farm.house import House, Material, MaterialKind
+from pbrs_farm.lighting import Group, Mode
 from pbrs_farm.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.transport.proof.rooms import furnace
+from pbrs_farm.transport.proof.statistics import blocks, z_scores
 from pbrs_farm.transport.reference import ReferenceScene
 from pbrs_farm.transport.result import LightResult
 from pbrs_farm.transport.scene import LightScene
@@ -40,18 +41,6 @@ def rendered(
 ) -> LightResult:
     scene = LightScene.load(house, {}, recipe, sky)
     return scene.render(camera, "0_0", FIELDS.model_copy(update=fields), seed)
-
-
-def furnace(albedo: float) -> tuple[House, Camera]:
-    """A closed box whose walls all shine with luminance 1 and reflect albedo."""
-    walls = rooms.box((0, 0, 0), (4, 2.5, 4), 0)
-    area = 2 * (4 * 2.5 + 4 * 2.5 + 4 * 4)
-    part = LightPart(
-        (0, 0, 0), 1, 179 * math.pi * area, PowerUnit.LUMEN, rgb_linear=(1, 0.5, 0.2), emitting=(0,)
-    )
-    lamp = Item("walls", "walls", ItemKind.LAMP, "0", (walls,), lights=(part,))
-    house = rooms.house([], [rooms.matte("wall", albedo)]).with_items([lamp])
-    return house, rooms.camera((1, 1, 1), (3, 1.5, 3), 16, 12)
 
 
 @pytest.mark.parametrize("albedo", [0.0, 0.3, 0.8])
@@ -152,21 +141,6 @@ def test_each_group_holds_its_own_light_alone() -> None:
     assert not day.indoor.any()
     # The bulb's body stops a little daylight, so only the lamps' group is the same bits.
     np.testing.assert_array_equal(lamps.indoor, both.indoor)
-
-
-def blocks(picture: NDArray[np.float32], n: int = 4) -> NDArray[np.float64]:
-    luminance = picture @ LUMINANCE
-    h, w = luminance.shape
-    return luminance.reshape(n, h // n, n, w // n).mean((1, 3)).astype(np.float64)
-
-
-def z_scores(a: list[NDArray[np.float64]], b: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """z of the difference of means, one per block, the variance pooled over all blocks' ratios."""
-    x, y = np.array(a), np.array(b)
-    scale = 0.5 * (x.mean(0) + y.mean(0))
-    x, y = x / scale, y / scale
-    error = np.sqrt(x.var(0, ddof=1).mean() / len(x) + y.var(0, ddof=1).mean() / len(y))
-    return np.asarray((x.mean(0) - y.mean(0)) / error)
 
 
 @pytest.mark.parametrize("group", list(Group))

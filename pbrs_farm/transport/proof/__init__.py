@@ -1,0 +1,1 @@
+"""Is the light right? Rooms with known answers, statistics, and the claims of `verify --light`."""
