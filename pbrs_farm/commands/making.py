@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.commands.using import write_sheets
-from pbrs_farm.commands.words import Verb, add_recipe, complain, recipe_of, say
+from pbrs_farm.commands.words import Verb, add_light, add_recipe, complain, recipe_of, say
 from pbrs_farm.errors import BadInput, MachineFailed
 from pbrs_farm.recipe import Recipe
 
@@ -26,6 +26,7 @@ def add_verbs(verb: Verb) -> None:
     )
     p.add_argument("--out", default="out/demo", help="output folder")
     add_recipe(p, "preview")
+    add_light(p)
     _add_run(p)
     p = verb("run", _run, "houses -> repaired houses -> cameras -> pictures and labels")
     p.add_argument(
@@ -48,6 +49,7 @@ def add_verbs(verb: Verb) -> None:
         "--camera-file", type=Path, default=None, help="your own: JSON list, or room_camera.txt"
     )
     add_recipe(p)
+    add_light(p)
     _add_run(p)
     p = verb(
         "objects", _objects, "single models without context: 20 views each (paper section 4.1)"
@@ -71,6 +73,7 @@ def add_verbs(verb: Verb) -> None:
     )
     p.add_argument("--out", required=True, help="output folder or store URL")
     add_recipe(p)
+    add_light(p)
     _add_run(p)
     p = verb("step", _step, "one step in this process: reproduces a failure")
     p.add_argument("step")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from pbrs_farm.commands.words import (
     Verb,
     add_farm,
+    add_light,
     add_recipe,
     complain,
     dump,
@@ -31,6 +32,7 @@ def add_verbs(verb: Verb) -> None:
         "--houses", metavar="LIST", help="file with a SUNCG house id a line (HOME: root)"
     )
     add_recipe(p)
+    add_light(p)
     p.add_argument("--modes", nargs="+", default=[], metavar="MODE", help="default: all four")
     p.add_argument("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers")
     p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views a house")

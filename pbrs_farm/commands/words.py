@@ -54,6 +54,19 @@ def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
     p.add_argument("--strict", action="store_true", help="recoverable faults of a home are errors")
 
 
+def add_light(p: argparse.ArgumentParser) -> None:
+    """How long a view's light is carried: short forms of two fields of the recipe."""
+    p.add_argument(
+        "--noise", default=None, metavar="E",
+        help="add samples until the estimated relative error is below E, e.g. 0.05"
+        " (light.noise; path only)",
+    )  # fmt: skip
+    p.add_argument(
+        "--time-budget", default=None, metavar="S",
+        help="seconds of light a view, instead of samples or mutations (light.time_budget_s)",
+    )  # fmt: skip
+
+
 def recipe_of(args: argparse.Namespace) -> Recipe:
     """The recipe named by the words of a command; raises BadRecipe."""
     from pbrs_farm.recipe import recipe_from_name
@@ -67,6 +80,10 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
     if args.size is not None:
         width, _, height = args.size.partition("x")
         overrides |= {"image.width_px": width, "image.height_px": height}
+    if getattr(args, "noise", None) is not None:
+        overrides["light.noise"] = args.noise
+    if getattr(args, "time_budget", None) is not None:
+        overrides["light.time_budget_s"] = args.time_budget
     if args.seed is not None:
         overrides["seed"] = str(args.seed)
     if args.strict:

@@ -22,6 +22,8 @@ import mitsuba as mi
 
 from pbrs_farm.frames import LUMINANCE
 
+_SMOOTH_ALPHA = 0.1
+
 
 class Scatter(NamedTuple):
     """A surface's parameters at a hit. kd, f0, tau: Color3f; alpha: 0 = no coat; kind: UInt32."""
@@ -72,6 +74,25 @@ def sample(m: Scatter, wi: Any, lobe: Any, u: Any) -> Any:
     use_coat = (lobe >= p_diffuse) & (lobe < p_diffuse + p_coat)
     h = _visible_normal(wi, dr.maximum(m.alpha, 1e-4), u)
     return dr.select(use_coat, 2 * dr.dot(wi, h) * h - wi, wo)
+
+
+def is_smooth_lobe(m: Scatter) -> Any:
+    """Whether what is seen of a surface changes slowly with the direction it is seen from."""
+    return (m.alpha <= 0) | (m.alpha >= _SMOOTH_ALPHA)
+
+
+def steady_density(m: Scatter, ng: Any, w: Any) -> Any:
+    """A density per solid angle like sample()'s that does not depend on wi; world directions.
+
+    Positive wherever sample() may go from wi on the side of ng: a weight of the balance heuristic
+    that stays the same when wi moves.
+    """
+    through = dr.max(m.tau) > 0
+    diffuse, sheet = luminance(m.kd), luminance(m.tau)
+    above = dr.clip(diffuse / dr.maximum(diffuse + sheet, 1e-9), 0.05, 0.95)
+    cos = dr.dot(ng, w)
+    share = dr.select(through, dr.select(cos > 0, above, 1 - above), dr.select(cos > 0, 1, 0))
+    return share * (dr.abs(cos) * dr.inv_pi)
 
 
 def thin_glass_reflectance(cos_i: Any) -> Any:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.frames import LUMINANCE
+from pbrs_farm.lighting import Group
 from pbrs_farm.transport.numbers import device_array, opaque3
 from pbrs_farm.transport.portals import MAX_PORTALS
 from pbrs_farm.transport.sky import Sky, solid_angles
@@ -74,7 +75,13 @@ class Emitters:
         self._sun_cos = dr.opaque(mi.Float, cos_max)
         self._sun_density = dr.opaque(mi.Float, 1 / solid)
         self._sun_rgb = opaque3(mi.Color3f, sky.sun_irradiance / projected)
-        self.has_sky = dr.opaque(mi.Bool, bool(sky.dome.max() > 0 or sky.sun_irradiance.max() > 0))
+        shines = bool(sky.dome.max() > 0 or sky.sun_irradiance.max() > 0)
+        self.has_sky = dr.opaque(mi.Bool, shines)
+        self._has_group = {Group.OUTDOOR: shines, Group.INDOOR: len(tables.lamps) > 0}
+
+    def has_group(self, group: Group) -> bool:
+        """Whether anything of a group shines at all."""
+        return self._has_group[group]
 
     def aim(self, portals: NDArray[np.float64], weights: Weights) -> None:
         """Set the portals and weights of another view; lamps and sky stay."""

@@ -90,16 +90,17 @@ def _radiosity(
     up = mi.Vector3f(0, 1, 0)
     frame = mi.Frame3f(up)
     white = Scatter(mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.UInt32(0))
-    here = Hit(mi.Bool(True), p, up, up, mi.UInt32(NO_LAMP), white, mi.Bool(False))
+    here = Hit(mi.Bool(True), p, up, up, up, mi.UInt32(NO_LAMP), white, mi.Bool(False))
     only = Only(mi.Int32(-1), mi.Int32(-1))
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     s = mi.UInt32(0)
     while s < spp:
         numbers = SobolNumbers(key, s)
         dim = mi.UInt32(CAMERA_DIMS)
-        lit_out, lit_in = direct(
+        out, lamp = direct(
             stage, emitters, here, frame, mi.Vector3f(0, 0, 1), numbers, dim, only, mi.Bool(True)
         )
+        lit_out, lit_in = out.light, lamp.light
         wo = mi.warp.square_to_cosine_hemisphere(numbers.two(dim + 1))
         d = mi.Vector3f(frame.to_world(wo))
         density = wo.z * dr.inv_pi

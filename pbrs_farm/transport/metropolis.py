@@ -33,23 +33,35 @@ from pbrs_farm.lighting import Group
 from pbrs_farm.recipe import LightFields
 from pbrs_farm.transport.bsdf import luminance
 from pbrs_farm.transport.emitters import Emitters
+from pbrs_farm.transport.film import Film, film_point, level_of, splat
 from pbrs_farm.transport.numbers import (
     CAMERA_DIMS,
     VERTEX_DIMS,
     HashedNumbers,
+    Numbers,
+    device_array,
     hash32,
     stream_key,
     unit_float,
 )
 from pbrs_farm.transport.surface import Stage
+from pbrs_farm.transport.tails import (
+    NEAR_M,
+    TAIL_FLOATS,
+    close_tail,
+    deal,
+    first_vertices,
+    show_tails,
+    write_tail,
+)
 from pbrs_farm.transport.walk import (
     CameraRow,
     FieldsRow,
     Only,
+    Walk,
     advance,
     camera_row,
     fields_row,
-    film_position,
     start,
 )
 
@@ -57,8 +69,13 @@ STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 7
 _SMALLEST, _LARGEST = 1 / 1024, 1 / 64
 _FILM_STEP: Final = 2.0
 _RR_DEPTH: Final = 4
-_STEPS_PER_LAUNCH: Final = 32
+_STEPS_PER_LAUNCH: Final = 8
 _MIN_STEPS: Final = 64
+_TAIL_SEGMENTS: Final = 3
+_BOOTSTRAP_SHARE: Final = 4
+_ROUNDS_PER_HEAD: Final = 4
+_PATHS_PER_TILE: Final = 256
+_FLOOR: Final = 0.05
 _BOOTSTRAP: Final = (1 << 14, 1 << 18)
 
 
@@ -104,21 +121,46 @@ class MutatedNumbers:
         return mi.Point2f(self.one(dim), self.one(mi.UInt32(dim) + 1))
 
 
-class Film(NamedTuple):
-    """Size of the picture, opaque; splats: (2 * pixels * 3,) sums of the two halves."""
-
-    width: Any
-    height: Any
-    splats: Any
-
-
 class Chains(NamedTuple):
-    """Where every chain stands. numbers: (STORED_DIMS * N,), dimension by dimension."""
+    """Where every chain stands. numbers: (STORED_DIMS * N,), dimension by dimension.
+
+    is_shared: whether its tail can be shown from other pixels; tails: (TAIL_FLOATS * N,) rows.
+    """
 
     numbers: Any
     light: Any
     level: Any
     pixel: Any
+    is_shared: Any
+    tails: Any
+
+
+@dataclass
+class Trial:
+    """A path under way, in two parts: up to its second vertex, and beyond.
+
+    walk: beyond the second vertex with a throughput of its own. light: of the first part; head:
+    throughput up to the second vertex; tail: light from beyond, head not counted. is_straight:
+    the first vertex is rough and nothing was passed since; is_shared: see tails.py.
+    """
+
+    walk: Walk
+    light: mi.Color3f
+    head: mi.Color3f
+    tail: mi.Color3f
+    is_straight: mi.Bool
+    is_shared: mi.Bool
+
+
+class Rules(NamedTuple):
+    """What is asked of every path: the scene, the emitters that count, from how many segments."""
+
+    stage: Stage
+    emitters: Emitters
+    camera: CameraRow
+    fields: FieldsRow
+    only: Only
+    segments: Any
 
 
 def metropolis(
@@ -138,54 +180,142 @@ def metropolis(
     go on until it has passed.
     """
     i = camera.intrinsics
+    black = np.zeros((i.height_px, i.width_px, 3), np.float32)
+    if not emitters.has_group(group):
+        return Estimate((black, black), 0.0, 0.0, 0, 0)
     n_pixels = i.width_px * i.height_px
     wanted = fields.mutations_per_pixel * n_pixels
     n_chains = int(np.clip(wanted // _MIN_STEPS, 16, fields.chains)) & ~1
     splats = dr.zeros(mi.Float, 2 * n_pixels * 3)
-    film = Film(dr.opaque(mi.UInt32, i.width_px), dr.opaque(mi.UInt32, i.height_px), splats)
+    flat = device_array(mi.Float, np.ones(n_pixels, np.float32))
+    film = Film(dr.opaque(mi.UInt32, i.width_px), dr.opaque(mi.UInt32, i.height_px), splats, flat)
     off = dr.opaque(mi.Int32, -2)
     on = dr.opaque(mi.Int32, -1)
     only = Only(on, off) if group is Group.INDOOR else Only(off, on)
     # Roulette late: where it ends a path early, the path's neighbours are lost to the chain too.
     late = fields.model_copy(update={"rr_depth": max(fields.rr_depth, _RR_DEPTH)})
-    scene = (stage, emitters, camera_row(camera), fields_row(late), only)
     segments = dr.opaque(mi.UInt32, min_segments)
+    rules = Rules(stage, emitters, camera_row(camera), fields_row(late), only, segments)
 
-    # Bootstrap: independent paths; chains start at some of them, drawn in proportion to I.
-    n_bootstrap = int(np.clip(wanted // 4, *_BOOTSTRAP))
-    key = stream_key(dr.arange(mi.UInt32, n_bootstrap), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
-    light, pixel = _paths(*scene, film, segments, HashedNumbers(key, mi.UInt32(0)))
-    level = luminance(light)
-    level = dr.select(dr.isfinite(level), level, 0)
-    dr.eval(light, pixel, level)
-    levels = level.numpy().astype(np.float64)
-    black = np.zeros((i.height_px, i.width_px, 3), np.float32)
-    if levels.sum() <= 0:
+    n_bootstrap = int(np.clip(wanted // _BOOTSTRAP_SHARE, *_BOOTSTRAP))
+    pilot = _drawn(rules, film, n_bootstrap, seed ^ 0x5BD1E995)
+    shape = (i.height_px, i.width_px)
+    importance = importance_of(shape, pilot.pixel.numpy(), pilot.level.numpy())
+    film = film._replace(importance=device_array(mi.Float, importance.ravel()))
+    chains, total = _started(rules, film, n_bootstrap, n_chains, seed)
+    if chains is None:
         return Estimate((black, black), 0.0, 0.0, 0, 0)
-    offsets = (np.arange(n_chains) + np.random.default_rng(seed).random()) / n_chains
-    chosen = np.searchsorted(np.cumsum(levels) / levels.sum(), offsets)
-    chosen = np.random.default_rng(seed + 1).permutation(np.minimum(chosen, n_bootstrap - 1))
-    chains = _chains_at(mi.UInt32(chosen.astype(np.uint32)), key, light, level, pixel)
 
+    n_heads = fields.tail_pixels if min_segments >= _TAIL_SEGMENTS else 0
     n_steps = -(-wanted // n_chains)
-    total, n_total = levels.sum(), float(n_bootstrap)
+    n_total = float(n_bootstrap)
     accepted, n_bad, done = 0.0, 0, 0
+    n_rounds, heads = 0, None
+    p_large = dr.opaque(mi.Float, fields.large_step)
+    # One per chain: Dr.Jit 1.5 writes local memory in the wrong place where an index that varies
+    # began as a literal.
+    rows = dr.opaque(mi.UInt32, 0, n_chains)
     while done < n_steps if deadline is None else (done == 0 or time.monotonic() < deadline):
         n = min(_STEPS_PER_LAUNCH, n_steps - done) if deadline is None else _STEPS_PER_LAUNCH
         steps = dr.opaque(mi.UInt32, done), dr.opaque(mi.UInt32, done + n)
-        p_large = dr.opaque(mi.Float, fields.large_step)
-        chains, sums = _mutate(*scene, film, segments, chains, steps, p_large, seed_of(seed))
+        shares = dr.opaque(mi.Bool, n_heads > 0)
+        chains, sums = _mutate(rules, film, chains, steps, p_large, seed_of(seed), shares, rows)
         dr.eval(*chains, sums, film.splats)
+        if n_heads > 0:
+            if n_rounds % _ROUNDS_PER_HEAD == 0:
+                heads = first_vertices(
+                    *rules[:2], rules.fields, rules.camera, film, n_pixels, seed + done
+                )
+            groups = deal(i.width_px, i.height_px, n_heads, seed + done)
+            weight = dr.opaque(mi.Float, n)
+            show_tails(
+                stage, film, heads, groups, chains.tails, chains.pixel, chains.is_shared, weight
+            )
+            n_rounds += 1
         total += float(np.sum(sums[0].numpy(), dtype=np.float64))
         n_total += float(np.sum(sums[1].numpy(), dtype=np.float64))
         accepted += float(np.sum(sums[2].numpy(), dtype=np.float64))
         n_bad += int(np.sum(sums[3].numpy(), dtype=np.int64))
         done += n
     b = float(total / n_total)
-    splat = film.splats.numpy().reshape(2, i.height_px, i.width_px, 3)
-    scale = b * n_pixels / (done * n_chains / 2)
-    halves = (splat[0] * np.float32(scale), splat[1] * np.float32(scale))
+    halves = splats.numpy().reshape(2, i.height_px, i.width_px, 3)
+    scale = np.float32(b * n_pixels / (done * n_chains / 2))
+    halves = (halves[0] * scale, halves[1] * scale)
     return Estimate(halves, b, accepted / (done * n_chains), done * n_chains, n_bad)
+
+
+def importance_of(
+    shape: tuple[int, int], pixels: NDArray[np.uint32], levels: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """(H, W) what a unit of luminance counts: about 1 / the light expected at a pixel.
+
+    Without it chains go where the picture is bright; with it every pixel gets its share (Veach's
+    two stages, 1997). From N paths, their pixels and luminances: means over tiles of about
+    PATHS_PER_TILE, blended between tiles, held above FLOOR of the mean. Any positive values are
+    unbiased.
+    """
+    height, width = shape
+    side = max(int(np.sqrt(_PATHS_PER_TILE * height * width / len(pixels))), 1)
+    rows, columns = -(-height // side), -(-width // side)
+    tile = (pixels // width // side) * columns + pixels % width // side
+    count = np.bincount(tile, minlength=rows * columns)
+    total = np.bincount(tile, levels.astype(np.float64), rows * columns)
+    grid = (total / np.maximum(count, 1)).reshape(rows, columns)
+    mean = grid.mean()
+    if not mean > 0:
+        return np.ones(shape, np.float32)
+    y, x = (_between(n, side, m) for n, m in ((height, rows), (width, columns)))
+    light = y @ grid @ x.T
+    return np.asarray(mean / (light + _FLOOR * mean), np.float32)
+
+
+def _between(n: int, side: int, n_tiles: int) -> NDArray[np.float64]:
+    """(n, n_tiles) linear weights of tiles of `side` pixels at each of n pixels."""
+    at = np.clip((np.arange(n) + 0.5) / side - 0.5, 0, n_tiles - 1)
+    return np.maximum(1 - np.abs(at[:, None] - np.arange(n_tiles)[None]), 0)
+
+
+def _path_keys(n: int, seed: int) -> Any:
+    return stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+
+
+def _drawn(rules: Rules, film: Film, n: int, seed: int) -> Chains:
+    """n independent paths."""
+    found = _paths(rules, film, HashedNumbers(_path_keys(n, seed), mi.UInt32(0)))
+    dr.eval(found)
+    return found
+
+
+def _started(
+    rules: Rules, film: Film, n_bootstrap: int, n_chains: int, seed: int
+) -> tuple[Chains | None, float]:
+    """(chains at independent paths, drawn in proportion to I; sum of I over n_bootstrap paths).
+
+    None where no path brings light.
+    """
+    found = _drawn(rules, film, n_bootstrap, seed)
+    key = _path_keys(n_bootstrap, seed)
+    levels = found.level.numpy().astype(np.float64)
+    if levels.sum() <= 0:
+        return None, 0.0
+    offsets = (np.arange(n_chains) + np.random.default_rng(seed).random()) / n_chains
+    chosen = np.searchsorted(np.cumsum(levels) / levels.sum(), offsets)
+    chosen = np.random.default_rng(seed + 1).permutation(np.minimum(chosen, n_bootstrap - 1))
+    at = mi.UInt32(chosen.astype(np.uint32))
+    index = dr.arange(mi.UInt32, STORED_DIMS * n_chains)
+    keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, at, index % n_chains))
+    rows = dr.arange(mi.UInt32, TAIL_FLOATS * n_chains)
+    row = dr.gather(mi.UInt32, at, rows // TAIL_FLOATS)
+    chains = Chains(
+        HashedNumbers(keys, mi.UInt32(0)).one(index // n_chains),
+        dr.gather(mi.Color3f, found.light, at),
+        dr.gather(mi.Float, found.level, at),
+        dr.gather(mi.UInt32, found.pixel, at),
+        dr.gather(mi.Bool, found.is_shared, at),
+        dr.gather(mi.Float, found.tails, row * TAIL_FLOATS + rows % TAIL_FLOATS),
+    )
+    dr.eval(*chains)
+    return chains, float(levels.sum())
 
 
 def seed_of(seed: int) -> Any:
@@ -195,35 +325,37 @@ def seed_of(seed: int) -> Any:
 
 @dr.syntax
 def _mutate(
-    stage: Stage,
-    emitters: Emitters,
-    camera: CameraRow,
-    fields: FieldsRow,
-    only: Only,
+    rules: Rules,
     film: Film,
-    segments: Any,
     chains: Chains,
     steps: tuple[Any, Any],
     p_large: Any,
     seed: Any,
+    shares: Any,
+    rows: Any,
 ) -> tuple[Chains, tuple[Any, ...]]:
     n_chains = dr.width(chains.level)
     lane = dr.arange(mi.UInt32, n_chains)
     numbers = dr.alloc_local(mi.Float, STORED_DIMS)
+    tails = dr.alloc_local(mi.Float, 2 * TAIL_FLOATS)
     dim = mi.UInt32(0)
     while dim < STORED_DIMS:
         numbers.write(dr.gather(mi.Float, chains.numbers, dim * n_chains + lane), dim)
         dim += 1
+    dim = mi.UInt32(0)
+    while dim < TAIL_FLOATS:
+        tails.write(dr.gather(mi.Float, chains.tails, lane * TAIL_FLOATS + dim), dim)
+        dim += 1
 
-    # x is where a chain stands, y what it proposes.
+    # x is where a chain stands, y what it proposes; their tails take turns in two rows.
     x_light, x_level, x_pixel = chains.light, chains.level, chains.pixel
+    x_shared, x_row = mi.Bool(chains.is_shared), mi.UInt32(rows)
     x_weight = mi.Float(0)
-    y_light = mi.Color3f(0)
     large_sum, large_count = mi.Float(0), mi.Float(0)
     n_accepted, n_bad = mi.Float(0), mi.UInt32(0)
     step = mi.UInt32(steps[0])
     chain_key = stream_key(lane, seed)
-    walk = start(camera, mi.Float(0) * mi.Float(lane), mi.Float(0))
+    y = _trial(rules.camera, mi.Float(0) * mi.Float(lane), mi.Float(0))
     fresh = mi.Bool(True)
     active = step < steps[1]
 
@@ -232,21 +364,19 @@ def _mutate(
         key = hash32(chain_key ^ hash32(step + 0x9E3779B9))
         is_large = unit_float(hash32(key ^ 0x51ED270B)) < p_large
         proposal = MutatedNumbers(numbers, key, is_large)
-        y_pixel, at = _film_point(film, proposal.two(mi.UInt32(0)), fields.is_tent)
-        walk = dr.select(fresh, start(camera, at.x, at.y), walk)
-        y_light = dr.select(fresh, mi.Color3f(0), y_light)
-        before = walk.depth
-        walk, found, alive = advance(stage, emitters, fields, proposal, walk, only, active)
-        met, lit = before + 1 >= segments, walk.depth + 1 >= segments
-        y_light += dr.select(met, found.met_outdoor + found.met_indoor, 0)
-        y_light += dr.select(lit, found.lit_outdoor + found.lit_indoor, 0)
+        y_pixel, at = film_point(film, proposal.two(mi.UInt32(0)), rules.fields.is_tent)
+        y = dr.select(fresh, _trial(rules.camera, at.x, at.y), y)
+        y_row = TAIL_FLOATS - x_row
+        y, alive = _onward(rules, proposal, y, tails, y_row, active)
         done = active & ~alive
 
         # 2. Accept or stay.
+        y_light = y.light + y.head * y.tail
         good = dr.isfinite(luminance(y_light))
         n_bad += dr.select(done & ~good, mi.UInt32(1), 0)
         y_light = dr.select(good, y_light, 0)
-        y_level = luminance(y_light)
+        y_level = level_of(film, y_pixel, y_light)
+        y_shared = y.is_shared & shares
         a = dr.select(x_level > 0, dr.minimum(y_level / x_level, 1), 1)
         accept = done & (unit_float(hash32(key ^ 0x2545F491)) < a)
         n_accepted += dr.select(accept, mi.Float(1), 0)
@@ -254,19 +384,23 @@ def _mutate(
         large_count += dr.select(done & is_large, mi.Float(1), 0)
 
         # 3. Splat what is left behind: the old point with all it has gathered, or the refused one.
+        #    What is shared waits for the launch's end (tails.py).
         x_weight += dr.select(done, 1 - a, 0)
-        _splat(
+        splat(
             film,
             lane,
             dr.select(accept, x_pixel, y_pixel),
             dr.select(accept, x_light, y_light),
             dr.select(accept, x_level, y_level),
             dr.select(accept, x_weight, a),
-            done,
+            done & ~dr.select(accept, x_shared, y_shared),
         )
+        close_tail(tails, y_row, y_light, y.tail, accept & y_shared)
+        x_row = dr.select(accept, y_row, x_row)
         x_pixel = dr.select(accept, y_pixel, x_pixel)
         x_light = dr.select(accept, y_light, x_light)
         x_level = dr.select(accept, y_level, x_level)
+        x_shared = dr.select(accept, y_shared, x_shared)
         x_weight = dr.select(accept, a, x_weight)
         dim = mi.UInt32(0)
         updating = mi.Bool(accept)
@@ -279,73 +413,78 @@ def _mutate(
         fresh = mi.Bool(done)
         active = step < steps[1]
 
-    _splat(film, lane, x_pixel, x_light, x_level, x_weight, mi.Bool(True))
+    splat(film, lane, x_pixel, x_light, x_level, x_weight, ~x_shared)
     kept = dr.empty(mi.Float, STORED_DIMS * n_chains)
     dim = mi.UInt32(0)
     while dim < STORED_DIMS:
         dr.scatter(kept, numbers.read(dim), dim * n_chains + lane)
         dim += 1
+    kept_tails = dr.empty(mi.Float, TAIL_FLOATS * n_chains)
+    dim = mi.UInt32(0)
+    while dim < TAIL_FLOATS:
+        dr.scatter(kept_tails, tails.read(x_row + dim), lane * TAIL_FLOATS + dim)
+        dim += 1
     sums = large_sum, large_count, n_accepted, n_bad
-    return Chains(kept, x_light, x_level, x_pixel), sums
+    return Chains(kept, x_light, x_level, x_pixel, x_shared, kept_tails), sums
 
 
 @dr.syntax
-def _paths(
-    stage: Stage,
-    emitters: Emitters,
-    camera: CameraRow,
-    fields: FieldsRow,
-    only: Only,
-    film: Film,
-    segments: Any,
-    numbers: HashedNumbers,
-) -> tuple[Any, Any]:
-    """(light beyond direct, pixel) of one path per lane."""
-    pixel, at = _film_point(film, numbers.two(mi.UInt32(0)), fields.is_tent)
-    walk = start(camera, at.x, at.y)
-    light = mi.Color3f(0)
+def _paths(rules: Rules, film: Film, numbers: HashedNumbers) -> Chains:
+    """One path per lane, as where a chain stands; its numbers are not kept."""
+    pixel, at = film_point(film, numbers.two(mi.UInt32(0)), rules.fields.is_tent)
+    tails = dr.alloc_local(mi.Float, TAIL_FLOATS)
+    row = mi.UInt32(0)
+    y = _trial(rules.camera, at.x, at.y)
     active = mi.Bool(True)
     while active:
-        before = walk.depth
-        walk, found, alive = advance(stage, emitters, fields, numbers, walk, only, active)
-        met, lit = before + 1 >= segments, walk.depth + 1 >= segments
-        light += dr.select(active & met, found.met_outdoor + found.met_indoor, 0)
-        light += dr.select(active & lit, found.lit_outdoor + found.lit_indoor, 0)
+        y, alive = _onward(rules, numbers, y, tails, row, active)
         active = active & alive
-    return light, pixel
+    light = y.light + y.head * y.tail
+    level = level_of(film, pixel, light)
+    level = dr.select(dr.isfinite(level), level, 0)
+    close_tail(tails, row, light, y.tail, y.is_shared)
+    lane = dr.arange(mi.UInt32, dr.width(pixel))
+    rows = dr.empty(mi.Float, TAIL_FLOATS * dr.width(pixel))
+    dim = mi.UInt32(0)
+    while dim < TAIL_FLOATS:
+        dr.scatter(rows, tails.read(dim), lane * TAIL_FLOATS + dim)
+        dim += 1
+    return Chains(mi.Float(0), light, level, pixel, y.is_shared, rows)
 
 
-def _chains_at(chosen: Any, key: Any, light: Any, level: Any, pixel: Any) -> Chains:
-    """Chains that stand at the chosen bootstrap paths."""
-    n = len(chosen)
-    index = dr.arange(mi.UInt32, STORED_DIMS * n)
-    keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, chosen, index % n))
-    numbers = HashedNumbers(keys, mi.UInt32(0)).one(index // n)
-    chains = Chains(
-        numbers,
-        dr.gather(mi.Color3f, light, chosen),
-        dr.gather(mi.Float, level, chosen),
-        dr.gather(mi.UInt32, pixel, chosen),
+def _trial(camera: CameraRow, x: Any, y: Any) -> Trial:
+    """The path that leaves the camera through film position (x, y), in pixels."""
+    none, one = mi.Color3f(0), mi.Color3f(1)
+    return Trial(start(camera, x, y), none, one, mi.Color3f(0), mi.Bool(False), mi.Bool(False))
+
+
+def _onward(
+    rules: Rules, numbers: Numbers, trial: Trial, tails: Any, row: Any, active: Any
+) -> tuple[Trial, Any]:
+    """(the path one vertex on, whether it goes on); its tail is kept in local memory at row."""
+    walk, only = trial.walk, rules.only
+    before = walk.depth
+    may_be_steady = trial.is_straight & (before == 1)
+    following, found, alive = advance(
+        rules.stage, rules.emitters, rules.fields, numbers, walk, only, active, may_be_steady
     )
-    dr.eval(*chains)
-    return chains
-
-
-def _film_point(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any]:
-    """(pixel index, film position in pixels spread by the filter) of two numbers."""
-    x, y = u.x * mi.Float(film.width), u.y * mi.Float(film.height)
-    column = dr.minimum(mi.UInt32(x), film.width - 1)
-    row = dr.minimum(mi.UInt32(y), film.height - 1)
-    inside = mi.Point2f(dr.clip(x - mi.Float(column), 0, 1), dr.clip(y - mi.Float(row), 0, 1))
-    at = film_position(inside, is_tent) + mi.Point2f(mi.Float(column), mi.Float(row))
-    return row * film.width + column, at
-
-
-def _splat(
-    film: Film, lane: Any, pixel: Any, light: Any, level: Any, weight: Any, active: Any
-) -> None:
-    active = active & (level > 0) & (weight > 0)
-    value = light * (weight / dr.select(level > 0, level, 1))
-    base = ((lane & 1) * (film.width * film.height) + pixel) * 3
-    for c in range(3):
-        dr.scatter_add(film.splats, value[c], base + c, active)
+    met = dr.select(before + 1 >= rules.segments, found.met_outdoor + found.met_indoor, 0)
+    lit = dr.select(following.depth + 1 >= rules.segments, found.lit_outdoor + found.lit_indoor, 0)
+    is_beyond = before >= 2
+    is_second = active & (before < 2) & (following.depth == 2)
+    write_tail(tails, row, found, walk, only.lamp > -2, is_second & found.steady)
+    head = dr.select(is_second, following.beta, trial.head)
+    following.beta = dr.select(is_second, 1, following.beta)
+    is_far = dr.squared_norm(found.hit.p - walk.last_p) > NEAR_M**2
+    can_share = found.steady & (found.density > 0) & is_far
+    return (
+        Trial(
+            following,
+            trial.light + dr.select(is_beyond, 0, met + lit),
+            head,
+            trial.tail + dr.select(is_beyond, met + lit, 0),
+            dr.select(before == 0, found.is_rough, trial.is_straight & (following.depth > before)),
+            dr.select(is_second, can_share, trial.is_shared),
+        ),
+        alive,
+    )

@@ -18,6 +18,7 @@ from pbrs_farm.lighting import Group
 from pbrs_farm.recipe import LightFields, Recipe
 from pbrs_farm.transport.result import LightResult, joined_result, result_from_sums
 from pbrs_farm.transport.sky import Sky
+from pbrs_farm.transport.stopwatch import Stopwatch
 from pbrs_farm.transport.tables import SceneTables, tables_from_house
 from pbrs_farm.transport.variant import choose_variant, mitsuba
 
@@ -77,9 +78,10 @@ class LightScene:
         """Both light groups as a camera sees them, by the integrator that fields name.
 
         `path`: fields.spp samples per pixel, again and again until fields.noise is reached when
-        it is given. `metropolis`: direct light by fields.direct_spp samples, the rest by
-        mutations. room_id names the view in errors. Equal arguments give equal bits on one
-        machine (Metropolis: equal to 1e-5, it splats in parallel; with a time budget: similar).
+        it is given, or as many as fit into fields.time_budget_s. `metropolis`: direct light by
+        fields.direct_spp samples, the rest by mutations. room_id names the view in errors. Equal
+        arguments give equal bits on one machine (Metropolis: equal to 1e-5, it splats in
+        parallel); with a time budget similar pictures.
         """
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
@@ -101,22 +103,31 @@ class LightScene:
         *,
         max_depth: int | None = None,
     ) -> tuple[Any, int]:
-        """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached."""
+        """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached.
+
+        With a time budget: in launches as long as what is left of it, and no fewer than one.
+        """
         from pbrs_farm.transport.path import Lanes, trace
 
         i = camera.intrinsics
         per_launch = max(_SAMPLES_PER_LAUNCH // (i.width_px * i.height_px), 1)
+        watch = Stopwatch(fields.time_budget_s)
+        is_open = watch.runs or fields.noise > 0
+        goal = max(fields.spp, fields.max_spp) if is_open else fields.spp
+        if fields.noise > 0:
+            per_launch = min(per_launch, fields.spp)
         total: Any = None
-        spp, wanted = 0, fields.spp
-        while spp < wanted:
-            n = min(per_launch, wanted - spp)
+        spp = 0
+        while spp < goal and (n := watch.fitting(min(per_launch, goal - spp))) > 0:
             lanes = Lanes(i.width_px, i.height_px, spp, n, seed)
             sums = trace(self.stage, emitters, camera, lanes, fields, max_depth=max_depth)
+            watch.did(n)
             total = sums if total is None else total + sums
             spp += n
-            if spp == wanted and fields.noise > 0 and wanted < fields.max_spp:
-                noisy = result_from_sums(total, camera, spp, {}).noise["sum"] > fields.noise
-                wanted = min(wanted + fields.spp, fields.max_spp) if noisy else wanted
+            if fields.noise > 0 and spp >= fields.spp:
+                noise = result_from_sums(total, camera, spp, {}).noise["sum"]
+                if noise <= fields.noise:
+                    break
         return total, spp
 
     def _render_metropolis(
@@ -133,7 +144,7 @@ class LightScene:
 
         began = time.monotonic()
         is_separate = fields.direct_spp > 0
-        plain = fields.model_copy(update={"spp": max(fields.direct_spp, 1), "noise": 0.0})
+        plain = fields.model_copy(update={"spp": max(fields.direct_spp, 1), "time_budget_s": 0.0})
         sums, spp = self._path_sums(
             camera, plain, seed, emitters, max_depth=2 if is_separate else 1
         )

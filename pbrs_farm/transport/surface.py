@@ -24,13 +24,15 @@ class Hit(NamedTuple):
     """A ray's first meeting with the scene.
 
     valid; p: point; ng: unit face normal on the ray's side; n: shading normal, on the ray's side
-    too; lamp: UInt32, NO_LAMP = none; scatter: the material there; is_hole: cut out by alpha.
+    too, bent where it would turn away; smooth: the same before bending; lamp: UInt32, NO_LAMP =
+    none; scatter: the material there; is_hole: cut out by alpha.
     """
 
     valid: Any
     p: Any
     ng: Any
     n: Any
+    smooth: Any
     lamp: Any
     scatter: Scatter
     is_hole: Any
@@ -71,6 +73,10 @@ class Stage:
         if not self.has_veils:
             return dr.select(clear, mi.Color3f(1), 0)
         return self._through_veils(o, d, distance, clear)
+
+    def sees(self, o: Any, d: Any, distance: Any, active: Any) -> Any:
+        """Whether nothing at all, glass and cut-outs neither, lies between o and o + distance d."""
+        return active & ~self._all.ray_test(_ray(o, d, distance), active)
 
     @dr.syntax
     def _through_veils(self, o: Any, d: Any, distance: Any, clear: Any) -> Any:
@@ -122,9 +128,8 @@ class Stage:
 
         # Both normals on the ray's side; a shading normal that turns away is bent back.
         turned = dr.dot(ng, d) > 0
-        ng, n = dr.select(turned, -ng, ng), dr.select(turned, -n, n)
-        towards = -dr.dot(n, d)
-        n = dr.select(towards < 0.02, dr.normalize(n - (0.02 - towards) * d), n)
+        ng, smooth = dr.select(turned, -ng, ng), dr.select(turned, -n, n)
+        n = bent(smooth, d)
 
         tag = dr.gather(mi.UInt32, self._tags, face, valid)
         u = mi.Point2f(
@@ -132,7 +137,7 @@ class Stage:
             rows[1][3] + v * rows[3][0] + w * rows[3][2],
         )
         scatter, is_hole = self._material(tag & 0xFFFF, u, valid)
-        return Hit(valid, p, ng, n, tag >> 16, scatter, is_hole)
+        return Hit(valid, p, ng, n, smooth, tag >> 16, scatter, is_hole)
 
     def _material(self, index: Any, uv: Any, active: Any) -> tuple[Scatter, Any]:
         rows = [dr.gather(mi.Vector4f, self._materials, index * 4 + k, active) for k in range(4)]
@@ -179,6 +184,12 @@ class Stage:
         return total, solid >= 0.5
 
 
+def bent(n: Any, d: Any) -> Any:
+    """A shading normal turned so that a ray of direction d comes from its front."""
+    towards = -dr.dot(n, d)
+    return dr.select(towards < 0.02, dr.normalize(n - (0.02 - towards) * d), n)
+
+
 def offset(p: Any, n: Any) -> Any:
     """p moved off its surface along n, so that a ray from there does not meet it again."""
     return mi.Point3f(p + n * (_RAY_OFFSET * (1 + dr.max(dr.abs(p)))))
@@ -189,4 +200,4 @@ def _ray(o: Any, d: Any, reach: Any) -> Any:
     return ray(o, d, mi.Float(reach), 0.0, mi.Color0f())
 
 
-__all__ = ["NO_LAMP", "Hit", "Stage", "offset"]
+__all__ = ["NO_LAMP", "Hit", "Stage", "bent", "offset"]

@@ -15,7 +15,14 @@ import numpy as np
 
 from pbrs_farm.camera import Camera
 from pbrs_farm.recipe import LightFields
-from pbrs_farm.transport.bsdf import Scatter, evaluate, sample, thin_glass_reflectance
+from pbrs_farm.transport.bsdf import (
+    Scatter,
+    evaluate,
+    is_smooth_lobe,
+    sample,
+    steady_density,
+    thin_glass_reflectance,
+)
 from pbrs_farm.transport.emitters import FIRST_PORTAL, Emitters
 from pbrs_farm.transport.materials import GLASS, MIRROR
 from pbrs_farm.transport.numbers import CAMERA_DIMS, VERTEX_DIMS, Numbers, opaque3
@@ -74,6 +81,8 @@ class Found(NamedTuple):
     met_*: from an emitter the ray met, by `segments` = the walk's depth before + 1 segments;
     lit_*: from shadow rays at the new vertex, one segment more than its depth.
     is_rough: the vertex is neither mirror nor glass; albedo, normal: of it. missed: no surface.
+    hit: the vertex; ahead, density: the direction scattered to, 0 = nowhere; to_outdoor, to_indoor: where the
+    shadow rays went; steady: the vertex was weighted by steady_density (transport/tails.py).
     """
 
     met_outdoor: Any
@@ -84,6 +93,23 @@ class Found(NamedTuple):
     missed: Any
     albedo: Any
     normal: Any
+    hit: Any
+    ahead: Any
+    density: Any
+    to_outdoor: Any
+    to_indoor: Any
+    steady: Any
+
+
+class Lit(NamedTuple):
+    """What one shadow ray brought: light scattered along the path, before throughput.
+
+    d: towards the emitter; strength: its radiance times visibility and weight, over the density.
+    """
+
+    light: Any
+    d: Any
+    strength: Any
 
 
 def camera_row(camera: Camera) -> CameraRow:
@@ -135,8 +161,13 @@ def advance(
     walk: Walk,
     only: Only,
     active: Any,
+    may_be_steady: Any = False,
 ) -> tuple[Walk, Found, Any]:
-    """(the walk one vertex on, what that brought, whether it goes on)."""
+    """(the walk one vertex on, what that brought, whether it goes on).
+
+    may_be_steady: vertices whose share between scattered and shadow ray must not depend on where
+    the path came from, where their material allows it.
+    """
     hit = stage.hit(walk.o, walk.d, active)
     missed = active & ~hit.valid
     met_outdoor, met_indoor = _met(emitters, walk, hit, only, missed)
@@ -154,17 +185,8 @@ def advance(
 
     # Light that comes straight from an emitter.
     go_on = rough & (depth < fields.max_depth)
-    lit_outdoor, lit_indoor = direct(stage, emitters, hit, frame, wi, numbers, dim, only, go_on)
-    found = Found(
-        met_outdoor,
-        met_indoor,
-        walk.beta * lit_outdoor,
-        walk.beta * lit_indoor,
-        rough,
-        missed,
-        dr.minimum(m.kd + m.f0 + m.tau, 1),
-        hit.n,
-    )
+    steady = False if may_be_steady is False else may_be_steady & rough & is_smooth_lobe(m)
+    out, lamp = direct(stage, emitters, hit, frame, wi, numbers, dim, only, go_on, steady)
 
     # Scatter. Glass and mirrors keep one direction; what passes glass straight is no vertex.
     lobe = numbers.one(dim + _LOBE)
@@ -173,9 +195,9 @@ def advance(
     ahead = mi.Vector3f(frame.to_world(wo))
     bounced = go_on & (dr.dot(hit.ng, ahead) * wo.z > 0) & (density > 0)
     reflected = mirror | (glass & (lobe < thin_glass_reflectance(wi.z)))
-    bent = walk.d - 2 * dr.dot(hit.n, walk.d) * hit.n
+    back = walk.d - 2 * dr.dot(hit.n, walk.d) * hit.n
     may_pass = walk.nulls < MAX_NULLS
-    mirrored = reflected & may_pass & (depth < fields.max_depth) & (dr.dot(bent, hit.ng) > 0)
+    mirrored = reflected & may_pass & (depth < fields.max_depth) & (dr.dot(back, hit.ng) > 0)
     passed = ((glass & ~reflected) | (hit.valid & hit.is_hole)) & may_pass
     beta = walk.beta * _factor(m, value, density, rough, mirror, glass & passed)
 
@@ -186,7 +208,10 @@ def advance(
     alive = (bounced | mirrored | passed) & survives & (dr.max(beta) > 0)
     beta = dr.select(tested, beta * dr.rcp(dr.maximum(q, 1e-6)), beta)
 
-    d = dr.select(bounced, ahead, dr.select(mirrored, mi.Vector3f(bent), walk.d))
+    weighed = density
+    if steady is not False:
+        weighed = dr.select(steady, steady_density(m, hit.ng, ahead), density)
+    d = dr.select(bounced, ahead, dr.select(mirrored, mi.Vector3f(back), walk.d))
     outward = dr.select(dr.dot(d, hit.ng) > 0, hit.ng, -hit.ng)
     following = Walk(
         o=offset(hit.p, outward),
@@ -195,7 +220,23 @@ def advance(
         depth=depth,
         nulls=walk.nulls + dr.select(passed | (glass & mirrored), mi.UInt32(1), 0),
         last_p=dr.select(bounced, hit.p, walk.last_p),
-        last_density=dr.select(bounced, density, dr.select(mirrored, 0, walk.last_density)),
+        last_density=dr.select(bounced, weighed, dr.select(mirrored, 0, walk.last_density)),
+    )
+    found = Found(
+        met_outdoor,
+        met_indoor,
+        walk.beta * out.light,
+        walk.beta * lamp.light,
+        rough,
+        missed,
+        dr.minimum(m.kd + m.f0 + m.tau, 1),
+        hit.n,
+        hit,
+        ahead,
+        dr.select(bounced, density, 0),
+        out,
+        lamp,
+        steady,
     )
     return following, found, alive
 
@@ -210,8 +251,9 @@ def direct(
     dim: Any,
     only: Only,
     active: Any,
-) -> tuple[Any, Any]:
-    """(outdoor, indoor) light scattered towards wi, one shadow ray each, before throughput."""
+    steady: Any = False,
+) -> tuple[Lit, Lit]:
+    """(outdoor, indoor) light scattered towards wi, one shadow ray each."""
     uv_out, uv_lamp = numbers.two(dim + _OUT_UV), numbers.two(dim + _LAMP_UV)
     out = emitters.sample_outdoor(
         hit.p, numbers.one(dim + _OUT), uv_out, only.outdoor, active & (only.outdoor > -2)
@@ -227,7 +269,13 @@ def direct(
         value, density = evaluate(hit.scatter, wi, wo)
         # Light may not come through the face when the shading normal says it does not.
         side = dr.dot(hit.ng, to.d)
-        lit = to.valid & (side * wo.z > 0) & (dr.max(value) > 0) & (to.density > 0)
+        faces = side * wo.z > 0
+        lit = faces & (dr.max(value) > 0)
+        if steady is not False:
+            # Whatever wi is: what could be lit from some wi is asked for.
+            density = dr.select(steady, steady_density(hit.scatter, hit.ng, to.d), density)
+            lit = dr.select(steady, (side > 0) | (dr.max(hit.scatter.tau) > 0), lit)
+        lit = lit & to.valid & (to.density > 0)
         weight = 1 / (to.density + dr.select(alone, 0, density))
         begin = offset(hit.p, dr.select(side > 0, hit.ng, -hit.ng))
         # Aim again from the moved start: a lamp near by must not shadow itself.
@@ -237,7 +285,8 @@ def direct(
         way = dr.select(is_near, aim / reach, to.d)
         far = dr.select(is_near, reach * (1 - 1e-4), dr.inf)
         clear = stage.transmittance(begin, way, far, lit)
-        result.append(dr.select(lit, value * to.radiance * clear * weight, 0))
+        strength = dr.select(lit, to.radiance * clear * weight, 0)
+        result.append(Lit(dr.select(lit & faces, value * strength, 0), to.d, strength))
     return result[0], result[1]
 
 

@@ -1,0 +1,331 @@
+"""Against Blender's Cycles: the same home, cameras, light and depth; who is cleaner per CPU second?
+
+`make bench-cycles` installs `bpy` into out/cycles-venv (it wants numpy below 2: no extra of ours
+can hold it) and runs this. The scene is written to out/bench/cycles as the tables that our own
+kernels gather from; benchmarks/cycles_scene.py, a process of its own, renders them with Cycles.
+
+Coats are taken off for both (diffuse, textured; metals diffuse; mirrors, glass and shades as they
+are): then the two agree on every block of the picture, while Blender's Principled coat lets more
+light through to its base than Ashikhmin and Shirley's.
+
+Method. Both engines render the sum of all light, box filter, no denoiser, no clamping, paths of at
+most the recipe's segments, all cores. For each: one long picture as its own reference, and some
+short ones of other seeds; relMSE = mean over pixels of (y - ref)^2 / (ref^2 + 1e-3 mean(ref)^2) of
+luminance. Variance falls with 1 / samples, so CPU to a noise is relMSE x CPU time, and the figure
+is Cycles' product over ours. CPU time is that of all threads and of the samples alone: the time of
+a picture of one sample (loading, BVH, compiling, pilot) is taken off both; it is reported beside.
+relMSE can hang on a few bright pixels; so the same with the worst 0.1 % of pixels of either engine
+left out, as our own noise estimate leaves them out, stands beside it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.report import FOLDER, write_report
+from pbrs_farm.camera import Camera, Intrinsics
+from pbrs_farm.frames import LUMINANCE
+from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm.images import (
+    exr_from_layers,
+    layers_from_exr,
+    png_from_array,
+)
+from pbrs_farm.recipe import LightFields, Recipe
+from pbrs_farm.transport.materials import MIRROR, SURFACE
+from pbrs_farm.transport.portals import portals_of_house
+from pbrs_farm.transport.scene import LightScene
+from pbrs_farm.transport.sky import Sky, sky_for_house
+from pbrs_farm.transport.tables import NO_LAMP, SceneTables, tables_from_house
+from pbrs_farm.transport.tone import exposure_of, tone
+from pbrs_farm.transport.variant import choose_variant
+
+HOME = "2BedroomApartment"
+N_CAMERAS = 2
+PYTHON = Path("out/cycles-venv/bin/python")
+SCRIPT = Path(__file__).with_name("cycles_scene.py")
+FILES = FOLDER / "cycles"
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """Size of the pictures and samples per pixel."""
+
+    width: int
+    height: int
+    spp: int
+    reference_spp: int
+    n_short: int
+
+
+EFFORT = Effort(112, 84, 32, 2048, 8)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """Pictures of one engine: (H, W, 3) radiance; cpu_s of the samples of a short one."""
+
+    reference: NDArray[np.float32]
+    short: list[NDArray[np.float32]]
+    cpu_s: float
+    setup_s: float
+
+
+def main() -> None:
+    """Measure, print, write out/bench/cycles.json and cycles.png (ours above, Cycles below)."""
+    e = effort_from_environment()
+    house, scene, textures = _home()
+    cameras = [
+        Camera.look(Intrinsics.from_hfov(e.width, e.height, c.hfov_rad), c.eye, c.towards)
+        for c in house.cameras[:N_CAMERAS]
+    ]
+    fields = LightFields(filter="box", denoise=False)
+    export(scene.tables, scene.sky, house, textures)
+    ours = [_our_run(scene, camera, fields, e) for camera in cameras]
+    figures: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    theirs = _their_runs(cameras, fields, e)
+    for k, (a, b) in enumerate(zip(ours, theirs, strict=True), 1):
+        for name, value, unit in _compared(a, b):
+            figures[f"light.cycles_{k}_{name}"] = value
+            units[f"light.cycles_{k}_{name}"] = unit
+    ratios = [figures[f"light.cycles_{k + 1}_ratio"] for k in range(N_CAMERAS)]
+    trimmed = [figures[f"light.cycles_{k + 1}_ratio_trimmed"] for k in range(N_CAMERAS)]
+    figures["light.vs_cycles"] = min(ratios)
+    figures["light.vs_cycles_trimmed"] = min(trimmed)
+    units["light.vs_cycles"] = "x less CPU time than Cycles at equal relMSE, the worse camera"
+    units["light.vs_cycles_trimmed"] = "the same without the worst 0.1 % of pixels"
+    _write_pictures(ours, theirs)
+    write_report("cycles", figures, units)
+
+
+def effort_from_environment() -> Effort:
+    """EFFORT, or what CYCLES_EFFORT="width height spp reference_spp n_short" says."""
+    words = os.environ.get("CYCLES_EFFORT", "").split()
+    return Effort(*(int(w) for w in words)) if words else EFFORT
+
+
+def _home() -> tuple[House, LightScene, dict[str, NDArray[np.uint8]]]:
+    from pbrs_farm.farm.loaded import decoded_textures
+    from pbrs_farm.farm.sources import resolve
+    from pbrs_farm.farm.steps import repaired_house
+
+    recipe = Recipe()
+    house, _report = repaired_house(resolve(HOME), recipe)
+    textures, _unreadable = decoded_textures(house)
+    sky = sky_for_house(recipe, house.id)
+    tables = without_coats(tables_from_house(house, textures, recipe))
+    return house, LightScene(tables, sky, portals_of_house(house), choose_variant()), textures
+
+
+def without_coats(tables: SceneTables) -> SceneTables:
+    """The tables with every coat taken off; a metal's reflectance becomes diffuse."""
+    rows = tables.material_rows.copy()
+    is_metal = (rows[:, 11] == SURFACE) & (rows[:, 4:7].max(1) > 0.081)
+    rows[is_metal, 0:3] += rows[is_metal, 4:7]
+    rows[rows[:, 11] == SURFACE, 4:8] = 0
+    return replace(tables, material_rows=rows)
+
+
+def _our_run(scene: LightScene, camera: Camera, fields: LightFields, e: Effort) -> Run:
+    def rendered(spp: int, seed: int) -> tuple[NDArray[np.float32], float]:
+        some = fields.model_copy(update={"spp": spp})
+        began = time.process_time()
+        result = scene.render(camera, "-", some, seed)
+        return result.outdoor + result.indoor, time.process_time() - began
+
+    rendered(1, 0)
+    setup_s = rendered(1, 0)[1]
+    short = [rendered(e.spp, 10 + k) for k in range(e.n_short)]
+    reference, _s = rendered(e.reference_spp, 999)
+    return _run(reference, short, setup_s, e)
+
+
+def _their_runs(
+    cameras: Sequence[Camera], fields: LightFields, e: Effort, *, guiding: bool = False
+) -> list[Run]:
+    plans = [(1, 0), *((e.spp, 10 + k) for k in range(e.n_short)), (e.reference_spp, 999)]
+    jobs = [
+        {
+            "camera": {
+                "hfov_rad": 2 * math.atan(0.5 * e.width / camera.intrinsics.fx),
+                "world_from_camera": camera.world_from_camera.tolist(),
+            },
+            "size": [e.width, e.height],
+            "samples": spp,
+            "seed": seed,
+            "max_depth": fields.max_depth,
+            "light_tree": True,
+            "guiding": guiding,
+            "file": f"cycles_{k}_{spp}_{seed}.exr",
+        }
+        for k, camera in enumerate(cameras)
+        for spp, seed in plans
+    ]
+    (FILES / "jobs.json").write_text(json.dumps(jobs))
+    spent = _spent_by_cycles()
+    runs = []
+    for k in range(len(cameras)):
+        rows = [
+            (_exr(FILES / j["file"]), spent[j["file"]])
+            for j in jobs[k * len(plans) : (k + 1) * len(plans)]
+        ]
+        runs.append(_run(rows[-1][0], rows[1:-1], rows[0][1], e))
+    return runs
+
+
+def _spent_by_cycles() -> dict[str, float]:
+    """File -> CPU seconds of every job of jobs.json."""
+    python = os.environ.get("CYCLES_PYTHON", str(PYTHON))
+    # -P: this folder holds a cycles.py, and Blender's own module of that name must be found.
+    command = [python, "-P", str(SCRIPT), str(FILES)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    lines = [json.loads(x) for x in done.stdout.splitlines() if x.startswith('{"cycles"')]
+    if done.returncode != 0 or not lines:
+        raise RuntimeError(
+            f"{' '.join(command)} failed:\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
+        )
+    print(f"Cycles of Blender {lines[0]['cycles']}")
+    return {x["file"]: x["cpu_s"] for x in lines}
+
+
+def _run(
+    reference: NDArray[np.float32],
+    short: Sequence[tuple[NDArray[np.float32], float]],
+    setup_s: float,
+    e: Effort,
+) -> Run:
+    cpu_s = float(np.mean([s for _picture, s in short]))
+    return Run(reference, [p for p, _s in short], (cpu_s - setup_s) * e.spp / (e.spp - 1), setup_s)
+
+
+def _compared(ours: Run, theirs: Run) -> list[tuple[str, float, str]]:
+    a, b = (np.mean([_error(p, run.reference) for p in run.short], 0) for run in (ours, theirs))
+    mean = float((ours.reference @ LUMINANCE).mean()), float((theirs.reference @ LUMINANCE).mean())
+    blocks = [_blocks(run.reference @ LUMINANCE) for run in (ours, theirs)]
+    ratio = b.mean() * theirs.cpu_s / (a.mean() * ours.cpu_s)
+    trimmed = _trimmed(b) * theirs.cpu_s / (_trimmed(a) * ours.cpu_s)
+    return [
+        ("mean_luminance", mean[0], "W m-2 sr-1"),
+        ("mean_luminance_cycles", mean[1], "W m-2 sr-1"),
+        (
+            "block_ratio_median",
+            float(np.median(blocks[1] / blocks[0])),
+            "Cycles / ours, 8x6 blocks",
+        ),
+        ("relmse", float(a.mean()), "-"),
+        ("relmse_cycles", float(b.mean()), "-"),
+        ("relmse_trimmed", _trimmed(a), "-"),
+        ("relmse_trimmed_cycles", _trimmed(b), "-"),
+        ("cpu_s", ours.cpu_s, "s CPU of the samples"),
+        ("cpu_s_cycles", theirs.cpu_s, "s CPU of the samples"),
+        ("setup_s", ours.setup_s, "s CPU of a picture of one sample"),
+        ("setup_s_cycles", theirs.setup_s, "s CPU of a picture of one sample"),
+        ("ratio", float(ratio), "x less CPU time at equal relMSE"),
+        ("ratio_trimmed", float(trimmed), "the same without the worst 0.1 % of pixels"),
+    ]
+
+
+def _error(picture: NDArray[np.float32], reference: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(H, W) squared relative error of luminance."""
+    y, t = (np.asarray(v, np.float64) @ LUMINANCE for v in (picture, reference))
+    return np.asarray((y - t) ** 2 / (t**2 + 1e-3 * t.mean() ** 2))
+
+
+def _trimmed(error: NDArray[np.float64]) -> float:
+    kept = np.sort(error.ravel())
+    return float(kept[: int(len(kept) * 0.999)].mean())
+
+
+def _blocks(luminance: NDArray[np.float64]) -> NDArray[np.float64]:
+    h, w = luminance.shape
+    cut = luminance[: h // 6 * 6, : w // 8 * 8]
+    return np.asarray(cut.reshape(6, h // 6, 8, w // 8).mean((1, 3)))
+
+
+# The exchange: what our kernels gather from, as files.
+
+
+def export(
+    tables: SceneTables, sky: Sky, house: House, textures: dict[str, NDArray[np.uint8]]
+) -> None:
+    """Write scene.npz, scene.json, dome.exr and the textures into FILES."""
+    FILES.mkdir(parents=True, exist_ok=True)
+    rows = tables.face_rows
+    first = np.stack([rows[:, 3], rows[:, 7]], 1)
+    step = rows[:, [11, 12]], rows[:, [13, 14]]
+    tags, part = np.unique(tables.face_tags, return_inverse=True)
+    np.savez(
+        FILES / "scene.npz",
+        positions=tables.positions,
+        faces=tables.faces,
+        face_part=part.astype(np.int32),
+        uvs=np.stack([first, first + step[0], first + step[1]], 1),
+        normals=np.stack([rows[:, 16 + 4 * k : 19 + 4 * k] for k in range(3)], 1),
+    )
+    for name, picture in textures.items():
+        (FILES / f"{name}.png").write_bytes(png_from_array(picture))
+    # Blender's azimuth starts a quarter turn off ours.
+    dome = np.roll(sky.dome, sky.dome.shape[1] // 4, axis=1)
+    layers = {c: np.ascontiguousarray(dome[..., k]) for k, c in enumerate("RGB")}
+    (FILES / "dome.exr").write_bytes(exr_from_layers(layers))
+    described = {
+        "parts": [_part(int(tag), tables, house, textures) for tag in tags],
+        "sun": {
+            "direction": sky.sun_direction.tolist(),
+            "irradiance": sky.sun_irradiance.tolist(),
+            "half_angle_rad": sky.sun_half_angle_rad,
+        },
+    }
+    (FILES / "scene.json").write_text(json.dumps(described, indent=1))
+
+
+def _part(
+    tag: int, tables: SceneTables, house: House, textures: dict[str, NDArray[np.uint8]]
+) -> dict[str, Any]:
+    index, lamp = tag & 0xFFFF, tag >> 16
+    row, material = tables.material_rows[index], house.materials[index]
+    texture = material.texture_id if material.texture_id in textures else None
+    return {
+        "name": f"{index} {material.name}"[:60],
+        "kind": int(row[11]),
+        "kd": row[0:3].tolist(),
+        "f0": row[4:7].tolist(),
+        "tau": row[8:11].tolist(),
+        "texture": f"{texture}.png" if texture and int(row[11]) != MIRROR else None,
+        "cutout": bool(row[15] > 0),
+        "radiance": [0.0] * 3 if lamp == NO_LAMP else tables.lamp_rows[lamp, :3].tolist(),
+    }
+
+
+def _exr(path: Path) -> NDArray[np.float32]:
+    layers = layers_from_exr(path.read_bytes(), str(path))
+    return np.stack([layers[c] for c in "RGB"], -1)
+
+
+def _write_pictures(ours: Sequence[Run], theirs: Sequence[Run]) -> None:
+    """Short pictures and references of both engines, one exposure a camera."""
+    fields = Recipe().tone
+    columns = []
+    for a, b in zip(ours, theirs, strict=True):
+        exposure = exposure_of(a.reference, fields)
+        pictures = (a.short[0], b.short[0], a.reference, b.reference)
+        columns.append(np.concatenate([tone(p, fields, exposure=exposure) for p in pictures]))
+    sheet = np.concatenate(columns, 1)
+    (FOLDER / "cycles.png").write_bytes(png_from_array(sheet))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,305 @@
+"""One path's tail seen from many pixels: the lens mutations of `metropolis`; kernels, no effects.
+
+A path is a head, from the eye to its first vertex x1, and a tail, from its second vertex x2 on.
+Where both are rough and see each other, any other head x1' that sees x2 makes another path with
+the same tail. In the measure of (film, area at x2, direction out of x2) its contribution is
+
+    K(x1') = B f1(x1' -> x2) cos1' cos2' / |x1' - x2|^2
+             [ f2(-> lamp) S p2(-> x3) + f2(-> x3) T ]
+
+with B what reaches the eye from x1', S the shadow ray's radiance over its density, T the light
+that arrives from x3, p2 the density of going there: the PSSMLT integrand times the densities of
+what the head no longer draws. The pixels are dealt into random groups; a chain that stands at a
+path in proportion to its luminance I is equally well shown at all heads j of its pixel's group,
+each with weight I_j = luminance of K_j over the group's sum (a Gibbs step over the head, every
+outcome counted at once: it keeps the distribution of the chain). So one tail, dear to find, lights
+as many pixels as the group has, for one shadow ray each.
+
+Glass, mirrors or cut-outs between x1 and x2, or a mirror at x1, leave a path to its own pixel.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from pbrs_farm.transport.bsdf import Scatter, evaluate
+from pbrs_farm.transport.emitters import Emitters
+from pbrs_farm.transport.film import Film, level_of, point_in_pixel
+from pbrs_farm.transport.numbers import HashedNumbers, device_array, stream_key
+from pbrs_farm.transport.surface import Stage, bent, offset
+from pbrs_farm.transport.walk import (
+    CameraRow,
+    FieldsRow,
+    Found,
+    Only,
+    Walk,
+    advance,
+    start,
+)
+
+TAIL_FLOATS: Final = 36
+NEAR_M: Final = 0.3
+_HEAD_PACKETS: Final = 7
+_LANES_PER_LAUNCH: Final = 1 << 22
+_NEVER: Final = 0xFFFFFFFF
+
+
+class Groups(NamedTuple):
+    """The pixels dealt into groups of n. slots: (pixels,) place of each; pixels: (slots,) of each,
+    _NEVER = none; a group's slots are neighbours."""
+
+    slots: Any
+    pixels: Any
+    n: int
+
+
+def deal(width: int, height: int, n: int, seed: int) -> Groups:
+    """Random groups of about n pixels, each of up to four blocks: a tail that only a few places see
+    finds them beside its own pixel, one that all see is shown all over the picture."""
+    side = max(1 << (max(n // 4, 1).bit_length() - 1) // 2, 1)
+    rng = np.random.default_rng(seed)
+    rows, columns = -(-height // side), -(-width // side)
+    per_group = max(n // side**2, 1)
+    n_groups = -(-(rows * columns) // per_group)
+    rank = rng.permutation(n_groups * per_group)[: rows * columns]
+    # Blocks start anywhere and wrap around the picture, padded to whole ones.
+    y = (np.arange(height) + rng.integers(side)) % (rows * side)
+    x = (np.arange(width) + rng.integers(side)) % (columns * side)
+    block = rank[(y // side)[:, None] * columns + (x // side)[None]]
+    slots = block * side**2 + (y % side)[:, None] * side + (x % side)[None]
+    pixels = np.full(n_groups * per_group * side**2, _NEVER, np.uint32)
+    pixels[slots.ravel()] = np.arange(width * height, dtype=np.uint32)
+    return Groups(
+        device_array(mi.UInt32, slots.ravel().astype(np.uint32)),
+        device_array(mi.UInt32, pixels),
+        per_group * side**2,
+    )
+
+
+def first_vertices(
+    stage: Stage,
+    emitters: Emitters,
+    fields: FieldsRow,
+    camera: CameraRow,
+    film: Film,
+    n_pixels: int,
+    seed: int,
+) -> Any:
+    """(pixels * 28,) floats: a head of each pixel through a random place in it.
+
+    Invalid where a pixel does not see a rough surface first.
+    """
+    key = stream_key(dr.arange(mi.UInt32, n_pixels), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+    numbers = HashedNumbers(key, dr.opaque(mi.UInt32, 7))
+    rows = dr.zeros(mi.Float, n_pixels * _HEAD_PACKETS * 4)
+    _trace_heads(stage, emitters, fields, camera, film, numbers, rows)
+    dr.eval(rows)
+    return rows
+
+
+@dr.syntax
+def _trace_heads(
+    stage: Stage,
+    emitters: Emitters,
+    fields: FieldsRow,
+    camera: CameraRow,
+    film: Film,
+    numbers: HashedNumbers,
+    rows: Any,
+) -> None:
+    off = Only(mi.Int32(-2), mi.Int32(-2))
+    lane = dr.arange(mi.UInt32, dr.width(rows) // (_HEAD_PACKETS * 4))
+    at = point_in_pixel(film, lane, numbers.two(mi.UInt32(0)), fields.is_tent)
+    walk = start(camera, at.x, at.y)
+    p, n, ng, wi = mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Vector3f(0)
+    kd, f0, tau, alpha = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Float(0)
+    beta, is_valid = mi.Color3f(0), mi.Bool(False)
+    active = mi.Bool(True)
+    while active:
+        before, d = mi.Color3f(walk.beta), mi.Vector3f(walk.d)
+        walk, found, alive = advance(stage, emitters, fields, numbers, walk, off, active)
+        here = active & found.is_rough & (walk.depth == 1)
+        m = found.hit.scatter
+        p, n, ng = (
+            dr.select(here, found.hit.p, p),
+            dr.select(here, found.hit.n, n),
+            dr.select(here, found.hit.ng, ng),
+        )
+        wi, beta = dr.select(here, -d, wi), dr.select(here, before, beta)
+        kd, f0 = dr.select(here, m.kd, kd), dr.select(here, m.f0, f0)
+        tau, alpha = dr.select(here, m.tau, tau), dr.select(here, m.alpha, alpha)
+        is_valid = is_valid | here
+        active = active & alive & (walk.depth == 0)
+    values = (
+        *(p.x, p.y, p.z, dr.select(is_valid, mi.Float(1), 0)),
+        *(n.x, n.y, n.z, alpha),
+        *(ng.x, ng.y, ng.z, wi.x),
+        *(kd[0], kd[1], kd[2], wi.y),
+        *(f0[0], f0[1], f0[2], wi.z),
+        *(tau[0], tau[1], tau[2], mi.Float(0)),
+        *(beta[0], beta[1], beta[2], mi.Float(0)),
+    )
+    for k, value in enumerate(values):
+        dr.scatter(rows, value, lane * (_HEAD_PACKETS * 4) + k)
+
+
+def write_tail(
+    tails: Any, base: Any, found: Found, walk: Walk, is_indoor: Any, active: Any
+) -> None:
+    """Keep, in local memory from base on, the second vertex of a path just after it was made.
+
+    walk: as it was when it set out from the first vertex.
+    """
+    hit, m = found.hit, found.hit.scatter
+    way = hit.p - walk.last_p
+    out, lamp = found.to_outdoor, found.to_indoor
+    d = dr.select(is_indoor, lamp.d, out.d)
+    strength = dr.select(is_indoor, lamp.strength, out.strength)
+    # What turns the contribution into K's measure: the densities of x2 and of leaving it.
+    cos = dr.abs(dr.dot(hit.ng, walk.d))
+    densities = walk.last_density * cos / dr.squared_norm(way) * found.density
+    values = (
+        *(hit.p.x, hit.p.y, hit.p.z, densities),
+        *(hit.smooth.x, hit.smooth.y, hit.smooth.z, m.alpha),
+        *(hit.ng.x, hit.ng.y, hit.ng.z, found.ahead.x),
+        *(m.kd[0], m.kd[1], m.kd[2], found.ahead.y),
+        *(m.f0[0], m.f0[1], m.f0[2], found.ahead.z),
+        *(m.tau[0], m.tau[1], m.tau[2], d.x),
+        *(strength[0], strength[1], strength[2], d.y),
+    )
+    for k, value in enumerate(values):
+        tails.write(value, base + k, active)
+    tails.write(d.z, base + 31, active)
+
+
+def close_tail(tails: Any, base: Any, light: Any, tail: Any, active: Any) -> None:
+    """Add what is known at a path's end: its light, and what arrived out of its tail (T)."""
+    own = light * tails.read(base + 3, active)
+    for c in range(3):
+        tails.write(tail[c], base + 28 + c, active)
+        tails.write(own[c], base + 32 + c, active)
+
+
+def show_tails(
+    stage: Stage,
+    film: Film,
+    heads: Any,
+    groups: Groups,
+    tails: Any,
+    pixel: Any,
+    is_shared: Any,
+    weight: Any,
+) -> None:
+    """Splat every chain's tail at all heads of its pixel's group.
+
+    heads: rows of first_vertices(); tails: (36 * N,) rows of N chains; pixel, is_shared: (N,)
+    where each stands and whether its tail can be shown elsewhere; weight: what each has to splat.
+    """
+    chosen = dr.compress(is_shared)
+    n_chains = dr.width(chosen)
+    per_launch = max(_LANES_PER_LAUNCH // groups.n, 1)
+    for first in range(0, n_chains, per_launch):
+        some = dr.arange(mi.UInt32, min(per_launch, n_chains - first))
+        chain = dr.gather(mi.UInt32, chosen, some + dr.opaque(mi.UInt32, first))
+        dr.eval(chain)
+        _show(stage, film, heads, groups, tails, pixel, chain, weight)
+
+
+def _show(
+    stage: Stage,
+    film: Film,
+    heads: Any,
+    groups: Groups,
+    tails: Any,
+    pixel: Any,
+    chain: Any,
+    weight: Any,
+) -> None:
+    n = dr.opaque(mi.UInt32, groups.n)
+    lane = dr.arange(mi.UInt32, dr.width(chain) * groups.n)
+    row, k = lane // n, lane % n
+    which = dr.gather(mi.UInt32, chain, row)
+    own = dr.gather(mi.UInt32, pixel, which)
+    slot = dr.gather(mi.UInt32, groups.slots, own)
+    at = dr.gather(mi.UInt32, groups.pixels, slot - slot % n + k)
+    value = _seen(stage, heads, tails, which, at, at != own, at != _NEVER)
+    level = level_of(film, at, value, at != _NEVER)
+    good = (level > 0) & dr.isfinite(level)
+    total = dr.zeros(mi.Float, dr.width(chain))
+    dr.scatter_add(total, level, row, good)
+    dr.eval(total, value, good, at, which, row)
+    value *= weight / dr.maximum(dr.gather(mi.Float, total, row), 1e-37)
+    base = ((which & 1) * (film.width * film.height) + at) * 3
+    for c in range(3):
+        dr.scatter_add(film.splats, value[c], base + c, good)
+    dr.eval(film.splats)
+
+
+def _seen(
+    stage: Stage, heads: Any, tails: Any, chain: Any, at: Any, is_other: Any, active: Any
+) -> Any:
+    """K of a chain's tail at a head; of its own head as the chain has found it."""
+    h = [
+        dr.gather(mi.Vector4f, heads, at * _HEAD_PACKETS + k, active) for k in range(_HEAD_PACKETS)
+    ]
+    t = [dr.gather(mi.Vector4f, tails, chain * (TAIL_FLOATS // 4) + k) for k in range(9)]
+    p1, p2 = _point(h[0]), _point(t[0])
+    n1, ng1, ng2 = _vector(h[1]), _vector(h[2]), _vector(t[2])
+    m1 = Scatter(_colour(h[3]), _colour(h[4]), _colour(h[5]), h[1][3], mi.UInt32(0))
+    m2 = Scatter(_colour(t[3]), _colour(t[4]), _colour(t[5]), t[1][3], mi.UInt32(0))
+    wi1 = mi.Vector3f(h[2][3], h[3][3], h[4][3])
+    way = p2 - p1
+    distance2 = dr.squared_norm(way)
+    d = way * dr.rsqrt(distance2)
+
+    # From x1 to x2: f1 and the geometry of the two.
+    frame1 = mi.Frame3f(n1)
+    local = frame1.to_local(wi1)
+    local.z = dr.maximum(local.z, 1e-4)
+    out = frame1.to_local(d)
+    value1, density1 = evaluate(m1, local, out)
+    side, cos2 = dr.dot(ng1, d), -dr.dot(ng2, d)
+    valid = is_other & active & (h[0][3] > 0) & (distance2 > NEAR_M**2) & (side * out.z > 0)
+    valid &= (density1 > 0) & (dr.max(value1) > 0) & (cos2 > 0)
+
+    # At x2: towards the lamp, and along the tail.
+    frame2 = mi.Frame3f(bent(_vector(t[1]), d))
+    wi2 = frame2.to_local(-d)
+    wi2.z = dr.maximum(wi2.z, 1e-4)
+    to_lamp = mi.Vector3f(t[5][3], t[6][3], t[7][3])
+    ahead = mi.Vector3f(t[2][3], t[3][3], t[4][3])
+    from_lamp, _density = _scattered(m2, frame2, ng2, wi2, to_lamp)
+    from_tail, density2 = _scattered(m2, frame2, ng2, wi2, ahead)
+    inner = from_lamp * _colour(t[6]) * density2 + from_tail * _colour(t[7])
+    valid &= (density2 > 0) & (dr.max(inner) > 0)
+
+    begin = offset(p1, dr.select(side > 0, ng1, -ng1))
+    aim = p2 - begin
+    reach = dr.norm(aim)
+    clear = stage.sees(begin, aim / reach, reach * (1 - 1e-4), valid)
+    value = _colour(h[6]) * value1 * inner * (cos2 / distance2)
+    return dr.select(is_other, dr.select(clear, value, 0), _colour(t[8]))
+
+
+def _scattered(m: Scatter, frame: Any, ng: Any, wi: Any, d: Any) -> tuple[Any, Any]:
+    """(f |cos|, density) of going on in direction d; nothing where d leaves through the face."""
+    wo = frame.to_local(d)
+    value, density = evaluate(m, wi, wo)
+    faces = dr.dot(ng, d) * wo.z > 0
+    return dr.select(faces, value, 0), dr.select(faces, density, 0)
+
+
+def _point(row: Any) -> Any:
+    return mi.Point3f(row[0], row[1], row[2])
+
+
+def _vector(row: Any) -> Any:
+    return mi.Vector3f(row[0], row[1], row[2])
+
+
+def _colour(row: Any) -> Any:
+    return mi.Color3f(row[0], row[1], row[2])
