@@ -99,7 +99,9 @@ class LightFields(_Group):
     filter: Literal["box", "tent"] = Field("tent", description="of a pixel's samples")
     pilot_spp: int = Field(4, ge=0, description="32x24 pixels per emitter; 0 = uniform choice")
     noise: float = Field(
-        0.0, ge=0, description="relative error that `path` goes on to, in passes of spp; 0 = one pass"
+        0.0,
+        ge=0,
+        description="relative error that `path` goes on to, in passes of spp; 0 = one pass",
     )
     max_spp: int = Field(4096, ge=1, description="of `path` when it renders to a noise or a time")
     time_budget_s: float = Field(
@@ -107,9 +109,6 @@ class LightFields(_Group):
     )
     chains: int = Field(32768, ge=16, description="Markov chains of `metropolis`, in parallel")
     large_step: float = Field(0.3, gt=0, lt=1, description="chance of a fresh path, Kelemen 2002")
-    tail_pixels: int = Field(
-        64, ge=0, description="pixels that a Metropolis path's tail is shown to; 0 = its own alone"
-    )
     denoise: bool = True
 
     @model_validator(mode="after")

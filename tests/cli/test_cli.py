@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.cli import build_parser, main
+from pbrs_farm.commands.words import recipe_of
 from pbrs_farm.layers import LAYERS
 
 
@@ -37,6 +38,12 @@ def zipped(path: Path, **entries: str) -> Path:
         (["run", "builtin", "--out", "{out}", "--modes", "mlt"], "no such lighting mode"),
         (["run", "builtin", "--out", "{out}", "--layers", "smell"], "no such layer"),
         (["run", "builtin", "--out", "{out}", "--size", "axb"], "image.width_px"),
+        (["run", "builtin", "--out", "{out}", "--noise", "low"], "light.noise"),
+        (["run", "builtin", "--out", "{out}", "--time-budget", "-1"], "light.time_budget_s"),
+        (
+            ["run", "builtin", "--out", "{out}", "--recipe", "paper", "--noise", "0.05"],
+            "give metropolis a time_budget_s",
+        ),
         (["run", "builtin", "--out", "/proc/nowhere"], "/proc/nowhere"),
         (["verify", "{out}"], "no houses here"),
         (["sheet", "{out}"], "{out}"),
@@ -94,3 +101,11 @@ def test_layers_prints_the_table(capsys: pytest.CaptureFixture[str]) -> None:
 def test_no_verb_prints_the_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 2
     assert "usage" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", ["run x --out o", "demo", "objects x --out o", "submit x"])
+def test_noise_and_time_budget_are_short_forms_of_the_recipes_fields(verb: str) -> None:
+    pytest.importorskip("celery")
+    words = [*verb.split(), "--noise", "0.05", "--time-budget", "30"]
+    recipe = recipe_of(build_parser().parse_args(words))
+    assert (recipe.light.noise, recipe.light.time_budget_s) == (0.05, 30.0)

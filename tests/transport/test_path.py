@@ -239,3 +239,29 @@ def test_more_passes_are_made_until_the_noise_is_reached() -> None:
     assert result.spp > 8
     capped = fields.model_copy(update={"noise": 1e-6, "max_spp": 32})
     assert scene.render(camera, "0_0", capped, 1).spp == 32
+
+
+def test_a_time_budget_takes_the_samples_that_fit_and_at_least_some() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
+    fields = FIELDS.model_copy(update={"spp": 1, "max_spp": 100_000})
+    scene.render(camera, "0_0", fields, 1)
+    few = scene.render(camera, "0_0", fields.model_copy(update={"time_budget_s": 1e-6}), 1)
+    more = scene.render(camera, "0_0", fields.model_copy(update={"time_budget_s": 0.3}), 1)
+    assert few.spp == 4
+    assert 4 < more.spp < 100_000
+    # As many samples without a clock are the same bits.
+    same = scene.render(camera, "0_0", fields.model_copy(update={"spp": few.spp}), 1)
+    np.testing.assert_array_equal(few.indoor, same.indoor)
+    capped = fields.model_copy(update={"time_budget_s": 60.0, "max_spp": 8})
+    assert scene.render(camera, "0_0", capped, 1).spp == 8
+
+
+def test_a_noise_ends_a_time_budget_early() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
+    fields = FIELDS.model_copy(update={"spp": 8, "time_budget_s": 60.0})
+    target = scene.render(camera, "0_0", FIELDS.model_copy(update={"spp": 8}), 1).noise["sum"] / 2
+    result = scene.render(camera, "0_0", fields.model_copy(update={"noise": target}), 1)
+    assert result.noise["sum"] <= target
+    assert result.spp < 200
