@@ -22,6 +22,7 @@ SHARD: Final = "shard"
 JOB: Final = "job"
 STAGES: Final = (GEOMETRY, GL, LIGHT, REDUCE, SHARD, JOB)
 QUEUES: Final = (GEOMETRY, GL, LIGHT, "light.gpu", REDUCE)
+LEASES: Final = (*STAGES, "light.gpu")
 WHOLE: Final = "-"
 
 _JOB_ID: Final = re.compile(r"[0-9a-f]{12}")

@@ -17,7 +17,7 @@ from redis.retry import Retry
 
 import pbrs_farm
 from workers.config import FarmConfig, shown_url
-from workers.ids import STAGES
+from workers.ids import LEASES
 from workers.ledger import (
     Claim,
     Fault,
@@ -146,8 +146,8 @@ class RedisLedger:
         with self.errors():
             self.client.zrem(f"{self._g}jobs", job)
             self.client.zrem(f"{self._g}known", job)
-            for stage in STAGES:
-                key = f"{self._g}lease:{stage}"
+            for name in LEASES:
+                key = f"{self._g}lease:{name}"
                 members = self.client.zscan_iter(key, match=f"{job}|*")
                 for member, _score in members:
                     self.client.zrem(key, member)
@@ -211,7 +211,7 @@ class RedisLedger:
 
     def reap(self, token: str) -> int:
         """End leases that ran out; how many, -1 when not leading."""
-        return int(self._run("reap", "", token, 200, *STAGES))
+        return int(self._run("reap", "", token, 200, *LEASES))
 
     def feed(
         self, job: str, token: str, *, max_open: int, room: Mapping[str, int]

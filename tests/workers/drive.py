@@ -76,9 +76,9 @@ class Drive:
         return view.state
 
 
-def drive(ledger: RedisLedger, n_houses: int, **rules: object) -> Drive:
+def drive(ledger: RedisLedger, n_houses: int, *, gpu: bool = False, **rules: object) -> Drive:
     """A submitted job of houses h0, h1, ..."""
-    job = spec(n_houses, **rules)
+    job = spec(n_houses, **rules).model_copy(update={"gpu": gpu})
     assert ledger.create(job) == ""
     ledger.add_houses(
         job.job_id, 0, [HouseEntry(house_id=f"h{k}", source="{}") for k in range(n_houses)]

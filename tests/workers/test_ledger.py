@@ -63,6 +63,26 @@ def test_the_attempt_is_counted_before_the_work(ledger: RedisLedger) -> None:
     assert ledger.task_facts(d.job.job_id, task)["attempts"] == "1"
 
 
+def test_light_on_a_gpu_is_leased_apart_so_that_each_kind_of_worker_scales_by_its_own(
+    ledger: RedisLedger,
+) -> None:
+    d = drive(ledger, 1, gpu=True)
+    d.run(d.feed()[0])
+    for task in d.feed():
+        d.run(task)
+    task = d.feed()[0]
+    held = d.claim(task, "w1")
+    sizes = [
+        ledger.client.zcard(f"{ledger.config.prefix}lease:{name}")
+        for name in ("light", "light.gpu")
+    ]
+    assert (held.verdict, sizes) == ("run", [0, 1])
+    assert ledger.beat(d.job.job_id, task, held.token) == "ok"
+    time.sleep(0.35)
+    assert ledger.reap(d.leader) == 1
+    assert ledger.client.zcard(f"{ledger.config.prefix}lease:light.gpu") == 0
+
+
 def test_an_expired_lease_is_reaped_and_its_holder_fenced_off(ledger: RedisLedger) -> None:
     d = drive(ledger, 1)
     (task,) = d.feed()

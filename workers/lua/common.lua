@@ -15,7 +15,12 @@ local function task_of(house, unit, stage) return house .. '/' .. unit .. '/' ..
 local function house_key(house) return P .. 'h:' .. house end
 local function bump(field, by) return redis.call('HINCRBY', P .. 'n', field, by) end
 local function job_of(prefix) return string.match(prefix, '{(.-)}:$') end
-local function lease_key(stage) return G .. 'lease:' .. stage end
+
+-- Leases are kept by queue, so that each class of workers can be scaled by its own.
+local function lease_key(stage)
+  if stage == 'light' and redis.call('HGET', P .. 'job', 'gpu') == '1' then stage = 'light.gpu' end
+  return G .. 'lease:' .. stage
+end
 
 local function unit_at(house, unit)
   local at = redis.call('HGET', house_key(house), unit)

@@ -1,9 +1,9 @@
--- Leases that ran out: their holders are dead or cut off. ARGV: leader token, most, stage...
+-- Leases that ran out: their holders are dead or cut off. ARGV: leader token, most, lease...
 -- -> number of leases ended, -1 when not leading
 if not leads(ARGV[1]) then return -1 end
 local t, n, own = now(), 0, P
 for i = 3, #ARGV do
-  local expired = redis.call('ZRANGEBYSCORE', lease_key(ARGV[i]), '-inf', t, 'LIMIT', 0, tonumber(ARGV[2]))
+  local expired = redis.call('ZRANGEBYSCORE', G .. 'lease:' .. ARGV[i], '-inf', t, 'LIMIT', 0, tonumber(ARGV[2]))
   for _, member in ipairs(expired) do
     local job, task = string.match(member, '^(.-)|(.*)$')
     P = G .. '{' .. job .. '}:'
@@ -20,7 +20,7 @@ for i = 3, #ARGV do
         }),
       })
     else
-      redis.call('ZREM', lease_key(ARGV[i]), member)
+      redis.call('ZREM', G .. 'lease:' .. ARGV[i], member)
     end
     n = n + 1
   end
