@@ -1,6 +1,6 @@
 """How a run tells what it does: bars on a terminal, plain lines otherwise, JSON lines for machines.
 
-Effects: writes to standard output.
+Effects: writes to standard output; plain lines of failures to standard error.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class _JsonLines(_Silent):
 
 
 class _PlainLines(_Silent):
-    """A line per house's step and per finished view."""
+    """A line per house's step and per finished view; failures on standard error."""
 
     def __init__(self) -> None:
         self._started = time.monotonic()
@@ -95,7 +95,7 @@ class _PlainLines(_Silent):
         name = _name(event)
         clock = f"[{time.monotonic() - self._started:6.1f} s]"
         if event.kind == "failed":
-            self._say(f"{clock} {name} {event.step}: FAILED: {event.message}")
+            sys.stderr.write(f"{clock} {name} {event.step}: FAILED: {event.message}\n")
         elif event.kind in ("done", "kept"):
             self._seconds[name] = self._seconds.get(name, 0.0) + event.seconds
             self._made[name] = self._made.get(name, 0) + (event.kind == "done")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.commands.using import write_sheets
-from pbrs_farm.commands.words import Verb, add_light, add_recipe, complain, recipe_of, say
+from pbrs_farm.commands.words import Verb, add_light, add_recipe, complain, counted, recipe_of, say
 from pbrs_farm.errors import BadInput, MachineFailed
 from pbrs_farm.recipe import Recipe
 
@@ -187,16 +187,18 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         say(json.dumps(row))
         return
     say(
-        f"{len(summary.houses)} houses, {summary.n_views} views: {summary.n_done} steps done, "
+        f"{counted(len(summary.houses), 'house')}, {counted(summary.n_views, 'view')}: "
+        f"{counted(summary.n_done, 'step')} done, "
         f"{summary.n_kept} already there, {len(summary.failures)} failed; "
         f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
     )
     for house, why in summary.without_views:
         complain(f"{house}: no view: {why}")
     for what, message, command in summary.failures:
-        complain(message if message.startswith(what) else f"{what}: {message}")
-        if command:
-            complain(f"    reproduce: {command}")
+        if command:  # the message was told when it happened
+            complain(f"{what} failed; reproduce: {command}")
+        else:
+            complain(message if message.startswith(what) else f"{what}: {message}")
 
 
 def _demo(args: argparse.Namespace) -> int:

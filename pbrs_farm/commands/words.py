@@ -39,6 +39,11 @@ def dump(value: Any) -> None:
     say(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False))
 
 
+def counted(n: int, noun: str) -> str:
+    """ "1 house", "2 houses"."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
 def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
     """The words of a recipe."""
     from pbrs_farm.recipe import RECIPE_NAMES
