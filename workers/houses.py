@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from pbrs_farm import keys
-from pbrs_farm.errors import BadHouse, ObjectMissing
+from pbrs_farm.errors import BadHouse, MachineFailed, ObjectMissing
 from pbrs_farm.farm import plan
 from pbrs_farm.farm.loaded import Shelf
 from pbrs_farm.farm.marked import Work, read_marker
@@ -30,7 +30,7 @@ from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
 from workers.job import JobSpec
 from workers.merge import merge_job, merge_shard
 from workers.runner import Request, Result, Survey, Tell
-from workers.sources import FOLDER, fill_cache
+from workers.sources import FOLDER, fill_cache, is_left_in_place
 
 _HOUSE_STEPS: Final = ("house", "cameras")
 _LIGHT_STEPS: Final = ("light", "develop")
@@ -154,6 +154,11 @@ class HouseRunner:
         """The house's source; when it is kept in the store, on scratch under its own name."""
         source = SourceRef.model_validate_json(text)
         if not source.location.startswith(FOLDER):
+            if is_left_in_place(source) and not Path(source.location).exists():
+                raise MachineFailed(
+                    f"this worker does not see {source.location}",
+                    hint="such sources are not uploaded: mount them at the path they were submitted by",
+                )
             return source
         name = source.location.rpartition("/")[2]
         data = self._store.get(source.location)

@@ -51,6 +51,11 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
                 store.put_if_absent(FOLDER + _key_name(deb.name), deb.read_bytes())
 
 
+def is_left_in_place(ref: SourceRef) -> bool:
+    """The source is read where it lies, so every worker must see it: SUNCG, .gltf with side files."""
+    return ref.kind in ("suncg", "gltf") and _placed(ref).location == ref.location
+
+
 def placed_reference(path: Path) -> tuple[str, bytes]:
     """Key and bytes of the reference file a job is to be selected against; BadInput if none."""
     from pbrs_farm.farm.reference import read_reference

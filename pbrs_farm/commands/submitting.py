@@ -12,6 +12,7 @@ from pbrs_farm.commands.words import (
     add_light,
     add_recipe,
     complain,
+    counted,
     dump,
     farm_of,
     recipe_of,
@@ -47,13 +48,17 @@ def add_verbs(verb: Verb) -> None:
 def _submit(args: argparse.Namespace) -> int:
     from workers.client import completed
     from workers.estimate import estimate
-    from workers.sources import entries_from_words, placed_reference, upload
+    from workers.sources import entries_from_words, is_left_in_place, placed_reference, upload
 
     spec = _spec(args)
     found = entries_from_words(_words(args))
     reference = placed_reference(args.reference) if args.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
     houses = [entry for entry, _ref in found]
+    in_place = [ref for _entry, ref in found if is_left_in_place(ref)]
+    if in_place:
+        lie = f"{counted(len(in_place), 'house')} not uploaded: {in_place[0].location}"
+        complain(f"{lie}{' ...' if len(in_place) > 1 else ''}; workers must see that path")
     if args.dry_run:
         plan = estimate(completed(houses, spec)[1], args.slots)
         if args.json:

@@ -150,8 +150,18 @@ def _example(name: str) -> SourceRef:
 
 def _suncg(path: Path) -> SourceRef:
     folder = path.parent if path.name == "house.json" else path
+    if not (folder / "house.json").exists():
+        raise BadHouse(
+            folder, "", "holds no house.json and no home file", hint=_folder_hint(folder)
+        )
     sha = _sha256(folder / "house.json")
     return SourceRef(kind="suncg", location=str(folder.resolve()), house_id=folder.name, sha256=sha)
+
+
+def _folder_hint(folder: Path) -> str:
+    if (folder / "house").is_dir():
+        return "SUNCG's root: name ROOT/house/ID, or ROOT and --houses LIST"
+    return "a SUNCG house folder, or .sh3d, .glb files"
 
 
 def _sha256(path: Path) -> str:

@@ -18,18 +18,21 @@ from pbrs_farm.errors import (
     StoreUnavailable,
 )
 from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.store import MemoryStore
 from tests.workers.conftest import spec
 from workers.client import completed, new_spec
 from workers.estimate import estimate, seconds_per_view
 from workers.faults import class_of, fingerprint, without_numbers
 from workers.groups import groups_from_views
-from workers.houses import steps_of_stage
-from workers.ids import check_job_id, queue_of, stages_of_queue, task_from_text
+from workers.houses import HouseRunner, steps_of_stage
+from workers.ids import check_job_id, job_key, queue_of, stages_of_queue, task_from_text
 from workers.job import HouseEntry
 from workers.ledger import JobView
 from workers.memory import machine_mb, memory_limit_mb
 from workers.rates import Rates, quantile_s, stage_views
+from workers.runner import Request
 from workers.show import duration_text
+from workers.sources import entries_from_words, is_left_in_place
 
 
 @given(
@@ -170,3 +173,30 @@ def test_a_job_is_the_same_job_in_any_order_and_another_with_another_recipe() ->
 def test_durations_read_well() -> None:
     told = [duration_text(s) for s in (None, 0.5, 42, 600, 7200, 200_000)]
     assert told == ["-", "0.5s", "42s", "10m", "2.0h", "2.3d"]
+
+
+def test_a_worker_that_does_not_see_a_suncg_folder_is_itself_at_fault(tmp_path: Path) -> None:
+    house = tmp_path / "root/house/0a1b"
+    house.mkdir(parents=True)
+    (house / "house.json").write_text("{}")
+    ((entry, ref),) = entries_from_words([str(house)])
+    assert is_left_in_place(ref)
+    store = MemoryStore()
+    _houses, job = completed([entry], new_spec(recipe_from_name("preview")))
+    store.put(job_key(job.job_id), job.model_dump_json().encode())
+    request = Request(
+        job_id=job.job_id, house=entry.house_id, unit="-", stage="geometry", source=entry.source
+    )
+    (house / "house.json").rename(tmp_path / "moved.json")
+    house.rmdir()
+    with pytest.raises(MachineFailed, match=r"does not see .*0a1b") as caught:
+        HouseRunner(store, n_threads=1).run(request, lambda _step: None)
+    assert class_of(caught.value) == "machine"
+
+
+def test_a_folder_that_is_no_house_says_what_would_be_one(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"holds no house\.json"):
+        entries_from_words([str(tmp_path)])
+    (tmp_path / "house").mkdir()
+    with pytest.raises(BadInput, match="--houses LIST"):
+        entries_from_words([str(tmp_path)])
