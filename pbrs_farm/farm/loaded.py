@@ -80,11 +80,6 @@ class LoadedHouse:
         return LightScene.load(self.house, self.textures, self.recipe, self.sky)
 
     @cached_property
-    def floor_lux(self) -> dict[str, dict[str, float]]:
-        """Room id -> light group -> mean illuminance of the floor, lx."""
-        return self.light_scene.floor_lux(self.house, seed=keys.seed(self.house_id, "floor_lux"))
-
-    @cached_property
     def sky(self) -> Sky:
         """The sky over this house; BadRecipe when the recipe's panoramas cannot be had."""
         from pbrs_farm.farm.panoramas import panorama_for_house
@@ -111,7 +106,7 @@ class LoadedHouse:
         rasterizer = self.__dict__.pop("rasterizer", None)
         if rasterizer is not None:
             rasterizer.close()
-        for name in ("light_scene", "floor_lux", "caster", "geometry", "house", "textures"):
+        for name in ("light_scene", "caster", "geometry", "house", "textures"):
             self.__dict__.pop(name, None)
         gc.collect()
 

@@ -2,6 +2,7 @@
 
     house -> cameras -> per view: truth, opengl_dl, opengl_il, light -> develop -> view -> finish
 
+and illuminance, once a house, which the first light step that is done calls for.
 A step's digest covers its version, its ids, the recipe groups it uses and the digests of the
 steps it reads. So a changed recipe field runs again exactly the steps that use it and those after.
 """
@@ -40,6 +41,7 @@ STEPS: Final = {
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
+        Step("illuminance", 1, ("sky", "emission", "materials"), ("house",), per_view=False),
         Step("light", 4, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
         Step("develop", 4, ("tone", "light"), ("light",)),
         Step("view", 1, ("histogram",), _VIEW_READS),

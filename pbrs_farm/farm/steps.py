@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Final
 
@@ -266,20 +267,30 @@ def _light(work: Work) -> Made:
     }
     room = room_of(loaded.house, view)
     if room is not None:
-        facts["floor_lux"] = loaded.floor_lux.get(room.id)
-        facts["warnings"] = _light_warnings(loaded, room)
+        # Measured once a house, by whichever view's light comes first.
+        lit = run_step("illuminance", replace(work, view_id=None)).marker.facts
+        facts["floor_lux"] = lit["floor_lux"].get(room.id)
+        facts["warnings"] = lit["warnings"].get(room.id, [])
     if loaded.light_scene.n_lamps == 0:
         facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
     exr = exr_from_layers(layers, attribution=loaded.house.source.attribution)
     return Made({"radiance.exr": exr}, facts)
 
 
-def _light_warnings(loaded: LoadedHouse, room: Room) -> list[str]:
-    """Whether the room's floor is lit as floors of homes are (spec: one photometric scale)."""
-    from pbrs_farm.transport.illuminance import photometric_warnings
+def _illuminance(work: Work) -> Made:
+    """How bright every floor is by each light group: it needs the sky, so repair cannot know it."""
+    from pbrs_farm.transport.illuminance import illuminance_record
 
-    lux = {k: v for k, v in loaded.floor_lux.items() if k == room.id}
-    return photometric_warnings(lux, {room.id: room.lit_by})
+    loaded = _loaded(work)
+    lux = loaded.light_scene.floor_lux(
+        loaded.house, seed=keys.seed(work.house_id, "floor_lux", work.recipe.seed)
+    )
+    record = illuminance_record(loaded.house, lux)
+    warnings = {row["room"]: row["warnings"] for row in record["rooms"] if row["warnings"]}
+    return Made(
+        {"illuminance.json": json_bytes({**record, "sky": loaded.sky.facts()})},
+        {"floor_lux": lux, "warnings": warnings},
+    )
 
 
 def _develop(work: Work) -> Made:
@@ -367,6 +378,7 @@ _FUNCTIONS: Final[Mapping[str, Callable[[Work], Made]]] = {
     "truth": _truth,
     "opengl_dl": _opengl_dl,
     "opengl_il": _opengl_il,
+    "illuminance": _illuminance,
     "light": _light,
     "develop": _develop,
     "view": _view,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.frames import LM_PER_W, LUMINANCE
-from pbrs_farm.house import Room
+from pbrs_farm.house import House, Room
 from pbrs_farm.recipe import LightFields
 from pbrs_farm.transport.bsdf import Scatter
 from pbrs_farm.transport.emitters import Emitters
@@ -28,26 +28,43 @@ _SPP: Final = 32
 _ABOVE_FLOOR_M: Final = 0.05
 
 
-def photometric_warnings(
-    lux: dict[str, dict[str, float]], lit_by: dict[str, tuple[str, ...]]
-) -> list[str]:
-    """One line for each room whose floor is lit outside the expected range.
+def illuminance_record(house: House, lux: dict[str, dict[str, float]]) -> dict[str, Any]:
+    """What illuminance.json says of a house: a row a room, with what is outside the range.
 
-    lux: as LightScene.floor_lux gives it. lit_by: Room.lit_by of each room; a group that lights
-    nothing there is not expected to.
+    lux: as LightScene.floor_lux gives it; rooms that it lacks are left out.
+    """
+    rows = [
+        {
+            "room": room.id,
+            "name": room.name,
+            "lit_by": list(room.lit_by),
+            "outdoor_lx": lux[room.id]["outdoor"],
+            "indoor_lx": lux[room.id]["indoor"],
+            "warnings": photometric_warnings(room, lux[room.id]),
+        }
+        for room in house.rooms
+        if room.id in lux
+    ]
+    return {"rooms": rows, "expected_lx": {"outdoor": DAYLIGHT_LX, "indoor": LAMPS_LX}}
+
+
+def photometric_warnings(room: Room, lux: dict[str, float]) -> list[str]:
+    """One line for each group that lights a room's floor outside the expected range.
+
+    lux: of "outdoor" and "indoor". A group that lights nothing here (room.lit_by) need not.
     """
     lines = []
-    for room_id, values in lux.items():
-        sources = lit_by.get(room_id, ())
-        wanted = [("outdoor", "windows" in sources, DAYLIGHT_LX)]
-        wanted.append(("indoor", "lamps" in sources or "fallback" in sources, LAMPS_LX))
-        for group, is_expected, (low, high) in wanted:
-            value = values[group]
-            if (is_expected and value < low) or value > high:
-                lines.append(
-                    f"room {room_id}: {group} light gives {value:g} lx on the floor,"
-                    f" expected {low:g} to {high:g}"
-                )
+    has_lamps = "lamps" in room.lit_by or "fallback" in room.lit_by
+    for group, is_expected, (low, high) in (
+        ("outdoor", "windows" in room.lit_by, DAYLIGHT_LX),
+        ("indoor", has_lamps, LAMPS_LX),
+    ):
+        value = lux[group]
+        if (is_expected and value < low) or value > high:
+            lines.append(
+                f"room {room.id}: {group} light gives {value:g} lx on the floor,"
+                f" expected {low:g} to {high:g}"
+            )
     return lines
 
 

@@ -65,6 +65,24 @@ def test_the_pictures_are_lit(view: Path) -> None:
         assert 20 < array_from_png((view / f"{mode}.png").read_bytes()).mean() < 240, mode
 
 
+def test_every_rooms_illuminance_is_recorded_once_and_each_view_repeats_its_own(
+    made: tuple[Path, Summary],
+) -> None:
+    house = next(made[0].glob("houses/*"))
+    record = json.loads((house / "illuminance.json").read_text())
+    rooms = {row["room"]: row for row in record["rooms"]}
+    described = json.loads((house / "house.json").read_text())
+    assert set(rooms) == {room["id"] for room in described["rooms"]}
+    assert all(row["outdoor_lx"] + row["indoor_lx"] > 0 for row in rooms.values())
+    assert record["sky"]["sky_lx"] == pytest.approx(10_000, rel=1e-3)
+    assert "illuminance.json" in (house / "manifest.jsonl").read_text()
+    for file in house.glob("views/*/view.json"):
+        sheet = json.loads(file.read_text())
+        row, light = rooms[sheet["room"]], sheet["modes"]["light"]
+        assert light["floor_lux"] == {"outdoor": row["outdoor_lx"], "indoor": row["indoor_lx"]}
+        assert light["warnings"] == row["warnings"]
+
+
 def test_labels_agree_with_the_table(view: Path) -> None:
     table = {row["id"]: row for row in json.loads((view / "view.json").read_text())["instances"]}
     instance = array_from_png((view / "instance.png").read_bytes())

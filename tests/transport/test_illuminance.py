@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from pbrs_farm.recipe import recipe_from_name
-from pbrs_farm.transport.illuminance import photometric_warnings
+from pbrs_farm.transport.illuminance import illuminance_record, photometric_warnings
 from pbrs_farm.transport.scene import LightScene
 from pbrs_farm.transport.sky import dark_sky, sunsky
 from pbrs_farm.transport.variant import choose_variant
@@ -42,9 +43,13 @@ def test_a_black_room_has_the_direct_light_of_its_bulb_alone() -> None:
 
 
 def test_rooms_outside_the_range_are_named_and_unlit_groups_are_not() -> None:
+    bare = rooms.house([], []).rooms[0]
+    day = replace(bare, lit_by=("windows", "lamps"))
+    night = replace(bare, id="0_1", lit_by=("lamps",))
     lux = {"0_0": {"outdoor": 3.0, "indoor": 100.0}, "0_1": {"outdoor": 0.0, "indoor": 2000.0}}
-    lit_by = {"0_0": ("windows", "lamps"), "0_1": ("lamps",)}
-    lines = photometric_warnings(lux, lit_by)
-    assert len(lines) == 2
-    assert "room 0_0: outdoor light gives 3 lx" in lines[0]
-    assert "room 0_1: indoor light gives 2000 lx" in lines[1]
+    assert "room 0_0: outdoor light gives 3 lx" in photometric_warnings(day, lux["0_0"])[0]
+    assert "room 0_1: indoor light gives 2000 lx" in photometric_warnings(night, lux["0_1"])[0]
+    house = replace(rooms.house([], []), rooms=(day, night, replace(bare, id="0_2")))
+    record = illuminance_record(house, lux)
+    assert [(r["room"], len(r["warnings"])) for r in record["rooms"]] == [("0_0", 1), ("0_1", 1)]
+    assert record["rooms"][1]["indoor_lx"] == 2000.0
