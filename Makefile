@@ -29,6 +29,7 @@ test: check ## check, then the tests
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow
 
+test-farm: export PBRS_SETUP_ALSO := faketime
 test-farm: setup ## the farm's tests that really kill processes
 	$(BIN)/pytest -m chaos
 

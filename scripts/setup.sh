@@ -11,6 +11,7 @@ EXTRAS=gl,transport,s3,workers,selection,dev
 has_lib() { PATH=$PATH:/sbin:/usr/sbin ldconfig -p | grep -q "$1"; }
 
 missing_packages() {
+  local p
   has_lib 'libLLVM\(-19\.so\|\.so\.19\|-20\.so\|\.so\.2[0-9]\|-1[78]\.so\|\.so\.18\)' || echo libllvm19
   has_lib 'libatomic\.so\.1' || echo libatomic1
   has_lib 'libEGL\.so\.1' || echo libegl1
@@ -18,6 +19,8 @@ missing_packages() {
   has_lib 'libEGL_mesa\.so\.0' || [ -e /proc/driver/nvidia ] || echo libegl-mesa0
   compgen -G '/usr/lib/*/dri/swrast_dri.so' >/dev/null || compgen -G '/usr/lib/*/libgallium*.so' >/dev/null || [ -e /proc/driver/nvidia ] || echo libgl1-mesa-dri
   command -v redis-server >/dev/null || echo redis-server
+  # Commands that a target of the Makefile wants beside the usual ones; each is its package's name.
+  for p in ${PBRS_SETUP_ALSO:-}; do command -v "$p" >/dev/null || echo "$p"; done
   [ -n "$(find_python)" ] || echo python3
   [ -x "$VENV/bin/python" ] || "$(find_python || echo false)" -c 'import ensurepip' 2>/dev/null || echo python3-venv
 }
