@@ -5,9 +5,14 @@ Effects: the store's. Every object here is rebuilt from those below it, so mergi
 
 from __future__ import annotations
 
+import heapq
+import io
 import json
 from collections.abc import Iterator
-from typing import Any
+from itertools import groupby
+from mmap import ACCESS_READ, mmap
+from tempfile import TemporaryFile
+from typing import IO, Any
 
 from pbrs_farm import keys
 from pbrs_farm.errors import ObjectMissing
@@ -42,26 +47,47 @@ def merge_job(store: Store, spec: JobSpec, tell: Tell) -> None:
     """Write the root's manifest.jsonl and the job's report.json, which says what is missing.
 
     Rows of other jobs' houses in the same root are kept. Over a job that still runs, houses that
-    have no manifest yet are missing, and the report says so.
+    have no manifest yet are missing, and the report says so. What is held is a shard's rows, and the
+    root's former manifest where there is one.
     """
     houses = house_ids(store, spec)
     own = set(houses)
-    rows: dict[str, bytes] = {h: part for h, part in _old_rows(store) if h not in own}
-    missing = []
-    for house, part in _new_rows(store, spec, houses, tell):
-        if part is None:
-            missing.append(house)
-        else:
-            rows[house] = part
-    store.put(keys.MANIFEST, b"".join(rows[h] for h in sorted(rows)))
+    missing: list[str] = []
+    n_objects = 0
+    with TemporaryFile() as file:
+        for house, part in _merged(store, own, _new_rows(store, spec, houses, tell)):
+            if part is None:
+                missing.append(house)
+            else:
+                file.write(part)
+                n_objects += part.count(b"\n") if house in own else 0
+        _put_file(store, keys.MANIFEST, file)
     report: dict[str, Any] = {
         "job": spec.job_id,
         "houses": len(houses),
         "houses_missing": missing,
-        "objects": sum(rows[h].count(b"\n") for h in houses if h in rows),
+        "objects": n_objects,
         "failed": sorted(_failed(store, spec.job_id), key=lambda row: str(row["task"])),
     }
     store.put(job_key(spec.job_id, "report.json"), json.dumps(report, indent=1).encode() + b"\n")
+
+
+def _merged(
+    store: Store, own: set[str], new: Iterator[tuple[str, bytes | None]]
+) -> Iterator[tuple[str, bytes | None]]:
+    """The job's rows and those of other houses of the root, by house, one house at a time."""
+    old = ((house, part) for house, part in _old_rows(store) if house not in own)
+    return heapq.merge(old, new, key=lambda row: row[0])
+
+
+def _put_file(store: Store, key: str, file: IO[bytes]) -> None:
+    """Put a file's bytes without holding them: pages of the file come and go."""
+    file.flush()
+    if file.tell() == 0:
+        store.put(key, b"")
+        return
+    with mmap(file.fileno(), 0, access=ACCESS_READ) as pages, memoryview(pages) as view:
+        store.put(key, view)
 
 
 def _new_rows(
@@ -83,11 +109,14 @@ def _old_rows(store: Store) -> Iterator[tuple[str, bytes]]:
 
 
 def _by_house(manifest: bytes) -> Iterator[tuple[str, bytes]]:
-    rows: dict[str, list[bytes]] = {}
-    for line in manifest.splitlines(keepends=True):
-        rows.setdefault(str(json.loads(line)["key"]).split("/")[1], []).append(line)
-    for house, lines in rows.items():
+    """House -> its rows, in the manifest's order: by house, as every manifest is written."""
+    rows = io.BytesIO(manifest)  # shares the bytes, does not copy them
+    for house, lines in groupby(rows, key=_house_of_row):
         yield house, b"".join(lines)
+
+
+def _house_of_row(line: bytes) -> str:
+    return str(json.loads(line)["key"]).split("/")[1]
 
 
 def _manifest(store: Store, house: str) -> bytes | None:

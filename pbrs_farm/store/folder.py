@@ -35,7 +35,7 @@ class FolderStore:
     def url(self) -> str:
         return self.root.as_uri()
 
-    def put(self, key: str, data: bytes) -> None:
+    def put(self, key: str, data: bytes | memoryview) -> None:
         path = self._path(key)
         try:
             temporary = self._write_temporary(data)
@@ -105,7 +105,7 @@ class FolderStore:
     def _path(self, key: str) -> Path:
         return self.root / check_key(key)
 
-    def _write_temporary(self, data: bytes) -> Path:
+    def _write_temporary(self, data: bytes | memoryview) -> Path:
         temporary = self.root / TEMPORARY / f"{os.getpid()}-{secrets.token_hex(8)}"
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
         descriptor = _with_parent(temporary, lambda: os.open(temporary, flags, 0o666))

@@ -45,7 +45,7 @@ class Store(Protocol):
         """Where the store is, without secrets."""
         ...
 
-    def put(self, key: str, data: bytes) -> None:
+    def put(self, key: str, data: bytes | memoryview) -> None:
         """Write the object whole, over an older one if there is one."""
         ...
 

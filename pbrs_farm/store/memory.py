@@ -20,7 +20,7 @@ class MemoryStore:
     def url(self) -> str:
         return "memory:"
 
-    def put(self, key: str, data: bytes) -> None:
+    def put(self, key: str, data: bytes | memoryview) -> None:
         with self._lock:
             self._objects[check_key(key)] = bytes(data)
 

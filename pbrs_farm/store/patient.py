@@ -31,7 +31,7 @@ class PatientStore:
     def url(self) -> str:
         return self._store.url
 
-    def put(self, key: str, data: bytes) -> None:
+    def put(self, key: str, data: bytes | memoryview) -> None:
         self._call(lambda: self._store.put(key, data))
 
     def put_if_absent(self, key: str, data: bytes) -> bool:

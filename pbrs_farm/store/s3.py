@@ -96,7 +96,7 @@ class S3Store:
     def url(self) -> str:
         return f"s3://{self._bucket}/{self._prefix}" if self._prefix else f"s3://{self._bucket}"
 
-    def put(self, key: str, data: bytes) -> None:
+    def put(self, key: str, data: bytes | memoryview) -> None:
         self._call(key, lambda _tries: self._put(key, data, "overwrite"))
 
     def put_if_absent(self, key: str, data: bytes) -> bool:
@@ -130,7 +130,7 @@ class S3Store:
         except ObjectMissing:
             return
 
-    def _put(self, key: str, data: bytes, mode: str) -> None:
+    def _put(self, key: str, data: bytes | memoryview, mode: str) -> None:
         attributes = {"Content-Type": content_type(key)}
         # A multipart upload would not honour If-None-Match on every gateway (Ceph RGW 16).
         self._obstore.put(

@@ -7,6 +7,7 @@ import secrets
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,15 @@ def test_a_later_put_replaces_an_earlier_one(store: Store) -> None:
     store.put("a", b"long first version")
     store.put("a", b"")
     assert store.get("a") == b""
+
+
+def test_a_mapped_file_is_put_whole(store: Store, tmp_path: Path) -> None:
+    with (tmp_path / "large").open("w+b") as file:
+        file.write(b"0123456789" * 10_000)
+        file.flush()
+        with mmap(file.fileno(), 0, access=ACCESS_READ) as pages, memoryview(pages) as view:
+            store.put("large", view)
+    assert store.get("large") == b"0123456789" * 10_000
 
 
 def test_put_if_absent_keeps_the_first(store: Store) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 import urllib.request
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from pbrs_farm.cli import main
 from pbrs_farm.errors import BadInput, BadRecipe, MachineFailed
 from pbrs_farm.recipe import recipe_from_name
 from pbrs_farm.store import MemoryStore
+from pbrs_farm.store.folder import FolderStore
 from tests.workers.drive import Drive
 from tests.workers.redis_server import free_port
 from workers.client import Farm, completed, new_spec
@@ -141,6 +143,29 @@ def test_merging_goes_upward_twice_the_same_and_says_what_is_missing() -> None:
         assert report["houses_missing"] == ["h1"]
         rows = [json.loads(x)["key"] for x in store.get("manifest.jsonl").splitlines()]
         assert rows == [f"houses/{h}/house.glb" for h in ("h0", "h2", "other")]
+
+
+def test_merging_a_job_holds_a_shard_not_all_of_it(tmp_path: Path) -> None:
+    store = FolderStore(tmp_path)
+    entries = [HouseEntry(house_id=f"h{k:02d}") for k in range(40)]
+    spec: JobSpec
+    houses, spec = completed(
+        entries, new_spec(recipe_from_name("preview"), rules={"shard_size": 2})
+    )
+    store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
+    for entry in entries:
+        row = json.dumps({"key": f"houses/{entry.house_id}/house.glb", "sha256": "0" * 64}) + "\n"
+        store.put(f"houses/{entry.house_id}/manifest.jsonl", row.encode() * 1000)
+    for shard in range(20):
+        merge_shard(store, spec, shard, lambda _step: None)
+    tracemalloc.start()
+    merge_job(store, spec, lambda _step: None)
+    _now, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    size = len(store.get("manifest.jsonl"))
+    assert json.loads(store.get(job_key(spec.job_id, "report.json")))["objects"] == 40_000
+    assert size > 4_000_000
+    assert peak < size / 4
 
 
 def test_the_verbs_parse_and_dry_run_touches_nothing(
