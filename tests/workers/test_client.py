@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tracemalloc
 import urllib.request
 from dataclasses import replace
@@ -125,6 +126,13 @@ def test_the_metrics_endpoint_counts_without_naming_houses(farm: Farm) -> None:
     assert f"pbrs_task_seconds_count{labels} 1.0" in text
     assert "pbrs_up 1.0" in text
     assert "h0" not in text
+    board = (Path(__file__).parents[2] / "deploy/grafana-dashboard.json").read_text()
+    asked = set(re.findall(r"pbrs_[a-z_]+", board)) - {"pbrs_farm"}
+    told = set(re.findall(r"^# TYPE (pbrs_[a-z_]+)", text, re.MULTILINE)) | {
+        "pbrs_task_seconds_bucket"
+    }
+    assert len(asked) > 8
+    assert asked <= told
 
 
 def test_merging_goes_upward_twice_the_same_and_says_what_is_missing() -> None:
