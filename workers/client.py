@@ -302,7 +302,8 @@ class Farm:
         if letter == "w" and "not_before" in facts:
             row["state"] = "waits before it is tried again"
         if "claim" in facts:
-            _token, row["worker"], row["since"] = facts["claim"].split("|")
+            _token, row["worker"], since = facts["claim"].split("|")
+            row["for_s"] = round(self.ledger.now() - float(since), 1)
         row |= {name: facts[name] for name in ("attempts", "tried") if name in facts}
         if "fault" in facts:
             row["fault"] = json.loads(facts["fault"])

@@ -76,7 +76,7 @@ def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
     p50, p90 = quantile_s(counts, 0.5), quantile_s(counts, 0.9)
     rate = view.rates.get(stage, 0.0)
     eta: float | None = None
-    if left == 0:
+    if left == 0 and (total or view.state == "done"):
         eta = 0.0
     elif rate > 1e-6:
         eta = left / rate
@@ -91,17 +91,24 @@ def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
 
 
 def expected_total(view: JobView, stage: str) -> int:
-    """Tasks of a stage in the whole job; groups of houses not yet opened at the mean so far."""
+    """Tasks of a stage in the whole job; groups of houses not yet opened at the mean so far.
+
+    0 while nothing is known. Houses that were given up have none that are still to come.
+    """
     n_houses = int(view.fields.get("n_houses", 0))
     if stage == "job":
         return 1
     if stage == "shard":
         return max(1, math.ceil(n_houses / int(view.fields.get("shard_size", 500))))
-    if stage in ("geometry", "reduce"):
+    if stage == "geometry":
         return n_houses
+    n_given_up = int(view.counts.get("houses:quarantined", 0))
+    if stage == "reduce":
+        return n_houses - n_given_up
     opened = view.counts.get("done:geometry", 0)
     groups = view.counts.get("groups", 0)
-    return int(groups + (n_houses - opened) * (groups / opened if opened else 0))
+    unread = view.counts.get("geometry:f", 0) + view.counts.get("geometry:x", 0)
+    return int(groups + (n_houses - opened - unread) * (groups / opened if opened else 0))
 
 
 def _took(view: JobView, stage: str) -> dict[int, float]:

@@ -23,7 +23,7 @@ def status_text(status: Mapping[str, Any]) -> str:
         lines.append(
             f"{stage['stage']:<10}{stage['done']:>9}{stage['running']:>9}{stage['queued']:>8}"
             f"{stage['failed']:>8}{stage['total']:>9}{3600 * stage['per_s']:>9.0f}"
-            f"{duration_text(stage['p50_s']):>8}{duration_text(stage['p90_s']):>8}"
+            f"{duration_text(stage['p50_s'] or None):>8}{duration_text(stage['p90_s'] or None):>8}"
             f"{duration_text(stage['eta_s']):>9}"
         )
     for name in ("failures", "handed_back"):
@@ -41,6 +41,8 @@ def why_text(rows: Sequence[Mapping[str, Any]]) -> str:
     lines = []
     for row in rows:
         lines.append(f"{row['task']}: {row['state']}")
+        if "for_s" in row:
+            lines[-1] += f" for {duration_text(row['for_s'])}"
         for name in ("views", "worker", "attempts", "tried"):
             if name in row:
                 value = row[name]

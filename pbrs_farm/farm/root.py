@@ -91,7 +91,7 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
     if differing and not update:
         raise BadRecipe(
             f"{store.url} holds another recipe: {'; '.join(differing)}",
-            hint="--update renders again what differs, or choose another --out",
+            hint="--update renders again what differs, or choose another output",
         )
     if differing:
         store.put(keys.RECIPE, data)

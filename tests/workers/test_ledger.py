@@ -373,6 +373,7 @@ def test_a_ledger_rebuilt_from_storage_goes_on_where_it_was(ledger: RedisLedger)
     counts = d.counts
     assert counts["done:light"] == counts["done:gl"] == counts["groups"] == 6
     assert counts["done:geometry"] == counts["done:reduce"] == counts["houses:done"] == 3
+    assert counts["views"] == 5 + 3  # five were stored; Drive tells of one a group it runs
 
 
 def test_a_partial_reduction_does_not_end_the_job(ledger: RedisLedger) -> None:

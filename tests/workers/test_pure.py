@@ -132,6 +132,17 @@ def test_rates_and_time_left_follow_the_counts() -> None:
     assert gl.p50_s == 8.0
 
 
+def test_houses_given_up_and_stages_unknown_expect_nothing() -> None:
+    fields = {"n_houses": "2", "stages": "gl,light", "shard_size": "500", "state": "running"}
+    start = {s.stage: s for s in stage_views(JobView("j", fields, {}, {}, 0), {})}
+    assert (start["gl"].total, start["gl"].eta_s) == (0, None)
+    counts = {"done:geometry": 1.0, "geometry:f": 1.0, "groups": 3.0, "done:gl": 3.0, "done:light": 3.0,
+              "houses:quarantined": 1.0, "done:reduce": 1.0}  # fmt: skip
+    end = {s.stage: s for s in stage_views(JobView("j", fields, counts, {}, 0), {})}
+    assert [end[s].total for s in ("geometry", "gl", "light", "reduce")] == [2, 3, 3, 1]
+    assert all(end[s].eta_s == 0.0 for s in ("geometry", "gl", "light", "reduce"))
+
+
 def test_a_quantile_is_the_upper_end_of_its_bucket() -> None:
     assert quantile_s({0: 5, 3: 5}, 0.5) == 1.0
     assert quantile_s({0: 5, 3: 5}, 0.9) == 8.0

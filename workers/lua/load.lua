@@ -3,8 +3,11 @@
 local i, house, what, groups = ARGV[1], ARGV[2], ARGV[3], ARGV[4]
 local key = house_key(house)
 if redis.call('EXISTS', key) == 1 then return 0 end
-local n, left = 0, 0
-for _ in string.gmatch(groups, '[^;]+') do n = n + 1 end
+local n, left, views, n_views = 0, 0, 0, {}
+for group in string.gmatch(groups, '[^;]+') do
+  n_views[n] = select(2, string.gsub(group, '[^,]+', ''))
+  n = n + 1
+end
 redis.call('HSET', key, 'i', i, 's', what)
 if groups ~= '' then redis.call('HSET', P .. 'views', house, groups) end
 local names = group_stages()
@@ -14,7 +17,7 @@ for j = 5, #ARGV, 3 do
   set_unit(house, unit, stage, letter)
   if unit ~= '-' then
     opened = true
-    if letter ~= 'd' then left = left + 1 end
+    if letter ~= 'd' then left = left + 1 else views = views + n_views[tonumber(unit)] end
     for _, name in ipairs(names) do
       if name == stage and letter ~= 'd' then break end
       bump('done:' .. name, 1)
@@ -24,6 +27,7 @@ for j = 5, #ARGV, 3 do
     if letter == 'd' then bump('done:reduce', 1) end
   end
 end
+if views > 0 then bump('views', views) end
 if opened then
   bump('done:geometry', 1)
   redis.call('HSET', key, 'n', n, 'left', left, 'nf', 0)
