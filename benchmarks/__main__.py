@@ -1,4 +1,4 @@
-"""Run benches by name: `python -m benchmarks [NAME...]`; all but light and farm when none is named.
+"""Run benches by name: `python -m benchmarks [NAME...]`; all but light, cycles and farm when none is named.
 
 Each bench is a module of this folder with main(); a bench that fails does not stop the others.
 """
@@ -10,8 +10,8 @@ import sys
 import time
 import traceback
 
-DEFAULT = ("demo", "view", "houses", "cameras", "labels", "gl", "selection")
-OWN_TARGET = ("light", "farm")
+DEFAULT = ("demo", "view", "houses", "cameras", "labels", "gl", "lux", "selection")
+OWN_TARGET = ("light", "cycles", "farm")
 
 
 def main(names: list[str]) -> int:

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from benchmarks.report import FOLDER, write_report
 from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.frames import LUMINANCE
-from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm.house import House
 from pbrs_farm.images import (
     exr_from_layers,
     layers_from_exr,

@@ -61,7 +61,7 @@ def flux_lm(
     unit: PowerUnit,
     share: float,
     *,
-    lamp_lm: float = 800.0,
+    lamp_lm: float = 1_600.0,
     lm_per_watt: float = 13.0,
 ) -> float:
     """Luminous flux in lm of one light source (spec/sky.md: one photometric scale).

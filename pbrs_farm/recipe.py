@@ -136,7 +136,7 @@ class EmissionFields(_Group):
     preset: Literal["photometric", "released"] = "photometric"
     sky_lx: float = Field(10_000.0, gt=0, description="sky without sun on open ground")
     sun_lx: float = Field(60_000.0, ge=0, description="the sun's share, at most")
-    lamp_lm: float = Field(800.0, gt=0, description="a Sweet Home 3D lamp of power 0.5")
+    lamp_lm: float = Field(1_600.0, gt=0, description="a Sweet Home 3D lamp of power 0.5")
     lm_per_watt: float = Field(13.0, gt=0, description="SUNCG's watts")
     compensate_shades: bool = Field(True, description="flux is what leaves the lamp, shade and all")
     lamp_kelvin_min: float = 2700.0
