@@ -68,7 +68,7 @@ from pbrs_farm.transport.walk import (
 STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 7
 _SMALLEST, _LARGEST = 1 / 1024, 1 / 64
 _FILM_STEP: Final = 2.0
-_RR_DEPTH: Final = 4
+_RR_DEPTH: Final = 3
 _STEPS_PER_LAUNCH: Final = 8
 _MIN_STEPS: Final = 64
 _TAIL_SEGMENTS: Final = 3
@@ -124,7 +124,8 @@ class MutatedNumbers:
 class Chains(NamedTuple):
     """Where every chain stands. numbers: (STORED_DIMS * N,), dimension by dimension.
 
-    is_shared: whether its tail can be shown from other pixels; tails: (TAIL_FLOATS * N,) rows.
+    is_shared: whether its tail can be shown from other pixels; tails: (TAIL_FLOATS * N,),
+    number by number.
     """
 
     numbers: Any
@@ -189,16 +190,15 @@ def metropolis(
     splats = dr.zeros(mi.Float, 2 * n_pixels * 3)
     flat = device_array(mi.Float, np.ones(n_pixels, np.float32))
     film = Film(dr.opaque(mi.UInt32, i.width_px), dr.opaque(mi.UInt32, i.height_px), splats, flat)
-    off = dr.opaque(mi.Int32, -2)
     on = dr.opaque(mi.Int32, -1)
-    only = Only(on, off) if group is Group.INDOOR else Only(off, on)
+    only = Only(on, None) if group is Group.INDOOR else Only(None, on)
     # Roulette late: where it ends a path early, the path's neighbours are lost to the chain too.
     late = fields.model_copy(update={"rr_depth": max(fields.rr_depth, _RR_DEPTH)})
     segments = dr.opaque(mi.UInt32, min_segments)
     rules = Rules(stage, emitters, camera_row(camera), fields_row(late), only, segments)
 
     n_bootstrap = int(np.clip(wanted // _BOOTSTRAP_SHARE, *_BOOTSTRAP))
-    pilot = _drawn(rules, film, n_bootstrap, seed ^ 0x5BD1E995)
+    pilot = _drawn(rules, film, n_bootstrap // 4, seed ^ 0x5BD1E995)
     shape = (i.height_px, i.width_px)
     importance = importance_of(shape, pilot.pixel.numpy(), pilot.level.numpy())
     film = film._replace(importance=device_array(mi.Float, importance.ravel()))
@@ -212,14 +212,11 @@ def metropolis(
     accepted, n_bad, done = 0.0, 0, 0
     n_rounds, heads = 0, None
     p_large = dr.opaque(mi.Float, fields.large_step)
-    # One per chain: Dr.Jit 1.5 writes local memory in the wrong place where an index that varies
-    # began as a literal.
-    rows = dr.opaque(mi.UInt32, 0, n_chains)
     while done < n_steps if deadline is None else (done == 0 or time.monotonic() < deadline):
         n = min(_STEPS_PER_LAUNCH, n_steps - done) if deadline is None else _STEPS_PER_LAUNCH
         steps = dr.opaque(mi.UInt32, done), dr.opaque(mi.UInt32, done + n)
         shares = dr.opaque(mi.Bool, n_heads > 0)
-        chains, sums = _mutate(rules, film, chains, steps, p_large, seed_of(seed), shares, rows)
+        chains, sums = _mutate(rules, film, chains, steps, p_large, seed_of(seed), shares)
         dr.eval(*chains, sums, film.splats)
         if n_heads > 0:
             if n_rounds % _ROUNDS_PER_HEAD == 0:
@@ -304,15 +301,15 @@ def _started(
     at = mi.UInt32(chosen.astype(np.uint32))
     index = dr.arange(mi.UInt32, STORED_DIMS * n_chains)
     keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, at, index % n_chains))
-    rows = dr.arange(mi.UInt32, TAIL_FLOATS * n_chains)
-    row = dr.gather(mi.UInt32, at, rows // TAIL_FLOATS)
+    index_tail = dr.arange(mi.UInt32, TAIL_FLOATS * n_chains)
+    source = index_tail // n_chains * n_bootstrap + dr.gather(mi.UInt32, at, index_tail % n_chains)
     chains = Chains(
         HashedNumbers(keys, mi.UInt32(0)).one(index // n_chains),
         dr.gather(mi.Color3f, found.light, at),
         dr.gather(mi.Float, found.level, at),
         dr.gather(mi.UInt32, found.pixel, at),
         dr.gather(mi.Bool, found.is_shared, at),
-        dr.gather(mi.Float, found.tails, row * TAIL_FLOATS + rows % TAIL_FLOATS),
+        dr.gather(mi.Float, found.tails, source),
     )
     dr.eval(*chains)
     return chains, float(levels.sum())
@@ -332,24 +329,24 @@ def _mutate(
     p_large: Any,
     seed: Any,
     shares: Any,
-    rows: Any,
 ) -> tuple[Chains, tuple[Any, ...]]:
     n_chains = dr.width(chains.level)
     lane = dr.arange(mi.UInt32, n_chains)
     numbers = dr.alloc_local(mi.Float, STORED_DIMS)
-    tails = dr.alloc_local(mi.Float, 2 * TAIL_FLOATS)
+    x_tail = dr.alloc_local(mi.Float, TAIL_FLOATS)
+    y_tail = dr.alloc_local(mi.Float, TAIL_FLOATS)
     dim = mi.UInt32(0)
     while dim < STORED_DIMS:
         numbers.write(dr.gather(mi.Float, chains.numbers, dim * n_chains + lane), dim)
         dim += 1
     dim = mi.UInt32(0)
     while dim < TAIL_FLOATS:
-        tails.write(dr.gather(mi.Float, chains.tails, lane * TAIL_FLOATS + dim), dim)
+        x_tail.write(dr.gather(mi.Float, chains.tails, dim * n_chains + lane), dim)
         dim += 1
 
-    # x is where a chain stands, y what it proposes; their tails take turns in two rows.
+    # x is where a chain stands, y what it proposes.
     x_light, x_level, x_pixel = chains.light, chains.level, chains.pixel
-    x_shared, x_row = mi.Bool(chains.is_shared), mi.UInt32(rows)
+    x_shared = mi.Bool(chains.is_shared)
     x_weight = mi.Float(0)
     large_sum, large_count = mi.Float(0), mi.Float(0)
     n_accepted, n_bad = mi.Float(0), mi.UInt32(0)
@@ -366,8 +363,7 @@ def _mutate(
         proposal = MutatedNumbers(numbers, key, is_large)
         y_pixel, at = film_point(film, proposal.two(mi.UInt32(0)), rules.fields.is_tent)
         y = dr.select(fresh, _trial(rules.camera, at.x, at.y), y)
-        y_row = TAIL_FLOATS - x_row
-        y, alive = _onward(rules, proposal, y, tails, y_row, active)
+        y, alive = _onward(rules, proposal, y, y_tail, active)
         done = active & ~alive
 
         # 2. Accept or stay.
@@ -395,8 +391,7 @@ def _mutate(
             dr.select(accept, x_weight, a),
             done & ~dr.select(accept, x_shared, y_shared),
         )
-        close_tail(tails, y_row, y_light, y.tail, accept & y_shared)
-        x_row = dr.select(accept, y_row, x_row)
+        close_tail(y_tail, y_light, y.tail, accept & y_shared)
         x_pixel = dr.select(accept, y_pixel, x_pixel)
         x_light = dr.select(accept, y_light, x_light)
         x_level = dr.select(accept, y_level, x_level)
@@ -408,6 +403,12 @@ def _mutate(
             numbers.write(proposal.one(dim), dim)
             dim += 1
             updating = updating & (dim < STORED_DIMS)
+        dim = mi.UInt32(0)
+        updating = accept & y_shared
+        while updating:
+            x_tail.write(y_tail.read(dim), dim)
+            dim += 1
+            updating = updating & (dim < TAIL_FLOATS)
 
         step += dr.select(done, mi.UInt32(1), 0)
         fresh = mi.Bool(done)
@@ -422,7 +423,7 @@ def _mutate(
     kept_tails = dr.empty(mi.Float, TAIL_FLOATS * n_chains)
     dim = mi.UInt32(0)
     while dim < TAIL_FLOATS:
-        dr.scatter(kept_tails, tails.read(x_row + dim), lane * TAIL_FLOATS + dim)
+        dr.scatter(kept_tails, x_tail.read(dim), dim * n_chains + lane)
         dim += 1
     sums = large_sum, large_count, n_accepted, n_bad
     return Chains(kept, x_light, x_level, x_pixel, x_shared, kept_tails), sums
@@ -432,22 +433,21 @@ def _mutate(
 def _paths(rules: Rules, film: Film, numbers: HashedNumbers) -> Chains:
     """One path per lane, as where a chain stands; its numbers are not kept."""
     pixel, at = film_point(film, numbers.two(mi.UInt32(0)), rules.fields.is_tent)
-    tails = dr.alloc_local(mi.Float, TAIL_FLOATS)
-    row = mi.UInt32(0)
+    tail = dr.alloc_local(mi.Float, TAIL_FLOATS)
     y = _trial(rules.camera, at.x, at.y)
     active = mi.Bool(True)
     while active:
-        y, alive = _onward(rules, numbers, y, tails, row, active)
+        y, alive = _onward(rules, numbers, y, tail, active)
         active = active & alive
     light = y.light + y.head * y.tail
     level = level_of(film, pixel, light)
     level = dr.select(dr.isfinite(level), level, 0)
-    close_tail(tails, row, light, y.tail, y.is_shared)
+    close_tail(tail, light, y.tail, y.is_shared)
     lane = dr.arange(mi.UInt32, dr.width(pixel))
     rows = dr.empty(mi.Float, TAIL_FLOATS * dr.width(pixel))
     dim = mi.UInt32(0)
     while dim < TAIL_FLOATS:
-        dr.scatter(rows, tails.read(dim), lane * TAIL_FLOATS + dim)
+        dr.scatter(rows, tail.read(dim), dim * dr.width(pixel) + lane)
         dim += 1
     return Chains(mi.Float(0), light, level, pixel, y.is_shared, rows)
 
@@ -459,9 +459,9 @@ def _trial(camera: CameraRow, x: Any, y: Any) -> Trial:
 
 
 def _onward(
-    rules: Rules, numbers: Numbers, trial: Trial, tails: Any, row: Any, active: Any
+    rules: Rules, numbers: Numbers, trial: Trial, tail: Any, active: Any
 ) -> tuple[Trial, Any]:
-    """(the path one vertex on, whether it goes on); its tail is kept in local memory at row."""
+    """(the path one vertex on, whether it goes on); its tail is kept in local memory."""
     walk, only = trial.walk, rules.only
     before = walk.depth
     may_be_steady = trial.is_straight & (before == 1)
@@ -472,7 +472,7 @@ def _onward(
     lit = dr.select(following.depth + 1 >= rules.segments, found.lit_outdoor + found.lit_indoor, 0)
     is_beyond = before >= 2
     is_second = active & (before < 2) & (following.depth == 2)
-    write_tail(tails, row, found, walk, only.lamp > -2, is_second & found.steady)
+    write_tail(tail, found, walk, only, is_second & found.steady)
     head = dr.select(is_second, following.beta, trial.head)
     following.beta = dr.select(is_second, 1, following.beta)
     is_far = dr.squared_norm(found.hit.p - walk.last_p) > NEAR_M**2

@@ -42,7 +42,7 @@ from pbrs_farm.transport.walk import (
 )
 
 TAIL_FLOATS: Final = 36
-NEAR_M: Final = 0.3
+NEAR_M: Final = 0.1
 _HEAD_PACKETS: Final = 7
 _LANES_PER_LAUNCH: Final = 1 << 22
 _NEVER: Final = 0xFFFFFFFF
@@ -111,7 +111,7 @@ def _trace_heads(
     numbers: HashedNumbers,
     rows: Any,
 ) -> None:
-    off = Only(mi.Int32(-2), mi.Int32(-2))
+    off = Only(None, None)
     lane = dr.arange(mi.UInt32, dr.width(rows) // (_HEAD_PACKETS * 4))
     at = point_in_pixel(film, lane, numbers.two(mi.UInt32(0)), fields.is_tent)
     walk = start(camera, at.x, at.y)
@@ -147,18 +147,14 @@ def _trace_heads(
         dr.scatter(rows, value, lane * (_HEAD_PACKETS * 4) + k)
 
 
-def write_tail(
-    tails: Any, base: Any, found: Found, walk: Walk, is_indoor: Any, active: Any
-) -> None:
-    """Keep, in local memory from base on, the second vertex of a path just after it was made.
+def write_tail(tail: Any, found: Found, walk: Walk, only: Only, active: Any) -> None:
+    """Keep, in local memory, the second vertex of a path just after it was made.
 
     walk: as it was when it set out from the first vertex.
     """
     hit, m = found.hit, found.hit.scatter
     way = hit.p - walk.last_p
-    out, lamp = found.to_outdoor, found.to_indoor
-    d = dr.select(is_indoor, lamp.d, out.d)
-    strength = dr.select(is_indoor, lamp.strength, out.strength)
+    to = found.to_outdoor if only.lamp is None else found.to_indoor
     # What turns the contribution into K's measure: the densities of x2 and of leaving it.
     cos = dr.abs(dr.dot(hit.ng, walk.d))
     densities = walk.last_density * cos / dr.squared_norm(way) * found.density
@@ -168,20 +164,20 @@ def write_tail(
         *(hit.ng.x, hit.ng.y, hit.ng.z, found.ahead.x),
         *(m.kd[0], m.kd[1], m.kd[2], found.ahead.y),
         *(m.f0[0], m.f0[1], m.f0[2], found.ahead.z),
-        *(m.tau[0], m.tau[1], m.tau[2], d.x),
-        *(strength[0], strength[1], strength[2], d.y),
+        *(m.tau[0], m.tau[1], m.tau[2], to.d.x),
+        *(to.strength[0], to.strength[1], to.strength[2], to.d.y),
     )
     for k, value in enumerate(values):
-        tails.write(value, base + k, active)
-    tails.write(d.z, base + 31, active)
+        tail.write(value, mi.UInt32(k), active)
+    tail.write(to.d.z, mi.UInt32(31), active)
 
 
-def close_tail(tails: Any, base: Any, light: Any, tail: Any, active: Any) -> None:
+def close_tail(tail: Any, light: Any, beyond: Any, active: Any) -> None:
     """Add what is known at a path's end: its light, and what arrived out of its tail (T)."""
-    own = light * tails.read(base + 3, active)
+    own = light * tail.read(mi.UInt32(3), active)
     for c in range(3):
-        tails.write(tail[c], base + 28 + c, active)
-        tails.write(own[c], base + 32 + c, active)
+        tail.write(beyond[c], mi.UInt32(28 + c), active)
+        tail.write(own[c], mi.UInt32(32 + c), active)
 
 
 def show_tails(
@@ -196,17 +192,26 @@ def show_tails(
 ) -> None:
     """Splat every chain's tail at all heads of its pixel's group.
 
-    heads: rows of first_vertices(); tails: (36 * N,) rows of N chains; pixel, is_shared: (N,)
+    heads: rows of first_vertices(); tails: (36 * N,) of N chains; pixel, is_shared: (N,)
     where each stands and whether its tail can be shown elsewhere; weight: what each has to splat.
     """
     chosen = dr.compress(is_shared)
     n_chains = dr.width(chosen)
+    tails = _rows(tails, dr.width(pixel))
     per_launch = max(_LANES_PER_LAUNCH // groups.n, 1)
     for first in range(0, n_chains, per_launch):
         some = dr.arange(mi.UInt32, min(per_launch, n_chains - first))
         chain = dr.gather(mi.UInt32, chosen, some + dr.opaque(mi.UInt32, first))
         dr.eval(chain)
         _show(stage, film, heads, groups, tails, pixel, chain, weight)
+
+
+def _rows(tails: Any, n: int) -> Any:
+    """(N * 36,) rows of what lies number by number."""
+    index = dr.arange(mi.UInt32, TAIL_FLOATS * n)
+    rows = dr.gather(mi.Float, tails, index % TAIL_FLOATS * n + index // TAIL_FLOATS)
+    dr.eval(rows)
+    return rows
 
 
 def _show(

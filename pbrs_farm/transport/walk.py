@@ -23,7 +23,7 @@ from pbrs_farm.transport.bsdf import (
     steady_density,
     thin_glass_reflectance,
 )
-from pbrs_farm.transport.emitters import FIRST_PORTAL, Emitters
+from pbrs_farm.transport.emitters import FIRST_PORTAL, Emitters, Towards
 from pbrs_farm.transport.materials import GLASS, MIRROR
 from pbrs_farm.transport.numbers import CAMERA_DIMS, VERTEX_DIMS, Numbers, opaque3
 from pbrs_farm.transport.surface import Hit, Stage, offset
@@ -51,7 +51,10 @@ class FieldsRow(NamedTuple):
 
 
 class Only(NamedTuple):
-    """Which emitters count: -1 all of the group, -2 none, else that lamp or technique alone."""
+    """Which emitters count: -1 all of the group, -2 none, else that lamp or technique alone.
+
+    None instead of a device value: none ever, the kernel is built without that group.
+    """
 
     lamp: Any
     outdoor: Any
@@ -254,65 +257,78 @@ def direct(
     steady: Any = False,
 ) -> tuple[Lit, Lit]:
     """(outdoor, indoor) light scattered towards wi, one shadow ray each."""
-    uv_out, uv_lamp = numbers.two(dim + _OUT_UV), numbers.two(dim + _LAMP_UV)
-    out = emitters.sample_outdoor(
-        hit.p, numbers.one(dim + _OUT), uv_out, only.outdoor, active & (only.outdoor > -2)
-    )
-    lamp = emitters.sample_lamp(
-        stage, hit.p, numbers.one(dim + _LAMP), uv_lamp, only.lamp, active & (only.lamp > -2)
-    )
+    out = lamp = None
+    if only.outdoor is not None:
+        asks = active & (only.outdoor > -2)
+        u, uv = numbers.one(dim + _OUT), numbers.two(dim + _OUT_UV)
+        out = emitters.sample_outdoor(hit.p, u, uv, only.outdoor, asks)
+    if only.lamp is not None:
+        asks = active & (only.lamp > -2)
+        u, uv = numbers.one(dim + _LAMP), numbers.two(dim + _LAMP_UV)
+        lamp = emitters.sample_lamp(stage, hit.p, u, uv, only.lamp, asks)
     # The pilot draws a portal's light through the portal alone.
-    alone = only.outdoor >= FIRST_PORTAL
-    result = []
-    for to in (out, lamp):
-        wo = frame.to_local(to.d)
-        value, density = evaluate(hit.scatter, wi, wo)
-        # Light may not come through the face when the shading normal says it does not.
-        side = dr.dot(hit.ng, to.d)
-        faces = side * wo.z > 0
-        lit = faces & (dr.max(value) > 0)
-        if steady is not False:
-            # Whatever wi is: what could be lit from some wi is asked for.
-            density = dr.select(steady, steady_density(hit.scatter, hit.ng, to.d), density)
-            lit = dr.select(steady, (side > 0) | (dr.max(hit.scatter.tau) > 0), lit)
-        lit = lit & to.valid & (to.density > 0)
-        weight = 1 / (to.density + dr.select(alone, 0, density))
-        begin = offset(hit.p, dr.select(side > 0, hit.ng, -hit.ng))
-        # Aim again from the moved start: a lamp near by must not shadow itself.
-        aim = hit.p + to.d * to.distance - begin
-        reach = dr.norm(aim)
-        is_near = to.distance < dr.inf
-        way = dr.select(is_near, aim / reach, to.d)
-        far = dr.select(is_near, reach * (1 - 1e-4), dr.inf)
-        clear = stage.transmittance(begin, way, far, lit)
-        strength = dr.select(lit, to.radiance * clear * weight, 0)
-        result.append(Lit(dr.select(lit & faces, value * strength, 0), to.d, strength))
-    return result[0], result[1]
+    alone = False if only.outdoor is None else only.outdoor >= FIRST_PORTAL
+    to_outdoor, to_lamp = (_lit(stage, hit, frame, wi, to, alone, steady) for to in (out, lamp))
+    return to_outdoor, to_lamp
+
+
+def _lit(
+    stage: Stage, hit: Hit, frame: Any, wi: Any, to: Towards | None, alone: Any, steady: Any
+) -> Lit:
+    """What one shadow ray brings."""
+    if to is None:
+        return Lit(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
+    wo = frame.to_local(to.d)
+    value, density = evaluate(hit.scatter, wi, wo)
+    # Light may not come through the face when the shading normal says it does not.
+    side = dr.dot(hit.ng, to.d)
+    faces = side * wo.z > 0
+    lit = faces & (dr.max(value) > 0)
+    if steady is not False:
+        # Whatever wi is: what could be lit from some wi is asked for.
+        density = dr.select(steady, steady_density(hit.scatter, hit.ng, to.d), density)
+        lit = dr.select(steady, (side > 0) | (dr.max(hit.scatter.tau) > 0), lit)
+    lit = lit & to.valid & (to.density > 0)
+    weight = 1 / (to.density + dr.select(alone, 0, density))
+    begin = offset(hit.p, dr.select(side > 0, hit.ng, -hit.ng))
+    # Aim again from the moved start: a lamp near by must not shadow itself.
+    aim = hit.p + to.d * to.distance - begin
+    reach = dr.norm(aim)
+    is_near = to.distance < dr.inf
+    way = dr.select(is_near, aim / reach, to.d)
+    far = dr.select(is_near, reach * (1 - 1e-4), dr.inf)
+    clear = stage.transmittance(begin, way, far, lit)
+    strength = dr.select(lit, to.radiance * clear * weight, 0)
+    return Lit(dr.select(lit & faces, value * strength, 0), to.d, strength)
 
 
 def _met(emitters: Emitters, walk: Walk, hit: Hit, only: Only, missed: Any) -> tuple[Any, Any]:
     """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled."""
     by_scatter = walk.last_density > 0
-    # What the camera sees directly needs no choice: the pilot leaves it out.
-    counts = (only.lamp == -1) | (only.outdoor == -1) | by_scatter
 
     def weight(density: Any) -> Any:
         return dr.select(by_scatter, walk.last_density / (walk.last_density + density), 1)
 
-    sun, sun_density = emitters.sun(walk.d, only.outdoor)
-    dome, dome_density = emitters.dome(walk.last_p, walk.d, only.outdoor, missed)
-    # The pilot of a portal counts what is drawn through it only.
-    wanted = (only.outdoor > -2) & (only.outdoor < FIRST_PORTAL)
-    sees_sky = missed & counts & emitters.has_sky & wanted
-    sky = sun * weight(sun_density) + dome * weight(dome_density)
-    glows = hit.valid & counts & (only.lamp > -2) & (hit.lamp != NO_LAMP)
-    glow, lamp_density = emitters.hit_lamp(
-        hit.lamp, dr.norm(hit.p - walk.last_p), dr.dot(walk.d, hit.ng), only.lamp, glows
-    )
-    return (
-        dr.select(sees_sky, walk.beta * sky, 0),
-        dr.select(glows, walk.beta * glow * weight(lamp_density), 0),
-    )
+    # What the camera sees directly needs no choice: the pilot leaves it out.
+    counts = mi.Bool(by_scatter)
+    for asked in only:
+        counts |= False if asked is None else asked == -1
+    outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
+    if only.outdoor is not None:
+        sun, sun_density = emitters.sun(walk.d, only.outdoor)
+        dome, dome_density = emitters.dome(walk.last_p, walk.d, only.outdoor, missed)
+        # The pilot of a portal counts what is drawn through it only.
+        wanted = (only.outdoor > -2) & (only.outdoor < FIRST_PORTAL)
+        sees_sky = missed & counts & emitters.has_sky & wanted
+        sky = sun * weight(sun_density) + dome * weight(dome_density)
+        outdoor = dr.select(sees_sky, walk.beta * sky, 0)
+    if only.lamp is not None:
+        glows = hit.valid & counts & (only.lamp > -2) & (hit.lamp != NO_LAMP)
+        glow, lamp_density = emitters.hit_lamp(
+            hit.lamp, dr.norm(hit.p - walk.last_p), dr.dot(walk.d, hit.ng), only.lamp, glows
+        )
+        indoor = dr.select(glows, walk.beta * glow * weight(lamp_density), 0)
+    return outdoor, indoor
 
 
 def _factor(m: Scatter, value: Any, density: Any, rough: Any, mirror: Any, passed: Any) -> Any:
