@@ -279,7 +279,7 @@ def _path_keys(n: int, seed: int) -> Any:
 def _drawn(rules: Rules, film: Film, n: int, seed: int) -> Chains:
     """n independent paths."""
     found = _paths(rules, film, HashedNumbers(_path_keys(n, seed), mi.UInt32(0)))
-    dr.eval(found)
+    dr.eval(*found)
     return found
 
 
