@@ -70,6 +70,7 @@ def make_app(config: FarmConfig) -> Celery:
         worker_enable_remote_control=False,
         worker_hijack_root_logger=False,
         worker_cancel_long_running_tasks_on_connection_loss=False,
+        broker_transport="workers.broker:Transport",
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,
         visibility_timeout=_VISIBILITY_S,
