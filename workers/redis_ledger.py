@@ -72,6 +72,7 @@ class RedisLedger:
         self.config = config
         self.client = client or redis_client(config)
         self._g = config.prefix
+        self._where = shown_url(config.redis_url.reveal())
         folder = Path(__file__).with_name("lua")
         common = (folder / "common.lua").read_text()
         self._scripts: dict[str, Any] = {
@@ -320,20 +321,19 @@ class RedisLedger:
     @contextmanager
     def errors(self) -> Iterator[None]:
         """Inside: whatever Redis refuses or fails at becomes LedgerUnavailable, one clear line."""
-        where = shown_url(self.config.redis_url.reveal())
         try:
             yield
         except redis.AuthenticationError as error:
-            raise LedgerUnavailable(f"{where} refuses these credentials: {error}") from error
+            raise LedgerUnavailable(f"{self._where} refuses these credentials: {error}") from error
         except redis.exceptions.NoPermissionError as error:
-            raise LedgerUnavailable(f"{where} denies: {error}") from error
+            raise LedgerUnavailable(f"{self._where} denies: {error}") from error
         except (redis.ConnectionError, redis.TimeoutError) as error:
             raise LedgerUnavailable(
-                f"no Redis at {where}: {error}", hint="is it running? PBRS_REDIS_URL names it"
+                f"no Redis at {self._where}: {error}", hint="is it running? PBRS_REDIS_URL names it"
             ) from error
         except redis.exceptions.OutOfMemoryError as error:
             raise LedgerUnavailable(
-                f"{where} is out of memory: {error}", hint="raise maxmemory"
+                f"{self._where} is out of memory: {error}", hint="raise maxmemory"
             ) from error
 
 
