@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from pbrs_farm import keys
-from pbrs_farm.errors import BadHouse
+from pbrs_farm.errors import BadHouse, MachineFailed
 from pbrs_farm.house import House
 from pbrs_farm.recipe import ReadFields
 
@@ -77,14 +77,14 @@ def read_house(source: SourceRef, fields: ReadFields) -> House:
 
         return builtin_home()
     if source.kind == "example":
-        return _read_example(source.location, fields)
+        return _read_example(source, fields)
     if source.kind == "suncg":
         from pbrs_farm.read.suncg import read_suncg
 
+        _check_unchanged(path / "house.json", _bytes(path / "house.json"), source)
         return read_suncg(path.parent.parent, path.name, fields)
     data = _bytes(path)
-    if hashlib.sha256(data).hexdigest() != source.sha256:
-        raise BadHouse(path, "", "changed since the run began", hint="run again")
+    _check_unchanged(path, data, source)
     if source.kind == "gltf":
         from pbrs_farm.read.gltf import read_gltf_file
 
@@ -122,12 +122,22 @@ def _read_object(source: SourceRef, fields: ReadFields) -> House:
     return replace(house, id=source.house_id, is_repaired=True)
 
 
-def _read_example(name: str, fields: ReadFields) -> House:
+def _check_unchanged(path: Path, data: bytes, source: SourceRef) -> None:
+    if keys.sha256(data) != source.sha256:
+        raise BadHouse(path, "", "changed since the run began", hint="run, or submit, again")
+
+
+def _read_example(source: SourceRef, fields: ReadFields) -> House:
     from pbrs_farm import homes
     from pbrs_farm.read.sweethome3d import read_home
 
     package = homes.fetch()
-    data, file = package.home(name)
+    data, file = package.home(source.location)
+    if keys.sha256(data) != source.sha256:
+        raise MachineFailed(
+            f"{package.label} holds another {source.location} than was asked for",
+            hint="another version of the package; `pbrs-farm homes --fetch`",
+        )
     resources = package.resources()
     return read_home(
         data,

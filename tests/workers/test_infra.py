@@ -14,6 +14,7 @@ import subprocess
 import time
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -22,7 +23,6 @@ from tests.store.test_contract import s3_store
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import REPO, SmallFarm
 from workers.client import Farm
-from workers.config import FarmConfig
 
 pytestmark = pytest.mark.infra
 
@@ -70,15 +70,34 @@ def test_s3_refuses_wrong_credentials_and_a_missing_bucket_in_one_line() -> None
         assert "\n" not in str(caught.value)
 
 
-def test_redis_with_tls_and_an_acl_user() -> None:
-    url = os.environ.get("PBRS_TEST_TLS_REDIS")
+class _SomebodysRedis(RedisServer):
+    """A Redis that is there already; only its URL matters."""
+
+    url = ""
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+
+
+def test_a_farm_over_tls_with_an_acl_user(tmp_path: Path) -> None:
+    url, ca = os.environ.get("PBRS_TEST_TLS_REDIS"), os.environ.get("PBRS_FARM_REDIS_CA", "")
     if not url:
         pytest.skip("PBRS_TEST_TLS_REDIS is not set")
-    config = FarmConfig(redis_url=Secret(url), redis_ca=os.environ["PBRS_FARM_REDIS_CA"])
-    farm = Farm(config)
-    farm.ledger.ping()
-    assert farm.ledger.lead("test")
-    farm.ledger.resign("test")
+    farm = SmallFarm(tmp_path, _SomebodysRedis(url), redis_ca=ca)
+    farm.farm = Farm(replace(farm.farm.config, redis_ca=ca))
+    try:
+        farm.coordinator()
+        farm.worker("tls", slots=2)
+        farm.submit(3)
+        farm.wait_done(60)
+        farm.check_complete(n_repeats=0)
+        password = urlsplit(url).password or ""
+        assert password
+        assert all(password not in log.read_text() for log in tmp_path.glob("*.log"))
+    finally:
+        if farm.job:
+            farm.farm.ledger.forget(farm.job)
+        farm.close()
 
 
 @pytest.mark.parametrize("words", [[], ["-f", "docker/compose.s3.yaml"]])
