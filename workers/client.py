@@ -29,6 +29,7 @@ from workers.ids import (
     failed_key,
     job_key,
     log_key,
+    queue_of,
     task_from_text,
 )
 from workers.ledger import JobView
@@ -44,6 +45,8 @@ _LETTERS = {
     "l": "loaded, its house not admitted yet", "w": "ready", "q": "queued", "r": "running",
     "d": "done", "f": "failed for good", "x": "cancelled",
 }  # fmt: skip
+_WAITING = {_LETTERS[letter] for letter in "lwq"}
+_ALIVE_S = 45.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,11 +164,11 @@ class Farm:
             "eta_s": max((s.eta_s for s in stages if s.eta_s is not None), default=None),
             "failures": _with_prefix(view.counts, "failures:"),
             "handed_back": _with_prefix(view.counts, "handed_back:"),
-            "workers": len([w for w in workers if w.age_s < 45]),
+            "workers": len([w for w in workers if w.age_s < _ALIVE_S]),
             "refusing": [
                 {"worker": w.name, "why": w.fields["refuses"]}
                 for w in workers
-                if w.age_s < 45 and job in w.fields.get("refuses", "")
+                if w.age_s < _ALIVE_S and job in w.fields.get("refuses", "")
             ],
             "storage": self.registry.breaker() or "ok",
         }
@@ -175,6 +178,7 @@ class Farm:
 
         Says in words what each waits for. Raises BadInput when the job has no such house.
         """
+        view = self.view(job)
         house, _, rest = text.partition("/")
         states = self.ledger.unit_states(job, house)
         if not states:
@@ -190,7 +194,11 @@ class Farm:
             units = {holding[0]: units[holding[0]]}
         elif wanted:
             units = {wanted: units[wanted]}
-        return [self._why_unit(job, house, u, at, groups) for u, at in sorted(units.items())]
+        rows = [self._why_unit(job, house, u, at, groups) for u, at in sorted(units.items())]
+        for row in rows:
+            if row["state"] in _WAITING and (hindered := self._hindrance(view, row["task"])):
+                row["because"] = hindered
+        return rows
 
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
         """The stored log of a task's attempt (the last one by default); BadInput when none."""
@@ -281,6 +289,24 @@ class Farm:
         if not state:
             raise BadInput(job, "", "not in the ledger", hint="`recover` rebuilds it from storage")
         return state
+
+    def _hindrance(self, view: JobView, task: str) -> str:
+        """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
+        stage = task_from_text(task).stage
+        if view.state != "running":
+            return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
+        if sick := self.registry.breaker():
+            return f"storage is sick: {sick}"
+        queue = queue_of(stage, gpu=view.fields.get("gpu") == "1")
+        takers = [
+            w for w in self.registry.workers()
+            if w.age_s < _ALIVE_S and queue in w.fields.get("queues", "").split(",")
+        ]  # fmt: skip
+        if not takers:
+            return f"no worker takes {queue}"
+        if all(w.fields.get("drain") == "1" for w in takers):
+            return f"every worker that takes {queue} is leaving"
+        return ""
 
     def _why_not_admitted(self, job: str, house: str) -> list[dict[str, Any]]:
         from workers.job import houses_from_lines

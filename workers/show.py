@@ -47,6 +47,8 @@ def why_text(rows: Sequence[Mapping[str, Any]]) -> str:
             if name in row:
                 value = row[name]
                 lines.append(f"    {name}: {' '.join(value) if name == 'views' else value}")
+        if "because" in row:
+            lines.append(f"    {row['because']}")
         if "fault" in row:
             fault = row["fault"]
             lines.append(f"    {fault['fault']} on {fault['worker']}: {fault['message']}")

@@ -74,6 +74,26 @@ def test_status_counts_what_runs_and_why_says_what_waits(farm: Farm) -> None:
         farm.why(d.job.job_id, "h0/zzz")
 
 
+def test_why_says_what_keeps_a_task_from_running(farm: Farm) -> None:
+    d = submit(farm)
+    job = d.job.job_id
+    d.feed()
+
+    def because() -> str:
+        (row,) = farm.why(job, "h0")
+        return str(row.get("because", ""))
+
+    assert because() == "no worker takes geometry"
+    farm.registry.beat()
+    assert because() == ""
+    assert farm.registry.drain("w1")
+    assert because() == "every worker that takes geometry is leaving"
+    farm.registry.storage_sick("disk full")
+    assert because() == "storage is sick: disk full"
+    farm.pause(job)
+    assert because() == "the job is paused: by hand"
+
+
 def test_failures_alike_stand_together(farm: Farm) -> None:
     d = submit(farm)
     for number, task in enumerate(d.feed()):
