@@ -10,7 +10,6 @@ the recipe's models: `status` is asked often, of machines that are busy.
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -23,30 +22,21 @@ from pbrs_farm.errors import BadInput, MachineFailed, ObjectMissing
 from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig
 from workers.ids import (
-    WHOLE,
-    TaskId,
     check_job_id,
     failed_key,
     job_key,
     log_key,
-    queue_of,
     task_from_text,
 )
 from workers.ledger import JobView
 from workers.rates import stage_views
 from workers.redis_ledger import RedisLedger
-from workers.registry import Registry
+from workers.registry import ALIVE_S, Registry
+from workers.why import why
 
 if TYPE_CHECKING:
     from pbrs_farm.recipe import Recipe
     from workers.job import HouseEntry, JobSpec
-
-_LETTERS = {
-    "l": "loaded, its house not admitted yet", "w": "ready", "q": "queued", "r": "running",
-    "d": "done", "f": "failed for good", "x": "cancelled",
-}  # fmt: skip
-_WAITING = {_LETTERS[letter] for letter in "lwq"}
-_ALIVE_S = 45.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,11 +154,11 @@ class Farm:
             "eta_s": max((s.eta_s for s in stages if s.eta_s is not None), default=None),
             "failures": _with_prefix(view.counts, "failures:"),
             "handed_back": _with_prefix(view.counts, "handed_back:"),
-            "workers": len([w for w in workers if w.age_s < _ALIVE_S]),
+            "workers": len([w for w in workers if w.age_s < ALIVE_S]),
             "refusing": [
                 {"worker": w.name, "why": w.fields["refuses"]}
                 for w in workers
-                if w.age_s < _ALIVE_S and job in w.fields.get("refuses", "")
+                if w.age_s < ALIVE_S and job in w.fields.get("refuses", "")
             ],
             "storage": self.registry.breaker() or "ok",
         }
@@ -178,27 +168,8 @@ class Farm:
 
         Says in words what each waits for. Raises BadInput when the job has no such house.
         """
-        view = self.view(job)
-        house, _, rest = text.partition("/")
-        states = self.ledger.unit_states(job, house)
-        if not states:
-            return self._why_not_admitted(job, house)
-        groups = self.ledger.groups(job, house)
-        units = {u: at for u, at in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
-        units = {u: at for u, at in units.items() if ":" in at}
-        wanted = rest.partition("/")[0]
-        if wanted and wanted not in units:
-            holding = [str(k) for k, views in enumerate(groups) if wanted in views]
-            if not holding:
-                raise BadInput(text, "", "the job has no such task or view")
-            units = {holding[0]: units[holding[0]]}
-        elif wanted:
-            units = {wanted: units[wanted]}
-        rows = [self._why_unit(job, house, u, at, groups) for u, at in sorted(units.items())]
-        for row in rows:
-            if row["state"] in _WAITING and (hindered := self._hindrance(view, row["task"])):
-                row["because"] = hindered
-        return rows
+        rows = why(self.ledger, self.registry, self.view(job), text)
+        return rows or self._why_not_admitted(job, text.partition("/")[0])
 
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
         """The stored log of a task's attempt (the last one by default); BadInput when none."""
@@ -290,24 +261,6 @@ class Farm:
             raise BadInput(job, "", "not in the ledger", hint="`recover` rebuilds it from storage")
         return state
 
-    def _hindrance(self, view: JobView, task: str) -> str:
-        """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
-        stage = task_from_text(task).stage
-        if view.state != "running":
-            return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
-        if sick := self.registry.breaker():
-            return f"storage is sick: {sick}"
-        queue = queue_of(stage, gpu=view.fields.get("gpu") == "1")
-        takers = [
-            w for w in self.registry.workers()
-            if w.age_s < _ALIVE_S and queue in w.fields.get("queues", "").split(",")
-        ]  # fmt: skip
-        if not takers:
-            return f"no worker takes {queue}"
-        if all(w.fields.get("drain") == "1" for w in takers):
-            return f"every worker that takes {queue} is leaving"
-        return ""
-
     def _why_not_admitted(self, job: str, house: str) -> list[dict[str, Any]]:
         from workers.job import houses_from_lines
 
@@ -315,25 +268,6 @@ class Farm:
         if all(entry.house_id != house for entry in houses_from_lines(data)):
             raise BadInput(house, "", "the job has no such house")
         return [{"task": house, "state": "its house is not admitted yet"}]
-
-    def _why_unit(
-        self, job: str, house: str, unit: str, at: str, groups: tuple[tuple[str, ...], ...]
-    ) -> dict[str, Any]:
-        stage, _, letter = at.partition(":")
-        task = str(TaskId(house, unit, stage))
-        facts = self.ledger.task_facts(job, task)
-        row: dict[str, Any] = {"task": task, "state": _LETTERS.get(letter, letter)}
-        if unit.isdigit():
-            row["views"] = list(groups[int(unit)])
-        if letter == "w" and "not_before" in facts:
-            row["state"] = "waits before it is tried again"
-        if "claim" in facts:
-            _token, row["worker"], since = facts["claim"].split("|")
-            row["for_s"] = round(self.ledger.now() - float(since), 1)
-        row |= {name: facts[name] for name in ("attempts", "tried") if name in facts}
-        if "fault" in facts:
-            row["fault"] = json.loads(facts["fault"])
-        return row
 
 
 # A submission that takes longer has died; the next one starts afresh.

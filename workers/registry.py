@@ -14,6 +14,8 @@ from workers.ledger import WorkerView
 from workers.redis_ledger import RedisLedger
 
 _GONE_S = 3600.0
+ALIVE_S = 45.0
+"""A worker seen no longer ago than this is there."""
 
 
 class Registry:
@@ -85,7 +87,7 @@ class Registry:
             key=lambda worker: worker.name,
         )
 
-    def slots(self, *, alive_s: float = 45.0) -> dict[str, int]:
+    def slots(self, *, alive_s: float = ALIVE_S) -> dict[str, int]:
         """Stage -> tasks that workers seen in the last alive_s seconds can run at once."""
         slots: dict[str, int] = {}
         for worker in self.workers():
