@@ -225,7 +225,11 @@ def test_a_house_that_hangs(tmp_path: Path) -> None:
         seconds = farm.wait_done(120)
         assert farm.farm.view(farm.job).counts["failures:silent"] == 6
         assert farm.farm.view(farm.job).counts["houses:quarantined"] == 1
-        note("a house that hangs (silence limit 2 s)", farm, 4, seconds)
+        (farm.control / "hang.h002").unlink()
+        assert len(farm.farm.retry(farm.job)) == 2
+        farm.wait_done(60)
+        farm.check_complete(n_repeats=8)
+        note("a house that hangs (silence limit 2 s), then retry", farm, 4, seconds)
     finally:
         farm.close()
         server.end()
