@@ -7,6 +7,7 @@ numpy, celery or mitsuba (coordinator and worker do, when they start).
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from collections.abc import Callable
@@ -29,7 +30,11 @@ def add_verbs(verb: Verb) -> None:
 
     p = farm_verb("status", _status, "how far a job is: stages, rate, time left, workers")
     _add_job(p)
-    p.add_argument("--watch", action="store_true", help="again every two seconds, to the end")
+    p.add_argument(
+        "--watch",
+        action="store_true",
+        help="again every two seconds, to the end (--json: a line each)",
+    )
     p = farm_verb("why", _why, "what a task, a house or a view waits for")
     p.add_argument("task", help="HOUSE, HOUSE/VIEW or HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
@@ -90,9 +95,13 @@ def _status(args: argparse.Namespace) -> int:
     farm, job = _farm_and_job(args)
     while True:
         status = farm.status(job)
-        if args.watch and sys.stdout.isatty():
-            sys.stdout.write("\x1b[H\x1b[2J")
-        _show(args, status, lambda s=status: status_text(s))  # type: ignore[misc]
+        if args.watch and args.json:
+            say(json.dumps(status, sort_keys=True))
+        elif args.watch and sys.stdout.isatty():
+            say(f"\x1b[H\x1b[2J{status_text(status)}")
+        else:
+            _show(args, status, lambda s=status: status_text(s))  # type: ignore[misc]
+        sys.stdout.flush()
         if not args.watch or status["state"] in ("done", "cancelled"):
             return 0
         time.sleep(2.0)
