@@ -11,7 +11,7 @@ import time
 import traceback
 
 DEFAULT = ("demo", "view", "houses", "cameras", "labels", "gl", "lux", "selection")
-OWN_TARGET = ("light", "cycles", "farm")
+OWN_TARGET = ("light", "presets", "cycles", "farm")
 
 
 def main(names: list[str]) -> int:
