@@ -91,12 +91,12 @@ def _verify_light(args: argparse.Namespace) -> int:
 
     variant, claims = choose_variant(), []
     if not args.json:
-        say(f"{'':<5}{'claim':<63}{'measured':<34}expected")
+        say(f"{'':<5}{'claim':<63}{'measured':<48}expected")
     for claim in light_claims(variant):
         claims.append(claim)
         if not args.json:
             verdict = "ok" if claim.passed else "FAIL"
-            say(f"{verdict:<5}{claim.text:<63}{claim.measured:<34}{claim.expected}")
+            say(f"{verdict:<5}{claim.text:<63}{claim.measured:<48}{claim.expected}")
     n_failed = sum(not claim.passed for claim in claims)
     if args.json:
         rows = [asdict(claim) for claim in claims]
