@@ -110,7 +110,9 @@ class LightFields(_Group):
     chains: int = Field(32768, ge=16, description="Markov chains of `metropolis`, in parallel")
     large_step: float = Field(0.3, gt=0, lt=1, description="chance of a fresh path, Kelemen 2002")
     tail_pixels: int = Field(
-        64, ge=0, description="pixels that a Metropolis path's tail is shown to; 0 = its own alone"
+        1024,
+        ge=0,
+        description="pixels that a Metropolis path's tail is shown to; 0 = its own alone",
     )
     denoise: bool = True
 

@@ -167,7 +167,7 @@ class LightScene:
             halves[group] = rest.halves
             n_bad += rest.n_bad
             facts[group.value] = {
-                "mean_luminance": rest.b,
+                "mean_luminance": rest.mean_luminance,
                 "acceptance": round(rest.acceptance, 4),
                 "mutations": rest.n_mutations,
             }
@@ -178,7 +178,11 @@ class LightScene:
                 mode="light",
                 seed=seed,
             )
-        facts |= {"integrator": "pssmlt-camera", "large_step": fields.large_step}
+        facts |= {
+            "integrator": "pssmlt-camera",
+            "large_step": fields.large_step,
+            "tail_pixels": fields.tail_pixels,
+        }
         return joined_result(direct if is_separate else None, direct, halves, n_bad, facts, fields)
 
     def floor_lux(self, house: House, *, seed: int = 0) -> dict[str, dict[str, float]]:

@@ -20,7 +20,7 @@ Glass, mirrors or cut-outs between x1 and x2, or a mirror at x1, leave a path to
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -36,6 +36,7 @@ from pbrs_farm.transport.walk import (
     FieldsRow,
     Found,
     Only,
+    Rules,
     Walk,
     advance,
     start,
@@ -48,6 +49,25 @@ _LANES_PER_LAUNCH: Final = 1 << 22
 _NEVER: Final = 0xFFFFFFFF
 
 
+class Standing(Protocol):
+    """Where N chains stand (chains.Chains)."""
+
+    @property
+    def pixel(self) -> Any:
+        """(N,) UInt32."""
+        ...
+
+    @property
+    def is_shared(self) -> Any:
+        """(N,) Bool: whether the path's tail can be shown elsewhere."""
+        ...
+
+    @property
+    def tails(self) -> Any:
+        """(TAIL_FLOATS * N,), number by number."""
+        ...
+
+
 class Groups(NamedTuple):
     """The pixels dealt into groups of n. slots: (pixels,) place of each; pixels: (slots,) of each,
     _NEVER = none; a group's slots are neighbours."""
@@ -57,7 +77,7 @@ class Groups(NamedTuple):
     n: int
 
 
-def deal(width: int, height: int, n: int, seed: int) -> Groups:
+def deal(height: int, width: int, n: int, seed: int) -> Groups:
     """Random groups of about n pixels, each of up to four blocks: a tail that only a few places see
     finds them beside its own pixel, one that all see is shown all over the picture."""
     side = max(1 << (max(n // 4, 1).bit_length() - 1) // 2, 1)
@@ -80,15 +100,7 @@ def deal(width: int, height: int, n: int, seed: int) -> Groups:
     )
 
 
-def first_vertices(
-    stage: Stage,
-    emitters: Emitters,
-    fields: FieldsRow,
-    camera: CameraRow,
-    film: Film,
-    n_pixels: int,
-    seed: int,
-) -> Any:
+def first_vertices(rules: Rules, film: Film, n_pixels: int, seed: int) -> Any:
     """(pixels * 28,) floats: a head of each pixel through a random place in it.
 
     Invalid where a pixel does not see a rough surface first.
@@ -96,7 +108,7 @@ def first_vertices(
     key = stream_key(dr.arange(mi.UInt32, n_pixels), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     numbers = HashedNumbers(key, dr.opaque(mi.UInt32, 7))
     rows = dr.zeros(mi.Float, n_pixels * _HEAD_PACKETS * 4)
-    _trace_heads(stage, emitters, fields, camera, film, numbers, rows)
+    _trace_heads(rules.stage, rules.emitters, rules.fields, rules.camera, film, numbers, rows)
     dr.eval(rows)
     return rows
 
@@ -181,29 +193,21 @@ def close_tail(tail: Any, light: Any, beyond: Any, active: Any) -> None:
 
 
 def show_tails(
-    stage: Stage,
-    film: Film,
-    heads: Any,
-    groups: Groups,
-    tails: Any,
-    pixel: Any,
-    is_shared: Any,
-    weight: Any,
+    stage: Stage, film: Film, heads: Any, groups: Groups, chains: Standing, weight: Any
 ) -> None:
     """Splat every chain's tail at all heads of its pixel's group.
 
-    heads: rows of first_vertices(); tails: (36 * N,) of N chains; pixel, is_shared: (N,)
-    where each stands and whether its tail can be shown elsewhere; weight: what each has to splat.
+    heads: rows of first_vertices(); weight: what each chain has to splat.
     """
-    chosen = dr.compress(is_shared)
+    chosen = dr.compress(chains.is_shared)
     n_chains = dr.width(chosen)
-    tails = _rows(tails, dr.width(pixel))
+    tails = _rows(chains.tails, dr.width(chains.pixel))
     per_launch = max(_LANES_PER_LAUNCH // groups.n, 1)
     for first in range(0, n_chains, per_launch):
         some = dr.arange(mi.UInt32, min(per_launch, n_chains - first))
         chain = dr.gather(mi.UInt32, chosen, some + dr.opaque(mi.UInt32, first))
         dr.eval(chain)
-        _show(stage, film, heads, groups, tails, pixel, chain, weight)
+        _show(stage, film, heads, groups, tails, chains.pixel, chain, weight)
 
 
 def _rows(tails: Any, n: int) -> Any:

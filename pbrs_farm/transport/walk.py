@@ -104,6 +104,17 @@ class Found(NamedTuple):
     steady: Any
 
 
+class Rules(NamedTuple):
+    """What is asked of every path: the scene, the emitters that count, from how many segments."""
+
+    stage: Stage
+    emitters: Emitters
+    camera: CameraRow
+    fields: FieldsRow
+    only: Only
+    segments: Any
+
+
 class Lit(NamedTuple):
     """What one shadow ray brought: light scattered along the path, before throughput.
 
