@@ -166,9 +166,7 @@ def _check(config: FarmConfig | Limits, prefix: str) -> None:
         value, above = getattr(config, f.name), f.metadata.get("above")
         if above is not None and not value > above:
             name = f"{prefix}{f.name.upper()}"
-            raise BadInput(
-                "environment", name, f"{value} is too little, more than {above:g} is not"
-            )
+            raise BadInput("environment", name, f"expected more than {above:g}, got {value}")
 
 
 def _secret(env: Mapping[str, str], name: str) -> str:

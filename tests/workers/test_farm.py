@@ -121,7 +121,15 @@ def test_no_secret_stands_on_a_command_line_or_in_a_log() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("PBRS_FARM_SLOTS", "many"), ("PBRS_FARM_NONSENSE", "1")]
+    ("name", "value"),
+    [
+        ("PBRS_FARM_SLOTS", "many"),
+        ("PBRS_FARM_SLOTS", "0"),
+        ("PBRS_FARM_LIMITS_LIGHT_S", "-1"),
+        ("PBRS_FARM_QUEUES", "light,gpu"),
+        ("PBRS_FARM_NONSENSE", "1"),
+        ("PBRS_FARM_STORE_URL", "memory:"),
+    ],
 )
 def test_a_setting_that_is_none_is_one_line(name: str, value: str) -> None:
     with pytest.raises(BadInput, match=name) as caught:
