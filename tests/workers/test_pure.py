@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ from pbrs_farm.recipe import recipe_from_name
 from pbrs_farm.store import MemoryStore
 from tests.workers.conftest import spec
 from workers.client import completed, new_spec
+from workers.config import FarmConfig, Limits
 from workers.estimate import estimate, seconds_per_view
 from workers.faults import class_of, fingerprint, without_numbers
 from workers.groups import groups_from_views
@@ -179,6 +181,14 @@ def test_a_job_is_the_same_job_in_any_order_and_another_with_another_recipe() ->
         completed([*houses, houses[0]], preview)
     with pytest.raises(BadInput, match="no house"):
         completed([], preview)
+
+
+def test_every_setting_stands_in_the_docs() -> None:
+    docs = (Path(__file__).parents[2] / "docs/farm.md").read_text()
+    elsewhere = {"redis_url", "store_url", "store", "limits"}
+    names = {f"_{f.name.upper()}" for f in fields(FarmConfig) if f.name not in elsewhere}
+    names |= {f"_{f.name.upper()}" for f in fields(Limits)}
+    assert sorted(n for n in names if f"{n}`" not in docs) == []
 
 
 def test_durations_read_well() -> None:
