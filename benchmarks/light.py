@@ -1,15 +1,23 @@
 """Light transport: path, Metropolis and the denoiser at equal CPU time, scene by scene.
 
-Every engine runs in this process on the same scene; errors are against a path-traced reference of
-another seed. CPU time counts all threads. Ratios below 1 favour Metropolis. `light.png` shows path,
-Metropolis and the reference of each scene, one under the other.
+Every engine runs in this process on the same scene; CPU time is that of all threads. For each
+scene: Metropolis with its usual settings and MUTATIONS a pixel, then `path` with as many samples
+as fit into the same CPU time; both twice, with other seeds. Errors are against a long path-traced
+reference of another seed; the noise of that reference counts against both. relMSE = mean over
+pixels of (y - ref)^2 / (ref^2 + 1e-3 mean(ref)^2) of luminance. Ratios are Metropolis over path,
+below 1 favours Metropolis: `relmse_ratio` of relMSE, `median_ratio` of the median pixel's error.
+`fast_times_cheaper`: CPU time of Metropolis over that of recipe `fast` (path and denoiser) for the
+error `fast` reaches.
+
+`light.png`: path, Metropolis and reference of each room, one under the other. `techniques.png`: the
+paper's comparison of rendering techniques on a home: path, Metropolis with 16 and with 512 direct
+samples at equal CPU time, and a crop of each, enlarged.
 """
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,11 +38,21 @@ from pbrs_farm.transport.sky import Sky, dark_sky, sky_for_house, sunsky
 from pbrs_farm.transport.tone import tone
 from tests.transport import hard_rooms
 
-SIZE = (96, 72)
-REFERENCE_SPP = 8192
-PATH_SPP = 256
-MUTATIONS = 512
-HOMES = ("2BedroomApartment", "Studio")
+SIZE = (64, 48)
+ROOM_REFERENCE_SPP, HARD_REFERENCE_SPP, HOME_REFERENCE_SPP = 8192, 32768, 2048
+MUTATIONS, DIRECT_SPP = 128, 128
+CHAINS = 16384
+HOMES = ("2BedroomApartment", "Studio", "3BedroomApartment")
+CAMERAS_PER_HOME = 2
+PLAIN = LightFields(filter="box", denoise=False)
+METROPOLIS = PLAIN.model_copy(
+    update={
+        "integrator": "metropolis",
+        "direct_spp": DIRECT_SPP,
+        "mutations_per_pixel": MUTATIONS,
+        "chains": CHAINS,
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,114 +62,159 @@ class Shot:
     key: str
     scene: LightScene
     camera: Camera
+    reference_spp: int
 
 
 def main() -> None:
-    """Measure, print and write out/bench/light.json and light.png."""
+    """Measure, print and write out/bench/light.json, light.png and techniques.png."""
     figures: dict[str, Any] = {}
-    units: dict[str, str] = {}
     rows = []
-    for make in (*_room_makers(), *_home_makers()):
+    for make in _room_makers():
         shot = make()
         found, row = _compared(shot)
         rows.append(row)
-        for name, value in found.items():
-            figures[f"light.{shot.key}_{name}"] = round(value, 4)
-            units[f"light.{shot.key}_{name}"] = "s CPU" if name.endswith("_s") else "-"
-    figures["light.mutation_cost"] = round(_mutation_cost(), 3)
+        figures |= {f"light.{shot.key}_{name}": value for name, value in found.items()}
+    _write_rows(rows, "light.png", 3)
+    ratios = []
+    for number, shot in enumerate(_home_shots()):
+        found, _row = _compared(shot)
+        ratios.append(found["relmse_ratio"])
+        figures |= {f"light.{shot.key}_{name}": value for name, value in found.items()}
+        if number == 0:
+            _write_rows(_techniques(shot), "techniques.png", 2)
+    figures["light.homes_relmse_ratio_median"] = float(np.median(ratios))
+    figures["light.mutation_cost"] = _mutation_cost()
+    figures["light.compiled_by_another_camera"] = _compiled_by_another_camera()
+    units = {name: "s CPU" if name.endswith("_s") else "-" for name in figures}
     units["light.mutation_cost"] = "path samples of the same depth"
-    _write_picture(rows)
-    write_report("light", figures, units)
+    units["light.compiled_by_another_camera"] = "kernels"
+    write_report("light", {k: round(v, 4) for k, v in figures.items()}, units)
 
 
 def _room_makers() -> list[Callable[[], Shot]]:
     recipe = Recipe()
     sun = sunsky(recipe, elevation_rad=0.6, azimuth_rad=0.35)
 
-    def shot(key: str, room: tuple[House, Camera], sky: Sky) -> Shot:
-        return Shot(key, LightScene.load(room[0], {}, recipe, sky), room[1])
+    def shot(key: str, room: tuple[House, Camera], sky: Sky, spp: int) -> Shot:
+        scene = LightScene.load(room[0], {}, recipe, sky)
+        return Shot(key, scene, room[1].with_size(*SIZE), spp)
 
     return [
-        lambda: shot("door", hard_rooms.door_ajar(), dark_sky()),
-        lambda: shot("globe", hard_rooms.glass_globe(), dark_sky()),
-        lambda: shot("sunlit", hard_rooms.sunlit(), sun),
-        lambda: shot("shade", hard_rooms.open_shade(), dark_sky()),
+        lambda: shot("door", hard_rooms.door_ajar(), dark_sky(), HARD_REFERENCE_SPP),
+        lambda: shot("globe", hard_rooms.glass_globe(), dark_sky(), ROOM_REFERENCE_SPP),
+        lambda: shot("sunlit", hard_rooms.sunlit(), sun, ROOM_REFERENCE_SPP),
+        lambda: shot("shade", hard_rooms.open_shade(), dark_sky(), HARD_REFERENCE_SPP),
     ]
 
 
-def _home_makers() -> list[Callable[[], Shot]]:
-    def shot(name: str) -> Shot:
-        from pbrs_farm.farm.loaded import decoded_textures
-        from pbrs_farm.farm.sources import read_house, resolve
-        from pbrs_farm.repair import repair
-        from pbrs_farm.transport.caster import Caster
+def _home_shots() -> Iterator[Shot]:
+    """The first stored cameras of the example homes."""
+    from pbrs_farm.farm.loaded import decoded_textures
+    from pbrs_farm.farm.sources import read_house, resolve
+    from pbrs_farm.repair import repair
+    from pbrs_farm.transport.caster import Caster
 
-        recipe = Recipe()
+    recipe = Recipe()
+    for name in HOMES:
         house, _report = repair(
             read_house(resolve(name), recipe.read),
             recipe.repair,
             occluder_from=lambda h: Caster(geometry_from_house(h)),
         )
-        scene = LightScene.load(
-            house, decoded_textures(house), recipe, sky_for_house(recipe, house.id)
-        )
-        stored = house.cameras[0]
-        camera = Camera.look(
-            Intrinsics.from_hfov(*SIZE, stored.hfov_rad), stored.eye, stored.towards
-        )
-        return Shot(name.lower(), scene, camera)
-
-    return [lambda name=name: shot(name) for name in HOMES]  # type: ignore[misc]
+        textures, _problems = decoded_textures(house)
+        scene = LightScene.load(house, textures, recipe, sky_for_house(recipe, house.id))
+        for number, stored in enumerate(house.cameras[:CAMERAS_PER_HOME]):
+            intrinsics = Intrinsics.from_hfov(*SIZE, stored.hfov_rad)
+            camera = Camera.look(intrinsics, stored.eye, stored.towards)
+            yield Shot(f"{name.lower()}_{number}", scene, camera, HOME_REFERENCE_SPP)
 
 
-def _compared(shot: Shot) -> tuple[dict[str, float], list[NDArray[np.uint8]]]:
+def _compared(shot: Shot) -> tuple[dict[str, float], list[NDArray[np.float64]]]:
     """Figures of one shot, and its pictures: path, Metropolis, reference."""
-    camera = shot.camera.with_size(*SIZE)
-    plain = LightFields(filter="box", denoise=False)
-    markov = plain.model_copy(
-        update={
-            "integrator": "metropolis",
-            "direct_spp": 16,
-            "mutations_per_pixel": MUTATIONS,
-            "chains": 4096,
-        }
-    )
-    reference, _s = _timed(shot, camera, plain.model_copy(update={"spp": REFERENCE_SPP}), seed=999)
-    path, path_s = _timed(shot, camera, plain.model_copy(update={"spp": PATH_SPP}), seed=1)
-    chains, chains_s = _timed(shot, camera, markov, seed=1)
-    began = time.process_time()
-    clean = denoise(path)
-    clean_s = path_s + time.process_time() - began
-
+    reference, _s = _timed(shot, PLAIN.model_copy(update={"spp": shot.reference_spp}), seed=999)
     truth = _sum(reference)
-    error = {k: _relative_square(_sum(r), truth) for k, r in (("path", path), ("mlt", chains))}
-    cleaned = float(np.mean(_relative_square(_sum(clean), truth)))
+    chains = [_timed(shot, METROPOLIS, seed=k) for k in (1, 2)]
+    chains_s = float(np.mean([s for _r, s in chains]))
+    _trial, trial_s = _timed(shot, PLAIN.model_copy(update={"spp": 256}), seed=3)
+    equal = PLAIN.model_copy(update={"spp": max(round(256 * chains_s / trial_s), 1)})
+    paths = [_timed(shot, equal, seed=k) for k in (1, 2)]
+    path_s = float(np.mean([s for _r, s in paths]))
+    fast, fast_s = _timed(shot, PLAIN.model_copy(update={"spp": 64}), seed=4)
+    began = time.process_time()
+    clean = denoise(fast)
+    fast_s += time.process_time() - began
+
+    errors = [
+        np.array([_relative_square(_sum(r), truth) for r, _s in some]) for some in (chains, paths)
+    ]
+    times = chains_s / path_s
+    fast_error = float(_relative_square(_sum(clean), truth).mean())
     found = {
         "path_s": path_s,
         "metropolis_s": chains_s,
-        "path_relmse": float(error["path"].mean()),
-        "metropolis_relmse": float(error["mlt"].mean()),
-        "relmse_ratio": float(error["mlt"].mean() * chains_s / (error["path"].mean() * path_s)),
-        "median_ratio": math.sqrt(
-            float(np.median(error["mlt"])) * chains_s / (float(np.median(error["path"])) * path_s)
-        ),
-        "denoised_relmse": cleaned,
-        "denoised_times_cheaper": float(error["mlt"].mean()) * chains_s / (cleaned * clean_s),
+        "path_spp": float(equal.spp),
+        "path_relmse": float(errors[1].mean()),
+        "metropolis_relmse": float(errors[0].mean()),
+        "relmse_ratio": float(errors[0].mean() / errors[1].mean() * times),
+        "median_ratio": float(np.sqrt(np.median(errors[0]) / np.median(errors[1]) * times)),
+        "fast_relmse": fast_error,
+        "fast_s": fast_s,
+        "fast_times_cheaper": float(errors[0].mean()) * chains_s / (fast_error * fast_s),
     }
-    print(f"{shot.key}: {found}", flush=True)
-    tones = Recipe().tone
-    return found, [tone(_sum(r), tones) for r in (path, chains, reference)]
+    print(shot.key, {k: round(v, 4) for k, v in found.items()}, flush=True)
+    return found, [_sum(paths[0][0]), _sum(chains[0][0]), truth]
 
 
-def _timed(
-    shot: Shot, camera: Camera, fields: LightFields, *, seed: int
-) -> tuple[LightResult, float]:
+def _techniques(shot: Shot) -> list[list[NDArray[np.float64]]]:
+    """Rows of pictures: path, Metropolis with 16 and 512 direct samples; below, a crop of each."""
+    size = (2 * SIZE[0], 2 * SIZE[1])
+    shot = Shot(shot.key, shot.scene, shot.camera.with_size(*size), 0)
+    few = METROPOLIS.model_copy(update={"direct_spp": 16, "mutations_per_pixel": 64})
+    many = few.model_copy(update={"direct_spp": 512})
+    _r, few_s = _timed(shot, few, seed=1)
+    result_many, many_s = _timed(shot, many, seed=1)
+    more = max(round(64 * many_s / few_s), 1)
+    result_few, _s = _timed(shot, few.model_copy(update={"mutations_per_pixel": more}), seed=1)
+    _r, path_s = _timed(shot, PLAIN.model_copy(update={"spp": 64}), seed=1)
+    equal = PLAIN.model_copy(update={"spp": max(round(64 * many_s / path_s), 1)})
+    result_path, _s = _timed(shot, equal, seed=1)
+    pictures = [_sum(r) for r in (result_path, result_few, result_many)]
+    print(f"techniques: {many_s:.1f} s CPU each; path {equal.spp} samples, 16 direct with {more}"
+          " mutations, 512 direct with 64", flush=True)  # fmt: skip
+    h, w = size[1], size[0]
+    crops = [p[h // 2 : h // 2 + h // 3, w // 3 : w // 3 + w // 3] for p in pictures]
+    return [pictures, [c.repeat(3, 0).repeat(3, 1)[:h, :w] for c in crops]]
+
+
+def _timed(shot: Shot, fields: LightFields, *, seed: int) -> tuple[LightResult, float]:
     """(result, CPU seconds of all threads); kernels are compiled before the clock starts."""
     few = {"spp": 1, "direct_spp": 1, "mutations_per_pixel": 1}
-    shot.scene.render(camera, "-", fields.model_copy(update=few), seed)
+    shot.scene.render(shot.camera, "-", fields.model_copy(update=few), seed)
     began = time.process_time()
-    result = shot.scene.render(camera, "-", fields, seed)
+    result = shot.scene.render(shot.camera, "-", fields, seed)
     return result, time.process_time() - began
+
+
+def _compiled_by_another_camera() -> float:
+    """Kernels that a second camera of a loaded home compiles, both integrators."""
+    import drjit as dr
+
+    house, camera = hard_rooms.sunlit()
+    scene = LightScene.load(
+        house, {}, Recipe(), sunsky(Recipe(), elevation_rad=0.6, azimuth_rad=0.35)
+    )
+    few = METROPOLIS.model_copy(update={"mutations_per_pixel": 8, "direct_spp": 1})
+    fields = (PLAIN.model_copy(update={"spp": 1}), few)
+    for some in fields:
+        scene.render(camera.with_size(*SIZE), "-", some, 1)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for some in fields:
+            scene.render(camera.with_size(SIZE[1], SIZE[0]), "-", some, 2)
+        kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+    misses = sum(not k["cache_hit"] for k in kernels)
+    print(f"another camera: {len(kernels)} kernels launched, {misses} compiled", flush=True)
+    return float(misses)
 
 
 def _mutation_cost() -> float:
@@ -166,11 +229,13 @@ def _mutation_cost() -> float:
         house, {}, Recipe(), sunsky(Recipe(), elevation_rad=0.6, azimuth_rad=0.35)
     )
     camera = camera.with_size(*SIZE)
-    fields = LightFields(
-        filter="box", spp=256, large_step=0.99, mutations_per_pixel=256, rr_depth=4, direct_spp=0
+    fields = METROPOLIS.model_copy(
+        update={"spp": 512, "large_step": 0.99, "rr_depth": 3, "tail_pixels": 0}
     )
-    shot = Shot("cost", scene, camera)
-    _result, path_s = _timed(shot, camera, fields, seed=1)
+    shot = Shot("cost", scene, camera, 0)
+    _result, path_s = _timed(
+        shot, PLAIN.model_copy(update={"spp": 512, "rr_depth": fields.rr_depth}), seed=1
+    )
     emitters, _weights = scene.emitters(camera, fields, 1)
 
     def mutate(n: int) -> int:
@@ -181,8 +246,8 @@ def _mutation_cost() -> float:
 
     mutate(1)
     began = time.process_time()
-    n = mutate(256)
-    return (time.process_time() - began) / n / (path_s / (256 * SIZE[0] * SIZE[1]))
+    n = mutate(512)
+    return (time.process_time() - began) / n / (path_s / (512 * SIZE[0] * SIZE[1]))
 
 
 def _sum(result: LightResult) -> NDArray[np.float64]:
@@ -197,13 +262,22 @@ def _relative_square(
     return np.asarray((y - t) ** 2 / (t**2 + 1e-3 * t.mean() ** 2))
 
 
-def _write_picture(rows: list[list[NDArray[np.uint8]]]) -> None:
+def _write_rows(rows: list[list[NDArray[np.float64]]], name: str, times: int) -> None:
+    """A PNG of rows of pictures, each row exposed alike, enlarged."""
     from pbrs_farm.images import png_from_array
+    from pbrs_farm.transport.tone import exposure_of
 
-    picture = np.concatenate([np.concatenate(row, 1) for row in rows], 0)
-    picture = picture.repeat(2, 0).repeat(2, 1)
+    tones = Recipe().tone
+    shown = []
+    for row in rows:
+        exact = [p.astype(np.float32) for p in row]
+        exposure = exposure_of(exact[-1], tones)
+        shown.append(np.concatenate([tone(p, tones, exposure=exposure) for p in exact], 1))
+    width = min(r.shape[1] for r in shown)
+    picture = np.concatenate([r[:, :width] for r in shown], 0)
     FOLDER.mkdir(parents=True, exist_ok=True)
-    Path(FOLDER / "light.png").write_bytes(png_from_array(picture))
+    enlarged = picture.repeat(times, 0).repeat(times, 1)
+    Path(FOLDER / name).write_bytes(png_from_array(enlarged))
 
 
 if __name__ == "__main__":
