@@ -28,7 +28,7 @@ from pbrs_farm.transport.numbers import (
     stream_key,
     unit_float,
 )
-from pbrs_farm.transport.tails import NEAR_M, TAIL_FLOATS, close_tail, write_tail
+from pbrs_farm.transport.tails import NEAR_M, TAIL_FLOATS, close_tail, passing_chance, write_tail
 from pbrs_farm.transport.walk import CameraRow, Rules, Walk, advance, start
 
 STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 7
@@ -84,7 +84,8 @@ class Trial:
 
     walk: beyond the second vertex with a throughput of its own. light: of the first part; head:
     throughput up to the second vertex; tail: light from beyond, head not counted. is_straight:
-    the first vertex is rough and nothing was passed since; is_shared: see tails.py.
+    the first vertex is rough and nothing but glass and cut-outs was met since, passed with chance
+    `passes`; is_shared: see tails.py.
     """
 
     walk: Walk
@@ -92,6 +93,7 @@ class Trial:
     head: mi.Color3f
     tail: mi.Color3f
     is_straight: mi.Bool
+    passes: mi.Float
     is_shared: mi.Bool
 
 
@@ -236,27 +238,31 @@ def draw_paths(rules: Rules, film: Film, numbers: HashedNumbers) -> Chains:
 def _trial(camera: CameraRow, x: Any, y: Any) -> Trial:
     """The path that leaves the camera through film position (x, y), in pixels."""
     none, one = mi.Color3f(0), mi.Color3f(1)
-    return Trial(start(camera, x, y), none, one, mi.Color3f(0), mi.Bool(False), mi.Bool(False))
+    no = mi.Bool(False)
+    return Trial(start(camera, x, y), none, one, mi.Color3f(0), no, mi.Float(1), mi.Bool(no))
 
 
 def _onward(
     rules: Rules, numbers: Numbers, trial: Trial, tail: Any, active: Any
 ) -> tuple[Trial, Any]:
     """(the path one vertex on, whether it goes on); its tail is kept in local memory."""
-    walk, only = trial.walk, rules.only
+    walk = trial.walk
     before = walk.depth
     may_be_steady = trial.is_straight & (before == 1)
     following, found, alive = advance(
-        rules.stage, rules.emitters, rules.fields, numbers, walk, only, active, may_be_steady
+        rules.stage, rules.emitters, rules.fields, numbers, walk, rules.only, active, may_be_steady
     )
     met = dr.select(before + 1 >= rules.segments, found.met_outdoor + found.met_indoor, 0)
     lit = dr.select(following.depth + 1 >= rules.segments, found.lit_outdoor + found.lit_indoor, 0)
     is_beyond = before >= 2
     is_second = active & (before < 2) & (following.depth == 2)
-    write_tail(tail, found, walk, only, is_second & found.steady)
+    write_tail(tail, found, walk, trial.passes, rules.only, is_second & found.steady)
     head = dr.select(is_second, following.beta, trial.head)
     following.beta = dr.select(is_second, 1, following.beta)
     is_far = dr.squared_norm(found.hit.p - walk.last_p) > NEAR_M**2
+    # What reflects, glass too, forgets the density of the direction.
+    goes_on = trial.is_straight & (following.last_density > 0)
+    is_straight = dr.select(before == 0, found.is_rough, goes_on)
     can_share = found.steady & (found.density > 0) & is_far
     return (
         Trial(
@@ -264,7 +270,8 @@ def _onward(
             trial.light + dr.select(is_beyond, 0, met + lit),
             head,
             trial.tail + dr.select(is_beyond, met + lit, 0),
-            dr.select(before == 0, found.is_rough, trial.is_straight & (following.depth > before)),
+            is_straight,
+            trial.passes * dr.select(before == 1, passing_chance(found.hit, walk.d), 1),
             dr.select(is_second, can_share, trial.is_shared),
         ),
         alive,

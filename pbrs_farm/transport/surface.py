@@ -74,10 +74,6 @@ class Stage:
             return dr.select(clear, mi.Color3f(1), 0)
         return self._through_veils(o, d, distance, clear)
 
-    def sees(self, o: Any, d: Any, distance: Any, active: Any) -> Any:
-        """Whether nothing at all, glass and cut-outs neither, lies between o and o + distance d."""
-        return active & ~self._all.ray_test(_ray(o, d, distance), active)
-
     @dr.syntax
     def _through_veils(self, o: Any, d: Any, distance: Any, clear: Any) -> Any:
         left = dr.select(clear, mi.Color3f(1), 0)

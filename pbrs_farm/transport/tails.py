@@ -5,17 +5,19 @@ Where both are rough and see each other, any other head x1' that sees x2 makes a
 the same tail. In the measure of (film, area at x2, direction out of x2) its contribution is
 
     K(x1') = B f1(x1' -> x2) cos1' cos2' / |x1' - x2|^2
-             [ f2(-> lamp) S p2(-> x3) + f2(-> x3) T ]
+             V(x1', x2) [ f2(-> lamp) S p2(-> x3) + f2(-> x3) T ]
 
-with B what reaches the eye from x1', S the shadow ray's radiance over its density, T the light
-that arrives from x3, p2 the density of going there: the PSSMLT integrand times the densities of
-what the head no longer draws. The pixels are dealt into random groups; a chain that stands at a
+with B what reaches the eye from x1', V what thin glass between lets through (0 behind a wall), S
+the shadow ray's radiance over its density, T the light that arrives from x3, p2 the density of
+going there: the PSSMLT integrand times the densities of what the head no longer draws. The pixels are dealt into random groups; a chain that stands at a
 path in proportion to its luminance I is equally well shown at all heads j of its pixel's group,
 each with weight I_j = luminance of K_j over the group's sum (a Gibbs step over the head, every
 outcome counted at once: it keeps the distribution of the chain). So one tail, dear to find, lights
 as many pixels as the group has, for one shadow ray each.
 
-Glass, mirrors or cut-outs between x1 and x2, or a mirror at x1, leave a path to its own pixel.
+Thin glass and cut-outs between x1 and x2 let a tail through, with the share of the light they let
+through. A mirror at x1, a reflection between the two, or less than NEAR_M between them leave a path
+to its own pixel.
 """
 
 from __future__ import annotations
@@ -26,11 +28,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from pbrs_farm.transport.bsdf import Scatter, evaluate
+from pbrs_farm.transport.bsdf import Scatter, evaluate, thin_glass_reflectance
 from pbrs_farm.transport.emitters import Emitters
 from pbrs_farm.transport.film import Film, level_of, point_in_pixel
+from pbrs_farm.transport.materials import GLASS
 from pbrs_farm.transport.numbers import HashedNumbers, device_array, stream_key
-from pbrs_farm.transport.surface import Stage, bent, offset
+from pbrs_farm.transport.surface import Hit, Stage, bent, offset
 from pbrs_farm.transport.walk import (
     CameraRow,
     FieldsRow,
@@ -159,17 +162,25 @@ def _trace_heads(
         dr.scatter(rows, value, lane * (_HEAD_PACKETS * 4) + k)
 
 
-def write_tail(tail: Any, found: Found, walk: Walk, only: Only, active: Any) -> None:
+def passing_chance(hit: Hit, d: Any) -> Any:
+    """Chance that a path goes straight through what it met: below 1 for glass, 1 for all else."""
+    is_glass = hit.valid & ~hit.is_hole & (hit.scatter.kind == GLASS)
+    return dr.select(is_glass, 1 - thin_glass_reflectance(dr.dot(hit.n, d)), 1)
+
+
+def write_tail(tail: Any, found: Found, walk: Walk, passes: Any, only: Only, active: Any) -> None:
     """Keep, in local memory, the second vertex of a path just after it was made.
 
-    walk: as it was when it set out from the first vertex.
+    walk: as it was when it set out from the first vertex, or from the last sheet of glass on the
+    way; passes: chance of having passed those.
     """
     hit, m = found.hit, found.hit.scatter
     way = hit.p - walk.last_p
     to = found.to_outdoor if only.lamp is None else found.to_indoor
-    # What turns the contribution into K's measure: the densities of x2 and of leaving it.
+    # What turns the contribution into K's measure: the densities of x2 and of leaving it, the
+    # chance of the glass between.
     cos = dr.abs(dr.dot(hit.ng, walk.d))
-    densities = walk.last_density * cos / dr.squared_norm(way) * found.density
+    densities = walk.last_density * cos / dr.squared_norm(way) * found.density * passes
     values = (
         *(hit.p.x, hit.p.y, hit.p.z, densities),
         *(hit.smooth.x, hit.smooth.y, hit.smooth.z, m.alpha),
@@ -289,9 +300,9 @@ def _seen(
     begin = offset(p1, dr.select(side > 0, ng1, -ng1))
     aim = p2 - begin
     reach = dr.norm(aim)
-    clear = stage.sees(begin, aim / reach, reach * (1 - 1e-4), valid)
-    value = _colour(h[6]) * value1 * inner * (cos2 / distance2)
-    return dr.select(is_other, dr.select(clear, value, 0), _colour(t[8]))
+    clear = stage.transmittance(begin, aim / reach, reach * (1 - 1e-4), valid)
+    value = _colour(h[6]) * value1 * inner * clear * (cos2 / distance2)
+    return dr.select(is_other, dr.select(valid, value, 0), _colour(t[8]))
 
 
 def _scattered(m: Scatter, frame: Any, ng: Any, wi: Any, d: Any) -> tuple[Any, Any]:
