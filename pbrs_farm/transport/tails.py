@@ -81,25 +81,27 @@ class Groups(NamedTuple):
 
 
 def deal(height: int, width: int, n: int, seed: int) -> Groups:
-    """Random groups of about n pixels, each of up to four blocks: a tail that only a few places see
-    finds them beside its own pixel, one that all see is shown all over the picture."""
-    side = max(1 << (max(n // 4, 1).bit_length() - 1) // 2, 1)
-    rng = np.random.default_rng(seed)
+    """Groups of at most n pixels (of one, where n is 0), each spread over the whole picture.
+
+    The picture is cut into as many square cells as a group may have pixels; every cell deals its
+    pixels to different groups, at random, so that neighbours do not share their noise.
+    """
+    side = 1
+    while -(-height // side) * -(-width // side) > max(n, 1):
+        side += 1
     rows, columns = -(-height // side), -(-width // side)
-    per_group = max(n // side**2, 1)
-    n_groups = -(-(rows * columns) // per_group)
-    rank = rng.permutation(n_groups * per_group)[: rows * columns]
-    # Blocks start anywhere and wrap around the picture, padded to whole ones.
-    y = (np.arange(height) + rng.integers(side)) % (rows * side)
-    x = (np.arange(width) + rng.integers(side)) % (columns * side)
-    block = rank[(y // side)[:, None] * columns + (x // side)[None]]
-    slots = block * side**2 + (y % side)[:, None] * side + (x % side)[None]
-    pixels = np.full(n_groups * per_group * side**2, _NEVER, np.uint32)
+    n_cells = rows * columns
+    rng = np.random.default_rng(seed)
+    order = rng.permuted(np.tile(np.arange(side * side), (n_cells, 1)), axis=1)
+    y, x = np.mgrid[0:height, 0:width]
+    cell = y // side * columns + x // side
+    slots = order[cell, y % side * side + x % side] * n_cells + cell
+    pixels = np.full(side * side * n_cells, _NEVER, np.uint32)
     pixels[slots.ravel()] = np.arange(width * height, dtype=np.uint32)
     return Groups(
         device_array(mi.UInt32, slots.ravel().astype(np.uint32)),
         device_array(mi.UInt32, pixels),
-        per_group * side**2,
+        n_cells,
     )
 
 
