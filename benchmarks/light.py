@@ -44,8 +44,8 @@ SIZE = (64, 48)
 ROOM_REFERENCE_SPP, HARD_REFERENCE_SPP, HOME_REFERENCE_SPP = 8192, 16384, 2048
 # The median is compared as it is: the reference must be far below it.
 GLOBE_REFERENCE_SPP = 32768
-SEEDS = (1, 2, 3)
-MUTATIONS, DIRECT_SPP = 128, 128
+SEEDS = (1, 2)
+MUTATIONS = 128
 CHAINS = 16384
 HOMES = ("2BedroomApartment", "Studio", "3BedroomApartment")
 CAMERAS_PER_HOME = 2
@@ -53,7 +53,6 @@ PLAIN = LightFields(filter="box", denoise=False)
 METROPOLIS = PLAIN.model_copy(
     update={
         "integrator": "metropolis",
-        "direct_spp": DIRECT_SPP,
         "mutations_per_pixel": MUTATIONS,
         "chains": CHAINS,
     }
