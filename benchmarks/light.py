@@ -252,10 +252,15 @@ def _mutation_cost() -> float:
             scene.stage, emitters, camera, Group.OUTDOOR, some, 1, min_segments=1
         ).n_mutations
 
+    # The bootstrap is the same for both counts and drops out of the difference.
     mutate(1)
-    began = time.process_time()
-    n = mutate(512)
-    return (time.process_time() - began) / n / (path_s / (512 * SIZE[0] * SIZE[1]))
+    counts, spent = [], []
+    for per_pixel in (256, 1024):
+        began = time.process_time()
+        counts.append(mutate(per_pixel))
+        spent.append(time.process_time() - began)
+    mutation_s = (spent[1] - spent[0]) / (counts[1] - counts[0])
+    return mutation_s / (path_s / (512 * SIZE[0] * SIZE[1]))
 
 
 def _sum(result: LightResult) -> NDArray[np.float64]:
