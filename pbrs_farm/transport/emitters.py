@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 
 from pbrs_farm.frames import LUMINANCE
 from pbrs_farm.lighting import Group
+from pbrs_farm.transport.aims import Aims, GlowTables, no_glow
+from pbrs_farm.transport.alias import alias_rows, pick
+from pbrs_farm.transport.nearby import Near, Nearby, Standpoint, drawn
 from pbrs_farm.transport.numbers import device_array, opaque3
 from pbrs_farm.transport.portals import MAX_PORTALS
 from pbrs_farm.transport.sky import Sky, solid_angles
@@ -26,6 +29,8 @@ from pbrs_farm.transport.surface import Stage
 from pbrs_farm.transport.tables import NO_LAMP, SceneTables
 
 SUN, DOME, FIRST_PORTAL = 0, 1, 2
+BY_PLACE = 0.5
+"""Of the shadow rays to lamps; the others go by the weights of the view alone (walls hide lamps)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +67,8 @@ class Emitters:
     def __init__(
         self, tables: SceneTables, sky: Sky, portals: NDArray[np.float64], weights: Weights
     ) -> None:
+        self.nearby = Nearby(tables)
+        self.aims = Aims(no_glow(len(tables.lamps)))
         self._set_lamps(tables, weights.lamps)
         self._set_dome(sky)
         self._set_portals(portals)
@@ -93,38 +100,56 @@ class Emitters:
         self._set_lamp_weights(weights.lamps)
         self._set_outdoor_weights(weights.outdoor)
 
+    def with_glow(self, glow: GlowTables) -> None:
+        """Set what guided rays aim at."""
+        self.aims = Aims(glow)
+        self.nearby.with_glow(glow)
+
     # Lamps
 
-    def sample_lamp(self, stage: Stage, p: Any, u: Any, uv: Any, only: Any, active: Any) -> Towards:
-        """A point on a lamp, seen from p."""
+    def sample_lamp(
+        self, stage: Stage, near: Near, u: Any, uv: Any, only: Any, active: Any
+    ) -> Towards:
+        """A point on a lamp, seen from p: by place with chance BY_PLACE, else by weight alone."""
         active = active & self._has_lamps
-        lamp, u = self._pick(self._lamp_alias, mi.UInt32(0), self._n_lamps, u, active)
+        by_place = _by_place(near.at)
+        is_near = u < by_place
+        rest = dr.select(is_near, u / BY_PLACE, (u - by_place) / (1 - by_place))
+        rest = dr.clip(rest, 0, 1 - 1e-7)
+        lamp, v = pick(self._lamp_alias, mi.UInt32(0), self._n_lamps, rest, active)
+        near_lamp, near_v = drawn(near.lamps, near.levels, near.at.total, rest)
+        lamp, u = dr.select(is_near, near_lamp, lamp), dr.select(is_near, near_v, v)
         lamp = dr.select(only >= 0, mi.UInt32(only), lamp)
         first = dr.gather(mi.UInt32, self._lamp_first, lamp, active)
         count = dr.gather(mi.UInt32, self._lamp_first, lamp + 1, active) - first
-        triangle, _u = self._pick(self._triangle_alias, first, count, u, active)
+        triangle, _u = pick(self._triangle_alias, first, count, u, active)
         face = dr.gather(mi.UInt32, self._lamp_faces, first + triangle, active)
         q, n = stage.lamp_point(face, uv, active)
 
-        to = q - p
+        to = q - near.at.p
         distance = dr.norm(to)
         d = to / distance
         cos = dr.abs(dr.dot(n, d))
         valid = active & (distance > 1e-5) & (cos > 1e-5)
-        radiance, density = self._lamp(lamp, distance, cos, only, valid)
+        radiance, density = self._lamp(lamp, near.at, distance, cos, only, valid)
         return Towards(d, distance, radiance, density, valid)
 
     def hit_lamp(
-        self, lamp: Any, distance: Any, cos: Any, only: Any, active: Any
+        self, lamp: Any, at: Standpoint, distance: Any, cos: Any, only: Any, active: Any
     ) -> tuple[Any, Any]:
-        """(radiance, density of sample_lamp) of a lamp that a scattered ray met."""
+        """(radiance, density of sample_lamp) of a lamp that a ray scattered there met."""
         active = active & (lamp != NO_LAMP)
-        radiance, density = self._lamp(lamp, distance, dr.abs(cos), only, active)
+        radiance, density = self._lamp(lamp, at, distance, dr.abs(cos), only, active)
         return dr.select(active, radiance, 0), density
 
-    def _lamp(self, lamp: Any, distance: Any, cos: Any, only: Any, active: Any) -> tuple[Any, Any]:
+    def _lamp(
+        self, lamp: Any, at: Standpoint, distance: Any, cos: Any, only: Any, active: Any
+    ) -> tuple[Any, Any]:
         row = dr.gather(mi.Vector4f, self._lamp_rows, lamp, active)
         weight = dr.gather(mi.Float, self._lamp_weights, lamp, active)
+        level, _aim = self.nearby.level(lamp, at.p, at.n, only, active)
+        by_place = _by_place(at)
+        weight = dr.lerp(weight, level / dr.maximum(at.total, 1e-30), by_place)
         weight = dr.select(only >= 0, 1, weight)
         density = weight * dr.square(distance) / dr.maximum(row[3] * cos, 1e-12)
         mine = (only < 0) | (mi.UInt32(only) == lamp)
@@ -135,9 +160,9 @@ class Emitters:
     def sample_outdoor(self, p: Any, u: Any, uv: Any, only: Any, active: Any) -> Towards:
         """A direction in which outdoor light may come to p."""
         active = active & self.has_sky
-        way, u = self._pick(self._outdoor_alias, mi.UInt32(0), self._n_outdoor, u, active)
+        way, u = pick(self._outdoor_alias, mi.UInt32(0), self._n_outdoor, u, active)
         way = dr.select(only >= 0, mi.UInt32(only), way)
-        texel, _u = self._pick(self._dome_alias, mi.UInt32(0), self._n_texels, u, active)
+        texel, _u = pick(self._dome_alias, mi.UInt32(0), self._n_texels, u, active)
         to_sun = self._sun_frame.to_world(_cone(uv, self._sun_cos))
         to_dome = self._texel_direction(texel, uv)
         to_portal = self._portal_direction(p, way, uv, active)
@@ -259,6 +284,7 @@ class Emitters:
 
     def _set_lamp_weights(self, weights: NDArray[np.float64]) -> None:
         padded = weights if len(weights) else np.ones(1)
+        self.nearby.with_weights(weights)
         self._lamp_weights = device_array(mi.Float, padded.astype(np.float32))
         self._lamp_alias = device_array(mi.Float, alias_rows(padded).ravel())
 
@@ -284,16 +310,10 @@ class Emitters:
         self._dome_height = dr.opaque(mi.UInt32, height)
         self._dome_height_f = dr.opaque(mi.Float, float(height))
 
-    def _pick(self, alias: Any, first: Any, count: Any, u: Any, active: Any) -> tuple[Any, Any]:
-        """(index, u made uniform again) of an alias table's part [first, first + count)."""
-        x = u * mi.Float(count)
-        i = dr.minimum(mi.UInt32(x), count - 1)
-        f = x - mi.Float(i)
-        row = dr.gather(mi.Vector2f, alias, first + i, active)
-        other = dr.reinterpret_array(mi.UInt32, row[1])
-        stay = f < row[0]
-        again = dr.select(stay, f / row[0], (f - row[0]) / (1 - row[0]))
-        return dr.select(stay, i, other), dr.clip(again, 0, 1 - 1e-7)
+
+def _by_place(at: Standpoint) -> Any:
+    """Chance that a lamp is chosen by where it is."""
+    return dr.select(at.total > 0, mi.Float(BY_PLACE), 0)
 
 
 def _cone(uv: Any, cos_max: Any) -> Any:
@@ -314,25 +334,3 @@ def dome_chances(dome: NDArray[np.float32]) -> NDArray[np.float64]:
     total = weight.sum()
     uniform = np.broadcast_to(solid_angles(height, width)[:, None], weight.shape) / (4 * math.pi)
     return np.asarray(uniform if total <= 0 else 0.95 * weight / total + 0.05 * uniform)
-
-
-def alias_rows(weights: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(N, 2) rows (chance to stay, bits of the other index) of Vose's alias method."""
-    w = np.asarray(weights, np.float64)
-    n = len(w)
-    total = w.sum()
-    chance = w * (n / total) if total > 0 else np.ones(n)
-    stay, other = np.ones(n), np.arange(n, dtype=np.uint32)
-    small = [int(i) for i in np.flatnonzero(chance < 1)]
-    large = [int(i) for i in np.flatnonzero(chance >= 1)]
-    level = chance.tolist()
-    while small and large:
-        i, j = small.pop(), large[-1]
-        stay[i], other[i] = level[i], j
-        level[j] -= 1 - level[i]
-        if level[j] < 1:
-            small.append(large.pop())
-    rows = np.empty((n, 2), np.float32)
-    rows[:, 0] = np.clip(stay, 0, 1)
-    rows[:, 1] = other.view(np.float32)
-    return rows

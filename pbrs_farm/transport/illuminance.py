@@ -13,12 +13,17 @@ from numpy.typing import NDArray
 from pbrs_farm.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.house import House, Room
 from pbrs_farm.recipe import LightFields
-from pbrs_farm.transport.bsdf import Scatter
 from pbrs_farm.transport.emitters import Emitters
 from pbrs_farm.transport.numbers import CAMERA_DIMS, SobolNumbers, device_array, stream_key
-from pbrs_farm.transport.surface import Hit, Stage, offset
-from pbrs_farm.transport.tables import NO_LAMP
-from pbrs_farm.transport.walk import Only, Walk, advance, direct, fields_row
+from pbrs_farm.transport.surface import Stage
+from pbrs_farm.transport.walk import (
+    Only,
+    advance,
+    direct,
+    fields_row,
+    left_surface,
+    white_hit,
+)
 
 LAMPS_LX: Final = (30.0, 1000.0)
 DAYLIGHT_LX: Final = (20.0, 5000.0)
@@ -86,44 +91,80 @@ def illuminance_lx(
     stage: Stage, emitters: Emitters, points: NDArray[np.float64], seed: int
 ) -> tuple[float, float]:
     """(outdoor, indoor) mean illuminance of level surfaces at points (N, 3), facing up."""
-    fields = fields_row(LightFields())
-    p = mi.Point3f(*(device_array(mi.Float, points[:, k].astype(np.float32)) for k in range(3)))
-    lane = dr.arange(mi.UInt32, len(points))
-    key = stream_key(lane, dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
-    outdoor, indoor = _radiosity(stage, emitters, fields, p, key, dr.opaque(mi.UInt32, _SPP))
-    dr.eval(outdoor, indoor)
-    lumens = [
-        float((v.numpy().T.astype(np.float64) @ LUMINANCE).mean()) * LM_PER_W * math.pi / _SPP
-        for v in (outdoor, indoor)
-    ]
+    up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
+    sent = radiosity(stage, emitters, points, up, _SPP, seed)
+    lumens = [float((v @ LUMINANCE).mean()) * LM_PER_W * math.pi for v in sent]
     return lumens[0], lumens[1]
+
+
+def radiosity(
+    stage: Stage,
+    emitters: Emitters,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    spp: int,
+    seed: int,
+    *,
+    lamps: NDArray[np.int64] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(outdoor, indoor) radiance that white matte surfaces send out: irradiance / pi, (N, 3) each.
+
+    points, normals: (N, 3). lamps: (N,) the one lamp that counts for each, nothing outdoors then.
+    """
+    n = len(points)
+    asked = np.full(n, -1) if lamps is None else lamps
+    outdoor = np.full(n, -1 if lamps is None else -2)
+    only = Only(*(device_array(mi.Int32, v.astype(np.int32)) for v in (asked, outdoor)))
+    key = stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+    p, normal = mi.Point3f(*_columns(points)), mi.Vector3f(*_columns(normals))
+    fields = fields_row(LightFields())
+    sums = _radiosity(stage, emitters, fields, (p, normal), key, only, dr.opaque(mi.UInt32, spp))
+    dr.eval(*sums)
+    outdoor_sum, indoor_sum = (v.numpy().T.astype(np.float64) / spp for v in sums)
+    return outdoor_sum, indoor_sum
+
+
+def _columns(rows: NDArray[np.float64]) -> list[Any]:
+    return [device_array(mi.Float, rows[:, k].astype(np.float32)) for k in range(3)]
 
 
 @dr.syntax
 def _radiosity(
-    stage: Stage, emitters: Emitters, fields: Any, p: Any, key: Any, spp: Any
+    stage: Stage,
+    emitters: Emitters,
+    fields: Any,
+    place: tuple[Any, Any],
+    key: Any,
+    only: Only,
+    spp: Any,
 ) -> tuple[Any, Any]:
-    """Sums of what a white matte surface at p would send back: irradiance / pi a sample."""
-    up = mi.Vector3f(0, 1, 0)
-    frame = mi.Frame3f(up)
-    white = Scatter(mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.UInt32(0))
-    here = Hit(mi.Bool(True), p, up, up, up, mi.UInt32(NO_LAMP), white, mi.Bool(False))
-    only = Only(mi.Int32(-1), mi.Int32(-1))
+    """Sums over samples."""
+    p, normal = place
+    frame = mi.Frame3f(normal)
+    here = white_hit(p, normal)
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     s = mi.UInt32(0)
     while s < spp:
         numbers = SobolNumbers(key, s)
         dim = mi.UInt32(CAMERA_DIMS)
+        near = emitters.nearby.seen(p, normal, only.lamp, mi.Bool(True))
+        up = mi.Vector3f(0, 0, 1)
         out, lamp = direct(
-            stage, emitters, here, frame, mi.Vector3f(0, 0, 1), numbers, dim, only, mi.Bool(True)
+            stage,
+            emitters,
+            here,
+            frame,
+            up,
+            numbers,
+            dim,
+            only,
+            near,
+            mi.Bool(True),
         )
         lit_out, lit_in = out.light, lamp.light
         wo = mi.warp.square_to_cosine_hemisphere(numbers.two(dim + 1))
         d = mi.Vector3f(frame.to_world(wo))
-        density = wo.z * dr.inv_pi
-        walk = Walk(
-            offset(p, up), d, mi.Color3f(1), mi.UInt32(1), mi.UInt32(0), mi.Point3f(p), density
-        )
+        walk = left_surface(p, normal, d, wo.z * dr.inv_pi, near)
         active = mi.Bool(True)
         while active:
             walk, found, alive = advance(stage, emitters, fields, numbers, walk, only, active)

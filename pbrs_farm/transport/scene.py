@@ -258,7 +258,12 @@ class LightScene:
         from pbrs_farm.transport.emitters import Emitters
 
         if self._emitters is None:
+            from pbrs_farm.transport.glow import densities_by_face, glow_tables
+
             self._emitters = Emitters(self.tables, self.sky, portals, weights)
+            glow = glow_tables(self.stage, self._emitters, self.tables, 0)
+            self.stage.set_aims(*densities_by_face(glow))
+            self._emitters.with_glow(glow)
         else:
             self._emitters.aim(portals, weights)
         return self._emitters

@@ -14,7 +14,7 @@ from pbrs_farm.transport.bsdf import Scatter, thin_glass_reflectance
 from pbrs_farm.transport.materials import GLASS, HOLE, MIRROR
 from pbrs_farm.transport.numbers import device_array
 from pbrs_farm.transport.rays import scene_from_mesh
-from pbrs_farm.transport.tables import NO_LAMP, SceneTables
+from pbrs_farm.transport.tables import FACE_FLOATS, NO_LAMP, SceneTables
 
 _RAY_OFFSET = 2e-5
 _MAX_VEILS = 16
@@ -25,7 +25,8 @@ class Hit(NamedTuple):
 
     valid; p: point; ng: unit face normal on the ray's side; n: shading normal, on the ray's side
     too, bent where it would turn away; smooth: the same before bending; lamp: UInt32, NO_LAMP =
-    none; scatter: the material there; is_hole: cut out by alpha.
+    none; scatter: the material there; is_hole: cut out by alpha. face: UInt32; aim: density per m2
+    with which guided rays aim at p on this side, when they go for lamp aim_lamp (transport/glow.py).
     """
 
     valid: Any
@@ -36,6 +37,9 @@ class Hit(NamedTuple):
     lamp: Any
     scatter: Scatter
     is_hole: Any
+    face: Any
+    aim: Any
+    aim_lamp: Any
 
 
 class Stage:
@@ -109,6 +113,17 @@ class Stage:
         p = mi.Point3f(v0[0], v0[1], v0[2]) + bary.x * a + bary.y * b
         return p, dr.normalize(dr.cross(a, b))
 
+    def set_aims(self, faces: Any, front: Any, back: Any, lamps: Any) -> None:
+        """Keep with each of faces (K,) the densities of Hit.aim, either side, and the lamp."""
+        if not len(faces):
+            return
+        at = device_array(mi.UInt32, faces) * FACE_FLOATS
+        for column, values in ((19, front), (23, back)):
+            dr.scatter(self._rows, device_array(mi.Float, values), at + column)
+        bits = dr.reinterpret_array(mi.Float, device_array(mi.UInt32, lamps))
+        dr.scatter(self._rows, bits, at + 27)
+        dr.eval(self._rows)
+
     def _packet(self, face: Any, k: int, active: Any) -> Any:
         return dr.gather(mi.Vector4f, self._rows, face * 7 + k, active)
 
@@ -133,7 +148,9 @@ class Stage:
             rows[1][3] + v * rows[3][0] + w * rows[3][2],
         )
         scatter, is_hole = self._material(tag & 0xFFFF, u, valid)
-        return Hit(valid, p, ng, n, smooth, tag >> 16, scatter, is_hole)
+        aim = dr.select(turned, rows[5][3], rows[4][3])
+        aim_lamp = dr.reinterpret_array(mi.UInt32, rows[6][3])
+        return Hit(valid, p, ng, n, smooth, tag >> 16, scatter, is_hole, face, aim, aim_lamp)
 
     def _material(self, index: Any, uv: Any, active: Any) -> tuple[Scatter, Any]:
         rows = [dr.gather(mi.Vector4f, self._materials, index * 4 + k, active) for k in range(4)]

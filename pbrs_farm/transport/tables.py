@@ -27,7 +27,8 @@ class SceneTables:
     """What the kernels gather from.
 
     positions (V, 3) float32, faces (F, 3) int32: the mesh for Mitsuba, degenerate faces removed.
-    face_rows: (F, 28) float32 v0 u0 | e1 v0 | e2 du1 | dv1 du2 dv2 0 | n0 0 | n1 0 | n2 0.
+    face_rows: (F, 28) float32 v0 u0 | e1 v0 | e2 du1 | dv1 du2 dv2 0 | n0 a | n1 b | n2 c; a, b, c
+    are kept free for Stage.set_aims.
     face_tags: (F,) uint32, material + 65536 * lamp (65535 = no lamp).
     see_through: (F,) bool, thin glass and cut-outs: shadow rays may pass.
     material_rows: (M, 16) float32. texels: the packed texture atlas.
@@ -146,3 +147,14 @@ def _lamp_triangles(
         np.concatenate([np.zeros(0), *faces]).astype(np.uint32),
         np.concatenate([np.zeros(0), *areas]).astype(np.float32),
     )
+
+
+def lamp_balls(tables: SceneTables) -> NDArray[np.float64]:
+    """(L, 4) centre and radius in m of the box around each lamp's shining faces."""
+    balls = np.zeros((len(tables.lamps), 4))
+    for k in range(len(tables.lamps)):
+        shining = tables.lamp_faces[tables.lamp_first[k] : tables.lamp_first[k + 1]]
+        corners = tables.positions[tables.faces[shining]].reshape(-1, 3)
+        low, high = corners.min(0), corners.max(0)
+        balls[k, :3], balls[k, 3] = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    return balls

@@ -177,7 +177,7 @@ def write_tail(tail: Any, found: Found, walk: Walk, passes: Any, only: Only, act
     way; passes: chance of having passed those.
     """
     hit, m = found.hit, found.hit.scatter
-    way = hit.p - walk.last_p
+    way = hit.p - walk.last.p
     to = found.to_outdoor if only.lamp is None else found.to_indoor
     # What turns the contribution into K's measure: the densities of x2 and of leaving it, the
     # chance of the glass between.

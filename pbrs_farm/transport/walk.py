@@ -15,6 +15,7 @@ import numpy as np
 
 from pbrs_farm.camera import Camera
 from pbrs_farm.recipe import LightFields
+from pbrs_farm.transport.aims import NO_FACE
 from pbrs_farm.transport.bsdf import (
     Scatter,
     evaluate,
@@ -24,7 +25,17 @@ from pbrs_farm.transport.bsdf import (
     thin_glass_reflectance,
 )
 from pbrs_farm.transport.emitters import FIRST_PORTAL, Emitters, Towards
+from pbrs_farm.transport.guide import (
+    cone_chance,
+    face_chance,
+    guide_at,
+    guided,
+    kept,
+    reflected_chance,
+    worth,
+)
 from pbrs_farm.transport.materials import GLASS, MIRROR
+from pbrs_farm.transport.nearby import Near, Standpoint, nowhere
 from pbrs_farm.transport.numbers import CAMERA_DIMS, VERTEX_DIMS, Numbers, opaque3
 from pbrs_farm.transport.surface import Hit, Stage, offset
 from pbrs_farm.transport.tables import NO_LAMP
@@ -65,8 +76,9 @@ class Walk:
     """A path under way.
 
     o, d: its ray. beta: throughput. depth: vertices so far, glass passed and holes not counted;
-    nulls: those. last_p, last_density: where and with which density the direction was drawn, 0
-    = behind the camera, a mirror or glass.
+    nulls: those. last, last_density: where and with which density of the surface's own the
+    direction was drawn, 0 = behind the camera, a mirror or glass. aimed, target: what guide.kept
+    asks for: chance of having aimed at a face over the density of all else, and that face.
     """
 
     o: mi.Point3f
@@ -74,8 +86,10 @@ class Walk:
     beta: mi.Color3f
     depth: mi.UInt32
     nulls: mi.UInt32
-    last_p: mi.Point3f
+    last: Standpoint
     last_density: mi.Float
+    aimed: mi.Float
+    target: mi.UInt32
 
 
 class Found(NamedTuple):
@@ -84,8 +98,8 @@ class Found(NamedTuple):
     met_*: from an emitter the ray met, by `segments` = the walk's depth before + 1 segments;
     lit_*: from shadow rays at the new vertex, one segment more than its depth.
     is_rough: the vertex is neither mirror nor glass; albedo, normal: of it. missed: no surface.
-    hit: the vertex; ahead, density: the direction scattered to, 0 = nowhere; to_outdoor, to_indoor: where the
-    shadow rays went; steady: the vertex was weighted by steady_density (transport/tails.py).
+    hit: the vertex; ahead, density: the direction scattered to, 0 = nowhere; to_outdoor, to_indoor:
+    where the shadow rays went; steady: the vertex was weighted by steady_density (tails.py).
     """
 
     met_outdoor: Any
@@ -162,8 +176,10 @@ def start(camera: CameraRow, x: Any, y: Any) -> Walk:
         mi.Color3f(1),
         mi.UInt32(0),
         mi.UInt32(0),
-        mi.Point3f(camera.eye),
+        nowhere(camera.eye),
         mi.Float(0),
+        mi.Float(0),
+        mi.UInt32(NO_FACE),
     )
 
 
@@ -184,7 +200,6 @@ def advance(
     """
     hit = stage.hit(walk.o, walk.d, active)
     missed = active & ~hit.valid
-    met_outdoor, met_indoor = _met(emitters, walk, hit, only, missed)
 
     # Kinds of surface.
     m = hit.scatter
@@ -192,49 +207,97 @@ def advance(
     glass, mirror = solid & (m.kind == GLASS), solid & (m.kind == MIRROR)
     rough = solid & ~glass & ~mirror
     depth = walk.depth + dr.select(solid & ~glass, mi.UInt32(1), 0)
-    dim = CAMERA_DIMS + VERTEX_DIMS * dr.minimum(depth + walk.nulls, 64)
+    # Vertices, glass and holes each have numbers of their own. (What is counted must depend on the
+    # hit: Dr.Jit 1.5 reads local memory at the wrong place by an index that began as a literal.)
+    count = depth + walk.nulls + dr.select(solid & ~glass, mi.UInt32(0), 1)
+    dim = CAMERA_DIMS + VERTEX_DIMS * dr.minimum(count - 1, 64)
     frame = mi.Frame3f(hit.n)
     wi = frame.to_local(-walk.d)
     wi.z = dr.maximum(wi.z, 1e-4)
+    near = None
+    if only.lamp is not None:
+        is_sheet = dr.max(m.tau) > 0
+        near = emitters.nearby.seen(hit.p, dr.select(is_sheet, 0, hit.ng), only.lamp, solid)
+    guiding = near if may_be_steady is False else None
+
+    # Glass: near lamps more rays are reflected, and weigh less.
+    lobe = numbers.one(dim + _LOBE)
+    mirroring = thin_glass_reflectance(wi.z)
+    p_mirroring = mirroring
+    if guiding is not None:
+        often = reflected_chance(mirroring, worth(guiding))
+        p_mirroring = dr.select(walk.last_density > 0, often, mirroring)
+    reflected = mirror | (glass & (lobe < p_mirroring))
 
     # Light that comes straight from an emitter.
+    if guiding is not None:
+        walk.beta *= _balanced(emitters, walk, hit, only, missed | reflected, rough)
+    met_outdoor, met_indoor = _met(emitters, walk, hit, only, missed)
     go_on = rough & (depth < fields.max_depth)
     steady = False if may_be_steady is False else may_be_steady & rough & is_smooth_lobe(m)
-    out, lamp = direct(stage, emitters, hit, frame, wi, numbers, dim, only, go_on, steady)
+    guide = None
+    if guiding is not None:
+        may_aim = go_on & (depth + 1 < fields.max_depth)
+        guide = guide_at(guiding, m, walk.beta, may_aim)
+    own = 1.0 if guide is None else 1 - guide.share
+    out, lamp = direct(
+        stage, emitters, hit, frame, wi, numbers, dim, only, near, go_on, own, steady
+    )
 
     # Scatter. Glass and mirrors keep one direction; what passes glass straight is no vertex.
-    lobe = numbers.one(dim + _LOBE)
-    wo = sample(m, wi, lobe, numbers.two(dim + _SCATTER))
+    uv = numbers.two(dim + _SCATTER)
+    is_guided, target = mi.Bool(False), mi.UInt32(NO_FACE)
+    if guide is None:
+        ahead = mi.Vector3f(frame.to_world(sample(m, wi, lobe, uv)))
+    else:
+        to = guided(guide, stage, emitters, hit.p, lobe, uv)
+        is_guided, target = to.is_guided, to.target
+        by_surface = mi.Vector3f(frame.to_world(sample(m, wi, to.own, uv)))
+        ahead = dr.select(is_guided, to.d, by_surface)
+        go_on &= to.valid
+    wo = frame.to_local(ahead)
     value, density = evaluate(m, wi, wo)
-    ahead = mi.Vector3f(frame.to_world(wo))
     bounced = go_on & (dr.dot(hit.ng, ahead) * wo.z > 0) & (density > 0)
-    reflected = mirror | (glass & (lobe < thin_glass_reflectance(wi.z)))
     back = walk.d - 2 * dr.dot(hit.n, walk.d) * hit.n
     may_pass = walk.nulls < MAX_NULLS
     mirrored = reflected & may_pass & (depth < fields.max_depth) & (dr.dot(back, hit.ng) > 0)
     passed = ((glass & ~reflected) | (hit.valid & hit.is_hole)) & may_pass
     beta = walk.beta * _factor(m, value, density, rough, mirror, glass & passed)
+    if guiding is not None:
+        share = dr.select(reflected, mirroring / p_mirroring, (1 - mirroring) / (1 - p_mirroring))
+        beta = dr.select(glass, beta * share, beta)
 
-    # Roulette.
-    q = dr.minimum(dr.max(beta), 0.95)
+    # Roulette, of what the surface draws; then the throughput is over all that could draw it.
+    q = dr.max(beta) / own
+    if guiding is not None:
+        q *= worth(guiding)
+    q = dr.minimum(q, 0.95)
     tested = bounced & (depth >= fields.rr_depth)
-    survives = ~tested | (numbers.one(dim + _ROULETTE) < q)
+    survives = ~tested | is_guided | (numbers.one(dim + _ROULETTE) < q)
     alive = (bounced | mirrored | passed) & survives & (dr.max(beta) > 0)
-    beta = dr.select(tested, beta * dr.rcp(dr.maximum(q, 1e-6)), beta)
+    chance = own * dr.select(tested, dr.maximum(q, 1e-6), 1)
+    aimed = mi.Float(0)
+    if guide is not None:
+        chance += cone_chance(guide, ahead) / dr.maximum(density, 1e-30)
+        aimed = face_chance(guide) / (chance * density)
+    beta = dr.select(bounced, beta / chance, beta)
 
-    weighed = density
+    weighed = density * own
     if steady is not False:
         weighed = dr.select(steady, steady_density(m, hit.ng, ahead), density)
     d = dr.select(bounced, ahead, dr.select(mirrored, mi.Vector3f(back), walk.d))
     outward = dr.select(dr.dot(d, hit.ng) > 0, hit.ng, -hit.ng)
+    here = nowhere(hit.p) if near is None else near.at
     following = Walk(
         o=offset(hit.p, outward),
         d=d,
         beta=beta,
         depth=depth,
         nulls=walk.nulls + dr.select(passed | (glass & mirrored), mi.UInt32(1), 0),
-        last_p=dr.select(bounced, hit.p, walk.last_p),
+        last=dr.select(bounced, here, walk.last),
         last_density=dr.select(bounced, weighed, dr.select(mirrored, 0, walk.last_density)),
+        aimed=dr.select(bounced, aimed, dr.select(mirrored, 0, walk.aimed)),
+        target=dr.select(bounced, target, dr.select(mirrored, NO_FACE, walk.target)),
     )
     found = Found(
         met_outdoor,
@@ -264,33 +327,48 @@ def direct(
     numbers: Numbers,
     dim: Any,
     only: Only,
+    near: Near | None,
     active: Any,
+    own: Any = 1.0,
     steady: Any = False,
 ) -> tuple[Lit, Lit]:
-    """(outdoor, indoor) light scattered towards wi, one shadow ray each."""
+    """(outdoor, indoor) light scattered towards wi, one shadow ray each.
+
+    own: share of the scattered rays that the surface draws itself.
+    """
     out = lamp = None
     if only.outdoor is not None:
         asks = active & (only.outdoor > -2)
         u, uv = numbers.one(dim + _OUT), numbers.two(dim + _OUT_UV)
         out = emitters.sample_outdoor(hit.p, u, uv, only.outdoor, asks)
-    if only.lamp is not None:
+    if only.lamp is not None and near is not None:
         asks = active & (only.lamp > -2)
         u, uv = numbers.one(dim + _LAMP), numbers.two(dim + _LAMP_UV)
-        lamp = emitters.sample_lamp(stage, hit.p, u, uv, only.lamp, asks)
+        lamp = emitters.sample_lamp(stage, near, u, uv, only.lamp, asks)
     # The pilot draws a portal's light through the portal alone.
     alone = False if only.outdoor is None else only.outdoor >= FIRST_PORTAL
-    to_outdoor, to_lamp = (_lit(stage, hit, frame, wi, to, alone, steady) for to in (out, lamp))
+    to_outdoor, to_lamp = (
+        _lit(stage, hit, frame, wi, to, alone, own, steady) for to in (out, lamp)
+    )
     return to_outdoor, to_lamp
 
 
 def _lit(
-    stage: Stage, hit: Hit, frame: Any, wi: Any, to: Towards | None, alone: Any, steady: Any
+    stage: Stage,
+    hit: Hit,
+    frame: Any,
+    wi: Any,
+    to: Towards | None,
+    alone: Any,
+    own: Any,
+    steady: Any,
 ) -> Lit:
     """What one shadow ray brings."""
     if to is None:
         return Lit(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
     wo = frame.to_local(to.d)
     value, density = evaluate(hit.scatter, wi, wo)
+    density *= own
     # Light may not come through the face when the shading normal says it does not.
     side = dr.dot(hit.ng, to.d)
     faces = side * wo.z > 0
@@ -313,6 +391,33 @@ def _lit(
     return Lit(dr.select(lit & faces, value * strength, 0), to.d, strength)
 
 
+def _balanced(emitters: Emitters, walk: Walk, hit: Hit, only: Only, turned: Any, rough: Any) -> Any:
+    aimed = walk.aimed, walk.target
+    return kept(emitters, walk.last, hit, walk.d, aimed, only.lamp, turned, rough)
+
+
+def left_surface(p: Any, n: Any, d: Any, density: Any, near: Near) -> Walk:
+    """The walk that leaves a matte surface at p in direction d, drawn with a density."""
+    return Walk(
+        o=offset(p, n),
+        d=d,
+        beta=mi.Color3f(1),
+        depth=mi.UInt32(1),
+        nulls=mi.UInt32(0),
+        last=near.at,
+        last_density=mi.Float(density),
+        aimed=mi.Float(0),
+        target=mi.UInt32(NO_FACE),
+    )
+
+
+def white_hit(p: Any, n: Any) -> Hit:
+    """A white matte surface at p."""
+    white = Scatter(mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.UInt32(0))
+    no, none = mi.Bool(False), mi.UInt32(NO_LAMP)
+    return Hit(mi.Bool(True), p, n, n, n, none, white, no, mi.UInt32(0), mi.Float(0), none)
+
+
 def _met(emitters: Emitters, walk: Walk, hit: Hit, only: Only, missed: Any) -> tuple[Any, Any]:
     """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled."""
     by_scatter = walk.last_density > 0
@@ -327,7 +432,7 @@ def _met(emitters: Emitters, walk: Walk, hit: Hit, only: Only, missed: Any) -> t
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     if only.outdoor is not None:
         sun, sun_density = emitters.sun(walk.d, only.outdoor)
-        dome, dome_density = emitters.dome(walk.last_p, walk.d, only.outdoor, missed)
+        dome, dome_density = emitters.dome(walk.last.p, walk.d, only.outdoor, missed)
         # The pilot of a portal counts what is drawn through it only.
         wanted = (only.outdoor > -2) & (only.outdoor < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & wanted
@@ -336,7 +441,12 @@ def _met(emitters: Emitters, walk: Walk, hit: Hit, only: Only, missed: Any) -> t
     if only.lamp is not None:
         glows = hit.valid & counts & (only.lamp > -2) & (hit.lamp != NO_LAMP)
         glow, lamp_density = emitters.hit_lamp(
-            hit.lamp, dr.norm(hit.p - walk.last_p), dr.dot(walk.d, hit.ng), only.lamp, glows
+            hit.lamp,
+            walk.last,
+            dr.norm(hit.p - walk.last.p),
+            dr.dot(walk.d, hit.ng),
+            only.lamp,
+            glows,
         )
         indoor = dr.select(glows, walk.beta * glow * weight(lamp_density), 0)
     return outdoor, indoor

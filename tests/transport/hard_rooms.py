@@ -20,7 +20,7 @@ from tests.transport.rooms import (
     sphere,
 )
 
-__all__ = ["door_ajar", "glass_globe", "open_shade", "sunlit"]
+__all__ = ["covered_cup", "door_ajar", "glass_globe", "open_shade", "sunlit"]
 
 
 def glass_globe(radius: float = 0.12) -> tuple[House, Camera]:
@@ -45,6 +45,19 @@ def open_shade() -> tuple[House, Camera]:
     materials = [matte("wall", 0.7), matte("shade", 0.5), matte("block", 0.2, 0.5, 0.3), BULB]
     lamp = bulb((2.0, 1.45, 2.2), 3, 800.0, radius=0.03)
     return house(surfaces, materials, lamps=[lamp]), camera((0.5, 1.5, 3.6), (2.4, 0.9, 1.8))
+
+
+def covered_cup() -> tuple[House, Camera]:
+    """A bulb in a white cup in a globe of thin glass: light comes by way of the cup's inside."""
+    surfaces = shell((4.0, 2.5, 4.0), 0)
+    surfaces.append(sphere((2.0, 1.5, 2.2), 0.12, 2, n=32))
+    surfaces.append(cylinder((2.0, 1.42, 2.2), 0.06, 0.1, 3))
+    surfaces.append(box((2.4, 0.0, 2.4), (3.2, 0.6, 3.2), 1, "block"))
+    glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
+    white = matte("white", 0.8)
+    materials = [matte("wall", 0.7), matte("block", 0.6, 0.2, 0.15), glass, white, BULB]
+    lamp = bulb((2.0, 1.47, 2.2), 4, 800.0, radius=0.03)
+    return house(surfaces, materials, lamps=[lamp]), camera((0.5, 1.5, 0.5), (2.4, 1.0, 2.4))
 
 
 def sunlit() -> tuple[House, Camera]:

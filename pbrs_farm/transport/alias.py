@@ -1,0 +1,44 @@
+"""Drawing one of many by weight in constant time: Vose's alias method; numpy and kernels, no effects."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+
+def pick(alias: Any, first: Any, count: Any, u: Any, active: Any) -> tuple[Any, Any]:
+    """(index, u made uniform again) of an alias table's part [first, first + count)."""
+    x = u * mi.Float(count)
+    i = dr.minimum(mi.UInt32(x), count - 1)
+    f = x - mi.Float(i)
+    row = dr.gather(mi.Vector2f, alias, first + i, active)
+    other = dr.reinterpret_array(mi.UInt32, row[1])
+    stay = f < row[0]
+    again = dr.select(stay, f / row[0], (f - row[0]) / (1 - row[0]))
+    return dr.select(stay, i, other), dr.clip(again, 0, 1 - 1e-7)
+
+
+def alias_rows(weights: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(N, 2) rows (chance to stay, bits of the other index) of Vose's alias method."""
+    w = np.asarray(weights, np.float64)
+    n = len(w)
+    total = w.sum()
+    chance = w * (n / total) if total > 0 else np.ones(n)
+    stay, other = np.ones(n), np.arange(n, dtype=np.uint32)
+    small = [int(i) for i in np.flatnonzero(chance < 1)]
+    large = [int(i) for i in np.flatnonzero(chance >= 1)]
+    level = chance.tolist()
+    while small and large:
+        i, j = small.pop(), large[-1]
+        stay[i], other[i] = level[i], j
+        level[j] -= 1 - level[i]
+        if level[j] < 1:
+            small.append(large.pop())
+    rows = np.empty((n, 2), np.float32)
+    rows[:, 0] = np.clip(stay, 0, 1)
+    rows[:, 1] = other.view(np.float32)
+    return rows

@@ -1,0 +1,128 @@
+"""Guided rays: a part of the scattered rays goes to where lamps light their own insides; kernels.
+
+A bulb deep in its shade lights a room by way of the shade. Shadow rays to the bulb are blocked, and
+a ray scattered by the surface alone meets the shade once in a hundred tries: a firefly. So every
+direction d out of a vertex is drawn by one of three techniques, with chances that depend on what
+came before and not on d:
+
+    own     by the surface (bsdf.sample), after roulette     (1 - share) q(d) p_own(d)
+    cone    uniform in the cone around a lamp's inside       share CONED p_cone(d)
+    face    at a point y on a face side that glows           share (1 - CONED) p_face(y) r^2 / cos
+
+and the path's throughput is divided by their sum, the balance heuristic in one-sample form. The
+third density is known only where the ray ends: `kept` applies it there. A ray aimed at a face that
+meets another one brings nothing. Cones also catch what reaches a bulb by a reflection in a lamp's
+glass cover. No effects.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from pbrs_farm.transport.aims import NO_FACE
+from pbrs_farm.transport.bsdf import Scatter
+from pbrs_farm.transport.emitters import Emitters
+from pbrs_farm.transport.nearby import Near, Standpoint, cone_density, drawn, in_cones
+from pbrs_farm.transport.surface import Hit, Stage
+
+MOST, LEAST = 0.4, 0.1
+"""Of the rays scattered at a vertex. In between it takes the rays that roulette would end, so that
+daylight, which is not guided, loses little."""
+
+CONED: Final = 0.3
+REFLECTED: Final = 0.5
+_MOST_WORTH, _WORTH_M2 = 100.0, 20.0
+
+
+class Guide(NamedTuple):
+    """What guides the rays of one vertex. share: of all its rays; coned: of those, into cones."""
+
+    near: Near
+    share: Any
+    coned: Any
+
+
+class Guided(NamedTuple):
+    """A direction and how it came about. is_guided: not drawn by the surface; own: the surface's
+    random number made uniform again; target: the face aimed at, NO_FACE = none; valid."""
+
+    d: Any
+    is_guided: Any
+    own: Any
+    target: Any
+    valid: Any
+
+
+def guide_at(near: Near, m: Scatter, beta: Any, may_aim: Any) -> Guide:
+    """The guide of a vertex that a path of throughput beta has reached."""
+    albedo = dr.minimum(m.kd + m.f0 + m.tau, 1)
+    # Within a lamp the surface finds the light by itself.
+    least = LEAST * near.cones.total / dr.maximum(near.at.aim_total, 1e-30)
+    spare = dr.clip(1 - 0.95 * worth(near) * dr.max(beta * albedo), least, MOST)
+    share = dr.select(may_aim & (near.at.aim_total > 0), spare, 0)
+    return Guide(near, share, dr.select(near.cones.total > 0, mi.Float(CONED), 0))
+
+
+def worth(near: Near) -> Any:
+    """How much less often roulette ends a path here: more than 1 near lamps, where it is bright."""
+    return dr.clip(_WORTH_M2 * near.at.total, 1, _MOST_WORTH)
+
+
+def reflected_chance(reflectance: Any, worth: Any) -> Any:
+    """How often a scattered ray is reflected by thin glass: often near lamps, by their covers."""
+    return dr.clip(worth * reflectance, reflectance, dr.maximum(reflectance, REFLECTED))
+
+
+def guided(guide: Guide, stage: Stage, emitters: Emitters, p: Any, u: Any, uv: Any) -> Guided:
+    """A direction by the second or third technique, where u says so."""
+    share, coned = guide.share, guide.coned
+    is_guided = u < share
+    own = dr.select(is_guided, 0, (u - share) / (1 - share))
+    v = u / dr.maximum(share, 1e-6)
+    is_coned = is_guided & (v < coned)
+    v = dr.select(is_coned, v / CONED, (v - coned) / (1 - coned))
+    v = dr.clip(v, 0, 1 - 1e-7)
+    lamp, rest = drawn(guide.near.lamps, guide.near.aims, guide.near.at.aim_total, v)
+    at_face = is_guided & ~is_coned
+    aim = emitters.aims.aim(stage, p, lamp, rest, uv, at_face)
+    d = dr.select(is_coned, in_cones(guide.near.cones, v, uv), aim.d)
+    target = dr.select(at_face, aim.face, mi.UInt32(NO_FACE))
+    return Guided(d, is_guided, own, target, ~at_face | aim.valid)
+
+
+def cone_chance(guide: Guide, d: Any) -> Any:
+    """Density of the second technique in direction d, chance included."""
+    return guide.share * guide.coned * cone_density(guide.near.cones, d)
+
+
+def face_chance(guide: Guide) -> Any:
+    """Chance of the third technique, over what the aims of all lamps add up to."""
+    total = dr.maximum(guide.near.at.aim_total, 1e-30)
+    return guide.share * (1 - guide.coned) / total
+
+
+def kept(
+    emitters: Emitters,
+    last: Standpoint,
+    hit: Hit,
+    d: Any,
+    ratio_target: tuple[Any, Any],
+    only: Any,
+    turned: Any,
+    rough: Any,
+) -> Any:
+    """What a ray's throughput keeps where it ends; 1 where it passes on.
+
+    last: where it was scattered; ratio_target: face_chance over the density of the first two
+    techniques, and the face aimed at; turned: it ended without meeting what may be aimed at.
+    """
+    ratio, target = ratio_target
+    _level, aim = emitters.nearby.level(hit.aim_lamp, last.p, last.n, only, rough)
+    cos = dr.maximum(dr.abs(dr.dot(hit.ng, d)), 1e-6)
+    density = aim * hit.aim * dr.squared_norm(hit.p - last.p) / cos
+    balanced = dr.select(rough, dr.rcp(1 + ratio * density), 1)
+    astray = (target != NO_FACE) & (turned | (rough & (target != hit.face)))
+    return dr.select(astray, 0, balanced)

@@ -1,0 +1,145 @@
+"""Guided rays: they change no mean, cut the noise, and aim at what shines in a lamp's light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrs_farm.camera import Camera
+from pbrs_farm.house import House, Material, MaterialKind
+from pbrs_farm.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.transport import guide
+from pbrs_farm.transport.aims import BACK, GlowTables
+from pbrs_farm.transport.proof.statistics import blocks, z_scores
+from pbrs_farm.transport.result import LightResult
+from pbrs_farm.transport.scene import LightScene
+from pbrs_farm.transport.sky import dark_sky
+from pbrs_farm.transport.variant import choose_variant
+from tests.transport import hard_rooms, rooms
+
+pytestmark = pytest.mark.skipif(
+    choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
+)
+
+RECIPE: Recipe = recipe_from_name("fast")
+FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "spp": 256})
+
+
+def loaded(room: tuple[House, Camera]) -> tuple[LightScene, Camera]:
+    return LightScene.load(room[0], {}, RECIPE, dark_sky()), room[1].with_size(32, 24)
+
+
+@pytest.mark.parametrize("room", [hard_rooms.open_shade, hard_rooms.covered_cup])
+def test_guided_rays_leave_the_mean_alone_and_cut_the_noise(
+    room: Callable[[], tuple[House, Camera]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # 16 blocks, |z| < 4.5; both engines share one pilot, so that only the guiding differs.
+    scene, camera = loaded(room())
+
+    def rendered() -> list[LightResult]:
+        return [scene.render(camera, "0_0", FIELDS, 10 + k) for k in range(6)]
+
+    aided = rendered()
+    monkeypatch.setattr(guide, "MOST", 0.0)
+    monkeypatch.setattr(guide, "LEAST", 0.0)
+    monkeypatch.setattr(guide, "_MOST_WORTH", 1.0)
+    plain = rendered()
+    means = [[blocks(r.indoor) for r in results] for results in (aided, plain)]
+    assert np.abs(z_scores(means[0], means[1])).max() < 4.5
+    variances = [np.var([r.indoor for r in results], 0).mean() for results in (aided, plain)]
+    assert variances[0] < 0.25 * variances[1]
+
+
+def glow_of(house: House) -> tuple[LightScene, GlowTables]:
+    from pbrs_farm.transport.glow import glow_tables
+
+    scene, camera = loaded((house, rooms.camera((0.5, 1.5, 0.5), (2.0, 1.0, 2.0))))
+    emitters, _weights = scene.emitters(camera, FIELDS, 0)
+    return scene, glow_tables(scene.stage, emitters, scene.tables, 0)
+
+
+def test_the_inside_of_an_opaque_shade_is_aimed_at_and_its_outside_is_not() -> None:
+    scene, glow = glow_of(hard_rooms.open_shade()[0])
+    faces = (glow.sides & np.uint32(BACK - 1)).astype(np.int64)
+    corners = scene.tables.positions[scene.tables.faces[faces]].astype(np.float64)
+    from_axis = corners.mean(1) - np.array([2.0, 0.0, 2.2])
+    assert np.hypot(from_axis[:, 0], from_axis[:, 2]).max() < 0.121
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals[glow.sides >= BACK] *= -1
+    assert ((normals[:, [0, 2]] * from_axis[:, [0, 2]]).sum(1) < 0).all()
+    assert glow.chances.sum() == pytest.approx(1)
+    areas = 0.5 * np.linalg.norm(normals, axis=1)
+    assert (glow.densities * areas).sum() == pytest.approx(1)
+    assert 0 < glow.shares[0] <= 1
+    assert 0.12 < glow.balls[0, 3] < 0.4
+
+
+def test_a_bare_bulb_in_a_room_has_nothing_to_aim_at() -> None:
+    _scene, glow = glow_of(rooms.window_room(lumen=800)[0])
+    assert not len(glow.sides)
+    assert glow.shares.tolist() == [0]
+
+
+def test_a_lamp_is_chosen_as_often_as_its_density_says() -> None:
+    import drjit as dr
+    import mitsuba as mi
+
+    lamps = [rooms.bulb((1.0 + k, 2.0, 2.0), 1, 800.0) for k in range(3)]
+    house, camera = rooms.window_room(lumen=0)
+    scene, camera = loaded((house.with_items([*house.items, *lamps]), camera))
+    emitters, _weights = scene.emitters(camera, FIELDS, 0)
+    n = 1 << 16
+    rng = mi.PCG32(size=n)
+    p, up = mi.Point3f(1.3, 0.5, 2.0), mi.Vector3f(0, 1, 0)
+    only, on = mi.Int32(-1), mi.Bool(True)
+    near = emitters.nearby.seen(p, up, only, on)
+    uv = mi.Point2f(rng.next_float32(), rng.next_float32())
+    to = emitters.sample_lamp(scene.stage, near, rng.next_float32(), uv, only, on)
+    # With the densities of all right, the mean of 1 / density is the solid angle of all lamps.
+    radius = emitters.nearby.seen(p, up, only, on).at
+    assert radius.total.numpy()[0] > 0
+    inverse = dr.select(to.valid, dr.rcp(to.density), 0).numpy()
+    area_over_d2 = sum(
+        2 * float(lamp.area_m2) / 4 / ((1 + k - 1.3) ** 2 + 1.5**2)
+        for k, lamp in enumerate(scene.tables.lamps)
+    )
+    assert inverse.mean() == pytest.approx(area_over_d2, rel=0.03)
+
+
+def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
+    import mitsuba as mi
+
+    from pbrs_farm.transport.walk import Only, advance, camera_row, fields_row, start
+
+    glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
+    sheets = [rooms.quad([(-9, y, -9), (-9, y, 9), (9, y, 9), (9, y, -9)], 1) for y in (1.0, 0.5)]
+    floor = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
+    view = rooms.camera((0.1, 2.0, 0), (0, 0, 0), 64, 64, 0.01)
+    house = rooms.house([floor, *sheets], [rooms.matte("floor", 0.5), glass])
+    scene, camera = loaded((house, view))
+    emitters, _weights = scene.emitters(camera, FIELDS, 0)
+    asked: list[set[int]] = []
+
+    class Recorded:
+        def one(self, dim: Any) -> Any:
+            asked[-1].add(int(mi.UInt32(dim).numpy()[0]))
+            return mi.Float(0.99)
+
+        def two(self, dim: Any) -> Any:
+            asked[-1].update({int(mi.UInt32(dim).numpy()[0]), int(mi.UInt32(dim).numpy()[0]) + 1})
+            return mi.Point2f(0.3, 0.6)
+
+    only = Only(mi.Int32(-1), mi.Int32(-1))
+    walk = start(camera_row(camera), mi.Float(16), mi.Float(12))
+    for _step in range(3):
+        asked.append(set())
+        walk, found, _alive = advance(
+            scene.stage, emitters, fields_row(FIELDS), Recorded(), walk, only, mi.Bool(True)
+        )
+        assert found.hit.valid.numpy()[0]
+    assert not asked[0] & asked[1]
+    assert not asked[1] & asked[2]
+    assert not asked[0] & asked[2]
