@@ -107,6 +107,9 @@ class LightFields(_Group):
     time_budget_s: float = Field(
         0.0, ge=0, description="of a view's light, instead of samples or mutations; 0 = off"
     )
+    groups: Literal["two", "lamps"] = Field(
+        "two", description="outdoor and indoor; `lamps`: a layer for each lamp, too (`path`)"
+    )
     chains: int = Field(32768, ge=16, description="Markov chains of `metropolis`, in parallel")
     large_step: float = Field(0.3, gt=0, lt=1, description="chance of a fresh path, Kelemen 2002")
     tail_pixels: int = Field(
@@ -120,6 +123,12 @@ class LightFields(_Group):
     def _noise_is_of_path(self) -> Self:
         if self.noise > 0 and self.integrator == "metropolis":
             raise ValueError("noise is reached by `path` alone: give metropolis a time_budget_s")
+        return self
+
+    @model_validator(mode="after")
+    def _lamps_are_of_path(self) -> Self:
+        if self.groups == "lamps" and self.integrator == "metropolis":
+            raise ValueError("groups lamps is of `path` alone: add --set light.integrator=path")
         return self
 
 
@@ -238,6 +247,9 @@ class Recipe(_Group):
     def digest(self, *groups: str) -> str:
         """Digest of the seed and the named groups; of all fields but the name when none is named."""
         fields = self.model_dump(mode="json", exclude={"name"})
+        if self.light.groups == "two":
+            # The field came later: what was stored without it keeps its digest.
+            del fields["light"]["groups"]
         if groups:
             fields = {g: fields[g] for g in ("seed", *groups)}
         return keys.digest(fields)

@@ -48,7 +48,7 @@ class Towards(NamedTuple):
     """A sampled direction to an emitter.
 
     d: unit direction; distance; radiance: Color3f from there; density: per solid angle, all
-    techniques that could have drawn it counted; valid.
+    techniques that could have drawn it counted; valid. lamp: its number, None for the sky.
     """
 
     d: Any
@@ -56,6 +56,7 @@ class Towards(NamedTuple):
     radiance: Any
     density: Any
     valid: Any
+    lamp: Any = None
 
 
 class Emitters:
@@ -132,7 +133,7 @@ class Emitters:
         cos = dr.abs(dr.dot(n, d))
         valid = active & (distance > 1e-5) & (cos > 1e-5)
         radiance, density = self._lamp(lamp, near.at, distance, cos, only, valid)
-        return Towards(d, distance, radiance, density, valid)
+        return Towards(d, distance, radiance, density, valid, lamp)
 
     def hit_lamp(
         self, lamp: Any, at: Standpoint, distance: Any, cos: Any, only: Any, active: Any

@@ -7,7 +7,7 @@ waits for the longest path. A lane sums its samples in order: the same seed give
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -23,6 +23,7 @@ from pbrs_farm.transport.surface import Stage
 from pbrs_farm.transport.walk import (
     CameraRow,
     FieldsRow,
+    Found,
     Only,
     advance,
     camera_row,
@@ -38,6 +39,7 @@ class Sums:
 
     outdoor, indoor: radiance; *_even: of every second sample; albedo, normal: of the first
     surface that is neither mirror nor glass; n_bad: paths that were not finite, left out.
+    lamps: (N, L, 3), indoor light by the lamp it comes from, when Lanes asks for it.
     """
 
     outdoor: NDArray[np.float32]
@@ -47,6 +49,7 @@ class Sums:
     albedo: NDArray[np.float32]
     normal: NDArray[np.float32]
     n_bad: int
+    lamps: NDArray[np.float32] | None = None
 
     def __add__(self, other: Sums) -> Sums:
         return Sums(
@@ -57,6 +60,7 @@ class Sums:
             self.albedo + other.albedo,
             self.normal + other.normal,
             self.n_bad + other.n_bad,
+            None if self.lamps is None or other.lamps is None else self.lamps + other.lamps,
         )
 
 
@@ -65,7 +69,8 @@ class Lanes:
     """Which pixels to trace and how often.
 
     width, height: of the picture. first_sample, n_samples: of each pixel. n_only_*: 0, or the
-    number of emitters that the pilot asks one by one: lane = pixel * n_only + emitter.
+    number of emitters that the pilot asks one by one: lane = pixel * n_only + emitter. n_lamps:
+    0, or the number of all lamps, to sum the light of each by itself.
     """
 
     width: int
@@ -75,6 +80,7 @@ class Lanes:
     seed: int
     n_only_lamps: int = 0
     n_only_outdoor: int = 0
+    n_lamps: int = 0
 
     @property
     def n_only(self) -> int:
@@ -85,6 +91,13 @@ class Lanes:
     def n_lanes(self) -> int:
         """Lanes of a launch."""
         return self.width * self.height * max(self.n_only, 1)
+
+
+class ByLamp(NamedTuple):
+    """Where a lane adds what each lamp brings: sums (lanes * lamps * 3,); first: its place there."""
+
+    sums: Any
+    first: Any
 
 
 def trace(
@@ -107,6 +120,10 @@ def trace(
         lamp=dr.select(asked, dr.select(is_lamp, which, -2), -1),
         outdoor=dr.select(asked, dr.select(is_lamp, -2, which - n_lamps), -1),
     )
+    by_lamp = None
+    if lanes.n_lamps > 0:
+        sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
+        by_lamp = ByLamp(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
     out = _trace(
         stage,
         emitters,
@@ -117,11 +134,15 @@ def trace(
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
         stream_key(lane, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF)),
         only,
+        by_lamp,
     )
     dr.eval(*out)
     arrays = [np.ascontiguousarray(v.numpy().T, np.float32) for v in out[:6]]
     n_bad = int(np.sum(out[6].numpy(), dtype=np.int64))
-    return Sums(arrays[0], arrays[1], arrays[2], arrays[3], arrays[4], arrays[5], n_bad)
+    lamps = None
+    if by_lamp is not None:
+        lamps = by_lamp.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
+    return Sums(arrays[0], arrays[1], arrays[2], arrays[3], arrays[4], arrays[5], n_bad, lamps)
 
 
 @dr.syntax
@@ -135,6 +156,7 @@ def _trace(
     last: Any,
     key: Any,
     only: Only,
+    by_lamp: ByLamp | None,
 ) -> tuple[Any, ...]:
     # Sums over samples, and the light of the path that is under way.
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
@@ -160,6 +182,7 @@ def _trace(
         walk, found, alive = advance(stage, emitters, fields, numbers, walk, only, active)
         l_out += found.met_outdoor + found.lit_outdoor
         l_in += found.met_indoor + found.lit_indoor
+        _add_by_lamp(by_lamp, found, active)
 
         # What the denoiser is told of the first surface that is not a mirror or glass.
         first_rough = found.is_rough & ~seen
@@ -182,3 +205,15 @@ def _trace(
         active = s < last
 
     return outdoor, indoor, outdoor_even, indoor_even, albedo, normal, n_bad
+
+
+def _add_by_lamp(by_lamp: ByLamp | None, found: Found, active: Any) -> None:
+    """Add what a step found to the lamps it came from; what is not finite is left out."""
+    if by_lamp is None:
+        return
+    met, lit = (found.met_indoor, found.hit.lamp), (found.lit_indoor, found.to_indoor.lamp)
+    for light, lamp in (met, lit):
+        level = luminance(light)
+        brings = active & (level > 0) & dr.isfinite(level)
+        for c in range(3):
+            dr.scatter_add(by_lamp.sums, light[c], by_lamp.first + lamp * 3 + c, brings)

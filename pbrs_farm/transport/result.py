@@ -25,6 +25,7 @@ class LightResult:
     noise: relative error of each group and of their sum, estimated from two half buffers.
     spp: samples (or mutations) per pixel. n_nonfinite: contributions replaced by nothing.
     facts: for view.json: integrator, weights of lamps, seed.
+    lamps: number -> (H, W, 3), what indoor is the sum of, when light.groups is "lamps".
     """
 
     outdoor: RadianceImage
@@ -35,6 +36,7 @@ class LightResult:
     spp: int
     n_nonfinite: int
     facts: dict[str, Any] = field(default_factory=dict)
+    lamps: Mapping[int, RadianceImage] = field(default_factory=dict)
 
     def group(self, group: Group) -> RadianceImage:
         """The picture of one light group."""

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.camera import Camera
-from pbrs_farm.errors import RenderFailed
+from pbrs_farm.errors import MachineFailed, RenderFailed
 from pbrs_farm.house import House
 from pbrs_farm.lighting import Group
 from pbrs_farm.recipe import LightFields, Recipe
+from pbrs_farm.transport.lamps import MAX_SUMS, with_lamps
 from pbrs_farm.transport.result import LightResult, joined_result, result_from_sums
 from pbrs_farm.transport.sky import Sky
 from pbrs_farm.transport.stopwatch import Stopwatch
@@ -79,7 +80,8 @@ class LightScene:
 
         `path`: fields.spp samples per pixel, again and again until fields.noise is reached when
         it is given, or as many as fit into fields.time_budget_s. `metropolis`: direct light by
-        fields.direct_spp samples, the rest by mutations. room_id names the view in errors. Equal
+        fields.direct_spp samples, the rest by mutations. With fields.groups "lamps" `path` sums the
+        light of each lamp by itself, too. room_id names the view in errors. Equal
         arguments give equal bits on one machine (Metropolis: equal to 1e-5, it splats in
         parallel); with a time budget similar pictures.
         """
@@ -90,9 +92,27 @@ class LightScene:
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": weights}
         if fields.integrator == "metropolis":
             return self._render_metropolis(camera, room_id, fields, seed, emitters, facts)
-        sums, spp = self._path_sums(camera, fields, seed, emitters)
         facts["integrator"] = "path"
-        return result_from_sums(sums, camera, spp, facts)
+        if fields.groups == "two":
+            sums, spp = self._path_sums(camera, fields, seed, emitters)
+            return result_from_sums(sums, camera, spp, facts)
+        n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
+        sums, spp = self._path_sums(camera, fields, seed, emitters, n_lamps=n_lamps)
+        result = result_from_sums(sums, camera, spp, facts)
+        return with_lamps(result, sums.lamps, spp, self.tables.lamps)
+
+    def _n_lamps_that_fit(self, camera: Camera, room_id: str, seed: int) -> int:
+        """The number of lamps; RenderFailed when a sum of each is more than the kernel can count."""
+        i = camera.intrinsics
+        if i.width_px * i.height_px * self.n_lamps * 3 >= MAX_SUMS:
+            raise RenderFailed(
+                f"{i.width_px}x{i.height_px} pixels are too many for {self.n_lamps} lamps each",
+                view=room_id,
+                mode="light",
+                seed=seed,
+                hint="a smaller picture, or --groups two",
+            )
+        return self.n_lamps
 
     def _path_sums(
         self,
@@ -102,10 +122,12 @@ class LightScene:
         emitters: Any,
         *,
         max_depth: int | None = None,
+        n_lamps: int = 0,
     ) -> tuple[Any, int]:
         """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached.
 
         With a time budget: in launches as long as what is left of it, and no fewer than one.
+        n_lamps: 0, or the number of all lamps, to sum the light of each by itself.
         """
         from pbrs_farm.transport.path import Lanes, trace
 
@@ -119,7 +141,7 @@ class LightScene:
         total: Any = None
         spp = 0
         while spp < goal and (n := watch.fitting(min(per_launch, goal - spp))) > 0:
-            lanes = Lanes(i.width_px, i.height_px, spp, n, seed)
+            lanes = Lanes(i.width_px, i.height_px, spp, n, seed, n_lamps=n_lamps)
             sums = trace(self.stage, emitters, camera, lanes, fields, max_depth=max_depth)
             watch.did(n)
             total = sums if total is None else total + sums
@@ -221,6 +243,11 @@ class LightScene:
         """By Mitsuba's own plugins: scalar variants have no arrays for our kernels."""
         from pbrs_farm.transport.reference import ReferenceScene
 
+        if fields.groups == "lamps":
+            raise MachineFailed(
+                f"light by lamp needs LLVM or CUDA, this is {self.variant}",
+                hint="sudo apt-get install -y libllvm19, or --groups two",
+            )
         scene = ReferenceScene(self.tables, self.sky, self.variant)
         half = fields.model_copy(update={"spp": max(fields.spp // 2, 1)})
         halves = {

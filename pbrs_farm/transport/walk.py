@@ -133,11 +133,13 @@ class Lit(NamedTuple):
     """What one shadow ray brought: light scattered along the path, before throughput.
 
     d: towards the emitter; strength: its radiance times visibility and weight, over the density.
+    lamp: the emitter's number, None for the sky.
     """
 
     light: Any
     d: Any
     strength: Any
+    lamp: Any = None
 
 
 def camera_row(camera: Camera) -> CameraRow:
@@ -388,7 +390,7 @@ def _lit(
     far = dr.select(is_near, reach * (1 - 1e-4), dr.inf)
     clear = stage.transmittance(begin, way, far, lit)
     strength = dr.select(lit, to.radiance * clear * weight, 0)
-    return Lit(dr.select(lit & faces, value * strength, 0), to.d, strength)
+    return Lit(dr.select(lit & faces, value * strength, 0), to.d, strength, to.lamp)
 
 
 def _balanced(emitters: Emitters, walk: Walk, hit: Hit, only: Only, turned: Any, rough: Any) -> Any:
