@@ -50,7 +50,7 @@ LAYERS: Final[tuple[Layer, ...]] = (
     Layer(
         "radiance",
         "radiance.exr",
-        "outdoor.{R,G,B} indoor.{R,G,B} albedo.{R,G,B} normal.{X,Y,Z}",
+        "outdoor.{R,G,B} indoor.{R,G,B} albedo.{R,G,B} normal.{X,Y,Z}; --groups lamps: lamp<N>.{R,G,B}",
         "float32",
         "W m-2 sr-1, linear sRGB primaries; albedo 0..1; normal: the pixel's mean, world, guides the denoiser",
         "-",

@@ -88,6 +88,25 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
                     f"{bad} pixels negative or not finite",
                     max(bad, 1),
                 )
+        _check_lamps(view, channels, tally)
+
+
+def _check_lamps(view: StoredView, channels: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """Where each lamp has a layer, indoor is their sum in the order of their numbers, to the bit."""
+    table = view.table.get("modes", {}).get("light", {}).get("lamps")
+    if table is None:
+        return
+    names = [row["layer"] for row in table if row["layer"]]
+    needed = {f"{name}.{c}" for name in ("indoor", *names) for c in "RGB"}
+    if not tally.expect(
+        "lamps", view.place, needed <= channels.keys(), f"lacks {needed - channels.keys()}"
+    ):
+        return
+    for c in "RGB":
+        total = np.zeros(view.size, np.float32)
+        for name in names:
+            total += channels[f"{name}.{c}"]
+        _same(view, tally, "indoor = sum of lamps", channels[f"indoor.{c}"] == total)
 
 
 def check_consistency(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:

@@ -5,9 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.words import Verb, dump, say
 from pbrs_farm.errors import BadInput
+
+if TYPE_CHECKING:
+    from pbrs_farm.farm.relight import LampFactor
 
 
 def add_verbs(verb: Verb) -> None:
@@ -40,6 +44,15 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("view", type=Path, help="a view's folder: OUT/houses/<house>/views/<view>")
     p.add_argument("--indoor", type=float, default=1.0, help="factor of the lamps (default 1)")
     p.add_argument("--outdoor", type=float, default=1.0, help="factor of the sky (default 1)")
+    p.add_argument(
+        "--lamp",
+        action="append",
+        default=[],
+        metavar="LAMP=F",
+        help="factor F, or R,G,B, of a lamp, repeatable: its number, item or name as --list prints"
+        " them, * for any; needs a view rendered with --groups lamps",
+    )
+    p.add_argument("--list", action="store_true", help="print the view's lamps, relight nothing")
     p.add_argument(
         "--out", type=Path, default=None, help="PNG to write (default VIEW_relit.png here)"
     )
@@ -112,11 +125,49 @@ def _relight(args: argparse.Namespace) -> int:
     from pbrs_farm.farm.relight import relit
     from pbrs_farm.store.folder import FolderStore
 
+    if args.list:
+        return _list_lamps(args.view)
     for name, factor in (("--indoor", args.indoor), ("--outdoor", args.outdoor)):
         if not 0 <= factor < math.inf:
             raise BadInput(name, str(factor), "expected a number that is finite and not negative")
     out = args.out or Path(f"{args.view.resolve().name}_relit.png")
-    png = relit(args.view, indoor=args.indoor, outdoor=args.outdoor, denoise=not args.no_denoise)
+    png = relit(
+        args.view,
+        indoor=args.indoor,
+        outdoor=args.outdoor,
+        denoise=not args.no_denoise,
+        lamps=[_lamp_factor(word) for word in args.lamp],
+    )
     FolderStore(out.parent).put(out.name, png)
     say(str(out))
     return 0
+
+
+def _list_lamps(view: Path) -> int:
+    from pbrs_farm.farm.relight import lamps_of_view
+
+    say(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
+    for row in lamps_of_view(view):
+        share = f"{row['share']:.1%}" if row["layer"] else "-"
+        place = f"{row['item']:<12} {row['room'] or '-':<8}"
+        say(f"{row['number']:>4} {share:>6} {row['lm']:>7.0f}  {place} {row['name']}")
+    return 0
+
+
+def _lamp_factor(word: str) -> LampFactor:
+    """NAME=F or NAME=R,G,B; a name may hold "="."""
+    from pbrs_farm.farm.relight import LampFactor
+
+    name, _, text = word.rpartition("=")
+    try:
+        factors = [float(part) for part in text.split(",")]
+    except ValueError:
+        factors = []
+    if not name or len(factors) not in (1, 3) or not all(0 <= f < math.inf for f in factors):
+        raise BadInput(
+            "--lamp",
+            word,
+            "expected LAMP=F or LAMP=R,G,B, numbers that are finite and not negative",
+        )
+    r, g, b = factors * (3 // len(factors))
+    return LampFactor(name, (r, g, b))

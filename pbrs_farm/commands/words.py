@@ -60,7 +60,7 @@ def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
 
 
 def add_light(p: argparse.ArgumentParser) -> None:
-    """How long a view's light is carried: short forms of two fields of the recipe."""
+    """How long a view's light is carried and by what parts: short forms of fields of the recipe."""
     p.add_argument(
         "--noise", default=None, metavar="E",
         help="add samples until the estimated relative error is below E, e.g. 0.05"
@@ -69,6 +69,11 @@ def add_light(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--time-budget", default=None, metavar="S",
         help="seconds of light a view, instead of samples or mutations (light.time_budget_s)",
+    )  # fmt: skip
+    p.add_argument(
+        "--groups", choices=("two", "lamps"), default=None,
+        help="lamps: store the light of each lamp, too, for `relight VIEW --lamp` (light.groups;"
+        " path only; default two: outdoor and indoor)",
     )  # fmt: skip
 
 
@@ -89,6 +94,8 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
         overrides["light.noise"] = args.noise
     if getattr(args, "time_budget", None) is not None:
         overrides["light.time_budget_s"] = args.time_budget
+    if getattr(args, "groups", None) is not None:
+        overrides["light.groups"] = args.groups
     if args.seed is not None:
         overrides["seed"] = str(args.seed)
     if args.strict:

@@ -243,15 +243,20 @@ def _opengl_il(work: Work) -> Made:
 
 def _light(work: Work) -> Made:
     from pbrs_farm.images import exr_from_layers
+    from pbrs_farm.transport.lamps import layer_name
 
     loaded = _loaded(work)
     view, camera = _view_at_size(work, loaded)
     groups = ("image", "light", "sky", "emission", "materials")
-    seed = keys.seed(work.house_id, view.id, "light", work.recipe.digest(*groups))
+    # A layer for each lamp changes no random number: the pictures stay what they are without.
+    fields = work.recipe.light.model_copy(update={"groups": "two"})
+    same = work.recipe.model_copy(update={"light": fields})
+    seed = keys.seed(work.house_id, view.id, "light", same.digest(*groups))
     result = loaded.light_scene.render(camera, view.room_id, work.recipe.light, seed)
+    images = {"outdoor": result.outdoor, "indoor": result.indoor, "albedo": result.albedo}
+    images |= {layer_name(number): image for number, image in result.lamps.items()}
     layers: dict[str, NDArray[np.float32]] = {}
-    for name in ("outdoor", "indoor", "albedo"):
-        image: NDArray[np.float32] = getattr(result, name)
+    for name, image in images.items():
         layers |= {f"{name}.{c}": image[..., k] for k, c in enumerate("RGB")}
     layers |= {f"normal.{c}": result.normal[..., k] for k, c in enumerate("XYZ")}
     if is_object(work):
@@ -265,6 +270,10 @@ def _light(work: Work) -> Made:
         "variant": loaded.light_scene.variant,
         "sky": loaded.sky.facts(),
     }
+    if "lamps" in facts:
+        items = loaded.house.items
+        named = [{**row, "name": items[row["instance"] - 1].name} for row in facts["lamps"]]
+        facts["lamps"] = named
     room = room_of(loaded.house, view)
     if room is not None:
         # Measured once a house, by whichever view's light comes first.

@@ -44,6 +44,10 @@ def zipped(path: Path, **entries: str) -> Path:
             ["run", "builtin", "--out", "{out}", "--recipe", "paper", "--noise", "0.05"],
             "give metropolis a time_budget_s",
         ),
+        (
+            ["run", "builtin", "--out", "{out}", "--recipe", "paper", "--groups", "lamps"],
+            "add --set light.integrator=path",
+        ),
         (["run", "builtin", "--out", "/proc/nowhere"], "/proc/nowhere"),
         (["verify", "{out}"], "no houses here"),
         (["sheet", "{out}"], "{out}"),
@@ -104,8 +108,9 @@ def test_no_verb_prints_the_help(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("verb", ["run x --out o", "demo", "objects x --out o", "submit x"])
-def test_noise_and_time_budget_are_short_forms_of_the_recipes_fields(verb: str) -> None:
+def test_noise_time_budget_and_groups_are_short_forms_of_the_recipes_fields(verb: str) -> None:
     pytest.importorskip("celery")
-    words = [*verb.split(), "--noise", "0.05", "--time-budget", "30"]
-    recipe = recipe_of(build_parser().parse_args(words))
-    assert (recipe.light.noise, recipe.light.time_budget_s) == (0.05, 30.0)
+    words = [*verb.split(), "--noise", "0.05", "--time-budget", "30", "--groups", "lamps"]
+    light = recipe_of(build_parser().parse_args(words)).light
+    assert (light.noise, light.time_budget_s, light.groups) == (0.05, 30.0, "lamps")
+    assert recipe_of(build_parser().parse_args(verb.split())).light.groups == "two"
