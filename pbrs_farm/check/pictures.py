@@ -77,6 +77,7 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
         tally.expect(
             "radiance", view.place, names <= channels.keys(), f"lacks {names - channels.keys()}"
         )
+        names |= {name for name in channels if name.startswith("lamp")}
         for name in sorted(names & channels.keys()):
             plane = channels[name]
             bad = int((~(np.isfinite(plane) & (plane >= 0))).sum())
