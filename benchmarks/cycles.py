@@ -28,13 +28,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.exchange import home_without_coats, write_scene
+from benchmarks.noise import blocks, relative_square
 from benchmarks.report import FOLDER, write_report
 from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.frames import LUMINANCE
@@ -45,13 +47,10 @@ from pbrs_farm.images import (
     png_from_array,
 )
 from pbrs_farm.recipe import LightFields, Recipe
-from pbrs_farm.transport.materials import MIRROR, SURFACE
-from pbrs_farm.transport.portals import portals_of_house
 from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import Sky, sky_for_house
-from pbrs_farm.transport.tables import NO_LAMP, SceneTables, tables_from_house
+from pbrs_farm.transport.sky import Sky
+from pbrs_farm.transport.tables import SceneTables
 from pbrs_farm.transport.tone import exposure_of, tone
-from pbrs_farm.transport.variant import choose_variant
 
 HOME = "2BedroomApartment"
 N_CAMERAS = 2
@@ -89,7 +88,7 @@ class Run:
 def main() -> None:
     """Measure, print, write out/bench/cycles.json and cycles.png."""
     e = effort_from_environment()
-    house, scene, textures = _home()
+    house, scene, textures = home_without_coats(HOME)
     cameras = [
         Camera.look(Intrinsics.from_hfov(e.width, e.height, c.hfov_rad), c.eye, c.towards)
         for c in house.cameras[:N_CAMERAS]
@@ -138,28 +137,6 @@ def effort_from_environment() -> Effort:
     """EFFORT, or what CYCLES_EFFORT="width height spp reference_spp n_short" says."""
     words = os.environ.get("CYCLES_EFFORT", "").split()
     return Effort(*(int(w) for w in words)) if words else EFFORT
-
-
-def _home() -> tuple[House, LightScene, dict[str, NDArray[np.uint8]]]:
-    from pbrs_farm.farm.loaded import decoded_textures
-    from pbrs_farm.farm.sources import resolve
-    from pbrs_farm.farm.steps import repaired_house
-
-    recipe = Recipe()
-    house, _report = repaired_house(resolve(HOME), recipe)
-    textures, _unreadable = decoded_textures(house)
-    sky = sky_for_house(recipe, house.id)
-    tables = without_coats(tables_from_house(house, textures, recipe))
-    return house, LightScene(tables, sky, portals_of_house(house), choose_variant()), textures
-
-
-def without_coats(tables: SceneTables) -> SceneTables:
-    """The tables with every coat taken off; a metal's reflectance becomes diffuse."""
-    rows = tables.material_rows.copy()
-    is_metal = (rows[:, 11] == SURFACE) & (rows[:, 4:7].max(1) > 0.081)
-    rows[is_metal, 0:3] += rows[is_metal, 4:7]
-    rows[rows[:, 11] == SURFACE, 4:8] = 0
-    return replace(tables, material_rows=rows)
 
 
 def _our_run(scene: LightScene, camera: Camera, fields: LightFields, e: Effort) -> Run:
@@ -259,9 +236,11 @@ def _run(
 
 
 def _compared(ours: Run, theirs: Run) -> list[tuple[str, float, str]]:
-    a, b = (np.stack([_error(p, run.reference) for p in run.short]) for run in (ours, theirs))
+    a, b = (
+        np.stack([relative_square(p, run.reference) for p in run.short]) for run in (ours, theirs)
+    )
     mean = float((ours.reference @ LUMINANCE).mean()), float((theirs.reference @ LUMINANCE).mean())
-    blocks = [_blocks(run.reference @ LUMINANCE) for run in (ours, theirs)]
+    parts = [blocks(run.reference @ LUMINANCE) for run in (ours, theirs)]
     cost = theirs.cpu_s / ours.cpu_s
     median = float(np.median(a)), float(np.median(b))
     return [
@@ -269,7 +248,7 @@ def _compared(ours: Run, theirs: Run) -> list[tuple[str, float, str]]:
         ("mean_luminance_cycles", mean[1], "W m-2 sr-1"),
         (
             "block_ratio_median",
-            float(np.median(blocks[1] / blocks[0])),
+            float(np.median(parts[1] / parts[0])),
             "Cycles / ours, 8x6 blocks",
         ),
         ("relmse", float(a.mean()), "-"),
@@ -285,71 +264,17 @@ def _compared(ours: Run, theirs: Run) -> list[tuple[str, float, str]]:
     ]
 
 
-def _error(picture: NDArray[np.float32], reference: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(H, W) squared relative error of luminance."""
-    y, t = (np.asarray(v, np.float64) @ LUMINANCE for v in (picture, reference))
-    return np.asarray((y - t) ** 2 / (t**2 + 1e-3 * t.mean() ** 2))
-
-
-def _blocks(luminance: NDArray[np.float64]) -> NDArray[np.float64]:
-    h, w = luminance.shape
-    cut = luminance[: h // 6 * 6, : w // 8 * 8]
-    return np.asarray(cut.reshape(6, h // 6, 8, w // 8).mean((1, 3)))
-
-
-# The exchange: what our kernels gather from, as files.
-
-
 def export(
     tables: SceneTables, sky: Sky, house: House, textures: dict[str, NDArray[np.uint8]]
 ) -> None:
-    """Write scene.npz, scene.json, dome.exr and the textures into FILES."""
-    FILES.mkdir(parents=True, exist_ok=True)
-    rows = tables.face_rows
-    first = np.stack([rows[:, 3], rows[:, 7]], 1)
-    step = rows[:, [11, 12]], rows[:, [13, 14]]
-    tags, part = np.unique(tables.face_tags, return_inverse=True)
-    np.savez(
-        FILES / "scene.npz",
-        positions=tables.positions,
-        faces=tables.faces,
-        face_part=part.astype(np.int32),
-        uvs=np.stack([first, first + step[0], first + step[1]], 1),
-        normals=np.stack([rows[:, 16 + 4 * k : 19 + 4 * k] for k in range(3)], 1),
-    )
+    """Write the scene, dome.exr and the textures as PNG into FILES."""
+    write_scene(FILES, tables, sky, house, textures)
     for name, picture in textures.items():
         (FILES / f"{name}.png").write_bytes(png_from_array(picture))
     # Blender's azimuth starts a quarter turn off ours.
     dome = np.roll(sky.dome, sky.dome.shape[1] // 4, axis=1)
     layers = {c: np.ascontiguousarray(dome[..., k]) for k, c in enumerate("RGB")}
     (FILES / "dome.exr").write_bytes(exr_from_layers(layers))
-    described = {
-        "parts": [_part(int(tag), tables, house, textures) for tag in tags],
-        "sun": {
-            "direction": sky.sun_direction.tolist(),
-            "irradiance": sky.sun_irradiance.tolist(),
-            "half_angle_rad": sky.sun_half_angle_rad,
-        },
-    }
-    (FILES / "scene.json").write_text(json.dumps(described, indent=1))
-
-
-def _part(
-    tag: int, tables: SceneTables, house: House, textures: dict[str, NDArray[np.uint8]]
-) -> dict[str, Any]:
-    index, lamp = tag & 0xFFFF, tag >> 16
-    row, material = tables.material_rows[index], house.materials[index]
-    texture = material.texture_id if material.texture_id in textures else None
-    return {
-        "name": f"{index} {material.name}"[:60],
-        "kind": int(row[11]),
-        "kd": row[0:3].tolist(),
-        "f0": row[4:7].tolist(),
-        "tau": row[8:11].tolist(),
-        "texture": f"{texture}.png" if texture and int(row[11]) != MIRROR else None,
-        "cutout": bool(row[15] > 0),
-        "radiance": [0.0] * 3 if lamp == NO_LAMP else tables.lamp_rows[lamp, :3].tolist(),
-    }
 
 
 def _exr(path: Path) -> NDArray[np.float32]:

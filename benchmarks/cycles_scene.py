@@ -137,7 +137,7 @@ def material_of(folder: Path, part):  # type: ignore[no-untyped-def]
     picture = None
     if part["texture"]:
         picture = nodes.new("ShaderNodeTexImage")
-        path = str(folder / part["texture"])
+        path = str(folder / f"{part['texture']}.png")
         picture.image = bpy.data.images.load(path, check_existing=True)
         picture.image.alpha_mode = "CHANNEL_PACKED"
 
