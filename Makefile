@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 NAME ?=
 HOME_NAME ?= Studio
 
-.PHONY: help setup demo check test test-farm test-infra test-slow bench bench-light bench-cycles bench-farm format clean
+.PHONY: help setup demo check test test-farm test-infra test-slow bench bench-light bench-cycles bench-luxcore bench-farm format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 14
@@ -36,7 +36,7 @@ test-farm: setup ## the farm's tests that really kill processes
 test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm.md)
 	$(BIN)/pytest -m infra -rs
 
-bench: setup ## measure everything but light, cycles and farm (NAME=cameras for one), under 25 minutes
+bench: setup ## measure everything but light, cycles, luxcore and farm (NAME=cameras for one), under 25 minutes
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## light transport: path, metropolis, denoiser
@@ -46,6 +46,11 @@ bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wan
 	@test -x out/cycles-venv/bin/python || python3.11 -m venv out/cycles-venv
 	@out/cycles-venv/bin/python -c "import bpy" 2>/dev/null || out/cycles-venv/bin/pip install -q "bpy==5.0.1"
 	$(BIN)/python -m benchmarks cycles
+
+bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in a Python of its own: 12 minutes
+	@test -x out/luxcore-venv/bin/python || $(BIN)/python -m venv out/luxcore-venv
+	@out/luxcore-venv/bin/pip show -q pyluxcore || out/luxcore-venv/bin/pip install -q "pyluxcore==2.11.2" numpy
+	$(BIN)/python -m benchmarks luxcore
 
 bench-farm: setup ## queue, ledger, coordinator (FULL=1 for the whole job)
 	$(BIN)/python -m benchmarks farm

@@ -1,4 +1,4 @@
-"""Run benches by name: `python -m benchmarks [NAME...]`; all but light, cycles and farm when none is named.
+"""Run benches by name: `python -m benchmarks [NAME...]`; all but those with a target of their own if none is named.
 
 Each bench is a module of this folder with main(); a bench that fails does not stop the others.
 """
@@ -11,7 +11,7 @@ import time
 import traceback
 
 DEFAULT = ("demo", "view", "houses", "cameras", "labels", "gl", "lux", "selection")
-OWN_TARGET = ("light", "presets", "cycles", "farm")
+OWN_TARGET = ("light", "presets", "cycles", "luxcore", "farm")
 
 
 def main(names: list[str]) -> int:
