@@ -47,7 +47,7 @@ bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wan
 	@out/cycles-venv/bin/python -c "import bpy" 2>/dev/null || out/cycles-venv/bin/pip install -q "bpy==5.0.1"
 	$(BIN)/python -m benchmarks cycles
 
-bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in a Python of its own: 12 minutes
+bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in a Python of its own: 14 minutes when busy
 	@test -x out/luxcore-venv/bin/python || $(BIN)/python -m venv out/luxcore-venv
 	@out/luxcore-venv/bin/pip show -q pyluxcore || out/luxcore-venv/bin/pip install -q "pyluxcore==2.11.2" numpy
 	$(BIN)/python -m benchmarks luxcore
