@@ -41,8 +41,8 @@ STEPS: Final = {
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
-        Step("illuminance", 1, ("sky", "emission", "materials"), ("house",), per_view=False),
-        Step("light", 4, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
+        Step("illuminance", 2, ("sky", "emission", "materials"), ("house",), per_view=False),
+        Step("light", 5, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
         Step("develop", 4, ("tone", "light"), ("light",)),
         Step("view", 1, ("histogram",), _VIEW_READS),
     )

@@ -23,15 +23,16 @@ MIN_EXITANCE: Final = 0.5
 
 INSIDE: Final = 0.9
 
-_MAX_FACES: Final = 4096
+_MAX_FACES: Final = 1024
 _POINTS: Final = 4
-_SPP: Final = 8
+_SPP: Final = 4
+_DEPTH: Final = 3
 
 
 def glow_tables(stage: Stage, emitters: Emitters, tables: SceneTables, seed: int) -> GlowTables:
     """The face sides near each lamp that send out more of its light than MIN_EXITANCE.
 
-    4 points on either side of each face, 8 paths each from the lamp alone.
+    4 points on either side of each face, 4 paths each to its lamp alone.
     """
     faces, lamps = _candidates(tables)
     if not len(faces):
@@ -103,16 +104,20 @@ def _candidates(tables: SceneTables) -> tuple[NDArray[np.int64], NDArray[np.int6
     tag = tables.face_tags
     scatters = tables.material_rows[tag & 0xFFFF, 11] == SURFACE
     faces = np.flatnonzero(scatters & ((tag >> 16) == NO_LAMP))
-    corners = _corners(tables, faces)
-    places = np.concatenate([corners, corners.mean(1, keepdims=True)], 1)
+    corners = tables.positions[tables.faces[faces]]
+    low, high = corners.min(1), corners.max(1)
     nearest = np.full(len(faces), np.inf)
     lamps = np.zeros(len(faces), np.int64)
     for k, ball in enumerate(lamp_balls(tables)):
+        reach = REACH_M + ball[3]
+        in_box = (low >= ball[:3] - reach).all(1) & (high <= ball[:3] + reach).all(1)
+        within = np.flatnonzero(in_box)
+        places = np.concatenate([corners[within], corners[within].mean(1, keepdims=True)], 1)
         from_bulb = np.linalg.norm(places - ball[:3], axis=2)
         distance = np.maximum(from_bulb.min(1) - ball[3], 0)
-        distance[from_bulb.max(1) > REACH_M + ball[3]] = np.inf
-        lamps[distance < nearest] = k
-        nearest = np.minimum(nearest, distance)
+        closer = (from_bulb.max(1) <= reach) & (distance < nearest[within])
+        lamps[within[closer]] = k
+        nearest[within[closer]] = distance[closer]
     near = np.isfinite(nearest)
     # Take the faces that look largest from their lamp, should there be very many.
     faces, lamps = faces[near], lamps[near]
@@ -141,7 +146,9 @@ def _exitance(
     points = np.tile(points, (2, 1, 1)).reshape(-1, 3)
     normals = np.stack([normal, -normal])[:, None].repeat(_POINTS, 1).reshape(-1, 3)
     asked = np.tile(lamps, 2 * _POINTS)
-    _outdoor, indoor = radiosity(stage, emitters, points, normals, _SPP, seed, lamps=asked)
+    _outdoor, indoor = radiosity(
+        stage, emitters, points, normals, _SPP, seed, lamps=asked, max_depth=_DEPTH
+    )
     irradiance = np.pi * (indoor @ LUMINANCE).reshape(2, _POINTS, len(faces)).mean(1)
     rows = tables.material_rows[tables.face_tags[faces] & 0xFFFF]
     reflected, through = (rows[:, 0:3] + rows[:, 4:7]) @ LUMINANCE, rows[:, 8:11] @ LUMINANCE

@@ -106,10 +106,12 @@ def radiosity(
     seed: int,
     *,
     lamps: NDArray[np.int64] | None = None,
+    max_depth: int | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(outdoor, indoor) radiance that white matte surfaces send out: irradiance / pi, (N, 3) each.
 
     points, normals: (N, 3). lamps: (N,) the one lamp that counts for each, nothing outdoors then.
+    max_depth: vertices of a path, the recipe's usual number unless given.
     """
     n = len(points)
     asked = np.full(n, -1) if lamps is None else lamps
@@ -117,7 +119,7 @@ def radiosity(
     only = Only(*(device_array(mi.Int32, v.astype(np.int32)) for v in (asked, outdoor)))
     key = stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     p, normal = mi.Point3f(*_columns(points)), mi.Vector3f(*_columns(normals))
-    fields = fields_row(LightFields())
+    fields = fields_row(LightFields(), max_depth=max_depth)
     sums = _radiosity(stage, emitters, fields, (p, normal), key, only, dr.opaque(mi.UInt32, spp))
     dr.eval(*sums)
     outdoor_sum, indoor_sum = (v.numpy().T.astype(np.float64) / spp for v in sums)
