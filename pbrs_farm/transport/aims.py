@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.transport.alias import alias_rows, pick
 from pbrs_farm.transport.numbers import device_array
-from pbrs_farm.transport.surface import Stage
+from pbrs_farm.transport.surface import Stage, offset
 
 BACK: Final = 0x80000000
 NO_FACE: Final = 0xFFFFFFFF
@@ -56,8 +56,10 @@ class Aims:
         first = np.append(tables.first, tables.first[-1:]).astype(np.uint32)
         self._first = device_array(mi.UInt32, first)
 
-    def aim(self, stage: Stage, p: Any, lamp: Any, u: Any, uv: Any, active: Any) -> Aim:
-        """From p towards a point on a glowing side of a lamp."""
+    def aim(
+        self, stage: Stage, p_ng: tuple[Any, Any], lamp: Any, u: Any, uv: Any, active: Any
+    ) -> Aim:
+        """Towards a point on a glowing side of a lamp; p_ng: vertex and face normal there."""
         first = dr.gather(mi.UInt32, self._first, lamp, active)
         count = dr.gather(mi.UInt32, self._first, lamp + 1, active) - first
         active = active & (count > 0)
@@ -65,7 +67,10 @@ class Aims:
         side = dr.gather(mi.UInt32, self._sides, first + k, active)
         face = side & 0x7FFFFFFF
         q, n = stage.lamp_point(face, uv, active)
-        d = dr.normalize(q - p)
+        # From where the ray will start, or it would miss what is small and near.
+        p, ng = p_ng
+        begin = offset(p, dr.select(dr.dot(ng, q - p) > 0, ng, -ng))
+        d = dr.normalize(q - begin)
         n = dr.select(side >= BACK, -n, n)
         return Aim(d, face, active & (dr.dot(n, d) < 0))
 

@@ -2,7 +2,7 @@
 
 A bulb deep in its shade lights a room by way of the shade. Shadow rays to the bulb are blocked, and
 a ray scattered by the surface alone meets the shade once in a hundred tries: a firefly. So every
-direction d out of a vertex is drawn by one of three techniques, with chances that depend on what
+direction d out of a vertex is drawn by one of three techniques, with shares that depend on what
 came before and not on d:
 
     own     by the surface (bsdf.sample), after roulette     (1 - share) q(d) p_own(d)
@@ -26,7 +26,7 @@ from pbrs_farm.transport.aims import NO_FACE
 from pbrs_farm.transport.bsdf import Scatter
 from pbrs_farm.transport.emitters import Emitters
 from pbrs_farm.transport.nearby import Near, Standpoint, cone_density, drawn, in_cones
-from pbrs_farm.transport.surface import Hit, Stage
+from pbrs_farm.transport.surface import Hit, Stage, offset
 
 MOST, LEAST = 0.4, 0.1
 """Of the rays scattered at a vertex. In between it takes the rays that roulette would end, so that
@@ -34,7 +34,7 @@ daylight, which is not guided, loses little."""
 
 CONED: Final = 0.3
 REFLECTED: Final = 0.5
-_MOST_WORTH, _WORTH_M2 = 100.0, 20.0
+_MOST_WORTH, _WORTH_M2, _MATTERS = 100.0, 20.0, 4.0
 
 
 class Guide(NamedTuple):
@@ -62,7 +62,9 @@ def guide_at(near: Near, m: Scatter, beta: Any, may_aim: Any) -> Guide:
     # Within a lamp the surface finds the light by itself.
     least = LEAST * near.cones.total / dr.maximum(near.at.aim_total, 1e-30)
     spare = dr.clip(1 - 0.95 * worth(near) * dr.max(beta * albedo), least, MOST)
-    share = dr.select(may_aim & (near.at.aim_total > 0), spare, 0)
+    # Where lamps send little out by way of their insides, there is little to find.
+    matters = dr.minimum(_MATTERS * near.at.aim_total / dr.maximum(near.at.total, 1e-30), 1)
+    share = dr.select(may_aim & (near.at.aim_total > 0), spare * matters, 0)
     return Guide(near, share, dr.select(near.cones.total > 0, mi.Float(CONED), 0))
 
 
@@ -76,7 +78,7 @@ def reflected_chance(reflectance: Any, worth: Any) -> Any:
     return dr.clip(worth * reflectance, reflectance, dr.maximum(reflectance, REFLECTED))
 
 
-def guided(guide: Guide, stage: Stage, emitters: Emitters, p: Any, u: Any, uv: Any) -> Guided:
+def guided(guide: Guide, stage: Stage, emitters: Emitters, hit: Hit, u: Any, uv: Any) -> Guided:
     """A direction by the second or third technique, where u says so."""
     share, coned = guide.share, guide.coned
     is_guided = u < share
@@ -87,7 +89,7 @@ def guided(guide: Guide, stage: Stage, emitters: Emitters, p: Any, u: Any, uv: A
     v = dr.clip(v, 0, 1 - 1e-7)
     lamp, rest = drawn(guide.near.lamps, guide.near.aims, guide.near.at.aim_total, v)
     at_face = is_guided & ~is_coned
-    aim = emitters.aims.aim(stage, p, lamp, rest, uv, at_face)
+    aim = emitters.aims.aim(stage, (hit.p, hit.ng), lamp, rest, uv, at_face)
     d = dr.select(is_coned, in_cones(guide.near.cones, v, uv), aim.d)
     target = dr.select(at_face, aim.face, mi.UInt32(NO_FACE))
     return Guided(d, is_guided, own, target, ~at_face | aim.valid)
@@ -122,7 +124,8 @@ def kept(
     ratio, target = ratio_target
     _level, aim = emitters.nearby.level(hit.aim_lamp, last.p, last.n, only, rough)
     cos = dr.maximum(dr.abs(dr.dot(hit.ng, d)), 1e-6)
-    density = aim * hit.aim * dr.squared_norm(hit.p - last.p) / cos
+    begin = offset(last.p, dr.select(dr.dot(last.n, d) > 0, last.n, -last.n))
+    density = aim * hit.aim * dr.squared_norm(hit.p - begin) / cos
     balanced = dr.select(rough, dr.rcp(1 + ratio * density), 1)
     astray = (target != NO_FACE) & (turned | (rough & (target != hit.face)))
     return dr.select(astray, 0, balanced)

@@ -25,6 +25,7 @@ MAX_NEAR: Final = 8
 
 _LEAST_M: Final = 0.03
 _WIDEST_SIN2: Final = 0.98
+_EDGE: Final = 5e-4
 
 
 @dataclass
@@ -43,14 +44,14 @@ class Standpoint:
 class Cones(NamedTuple):
     """The cones in which the lamps' insides lie, as a vertex sees them.
 
-    levels: how often each is chosen, 0 from within; total: their sum; ways: axes; cosines: of half
-    the opening.
+    levels: how often each is chosen, 0 from within; total: their sum; ways: axes; heights: 1 -
+    cosine of half the opening.
     """
 
     levels: list[Any]
     total: Any
     ways: list[Any]
-    cosines: list[Any]
+    heights: list[Any]
 
 
 class Near(NamedTuple):
@@ -118,10 +119,11 @@ class Nearby:
         return Near(at, lamps, levels, aims, self._cones(p, lamps, aims, active))
 
     def level(self, lamp: Any, p: Any, n: Any, only: Any, active: Any) -> tuple[Any, Any]:
-        """(level, aim) of one lamp as `seen` gives them; 0 when it is none of the strongest."""
+        """(level, aim) of one lamp as `seen` gives them; 0 when it is none of those."""
         ball = dr.gather(mi.Vector4f, self._balls, lamp, active)
         row = dr.gather(mi.Vector4f, self._strengths, lamp, active)
-        weight = dr.select(only >= 0, 1, row[0])
+        alone = dr.select(mi.UInt32(only) == lamp, mi.Float(1), 0)
+        weight = dr.select(only >= 0, alone, row[0])
         to = mi.Point3f(ball[0], ball[1], ball[2]) - p
         d = dr.sqrt(dr.maximum(dr.squared_norm(to), dr.square(ball[3])))
         is_sheet = dr.squared_norm(n) < 0.5
@@ -130,7 +132,7 @@ class Nearby:
         return level, level * row[1]
 
     def _cones(self, p: Any, lamps: list[Any], aims: list[Any], active: Any) -> Cones:
-        levels, ways, cosines = [], [], []
+        levels, ways, heights = [], [], []
         total = mi.Float(0)
         for lamp, aim in zip(lamps, aims, strict=True):
             ball = dr.gather(mi.Vector4f, self._insides, lamp, active)
@@ -140,8 +142,9 @@ class Nearby:
             levels.append(dr.select((sin2 > 0) & (sin2 < _WIDEST_SIN2), aim, 0))
             total += levels[-1]
             ways.append(to * dr.rsqrt(d2))
-            cosines.append(dr.safe_sqrt(1 - sin2))
-        return Cones(levels, total, ways, cosines)
+            # 1 - cosine without the digits that float32 loses near 1.
+            heights.append(sin2 / (1 + dr.safe_sqrt(1 - sin2)))
+        return Cones(levels, total, ways, heights)
 
 
 def nowhere(p: Any) -> Standpoint:
@@ -163,18 +166,22 @@ def drawn(values: list[Any], levels: list[Any], total: Any, u: Any) -> tuple[Any
 
 def in_cones(cones: Cones, u: Any, uv: Any) -> Any:
     """A direction uniform in one of the cones."""
-    warp: Any = mi.warp.square_to_uniform_cone
-    cosine, _u = drawn(cones.cosines, cones.levels, cones.total, u)
+    height, _u = drawn(cones.heights, cones.levels, cones.total, u)
     way, _u = drawn(cones.ways, cones.levels, cones.total, u)
-    return mi.Frame3f(way).to_world(warp(uv, cosine))
+    h = uv.x * height
+    s = dr.safe_sqrt(h * (2 - h))
+    sin_phi, cos_phi = dr.sincos(2 * math.pi * uv.y)
+    return mi.Frame3f(way).to_world(mi.Vector3f(s * cos_phi, s * sin_phi, 1 - h))
 
 
 def cone_density(cones: Cones, d: Any) -> Any:
     """Density of in_cones() per solid angle; 0 where there are none."""
     density = mi.Float(0)
-    for level, way, cosine in zip(cones.levels, cones.ways, cones.cosines, strict=True):
-        solid = dr.maximum(2 * math.pi * (1 - cosine), 1e-6)
-        density += dr.select(dr.dot(way, d) >= cosine, level / solid, 0)
+    for level, way, height in zip(cones.levels, cones.ways, cones.heights, strict=True):
+        # |d - way|^2 is twice the height; what was drawn at the edge must count as inside.
+        inside = dr.squared_norm(d - way) <= (2 + _EDGE) * height
+        solid = 2 * math.pi * dr.maximum(height, 1e-9)
+        density += dr.select(inside & (level > 0), level / solid, 0)
     return density / dr.maximum(cones.total, 1e-30)
 
 

@@ -31,6 +31,18 @@ def uniform_weights(n_lamps: int, n_portals: int) -> Weights:
     return Weights(np.full(n_lamps, 1 / max(n_lamps, 1)), np.full(n_outdoor, 1 / n_outdoor))
 
 
+def weights_by_distance(
+    balls: NDArray[np.float64], place: NDArray[np.float64], n_portals: int
+) -> Weights:
+    """Lamps by 1 / distance squared (1 m at least) from a place (3,), outdoor techniques alike.
+
+    balls: (L, 4) centre and radius of each lamp.
+    """
+    squared = ((balls[:, :3] - place) ** 2).sum(1)
+    lamps = _with_floors(1 / np.maximum(squared, 1), np.full(len(balls), LAMP_FLOOR))
+    return Weights(lamps, uniform_weights(0, n_portals).outdoor)
+
+
 def pilot_weights(
     stage: Stage,
     emitters: Emitters,
@@ -40,7 +52,7 @@ def pilot_weights(
     fields: LightFields,
     seed: int,
 ) -> Weights:
-    """Weights for a view; emitters may carry any weights, the pilot does not use them."""
+    """Weights for a view; those that emitters carry already change the pilot's noise only."""
     n_outdoor = FIRST_PORTAL + n_portals
     width, height = _PILOT_SIZE
     lanes = Lanes(

@@ -20,7 +20,7 @@ from pbrs_farm.transport.lamps import MAX_SUMS, with_lamps
 from pbrs_farm.transport.result import LightResult, joined_result, result_from_sums
 from pbrs_farm.transport.sky import Sky
 from pbrs_farm.transport.stopwatch import Stopwatch
-from pbrs_farm.transport.tables import SceneTables, tables_from_house
+from pbrs_farm.transport.tables import SceneTables, lamp_balls, tables_from_house
 from pbrs_farm.transport.variant import choose_variant, mitsuba
 
 _SAMPLES_PER_LAUNCH: Final = 1 << 26
@@ -216,14 +216,15 @@ class LightScene:
             return {}
         mitsuba(self.variant)
         from pbrs_farm.transport.illuminance import floor_points, illuminance_lx
-        from pbrs_farm.transport.pilot import uniform_weights
+        from pbrs_farm.transport.pilot import weights_by_distance
         from pbrs_farm.transport.portals import nearest_portals
 
+        balls = lamp_balls(self.tables)
         lux: dict[str, dict[str, float]] = {}
         for room in house.rooms:
             points = floor_points(room, 256, seed)
             portals = nearest_portals(self._portals, points.mean(0))
-            weights = uniform_weights(self.n_lamps, len(portals))
+            weights = weights_by_distance(balls, points.mean(0), len(portals))
             emitters = self._aimed(portals, weights)
             outdoor, indoor = illuminance_lx(self.stage, emitters, points, seed)
             lux[room.id] = {"outdoor": round(outdoor, 2), "indoor": round(indoor, 2)}

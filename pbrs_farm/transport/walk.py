@@ -252,7 +252,7 @@ def advance(
     if guide is None:
         ahead = mi.Vector3f(frame.to_world(sample(m, wi, lobe, uv)))
     else:
-        to = guided(guide, stage, emitters, hit.p, lobe, uv)
+        to = guided(guide, stage, emitters, hit, lobe, uv)
         is_guided, target = to.is_guided, to.target
         by_surface = mi.Vector3f(frame.to_world(sample(m, wi, to.own, uv)))
         ahead = dr.select(is_guided, to.d, by_surface)

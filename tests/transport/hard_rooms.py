@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pbrs_farm.camera import Camera
@@ -36,15 +38,23 @@ def glass_globe(radius: float = 0.12) -> tuple[House, Camera]:
     )
 
 
-def open_shade() -> tuple[House, Camera]:
-    """A bulb deep in an opaque shade, open above and below, in a room with a window."""
+def open_shade(*, n: int = 32, east: float = 0.0) -> tuple[House, Camera]:
+    """A bulb deep in an opaque shade, open above and below, in a room with a window.
+
+    n: facets of the shade. east: m by which all of it is moved along +x.
+    """
     surfaces = shell((4.0, 2.5, 4.0), 0, front=False)
     surfaces += panel((0, 0, -0.1), (4.0, 2.5, 0.0), (1.5, 1.0, 2.5, 2.0), 0)
-    surfaces.append(cylinder((2.0, 1.3, 2.2), 0.12, 0.35, 1))
+    surfaces.append(cylinder((2.0, 1.3, 2.2), 0.12, 0.35, 1, n=n))
     surfaces.append(box((2.6, 0.0, 2.4), (3.4, 0.6, 3.2), 2, "block"))
+    there = np.array([east, 0, 0], np.float32)
+    surfaces = [replace(s, positions=s.positions + there) for s in surfaces]
     materials = [matte("wall", 0.7), matte("shade", 0.5), matte("block", 0.2, 0.5, 0.3), BULB]
-    lamp = bulb((2.0, 1.45, 2.2), 3, 800.0, radius=0.03)
-    return house(surfaces, materials, lamps=[lamp]), camera((0.5, 1.5, 3.6), (2.4, 0.9, 1.8))
+    lamp = bulb((2.0 + east, 1.45, 2.2), 3, 800.0, radius=0.03)
+    return (
+        house(surfaces, materials, lamps=[lamp]),
+        camera((0.5 + east, 1.5, 3.6), (2.4 + east, 0.9, 1.8)),
+    )
 
 
 def covered_cup() -> tuple[House, Camera]:
