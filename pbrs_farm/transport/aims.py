@@ -52,7 +52,8 @@ class Aims:
         rows = [alias_rows(tables.chances[a:b]) for a, b in parts if b > a]
         alias = np.concatenate([*rows, np.ones((1, 2), np.float32)])
         self._alias = device_array(mi.Float, alias.ravel())
-        self._sides = device_array(mi.UInt32, np.append(tables.sides, np.uint32(0)))
+        # Two more, so that it is no array of one, which would be another kernel.
+        self._sides = device_array(mi.UInt32, np.append(tables.sides, np.zeros(2, np.uint32)))
         first = np.append(tables.first, tables.first[-1:]).astype(np.uint32)
         self._first = device_array(mi.UInt32, first)
 

@@ -216,4 +216,6 @@ def _add_by_lamp(by_lamp: ByLamp | None, found: Found, active: Any) -> None:
         level = luminance(light)
         brings = active & (level > 0) & dr.isfinite(level)
         for c in range(3):
-            dr.scatter_add(by_lamp.sums, light[c], by_lamp.first + lamp * 3 + c, brings)
+            # A lane's place is its own: no copy of the sums for each thread.
+            at = by_lamp.first + lamp * 3 + c
+            dr.scatter_add(by_lamp.sums, light[c], at, brings, mode=dr.ReduceMode.NoConflicts)
