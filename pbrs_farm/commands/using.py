@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.words import Verb, dump, say
+from pbrs_farm.commands.words import Verb, complain, dump, say
 from pbrs_farm.errors import BadInput
 
 if TYPE_CHECKING:
@@ -122,10 +122,14 @@ def _verify_light(args: argparse.Namespace) -> int:
 
 
 def _relight(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.relight import relit
+    from pbrs_farm.farm.relight import relit, unlit_lamps
     from pbrs_farm.store.folder import FolderStore
 
     if args.list:
+        if args.lamp or args.out is not None:
+            raise BadInput(
+                "--list", "", "lists the lamps and makes no picture: not with --lamp, --out"
+            )
         return _list_lamps(args.view)
     for name, factor in (("--indoor", args.indoor), ("--outdoor", args.outdoor)):
         if not 0 <= factor < math.inf:
@@ -139,6 +143,9 @@ def _relight(args: argparse.Namespace) -> int:
         lamps=[_lamp_factor(word) for word in args.lamp],
     )
     FolderStore(out.parent).put(out.name, png)
+    if args.lamp:
+        for row in unlit_lamps(args.view, [_lamp_factor(word) for word in args.lamp]):
+            complain(f"lamp {row['number']} ({row['item']}) brings no light to this view")
     say(str(out))
     return 0
 
@@ -146,8 +153,9 @@ def _relight(args: argparse.Namespace) -> int:
 def _list_lamps(view: Path) -> int:
     from pbrs_farm.farm.relight import lamps_of_view
 
+    rows = lamps_of_view(view)
     say(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
-    for row in lamps_of_view(view):
+    for row in rows:
         share = f"{row['share']:.1%}" if row["layer"] else "-"
         place = f"{row['item']:<12} {row['room'] or '-':<8}"
         say(f"{row['number']:>4} {share:>6} {row['lm']:>7.0f}  {place} {row['name']}")

@@ -118,6 +118,13 @@ def lamp_factors(
     return factors
 
 
+def unlit_lamps(view: Path, words: Sequence[LampFactor]) -> list[dict[str, Any]]:
+    """The rows of lamps that words name one by one and that bring no light to a view."""
+    rows = lamps_of_view(view)
+    named = lamp_factors(rows, [w for w in words if "*" not in w.word])
+    return [row for row in rows if int(row["number"]) in named and not row["layer"]]
+
+
 def _is_named(row: Mapping[str, Any], word: str) -> bool:
     """By number, item (all light sources of one that has several), name, or a pattern of these."""
     item, name = str(row["item"]), str(row["name"])

@@ -13,6 +13,7 @@ from pbrs_farm.check import verify
 from pbrs_farm.cli import main
 from pbrs_farm.farm.local import Run, run_local
 from pbrs_farm.farm.plan import wanted
+from pbrs_farm.farm.relight import LampFactor, unlit_lamps
 from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr
 from pbrs_farm.recipe import Recipe, recipe_from_name
 from pbrs_farm.transport.variant import choose_variant
@@ -151,6 +152,18 @@ def test_list_prints_every_lamp(view: Path, capsys: pytest.CaptureFixture[str]) 
         assert f"{row['item']}" in printed
         assert f"{row['name']}" in printed
     assert "%" in printed
+
+
+def test_a_list_makes_no_picture(view: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["relight", str(view), "--list", "--lamp", "1=0"]) == 1
+    assert "makes no picture" in capsys.readouterr().err
+
+
+def test_a_lamp_that_brings_no_light_is_told(view: Path, tmp_path: Path) -> None:
+    rows = [{**row, "layer": None} for row in lamps_of(view)]
+    (tmp_path / "view.json").write_text(json.dumps({"modes": {"light": {"lamps": rows}}}))
+    words = [LampFactor("1", (0, 0, 0)), LampFactor("*", (1, 1, 1))]
+    assert [row["number"] for row in unlit_lamps(tmp_path, words)] == [1]
 
 
 @pytest.mark.parametrize(
