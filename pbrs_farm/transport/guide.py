@@ -28,13 +28,13 @@ from pbrs_farm.transport.emitters import Emitters
 from pbrs_farm.transport.nearby import Near, Standpoint, cone_density, drawn, in_cones
 from pbrs_farm.transport.surface import Hit, Stage, offset
 
-MOST, LEAST = 0.4, 0.1
+MOST, LEAST = 0.2, 0.1
 """Of the rays scattered at a vertex. In between it takes the rays that roulette would end, so that
 daylight, which is not guided, loses little."""
 
 CONED: Final = 0.3
 REFLECTED: Final = 0.5
-_MOST_WORTH, _WORTH_M2, _MATTERS = 100.0, 20.0, 4.0
+_MOST_WORTH, _WORTH_M2, _MATTERS = 100.0, 5.0, 4.0
 
 
 class Guide(NamedTuple):
