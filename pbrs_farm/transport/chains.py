@@ -28,8 +28,9 @@ from pbrs_farm.transport.numbers import (
     stream_key,
     unit_float,
 )
+from pbrs_farm.transport.step import advance
 from pbrs_farm.transport.tails import NEAR_M, TAIL_FLOATS, close_tail, passing_chance, write_tail
-from pbrs_farm.transport.walk import CameraRow, Rules, Walk, advance, start
+from pbrs_farm.transport.walk import CameraRow, Rules, Walk, start
 
 STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 7
 _SMALLEST, _LARGEST = 1 / 1024, 1 / 64

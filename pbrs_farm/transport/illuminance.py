@@ -15,15 +15,9 @@ from pbrs_farm.house import House, Room
 from pbrs_farm.recipe import LightFields
 from pbrs_farm.transport.emitters import Emitters
 from pbrs_farm.transport.numbers import CAMERA_DIMS, SobolNumbers, device_array, stream_key
+from pbrs_farm.transport.step import advance, direct
 from pbrs_farm.transport.surface import Stage
-from pbrs_farm.transport.walk import (
-    Only,
-    advance,
-    direct,
-    fields_row,
-    left_surface,
-    white_hit,
-)
+from pbrs_farm.transport.walk import Only, fields_row, left_surface, white_hit
 
 LAMPS_LX: Final = (30.0, 1000.0)
 DAYLIGHT_LX: Final = (20.0, 5000.0)

@@ -1,7 +1,7 @@
 """Primary-sample-space Metropolis light transport over the camera path: `pssmlt-camera`.
 
 Kelemen et al. 2002. A path is a function of a point u of the unit cube: two numbers for the film,
-ten for each vertex (walk.py). With F(u) its radiance beyond direct light and I(u) the luminance of
+ten for each vertex (step.py). With F(u) its radiance beyond direct light and I(u) the luminance of
 F times the importance of its pixel, each of many chains in parallel
 
     1. proposes u' : with chance p a fresh point (large step), else every number moved a little,

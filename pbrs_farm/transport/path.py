@@ -19,13 +19,13 @@ from pbrs_farm.recipe import LightFields
 from pbrs_farm.transport.bsdf import luminance
 from pbrs_farm.transport.emitters import Emitters
 from pbrs_farm.transport.numbers import SobolNumbers, stream_key
+from pbrs_farm.transport.step import advance
 from pbrs_farm.transport.surface import Stage
 from pbrs_farm.transport.walk import (
     CameraRow,
     FieldsRow,
     Found,
     Only,
-    advance,
     camera_row,
     fields_row,
     film_position,

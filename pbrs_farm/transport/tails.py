@@ -33,17 +33,9 @@ from pbrs_farm.transport.emitters import Emitters
 from pbrs_farm.transport.film import Film, level_of, point_in_pixel
 from pbrs_farm.transport.materials import GLASS
 from pbrs_farm.transport.numbers import HashedNumbers, device_array, stream_key
+from pbrs_farm.transport.step import advance
 from pbrs_farm.transport.surface import Hit, Stage, bent, offset
-from pbrs_farm.transport.walk import (
-    CameraRow,
-    FieldsRow,
-    Found,
-    Only,
-    Rules,
-    Walk,
-    advance,
-    start,
-)
+from pbrs_farm.transport.walk import CameraRow, FieldsRow, Found, Only, Rules, Walk, start
 
 TAIL_FLOATS: Final = 36
 NEAR_M: Final = 0.1

@@ -153,7 +153,8 @@ def test_a_lamp_is_chosen_as_often_as_its_density_says() -> None:
 def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
     import mitsuba as mi
 
-    from pbrs_farm.transport.walk import Only, advance, camera_row, fields_row, start
+    from pbrs_farm.transport.step import advance
+    from pbrs_farm.transport.walk import Only, camera_row, fields_row, start
 
     glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
     sheets = [rooms.quad([(-9, y, -9), (-9, y, 9), (9, y, 9), (9, y, -9)], 1) for y in (1.0, 0.5)]
