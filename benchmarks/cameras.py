@@ -19,18 +19,18 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.report import write_report
-from pbrs_farm import homes
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.debian import cache_folder
-from pbrs_farm.farm.sources import read_house, resolve
-from pbrs_farm.house import Geometry, House, geometry_from_house
-from pbrs_farm.recipe import CameraFields, Recipe
+from pbrs_farm.assets import homes
+from pbrs_farm.assets.debian import cache_folder
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import Geometry, House, geometry_from_house
+from pbrs_farm.core.recipe import CameraFields, Recipe
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.read.source import read_house, resolve
 from pbrs_farm.repair import repair
 from pbrs_farm.sample import sample_cameras
-from pbrs_farm.sample.probes import counted
-from pbrs_farm.sample.scores import object_columns, paper_score
-from pbrs_farm.sample.verdict import Verdict
-from pbrs_farm.transport.caster import Caster
+from pbrs_farm.sample.eye_probes import counted
+from pbrs_farm.sample.rejection import Verdict
+from pbrs_farm.sample.view_score import object_columns, paper_score
 
 HOME = "2BedroomApartmentWithBowWindow"
 SIZE = (160, 120)
@@ -123,7 +123,7 @@ def _bare_mrays(geometry: Geometry, cameras: list[Camera]) -> float:
     """Mitsuba's own rate: a default scene, coherent rays that lie ready in memory, t alone."""
     import drjit as dr
 
-    from pbrs_farm.transport.variant import choose_variant, mitsuba
+    from pbrs_farm.raycast.variant import choose_variant, mitsuba
 
     mi = mitsuba(choose_variant())
     mesh = mi.Mesh("house", len(geometry.positions), len(geometry.faces))

@@ -38,19 +38,19 @@ from numpy.typing import NDArray
 from benchmarks.exchange import home_without_coats, write_scene
 from benchmarks.noise import blocks, relative_square
 from benchmarks.report import FOLDER, write_report
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.frames import LUMINANCE
-from pbrs_farm.house import House
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.images import (
     exr_from_layers,
     layers_from_exr,
     png_from_array,
 )
-from pbrs_farm.recipe import LightFields, Recipe
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import Sky
-from pbrs_farm.transport.tables import SceneTables
-from pbrs_farm.transport.tone import exposure_of, tone
+from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.scene_tables import SceneTables
+from pbrs_farm.transport.scene_tables.sky import Sky
 
 HOME = "2BedroomApartment"
 N_CAMERAS = 2

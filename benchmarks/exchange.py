@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.house import House
-from pbrs_farm.recipe import Recipe
-from pbrs_farm.transport.materials import MIRROR, SURFACE
-from pbrs_farm.transport.portals import portals_of_house
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import Sky, sky_for_house
-from pbrs_farm.transport.tables import NO_LAMP, SceneTables, tables_from_house
-from pbrs_farm.transport.variant import choose_variant
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.material_rows import MIRROR, SURFACE
+from pbrs_farm.transport.scene_tables.portals import portals_of_house
+from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables, tables_from_house
+from pbrs_farm.transport.scene_tables.sky import Sky, sky_for_house
 
 
 def home_without_coats(name: str) -> tuple[House, LightScene, dict[str, NDArray[np.uint8]]]:
     """(repaired house, its scene without coats, decoded textures) of an example home."""
-    from pbrs_farm.farm.loaded import decoded_textures
-    from pbrs_farm.farm.sources import resolve
-    from pbrs_farm.farm.steps import repaired_house
+    from pbrs_farm.read.source import resolve
+    from pbrs_farm.run.house_cache import decoded_textures
+    from pbrs_farm.run.steps import repaired_house
 
     recipe = Recipe()
     house, _report = repaired_house(resolve(name), recipe)

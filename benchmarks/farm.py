@@ -26,16 +26,16 @@ from typing import Any
 
 from benchmarks.noop_runner import N_HOUSES, groups_of
 from benchmarks.report import write_report
-from pbrs_farm import keys
-from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.core import keys
+from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.secret import Secret
-from workers.client import Farm, completed, new_spec
+from workers.client.farm_client import Farm, completed, new_spec
 from workers.config import FarmConfig
 from workers.ids import job_key
 from workers.job import HouseEntry, lines_from_houses
-from workers.ledger import HouseState
-from workers.renderer import die_with_parent
+from workers.ledger.interface import HouseState
+from workers.node.renderer import die_with_parent
 
 FULL = os.environ.get("FULL") == "1"
 N_TASKS = 410_000 if FULL else 100_000
@@ -157,8 +157,8 @@ def throughput() -> dict[str, Any]:
         farm.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(spec_houses))
         print(f"   {N_HOUSES} houses entered in {load_s:.1f} s", flush=True)
 
-        bench.python("coordinator", "workers.coordinator")
-        bench.python("worker", "workers.supervisor", PBRS_FARM_SLOTS=str(SLOTS))
+        bench.python("coordinator", "workers.coordinator.leader")
+        bench.python("worker", "workers.node.supervisor", PBRS_FARM_SLOTS=str(SLOTS))
         watch = Watch(bench, farm, spec.job_id)
         watch.until(N_TASKS)
         figures = watch.figures() | {"farm.load_s": round(load_s, 1)}
@@ -272,14 +272,14 @@ def lost_worker() -> dict[str, Any]:
     """Seconds from kill -9 of a worker to the second start of its task, with default settings."""
     with bench_farm() as bench:
         farm = bench.farm()
-        bench.python("coordinator", "workers.coordinator")
-        bench.python("w1", "workers.supervisor", PBRS_FARM_WORKER="w1", PBRS_BENCH_SLEEP="300")
+        bench.python("coordinator", "workers.coordinator.leader")
+        bench.python("w1", "workers.node.supervisor", PBRS_FARM_WORKER="w1", PBRS_BENCH_SLEEP="300")
         houses = [HouseEntry(house_id="h00000")]
         job = farm.submit(houses, new_spec(recipe_from_name("fast"))).job_id
         while not _runner_of(farm, job):
             time.sleep(0.1)
         time.sleep(25)  # past its first beat
-        bench.python("w2", "workers.supervisor", PBRS_FARM_WORKER="w2", PBRS_BENCH_SLEEP="0")
+        bench.python("w2", "workers.node.supervisor", PBRS_FARM_WORKER="w2", PBRS_BENCH_SLEEP="0")
         bench.end("w1")
         began = time.monotonic()
         while farm.view(job).counts.get("done:geometry", 0) < 1:
@@ -332,9 +332,9 @@ def _local_s(out: Path) -> float:
 
 
 def _farm_s(bench: Bench) -> float:
-    bench.env["PBRS_FARM_RUNNER"] = "workers.houses:runner"
-    bench.python("coordinator", "workers.coordinator")
-    bench.python("worker", "workers.supervisor", PBRS_FARM_SLOTS="2")
+    bench.env["PBRS_FARM_RUNNER"] = "workers.node.house_runner:runner"
+    bench.python("coordinator", "workers.coordinator.leader")
+    bench.python("worker", "workers.node.supervisor", PBRS_FARM_SLOTS="2")
     farm = bench.farm()
     while not farm.registry.slots():
         time.sleep(0.1)

@@ -8,14 +8,14 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.report import write_report
-from pbrs_farm.arrays import Srgb8Image
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.farm.loaded import decoded_textures
-from pbrs_farm.farm.sources import read_house, resolve
-from pbrs_farm.frames import rotation_y
-from pbrs_farm.house import House
+from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.raster import Rasterizer
-from pbrs_farm.recipe import Recipe
+from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.run.house_cache import decoded_textures
 
 HOME = "2BedroomApartmentWithBowWindow"
 SIZE = (640, 480)

@@ -9,8 +9,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.camera import Camera
-from pbrs_farm.house import Geometry
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import Geometry
 
 _VERTEX = """
 #version 330

@@ -18,7 +18,7 @@ SUNCG = "suncg300"
 
 def main() -> None:
     """Measure every home in a process of its own and write out/bench/houses.json."""
-    from pbrs_farm import homes
+    from pbrs_farm.assets import homes
 
     homes.fetch()
     names = [home.name for home in homes.example_homes()]
@@ -66,12 +66,12 @@ def measure(name: str) -> dict[str, Any]:
     import resource
 
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    from pbrs_farm.farm.sources import read_house
-    from pbrs_farm.house import geometry_from_house
-    from pbrs_farm.recipe import Recipe
+    from pbrs_farm.core.house import geometry_from_house
+    from pbrs_farm.core.recipe import Recipe
+    from pbrs_farm.raycast.caster import Caster
+    from pbrs_farm.raycast.variant import set_threads
+    from pbrs_farm.read.source import read_house
     from pbrs_farm.repair import repair
-    from pbrs_farm.transport.caster import Caster
-    from pbrs_farm.transport.variant import set_threads
 
     recipe = Recipe()
     with tempfile.TemporaryDirectory() as folder:
@@ -98,11 +98,11 @@ def measure(name: str) -> dict[str, Any]:
 
 
 def _source(name: str, folder: Path) -> Any:
-    from pbrs_farm.farm.sources import resolve
+    from pbrs_farm.read.source import resolve
 
     if name != SUNCG:
         return resolve(name)
-    from tests.read.suncg_root import write_large_root
+    from tests.read.suncg.suncg_root import write_large_root
 
     house_id = write_large_root(folder, n_nodes=300)
     return resolve(str(folder / "house" / house_id))

@@ -12,17 +12,17 @@ import numpy as np
 from benchmarks.gl import turned_cameras
 from benchmarks.report import write_report
 from pbrs_farm import truth
-from pbrs_farm.camera import Camera
 from pbrs_farm.check import Certificate, verify
 from pbrs_farm.check.certificate import Count
-from pbrs_farm.farm.loaded import decoded_textures
-from pbrs_farm.farm.sources import read_house, resolve
-from pbrs_farm.farm.steps import layer_bytes
-from pbrs_farm.house import House, geometry_from_house
-from pbrs_farm.layers import LAYER
-from pbrs_farm.recipe import Recipe
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.read.source import read_house, resolve
 from pbrs_farm.repair import repair
-from pbrs_farm.transport.caster import Caster
+from pbrs_farm.run.house_cache import decoded_textures
+from pbrs_farm.run.steps import layer_bytes
 from tests.check.roots import make_root
 
 HOME = "Studio"

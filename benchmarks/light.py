@@ -28,16 +28,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import FOLDER, write_report
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.frames import LUMINANCE
-from pbrs_farm.house import House, geometry_from_house
-from pbrs_farm.lighting import Group
-from pbrs_farm.recipe import LightFields, Recipe
-from pbrs_farm.transport.denoise import denoise
-from pbrs_farm.transport.result import LightResult
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import Sky, dark_sky, sky_for_house, sunsky
-from pbrs_farm.transport.tone import tone
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.lighting import Group
+from pbrs_farm.core.recipe import LightFields, Recipe
+from pbrs_farm.transport.develop.denoiser import denoise
+from pbrs_farm.transport.develop.tone_mapping import tone
+from pbrs_farm.transport.light_result import LightResult
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sky_for_house, sunsky
 from tests.transport import hard_rooms
 
 SIZE = (64, 48)
@@ -113,10 +113,10 @@ def _room_makers() -> list[Callable[[], Shot]]:
 
 def _home_shots() -> Iterator[Shot]:
     """The first stored cameras of the example homes."""
-    from pbrs_farm.farm.loaded import decoded_textures
-    from pbrs_farm.farm.sources import read_house, resolve
+    from pbrs_farm.raycast.caster import Caster
+    from pbrs_farm.read.source import read_house, resolve
     from pbrs_farm.repair import repair
-    from pbrs_farm.transport.caster import Caster
+    from pbrs_farm.run.house_cache import decoded_textures
 
     recipe = Recipe()
     for name in HOMES:
@@ -230,7 +230,7 @@ def _mutation_cost() -> float:
 
     With 99 % large steps a proposal is a path like any other, so that depths are the same.
     """
-    from pbrs_farm.transport import metropolis as markov
+    from pbrs_farm.transport.metropolis import integrator as markov
 
     house, camera = hard_rooms.sunlit()
     scene = LightScene.load(
@@ -278,7 +278,7 @@ def _relative_square(
 def _write_rows(rows: list[list[NDArray[np.float64]]], name: str, times: int) -> None:
     """A PNG of rows of pictures, each row exposed alike, enlarged."""
     from pbrs_farm.images import png_from_array
-    from pbrs_farm.transport.tone import exposure_of
+    from pbrs_farm.transport.develop.tone_mapping import exposure_of
 
     tones = Recipe().tone
     shown = []

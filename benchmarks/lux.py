@@ -9,18 +9,18 @@ import statistics
 from typing import Any
 
 from benchmarks.report import write_report
-from pbrs_farm.farm.loaded import Shelf
-from pbrs_farm.farm.marked import Work
-from pbrs_farm.farm.sources import resolve
-from pbrs_farm.farm.steps import run_step
-from pbrs_farm.recipe import Recipe
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.read.source import resolve
+from pbrs_farm.run.house_cache import Shelf
+from pbrs_farm.run.step_cache import Work
+from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.illuminance import DAYLIGHT_LX, LAMPS_LX
 
 
 def main() -> None:
     """Measure the nine homes and write out/bench/lux.json."""
-    from pbrs_farm import homes
+    from pbrs_farm.assets import homes
 
     homes.fetch()
     rows: list[dict[str, Any]] = []

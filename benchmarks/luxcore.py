@@ -39,15 +39,15 @@ from numpy.typing import NDArray
 from benchmarks.exchange import home_without_coats, without_coats, write_scene
 from benchmarks.noise import blocks
 from benchmarks.report import FOLDER, write_report
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.frames import LUMINANCE, linear_from_srgb
-from pbrs_farm.house import House
-from pbrs_farm.recipe import LightFields, Recipe
-from pbrs_farm.transport.portals import portals_of_house
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import Sky, dark_sky, sunsky
-from pbrs_farm.transport.tables import tables_from_house
-from pbrs_farm.transport.variant import choose_variant
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import LightFields, Recipe
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.portals import portals_of_house
+from pbrs_farm.transport.scene_tables.scene_tables import tables_from_house
+from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky
 from tests.transport import hard_rooms
 
 HOME = "2BedroomApartment"
@@ -296,7 +296,7 @@ def _row_of_lights(name: str, f: dict[str, float]) -> str:
 def _write_rows(rows: Sequence[Sequence[NDArray[np.float64]]]) -> None:
     """luxcore.png, a row a scene, one exposure: path and Metropolis, LuxCore's two, reference."""
     from pbrs_farm.images import png_from_array
-    from pbrs_farm.transport.tone import exposure_of, tone
+    from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
 
     fields = Recipe().tone
     shown = []

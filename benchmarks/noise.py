@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.frames import LUMINANCE
+from pbrs_farm.core.frames import LUMINANCE
 
 
 def relative_square(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 
-from pbrs_farm import keys
+from pbrs_farm.core import keys
 from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig
 from workers.ids import GEOMETRY

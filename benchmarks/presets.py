@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import FOLDER, write_report
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.farm.loaded import decoded_textures
-from pbrs_farm.farm.panoramas import panorama_for_house
-from pbrs_farm.farm.sources import resolve
-from pbrs_farm.farm.steps import repaired_house
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.images import jpeg_from_array
-from pbrs_farm.recipe import Recipe, recipe_from_name
-from pbrs_farm.transport.develop import Negative, develop
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import sky_for_house
+from pbrs_farm.read.source import resolve
+from pbrs_farm.run.house_cache import decoded_textures
+from pbrs_farm.run.panoramas import panorama_for_house
+from pbrs_farm.run.steps import repaired_house
+from pbrs_farm.transport.develop.mode_pictures import Negative, develop
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import sky_for_house
 
 SIZE: Final = (240, 180)
 VIEWS: Final = (("Studio", 2), ("3BedroomApartment", 0), ("2BedroomApartmentWithBowWindow", 2))
@@ -34,7 +34,7 @@ PRESETS: Final = {"preview": {}, "fast": {}, "paper": REDUCED, "released": REDUC
 
 def main() -> None:
     """Render, print cost and noise of each, write the sheet: a row a home, a column a preset."""
-    from pbrs_farm import homes, skies
+    from pbrs_farm.assets import homes, skies
 
     homes.fetch()
     skies.fetch_skies()

@@ -21,16 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import write_report
-from pbrs_farm import keys
-from pbrs_farm.farm.selecting import json_lines, select
-from pbrs_farm.farm.selection_summary import PAPER_VIEWS
-from pbrs_farm.lighting import Mode
-from pbrs_farm.recipe import HistogramFields, SelectionFields
+from pbrs_farm.core import keys
+from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.recipe import HistogramFields, SelectionFields
+from pbrs_farm.curate.selection_run import json_lines, select
+from pbrs_farm.curate.selection_summary import PAPER_VIEWS
 from pbrs_farm.selection import SceneQuality, histogram, view_record
 from pbrs_farm.selection.binning import BINNINGS
+from pbrs_farm.selection.histogram_pack import HistogramPack, bytes_from_pack, pack_from_bytes
 from pbrs_farm.selection.histograms import normalised
-from pbrs_farm.selection.pack import HistogramPack, bytes_from_pack, pack_from_bytes
-from pbrs_farm.selection.reference import Reference, ReferenceFacts
+from pbrs_farm.selection.reference_set import Reference, ReferenceFacts
 from pbrs_farm.selection.scores import Scorer, merged
 from pbrs_farm.selection.similarity import best_match
 from pbrs_farm.selection.verdicts import verdicts

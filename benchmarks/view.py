@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable
 
 from benchmarks.report import write_report
-from pbrs_farm.farm.loaded import Shelf
-from pbrs_farm.farm.marked import Work
-from pbrs_farm.farm.sources import resolve
-from pbrs_farm.farm.steps import run_step
-from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.read.source import resolve
+from pbrs_farm.run.house_cache import Shelf
+from pbrs_farm.run.step_cache import Work
+from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
 
 N_VIEWS = 3

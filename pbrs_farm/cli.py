@@ -16,13 +16,13 @@ from importlib.util import find_spec
 from typing import Final
 
 import pbrs_farm
-from pbrs_farm.commands.words import Handler, complain
-from pbrs_farm.errors import PbrsError
+from pbrs_farm.commands.arguments import Handler, complain
+from pbrs_farm.core.errors import PbrsError
 
 MODULES: Final = {
     "looking": ("doctor", "homes", "skies", "recipes", "layers"),
     "making": ("demo", "run", "objects", "step"),
-    "stages": ("repair", "cameras"),
+    "explaining": ("repair", "cameras"),
     "using": ("sheet", "verify", "relight"),
     "labelling": ("export", "classes", "label-sheet"),
     "selecting": ("reference", "select"),

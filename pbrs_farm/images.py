@@ -18,7 +18,7 @@ import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 from numpy.typing import NDArray
 
-from pbrs_farm.errors import BadInput, MachineFailed
+from pbrs_farm.core.errors import BadInput, MachineFailed
 
 MAX_PIXELS: Final = 16384 * 16384
 """A picture that says it is larger is refused before its pixels are read."""

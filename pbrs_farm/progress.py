@@ -21,7 +21,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from pbrs_farm.farm.tasks import Event
+from pbrs_farm.run.task import Event
 
 
 class Teller(Protocol):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.s3 import S3Settings
 from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings

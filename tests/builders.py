@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from pbrs_farm.read.builtin import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 __all__ = ["builtin_home"]

@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote, urlsplit, urlunsplit
 
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings
-from workers.alive import alive_file
 from workers.ids import QUEUES
+from workers.liveness import alive_file
 
 _PREFIX: Final = "PBRS_FARM_"
 
@@ -78,7 +78,7 @@ class FarmConfig:
     slots: int = _least(1, 1)
     queues: tuple[str, ...] = ()
     scratch: Path = Path("/tmp")
-    runner: str = "workers.houses:runner"
+    runner: str = "workers.node.house_runner:runner"
     lease_s: float = _above(120.0)
     beat_s: float = _above(20.0)
     sticky_s: float = 2.0

@@ -12,7 +12,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.errors import BadInput
 
 GEOMETRY: Final = "geometry"
 GL: Final = "gl"

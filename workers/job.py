@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from pbrs_farm import keys
-from pbrs_farm.recipe import Recipe
+from pbrs_farm.core import keys
+from pbrs_farm.core.recipe import Recipe
 from workers.ids import GL, LIGHT
 
 

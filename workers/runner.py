@@ -14,10 +14,10 @@ from typing import Literal, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.errors import BadInput
 from workers.config import FarmConfig
 from workers.job import JobSpec
-from workers.ledger import FaultClass
+from workers.ledger.interface import FaultClass
 
 Tell = Callable[[str], None]
 
@@ -67,7 +67,7 @@ class Survey:
 
 
 class StepRunner(Protocol):
-    """Runs the steps of a task; raises the errors of pbrs_farm.errors."""
+    """Runs the steps of a task; raises the errors of pbrs_farm.core.errors."""
 
     def run(self, request: Request, tell: Tell) -> Result:
         """Do what the markers say is missing. tell: called with the name of each step begun."""

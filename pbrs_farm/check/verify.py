@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Certificate, Tally
-from pbrs_farm.check.files import check_files, check_root_manifest
-from pbrs_farm.check.pictures import check_consistency, check_pictures, read_labels
-from pbrs_farm.check.pixels import RAY_LAYERS, judge
-from pbrs_farm.check.planes import check_planes
-from pbrs_farm.check.poses import SeenView, check_pose, check_reprojection
-from pbrs_farm.check.rays import Rays
-from pbrs_farm.check.stored import StoredView, views_of_house
-from pbrs_farm.check.triangles import BadGlb, Triangles, triangles_from_glb
-from pbrs_farm.errors import BadInput
+from pbrs_farm.check.embree_caster import Rays
+from pbrs_farm.check.file_checks import check_files, check_root_manifest
+from pbrs_farm.check.pixel_checks import RAY_LAYERS, judge
+from pbrs_farm.check.plane_checks import check_planes
+from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
+from pbrs_farm.check.stored_mesh import BadGlb, Triangles, triangles_from_glb
+from pbrs_farm.check.stored_view import StoredView, views_of_house
+from pbrs_farm.check.view_checks import check_consistency, check_pictures, read_labels
+from pbrs_farm.core.errors import BadInput
 
 SAMPLE = 2000
 """Pixels of each view that are recomputed unless told otherwise."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pbrs_farm.commands.words import Verb, dump, say
-from pbrs_farm.errors import BadInput
+from pbrs_farm.commands.arguments import Verb, dump, say
+from pbrs_farm.core.errors import BadInput
 
 FORMS = ("coco", "hdf5", "webdataset", "released")
 
@@ -27,7 +27,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.export import export
+    from pbrs_farm.export.export_views import export
 
     out = args.out or Path(f"{args.folder.resolve().name}_{args.to}")
     n_views, n_files = export(args.folder, out, args.to, selection=args.selection)
@@ -36,7 +36,7 @@ def _export(args: argparse.Namespace) -> int:
 
 
 def _classes(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.class_statistics import class_statistics
+    from pbrs_farm.gallery.class_statistics import class_statistics
 
     statistics = class_statistics(args.folder)
     if args.json:
@@ -47,8 +47,8 @@ def _classes(args: argparse.Namespace) -> int:
 
 
 def _label_sheet(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.label_sheet import label_sheet
-    from pbrs_farm.farm.output import views_of
+    from pbrs_farm.formats.output_folder import views_of
+    from pbrs_farm.gallery.label_sheet import label_sheet
     from pbrs_farm.images import png_from_array
     from pbrs_farm.store.folder import FolderStore
 

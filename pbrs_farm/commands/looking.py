@@ -7,8 +7,8 @@ import json
 import os
 from dataclasses import asdict
 
-from pbrs_farm.commands.words import Verb, dump, say
-from pbrs_farm.recipe import RECIPE_NAMES, Recipe, recipe_from_name
+from pbrs_farm.commands.arguments import Verb, dump, say
+from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, recipe_from_name
 
 
 def add_verbs(verb: Verb) -> None:
@@ -27,7 +27,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _doctor(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.doctor import can_run, examine
+    from pbrs_farm.doctor import can_run, examine
 
     findings = examine(args.store, args.redis)
     fine = can_run(findings)
@@ -47,7 +47,7 @@ def _doctor(args: argparse.Namespace) -> int:
 
 
 def _homes(args: argparse.Namespace) -> int:
-    from pbrs_farm import homes
+    from pbrs_farm.assets import homes
 
     if args.fetch:
         homes.fetch()
@@ -67,7 +67,7 @@ def _homes(args: argparse.Namespace) -> int:
 
 
 def _skies(_args: argparse.Namespace) -> int:
-    from pbrs_farm.skies import fetch_skies
+    from pbrs_farm.assets.skies import fetch_skies
 
     folder = fetch_skies()
     for path in sorted(folder.glob("*.exr")):
@@ -92,7 +92,7 @@ def _recipes(args: argparse.Namespace) -> int:
 
 
 def _layers(_args: argparse.Namespace) -> int:
-    from pbrs_farm.layers import table
+    from pbrs_farm.core.layers import table
 
     say(table())
     return 0

@@ -9,13 +9,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pbrs_farm.commands.arguments import (
+    Verb,
+    add_light,
+    add_recipe,
+    complain,
+    counted,
+    recipe_of,
+    say,
+)
 from pbrs_farm.commands.using import write_sheets
-from pbrs_farm.commands.words import Verb, add_light, add_recipe, complain, counted, recipe_of, say
-from pbrs_farm.errors import BadInput, MachineFailed
-from pbrs_farm.recipe import Recipe
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.recipe import Recipe
 
 if TYPE_CHECKING:
-    from pbrs_farm.farm.sources import SourceRef
+    from pbrs_farm.read.source import SourceRef
 
 
 def add_verbs(verb: Verb) -> None:
@@ -114,7 +122,7 @@ def _add_run(p: argparse.ArgumentParser) -> None:
 
 
 def _words(args: argparse.Namespace) -> list[str]:
-    from pbrs_farm.farm.sources import suncg_list
+    from pbrs_farm.read.source import suncg_list
 
     words = [*args.homes, *args.home]
     if args.houses:
@@ -135,9 +143,9 @@ def _run(args: argparse.Namespace) -> int:
 def _run_words(
     args: argparse.Namespace, words: list[str], sources: Sequence[SourceRef] = ()
 ) -> int:
-    from pbrs_farm.farm.local import Run, run_local
-    from pbrs_farm.farm.plan import wanted
     from pbrs_farm.progress import teller
+    from pbrs_farm.run.local import Run, run_local
+    from pbrs_farm.run.plan import wanted
     from pbrs_farm.settings import settings_from_environment
 
     for name, value, least in (("--jobs", args.jobs, 1), ("--views", args.views, 0)):
@@ -166,7 +174,7 @@ def _run_words(
 
 def _warn_of_slowness() -> None:
     """Say it when only the scalar variant is left."""
-    from pbrs_farm.transport.variant import MIN_LLVM, find_llvm
+    from pbrs_farm.raycast.variant import MIN_LLVM, find_llvm
 
     if find_llvm() is None and not Path("/proc/driver/nvidia").exists():
         complain(
@@ -204,7 +212,7 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
 def _demo(args: argparse.Namespace) -> int:
     words = [args.home]
     if args.home not in ("builtin",) and not Path(args.home).exists():
-        from pbrs_farm import homes
+        from pbrs_farm.assets import homes
 
         try:
             homes.fetch()
@@ -219,11 +227,11 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 def _step(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.loaded import Shelf
-    from pbrs_farm.farm.marked import Work
-    from pbrs_farm.farm.plan import STEPS
-    from pbrs_farm.farm.sources import resolve
-    from pbrs_farm.farm.steps import run_step
+    from pbrs_farm.read.source import resolve
+    from pbrs_farm.run.house_cache import Shelf
+    from pbrs_farm.run.plan import STEPS
+    from pbrs_farm.run.step_cache import Work
+    from pbrs_farm.run.steps import run_step
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 
@@ -245,8 +253,8 @@ def _step(args: argparse.Namespace) -> int:
 
 
 def _objects(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.sources import object_source
-    from pbrs_farm.read.object_models import find_models, pick_models
+    from pbrs_farm.read.objects.model_folders import find_models, pick_models
+    from pbrs_farm.read.source import object_source
 
     if args.count < 1:
         raise BadInput("--count", str(args.count), "expected at least one model")

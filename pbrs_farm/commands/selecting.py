@@ -6,12 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.words import Verb, dump, say
-from pbrs_farm.errors import BadInput
-from pbrs_farm.recipe import HistogramFields, Recipe, SelectionFields, recipe_from_name
+from pbrs_farm.commands.arguments import Verb, dump, say
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.recipe import HistogramFields, Recipe, SelectionFields, recipe_from_name
 
 if TYPE_CHECKING:
-    from pbrs_farm.selection.reference import Reference
+    from pbrs_farm.selection.reference_set import Reference
 
 
 def add_verbs(verb: Verb) -> None:
@@ -82,7 +82,7 @@ def _overrides(words: list[str]) -> dict[str, str]:
 def _built(
     args: argparse.Namespace, histogram: HistogramFields, selection: SelectionFields
 ) -> Reference:
-    from pbrs_farm.farm.reference import PhotoOptions, build_reference
+    from pbrs_farm.curate.reference_build import PhotoOptions, build_reference
 
     source = args.source if hasattr(args, "source") else args.reference
     options = PhotoOptions(args.depth_scale, args.sun_rgbd, not args.no_crop)
@@ -91,7 +91,7 @@ def _built(
 
 def _reference(args: argparse.Namespace) -> int:
     from pbrs_farm.selection.binning import table_text
-    from pbrs_farm.selection.reference import bytes_from_reference
+    from pbrs_farm.selection.reference_set import bytes_from_reference
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_from_name("fast", _overrides(args.set))
@@ -103,8 +103,8 @@ def _reference(args: argparse.Namespace) -> int:
 
 
 def _select(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.reference import read_reference
-    from pbrs_farm.farm.selecting import run_key, select
+    from pbrs_farm.curate.reference_build import read_reference
+    from pbrs_farm.curate.selection_run import run_key, select
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 
@@ -119,7 +119,7 @@ def _select(args: argparse.Namespace) -> int:
     )
     summary = select(store, reference, fields, reference_name=str(args.reference), run=args.run)
     if args.report:
-        from pbrs_farm.farm.selection_report import selection_report
+        from pbrs_farm.curate.selection_report import selection_report
 
         html = selection_report(store, reference, fields, run=args.run)
         store.put(run_key(args.run, "html"), html.encode())

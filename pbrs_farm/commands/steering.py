@@ -13,11 +13,11 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from pbrs_farm.commands.words import Handler, Verb, add_farm, dump, farm_of, say
-from workers.show import failures_text, status_text, why_text, workers_text
+from pbrs_farm.commands.arguments import Handler, Verb, add_farm, dump, farm_of, say
+from workers.client.text import failures_text, status_text, why_text, workers_text
 
 if TYPE_CHECKING:
-    from workers.client import Farm
+    from workers.client.farm_client import Farm
 
 
 def add_verbs(verb: Verb) -> None:
@@ -167,12 +167,12 @@ def _recover(args: argparse.Namespace) -> int:
 
 
 def _coordinator(_args: argparse.Namespace) -> int:
-    from workers.coordinator import main
+    from workers.coordinator.leader import main
 
     return main()
 
 
 def _worker(args: argparse.Namespace) -> int:
-    from workers.supervisor import main
+    from workers.node.supervisor import main
 
     return main([] if args.until is None else ["--until", str(args.until)])

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.words import (
+from pbrs_farm.commands.arguments import (
     Verb,
     add_farm,
     add_light,
@@ -18,7 +18,7 @@ from pbrs_farm.commands.words import (
     recipe_of,
     say,
 )
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.errors import BadInput
 
 if TYPE_CHECKING:
     from workers.job import JobSpec
@@ -46,9 +46,9 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _submit(args: argparse.Namespace) -> int:
-    from workers.client import completed
-    from workers.estimate import estimate
-    from workers.sources import entries_from_words, is_left_in_place, placed_reference, upload
+    from workers.client.estimate import estimate
+    from workers.client.farm_client import completed
+    from workers.house_files import entries_from_words, is_left_in_place, placed_reference, upload
 
     spec = _spec(args)
     found = entries_from_words(_words(args))
@@ -82,7 +82,7 @@ def _submit(args: argparse.Namespace) -> int:
 
 
 def _words(args: argparse.Namespace) -> list[str]:
-    from pbrs_farm.farm.sources import suncg_list
+    from pbrs_farm.read.source import suncg_list
 
     if not args.houses:
         return list(args.homes)
@@ -93,10 +93,10 @@ def _words(args: argparse.Namespace) -> list[str]:
 
 def _spec(args: argparse.Namespace) -> JobSpec:
     """What the job is made with, its houses apart; raises BadInput, BadRecipe."""
-    from pbrs_farm.farm.plan import wanted
-    from workers.client import new_spec
-    from workers.estimate import seconds_per_view
-    from workers.houses import group_stages
+    from pbrs_farm.run.plan import wanted
+    from workers.client.estimate import seconds_per_view
+    from workers.client.farm_client import new_spec
+    from workers.node.house_runner import group_stages
 
     for name, value, least in (("--views", args.views, 0), ("--slots", args.slots, 1)):
         if value < least:

@@ -7,11 +7,11 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.words import Verb, complain, dump, say
-from pbrs_farm.errors import BadInput
+from pbrs_farm.commands.arguments import Verb, complain, dump, say
+from pbrs_farm.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from pbrs_farm.farm.relight import LampFactor
+    from pbrs_farm.run.relight import LampFactor
 
 
 def add_verbs(verb: Verb) -> None:
@@ -66,7 +66,7 @@ def _sheet(args: argparse.Namespace) -> int:
 
 def write_sheets(folder: Path, max_views: int) -> None:
     """Write sheet.png and index.html into an output folder and say where they are."""
-    from pbrs_farm.farm.sheet import contact_sheet, gallery
+    from pbrs_farm.gallery.contact_sheet import contact_sheet, gallery
     from pbrs_farm.store.folder import FolderStore
 
     store = FolderStore(folder)
@@ -99,8 +99,8 @@ def _verify_folder(args: argparse.Namespace) -> int:
 def _verify_light(args: argparse.Namespace) -> int:
     from dataclasses import asdict
 
-    from pbrs_farm.transport.proof.claims import light_claims
-    from pbrs_farm.transport.variant import choose_variant
+    from pbrs_farm.raycast.variant import choose_variant
+    from pbrs_farm.transport.validation.claims import light_claims
 
     variant, claims = choose_variant(), []
     if not args.json:
@@ -122,7 +122,7 @@ def _verify_light(args: argparse.Namespace) -> int:
 
 
 def _relight(args: argparse.Namespace) -> int:
-    from pbrs_farm.farm.relight import relit, unlit_lamps
+    from pbrs_farm.run.relight import relit, unlit_lamps
     from pbrs_farm.store.folder import FolderStore
 
     if args.list:
@@ -151,7 +151,7 @@ def _relight(args: argparse.Namespace) -> int:
 
 
 def _list_lamps(view: Path) -> int:
-    from pbrs_farm.farm.relight import lamps_of_view
+    from pbrs_farm.run.relight import lamps_of_view
 
     rows = lamps_of_view(view)
     say(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
@@ -164,7 +164,7 @@ def _list_lamps(view: Path) -> int:
 
 def _lamp_factor(word: str) -> LampFactor:
     """NAME=F or NAME=R,G,B; a name may hold "="."""
-    from pbrs_farm.farm.relight import LampFactor
+    from pbrs_farm.run.relight import LampFactor
 
     name, _, text = word.rpartition("=")
     try:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.arrays import Matrix4
-from pbrs_farm.camera import Camera
+from pbrs_farm.core.arrays import Matrix4
+from pbrs_farm.core.camera import Camera
 
 NEAR_M = 0.02
 

@@ -14,24 +14,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.arrays import DepthZ, ItemBuffer, Srgb8Image
-from pbrs_farm.camera import Camera
-from pbrs_farm.frames import linear_from_srgb
-from pbrs_farm.house import House
-from pbrs_farm.raster.blocks import LOOK_FLOATS, aligned_rows, item_lights, looks
-from pbrs_farm.raster.device import Target, encoded, n_samples, open_context, texture_from_pixels
-from pbrs_farm.raster.kinds import (
+from pbrs_farm.core.arrays import DepthZ, ItemBuffer, Srgb8Image
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import RasterFields
+from pbrs_farm.raster.gl_device import Target, encoded, n_samples, open_context, texture_from_pixels
+from pbrs_farm.raster.light_choice import LIGHT_FLOATS, brightness_scale
+from pbrs_farm.raster.projection import boxes_in_view, clip_from_world, distance_to_boxes, far_plane
+from pbrs_farm.raster.shader_features import (
     CUTOUT,
     SEE_THROUGH,
     features_of_kind,
     kind_of_material,
     light_features,
 )
-from pbrs_farm.raster.lights import LIGHT_FLOATS, brightness_scale
-from pbrs_farm.raster.mesh import mesh_from_house
-from pbrs_farm.raster.programs import plain_program, surface_program
-from pbrs_farm.raster.projection import boxes_in_view, clip_from_world, distance_to_boxes, far_plane
-from pbrs_farm.recipe import RasterFields
+from pbrs_farm.raster.shader_programs import plain_program, surface_program
+from pbrs_farm.raster.uniform_blocks import LOOK_FLOATS, aligned_rows, item_lights, looks
+from pbrs_farm.raster.vertex_buffers import mesh_from_house
 
 SKY_SRGB = (0.78, 0.87, 0.96)
 """Colour of what lies behind windows and beyond the house."""

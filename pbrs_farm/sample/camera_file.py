@@ -7,8 +7,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
-from pbrs_farm.camera import PAPER_HFOV_RAD, Camera, Intrinsics
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.camera import PAPER_HFOV_RAD, Camera, Intrinsics
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.sample.room_camera import cameras_from_text
 
 Vector = tuple[float, float, float]

@@ -13,13 +13,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from pbrs_farm.camera import View
-from pbrs_farm.house import House, Item, ItemKind
+from pbrs_farm.core.camera import View
+from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.sample.drawing import Drawing, Mark
-from pbrs_farm.sample.paper import room_shape
+from pbrs_farm.sample.paper_rules import room_shape
+from pbrs_farm.sample.rejection import Verdict
 from pbrs_farm.sample.report import RoomReport
 from pbrs_farm.sample.sampler import Sampling
-from pbrs_farm.sample.verdict import Verdict
 
 COLOURS: Final = {
     Verdict.OUTSIDE_ROOM: "#d9d9d9",

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm import keys
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.recipe import CameraFields
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.recipe import CameraFields
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from pbrs_farm.house import Geometry
+from pbrs_farm.core.house import Geometry
 
 _PAIRS: Final = 1 << 19
 _POINTS: Final = 1 << 12

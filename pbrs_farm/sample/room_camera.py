@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrs_farm.camera import Camera, Intrinsics, View
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.errors import BadInput
 
 
 @dataclass(frozen=True, slots=True, eq=False)

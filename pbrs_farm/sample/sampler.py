@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pbrs_farm.camera import View
-from pbrs_farm.house import House, geometry_from_house
-from pbrs_farm.recipe import CameraFields
-from pbrs_farm.sample.probes import Counter
+from pbrs_farm.core.camera import View
+from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.sample.eye_probes import Counter
 from pbrs_farm.sample.report import CameraReport, RoomReport, total_refused
-from pbrs_farm.sample.room import RoomSampler, RoomTrace
-from pbrs_farm.sample.stored import stored_views
+from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
+from pbrs_farm.sample.stored_cameras import stored_views
 
 
 @dataclass(frozen=True, slots=True, eq=False)

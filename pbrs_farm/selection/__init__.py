@@ -7,7 +7,7 @@ from pbrs_farm.selection.quality import (
     picture_quality,
     scene_quality,
 )
-from pbrs_farm.selection.record import SCORED_MODE, ViewRecord, record_from_json, view_record
+from pbrs_farm.selection.view_record import SCORED_MODE, ViewRecord, record_from_json, view_record
 
 __all__ = [
     "SCORED_MODE",

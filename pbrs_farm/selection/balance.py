@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_NAMES
 
 N_CLASSES: Final = len(NYU40_NAMES)
 _FLOOR: Final = 0.01

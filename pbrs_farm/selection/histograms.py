@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.arrays import Srgb8Image
-from pbrs_farm.recipe import HistogramFields
+from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.recipe import HistogramFields
 
 Counts = NDArray[np.uint32]
 """(bins,) uint32: pixels in each bin."""

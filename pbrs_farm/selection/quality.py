@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from pbrs_farm.arrays import Srgb8Image
-from pbrs_farm.classes import NYU40_NAMES
-from pbrs_farm.house import ItemKind
-from pbrs_farm.recipe import HistogramFields
+from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.core.recipe import HistogramFields
 
 _SATURATED: Final = 254
 

@@ -14,9 +14,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from pbrs_farm.selection.histogram_pack import QUALITIES, HistogramPack
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
-from pbrs_farm.selection.pack import QUALITIES, HistogramPack
-from pbrs_farm.selection.reference import Reference, check_comparable
+from pbrs_farm.selection.reference_set import Reference, check_comparable
 from pbrs_farm.selection.similarity import best_match
 
 SCORES: Final[Any] = pa.schema(

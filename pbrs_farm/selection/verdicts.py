@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from pbrs_farm.recipe import SelectionFields
+from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.selection.balance import balanced, class_shares
 
 REASONS: Final = (

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, TypeVar
 
-from pbrs_farm.errors import ObjectMissing, StoreFailed, StoreRefused, StoreUnavailable
+from pbrs_farm.core.errors import ObjectMissing, StoreFailed, StoreRefused, StoreUnavailable
 from pbrs_farm.store.interface import Head, check_key, check_prefix
 
 T = TypeVar("T")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from pbrs_farm.errors import StoreFailed
+from pbrs_farm.core.errors import StoreFailed
 
 _SEGMENT: Final = re.compile(r"[A-Za-z0-9_\-+=@,~ ()\[\]!][A-Za-z0-9_.\-+=@,~ ()\[\]!]*")
 _MAX_KEY: Final = 900

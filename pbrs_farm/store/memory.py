@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 
-from pbrs_farm.errors import ObjectMissing
+from pbrs_farm.core.errors import ObjectMissing
 from pbrs_farm.store.interface import Head, check_key, check_prefix
 
 

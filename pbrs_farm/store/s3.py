@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
-from pbrs_farm.errors import (
+from pbrs_farm.core.errors import (
     MachineFailed,
     ObjectMissing,
     StoreFailed,

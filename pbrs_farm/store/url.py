@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.interface import Store
 from pbrs_farm.store.memory import MemoryStore

@@ -10,14 +10,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.frames import LM_PER_W, LUMINANCE
-from pbrs_farm.house import House, Room
-from pbrs_farm.recipe import LightFields
-from pbrs_farm.transport.emitters import Emitters
-from pbrs_farm.transport.numbers import CAMERA_DIMS, SobolNumbers, device_array, stream_key
-from pbrs_farm.transport.step import advance, direct
-from pbrs_farm.transport.surface import Stage
-from pbrs_farm.transport.walk import Only, fields_row, left_surface, white_hit
+from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
+from pbrs_farm.core.house import House, Room
+from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.transport.kernels.device_scene import Stage
+from pbrs_farm.transport.kernels.emitters import Emitters
+from pbrs_farm.transport.kernels.path_state import Only, fields_row, left_surface, white_hit
+from pbrs_farm.transport.kernels.path_step import advance, direct
+from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, SobolNumbers, device_array, stream_key
 
 LAMPS_LX: Final = (30.0, 1000.0)
 DAYLIGHT_LX: Final = (20.0, 5000.0)

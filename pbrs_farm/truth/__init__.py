@@ -1,6 +1,18 @@
 """Ground truth: one hit record at pixel centres -> every label layer; pure functions, no effects."""
 
-from pbrs_farm.truth.basic import (
+from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
+from pbrs_farm.truth.coverage import coverage
+from pbrs_farm.truth.depth_sensor import sensor_depth
+from pbrs_farm.truth.optional_layers import (
+    OPTIONAL_NAMES,
+    Seen,
+    optional_layers,
+    optional_tables,
+    see_through_faces,
+    source_classes,
+)
+from pbrs_farm.truth.room_layout import layout_table
+from pbrs_farm.truth.standard_layers import (
     depth_mm,
     instance_png,
     layers_from_hit,
@@ -9,19 +21,7 @@ from pbrs_farm.truth.basic import (
     semantic_png,
     valid_png,
 )
-from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
-from pbrs_farm.truth.coverage import coverage
-from pbrs_farm.truth.layout import layout_table
-from pbrs_farm.truth.more import (
-    OPTIONAL_NAMES,
-    Seen,
-    optional_layers,
-    optional_tables,
-    see_through_faces,
-    source_classes,
-)
-from pbrs_farm.truth.sensor import sensor_depth
-from pbrs_farm.truth.table import camera_table, is_truncated, view_table
+from pbrs_farm.truth.view_table import camera_table, is_truncated, view_table
 
 __all__ = [
     "OPTIONAL_NAMES",

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.arrays import HitRecord
-from pbrs_farm.frames import linear_from_srgb, srgb_from_linear
-from pbrs_farm.house import Geometry, House
+from pbrs_farm.core.arrays import HitRecord
+from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
+from pbrs_farm.core.house import Geometry, House
 
 _LINEAR_OF_BYTE = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
 _STEPS = 4096

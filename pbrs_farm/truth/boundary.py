@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.arrays import HitRecord, Mask
-from pbrs_farm.camera import Camera
+from pbrs_farm.core.arrays import HitRecord, Mask
+from pbrs_farm.core.camera import Camera
 
 OCCLUSION_GAP_M = 0.03
 OCCLUSION_GAP_SHARE = 0.02

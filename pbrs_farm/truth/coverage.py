@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.arrays import Mask
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.house import Item
+from pbrs_farm.core.arrays import Mask
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import Item
 
 _CHUNK_ROWS = 500_000
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.arrays import HitRecord
-from pbrs_farm.camera import Camera
+from pbrs_farm.core.arrays import HitRecord
+from pbrs_farm.core.camera import Camera
 
 _DISPARITY_CM = 31000.0
 _NEAREST_CM = 100.0

@@ -5,16 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
-from pbrs_farm import keys, truth
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.farm.root import manifest_row
-from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm import truth
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.keys import Marker, StoredFile
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.images import exr_from_layers, png_from_array
-from pbrs_farm.keys import Marker, StoredFile
-from pbrs_farm.layers import LAYER
-from pbrs_farm.read.builtin import builtin_home
-from pbrs_farm.read.bundle import bundle_from_house
-from pbrs_farm.transport.caster import Caster
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.run.output_root import manifest_row
 
 SIZE = (128, 96)
 

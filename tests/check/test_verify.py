@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pbrs_farm.camera import Camera, Intrinsics
 from pbrs_farm.check import verify
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import array_from_png, png_from_array
-from pbrs_farm.read.builtin import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.check.roots import SIZE, changed_pixel, make_root, sign
 
 

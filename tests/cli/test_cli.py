@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.cli import build_parser, main
-from pbrs_farm.commands.words import recipe_of
-from pbrs_farm.layers import LAYERS
+from pbrs_farm.commands.arguments import recipe_of
+from pbrs_farm.core.layers import LAYERS
 
 
 def error_of(capsys: pytest.CaptureFixture[str], *words: str) -> str:

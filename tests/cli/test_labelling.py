@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pbrs_farm.commands import labelling
-from pbrs_farm.errors import BadInput
-from pbrs_farm.farm.export import FORMS
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.export.export_views import FORMS
 from pbrs_farm.images import png_from_array
 from tests.check.roots import SIZE, make_root
 

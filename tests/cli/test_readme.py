@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from pbrs_farm.cli import build_parser
-from pbrs_farm.layers import table
+from pbrs_farm.core.layers import table
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 

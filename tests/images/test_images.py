@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from pbrs_farm import images
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.errors import BadInput
 
 SHAPES = [(7, 5), (7, 5, 3), (7, 5, 4)]
 

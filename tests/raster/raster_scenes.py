@@ -2,17 +2,8 @@
 
 import numpy as np
 
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.house import (
-    House,
-    Item,
-    ItemKind,
-    Level,
-    LightPart,
-    Material,
-    Source,
-    Surface,
-)
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import House, Item, ItemKind, Level, LightPart, Material, Source, Surface
 
 
 def camera(width: int = 32, height: int = 24) -> Camera:

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from pbrs_farm.house import ItemKind, LightPart, Material, Surface
-from pbrs_farm.lighting import LightForm, PowerUnit
-from pbrs_farm.raster.lights import (
+from pbrs_farm.core.house import ItemKind, LightPart, Material, Surface
+from pbrs_farm.core.lighting import LightForm, PowerUnit
+from pbrs_farm.raster.light_choice import (
     FLOOR_LEVEL,
     SOFT_M,
     best_lights,

@@ -1,16 +1,17 @@
 import numpy as np
 import pytest
 
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.errors import MachineFailed
-from pbrs_farm.frames import srgb_from_linear
-from pbrs_farm.house import LightPart, Material, MaterialKind, Surface, geometry_from_house
-from pbrs_farm.lighting import LightForm, PowerUnit
-from pbrs_farm.raster import Rasterizer, device
-from pbrs_farm.raster.programs import DL_SCALE, PANE_OPACITY
-from pbrs_farm.read.builtin import builtin_home
-from pbrs_farm.recipe import RasterFields
-from pbrs_farm.transport.caster import Caster
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.frames import srgb_from_linear
+from pbrs_farm.core.house import LightPart, Material, MaterialKind, Surface, geometry_from_house
+from pbrs_farm.core.lighting import LightForm, PowerUnit
+from pbrs_farm.core.recipe import RasterFields
+from pbrs_farm.raster import Rasterizer
+from pbrs_farm.raster import gl_device as device
+from pbrs_farm.raster.shader_programs import DL_SCALE, PANE_OPACITY
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.raster.raster_scenes import camera, house, item, square
 
 WHITE = Material("white")

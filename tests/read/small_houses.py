@@ -8,7 +8,7 @@ import zlib
 
 import numpy as np
 
-from pbrs_farm.house import (
+from pbrs_farm.core.house import (
     Box,
     Enclosure,
     House,
@@ -26,7 +26,7 @@ from pbrs_farm.house import (
     Surface,
     Texture,
 )
-from pbrs_farm.lighting import LightForm, PowerUnit
+from pbrs_farm.core.lighting import LightForm, PowerUnit
 
 
 def png(width: int = 2, height: int = 2, rgb: tuple[int, int, int] = (200, 30, 40)) -> bytes:

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.errors import BadHouse
-from pbrs_farm.read import glb
-from pbrs_farm.read.bundle import bundle_from_house, house_from_bundle
-from pbrs_farm.read.gltf import read_gltf
-from pbrs_farm.recipe import ReadFields
-from tests.read.gltf_scenes import two_rooms
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.formats import glb
+from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
+from pbrs_farm.read.gltf.scene import read_gltf
+from tests.read.gltf.gltf_scenes import two_rooms
 from tests.read.small_houses import full_house
-from tests.read.test_suncg_bad import outcome, paths_of, values
+from tests.read.suncg.test_suncg_bad import outcome, paths_of, values
 
 SCENE = two_rooms()
 SCENE.node("Lamp", mesh=SCENE.box([1, 0, 1], [1.2, 1, 1.2]), extras={"class": "lamp"})

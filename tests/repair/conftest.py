@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from pbrs_farm.house import House
-from pbrs_farm.read.builtin import builtin_home
-from pbrs_farm.recipe import RepairFields
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import RepairReport, repair
 from tests.repair.embree import EmbreeOccluder
 

@@ -7,7 +7,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm.core.house import House, geometry_from_house
 
 
 class EmbreeOccluder:

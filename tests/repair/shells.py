@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.house import House, geometry_from_house
-from pbrs_farm.repair.patches import face_areas, face_normals
+from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.repair.structure.patches import face_areas, face_normals
 from tests.repair.embree import EmbreeOccluder
 
 F64 = NDArray[np.float64]

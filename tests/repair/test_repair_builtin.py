@@ -5,16 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrs_farm.house import (
-    Enclosure,
-    House,
-    ItemKind,
-    MaterialKind,
-    geometry_from_house,
-)
-from pbrs_farm.recipe import RepairFields
+from pbrs_farm.core.house import Enclosure, House, ItemKind, MaterialKind, geometry_from_house
+from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair import RepairReport, repair
-from pbrs_farm.repair.patches import face_areas
+from pbrs_farm.repair.structure.patches import face_areas
 from tests.repair.shells import leaning_area, unpaired_edges
 
 Repaired = tuple[House, RepairReport]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from pbrs_farm import homes
-from pbrs_farm.house import House, ItemKind, MaterialKind
+from pbrs_farm.assets import homes
+from pbrs_farm.core.house import House, ItemKind, MaterialKind
+from pbrs_farm.core.recipe import ReadFields, RepairFields
 from pbrs_farm.read.sweethome3d import read_home
-from pbrs_farm.recipe import ReadFields, RepairFields
 from pbrs_farm.repair import RepairReport, repair
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.shells import unpaired_edges

@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.house import House, Item, ItemKind, LightPart, Material, MaterialKind, Surface
-from pbrs_farm.lighting import PowerUnit
-from pbrs_farm.read.builtin import builtin_home
-from pbrs_farm.recipe import RepairFields
-from pbrs_farm.repair.bulbs import icosphere, triangles_of, with_bulbs
-from pbrs_farm.repair.distance import distance_to_triangles
-from pbrs_farm.repair.lit import with_lit_rooms
-from pbrs_farm.repair.patches import face_areas
-from pbrs_farm.repair.shades import with_shades
+from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Material, MaterialKind, Surface
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of, with_bulbs
+from pbrs_farm.repair.lamps.room_lighting import with_lit_rooms
+from pbrs_farm.repair.lamps.shades import with_shades
+from pbrs_farm.repair.measure.distance import distance_to_triangles
+from pbrs_farm.repair.structure.patches import face_areas
 from tests.repair.embree import EmbreeOccluder
 
 FIELDS = RepairFields()

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 import shapely
 
-from pbrs_farm.house import House, Item, ItemKind
-from pbrs_farm.read.builtin import builtin_home
-from pbrs_farm.recipe import RepairFields
-from pbrs_farm.repair import repair, structure
-from pbrs_farm.repair.enclosure import Space
-from pbrs_farm.repair.leaks import LeakMeter, leaks_of_house
-from pbrs_farm.repair.prisms import level_plane
-from pbrs_farm.repair.room_air import RoomAir
+from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.repair import repair
+from pbrs_farm.repair.measure.enclosure import Space
+from pbrs_farm.repair.measure.leaks import LeakMeter, leaks_of_house
+from pbrs_farm.repair.measure.room_edges import RoomAir
+from pbrs_farm.repair.structure import watertight as structure
+from pbrs_farm.repair.structure.prisms import level_plane
 from tests.repair.embree import EmbreeOccluder
 
 GAP_M = 0.02

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from pbrs_farm.house import House
-from pbrs_farm.read.suncg import read_suncg
-from pbrs_farm.recipe import ReadFields, RepairFields
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import ReadFields, RepairFields
+from pbrs_farm.read.suncg.suncg_house import read_suncg
 from pbrs_farm.repair import RepairReport, repair
-from tests.read.suncg_root import write_root
+from tests.read.suncg.suncg_root import write_root
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.shells import coinciding_share, seen_from
 

@@ -7,8 +7,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from pbrs_farm.camera import Camera
-from pbrs_farm.house import (
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import (
     House,
     Item,
     ItemKind,
@@ -19,8 +19,8 @@ from pbrs_farm.house import (
     Surface,
     geometry_from_house,
 )
-from pbrs_farm.recipe import CameraFields
-from pbrs_farm.transport.caster import Caster
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.raycast.caster import Caster
 
 QUICK = CameraFields(
     score_width_px=80, score_height_px=60, coarse_width_px=40, coarse_height_px=30, cell_m=0.5

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from pbrs_farm.camera import PAPER_HFOV_RAD, View
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.camera import PAPER_HFOV_RAD, View
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.sample import room_camera, sample_cameras
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from tests.builders import builtin_home

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pbrs_farm.recipe import CameraFields
+from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.candidates import Grid, grid_candidates, uniforms
 
 GRID = Grid(-1.0, 2.0, 4.0, 6.0, base_y=3.0)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pbrs_farm.house import House
-from pbrs_farm.recipe import CameraFields
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import sample_cameras
-from pbrs_farm.sample.choose import Coarse, FullScores, best_first
-from pbrs_farm.sample.probes import Counter
+from pbrs_farm.sample.eye_probes import Counter
+from pbrs_farm.sample.sector_choice import Coarse, FullScores, best_first
 from tests.builders import builtin_home
 from tests.sample.rooms import QUICK, IndependentLook, counter_of, furnished
 

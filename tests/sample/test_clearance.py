@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pbrs_farm.sample.clearance import near_any_triangle, squared_distance
-from tests.transport.scenes import geometry, soup
+from tests.raycast.scenes import geometry, soup
 
 TRIANGLE = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]])
 

@@ -4,12 +4,12 @@ import functools
 
 import pytest
 
-from pbrs_farm import homes
-from pbrs_farm.house import House, geometry_from_house
+from pbrs_farm.assets import homes
+from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.recipe import CameraFields, Recipe, recipe_from_name
+from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d import read_home
-from pbrs_farm.recipe import CameraFields, Recipe, recipe_from_name
 from pbrs_farm.repair import repair
-from pbrs_farm.transport.caster import Caster
 from tests.sample.test_rules import hold_the_rules
 
 pytestmark = pytest.mark.homes

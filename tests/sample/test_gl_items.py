@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pbrs_farm.camera import Intrinsics
-from pbrs_farm.house import geometry_from_house
-from pbrs_farm.recipe import CameraFields
+from pbrs_farm.core.camera import Intrinsics
+from pbrs_farm.core.house import geometry_from_house
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.sample import sample_cameras
-from pbrs_farm.transport.caster import Caster
 from tests.builders import builtin_home
 
 gl_items = pytest.importorskip("benchmarks.gl_items")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pbrs_farm.camera import Intrinsics
-from pbrs_farm.sample.objects import icosphere, object_views
+from pbrs_farm.core.camera import Intrinsics
+from pbrs_farm.sample.object_cameras import icosphere, object_views
 
 BOX = np.array([[-1.0, 0.0, 2.0], [1.0, 2.0, 3.0]])
 INTRINSICS = Intrinsics.from_hfov(64, 48)

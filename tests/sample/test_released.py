@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.house import ItemKind
-from pbrs_farm.recipe import CameraFields, recipe_from_name
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.core.recipe import CameraFields, recipe_from_name
 from pbrs_farm.sample import sample_cameras
-from pbrs_farm.sample.released import room_grid, viewpoint_mask
-from pbrs_farm.sample.scores import released_columns, released_score
-from pbrs_farm.sample.verdict import Verdict
+from pbrs_farm.sample.rejection import Verdict
+from pbrs_farm.sample.released_rules import room_grid, viewpoint_mask
+from pbrs_farm.sample.view_score import released_columns, released_score
 from tests.sample.rooms import box, counter_of, furnished, room_house, shell
 
 RELEASED = recipe_from_name("released").cameras

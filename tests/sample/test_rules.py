@@ -9,10 +9,10 @@ import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.house import House, ItemKind
-from pbrs_farm.recipe import CameraFields
+from pbrs_farm.core.house import House, ItemKind
+from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import sample_cameras
-from pbrs_farm.sample.verdict import Verdict
+from pbrs_farm.sample.rejection import Verdict
 from tests.builders import builtin_home
 from tests.sample.rooms import QUICK, IndependentLook, box, counter_of, furnished, room_house, shell
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from pbrs_farm import selection
-from pbrs_farm.errors import BadInput
-from pbrs_farm.lighting import Mode
-from pbrs_farm.recipe import HistogramFields
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.selection.histograms import (
     coarser_colour,
     coarser_depth,
@@ -22,7 +22,7 @@ from pbrs_farm.selection.histograms import (
     depth_counts,
     normalised,
 )
-from pbrs_farm.selection.record import SparseCounts
+from pbrs_farm.selection.view_record import SparseCounts
 
 RNG = np.random.default_rng(5)
 PICTURE = RNG.integers(0, 256, (30, 40, 3), np.uint8)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.errors import BadInput
-from pbrs_farm.recipe import HistogramFields, SelectionFields
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.selection.binning import (
     BINNINGS,
     Binning,
@@ -21,7 +21,7 @@ from pbrs_farm.selection.binning import (
     table_text,
 )
 from pbrs_farm.selection.histograms import Histogram, coarser_colour, coarser_depth, normalised
-from pbrs_farm.selection.reference import (
+from pbrs_farm.selection.reference_set import (
     bytes_from_reference,
     check_comparable,
     reference_from_bytes,

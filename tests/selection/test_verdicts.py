@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from pbrs_farm.recipe import SelectionFields
+from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.selection.balance import balanced, class_shares
 from pbrs_farm.selection.scores import SCORES, merged, score
 from pbrs_farm.selection.verdicts import REASONS, verdicts

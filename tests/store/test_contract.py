@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.errors import ObjectMissing, StoreFailed
+from pbrs_farm.core.errors import ObjectMissing, StoreFailed
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store import MemoryStore, Store, store_from_url
 from pbrs_farm.store.folder import FolderStore

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.errors import StoreFailed, StoreUnavailable
+from pbrs_farm.core.errors import StoreFailed, StoreUnavailable
 from pbrs_farm.store.folder import TEMPORARY, FolderStore
 
 

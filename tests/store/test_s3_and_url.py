@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.errors import BadInput, StoreFailed, StoreUnavailable
+from pbrs_farm.core.errors import BadInput, StoreFailed, StoreUnavailable
 from pbrs_farm.store import MemoryStore, StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.interface import content_type

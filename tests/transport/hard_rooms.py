@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pbrs_farm.camera import Camera
-from pbrs_farm.house import House, Material, MaterialKind, Surface
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import House, Material, MaterialKind, Surface
 from tests.transport.rooms import (
     BULB,
     Triple,

@@ -1,6 +1,6 @@
 """The rooms of the light tests; they live in the package, `pbrs-farm verify --light` uses them."""
 
-from pbrs_farm.transport.proof.rooms import (
+from pbrs_farm.transport.validation.known_rooms import (
     BULB,
     Triple,
     box,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pbrs_farm.transport.variant import choose_variant, mitsuba
+from pbrs_farm.raycast.variant import choose_variant, mitsuba
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
@@ -19,7 +19,7 @@ N = 1 << 18
 
 def scatter(kd: float, f0: float, alpha: float, tau: float = 0.0) -> Any:
     mi = mitsuba()
-    from pbrs_farm.transport.bsdf import Scatter
+    from pbrs_farm.transport.kernels.bsdf import Scatter
 
     return Scatter(mi.Color3f(kd), mi.Color3f(f0), mi.Color3f(tau), mi.Float(alpha), mi.UInt32(0))
 
@@ -44,7 +44,7 @@ ANGLES = [0.0, 0.7, 1.2, 1.5]
 @pytest.mark.parametrize("theta", ANGLES)
 def test_no_more_light_leaves_than_arrives(model: tuple[float, ...], theta: float) -> None:
     mi = mitsuba()
-    from pbrs_farm.transport.bsdf import evaluate, sample
+    from pbrs_farm.transport.kernels.bsdf import evaluate, sample
 
     m, wi = scatter(*model), direction(theta)
     lobes = mi.Float(np.random.default_rng(1).random(N, np.float32))
@@ -62,7 +62,7 @@ def test_no_more_light_leaves_than_arrives(model: tuple[float, ...], theta: floa
 def test_samples_follow_the_density_they_name(model: tuple[float, ...], theta: float) -> None:
     # The integral of g over the sphere by the sampler equals that by uniform directions.
     mi = mitsuba()
-    from pbrs_farm.transport.bsdf import evaluate, sample
+    from pbrs_farm.transport.kernels.bsdf import evaluate, sample
 
     m, wi = scatter(*model), direction(theta)
     lobes = mi.Float(np.random.default_rng(3).random(N, np.float32))
@@ -82,7 +82,7 @@ def test_samples_follow_the_density_they_name(model: tuple[float, ...], theta: f
 
 @pytest.mark.parametrize("model", MODELS[:4])
 def test_swapping_the_directions_gives_the_same_reflectance(model: tuple[float, ...]) -> None:
-    from pbrs_farm.transport.bsdf import evaluate
+    from pbrs_farm.transport.kernels.bsdf import evaluate
 
     m = scatter(*model)
     a, b = direction(0.4, 0.1), direction(1.1, 2.5)
@@ -93,7 +93,7 @@ def test_swapping_the_directions_gives_the_same_reflectance(model: tuple[float, 
 
 def test_thin_glass_of_index_1_5_reflects_8_percent_head_on() -> None:
     mi = mitsuba()
-    from pbrs_farm.transport.bsdf import thin_glass_reflectance
+    from pbrs_farm.transport.kernels.bsdf import thin_glass_reflectance
 
     assert thin_glass_reflectance(mi.Float(1.0)).numpy()[0] == pytest.approx(0.0769, abs=1e-3)
 
@@ -102,7 +102,7 @@ def test_pairs_of_sobol_numbers_fill_every_cell_once() -> None:
     import drjit as dr
 
     mi = mitsuba()
-    from pbrs_farm.transport.numbers import SobolNumbers, stream_key
+    from pbrs_farm.transport.kernels.sampler import SobolNumbers, stream_key
 
     s = dr.arange(mi.UInt32, 64)
     for pixel in (0, 1, 77):
@@ -118,7 +118,7 @@ def test_neighbouring_streams_are_not_correlated() -> None:
     import drjit as dr
 
     mi = mitsuba()
-    from pbrs_farm.transport.numbers import HashedNumbers, stream_key
+    from pbrs_farm.transport.kernels.sampler import HashedNumbers, stream_key
 
     lanes = dr.arange(mi.UInt32, 1 << 16)
     u = HashedNumbers(stream_key(lanes, mi.UInt32(0)), mi.UInt32(0)).one(mi.UInt32(3)).numpy()

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pbrs_farm.camera import Camera
-from pbrs_farm.house import House, Material, MaterialKind
-from pbrs_farm.recipe import LightFields, Recipe, recipe_from_name
-from pbrs_farm.transport import guide
-from pbrs_farm.transport.aims import BACK, GlowTables
-from pbrs_farm.transport.proof.statistics import blocks, z_scores
-from pbrs_farm.transport.result import LightResult
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import dark_sky
-from pbrs_farm.transport.variant import choose_variant
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import House, Material, MaterialKind
+from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.guiding import guided_rays as guide
+from pbrs_farm.transport.guiding.guiding_targets import BACK, GlowTables
+from pbrs_farm.transport.light_result import LightResult
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import dark_sky
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
 from tests.transport import hard_rooms, rooms
 
 pytestmark = pytest.mark.skipif(
@@ -79,7 +79,7 @@ def test_a_direction_drawn_in_a_cone_has_the_density_of_the_cone() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.nearby import Cones, cone_density, in_cones
+    from pbrs_farm.transport.guiding.nearby_lamps import Cones, cone_density, in_cones
 
     n = 1 << 18
     rng = mi.PCG32(size=n)
@@ -95,7 +95,7 @@ def test_a_direction_drawn_in_a_cone_has_the_density_of_the_cone() -> None:
 
 
 def glow_of(house: House) -> tuple[LightScene, GlowTables]:
-    from pbrs_farm.transport.glow import glow_tables
+    from pbrs_farm.transport.guiding.lampshade_exitance import glow_tables
 
     scene, camera = loaded((house, rooms.camera((0.5, 1.5, 0.5), (2.0, 1.0, 2.0))))
     emitters, _weights = scene.emitters(camera, FIELDS, 0)
@@ -153,8 +153,8 @@ def test_a_lamp_is_chosen_as_often_as_its_density_says() -> None:
 def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
     import mitsuba as mi
 
-    from pbrs_farm.transport.step import advance
-    from pbrs_farm.transport.walk import Only, camera_row, fields_row, start
+    from pbrs_farm.transport.kernels.path_state import Only, camera_row, fields_row, start
+    from pbrs_farm.transport.kernels.path_step import advance
 
     glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
     sheets = [rooms.quad([(-9, y, -9), (-9, y, 9), (9, y, 9), (9, y, -9)], 1) for y in (1.0, 0.5)]

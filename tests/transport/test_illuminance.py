@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.illuminance import illuminance_record, photometric_warnings
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import dark_sky, sunsky
-from pbrs_farm.transport.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import dark_sky, sunsky
 from tests.transport import rooms
 
 RECIPE = recipe_from_name("fast")

@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm import keys
-from pbrs_farm.camera import Camera
-from pbrs_farm.errors import BadRecipe, MachineFailed, RenderFailed
-from pbrs_farm.house import House
-from pbrs_farm.recipe import RECIPE_NAMES, LightFields, recipe_from_name
-from pbrs_farm.transport import scene as scene_module
-from pbrs_farm.transport.lamps import indoor_from_lamps, lamp_table
-from pbrs_farm.transport.proof.statistics import blocks, z_scores
-from pbrs_farm.transport.result import LightResult
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import uniform_sky
-from pbrs_farm.transport.variant import choose_variant
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.errors import BadRecipe, MachineFailed, RenderFailed
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import RECIPE_NAMES, LightFields, recipe_from_name
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport import light_scene as scene_module
+from pbrs_farm.transport.lamp_layers import indoor_from_lamps, lamp_table
+from pbrs_farm.transport.light_result import LightResult
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import uniform_sky
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
 from tests.transport import rooms
 
 needs_kernels = pytest.mark.skipif(

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrs_farm.errors import RenderFailed
-from pbrs_farm.frames import LUMINANCE
-from pbrs_farm.lighting import Group
-from pbrs_farm.recipe import LightFields
-from pbrs_farm.transport.proof.rooms import furnace
-from pbrs_farm.transport.proof.statistics import blocks, z_scores
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import dark_sky, sunsky, uniform_sky
-from pbrs_farm.transport.variant import choose_variant
+from pbrs_farm.core.errors import RenderFailed
+from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.lighting import Group
+from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import dark_sky, sunsky, uniform_sky
+from pbrs_farm.transport.validation.known_rooms import furnace
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
 from tests.transport import hard_rooms, rooms
 from tests.transport.test_path import FIELDS, RECIPE, rendered
 

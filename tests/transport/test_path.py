@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.camera import Camera
-from pbrs_farm.frames import LUMINANCE
-from pbrs_farm.house import House, Material, MaterialKind
-from pbrs_farm.lighting import Group, Mode
-from pbrs_farm.recipe import LightFields, Recipe, recipe_from_name
-from pbrs_farm.transport.proof.rooms import furnace
-from pbrs_farm.transport.proof.statistics import blocks, z_scores
-from pbrs_farm.transport.reference import ReferenceScene
-from pbrs_farm.transport.result import LightResult
-from pbrs_farm.transport.scene import LightScene
-from pbrs_farm.transport.sky import Sky, dark_sky, sunsky, uniform_sky
-from pbrs_farm.transport.variant import choose_variant
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.house import House, Material, MaterialKind
+from pbrs_farm.core.lighting import Group, Mode
+from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_result import LightResult
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky, uniform_sky
+from pbrs_farm.transport.validation.known_rooms import furnace
+from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
 from tests.transport import rooms
 
 pytestmark = pytest.mark.skipif(

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pbrs_farm.arrays import HitRecord
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.house import House, Item, ItemKind, Level, Material, Source, Surface
+from pbrs_farm.core.arrays import HitRecord
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import House, Item, ItemKind, Level, Material, Source, Surface
 
 
 def camera(width: int = 8, height: int = 6) -> Camera:

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from pbrs_farm import truth
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.errors import BadHouse
-from pbrs_farm.frames import published_normal_from_world
-from pbrs_farm.house import geometry_from_house
-from pbrs_farm.layers import LAYER
-from pbrs_farm.read.builtin import builtin_home
-from pbrs_farm.transport.caster import Caster
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import published_normal_from_world
+from pbrs_farm.core.house import geometry_from_house
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.truth.hits import camera, hit, house
 
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from pbrs_farm import truth
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.house import Item, ItemKind, Surface
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import Item, ItemKind, Surface
 from tests.truth.hits import camera, house
 
 

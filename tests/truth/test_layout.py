@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from pbrs_farm import truth
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.house import Room
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import Room
 
 ROOM = Room("0_0", "box", "0", np.array([[-2.0, -4], [2, -4], [2, 1], [-2, 1]]), 0.0, 2.5)
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from pbrs_farm import truth
-from pbrs_farm.arrays import HitRecord
-from pbrs_farm.camera import Camera, Intrinsics
-from pbrs_farm.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
-from pbrs_farm.house import House, Material, MaterialKind, geometry_from_house
-from pbrs_farm.layers import LAYER, LAYERS
-from pbrs_farm.read.builtin import builtin_home
-from pbrs_farm.transport.caster import Caster
+from pbrs_farm.core.arrays import HitRecord
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
+from pbrs_farm.core.house import House, Material, MaterialKind, geometry_from_house
+from pbrs_farm.core.layers import LAYER, LAYERS
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.truth.hits import camera, hit, house, square
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm import truth
-from pbrs_farm.frames import transform_points
+from pbrs_farm.core.frames import transform_points
 from tests.truth.hits import camera, house
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.store.secret import Secret
 from tests.workers.redis_server import RedisServer
 from workers.config import FarmConfig
 from workers.job import JobRules, JobSpec
-from workers.redis_ledger import RedisLedger
+from workers.ledger.redis_ledger import RedisLedger
 
 
 @pytest.fixture(scope="session")

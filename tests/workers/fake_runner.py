@@ -13,10 +13,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from pbrs_farm import keys
-from pbrs_farm.errors import BadHouse, StoreUnavailable
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadHouse, StoreUnavailable
 from pbrs_farm.store import Head, Store, store_from_url
-from pbrs_farm.store.patient import PatientStore
+from pbrs_farm.store.retrying import PatientStore
 from workers.config import FarmConfig
 from workers.job import JobSpec
 from workers.runner import Request, Result, Survey, Tell

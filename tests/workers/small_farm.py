@@ -12,17 +12,17 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store import Store, StoreSettings
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.secret import Secret
 from tests.workers.fake_runner import FakeRunner, groups_of
 from tests.workers.redis_server import RedisServer
-from workers.client import Farm, new_spec
+from workers.client.farm_client import Farm, new_spec
 from workers.config import FarmConfig
 from workers.job import HouseEntry
-from workers.renderer import die_with_parent
+from workers.node.renderer import die_with_parent
 from workers.runner import Request
 
 REPO = Path(__file__).parents[2]
@@ -89,10 +89,10 @@ class SmallFarm:
             )
 
     def coordinator(self, name: str = "coordinator") -> None:
-        self.start(name, "workers.coordinator")
+        self.start(name, "workers.coordinator.leader")
 
     def worker(self, name: str, slots: int = 1, prefix: tuple[str, ...] = ()) -> None:
-        self.start(name, "workers.supervisor", slots=slots, prefix=prefix)
+        self.start(name, "workers.node.supervisor", slots=slots, prefix=prefix)
 
     def submit(self, n_houses: int) -> None:
         self.houses = [f"h{k:03d}" + "x" * (k % 2) for k in range(n_houses)]

@@ -160,12 +160,12 @@ def test_redis_flushed_then_recovered(farm: SmallFarm) -> None:
 
 
 def test_every_message_delivered_twice(farm: SmallFarm) -> None:
-    from workers.coordinator import Coordinator, celery_sender
+    from workers.coordinator.leader import Coordinator, celery_sender
 
     (farm.control / "slow").write_text("0.05")
     farm.worker("w1")
     farm.worker("w2")
-    from workers.app import make_app
+    from workers.queue.celery_app import make_app
 
     send = celery_sender(make_app(farm.farm.config))
 

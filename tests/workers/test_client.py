@@ -12,19 +12,19 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.cli import main
-from pbrs_farm.errors import BadInput, BadRecipe, MachineFailed
-from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.core.errors import BadInput, BadRecipe, MachineFailed
+from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.store.folder import FolderStore
 from tests.workers.drive import Drive
 from tests.workers.redis_server import free_port
-from workers.client import Farm, completed, new_spec
+from workers.client.farm_client import Farm, completed, new_spec
 from workers.config import FarmConfig
+from workers.coordinator.metrics import serve_metrics
 from workers.ids import job_key
 from workers.job import HouseEntry, JobSpec, lines_from_houses
-from workers.ledger import Fault
-from workers.merge import merge_job, merge_shard
-from workers.metrics import serve_metrics
+from workers.ledger.interface import Fault
+from workers.node.merge_manifests import merge_job, merge_shard
 
 HOUSES = [HouseEntry(house_id=f"h{k}", source="{}") for k in range(3)]
 

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.errors import BadInput
+from pbrs_farm.core.errors import BadInput
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import SmallFarm, descendants
 from workers.config import config_from_environment
 from workers.logs import NoSecrets
-from workers.supervisor import command
+from workers.node.supervisor import command
 
 
 @pytest.fixture
@@ -92,7 +92,7 @@ def renderers(farm: SmallFarm, worker: str) -> list[int]:
     found = []
     for pid in descendants(farm.processes[worker].pid):
         words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-        if b"workers.renderer" in words:
+        if b"workers.node.renderer" in words:
             found.append(pid)
     return found
 
@@ -101,7 +101,7 @@ def test_celerys_parent_process_is_kept_out_of_storage() -> None:
     code = """
 from celery.signals import worker_init
 from pbrs_farm.store import store_from_url
-import workers.app
+import workers.queue.celery_app
 worker_init.send(sender=None)
 store_from_url("s3://bucket/prefix").put("k", b"")
 """

@@ -22,7 +22,7 @@ from pbrs_farm.store.secret import Secret
 from tests.store.test_contract import s3_store
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import REPO, SmallFarm
-from workers.client import Farm
+from workers.client.farm_client import Farm
 
 pytestmark = pytest.mark.infra
 
@@ -53,7 +53,7 @@ def test_a_farm_on_s3_with_a_worker_killed(tmp_path: Path) -> None:
 
 
 def test_s3_refuses_wrong_credentials_and_a_missing_bucket_in_one_line() -> None:
-    from pbrs_farm.errors import StoreFailed, StoreUnavailable
+    from pbrs_farm.core.errors import StoreFailed, StoreUnavailable
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 

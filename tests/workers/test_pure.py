@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pbrs_farm.errors import (
+from pbrs_farm.core.errors import (
     BadHouse,
     BadInput,
     MachineFailed,
@@ -18,23 +18,23 @@ from pbrs_farm.errors import (
     StoreRefused,
     StoreUnavailable,
 )
-from pbrs_farm.recipe import recipe_from_name
+from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.store import MemoryStore
 from tests.workers.conftest import spec
-from workers.client import completed, new_spec
+from workers.client.estimate import estimate, seconds_per_view
+from workers.client.farm_client import completed, new_spec
+from workers.client.text import duration_text
 from workers.config import FarmConfig, Limits
-from workers.estimate import estimate, seconds_per_view
-from workers.faults import class_of, fingerprint, without_numbers
-from workers.groups import groups_from_views
-from workers.houses import HouseRunner, steps_of_stage
+from workers.coordinator.progress_rates import Rates, quantile_s, stage_views
+from workers.house_files import entries_from_words, is_left_in_place
 from workers.ids import check_job_id, job_key, queue_of, stages_of_queue, task_from_text
 from workers.job import HouseEntry
-from workers.ledger import JobView
-from workers.memory import machine_mb, memory_limit_mb
-from workers.rates import Rates, quantile_s, stage_views
+from workers.ledger.interface import JobView
+from workers.node.faults import class_of, fingerprint, without_numbers
+from workers.node.house_runner import HouseRunner, steps_of_stage
+from workers.node.memory import machine_mb, memory_limit_mb
+from workers.node.view_groups import groups_from_views
 from workers.runner import Request
-from workers.show import duration_text
-from workers.sources import entries_from_words, is_left_in_place
 
 
 @given(

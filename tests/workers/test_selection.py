@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import json
 
-from pbrs_farm.farm import selecting
-from pbrs_farm.recipe import recipe_from_name
-from pbrs_farm.selection.reference import bytes_from_reference
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.curate import selection_run as selecting
+from pbrs_farm.selection.reference_set import bytes_from_reference
 from pbrs_farm.store import MemoryStore
-from tests.farm.test_selecting import put_house
+from tests.curate.test_selection_run import put_house
 from tests.selection.histogram_sets import reference
-from workers.client import completed, new_spec
-from workers.houses import HouseRunner
+from workers.client.farm_client import completed, new_spec
 from workers.ids import job_key
 from workers.job import HouseEntry, lines_from_houses
+from workers.node.house_runner import HouseRunner
 from workers.runner import Request
 
 KEY = "jobs/sources/references/r.npz"

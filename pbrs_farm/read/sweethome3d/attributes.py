@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from pbrs_farm.errors import BadHouse
-from pbrs_farm.frames import M_FROM_CM
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import M_FROM_CM
 
 Rgb = tuple[float, float, float]
 

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.arrays import Points2
-from pbrs_farm.house import Surface
-from pbrs_farm.read.planes import horizontal
+from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.house import Surface
+from pbrs_farm.read.mesh.horizontal_polygons import horizontal
+from pbrs_farm.read.sweethome3d.home_xml import Plan, PlanLevel, level_of
 from pbrs_farm.read.sweethome3d.outlines import Outline
-from pbrs_farm.read.sweethome3d.plan import Plan, PlanLevel, level_of
 from pbrs_farm.read.sweethome3d.roofs import roof_over
-from pbrs_farm.read.sweethome3d.walls import top_heights
+from pbrs_farm.read.sweethome3d.wall_solids import top_heights
 
 F64 = NDArray[np.float64]
 KINK_M = 0.01

@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element, ParseError
 from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
-from pbrs_farm.errors import BadHouse
-from pbrs_farm.read.resources import Layered, Resources, ZipResources
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.read.common.resources import Layered, Resources, ZipResources
 
 MAX_XML_BYTES = 16 * 2**20
 MAX_DEPTH = 200

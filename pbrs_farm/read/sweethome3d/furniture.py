@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from pbrs_farm.classes import NYU40_NAMES
-from pbrs_farm.house import Item, MaterialKind, Opening, Surface
-from pbrs_farm.read.labels import kind_of, nyu40_of
-from pbrs_farm.read.sweethome3d.cutouts import StandingWall, opening_of
-from pbrs_farm.read.sweethome3d.finish import finish_of
-from pbrs_farm.read.sweethome3d.lamps import light_parts
-from pbrs_farm.read.sweethome3d.looks import Looks
-from pbrs_farm.read.sweethome3d.models import PANE, Model, Models
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.house import Item, MaterialKind, Opening, Surface
+from pbrs_farm.read.common.furniture_classes import kind_of, nyu40_of
+from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall, opening_of
+from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
+from pbrs_farm.read.sweethome3d.home_xml import PlanLevel, PlanPiece
+from pbrs_farm.read.sweethome3d.light_sources import light_parts
+from pbrs_farm.read.sweethome3d.material_collector import Looks
+from pbrs_farm.read.sweethome3d.piece_materials import finish_of
+from pbrs_farm.read.sweethome3d.piece_models import PANE, Model, Models
 from pbrs_farm.read.sweethome3d.placement import (
     Frame,
     frame_of,
     local_from_model,
     placed_surface,
 )
-from pbrs_farm.read.sweethome3d.plan import PlanLevel, PlanPiece
-from pbrs_farm.read.sweethome3d.rooms import ReadRoom
 
 DOOR, WINDOW = NYU40_NAMES.index("door"), NYU40_NAMES.index("window")
 LAMP, OTHERPROP = NYU40_NAMES.index("lamp"), NYU40_NAMES.index("otherprop")

@@ -7,24 +7,24 @@ from pathlib import PurePath
 
 import shapely
 
-from pbrs_farm import keys
-from pbrs_farm.errors import BadHouse
-from pbrs_farm.house import MAX_INSTANCES, House, Item, Level, Opening, Source
-from pbrs_farm.read.resources import Resources
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Source
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.read.sweethome3d.cameras import stored_cameras
 from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
 from pbrs_farm.read.sweethome3d.container import open_container
-from pbrs_farm.read.sweethome3d.cutouts import StandingWall
+from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
 from pbrs_farm.read.sweethome3d.furniture import piece_item, piece_opening
-from pbrs_farm.read.sweethome3d.looks import Looks
-from pbrs_farm.read.sweethome3d.models import Models
+from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom, plane_items, read_rooms, room_nouns
+from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, level_of
+from pbrs_farm.read.sweethome3d.material_collector import Looks
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 from pbrs_farm.read.sweethome3d.parse import parse_plan
-from pbrs_farm.read.sweethome3d.plan import Paint, Plan, level_of
-from pbrs_farm.read.sweethome3d.rooms import ReadRoom, plane_items, read_rooms, room_nouns
+from pbrs_farm.read.sweethome3d.piece_models import Models
 from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
-from pbrs_farm.read.sweethome3d.walls import wall_items
-from pbrs_farm.recipe import ReadFields
+from pbrs_farm.read.sweethome3d.wall_solids import wall_items
 
 HARMLESS = frozenset(
     {

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pbrs_farm.read.obj import Mesh
+from pbrs_farm.read.mesh.obj import Mesh
 
 _JOINT = re.compile(r"(?:^|_)((?:hinge|rail)_\d+|unique_rail)(?:_|$)")
 

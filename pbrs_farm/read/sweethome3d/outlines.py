@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from pbrs_farm.arrays import Points2
-from pbrs_farm.read.sweethome3d.plan import PlanWall
+from pbrs_farm.core.arrays import Points2
+from pbrs_farm.read.sweethome3d.home_xml import PlanWall
 
 ARC_STEP_RAD = math.radians(5.0)
 MITRE_LIMIT = 2.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from pbrs_farm.read.sweethome3d.attributes import Attributes
-from pbrs_farm.read.sweethome3d.plan import Baseboard, Paint, Picture
+from pbrs_farm.read.sweethome3d.home_xml import Baseboard, Paint, Picture
 
 
 def wall_paint(a: Attributes, side: str) -> Paint:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from pbrs_farm.errors import BadHouse
+from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.sweethome3d.attributes import Attributes
-from pbrs_farm.read.sweethome3d.paints import baseboard_of, room_paint, wall_paint
-from pbrs_farm.read.sweethome3d.parse_pieces import parse_piece
-from pbrs_farm.read.sweethome3d.plan import (
+from pbrs_farm.read.sweethome3d.home_xml import (
     Plan,
     PlanCamera,
     PlanLevel,
@@ -17,6 +15,8 @@ from pbrs_farm.read.sweethome3d.plan import (
     PlanWall,
     as_points,
 )
+from pbrs_farm.read.sweethome3d.paints import baseboard_of, room_paint, wall_paint
+from pbrs_farm.read.sweethome3d.parse_pieces import parse_piece
 
 MAX_PIECES = 20_000
 MAX_WALLS = 10_000

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.frames import rotation_y
-from pbrs_farm.house import Box, Surface
-from pbrs_farm.read.obj import Mesh
-from pbrs_farm.read.sweethome3d.finish import Finish
-from pbrs_farm.read.sweethome3d.models import Model
-from pbrs_farm.read.sweethome3d.plan import Picture, PlanLevel, PlanPiece
-from pbrs_farm.read.sweethome3d.walls import picture_uvs
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Box, Surface
+from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.sweethome3d.home_xml import Picture, PlanLevel, PlanPiece
+from pbrs_farm.read.sweethome3d.piece_materials import Finish
+from pbrs_farm.read.sweethome3d.piece_models import Model
+from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 F64 = NDArray[np.float64]
 _FLAT = 1e-9

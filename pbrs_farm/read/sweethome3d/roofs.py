@@ -10,8 +10,8 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from pbrs_farm.arrays import Points2
-from pbrs_farm.read.planes import triangulated
+from pbrs_farm.core.arrays import Points2
+from pbrs_farm.read.mesh.horizontal_polygons import triangulated
 
 F64 = NDArray[np.float64]
 FIT_M = 0.02

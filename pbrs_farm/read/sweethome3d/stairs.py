@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from pbrs_farm.read.sweethome3d.looks import Looks
+from pbrs_farm.read.sweethome3d.home_xml import Plan, PlanPiece, level_of
+from pbrs_farm.read.sweethome3d.material_collector import Looks
 from pbrs_farm.read.sweethome3d.placement import Frame, frame_of
-from pbrs_farm.read.sweethome3d.plan import Plan, PlanPiece, level_of
-from pbrs_farm.read.sweethome3d.svg import polygons_from_path
+from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
 TOLERANCE_M = 0.01
 

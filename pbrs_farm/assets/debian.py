@@ -1,0 +1,161 @@
+"""Debian packages as a source of data: downloaded once through apt, read without installing.
+
+Effects: runs `apt-get download` (no root; apt's signed index vouches for the file) and keeps
+packages in a cache folder. Nothing of a package is committed or shipped.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import lzma
+import os
+import shutil
+import subprocess
+import tarfile
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.core.errors import MachineFailed
+
+APT_TIMEOUT_S: Final = 600
+
+
+def cache_folder() -> Path:
+    """$PBRS_CACHE, else ~/.cache/pbrs_farm."""
+    given = os.environ.get("PBRS_CACHE", "")
+    return Path(given) if given else Path.home() / ".cache" / "pbrs_farm"
+
+
+@dataclass(frozen=True, slots=True)
+class Deb:
+    """A downloaded package. sha256: of the .deb."""
+
+    name: str
+    version: str
+    path: Path
+    sha256: str
+
+    def members(self, wanted: Callable[[str], bool]) -> dict[str, bytes]:
+        """Path in the package -> bytes of every wanted file; MachineFailed if it is damaged."""
+        try:
+            for name, content in _ar_members(self.path.read_bytes()):
+                if name.startswith("data.tar"):
+                    return _files(_plain_tar(name, content, self.path), wanted)
+        except (tarfile.TarError, lzma.LZMAError, EOFError, OSError, ValueError) as error:
+            raise self.damaged(str(error)) from None
+        raise self.damaged("holds no files")
+
+    def damaged(self, why: str) -> MachineFailed:
+        """The error of a package that does not hold what it should."""
+        return MachineFailed(f"{self.path}: {why}", hint="delete the file and fetch it again")
+
+
+def cached_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb | None:
+    """The package if it was fetched before, the tested version if there is a choice; else None."""
+    debs = sorted((folder or cache_folder()).glob(f"{package}_*.deb"))
+    debs.sort(key=lambda p: version_of(p) == tested_version)
+    return _deb(package, debs[-1]) if debs else None
+
+
+def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb:
+    """The package from the cache, else downloaded through apt.
+
+    Raises MachineFailed, with the command to type, where apt cannot give it.
+    """
+    folder = folder or cache_folder()
+    try:
+        return cached_deb(package, tested_version, folder) or _download_into(
+            package, tested_version, folder
+        )
+    except OSError as error:
+        raise MachineFailed(
+            f"{folder}: {error.strerror or error}", hint="set PBRS_CACHE to a folder of yours"
+        ) from None
+
+
+def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
+    folder.mkdir(parents=True, exist_ok=True)
+    if shutil.which("apt-get") is None:
+        raise MachineFailed(
+            f"no apt-get here to fetch {package}",
+            hint=f"put Debian's {package}_{tested_version}_all.deb into {folder}",
+        )
+    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+        _download(package, Path(scratch))
+        debs = sorted(Path(scratch).glob(f"{package}_*.deb"))
+        if not debs:
+            raise MachineFailed(f"apt-get download {package} left no file", hint=_HINT)
+        target = folder / debs[0].name
+        debs[0].replace(target)
+    return _deb(package, target)
+
+
+def _deb(package: str, path: Path) -> Deb:
+    return Deb(package, version_of(path), path, hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+_HINT: Final = "type `sudo apt-get update`, then try again"
+
+
+def _download(package: str, scratch: Path) -> None:
+    try:
+        done = subprocess.run(
+            ["apt-get", "download", package],
+            cwd=scratch,
+            capture_output=True,
+            text=True,
+            timeout=APT_TIMEOUT_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise MachineFailed(f"apt-get download {package}: {error}", hint=_HINT) from None
+    if done.returncode != 0:
+        lines = [x for x in (done.stderr + done.stdout).splitlines() if x.startswith("E:")]
+        reason = lines[0] if lines else f"exit status {done.returncode}"
+        raise MachineFailed(f"apt-get download {package}: {reason}", hint=_HINT)
+
+
+def version_of(deb: Path) -> str:
+    """The version in a .deb's file name; "" if it has none."""
+    return deb.name.split("_")[1].replace("%3a", ":") if deb.name.count("_") >= 2 else ""
+
+
+def _files(tar: bytes, wanted: Callable[[str], bool]) -> dict[str, bytes]:
+    found = {}
+    with tarfile.open(fileobj=io.BytesIO(tar)) as archive:
+        for member in archive:
+            name = member.name.removeprefix("./")
+            stream = archive.extractfile(member) if member.isfile() and wanted(name) else None
+            if stream is not None:
+                found[name] = stream.read()
+    return found
+
+
+def _ar_members(data: bytes) -> list[tuple[str, bytes]]:
+    if not data.startswith(b"!<arch>\n"):
+        raise ValueError("not a Debian package")
+    members, at = [], 8
+    while at + 60 <= len(data):
+        name = data[at : at + 16].decode("ascii", "replace").strip().rstrip("/")
+        size = int(data[at + 48 : at + 58])
+        members.append((name, data[at + 60 : at + 60 + size]))
+        at += 60 + size + size % 2
+    return members
+
+
+def _plain_tar(name: str, content: bytes, deb: Path) -> bytes:
+    if name.endswith(".xz"):
+        return lzma.decompress(content)
+    if name.endswith((".tar", ".gz")):
+        return gzip.decompress(content) if name.endswith(".gz") else content
+    if shutil.which("dpkg-deb") is None:
+        raise ValueError(f"{name}: dpkg-deb is needed to unpack it")
+    done = subprocess.run(
+        ["dpkg-deb", "--fsys-tarfile", str(deb)], capture_output=True, check=True, timeout=300
+    )
+    return done.stdout

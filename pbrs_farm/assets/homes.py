@@ -1,0 +1,124 @@
+"""The nine example homes of Debian's `sweethome3d` package: list, fetch, read their bytes.
+
+Effects: those of debian.py, and the unpacked jar in the cache folder.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.assets.debian import Deb, cached_deb, fetched_deb
+from pbrs_farm.core.errors import BadInput
+
+PACKAGE: Final = "sweethome3d"
+TESTED_VERSION: Final = "7.0.2+dfsg-3"
+JAR: Final = "usr/share/sweethome3d/sweethome3d.jar"
+EXAMPLES: Final = "com/eteks/sweethome3d/io/resources/examples"
+
+
+@dataclass(frozen=True, slots=True)
+class ExampleHome:
+    """A home drawn by E. and V. Puybaret / eTeks (CC-BY 3.0). name: to ask for it by."""
+
+    name: str
+    n_rooms: int
+    n_levels: int
+
+
+_HOMES: Final = (
+    ExampleHome("Studio", 5, 1),
+    ExampleHome("1BedroomApartmentWithRoundWall", 3, 1),
+    ExampleHome("2BedroomApartment", 7, 1),
+    ExampleHome("2BedroomApartmentWithBowWindow", 8, 1),
+    ExampleHome("2BedroomHouseWithBasement", 13, 3),
+    ExampleHome("3BedroomApartment", 9, 1),
+    ExampleHome("3BedroomHouseWithAttic", 11, 4),
+    ExampleHome("3BedroomHouseWithMezzanine", 23, 3),
+    ExampleHome("4BedroomHouse", 11, 2),
+)
+
+
+def example_homes() -> tuple[ExampleHome, ...]:
+    """The example homes by name; rooms and levels as drawn, hidden levels included."""
+    return _HOMES
+
+
+@dataclass(frozen=True, slots=True)
+class Package:
+    """A fetched package. deb_sha256: of the .deb. note: what is odd about it, or ""."""
+
+    version: str
+    deb_sha256: str
+    jar: Path
+    note: str = ""
+
+    @property
+    def label(self) -> str:
+        """For Source.package: name, version and hash."""
+        return f"{PACKAGE} {self.version} (Debian, sha256 {self.deb_sha256})"
+
+    def home(self, name: str) -> tuple[bytes, str]:
+        """The XML of an example home and its file name; BadInput for an unknown name."""
+        known = {h.name.lower(): h.name for h in _HOMES}
+        exact = known.get(name.lower().removesuffix(".xml"))
+        if exact is None:
+            raise BadInput("example homes", "", f"no home {name!r}", hint=", ".join(known.values()))
+        with zipfile.ZipFile(self.jar) as jar:
+            try:
+                return jar.read(f"{EXAMPLES}/{exact}.xml"), f"{exact}.xml"
+            except KeyError:
+                raise BadInput(self.jar, f"{EXAMPLES}/{exact}.xml", "not in this version") from None
+
+    def resources(self) -> JarResources:
+        """The program's own models and textures, for homes that refer to them."""
+        return JarResources(self.jar)
+
+
+class JarResources:
+    """Contents of the program's jar by name; opened on the first read."""
+
+    def __init__(self, jar: Path) -> None:
+        self._jar = jar
+        self._zip: zipfile.ZipFile | None = None
+
+    def read(self, name: str) -> bytes | None:
+        """The content's bytes, or None if there is none of that name."""
+        if self._zip is None:
+            self._zip = zipfile.ZipFile(self._jar)
+        try:
+            return self._zip.read(name)
+        except KeyError:
+            return None
+
+
+def cached(cache: Path | None = None) -> Package | None:
+    """The package if it was fetched before, else None; touches no network."""
+    deb = cached_deb(PACKAGE, TESTED_VERSION, cache)
+    return _unpacked(deb) if deb else None
+
+
+def fetch(cache: Path | None = None) -> Package:
+    """The package from the cache, else downloaded through apt.
+
+    Raises MachineFailed, with the command to type, where apt cannot give it.
+    """
+    return _unpacked(fetched_deb(PACKAGE, TESTED_VERSION, cache))
+
+
+def _unpacked(deb: Deb) -> Package:
+    jar = deb.path.parent / f"{PACKAGE}-{deb.sha256[:16]}.jar"
+    if not jar.exists():
+        files = deb.members(lambda name: name == JAR)
+        if JAR not in files:
+            raise deb.damaged(f"holds no {JAR}")
+        with tempfile.NamedTemporaryFile(dir=deb.path.parent, delete=False) as scratch:
+            scratch.write(files[JAR])
+        Path(scratch.name).replace(jar)
+    note = ""
+    if deb.version != TESTED_VERSION:
+        note = f"{PACKAGE} {deb.version} is not the tested version {TESTED_VERSION}"
+    return Package(deb.version, deb.sha256, jar, note)

@@ -1,0 +1,38 @@
+"""Outdoor panoramas of Debian's `blender-data` (CC0): fetched into a folder for sky.panoramas.
+
+Effects: those of debian.py, and EXR files in the cache folder.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.assets.debian import cache_folder, fetched_deb
+
+PACKAGE: Final = "blender-data"
+TESTED_VERSION: Final = "3.4.1+dfsg-2"
+NAMES: Final = ("city", "forest", "sunrise", "sunset")
+"""Those of its panoramas that show a daylight sky (interior, studio, courtyard, night do not)."""
+
+
+def fetch_skies(cache: Path | None = None) -> Path:
+    """The folder that holds the outdoor panoramas, filled through apt the first time.
+
+    Raises MachineFailed where apt cannot give the package.
+    """
+    folder = (cache or cache_folder()) / "skies"
+    if all((folder / f"{name}.exr").exists() for name in NAMES):
+        return folder
+    deb = fetched_deb(PACKAGE, TESTED_VERSION, cache)
+    wanted = {f"{name}.exr" for name in NAMES}
+    files = deb.members(lambda path: "studiolights/world/" in path and Path(path).name in wanted)
+    if {Path(path).name for path in files} != wanted:
+        raise deb.damaged(f"holds no {', '.join(sorted(wanted))}")
+    folder.mkdir(parents=True, exist_ok=True)
+    for path, data in files.items():
+        with tempfile.NamedTemporaryFile(dir=folder, delete=False) as scratch:
+            scratch.write(data)
+        Path(scratch.name).replace(folder / Path(path).name)
+    return folder

@@ -1,0 +1,200 @@
+"""Every label of a pixel against what an independent ray through its centre finds; no effects.
+
+A ray that grazes an edge, or meets two surfaces in the same place, has more than one right
+answer. Where the centre's answer does not explain what is stored, the triangles next to it (rays
+0.02 px away) and those of the stored instance at the same depth are tried. If one of them
+explains every layer at once the pixel is a tie, which is counted; otherwise it failed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.check.embree_caster import Faces, Floats, Rays
+from pbrs_farm.check.stored_mesh import Triangles
+from pbrs_farm.check.stored_view import StoredView
+
+Bools = NDArray[np.bool_]
+
+RAY_LAYERS = (
+    "instance", "semantic", "depth", "normal", "valid",
+    "depth_z", "position", "normal_world", "material", "glass",
+)  # fmt: skip
+"""Layers that a ray through the pixel's centre decides."""
+
+ROUNDING_MM = 0.505
+RAY_ERROR_MM = 2e-4
+"""Per metre of depth, over the cosine: rays with float32 directions, magnified by a slanting face."""
+
+MAX_RAY_ERROR_MM = 5.0
+NORMAL_TOLERANCE_DEG = 0.02
+TIE_DEPTH_M = 1e-4
+METRES = 2e-4
+"""Tolerance of depths and positions stored as floats."""
+
+_JITTER_PX = 0.02
+_JITTER = _JITTER_PX * np.array(
+    [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]], np.float64
+)
+
+
+Labels = dict[str, NDArray[Any]]
+"""Layer name -> what is stored at N pixels: (N,), normals and positions (N, 3)."""
+
+
+def labels_at(labels: Labels, index: NDArray[np.int64]) -> Labels:
+    """The labels of some of the pixels."""
+    return {name: array[index] for name, array in labels.items()}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """Per check (N,) bool: what is stored is right; tied: right by another triangle; (N,) faces."""
+
+    right: dict[str, Bools]
+    tied: Bools
+    face: Faces
+
+
+def judge(
+    view: StoredView,
+    labels: Labels,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    scene: tuple[Triangles, Rays],
+) -> Verdict:
+    """Compare labels at pixels (rows, columns) with rays through the scene."""
+    _, rays = scene
+    origin, directions = view.rays(rows, columns)
+    face = rays.first(origin, directions)
+    right = _explained(view, labels, face, directions, scene)
+    tied = np.zeros(len(rows), bool)
+
+    # Try other triangles where the first one does not explain everything.
+    open_ = np.nonzero(~np.logical_and.reduce(list(right.values())))[0]
+    candidates = [
+        rays.first(origin, view.rays(rows[open_] + dy, columns[open_] + dx)[1])
+        for dx, dy in _JITTER
+    ]
+    candidates.append(
+        _coincident(labels_at(labels, open_), face[open_], origin, directions[open_], scene)
+    )
+    best = np.sum([~right[name][open_] for name in right], axis=0)
+    for other in candidates:
+        trial = _explained(view, labels_at(labels, open_), other, directions[open_], scene)
+        wrong = np.sum([~ok for ok in trial.values()], axis=0)
+        better = wrong < best
+        best = np.where(better, wrong, best)
+        face[open_[better]] = other[better]
+        for name in right:
+            right[name][open_[better]] = trial[name][better]
+    tied[open_] = best == 0
+    return Verdict(right, tied, face)
+
+
+def _explained(
+    view: StoredView,
+    labels: Labels,
+    face: Faces,
+    directions: Floats,
+    scene: tuple[Triangles, Rays],
+) -> dict[str, Bools]:
+    """Per layer whether hitting these faces explains what is stored."""
+    triangles, rays = scene
+    hit = face >= 0
+    instance = _of_face(triangles.instance, face)
+    z = rays.distance(face, view.world_from_camera[:3, 3], directions)
+    normal = rays.normal(face, directions)
+    classes = np.zeros(max(triangles.nyu40, default=0) + 1, np.int64)
+    classes[list(triangles.nyu40)] = list(triangles.nyu40.values())
+    mm = np.clip(z * 1000, 0.5, 65535)
+    point = view.world_from_camera[:3, 3] + directions * z[:, None]
+    cosine = np.abs(np.einsum("ni,ni->n", normal, directions))
+    slant_mm = RAY_ERROR_MM * z / np.maximum(cosine, 1e-9)
+    tolerance_mm = ROUNDING_MM + np.minimum(slant_mm, MAX_RAY_ERROR_MM)
+
+    checks: dict[str, Callable[[NDArray[Any]], Any]] = {
+        "instance": lambda stored: stored == instance,
+        "semantic": lambda stored: stored == classes[instance],
+        "depth": lambda stored: np.where(hit, np.abs(stored - mm) <= tolerance_mm, stored == 0),
+        "normal": lambda stored: normal_is_right(stored, published_axes(normal, view)),
+        "valid": lambda stored: stored == np.where(hit, 255, 0),
+        "depth_z": lambda stored: np.where(hit, np.abs(stored - z) <= METRES, stored == 0),
+        "position": lambda stored: np.where(
+            hit, np.abs(stored - point).max(axis=1) <= METRES, ~stored.any(axis=1)
+        ),
+        "normal_world": lambda stored: normal_is_right(stored, normal),
+        "material": lambda stored: (
+            stored == np.where(hit, _of_face(triangles.material, face) + 1, 0)
+        ),
+        "glass": lambda stored: (
+            stored == np.where(hit & _of_face(triangles.see_through, face), 255, 0)
+        ),
+    }
+    return {name: np.asarray(checks[name](stored), bool) for name, stored in labels.items()}
+
+
+def _of_face(table: NDArray[Any], face: Faces) -> NDArray[Any]:
+    """table[face], 0 where face is -1."""
+    if not len(table):
+        return np.zeros(len(face), table.dtype)
+    return np.where(face >= 0, table[face], table.dtype.type(0))
+
+
+def published_axes(world: Floats, view: StoredView) -> Floats:
+    """(N, 3) x right, y forward, z up from world directions."""
+    camera = world @ view.world_from_camera[:3, :3]
+    return np.stack([camera[:, 0], camera[:, 2], -camera[:, 1]], axis=1)
+
+
+def normal_is_right(stored: NDArray[np.int64], expected: Floats) -> Bools:
+    """(N,) stored 16-bit normals decode to the expected ones; where those are 0, to nothing."""
+    decoded = stored * (2 / 65535) - 1
+    length = np.linalg.norm(decoded, axis=1)
+    sine = np.linalg.norm(np.cross(decoded, expected), axis=1)
+    close = (np.einsum("ni,ni->n", decoded, expected) > 0) & (
+        sine <= np.radians(NORMAL_TOLERANCE_DEG) * length
+    )
+    nothing = (stored == 32768).all(axis=1)
+    right = np.where(expected.any(axis=1), close & (np.abs(length - 1) < 1e-3), nothing)
+    return np.asarray(right, bool)
+
+
+def _coincident(
+    labels: Labels,
+    face: Faces,
+    origin: Floats,
+    directions: Floats,
+    scene: tuple[Triangles, Rays],
+) -> Faces:
+    """(N,) triangle of the stored instance that the ray pierces at the first hit's depth, or -1."""
+    triangles, rays = scene
+    found = np.full(len(face), -1, np.int64)
+    first = rays.distance(face, origin, directions)
+    for instance in np.unique(labels["instance"]):
+        own = np.nonzero(triangles.instance == instance)[0]
+        for pixel in np.nonzero(labels["instance"] == instance)[0]:
+            t = _pierced(triangles, own, origin, directions[pixel])
+            gap = np.abs(t - first[pixel])
+            if len(own) and gap.min() <= TIE_DEPTH_M:
+                found[pixel] = own[gap.argmin()]
+    return found
+
+
+def _pierced(triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: Floats) -> Floats:
+    """(F,) distance at which one ray pierces each of the triangles own; inf = misses it."""
+    a, b, c = (triangles.vertices[triangles.faces[own, k]].astype(np.float64) for k in range(3))
+    e1, e2, s = b - a, c - a, origin - a
+    p = np.cross(ray, e2)
+    q = np.cross(s, e1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1 / np.einsum("fi,fi->f", e1, p)
+        u, v = np.einsum("fi,fi->f", s, p) * inverse, (q @ ray) * inverse
+        t = np.einsum("fi,fi->f", e2, q) * inverse
+        inside = (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 0)
+    return np.where(inside, t, np.inf)

@@ -1,0 +1,136 @@
+"""K and poses: proper by themselves, and one view's points fall on what another view sees.
+
+No effects but reading what it is given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.stored_view import StoredView
+
+SLACK_M = 0.02
+MAX_SEEN_PAST = 0.002
+"""Share of points that a thin thing between two pixels may cost; a wrong pose costs far more."""
+
+_MIN_COSINE = 0.5
+_MIN_NEARER = 0.7
+_STEP_PX = 16
+_MAX_PARTNERS = 40
+
+
+def check_pose(view: StoredView, tally: Tally) -> None:
+    """The pose is a rotation and a position, both conventions agree, and K is a pinhole's."""
+    opencv = view.world_from_camera
+    opengl = np.array(view.table["world_from_camera_opengl"], np.float64)
+    shaped = opencv.shape == opengl.shape == (4, 4) and view.k.shape == (3, 3)
+    if not tally.expect("pose", view.place, shaped, "not (4, 4) poses and a (3, 3) K"):
+        return
+    rotation = opencv[:3, :3]
+    proper = np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-6 < np.linalg.det(rotation)
+    tally.expect("pose", view.place, bool(proper), "the rotation is none")
+    agree = np.abs(opengl @ np.diag([1.0, -1, -1, 1]) - opencv).max() < 1e-9
+    tally.expect("pose", view.place, bool(agree), "the OpenGL and OpenCV poses differ")
+    height, width = view.size
+    fx, fy, cx, cy = view.k[0, 0], view.k[1, 1], view.k[0, 2], view.k[1, 2]
+    pinhole = fx > 0 and fy > 0 and 0 < cx < width and 0 < cy < height and view.k[2, 2] == 1
+    tally.expect("pose", view.place, bool(pinhole), "K is no pinhole camera's")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenView:
+    """A view with the layers that reprojection needs: depth.png and normal.png as stored."""
+
+    view: StoredView
+    depth: NDArray[Any]
+    normal: NDArray[Any]
+
+
+def check_reprojection(views: list[SeenView], tally: Tally) -> None:
+    """Points that one view sees are nowhere in front of what another view of the house sees.
+
+    views: of one house. A point at depth z in another view is right when that view's surface
+    there is at most z + SLACK_M away (it may be nearer: the point is then hidden). Of a pixel and
+    its neighbours the nearest counts, since points do not fall on pixel centres. Points of narrow
+    surfaces, or that the other view sees from the side or from much farther, are left out, since
+    they may fall between its pixels; up to MAX_SEEN_PAST of a pair's points may still be wrong,
+    and are counted as ties. Every view is held against every other, or _MAX_PARTNERS of them.
+    """
+    points = [_points(seen) for seen in views]
+    nearest = [_nearest(seen.depth) for seen in views]
+    rng = np.random.default_rng(0)
+    for a, seen in enumerate(views):
+        others = np.array([b for b in range(len(views)) if b != a], np.int64)
+        if len(others) > _MAX_PARTNERS:
+            others = rng.choice(others, _MAX_PARTNERS, replace=False)
+        for b in others:
+            n, wrong = _seen_past(points[a], views[b].view, nearest[b])
+            if wrong > max(2, MAX_SEEN_PAST * n):
+                tally.add("reprojection", n)
+                place = f"{seen.view.place} in {views[b].view.place}"
+                what = f"{wrong} of {n} points lie before what is seen there"
+                tally.fail("reprojection", place, what, wrong)
+            else:
+                tally.add("reprojection", n, ties=wrong)
+
+
+def _points(seen: SeenView) -> NDArray[np.float64]:
+    """(N, 3, 3) world positions, normals and eye of a grid of the view's pixels.
+
+    Only pixels amid a flat patch of 5 x 5: what is thinner here may be thinner than a pixel there.
+    """
+    view, (height, width) = seen.view, seen.view.size
+    grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
+    rows, columns = (g.reshape(-1) for g in grid)
+    published = seen.normal[rows, columns] * (2 / 65535) - 1
+    # Published axes are x right, y forward, z up; the pose's are x right, y down, z forward.
+    camera = np.stack([published[:, 0], -published[:, 2], published[:, 1]], axis=1)
+    normal = camera @ view.world_from_camera[:3, :3].T
+
+    centre, eye = _positions(seen, rows, columns), view.world_from_camera[:3, 3]
+    z = seen.depth[rows, columns] / 1000
+    flat = (z > 0) & (z < 65)
+    for dy, dx in np.ndindex(5, 5):
+        r, c = (rows + dy - 2).clip(0, height - 1), (columns + dx - 2).clip(0, width - 1)
+        off = np.einsum("ni,ni->n", _positions(seen, r, c) - centre, normal)
+        flat &= np.abs(off) < SLACK_M / 2
+    rows_of = np.stack([centre, normal, np.broadcast_to(eye, centre.shape)], axis=1)
+    return np.asarray(rows_of[flat])
+
+
+def _positions(
+    seen: SeenView, rows: NDArray[np.int64], columns: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    origin, directions = seen.view.rays(rows, columns)
+    return np.asarray(origin + directions * (seen.depth[rows, columns] / 1000)[:, None])
+
+
+def _nearest(depth: NDArray[Any]) -> NDArray[np.float64]:
+    """(H, W) metres of the nearest surface among a pixel and its neighbours; inf = nothing."""
+    metres = np.where(depth > 0, depth / 1000, np.inf)
+    return np.asarray(ndimage.minimum_filter(metres, size=3, mode="nearest"))
+
+
+def _seen_past(
+    points: NDArray[np.float64], view: StoredView, nearest: NDArray[np.float64]
+) -> tuple[int, int]:
+    """How many of the points lie in the view's picture, and in front of all it sees there."""
+    towards = points[:, 0] - view.world_from_camera[:3, 3]
+    distance = np.linalg.norm(towards, axis=1)
+    own_distance = np.linalg.norm(points[:, 0] - points[:, 2], axis=1)
+    broad = np.abs(np.einsum("ni,ni->n", points[:, 1], towards)) > _MIN_COSINE * distance
+    broad &= own_distance > _MIN_NEARER * distance
+    camera = towards[broad] @ view.world_from_camera[:3, :3]
+    camera = camera[camera[:, 2] > 0.05]
+    pixel = camera @ view.k.T
+    x, y = np.floor(pixel[:, :2] / pixel[:, 2:]).astype(np.int64).T
+    height, width = view.size
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    past = nearest[y[inside], x[inside]] > camera[inside, 2] + SLACK_M
+    return int(inside.sum()), int(past.sum())

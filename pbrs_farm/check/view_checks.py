@@ -1,0 +1,191 @@
+"""What a view's files must be by themselves: sizes, types, tables, boundaries; no rays.
+
+Effects: reads files.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU40_NAMES
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import LAYERS, Layer
+
+BASIC = ("depth", "normal", "valid", "semantic", "instance", "boundary")
+
+
+def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | None:
+    """The basic layers by name, None when one of them is missing, damaged or of a wrong shape."""
+    arrays = {}
+    for layer in LAYERS:
+        if layer.name in BASIC or (view.has(layer.file) and layer.name != "radiance"):
+            array = _read(view, layer, tally)
+            if array is not None:
+                arrays[layer.name] = array
+    return arrays if all(name in arrays for name in BASIC) else None
+
+
+def _read(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | None:
+    place = f"{view.place}/{layer.file}"
+    if not tally.expect("layers", place, view.has(layer.file), "is missing"):
+        return None
+    try:
+        array = view.png(layer.file) if layer.file.endswith(".png") else _planes(view, layer)
+    except (BadInput, KeyError) as error:
+        tally.expect("layers", place, False, str(error))
+        return None
+    shape = (*view.size, 3) if layer.channels in ("RGB", "X Y Z") else view.size
+    fits = array.shape == shape and str(array.dtype) == layer.dtype
+    what = f"{array.shape} {array.dtype}, expected {shape} {layer.dtype}"
+    return array if tally.expect("layers", place, fits, what) else None
+
+
+def _planes(view: StoredView, layer: Layer) -> NDArray[np.float32]:
+    """The channels of an EXR layer, stacked when there are several."""
+    channels = view.exr(layer.file)
+    planes = [channels[name] for name in layer.channels.split()]
+    return planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
+
+
+def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """No OpenGL picture is one colour; radiance is finite and not negative.
+
+    A light mode may be: without a window, outdoor light alone leaves a room black. That is noted.
+    """
+    for layer in LAYERS:
+        if layer.step in ("opengl", "light") and layer.name in arrays:
+            picture = arrays[layer.name]
+            constant = bool((picture == picture[0, 0]).all())
+            may_be = layer.step == "light" or not arrays["valid"].any()
+            place = f"{view.place}/{layer.file}"
+            tally.expect("pictures", place, not constant or may_be, "is one colour")
+            if constant:
+                tally.notes.append(f"{place} is one colour: {picture[0, 0].tolist()}")
+    if view.has("radiance.exr"):
+        try:
+            channels = view.exr("radiance.exr")
+        except BadInput as error:
+            tally.expect("radiance", view.place, False, str(error))
+            return
+        names = {f"{g}.{c}" for g in ("outdoor", "indoor", "albedo") for c in "RGB"}
+        tally.expect(
+            "radiance", view.place, names <= channels.keys(), f"lacks {names - channels.keys()}"
+        )
+        names |= {name for name in channels if name.startswith("lamp")}
+        for name in sorted(names & channels.keys()):
+            plane = channels[name]
+            bad = int((~(np.isfinite(plane) & (plane >= 0))).sum())
+            tally.add("radiance", plane.size)
+            if bad or plane.shape != view.size:
+                tally.fail(
+                    "radiance",
+                    f"{view.place} {name}",
+                    f"{bad} pixels negative or not finite",
+                    max(bad, 1),
+                )
+        _check_lamps(view, channels, tally)
+
+
+def _check_lamps(view: StoredView, channels: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """Where each lamp has a layer, indoor is their sum in the order of their numbers, to the bit."""
+    table = view.table.get("modes", {}).get("light", {}).get("lamps")
+    if table is None:
+        return
+    names = [row["layer"] for row in table if row["layer"]]
+    needed = {f"{name}.{c}" for name in ("indoor", *names) for c in "RGB"}
+    if not tally.expect(
+        "lamps", view.place, needed <= channels.keys(), f"lacks {needed - channels.keys()}"
+    ):
+        return
+    for c in "RGB":
+        total = np.zeros(view.size, np.float32)
+        for name in names:
+            total += channels[f"{name}.{c}"]
+        _same(view, tally, "indoor = sum of lamps", channels[f"indoor.{c}"] == total)
+
+
+def check_consistency(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """Layers against each other over the whole picture: valid, unit normals, ids, boundary."""
+    instance, depth, valid = arrays["instance"], arrays["depth"], arrays["valid"]
+    _same(view, tally, "valid = depth", (valid == 255) == (depth > 0))
+    _same(view, tally, "valid is 0 or 255", (valid == 255) | (valid == 0))
+    _same(view, tally, "instance = depth", (instance > 0) == (depth > 0))
+    length = np.linalg.norm(arrays["normal"] * (2 / 65535) - 1, axis=-1)
+    _same(
+        view, tally, "unit normals", np.where(valid > 0, np.abs(length - 1) < 1e-3, length < 1e-4)
+    )
+    classes = np.zeros(65536, np.int64)
+    for instance_id, nyu40 in view.nyu40.items():
+        classes[instance_id] = nyu40
+    _same(view, tally, "semantic = table", classes[instance] == arrays["semantic"])
+    _same(view, tally, "boundary", arrays["boundary"] == np.where(_boundary(instance), 255, 0))
+    _check_optional(view, arrays, tally)
+    _check_table(view, instance, tally)
+
+
+def _check_optional(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """Optional layers that other layers decide, or that hold few values."""
+    semantic = arrays["semantic"]
+    if "nyu13" in arrays:
+        _same(view, tally, "nyu13", arrays["nyu13"] == NYU13_FROM_NYU40[semantic.clip(0, 40)])
+    if "boundary_semantic" in arrays:
+        edges = np.where(_boundary(semantic), 255, 0)
+        _same(view, tally, "boundary_semantic", arrays["boundary_semantic"] == edges)
+    for name, values in (("boundary_occlusion", (0, 128, 255)), ("boundary_crease", (0, 255))):
+        if name in arrays:
+            _same(view, tally, name, np.isin(arrays[name], values))
+    if "normal_shading" in arrays:
+        length = np.linalg.norm(arrays["normal_shading"] * (2 / 65535) - 1, axis=-1)
+        unit = np.where(arrays["valid"] > 0, np.abs(length - 1) < 1e-3, length < 1e-4)
+        _same(view, tally, "normal_shading", unit)
+    if "class_source" in arrays:
+        _same(view, tally, "class_source", _source_class_is_right(view, arrays))
+
+
+def _source_class_is_right(view: StoredView, arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """(H, W) bool: the id's name in the table is the source class of the instance there."""
+    names = {int(k): name for k, name in view.table.get("source_classes", {}).items()}
+    number = {name: k for k, name in names.items()}
+    expected = np.zeros(65536, np.int64)
+    for row in view.table["instances"]:
+        expected[int(row["id"])] = number.get(row["source_class"], 0)
+    return np.asarray(arrays["class_source"] == expected[arrays["instance"]], bool)
+
+
+def _same(view: StoredView, tally: Tally, check: str, right: NDArray[np.bool_]) -> None:
+    tally.add(check, right.size)
+    if not right.all():
+        row, column = np.argwhere(~right)[0]
+        tally.fail(check, view.place, f"row {row}, column {column}", int((~right).sum()))
+
+
+def _boundary(ids: NDArray[Any]) -> NDArray[np.bool_]:
+    """The published instance boundary: any unequal adjacent pair in the block to the lower right."""
+    padded = np.pad(ids.astype(np.int64), ((0, 1), (0, 1)), mode="edge")
+    a, b, c, d = padded[:-1, :-1], padded[:-1, 1:], padded[1:, :-1], padded[1:, 1:]
+    return np.asarray((a != b) | (a != c) | (b != d) | (c != d), bool)
+
+
+def _check_table(view: StoredView, instance: NDArray[Any], tally: Tally) -> None:
+    """The table has a row for each id in the picture, with its pixels, share, box and class name."""
+    counts = np.bincount(instance.reshape(-1), minlength=1)
+    seen = {int(i) for i in np.nonzero(counts)[0]} - {0}
+    rows = {int(row["id"]): row for row in view.table["instances"]}
+    tally.expect("table", view.place, seen == rows.keys(), f"ids {sorted(seen ^ rows.keys())[:5]}")
+    boxes = ndimage.find_objects(instance.astype(np.int32))
+    for i in sorted(seen & rows.keys()):
+        row, (ys, xs) = rows[i], boxes[i - 1]
+        place = f"{view.place} instance {i}"
+        tally.expect("table", place, row["pixels"] == counts[i], f"{counts[i]} pixels")
+        share = abs(row["fraction"] - counts[i] / instance.size) < 1e-9
+        tally.expect("table", place, share, "fraction is not pixels over the picture's")
+        box = [xs.start, ys.start, xs.stop, ys.stop]
+        tally.expect("table", place, row["box2d"] == box, f"box2d is not {box}")
+        named = row["class"] == NYU40_NAMES[int(row["nyu40"])]
+        tally.expect("table", place, named, f"class {row['class']} is not {row['nyu40']}")

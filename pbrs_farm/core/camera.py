@@ -1,0 +1,126 @@
+"""Intrinsics, cameras and views; frozen values, no effects.
+
+Inside the package a camera has OpenGL axes: x right, y up, looking along -z. Pixel (row 0,
+column 0) is top left and its centre lies at (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import Matrix4
+
+PAPER_HFOV_RAD = 2 * 0.5534
+"""Full horizontal field of view of the published cameras: half-angle 0.5534 rad (suncg section 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """A pinhole camera without distortion. width_px, height_px; fx, fy, cx, cy in pixels."""
+
+    width_px: int
+    height_px: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    @staticmethod
+    def from_hfov(width_px: int, height_px: int, hfov_rad: float = PAPER_HFOV_RAD) -> Intrinsics:
+        """Square pixels, principal point in the middle, full horizontal field of view hfov_rad."""
+        f = 0.5 * width_px / math.tan(0.5 * hfov_rad)
+        return Intrinsics(width_px, height_px, f, f, 0.5 * width_px, 0.5 * height_px)
+
+    def resized(self, width_px: int, height_px: int) -> Intrinsics:
+        """The same field of view on another pixel grid."""
+        sx, sy = width_px / self.width_px, height_px / self.height_px
+        return Intrinsics(
+            width_px, height_px, self.fx * sx, self.fy * sy, self.cx * sx, self.cy * sy
+        )
+
+    @property
+    def k(self) -> NDArray[np.float64]:
+        """(3, 3) matrix K: pixel = K @ (x right, y down, z forward), divided by z."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """Intrinsics and pose. world_from_camera: (4, 4) float64, OpenGL axes, metres."""
+
+    intrinsics: Intrinsics
+    world_from_camera: Matrix4
+
+    @staticmethod
+    def look(
+        intrinsics: Intrinsics,
+        eye: NDArray[np.float64],
+        towards: NDArray[np.float64],
+        up: tuple[float, float, float] = (0.0, 1.0, 0.0),
+    ) -> Camera:
+        """A camera at eye (3,) looking along towards (3,), any length; up must not be parallel to it."""
+        back = -np.asarray(towards, np.float64)
+        back = back / np.linalg.norm(back)
+        right = np.cross(np.asarray(up, np.float64), back)
+        right = right / np.linalg.norm(right)
+        world_from_camera = np.eye(4)
+        world_from_camera[:3, 0] = right
+        world_from_camera[:3, 1] = np.cross(back, right)
+        world_from_camera[:3, 2] = back
+        world_from_camera[:3, 3] = eye
+        return Camera(intrinsics, world_from_camera)
+
+    @property
+    def eye(self) -> NDArray[np.float64]:
+        """(3,) position in the world, metres."""
+        return self.world_from_camera[:3, 3]
+
+    @property
+    def towards(self) -> NDArray[np.float64]:
+        """(3,) unit view direction in the world."""
+        return np.asarray(-self.world_from_camera[:3, 2])
+
+    def with_size(self, width_px: int, height_px: int) -> Camera:
+        """The same camera on another pixel grid."""
+        return Camera(self.intrinsics.resized(width_px, height_px), self.world_from_camera)
+
+    def rays(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Rays through the pixels' centres: origin (3,) and directions (H, W, 3), float32, world.
+
+        Directions have unit length along the optical axis, so that t along a ray is depth_z.
+        """
+        origin, directions = self.exact_rays()
+        return origin.astype(np.float32), directions.astype(np.float32)
+
+    def exact_rays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As rays, in float64."""
+        i = self.intrinsics
+        x = (np.arange(i.width_px) + 0.5 - i.cx) / i.fx
+        y = -(np.arange(i.height_px) + 0.5 - i.cy) / i.fy
+        grid = np.empty((i.height_px, i.width_px, 3), np.float64)
+        grid[..., 0] = x[None, :]
+        grid[..., 1] = y[:, None]
+        grid[..., 2] = -1.0
+        return self.eye, grid @ self.world_from_camera[:3, :3].T
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A camera with its place in a house. id is `<room>_<sector>`, `_<k>` when several per sector.
+
+    origin: "sampled", "stored" (placed by the home's author) or "file" (given by the user).
+    score: the sampler's score; 0 where there is none.
+    objects: instance id -> covered pixels at the size the score was taken.
+    """
+
+    id: str
+    room_id: str
+    sector: int
+    camera: Camera
+    origin: str = "sampled"
+    score: float = 0.0
+    objects: dict[int, int] = field(default_factory=dict)

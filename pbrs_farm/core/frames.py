@@ -1,0 +1,73 @@
+"""Every axis and unit convention, and every a_from_b transform; no effects. Nothing else converts.
+
+World: metres, right-handed, y up. Plan coordinates are (x, z). Camera inside: OpenGL axes
+(x right, y up, looking along -z). Names read as composition: a_from_c = a_from_b @ b_from_c.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import Matrix4
+
+M_FROM_CM = 0.01
+
+OPENCV_FROM_OPENGL: Matrix4 = np.diag([1.0, -1.0, -1.0, 1.0])
+"""Camera axes x right, y down, z forward  <-  x right, y up, z backward."""
+
+PUBLISHED_FROM_OPENGL: NDArray[np.float64] = np.array(
+    [[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], np.float64
+)
+"""Published normal axes x right, y forward, z up  <-  OpenGL camera axes (suncg section 5)."""
+
+
+def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
+    """Pose of a camera with OpenCV axes from the pose with OpenGL axes."""
+    return world_from_camera @ OPENCV_FROM_OPENGL
+
+
+def opengl_world_from_camera(world_from_camera_opencv: Matrix4) -> Matrix4:
+    """Pose of a camera with OpenGL axes from the pose with OpenCV axes."""
+    return world_from_camera_opencv @ OPENCV_FROM_OPENGL
+
+
+def published_normal_from_world(
+    normal_world: NDArray[np.floating], world_from_camera: Matrix4
+) -> NDArray[np.float64]:
+    """(..., 3) normals in the published camera frame (x right, y forward, z up) from world normals."""
+    published_from_world = PUBLISHED_FROM_OPENGL @ world_from_camera[:3, :3].T
+    return np.asarray(normal_world, np.float64) @ published_from_world.T
+
+
+def rotation_y(angle_rad: float) -> NDArray[np.float64]:
+    """(3, 3) right-handed rotation about +y."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], np.float64)
+
+
+def transform_points(
+    a_from_b: NDArray[np.float64], points_b: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """(N, 3) points in frame a; a_from_b is (4, 4) affine."""
+    p = np.asarray(points_b, np.float64)
+    return np.asarray(p @ a_from_b[:3, :3].T + a_from_b[:3, 3])
+
+
+def linear_from_srgb(encoded: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Linear values from sRGB-encoded ones, both in 0..1 (IEC 61966-2-1)."""
+    e = np.asarray(encoded, np.float64)
+    return np.where(e <= 0.04045, e / 12.92, ((np.maximum(e, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_from_linear(linear: NDArray[np.floating]) -> NDArray[np.float64]:
+    """sRGB-encoded values from linear ones, both in 0..1 (IEC 61966-2-1)."""
+    v = np.asarray(linear, np.float64)
+    return np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.maximum(v, 0) ** (1 / 2.4) - 0.055)
+
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float64)
+"""Weights of linear sRGB primaries in luminance (Rec. 709)."""
+
+LM_PER_W = 179.0
+"""Lumen per watt of white light: radiance in W m-2 sr-1 times this is luminance in cd m-2."""

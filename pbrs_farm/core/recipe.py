@@ -1,0 +1,335 @@
+"""Every constant of the paper as a named field with its section; presets; overrides. No effects.
+
+A recipe is a full set of fields in groups, one group per stage, so that a step's digest covers
+the groups it uses and nothing else. `--set group.field=value` overrides any field.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadRecipe
+
+
+class _Group(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class ReadFields(_Group):
+    """Limits of what is read."""
+
+    max_triangles: int = Field(5_000_000, gt=0, description="of a house; more is refused")
+    max_model_triangles: int = Field(2_000_000, gt=0, description="of one model; more is refused")
+    max_extent_m: float = Field(1_000.0, gt=0, description="a piece farther out is refused")
+    hidden_levels: bool = Field(False, description="Sweet Home 3D: read levels not shown, too")
+    strict: bool = Field(False, description="recoverable faults of a source are errors")
+
+
+class RepairFields(_Group):
+    """Geometry repair (paper section 3, "Data")."""
+
+    wall_thickness_m: float = Field(0.10, gt=0, description="of planar walls, paper section 3")
+    default_wall_rgb: tuple[float, float, float] = Field(
+        (1.0, 1.0, 1.0), description="sRGB of walls without a colour, paper section 3"
+    )
+    remove_persons: bool = True
+    remove_plants: bool = True
+    fallback_light: bool = Field(True, description="a ceiling light where nothing lights a room")
+    shade_transmission: float = Field(0.4, ge=0, le=1, description="diffuse, of enclosing shades")
+    min_escape: float = Field(0.2, ge=0, le=1, description="share of light below which a shade is")
+    bulb_radius_m: float = Field(0.0325, gt=0, description="where the source gives none")
+
+
+class CameraFields(_Group):
+    """Camera sampling (paper section 3.1)."""
+
+    preset: Literal["paper", "released"] = "paper"
+    n_sectors: int = Field(6, ge=1, description="per room, 60 degrees each")
+    cell_m: float = Field(0.25, ge=0.02, description="edge of the viewpoint grid")
+    height_min_m: float = Field(1.5, gt=0, description="eye above the floor's surface")
+    height_max_m: float = Field(1.6, gt=0)
+    tilt_deg: float = Field(11.0, description="downwards")
+    tilt_sd_deg: float = Field(
+        0.0,
+        ge=0,
+        le=30,
+        description="of a normal spread about tilt_deg; 0 = fixed, as in the paper",
+    )
+    clearance_m: float = Field(0.10, ge=0, description="from any obstacle, in three dimensions")
+    min_objects: int = Field(3, ge=0)
+    min_object_fraction: float = Field(0.01, ge=0, le=1, description="of the picture, per object")
+    max_item_fraction: float = Field(
+        1.0, gt=0, le=1, description="of the picture, of any one object; 1 = off, as in the paper"
+    )
+    max_wall_fraction: float = Field(
+        1.0, gt=0, le=1, description="the same of a wall, floor or ceiling; 1 = off"
+    )
+    hfov_rad: float = Field(2 * 0.5534, gt=0, lt=3.1, description="full horizontal field of view")
+    score_width_px: int = Field(640, gt=0)
+    score_height_px: int = Field(480, gt=0)
+    coarse_width_px: int = Field(160, gt=0)
+    coarse_height_px: int = Field(120, gt=0)
+    per_sector: int = Field(1, ge=1)
+    source: Literal["sampled", "stored", "file"] = "sampled"
+    file: str = Field("", description="camera file of the user's, for source file")
+    exact: bool = Field(False, description="score every candidate at full size")
+
+
+class ImageFields(_Group):
+    """Size and modes of the pictures."""
+
+    width_px: int = Field(640, gt=0, le=16384)
+    height_px: int = Field(480, gt=0, le=16384)
+
+
+class LightFields(_Group):
+    """Light transport (paper section 3.2)."""
+
+    integrator: Literal["path", "metropolis"] = "path"
+    spp: int = Field(64, ge=1, description="samples per pixel of `path`")
+    direct_spp: int = Field(512, ge=0, description="direct samples beside Metropolis")
+    mutations_per_pixel: int = Field(1024, ge=1)
+    max_depth: int = Field(12, ge=1, description="path segments; Russian roulette from rr_depth")
+    rr_depth: int = Field(1, ge=1, description="docs/light.md: measured the best of 1 to 6")
+    filter: Literal["box", "tent"] = Field("tent", description="of a pixel's samples")
+    pilot_spp: int = Field(4, ge=0, description="32x24 pixels per emitter; 0 = uniform choice")
+    noise: float = Field(
+        0.0,
+        ge=0,
+        description="relative error that `path` goes on to, in passes of spp; 0 = one pass",
+    )
+    max_spp: int = Field(4096, ge=1, description="of `path` when it renders to a noise or a time")
+    time_budget_s: float = Field(
+        0.0, ge=0, description="of a view's light, instead of samples or mutations; 0 = off"
+    )
+    groups: Literal["two", "lamps"] = Field(
+        "two", description="outdoor and indoor; `lamps`: a layer for each lamp, too (`path`)"
+    )
+    chains: int = Field(32768, ge=16, description="Markov chains of `metropolis`, in parallel")
+    large_step: float = Field(0.3, gt=0, lt=1, description="chance of a fresh path, Kelemen 2002")
+    tail_pixels: int = Field(
+        1024,
+        ge=0,
+        description="pixels that a Metropolis path's tail is shown to; 0 = its own alone",
+    )
+    denoise: bool = True
+
+    @model_validator(mode="after")
+    def _noise_is_of_path(self) -> Self:
+        if self.noise > 0 and self.integrator == "metropolis":
+            raise ValueError("noise is reached by `path` alone: give metropolis a time_budget_s")
+        return self
+
+    @model_validator(mode="after")
+    def _lamps_are_of_path(self) -> Self:
+        if self.groups == "lamps" and self.integrator == "metropolis":
+            raise ValueError("groups lamps is of `path` alone: add --set light.integrator=path")
+        return self
+
+
+class SkyFields(_Group):
+    """Outdoor light (spec/sky.md)."""
+
+    kind: Literal["sunsky", "panorama"] = "sunsky"
+    panoramas: str = Field(
+        "", description="folder of latitude-longitude HDR pictures; empty = `pbrs-farm skies`"
+    )
+
+
+class EmissionFields(_Group):
+    """How strong lights are."""
+
+    preset: Literal["photometric", "released"] = "photometric"
+    sky_lx: float = Field(10_000.0, gt=0, description="sky without sun on open ground")
+    sun_lx: float = Field(60_000.0, ge=0, description="the sun's share, at most")
+    lamp_lm: float = Field(1_600.0, gt=0, description="a Sweet Home 3D lamp of power 0.5")
+    lm_per_watt: float = Field(13.0, gt=0, description="SUNCG's watts")
+    compensate_shades: bool = Field(True, description="flux is what leaves the lamp, shade and all")
+    lamp_kelvin_min: float = 2700.0
+    lamp_kelvin_max: float = 3000.0
+    released_bulb: float = 400.0
+    released_shade: float = 0.5
+    released_sky: float = 75.0
+
+
+class MaterialFields(_Group):
+    """Materials (paper section 3.2; presets in spec/suncg section 6)."""
+
+    preset: Literal["physical", "released"] = "physical"
+
+
+class ToneFields(_Group):
+    """Radiance to 8 bits."""
+
+    preset: Literal["photo", "released"] = "photo"
+    key: float = Field(0.18, gt=0)
+    white_balance: float = Field(
+        0.7,
+        ge=0,
+        le=1,
+        description="how far the light's colour is turned to white; 1 = all the way",
+    )
+
+
+class RasterFields(_Group):
+    """The OpenGL modes."""
+
+    samples: int = Field(4, ge=1, description="per pixel, resolved")
+    lights_per_object: int = Field(8, ge=1, description="best ones, paper section 3.2")
+
+
+class HistogramFields(_Group):
+    """The histograms of a view and its quality numbers, written beside it (paper section 3.3).
+
+    Bins are powers of two, so that every coarser binning is an exact sum of these.
+    """
+
+    colour_space: Literal["rgb", "ycbcr"] = Field("rgb", description="sRGB-encoded; joint bins")
+    colour_bins: Literal[2, 4, 8, 16] = Field(8, description="per channel, three channels jointly")
+    depth_bins: Literal[8, 16, 32, 64, 128, 256] = 128
+    depth_min_m: float = Field(0.0, ge=0, description="nearer counts as the first bin")
+    depth_max_m: float = Field(10.0, gt=0, description="farther counts as the last bin")
+    near_m: float = Field(0.25, gt=0, description="what is nearer counts as touching the camera")
+    object_fraction: float = Field(0.01, ge=0, le=1, description="of the picture, to be an object")
+
+    @model_validator(mode="after")
+    def _depth_grows(self) -> Self:
+        if self.depth_max_m <= self.depth_min_m:
+            raise ValueError("depth_max_m must be above depth_min_m")
+        return self
+
+
+class SelectionFields(_Group):
+    """Image selection (paper section 3.3) and the thresholds of image quality."""
+
+    min_colour: float = Field(0.70, ge=0, le=1, description="kept when above, paper section 3.3")
+    min_depth: float = Field(0.70, ge=0, le=1, description="kept when above, paper section 3.3")
+    score_mode: Literal["mlt_il_ol", "mlt_ol", "opengl_il", "opengl_dl"] = Field(
+        "mlt_il_ol", description="scored where a view lacks mlt_il_ol"
+    )
+    per_room_cap: int = Field(0, ge=0, description="best views kept per room; 0 = all")
+    balance: Literal["none", "classes"] = Field(
+        "none", description="take of the kept views those that balance the classes"
+    )
+    balance_share: float = Field(0.5, gt=0, le=1, description="share of the kept views taken")
+    min_brightness: float = Field(0.06, ge=0, le=1, description="median sRGB luma; too dark below")
+    max_blown: float = Field(0.50, ge=0, le=1, description="share of saturated pixels")
+    max_surface: float = Field(0.85, ge=0, le=1, description="share of the largest instance")
+    max_near: float = Field(0.30, ge=0, le=1, description="share nearer than near_m: inside it")
+    min_objects: int = Field(3, ge=0, description="objects of object_fraction and more")
+    max_noise: float = Field(1.0, ge=0, description="relative error of the raw light")
+    max_missing_textures: int = Field(3, ge=0, description="of the house")
+
+
+class Recipe(_Group):
+    """The full set of fields one output root is made with."""
+
+    name: str = "fast"
+    seed: int = Field(0, ge=0)
+    read: ReadFields = ReadFields()
+    repair: RepairFields = RepairFields()
+    cameras: CameraFields = CameraFields()
+    image: ImageFields = ImageFields()
+    light: LightFields = LightFields()
+    sky: SkyFields = SkyFields()
+    emission: EmissionFields = EmissionFields()
+    materials: MaterialFields = MaterialFields()
+    tone: ToneFields = ToneFields()
+    raster: RasterFields = RasterFields()
+    histogram: HistogramFields = HistogramFields()
+    selection: SelectionFields = SelectionFields()
+
+    def digest(self, *groups: str) -> str:
+        """Digest of the seed and the named groups; of all fields but the name when none is named."""
+        fields = self.model_dump(mode="json", exclude={"name"})
+        if self.light.groups == "two":
+            # The field came later: what was stored without it keeps its digest.
+            del fields["light"]["groups"]
+        if groups:
+            fields = {g: fields[g] for g in ("seed", *groups)}
+        return keys.digest(fields)
+
+
+_PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "preview": {
+        "cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55},
+        "image": {"width_px": 320, "height_px": 240},
+        "light": {"spp": 16},
+    },
+    "fast": {"cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55}},
+    "paper": {
+        "light": {"integrator": "metropolis", "denoise": False},
+        "sky": {"kind": "panorama"},
+    },
+    "released": {
+        "cameras": {
+            "preset": "released",
+            "n_sectors": 4,
+            "tilt_deg": 11.309932,  # direction (cos, -0.2, sin), suncg section 3.2 c
+            "clearance_m": 0.0,
+            "min_objects": 4,
+        },
+        "light": {"integrator": "metropolis", "denoise": False},
+        "sky": {"kind": "panorama"},
+        "emission": {"preset": "released"},
+        "materials": {"preset": "released"},
+        "tone": {"preset": "released", "key": 0.8, "white_balance": 0.0},
+    },
+}
+
+RECIPE_NAMES = tuple(_PRESETS)
+
+
+def recipe_from_name(name: str, overrides: Mapping[str, str] | None = None) -> Recipe:
+    """The named preset with overrides ("group.field" -> text, parsed as JSON, else as a string).
+
+    Raises BadRecipe for an unknown name or field, or a value that does not fit.
+    """
+    if name not in _PRESETS:
+        raise BadRecipe(f"no recipe {name!r}", hint=f"one of {', '.join(RECIPE_NAMES)}")
+    fields: dict[str, Any] = {"name": name}
+    for group, values in _PRESETS[name].items():
+        fields[group] = dict(values)
+    for path, text in (overrides or {}).items():
+        _set(fields, path, text)
+    try:
+        return Recipe.model_validate(fields)
+    except ValidationError as error:
+        lines = "; ".join(
+            f"{'.'.join(str(p) for p in e['loc'])}: {e['msg']}" for e in error.errors()
+        )
+        raise BadRecipe(lines, hint="`pbrs-farm recipes` lists every field") from None
+
+
+def _set(fields: dict[str, Any], path: str, text: str) -> None:
+    try:
+        value = json.loads(text)
+    except ValueError:
+        value = text
+    group, _, field = path.partition(".")
+    if not field:
+        fields[group] = value
+    elif isinstance(fields.setdefault(group, {}), dict):
+        fields[group][field] = value
+
+
+def differences(a: Recipe, b: Recipe) -> list[str]:
+    """ "group.field: a -> b" for every field that differs, names aside."""
+    lines: list[str] = []
+
+    def walk(x: Any, y: Any, path: str) -> None:
+        if isinstance(x, dict) and isinstance(y, dict):
+            for k in sorted(set(x) | set(y)):
+                walk(x.get(k), y.get(k), f"{path}.{k}" if path else str(k))
+        elif x != y:
+            lines.append(f"{path}: {x} -> {y}")
+
+    walk(
+        a.model_dump(mode="json", exclude={"name"}), b.model_dump(mode="json", exclude={"name"}), ""
+    )
+    return lines

@@ -1,0 +1,1 @@
+"""Which stored views to keep: reference photographs, selection runs, their report."""

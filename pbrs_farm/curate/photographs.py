@@ -1,0 +1,253 @@
+"""Reads photographs with depth: a folder of pairs, or NYUv2's labelled .mat. Effects: reads files.
+
+A folder is searched at any depth for pairs, in two layouts:
+
+    .../rgb/NAME.jpg with .../depth/NAME.png     rgb may be called color, colour, image or images;
+                                                 depth may be called depth_bfx (preferred) too;
+                                                 where each folder holds one file, the names may
+                                                 differ (SUN RGB-D)
+    .../NAME_rgb.jpg with .../NAME_depth.png     _rgb may be _color, _colour or _image
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm import images
+from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.selection.depth_photographs import depth_mm_from_units, sun_rgbd_depth
+
+_RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")
+_DEPTH_NAMES: Final = ("depth_bfx", "depth")
+_RGB_FILES: Final = (".jpg", ".jpeg", ".png", ".bmp")
+_DEPTH_FILES: Final = (".png", ".npy", ".exr")
+_SUFFIX: Final = re.compile(r"(.+)_(rgb|color|colour|image|depth)", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Photo:
+    """A photograph. rgb: (H, W, 3) uint8 sRGB. depth_mm: (H, W) uint16, 0 = unknown."""
+
+    id: str
+    rgb: Srgb8Image
+    depth_mm: NDArray[np.uint16]
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """The two files of one photograph."""
+
+    id: str
+    rgb: Path
+    depth: Path
+
+
+def pairs_in(folder: Path) -> tuple[Pair, ...]:
+    """Every pair below folder, by id (its path below folder).
+
+    Raises BadInput for a folder without pairs, and for a file whose other half is missing.
+    """
+    if not folder.is_dir():
+        raise BadInput(folder, "", "no such folder")
+    pairs: list[Pair] = []
+    for inner in sorted({folder, *(p for p in folder.rglob("*") if p.is_dir())}):
+        names = {p.name.lower(): p for p in inner.iterdir() if p.is_dir()}
+        rgb = next((names[n] for n in _RGB_NAMES if n in names), None)
+        depth = next((names[n] for n in _DEPTH_NAMES if n in names), None)
+        if rgb is not None and depth is not None:
+            pairs += _pairs_of_folders(folder, inner, rgb, depth)
+        if inner.name.lower() not in (*_RGB_NAMES, *_DEPTH_NAMES):
+            pairs += _pairs_by_suffix(folder, inner)
+    if not pairs:
+        raise BadInput(
+            folder, "", "holds no RGB-D pairs", hint="rgb/NAME.jpg with depth/NAME.png; see docs"
+        )
+    return tuple(sorted(pairs, key=lambda pair: pair.id))
+
+
+def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[Pair]:
+    pictures, depths = _files(rgb, _RGB_FILES), _files(depth, _DEPTH_FILES)
+    if len(pictures) == len(depths) == 1 and pictures.keys() != depths.keys():
+        (one,), (other,) = pictures.values(), depths.values()
+        return [Pair(inner.relative_to(root).as_posix(), one, other)]
+    for name, path in (pictures | depths).items():
+        if name not in pictures or name not in depths:
+            lacks = "depth" if name in pictures else "colour"
+            where = depth if name in pictures else rgb
+            raise BadInput(path, "", f"only one half of a pair: {where} has no {lacks} {name}")
+    return [
+        Pair((inner.relative_to(root) / name).as_posix(), pictures[name], depths[name])
+        for name in pictures
+    ]
+
+
+def _files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for path in sorted(folder.iterdir()):
+        if path.is_file() and path.suffix.lower() in endings:
+            if path.stem in found:
+                raise BadInput(path, "", f"a second file of the name {path.stem}")
+            found[path.stem] = path
+    return found
+
+
+def _pairs_by_suffix(root: Path, inner: Path) -> list[Pair]:
+    halves: dict[str, dict[str, Path]] = {}
+    for path in sorted(p for p in inner.iterdir() if p.is_file()):
+        match = _SUFFIX.fullmatch(path.stem)
+        if match is None:
+            continue
+        kind = "depth" if match[2].lower() == "depth" else "rgb"
+        if path.suffix.lower() in (_DEPTH_FILES if kind == "depth" else _RGB_FILES):
+            halves.setdefault(match[1], {})[kind] = path
+    pairs = []
+    for name, found in halves.items():
+        if len(found) != 2:
+            (kind, path), *_ = found.items()
+            raise BadInput(
+                path, "", f"only one half of a pair: no {'rgb' if kind == 'depth' else 'depth'}"
+            )
+        pairs.append(
+            Pair((inner.relative_to(root) / name).as_posix(), found["rgb"], found["depth"])
+        )
+    return pairs
+
+
+def photo_from_pair(pair: Pair, *, depth_scale: float | None, sun_rgbd: bool) -> Photo:
+    """The photograph of two files; BadInput naming the file that is wrong.
+
+    depth_scale: depth units per metre; None = 1000 for whole numbers, 1 for .npy and .exr.
+    """
+    rgb = images.decode_photo(_read(pair.rgb), str(pair.rgb))
+    stored = _stored_depth(pair.depth)
+    if stored.ndim != 2:
+        raise BadInput(pair.depth, "", f"expected one channel of depth, got {stored.shape}")
+    if stored.shape != rgb.shape[:2]:
+        sizes = f"{stored.shape[1]}x{stored.shape[0]}, the picture {rgb.shape[1]}x{rgb.shape[0]}"
+        raise BadInput(pair.depth, "", f"sizes differ: depth is {sizes}")
+    if sun_rgbd:
+        if stored.dtype != np.uint16:
+            raise BadInput(pair.depth, "", "SUN RGB-D's depth has 16 bits; this file has not")
+        stored = sun_rgbd_depth(stored)
+    is_float = np.issubdtype(stored.dtype, np.floating)
+    scale = depth_scale or (1.0 if is_float else 1000.0)
+    return Photo(pair.id, rgb, _depth_mm(stored, scale, str(pair.depth), ""))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise BadInput(path, "", f"cannot be read: {error.strerror}") from None
+
+
+def _stored_depth(path: Path) -> NDArray[Any]:
+    if path.suffix.lower() == ".png":
+        return images.array_from_png(_read(path), str(path))
+    if path.suffix.lower() == ".exr":
+        layers = images.layers_from_exr(_read(path), str(path))
+        return layers.get("Z", next(iter(layers.values())))
+    try:
+        return np.asarray(np.load(path, allow_pickle=False))
+    except (OSError, ValueError, EOFError):
+        raise BadInput(path, "", "cannot be read as a numpy array") from None
+
+
+def _depth_mm(depth: NDArray[Any], scale: float, file: str, place: str) -> NDArray[np.uint16]:
+    try:
+        return depth_mm_from_units(depth, scale)
+    except ValueError as error:
+        raise BadInput(file, place, str(error)) from None
+
+
+class NyuMat:
+    """NYUv2's nyu_depth_v2_labeled.mat, read lazily: the file is 2.8 GB.
+
+    MATLAB 7.3 is HDF5 with the axes reversed: images (n, 3, 640, 480) uint8 and depths
+    (n, 640, 480) metres. Use as a context manager. Raises BadInput for a file that is truncated,
+    of another MATLAB version, or without these two.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import h5py
+        except ImportError:
+            raise MachineFailed("h5py is needed for .mat files", hint="pip install h5py") from None
+        self.path = path
+        try:
+            self._file = h5py.File(path, "r")
+        except OSError as error:
+            raise BadInput(path, "", self._open_fault(str(error))) from None
+        try:
+            self._images, self._depths = self._tables(h5py)
+        except BadInput:
+            self._file.close()
+            raise
+
+    def _open_fault(self, text: str) -> str:
+        if not self.path.is_file():
+            return "no such file"
+        with self.path.open("rb") as file:
+            start = file.read(10)
+        if start.startswith(b"MATLAB 5.0"):
+            return "a MATLAB 5 file; nyu_depth_v2_labeled.mat is of version 7.3"
+        if "truncated" in text:
+            return "the file is truncated; download it again"
+        return "not a MATLAB 7.3 (HDF5) file, or damaged"
+
+    def _tables(self, h5py: Any) -> tuple[Any, Any]:
+        pictures, depths = self._file.get("images"), self._file.get("depths")
+        for name, table, n_axes in (("images", pictures, 4), ("depths", depths, 3)):
+            if not isinstance(table, h5py.Dataset):
+                raise BadInput(self.path, name, "missing; is this nyu_depth_v2_labeled.mat?")
+            if table.ndim != n_axes:
+                raise BadInput(self.path, name, f"expected {n_axes} axes, got {table.shape}")
+        if pictures.dtype != np.uint8 or pictures.shape[1] != 3:
+            raise BadInput(self.path, "images", f"expected (n, 3, w, h) uint8, got {pictures}")
+        if (pictures.shape[0], *pictures.shape[2:]) != depths.shape:
+            text = f"sizes differ: images {pictures.shape}, depths {depths.shape}"
+            raise BadInput(self.path, "depths", text)
+        return pictures, depths
+
+    def __enter__(self) -> NyuMat:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def __len__(self) -> int:
+        return int(self._depths.shape[0])
+
+    def photos(self) -> Iterator[Photo]:
+        """The photographs in order, ids from 0001; one at a time in memory."""
+        for k in range(len(self)):
+            place = f"image {k + 1}"
+            try:
+                rgb = np.ascontiguousarray(np.asarray(self._images[k]).transpose(2, 1, 0))
+                depth = np.asarray(self._depths[k]).T
+            except (OSError, RuntimeError):
+                raise BadInput(self.path, place, "cannot be read; the file is damaged") from None
+            yield Photo(f"{k + 1:04d}", rgb, _depth_mm(depth, 1.0, str(self.path), place))
+
+
+def sha256_of_files(paths: list[Path]) -> str:
+    """sha256 over the files' own, in the order given; of the file itself when there is one."""
+    digests = []
+    for path in paths:
+        try:
+            with path.open("rb") as file:
+                digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+        except OSError as error:
+            raise BadInput(path, "", f"cannot be read: {error.strerror}") from None
+    return (
+        digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+    )

@@ -1,0 +1,104 @@
+"""`pbrs-farm reference build`: photographs -> a reference file. Effects: reads files.
+
+The reference holds histograms only, so it can be shared where the photographs cannot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.recipe import HistogramFields, SelectionFields
+from pbrs_farm.curate.photographs import (
+    NyuMat,
+    Pair,
+    Photo,
+    pairs_in,
+    photo_from_pair,
+    sha256_of_files,
+)
+from pbrs_farm.selection.depth_photographs import registration_border
+from pbrs_farm.selection.histograms import Histogram, histogram
+from pbrs_farm.selection.reference_set import (
+    Reference,
+    reference_from_bytes,
+    reference_from_histograms,
+)
+
+Progress = Callable[[int, int], None]
+"""Called with (photographs done, photographs in all)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoOptions:
+    """How photographs are read. depth_scale: depth units per metre, None = by the file's kind.
+
+    sun_rgbd: undo SUN RGB-D's rotation of bits. crop: peel off the registration border.
+    """
+
+    depth_scale: float | None = None
+    sun_rgbd: bool = False
+    crop: bool = True
+
+
+def build_reference(
+    source: Path,
+    settings: HistogramFields,
+    selection: SelectionFields,
+    options: PhotoOptions | None = None,
+    progress: Progress | None = None,
+) -> Reference:
+    """The reference of a folder of RGB-D pairs, or of NYUv2's labelled .mat.
+
+    Raises BadInput naming the file that is wrong; see photos.py for the layouts.
+    """
+    options = options or PhotoOptions()
+    if options.depth_scale is not None and not options.depth_scale > 0:
+        raise BadInput("--depth-scale", "", f"{options.depth_scale} is not above 0")
+    if not source.exists():
+        raise BadInput(source, "", "no such file or folder")
+    if source.is_file():
+        with NyuMat(source) as mat:
+            counted = _counted(mat.photos(), len(mat), settings, options, progress)
+            digest = sha256_of_files([source])
+    else:
+        pairs = pairs_in(source)
+        counted = _counted(_photos(pairs, options), len(pairs), settings, options, progress)
+        digest = sha256_of_files([path for pair in pairs for path in (pair.rgb, pair.depth)])
+    return reference_from_histograms(
+        list(counted), list(counted.values()), settings, selection, source=(source.name, digest)
+    )
+
+
+def _photos(pairs: tuple[Pair, ...], options: PhotoOptions) -> Iterator[Photo]:
+    for pair in pairs:
+        yield photo_from_pair(pair, depth_scale=options.depth_scale, sun_rgbd=options.sun_rgbd)
+
+
+def _counted(
+    photos: Iterator[Photo],
+    n_photos: int,
+    settings: HistogramFields,
+    options: PhotoOptions,
+    progress: Progress | None,
+) -> dict[str, Histogram]:
+    counted: dict[str, Histogram] = {}
+    for photo in photos:
+        rows, columns = registration_border(photo.rgb) if options.crop else (slice(None),) * 2
+        rgb, depth = photo.rgb[rows, columns], photo.depth_mm[rows, columns]
+        counted[photo.id] = histogram(rgb, depth, settings)
+        if progress is not None:
+            progress(len(counted), n_photos)
+    return counted
+
+
+def read_reference(path: Path) -> Reference:
+    """The reference in a file; BadInput naming it when it is missing or none."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        hint = "`pbrs-farm reference build` makes one"
+        raise BadInput(path, "", f"cannot be read: {error.strerror}", hint=hint) from None
+    return reference_from_bytes(data, str(path))

@@ -1,0 +1,121 @@
+"""What a selection came to, as numbers: yield, reasons, per house and room type; no effects."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import pyarrow.compute as pc
+from pydantic import BaseModel, ConfigDict
+
+from pbrs_farm.core.recipe import SelectionFields
+from pbrs_farm.selection.binning import Binning, BinningRow
+from pbrs_farm.selection.reference_set import Reference
+from pbrs_farm.selection.verdicts import REASONS
+
+THRESHOLDS: Final = tuple(round(0.01 * k, 2) for k in range(101))
+
+PAPER_VIEWS: Final = 779_342
+PAPER_KEPT: Final = 568_793
+"""What the paper kept of its own pictures at 0.70 (section 3.3): 73.0 %."""
+
+
+class Tally(BaseModel):
+    """Views of one house or room type, and how many of them are kept."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    name: str
+    views: int
+    kept: int
+
+
+class ReferenceSummary(BaseModel):
+    """Which photographs the views were compared with, and how."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    source: str
+    source_sha256: str
+    digest: str
+    photographs: int
+    binning: Binning
+    table: tuple[BinningRow, ...]
+
+
+class SelectionSummary(BaseModel):
+    """selection.json. reasons: refused views by their first reason.
+
+    modes: scored views by the lighting mode they were scored on. yield_both: share of the scored
+    views whose two scores are above each of THRESHOLDS, whatever their image quality.
+    n_scored_houses: houses scored in this very run, the others had scores; not stored.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    run: str
+    fields: SelectionFields
+    reference: ReferenceSummary
+    views: int
+    scored: int
+    kept: int
+    reasons: dict[str, int]
+    modes: dict[str, int]
+    colour_quartiles: tuple[float, ...]
+    depth_quartiles: tuple[float, ...]
+    yield_both: tuple[float, ...]
+    houses: tuple[Tally, ...]
+    room_types: tuple[Tally, ...]
+    n_scored_houses: int = 0
+
+
+def summary_of(
+    judged: Any, run: str, fields: SelectionFields, reference: Reference
+) -> SelectionSummary:
+    """The summary of a table of verdicts."""
+    colour, depth = (judged[k].drop_null().to_numpy() for k in ("colour_score", "depth_score"))
+    counts = {r["values"]: r["counts"] for r in pc.value_counts(judged["reason"]).to_pylist()}
+    modes = pc.value_counts(judged["mode"].filter(judged["colour_score"].is_valid())).to_pylist()
+    facts = reference.facts
+    return SelectionSummary(
+        run=run,
+        fields=fields,
+        reference=ReferenceSummary(
+            source=facts.source,
+            source_sha256=facts.source_sha256,
+            digest=reference.digest,
+            photographs=len(facts.ids),
+            binning=facts.binning,
+            table=facts.table,
+        ),
+        views=judged.num_rows,
+        scored=len(colour),
+        kept=int(pc.sum(judged["kept"]).as_py() or 0),
+        reasons={reason: counts[reason] for reason in REASONS if reason in counts},
+        modes={m["values"]: m["counts"] for m in sorted(modes, key=lambda m: str(m["values"]))},
+        colour_quartiles=_quartiles(colour),
+        depth_quartiles=_quartiles(depth),
+        yield_both=tuple(yield_curve(np.minimum(colour, depth))),
+        houses=_tallies(judged, "house"),
+        room_types=_tallies(judged, "room_type"),
+    )
+
+
+def yield_curve(scores: np.ndarray[Any, np.dtype[np.float64]]) -> list[float]:
+    """Share of scores above each of THRESHOLDS; zeros where there are no scores."""
+    if not len(scores):
+        return [0.0] * len(THRESHOLDS)
+    above = len(scores) - np.searchsorted(np.sort(scores), THRESHOLDS, side="right")
+    return [round(float(n) / len(scores), 6) for n in above]
+
+
+def _quartiles(scores: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, ...]:
+    """Minimum, quartiles and maximum; empty where there are no scores."""
+    if not len(scores):
+        return ()
+    return tuple(round(float(q), 6) for q in np.percentile(scores, (0, 25, 50, 75, 100)))
+
+
+def _tallies(judged: Any, column: str) -> tuple[Tally, ...]:
+    groups = judged.group_by(column).aggregate([("kept", "count"), ("kept", "sum")])
+    rows = sorted(groups.to_pylist(), key=lambda r: str(r[column]))
+    return tuple(
+        Tally(name=r[column] or "", views=r["kept_count"], kept=r["kept_sum"]) for r in rows
+    )

@@ -1,0 +1,1 @@
+"""An output folder in the forms other tools read: COCO, HDF5, WebDataset, the released layout."""

@@ -1,0 +1,80 @@
+"""`pbrs-farm export`: a finished output folder in the forms other tools read.
+
+Effects: reads an output folder, writes a new folder; it appears whole or not at all. The forms
+are in export_coco, export_hdf5, export_webdataset and export_released; docs/formats.md tells them.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.export.coco import write_coco
+from pbrs_farm.export.hdf5 import write_hdf5
+from pbrs_farm.export.released_layout import write_released
+from pbrs_farm.export.webdataset import write_webdataset
+from pbrs_farm.formats.output_folder import ViewEntry, views_of
+
+Writer = Callable[[list[ViewEntry], Path], int]
+"""Views and a folder to write them into -> number of files written."""
+
+FORMS: Final[Mapping[str, Writer]] = {
+    "coco": write_coco,
+    "hdf5": write_hdf5,
+    "webdataset": write_webdataset,
+    "released": write_released,
+}
+
+
+def export(folder: Path, out: Path, form: str, *, selection: str | None = None) -> tuple[int, int]:
+    """Write the finished views of folder to out in a form of FORMS: (views, files written).
+
+    out must not exist, or be empty. selection: only the views that selection/<selection>.jsonl
+    keeps. Views without labels are left out. Raises BadInput for an unknown form, a folder without
+    finished views, a selection that does not exist, or an out that holds something.
+    """
+    if form not in FORMS:
+        raise BadInput("--to", form, "no such form", hint=f"of {', '.join(FORMS)}")
+    views = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
+    if selection is not None:
+        kept = _kept(folder, selection)
+        views = [v for v in views if (v.house.id, v.id) in kept]
+    if not views:
+        raise BadInput(folder, "", "no finished view to export")
+    with _whole_folder(out) as scratch:
+        return len(views), FORMS[form](views, scratch)
+
+
+def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
+    file = folder / "selection" / f"{run}.jsonl"
+    if not file.is_file():
+        raise BadInput(file, "", "no such selection", hint="pbrs-farm select makes one")
+    try:
+        rows = [json.loads(line) for line in file.read_text("utf-8").splitlines()]
+        return {(row["house"], row["view"]) for row in rows if row["kept"]}
+    except (ValueError, KeyError, TypeError) as error:
+        raise BadInput(file, "", f"not a selection: {error}") from None
+
+
+@contextmanager
+def _whole_folder(out: Path) -> Iterator[Path]:
+    """A folder beside out that becomes out at the end, and is removed on any error."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise BadInput(out, "", "is there already", hint="name a new folder")
+    scratch = out.with_name(f".{out.name}.partial")
+    shutil.rmtree(scratch, ignore_errors=True)
+    try:
+        scratch.mkdir(parents=True)
+        yield scratch
+        if out.exists():
+            out.rmdir()
+        scratch.rename(out)
+    except OSError as error:
+        raise BadInput(out, "", f"cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)

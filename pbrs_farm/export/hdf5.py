@@ -1,0 +1,73 @@
+"""HDF5 in BlenderProc's form: one file per view, its keys and conventions.
+
+Effects: reads views, writes files.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.export.coco import PICTURES
+from pbrs_farm.formats.output_folder import ViewEntry
+from pbrs_farm.images import array_from_png
+
+
+def write_hdf5(views: list[ViewEntry], out: Path) -> int:
+    """<n>.hdf5 per view, n counted from 0, and index.jsonl; the number of files.
+
+    colors (H, W, 3) uint8 (the first of PICTURES there is; every mode also by its name), depth
+    (H, W) float32 planar metres (0 = nothing), normals (H, W, 3) float32 (n + 1) / 2 with OpenGL
+    camera axes, category_id_segmaps uint8, instance_segmaps uint16, and as JSON text
+    instance_attribute_maps and campose (K and the OpenGL pose). Raises MachineFailed without h5py.
+    """
+    try:
+        import h5py
+    except ImportError:
+        hint = "pip install 'pbrs-farm[selection]'"
+        raise MachineFailed("writing HDF5 needs h5py", hint=hint) from None
+    index = []
+    for number, view in enumerate(views):
+        with h5py.File(out / f"{number}.hdf5", "w") as file:
+            for name, value in _datasets(view).items():
+                if isinstance(value, str):
+                    file.create_dataset(name, data=np.bytes_(value.encode()))
+                else:
+                    file.create_dataset(name, data=value, compression="gzip")
+        index.append(
+            json.dumps({"file": f"{number}.hdf5", "house": view.house.id, "view": view.id})
+        )
+    (out / "index.jsonl").write_text("\n".join(index) + "\n")
+    return len(views) + 1
+
+
+def _datasets(view: ViewEntry) -> dict[str, NDArray[Any] | str]:
+    def png(file: str) -> NDArray[Any]:
+        return array_from_png((view.folder / file).read_bytes(), f"{view.folder}/{file}")
+
+    data: dict[str, NDArray[Any] | str] = {}
+    for mode in reversed(PICTURES):
+        if view.file(f"{mode}.png"):
+            data[str(mode)] = data["colors"] = png(f"{mode}.png")
+    valid = png("valid.png") > 0
+    published = png("normal.png") * np.float32(2 / 65535) - np.float32(1)
+    # Published axes are x right, y forward, z up; OpenGL's are x right, y up, z backward.
+    opengl = np.stack([published[..., 0], published[..., 2], -published[..., 1]], axis=-1)
+    data["depth"] = png("depth.png").astype(np.float32) / np.float32(1000)
+    data["normals"] = np.where(valid[..., None], (opengl + 1) / 2, 0).astype(np.float32)
+    data["category_id_segmaps"] = png("semantic.png")
+    data["instance_segmaps"] = png("instance.png")
+    data["instance_attribute_maps"] = json.dumps(
+        [
+            {"idx": row["id"], "name": row["name"], "category_id": row["nyu40"]}
+            for row in view.facts["instances"]
+        ]
+    )
+    pose = view.facts["world_from_camera_opengl"]
+    data["campose"] = json.dumps({"cam_K": view.facts["K"], "cam2world_matrix": pose})
+    return data

@@ -1,0 +1,70 @@
+"""The layout of the published PBRS data (suncg section 5): <kind>_v2/<house>/<6 digits>_<kind>.png.
+
+Effects: reads views, writes files. Every label is stored in that form already, so files are copied.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.formats.output_folder import ViewEntry
+
+FILES: Final = {
+    "mlt_il_ol.png": "mlt_v2/{house}/{id}_mlt.png",
+    "opengl_il.png": "opengl_ver2/{house}/{id}_color.png",
+    "depth.png": "depth_v2/{house}/{id}_depth.png",
+    "normal.png": "normal_v2/{house}/{id}_norm_camera.png",
+    "valid.png": "normal_v2/{house}/{id}_valid.png",
+    "semantic.png": "category_v2/{house}/{id}_category40.png",
+    "boundary.png": "boundary_v2/{house}/{id}_instance_boundary.png",
+}
+"""Stored file -> where the published data has it."""
+
+
+def write_released(views: list[ViewEntry], out: Path) -> int:
+    """Every view's files, camera_v2/<house>/room_camera*.txt and data_goodlist_v2.txt; the number.
+
+    id is the view's number in its house, 0-based: its line in room_camera.txt.
+    """
+    houses: dict[str, list[ViewEntry]] = defaultdict(list)
+    for view in views:
+        houses[view.house.id].append(view)
+    n_files, good = 0, []
+    for house, own in houses.items():
+        for number, view in enumerate(own):
+            for stored, published in FILES.items():
+                n_files += _copied(
+                    view.file(stored), out / published.format(house=house, id=f"{number:06d}")
+                )
+            good.append(f"{house}/{number:06d}\n")
+        folder = out / "camera_v2" / house
+        folder.mkdir(parents=True)
+        (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in own))
+        names = "".join(f"Room#{v.room_id}_{v.facts.get('sector', 0)}\n" for v in own)
+        (folder / "room_camera_name.txt").write_text(names)
+        n_files += 2
+    (out / "data_goodlist_v2.txt").write_text("".join(good))
+    return n_files + 1
+
+
+def _copied(file: Path | None, target: Path) -> int:
+    if file is None:
+        return 0
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(file.read_bytes())
+    return 1
+
+
+def camera_line(view: ViewEntry) -> str:
+    """`vx vy vz  tx ty tz  ux uy uz  xf yf  value`: eye, towards, up, half angles in rad, score."""
+    pose = np.array(view.facts["world_from_camera_opengl"], np.float64)
+    width, height = view.facts["width_px"], view.facts["height_px"]
+    k = np.array(view.facts["K"], np.float64)
+    half = (math.atan(width / 2 / k[0, 0]), math.atan(height / 2 / k[1, 1]))
+    groups = (pose[:3, 3], -pose[:3, 2], pose[:3, 1], half, (view.facts.get("score") or 0.0,))
+    return "  ".join(" ".join(f"{x:g}" for x in group) for group in groups) + "\n"

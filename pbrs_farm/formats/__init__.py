@@ -1,0 +1,1 @@
+"""One file per stored file, its writer beside its reader; pure."""

@@ -1,0 +1,189 @@
+"""Binary glTF 2.0: writing deterministic GLB files and reading the arrays of any; no effects."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.formats.serialise import json_from_bytes
+
+_MAGIC: Final = b"glTF"
+_JSON_CHUNK: Final = 0x4E4F534A
+_BIN_CHUNK: Final = 0x004E4942
+_ARRAY_BUFFER: Final = 34962
+_ELEMENT_ARRAY_BUFFER: Final = 34963
+
+DTYPES: Final[dict[int, np.dtype[Any]]] = {
+    5120: np.dtype("<i1"),
+    5121: np.dtype("<u1"),
+    5122: np.dtype("<i2"),
+    5123: np.dtype("<u2"),
+    5125: np.dtype("<u4"),
+    5126: np.dtype("<f4"),
+}
+"""Component type of an accessor -> dtype."""
+
+WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+"""Type of an accessor -> components per element (matrices are not geometry)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gltf:
+    """A glTF document and its buffers. file: its name, for messages."""
+
+    document: dict[str, Any]
+    buffers: tuple[bytes, ...]
+    file: str
+
+
+class GlbWriter:
+    """Collects buffer views and accessors, then gives the GLB's bytes. State: what was added."""
+
+    def __init__(self) -> None:
+        self._binary = bytearray()
+        self._views: list[dict[str, int]] = []
+        self._accessors: list[dict[str, Any]] = []
+
+    def add_bytes(self, data: bytes, *, target: int | None = None) -> int:
+        """Index of a new buffer view that holds data."""
+        view = {"buffer": 0, "byteOffset": len(self._binary), "byteLength": len(data)}
+        if target is not None:
+            view["target"] = target
+        self._binary += data + b"\0" * (-len(data) % 4)
+        self._views.append(view)
+        return len(self._views) - 1
+
+    def add_vertices(self, array: NDArray[np.float32], *, with_bounds: bool = False) -> int:
+        """Index of a new accessor over array (N, 2 or 3) float32, N >= 1."""
+        accessor = {
+            "bufferView": self.add_bytes(_little(array, "<f4"), target=_ARRAY_BUFFER),
+            "componentType": 5126,
+            "count": len(array),
+            "type": f"VEC{array.shape[1]}",
+        }
+        if with_bounds:
+            accessor["min"] = array.min(0).tolist()
+            accessor["max"] = array.max(0).tolist()
+        self._accessors.append(accessor)
+        return len(self._accessors) - 1
+
+    def add_faces(self, faces: NDArray[np.int32]) -> int:
+        """Index of a new accessor over the vertex numbers of faces (F, 3), F >= 1."""
+        self._accessors.append(
+            {
+                "bufferView": self.add_bytes(_little(faces, "<u4"), target=_ELEMENT_ARRAY_BUFFER),
+                "componentType": 5125,
+                "count": faces.size,
+                "type": "SCALAR",
+            }
+        )
+        return len(self._accessors) - 1
+
+    def glb(self, document: dict[str, Any]) -> bytes:
+        """The file: document (empty lists dropped, as glTF asks) with buffers, and the binary."""
+        document = {
+            **document,
+            "accessors": self._accessors,
+            "bufferViews": self._views,
+            "buffers": [{"byteLength": len(self._binary)}] if self._binary else [],
+        }
+        kept = {k: v for k, v in document.items() if v != []}
+        text = json.dumps(kept, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<II", len(text), _JSON_CHUNK) + text
+        if self._binary:
+            chunks += struct.pack("<II", len(self._binary), _BIN_CHUNK) + bytes(self._binary)
+        return _MAGIC + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+
+
+def _little(array: NDArray[Any], dtype: str) -> bytes:
+    return np.ascontiguousarray(array).astype(dtype, copy=False).tobytes()
+
+
+def gltf_from_glb(data: bytes, file: str) -> Gltf:
+    """Document and binary chunk of a GLB; BadHouse if it is damaged or no glTF 2.0."""
+    if len(data) < 20 or data[:4] != _MAGIC:
+        raise BadHouse(file, "", "is no GLB file")
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise BadHouse(file, "", f"is glTF {version}; only glTF 2.0 is read")
+    if length > len(data):
+        raise BadHouse(file, "", f"is cut short: {len(data)} of {length} bytes")
+    chunks: dict[int, bytes] = {}
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, at)
+        if at + 8 + size > length:
+            raise BadHouse(file, f"byte {at}", "chunk reaches past the end")
+        chunks.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    document = json_from_bytes(chunks.get(_JSON_CHUNK, b""), file)
+    if not isinstance(document, dict):
+        raise BadHouse(file, "", "the JSON chunk is no object")
+    binary = chunks.get(_BIN_CHUNK)
+    return Gltf(document, () if binary is None else (binary,), file)
+
+
+def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
+    """document[kind][index]; BadHouse if it does not exist."""
+    entries = gltf.document.get(kind, [])
+    fits = isinstance(entries, list) and isinstance(index, int) and not isinstance(index, bool)
+    if not fits or not 0 <= index < len(entries) or not isinstance(entries[index], dict):
+        raise BadHouse(gltf.file, f"{kind}[{index}]", "does not exist")
+    found: dict[str, Any] = entries[index]
+    return found
+
+
+def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int = 0) -> int:
+    """holder[key] as a count >= 0; BadHouse otherwise."""
+    value = holder.get(key, default)
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise BadHouse(gltf.file, f"{place}.{key}", f"expected a count, got {str(value)[:40]}")
+    return value
+
+
+def view_bytes(gltf: Gltf, index: Any) -> bytes:
+    """The bytes of buffer view index; BadHouse if it reaches outside its buffer."""
+    place = f"bufferViews[{index}]"
+    view = entry(gltf, "bufferViews", index)
+    buffer = count(gltf, view, "buffer", place)
+    start = count(gltf, view, "byteOffset", place)
+    size = count(gltf, view, "byteLength", place)
+    if buffer >= len(gltf.buffers) or start + size > len(gltf.buffers[buffer]):
+        raise BadHouse(gltf.file, place, "reaches outside its buffer")
+    return gltf.buffers[buffer][start : start + size]
+
+
+def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
+    """(count, components) array of accessor index in its own dtype; sparse accessors are refused.
+
+    Raises BadHouse for an accessor that is damaged or not of geometry.
+    """
+    place = f"accessors[{index}]"
+    accessor = entry(gltf, "accessors", index)
+    dtype, width = DTYPES.get(_hashable(accessor.get("componentType"))), WIDTHS.get(
+        _hashable(accessor.get("type"))
+    )  # fmt: skip
+    if dtype is None or width is None or "sparse" in accessor:
+        raise BadHouse(gltf.file, place, "is sparse or of a type that no mesh uses")
+    n = count(gltf, accessor, "count", place)
+    data = view_bytes(gltf, accessor.get("bufferView"))
+    view = entry(gltf, "bufferViews", accessor["bufferView"])
+    size = width * dtype.itemsize
+    stride = count(gltf, view, "byteStride", place, size) or size
+    start = count(gltf, accessor, "byteOffset", place)
+    if stride < size or (n and start + (n - 1) * stride + size > len(data)):
+        raise BadHouse(gltf.file, place, "reaches outside its buffer view")
+    if n == 0:
+        return np.zeros((0, width), dtype)
+    return np.ndarray((n, width), dtype, data, start, (stride, dtype.itemsize)).copy()
+
+
+def _hashable(value: Any) -> Any:
+    return value if isinstance(value, (int, str)) else None

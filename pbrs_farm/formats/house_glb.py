@@ -1,0 +1,154 @@
+"""A House as the bytes of a GLB that any glTF viewer opens; no effects.
+
+glTF measures v downwards. Textures repeat, so v is stored negated, which loses no bit.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface
+from pbrs_farm.formats import glb
+from pbrs_farm.formats.serialise import plain_from_value
+
+GLTF_IMAGES: Final = ("image/png", "image/jpeg")
+"""The only pictures glTF knows; others stay in the file but no material shows them."""
+
+V_DOWN: Final[NDArray[np.float32]] = np.array([1, -1], np.float32)
+"""(u, v up) times this is (u, v down), one texture higher; and back."""
+
+_PANE_ALPHA: Final = 0.3
+
+
+def glb_from_house(house: House) -> bytes:
+    """house.glb: a node per item (in order), a primitive per surface that has vertices.
+
+    Raises BadHouse naming the item whose geometry is not finite or whose faces are out of range.
+    """
+    writer = glb.GlbWriter()
+    meshes: list[dict[str, Any]] = []
+    nodes = []
+    for index, item in enumerate(house.items):
+        node: dict[str, Any] = {"name": item.id, "extras": _item_extras(item, index + 1)}
+        primitives = [_primitive(writer, house, item, s) for s in item.surfaces if len(s.positions)]
+        if primitives:
+            node["mesh"] = len(meshes)
+            meshes.append({"name": item.name or item.id, "primitives": primitives})
+        nodes.append(node)
+    images, kept = _write_textures(writer, house)
+    return writer.glb(
+        {
+            "asset": _asset(house),
+            "scene": 0,
+            "scenes": [{"name": house.name, "nodes": list(range(len(nodes)))}]
+            if nodes
+            else [{"name": house.name}],
+            "nodes": nodes,
+            "meshes": meshes,
+            "materials": [_gltf_material(m, images) for m in house.materials],
+            "images": [image for image in kept if "name" in image],
+            "samplers": [{"wrapS": 10497, "wrapT": 10497}] if images else [],
+            "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
+            "extras": {"house": house.id, "textures": [x["bufferView"] for x in kept]},
+        }
+    )
+
+
+def _asset(house: House) -> dict[str, Any]:
+    source = house.source
+    asset: dict[str, Any] = {
+        "version": "2.0",
+        "generator": "pbrs_farm",
+        "extras": plain_from_value(source),
+    }
+    line = source.attribution or ", ".join(x for x in (source.author, source.licence) if x)
+    return asset | {"copyright": line} if line else asset
+
+
+def _item_extras(item: Item, instance: int) -> dict[str, Any]:
+    return {
+        "instance": instance,
+        "item": item.id,
+        "name": item.name,
+        "kind": item.kind.value,
+        "nyu40": item.nyu40,
+        "class": NYU40_NAMES[item.nyu40],
+        "room": item.room_id,
+    }
+
+
+def _primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> dict[str, Any]:
+    place = f"item {item.id}, surface {s.name}"
+    for array in (s.positions, s.uvs, s.normals):
+        if array is not None and not np.isfinite(array).all():
+            raise BadHouse(house.source.file, place, "holds a number that is not finite")
+    if len(s.faces) and not (s.faces.min() >= 0 and s.faces.max() < len(s.positions)):
+        raise BadHouse(house.source.file, place, "a face names a vertex that does not exist")
+    if not 0 <= s.material < len(house.materials):
+        raise BadHouse(house.source.file, place, f"material {s.material} does not exist")
+    attributes = {"POSITION": writer.add_vertices(s.positions, with_bounds=True)}
+    if s.normals is not None:
+        attributes["NORMAL"] = writer.add_vertices(s.normals)
+    if s.uvs is not None:
+        attributes["TEXCOORD_0"] = writer.add_vertices(s.uvs * V_DOWN)
+    primitive: dict[str, Any] = {"attributes": attributes, "material": int(s.material)}
+    if len(s.faces):
+        return primitive | {"indices": writer.add_faces(s.faces), "mode": 4}
+    return primitive | {"mode": 0}
+
+
+def _write_textures(
+    writer: glb.GlbWriter, house: House
+) -> tuple[dict[str, int], list[dict[str, Any]]]:
+    """(texture key -> glTF texture index, an image or a bare buffer view per texture)."""
+    images: dict[str, int] = {}
+    kept: list[dict[str, Any]] = []
+    for key, texture in house.textures.items():
+        view: dict[str, Any] = {"bufferView": writer.add_bytes(texture.data)}
+        if texture.media_type in GLTF_IMAGES:
+            images[key] = len(images)
+            view |= {"mimeType": texture.media_type, "name": texture.name or texture.id}
+        kept.append(view)
+    return images, kept
+
+
+def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
+    alpha, mode = _alpha(material)
+    shininess = max(material.shininess, 0.0)
+    is_mirror = material.kind is MaterialKind.MIRROR
+    look: dict[str, Any] = {
+        "baseColorFactor": [*_linear(material.diffuse), alpha],
+        "metallicFactor": 1.0 if is_mirror else 0.0,
+        "roughnessFactor": 0.0 if is_mirror else (2.0 / (shininess + 2.0)) ** 0.25,
+    }
+    if material.texture_id in images:
+        look["baseColorTexture"] = {"index": images[material.texture_id]}
+    plain: dict[str, Any] = {
+        "name": material.name,
+        "pbrMetallicRoughness": look,
+        "doubleSided": True,
+        "alphaMode": mode,
+        "extras": {"kind": material.kind.value},
+    }
+    if material.kind is MaterialKind.BULB:
+        plain["emissiveFactor"] = _linear(material.diffuse)
+    return plain
+
+
+def _linear(rgb: tuple[float, float, float]) -> list[float]:
+    return [float(c) for c in linear_from_srgb(np.clip(np.array(rgb), 0, 1))]
+
+
+def _alpha(material: Material) -> tuple[float, str]:
+    alpha = float(np.clip(material.opacity, 0, 1))
+    if material.kind in (MaterialKind.GLASS, MaterialKind.PANE):
+        return (alpha if alpha < 1 else _PANE_ALPHA), "BLEND"
+    if alpha < 1:
+        return alpha, "BLEND"
+    return 1.0, "MASK" if material.alpha_cutout else "OPAQUE"

@@ -1,0 +1,119 @@
+"""What lies in a finished output folder: its houses and views, as plain values. Effects: reads files.
+
+The layout is the README's ("stored layout"); pictures themselves are not opened here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pbrs_farm.core.errors import BadInput
+
+
+@dataclass(frozen=True, slots=True)
+class HouseEntry:
+    """A house of the folder. rooms: room id -> its name. attribution: the line to carry, or ""."""
+
+    id: str
+    name: str
+    attribution: str
+    rooms: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class ViewEntry:
+    """A view of the folder. facts: view.json, {} where there is none yet."""
+
+    house: HouseEntry
+    id: str
+    room_id: str
+    room_name: str
+    folder: Path
+    facts: dict[str, Any] = field(default_factory=dict)
+
+    def file(self, name: str) -> Path | None:
+        """The view's file of that name, or None."""
+        path = self.folder / name
+        return path if path.is_file() else None
+
+
+def views_of(root: Path) -> tuple[ViewEntry, ...]:
+    """Every view below root/houses, then root/objects, by house and view id.
+
+    Raises BadInput if root is no output folder or a JSON file in it cannot be read.
+    """
+    roots = [root / name for name in ("houses", "objects") if (root / name).is_dir()]
+    if not roots:
+        raise BadInput(
+            root, "", "not an output folder of pbrs-farm: it has no houses", hint="see --out"
+        )
+    folders = [folder for below in roots for folder in sorted(below.iterdir())]
+    return tuple(view for folder in folders for view in _views(folder))
+
+
+def _views(folder: Path) -> Iterator[ViewEntry]:
+    if not (folder / "views").is_dir():
+        return
+    house = _house(folder)
+    for view in sorted(p for p in (folder / "views").iterdir() if p.is_dir()):
+        facts = json_object(view / "view.json")
+        room = _room_id(view.name, facts, house)
+        yield ViewEntry(house, view.name, room, house.rooms.get(room, room), view, facts)
+
+
+def _house(folder: Path) -> HouseEntry:
+    facts = json_object(folder / "house.json")
+    source = facts.get("source") or {}
+    rooms = {
+        str(room["id"]): str(room.get("name") or _first(room.get("types")) or f"Room {room['id']}")
+        for room in facts.get("rooms") or ()
+        if "id" in room
+    }
+    name = str(facts.get("name") or folder.name)
+    return HouseEntry(folder.name, name, str(source.get("attribution") or ""), rooms)
+
+
+def _first(words: Any) -> str:
+    return str(words[0]) if words else ""
+
+
+def _room_id(view_id: str, facts: dict[str, Any], house: HouseEntry) -> str:
+    room = facts.get("room") or facts.get("room_id") or ""
+    room = room.get("id", "") if isinstance(room, dict) else room
+    if room:
+        return str(room)
+    owners = [r for r in house.rooms if view_id.startswith(f"{r}_")]
+    return max(owners, key=len) if owners else view_id.rpartition("_")[0]
+
+
+def reasons_of(root: Path) -> dict[tuple[str, str], str]:
+    """(house id, view id) -> "" where kept, else why refused, of the last selection; {} if none.
+
+    Raises BadInput when the selection's files are damaged.
+    """
+    run = json_object(root / "selection.json").get("run")
+    path = root / "selection" / f"{run}.jsonl"
+    if not run or not path.is_file():
+        return {}
+    try:
+        rows = [json.loads(line) for line in path.read_bytes().splitlines()]
+        return {(row["house"], row["view"]): str(row["reason"]) for row in rows}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BadInput(path, "", f"not the lines of a selection: {error}") from None
+
+
+def json_object(path: Path) -> dict[str, Any]:
+    """The JSON object in a file; {} if there is no such file; BadInput if it holds something else."""
+    try:
+        value = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as error:
+        raise BadInput(path, "", f"cannot be read as JSON: {error}") from None
+    if not isinstance(value, dict):
+        raise BadInput(path, "", "expected a JSON object")
+    return value

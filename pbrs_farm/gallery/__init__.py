@@ -1,0 +1,1 @@
+"""Contact sheet, HTML gallery and label sheet of an output folder."""

@@ -1,0 +1,109 @@
+"""How often each class is seen in an output folder, and what has no class. Effects: reads files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.formats.output_folder import ViewEntry, json_object, views_of
+from pbrs_farm.images import array_from_png
+
+
+class ClassRow(BaseModel):
+    """One NYU40 class. pixel_share: of all pixels. n_images: that see it. n_instances: seen in all."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    nyu40: int
+    name: str
+    pixel_share: float
+    n_images: int
+    n_instances: int
+
+
+class ClassStatistics(BaseModel):
+    """Classes by pixel share, largest first; id 0 is what has no class or is nothing.
+
+    classes_per_image: mean number of classes, 0 not counted. unmapped: "house: source class (how
+    many items)" of every item whose source's class has no place in the table; it is otherprop.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    n_views: int
+    classes_per_image: float
+    rows: tuple[ClassRow, ...]
+    unmapped: tuple[str, ...]
+
+    def text(self) -> str:
+        """The statistics as a Markdown table and a list."""
+        lines = [
+            f"{self.n_views} views, {self.classes_per_image:.1f} classes a view",
+            "",
+            "| class | id | pixels | images | instances an image |",
+            "|---|---|---|---|---|",
+        ]
+        for r in self.rows:
+            per_image = r.n_instances / r.n_images if r.n_images else 0.0
+            share, images = f"{100 * r.pixel_share:.2f} %", f"{r.n_images} of {self.n_views}"
+            lines.append(f"| {r.name} | {r.nyu40} | {share} | {images} | {per_image:.1f} |")
+        if self.unmapped:
+            lines += ["", "Without a class of their own (otherprop):"]
+            lines += [f"- {line}" for line in self.unmapped]
+        return "\n".join(lines)
+
+
+def class_statistics(folder: Path) -> ClassStatistics:
+    """Count the classes of every finished view below folder; classes never seen are left out.
+
+    Raises BadInput if folder holds no view with labels, or a label picture cannot be read.
+    """
+    views = [v for v in views_of(folder) if v.file("semantic.png") and "instances" in v.facts]
+    if not views:
+        raise BadInput(folder, "", "no finished view with labels")
+    pixels, images, instances = (np.zeros(256, np.int64) for _ in range(3))
+    for view in views:
+        counts = _pixels_of_classes(view)
+        pixels += counts
+        images += counts > 0
+        for row in view.facts["instances"]:
+            instances[int(row["nyu40"])] += 1
+    total = pixels.sum()
+    return ClassStatistics(
+        n_views=len(views),
+        classes_per_image=float(images[1:].sum() / len(views)),
+        rows=tuple(
+            ClassRow(
+                nyu40=int(i),
+                name=NYU40_NAMES[i],
+                pixel_share=float(pixels[i] / total),
+                n_images=int(images[i]),
+                n_instances=int(instances[i]),
+            )
+            for i in np.argsort(-pixels, kind="stable")
+            if pixels[i]
+        ),
+        unmapped=_unmapped(folder, {v.house.id for v in views}),
+    )
+
+
+def _pixels_of_classes(view: ViewEntry) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    place = f"{view.folder}/semantic.png"
+    ids = array_from_png((view.folder / "semantic.png").read_bytes(), place)
+    if ids.max(initial=0) >= len(NYU40_NAMES):
+        raise BadInput(place, "", f"holds class {ids.max()}, not 0..40")
+    return np.bincount(ids.reshape(-1), minlength=256).astype(np.int64)
+
+
+def _unmapped(folder: Path, houses: set[str]) -> tuple[str, ...]:
+    lines = []
+    for house in sorted(houses):
+        names: dict[str, int] = {}
+        for item in json_object(folder / "houses" / house / "house.json").get("items", ()):
+            if "unmapped" in item.get("tags", ()):
+                name = str(item.get("source_class") or item.get("name") or item.get("id"))
+                names[name] = names.get(name, 0) + 1
+        lines += [f"{house}: {name} ({n})" for name, n in sorted(names.items())]
+    return tuple(lines)

@@ -1,0 +1,125 @@
+"""How layers of numbers look on a sheet: depth, normals, classes, instances as colours; no effects."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import Srgb8Image
+
+_NYU40_HEX: Final = [
+    "0c0e12",
+    "cec8be",
+    "9c7654",
+    "9454c4",
+    "1c5c24",
+    "149cfc",
+    "8c1444",
+    "2c3cb4",
+    "ec6cc4",
+    "64bc34",
+    "fc8414",
+    "148c14",
+    "ec5454",
+    "544c74",
+    "34c4c4",
+    "2c9c94",
+    "ecdc14",
+    "fca4fc",
+    "1c7494",
+    "8c4c14",
+    "9c84ac",
+    "dcb414",
+    "e8ecf0",
+    "aca474",
+    "7c249c",
+    "aca4dc",
+    "fc94a4",
+    "849414",
+    "8cd484",
+    "845c7c",
+    "cc4ca4",
+    "5c744c",
+    "c42c5c",
+    "54e4fc",
+    "9c7cfc",
+    "2cfcac",
+    "2474e4",
+    "5c54b4",
+    "cc7c14",
+    "d4848c",
+    "c44c14",
+]
+
+NYU40_COLOURS: Final[NDArray[np.uint8]] = np.array(
+    [[int(text[i : i + 2], 16) for i in (0, 2, 4)] for text in _NYU40_HEX], np.uint8
+)
+"""(41, 3) sRGB of NYU40 ids 0..40. Structure is muted; each further class, the most frequent first,
+is the colour farthest in Oklab from those before it, so any two differ by 0.085 at least."""
+
+_NEAR_TO_FAR: Final = np.array(
+    [[253, 246, 214], [164, 216, 172], [64, 172, 172], [34, 112, 162], [42, 54, 122], [18, 14, 42]],
+    np.float64,
+)
+
+
+def depth_range_m(depth_mm: NDArray[np.integer]) -> tuple[float, float]:
+    """Metres of the 1st and 99th percentile of depth_mm where it is known; (0, 1) if it is nowhere."""
+    known = depth_mm[depth_mm > 0]
+    if not known.size:
+        return 0.0, 1.0
+    low, high = np.percentile(known, (1, 99)) / 1000.0
+    return float(low), float(max(high, low + 1e-3))
+
+
+def depth_colours(
+    depth_mm: NDArray[np.integer], near_m: float | None = None, far_m: float | None = None
+) -> Srgb8Image:
+    """(H, W, 3): pale where near, dark blue where far, grey where nothing is (0).
+
+    near_m, far_m: the ends of the scale; depth_range_m of the picture when None.
+    """
+    low, high = depth_range_m(depth_mm)
+    low = low if near_m is None else near_m
+    high = high if far_m is None else far_m
+    share = np.clip((depth_mm / 1000.0 - low) / max(high - low, 1e-6), 0, 1)
+    ramp = np.linspace(0, 1, len(_NEAR_TO_FAR))
+    table = np.stack(
+        [np.interp(np.arange(256) / 255, ramp, column) for column in _NEAR_TO_FAR.T], axis=-1
+    )
+    picked = np.rint(table[np.rint(share * 255).astype(np.intp)])
+    colours = np.asarray(picked, np.uint8)
+    colours[depth_mm == 0] = (58, 58, 62)
+    return colours
+
+
+def semantic_colours(nyu40: NDArray[np.integer]) -> Srgb8Image:
+    """(H, W, 3) colours of NYU40 ids; an id above 40 is shown as none."""
+    return NYU40_COLOURS[np.where(nyu40 > 40, 0, nyu40)]
+
+
+def instance_colours(instance: NDArray[np.integer]) -> Srgb8Image:
+    """(H, W, 3) a colour per instance id, the same in every view; neighbouring ids lie far apart."""
+    ids = np.arange(int(instance.max(initial=0)) + 1)
+    hue = (ids * 0.61803398875) % 1.0
+    value = np.array([0.96, 0.74, 0.56])[ids // 2 % 3]
+    saturation = np.array([0.72, 0.50, 0.85])[ids // 5 % 3]
+    ring = np.clip(np.abs((hue[:, None] * 6 + [0, 4, 2]) % 6 - 3) - 1, 0, 1)
+    table = 255 * value[:, None] * (1 - saturation[:, None] * (1 - ring))
+    table[0] = NYU40_COLOURS[0]
+    return np.asarray(np.rint(table).astype(np.uint8)[instance])
+
+
+def normal_colours(normal_png: NDArray[Any]) -> Srgb8Image:
+    """(H, W, 3) uint8 of a normal layer as stored (16-bit RGB); only the precision is lost."""
+    if normal_png.dtype == np.uint8:
+        return np.asarray(normal_png[..., :3], np.uint8)
+    return np.asarray(normal_png[..., :3] >> 8, np.uint8)
+
+
+def boundary_colours(boundary: NDArray[np.uint8]) -> Srgb8Image:
+    """(H, W, 3): boundaries are light on dark."""
+    table = np.array([[20, 22, 28], [244, 236, 214]], np.uint8)
+    return np.asarray(table[(boundary > 0).astype(np.intp)])

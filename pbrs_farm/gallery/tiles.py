@@ -1,0 +1,108 @@
+"""One view -> the nine tiles a sheet shows of it, as small pictures. Effects: reads picture files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm import images
+from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.formats.output_folder import ViewEntry
+from pbrs_farm.gallery import label_colours as colours
+
+
+@dataclass(frozen=True, slots=True)
+class TileKind:
+    """A column of the sheet. is_photo: a picture as it is; else numbers shown as colours."""
+
+    layer: str
+    title: str
+    file: str
+    is_photo: bool = False
+
+
+TILES: Final = (
+    TileKind("opengl_dl", "OpenGL, directional", "opengl_dl.png", True),
+    TileKind("opengl_il", "OpenGL, indoor", "opengl_il.png", True),
+    TileKind("mlt_ol", "Physical, outdoor", "mlt_ol.png", True),
+    TileKind("mlt_il_ol", "Physical, indoor + outdoor", "mlt_il_ol.png", True),
+    TileKind("depth", "Depth", "depth.png"),
+    TileKind("normal", "Normals", "normal.png"),
+    TileKind("semantic", "Classes", "semantic.png"),
+    TileKind("instance", "Instances", "instance.png"),
+    TileKind("boundary", "Boundaries", "boundary.png"),
+)
+
+_COLOURS: Final[dict[str, Callable[[NDArray[Any]], Srgb8Image]]] = {
+    "depth": colours.depth_colours,
+    "normal": colours.normal_colours,
+    "semantic": colours.semantic_colours,
+    "instance": colours.instance_colours,
+    "boundary": colours.boundary_colours,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tile:
+    """A tile of a view. pixels: (H, W, 3) sRGB, or None with the reason in missing.
+
+    note: what a reader needs with it ("0.8 to 5.4 m"). classes: (NYU40 id, share of the picture),
+    largest first, for the layer semantic only.
+    """
+
+    kind: TileKind
+    pixels: Srgb8Image | None
+    missing: str = ""
+    note: str = ""
+    classes: tuple[tuple[int, float], ...] = ()
+
+
+def tiles_of(view: ViewEntry, max_edge_px: int = 320) -> tuple[Tile, ...]:
+    """The view's tiles in the order of TILES; one that is absent or damaged says so in its place."""
+    return tuple(_tile(view, kind, max_edge_px) for kind in TILES)
+
+
+def _tile(view: ViewEntry, kind: TileKind, max_edge_px: int) -> Tile:
+    path = view.file(kind.file)
+    if path is None:
+        return Tile(kind, None, missing="not rendered")
+    try:
+        stored = images.array_from_png(path.read_bytes(), str(path))
+        if kind.is_photo:
+            return Tile(kind, images.thumbnail(_photo(stored), max_edge_px=max_edge_px))
+        pixels = _COLOURS[kind.layer](stored)
+    except (BadInput, OSError, ValueError, IndexError):
+        return Tile(kind, None, missing="cannot be read")
+    # Labels keep their values: the nearest pixel, but smooth layers are averaged.
+    nearest = kind.layer in ("semantic", "instance")
+    small = images.thumbnail(pixels, max_edge_px=max_edge_px, nearest=nearest)
+    return Tile(kind, small, note=_note(kind, stored), classes=_classes(kind, stored))
+
+
+def _photo(stored: NDArray[Any]) -> Srgb8Image:
+    if stored.dtype != np.uint8:
+        stored = (stored >> 8).astype(np.uint8)
+    return np.repeat(stored[..., None], 3, axis=2) if stored.ndim == 2 else stored[..., :3]
+
+
+def _note(kind: TileKind, stored: NDArray[Any]) -> str:
+    if kind.layer == "depth":
+        near, far = colours.depth_range_m(stored)
+        return f"{near:.1f} to {far:.1f} m"
+    if kind.layer == "instance":
+        return f"{len(np.unique(stored[stored > 0]))} instances"
+    return ""
+
+
+def _classes(kind: TileKind, stored: NDArray[Any]) -> tuple[tuple[int, float], ...]:
+    if kind.layer != "semantic":
+        return ()
+    counts = np.bincount(stored.reshape(-1), minlength=len(NYU40_NAMES))[: len(NYU40_NAMES)]
+    order = np.argsort(-counts, kind="stable")
+    return tuple((int(i), float(counts[i] / stored.size)) for i in order if counts[i])

@@ -1,0 +1,112 @@
+"""The OpenGL objects the rasterizer draws with: context, render targets, textures.
+
+Effects: opens an EGL context; everything here lives on it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.frames import srgb_from_linear
+
+_SRGB8_ALPHA8: Final = 0x8C43
+_MAX_TEXTURE_PX: Final = 4096
+
+
+def n_samples(context: Any, wanted: int) -> int:
+    """Samples a pixel that the context can give: 2 at least, so that pictures are multisampled."""
+    return max(2, min(wanted, int(context.max_samples)))
+
+
+def open_context() -> Any:
+    """A headless OpenGL 3.3 context through EGL; raises MachineFailed when there is none."""
+    try:
+        settings: Any = {"backend": "egl"}
+        context = moderngl.create_context(require=330, standalone=True, **settings)
+    except Exception as error:  # glcontext raises bare Exception
+        raise MachineFailed(
+            f"no headless OpenGL 3.3 on this machine: {error}",
+            hint="apt-get install libegl1 libgl1-mesa-dri, or a GPU driver with EGL",
+        ) from error
+    context.enable(moderngl.DEPTH_TEST)
+    return context
+
+
+def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
+    """A repeating, mipmapped sRGB texture from (H, W, 3 or 4) uint8, row 0 = top.
+
+    The GPU decodes to linear light before it filters. Larger than 4096 px is thinned out.
+    """
+    step = -(-max(pixels.shape[:2]) // _MAX_TEXTURE_PX)
+    thinned = pixels[::step, ::step]
+    rgba = np.full((*thinned.shape[:2], 4), 255, np.uint8)
+    rgba[..., : thinned.shape[2]] = thinned
+    size = (rgba.shape[1], rgba.shape[0])
+    texture = context.texture(size, 4, rgba[::-1].tobytes(), internal_format=_SRGB8_ALPHA8)
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    texture.repeat_x = texture.repeat_y = True
+    return texture
+
+
+class Target:
+    """What is drawn into: colour in half floats, multisampled, resolved on read; or ids.
+
+    nearest: for colour, the depth texture that a first pass over the house fills.
+    """
+
+    def __init__(self, context: Any, size: tuple[int, int], kind: str, samples: int) -> None:
+        self._context, self._size = context, size
+        self.nearest: Any = None
+        if kind == "ids":
+            planes = [context.renderbuffer(size, 1, dtype=t) for t in ("f4", "u4")]
+            self._drawn = context.framebuffer(planes, context.depth_renderbuffer(size))
+            self._resolved = self._drawn
+            return
+        plane = context.renderbuffer(size, 4, dtype="f2", samples=samples)
+        depth = context.depth_renderbuffer(size, samples=samples)
+        self._drawn = context.framebuffer([plane], depth)
+        self._resolved = context.framebuffer([context.renderbuffer(size, 4, dtype="f2")])
+        self.nearest = context.depth_texture(size, samples=samples)
+        self._depths = context.framebuffer([], self.nearest)
+
+    def begin_depths(self) -> None:
+        """Draw depth into nearest from now on."""
+        self._depths.use()
+        self._depths.clear(depth=1.0)
+
+    def begin(self, colour: tuple[float, ...]) -> None:
+        """Draw here from now on, over this colour."""
+        self._drawn.use()
+        self._drawn.clear(*colour, depth=1.0)
+
+    def read(self, dtype: str, attachment: int, channels: int) -> NDArray[Any]:
+        """(H, W, channels), row 0 = top."""
+        if self._resolved is not self._drawn:
+            self._context.copy_framebuffer(self._resolved, self._drawn)
+        raw = self._resolved.read(
+            components=channels, attachment=attachment, dtype=dtype, alignment=1
+        )
+        pixels = np.frombuffer(raw, np.dtype(dtype)).reshape(*self._size[::-1], channels)
+        return np.ascontiguousarray(pixels[::-1])
+
+
+def _encoding_table() -> NDArray[np.uint8]:
+    """(65536,) sRGB byte of every half float, by its bits; below 0 and NaN are 0, above 1 is 255."""
+    halves = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float64)
+    linear = np.clip(np.nan_to_num(halves, nan=0.0), 0.0, 1.0)
+    return np.rint(srgb_from_linear(linear) * 255).astype(np.uint8)
+
+
+_SRGB8_OF_HALF: Final = _encoding_table()
+
+
+def encoded(linear: NDArray[np.float16]) -> Srgb8Image:
+    """sRGB bytes of linear half floats."""
+    return _SRGB8_OF_HALF[linear.view(np.uint16)]

@@ -1,0 +1,57 @@
+"""What the shaders are told about each material and each item, as uniform blocks; no effects."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.house import House, Material, MaterialKind
+from pbrs_farm.raster.light_choice import LIGHT_FLOATS, best_lights, light_table
+
+LOOK_FLOATS = 16
+LAMP_TRANSMISSION = 0.1
+"""Share of light that a lamp shows on the far side of its own parts: shades look lit."""
+
+_GLOW = {MaterialKind.BULB: 1.0, MaterialKind.SHADE: 0.5}
+
+
+def looks(house: House) -> NDArray[np.float32]:
+    """(n_materials, 16) the Look block of each material."""
+    rows = [_look(m) for m in house.materials]
+    return np.array(rows, np.float32).reshape(-1, LOOK_FLOATS)
+
+
+def _look(material: Material) -> list[float]:
+    diffuse = linear_from_srgb(np.array(material.diffuse))
+    specular = linear_from_srgb(np.array(material.specular))
+    glow = _GLOW.get(material.kind, 0.0) * diffuse
+    exponent = material.shininess if specular.any() else 0.0
+    is_pane = material.kind is MaterialKind.PANE
+    return [
+        *diffuse, material.opacity,
+        *specular, exponent,
+        *glow, 0.0,
+        float(is_pane), 0.0, 0.0, 0.0,
+    ]  # fmt: skip
+
+
+def item_lights(house: House, n_best: int) -> NDArray[np.float32]:
+    """(n_items + 1, 4 + 16 n_best) the Lights block of each instance id: the best lights for it."""
+    lights = light_table(house)
+    block = np.zeros((len(house.items) + 1, 4 + LIGHT_FLOATS * n_best), np.float32)
+    if len(lights) and house.items:
+        bounds = np.array([item.bounds for item in house.items])
+        best = best_lights(lights, bounds[:, 0], bounds[:, 1], n_best)
+        block[1:, 0] = best.shape[1]
+        block[1:, 1] = [LAMP_TRANSMISSION if item.lights else 0.0 for item in house.items]
+        block[1:, 4 : 4 + LIGHT_FLOATS * best.shape[1]] = lights[best].reshape(len(best), -1)
+    return block
+
+
+def aligned_rows(rows: NDArray[np.float32], alignment_bytes: int) -> NDArray[np.float32]:
+    """Rows padded so that each starts at a multiple of alignment_bytes."""
+    step = -(-rows.shape[1] * 4 // alignment_bytes) * alignment_bytes // 4
+    padded = np.zeros((len(rows), step), np.float32)
+    padded[:, : rows.shape[1]] = rows
+    return padded

@@ -1,0 +1,110 @@
+"""House -> one vertex buffer, one index buffer and the draws that cut it up; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import House, Surface
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """All triangles of a house as OpenGL wants them, and the draws they are drawn in.
+
+    vertices: (V, 8) float32 rows of position (world, m), normal (unit) and uv (v up).
+    indices: (F, 3) uint32. A draw is the triangles of one item with one material:
+    draw_first, draw_count: (D,) int64, in triangles. draw_item: (D,) instance id.
+    draw_material: (D,) index into House.materials. draw_low, draw_high: (D, 3) box in the world.
+    """
+
+    vertices: NDArray[np.float32]
+    indices: NDArray[np.uint32]
+    draw_first: NDArray[np.int64]
+    draw_count: NDArray[np.int64]
+    draw_item: NDArray[np.int64]
+    draw_material: NDArray[np.int64]
+    draw_low: NDArray[np.float64]
+    draw_high: NDArray[np.float64]
+
+    @property
+    def n_draws(self) -> int:
+        """How many draws there are."""
+        return len(self.draw_first)
+
+
+def mesh_from_house(house: House) -> Mesh:
+    """The mesh of every surface of house, panes included; non-finite triangles are dropped."""
+    vertices: list[NDArray[np.float32]] = []
+    indices: list[NDArray[np.uint32]] = []
+    rows: list[tuple[int, int, int, int]] = []
+    boxes: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
+    n_vertices = n_faces = 0
+
+    for instance, item in enumerate(house.items, start=1):
+        for material in dict.fromkeys(s.material for s in item.surfaces):
+            first, corners = n_faces, []
+            for surface in item.surfaces:
+                if surface.material != material:
+                    continue
+                v, f = _vertices(surface)
+                vertices.append(v)
+                indices.append((f + n_vertices).astype(np.uint32))
+                corners.append(v[f.reshape(-1), :3])
+                n_vertices, n_faces = n_vertices + len(v), n_faces + len(f)
+            if n_faces > first:
+                points = np.concatenate(corners)
+                boxes.append((points.min(0), points.max(0)))
+                rows.append((first, n_faces - first, instance, material))
+
+    table = np.array(rows, np.int64).reshape(-1, 4)
+    box = np.array(boxes, np.float64).reshape(-1, 2, 3)
+    return Mesh(
+        np.concatenate([np.zeros((0, 8), np.float32), *vertices]),
+        np.concatenate([np.zeros((0, 3), np.uint32), *indices]),
+        draw_first=table[:, 0],
+        draw_count=table[:, 1],
+        draw_item=table[:, 2],
+        draw_material=table[:, 3],
+        draw_low=box[:, 0],
+        draw_high=box[:, 1],
+    )
+
+
+def _vertices(surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """(V, 8) vertices and (F, 3) faces of a surface; flat ones get three vertices per face."""
+    points, faces = surface.positions, surface.faces.astype(np.int64)
+    finite: NDArray[np.bool_] = np.all(np.isfinite(points), axis=1)
+    faces = faces[np.all(finite[faces], axis=1)]
+    uvs = surface.uvs if surface.uvs is not None else np.zeros((len(points), 2), np.float32)
+    normals = surface.normals
+    if normals is None or not _all_unit(normals[faces.reshape(-1)]):
+        corner = faces.reshape(-1)
+        flat = np.repeat(_face_normals(points, faces), 3, axis=0)
+        if normals is not None:
+            kept = normals[corner]
+            flat = np.where(_unit_rows(kept)[:, None], kept, flat)
+        points, normals, uvs = points[corner], flat, uvs[corner]
+        faces = np.arange(len(corner)).reshape(-1, 3)
+    finite_uvs = np.where(np.isfinite(uvs), uvs, np.float32(0))
+    return np.concatenate([points, normals, finite_uvs], 1, dtype=np.float32), faces
+
+
+def _unit_rows(normals: NDArray[np.float32]) -> NDArray[np.bool_]:
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(np.einsum("ij,ij->i", normals, normals) - 1) < 0.1)
+
+
+def _all_unit(normals: NDArray[np.float32]) -> bool:
+    return bool(_unit_rows(normals).all())
+
+
+def _face_normals(points: NDArray[np.float32], faces: NDArray[np.int64]) -> NDArray[np.float32]:
+    """(F, 3) unit normals; +y for triangles without area."""
+    a, b, c = (points[faces[:, k]].astype(np.float64) for k in range(3))
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1, keepdims=True)
+    unit = np.where(length > 0, cross / np.maximum(length, 1e-300), [0.0, 1.0, 0.0])
+    return unit.astype(np.float32)

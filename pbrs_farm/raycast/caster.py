@@ -1,0 +1,131 @@
+"""The ray caster over a house's triangles: hit records, item buffers, item counts, first hits.
+
+Effects: holds a Mitsuba scene. Mitsuba says which face a ray hits; everything else in a hit
+record is computed here, in double precision, from that face's float32 vertices: the labels are
+the same bits for every variant and as exact as the geometry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import HitRecord, ItemBuffer
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import Geometry
+from pbrs_farm.raycast.hit_record import hit_record_from_faces
+from pbrs_farm.raycast.scalar_tracer import ScalarTracer
+from pbrs_farm.raycast.tracer import JitTracer, RayTracer
+from pbrs_farm.raycast.variant import choose_variant
+
+_FACES_AT_ONCE: Final = 1 << 18
+
+
+class Caster:
+    """Rays over one Geometry, panes included; face numbers are Geometry's.
+
+    Degenerate triangles and those with a vertex that is no finite number are never hit.
+    A geometry without faces is allowed: every ray then hits nothing.
+    """
+
+    def __init__(self, geometry: Geometry, *, variant: str | None = None) -> None:
+        """variant: a Mitsuba variant; the best that works here when None."""
+        self.geometry = geometry
+        self.variant = choose_variant() if variant is None else variant
+        self.n_items = int(geometry.face_item.max()) if len(geometry.face_item) else 0
+        self._tracer = _tracer(self.variant, geometry, _hittable(geometry))
+        self._without: tuple[bytes, RayTracer | None] = (b"", None)
+
+    def hit_record(
+        self, camera: Camera, *, skip_faces: NDArray[np.bool_] | None = None
+    ) -> HitRecord:
+        """What the ray through each pixel's centre hits first (rule 8).
+
+        skip_faces: (F,) bool, faces that rays pass through: with the panes' faces this is the
+        hit behind glass. Raises ValueError if it is not one entry per face.
+        """
+        tracer = self._tracer if skip_faces is None else self._tracer_without(skip_faces)
+        return hit_record_from_faces(self.geometry, camera, _faces(tracer, camera))
+
+    def item_buffer(self, camera: Camera) -> ItemBuffer:
+        """(H, W) uint32 instance id seen through each pixel's centre, 0 = nothing."""
+        face = _faces(self._tracer, camera)
+        if not len(self.geometry.face_item):
+            return np.zeros(face.shape, np.uint32)
+        return np.where(face >= 0, self.geometry.face_item[face], np.uint32(0))
+
+    def item_counts(self, cameras: Sequence[Camera]) -> NDArray[np.uint32]:
+        """(n_cameras, n_items + 1) pixels each item covers; column 0 counts nothing.
+
+        n_items is the largest instance id of the geometry. Cameras may differ in size. The
+        result aside, memory does not grow with the number of cameras. Rays through edges may
+        fall otherwise than in item_buffer: 9 of a million pixels differed (see rays.py).
+        """
+        if self._tracer is None or not cameras:
+            counts = np.zeros((len(cameras), self.n_items + 1), np.uint32)
+            for row, camera in enumerate(cameras):
+                counts[row, 0] = camera.intrinsics.width_px * camera.intrinsics.height_px
+            return counts
+        return self._tracer.counts(cameras, self.geometry.face_item, self.n_items + 1)
+
+    def first_hit(
+        self,
+        origins: NDArray[np.floating],
+        directions: NDArray[np.floating],
+        max_distance: float | NDArray[np.floating] = np.inf,
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """(N,) float32 distance, inf = nothing, and (N,) int32 face, -1 = nothing.
+
+        origins, directions: (N, 3); distances are in lengths of each direction: metres when it
+        is a unit vector. A ray that starts on a surface may hit it at 0: start a little off it.
+        """
+        n = len(origins)
+        if self._tracer is None or n == 0:
+            return np.full(n, np.inf, np.float32), np.full(n, -1, np.int32)
+        reach = np.broadcast_to(np.asarray(max_distance, np.float32), (n,))
+        return self._tracer.first_hit(
+            np.asarray(origins, np.float32), np.asarray(directions, np.float32), reach
+        )
+
+    def _tracer_without(self, skip_faces: NDArray[np.bool_]) -> RayTracer | None:
+        if skip_faces.shape != (len(self.geometry.faces),):
+            raise ValueError(
+                f"skip_faces: expected ({len(self.geometry.faces)},), got {skip_faces.shape}"
+            )
+        key = np.packbits(skip_faces).tobytes()
+        if self._without[0] != key:
+            keep = _hittable(self.geometry) & ~skip_faces
+            self._without = (key, _tracer(self.variant, self.geometry, keep))
+        return self._without[1]
+
+
+def _tracer(variant: str, geometry: Geometry, keep: NDArray[np.bool_]) -> RayTracer | None:
+    if not keep.any():
+        return None
+    # A face that must not be hit keeps its number but collapses to a point.
+    faces = np.where(keep[:, None], geometry.faces, geometry.faces[np.argmax(keep), :1])
+    positions = np.where(np.isfinite(geometry.positions), geometry.positions, np.float32(0))
+    build = ScalarTracer if variant.startswith("scalar") else JitTracer
+    return build(variant, positions, faces)
+
+
+def _hittable(geometry: Geometry) -> NDArray[np.bool_]:
+    """(F,) bool: finite vertices and an area above what float32 can tell from none."""
+    keep = np.zeros(len(geometry.faces), np.bool_)
+    for start in range(0, len(keep), _FACES_AT_ONCE):
+        part = slice(start, start + _FACES_AT_ONCE)
+        corners = geometry.positions[geometry.faces[part]].astype(np.float64)
+        with np.errstate(invalid="ignore", over="ignore"):
+            edges = corners[:, [1, 2]] - corners[:, :1]
+            twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+            keep[part] = np.isfinite(corners).all((1, 2)) & (twice_area > 1e-12)
+    return keep
+
+
+def _faces(tracer: RayTracer | None, camera: Camera) -> NDArray[np.int32]:
+    if tracer is None:
+        return np.full((camera.intrinsics.height_px, camera.intrinsics.width_px), -1, np.int32)
+    return tracer.faces_of_camera(camera)

@@ -1,0 +1,152 @@
+"""From the face each pixel's ray hits to a full hit record; pure numpy, no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import HitRecord
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import Geometry
+
+
+def hit_record_from_faces(geometry: Geometry, camera: Camera, face: NDArray[np.int32]) -> HitRecord:
+    """The record of face (H, W), int32, -1 = nothing, seen by the camera's unjittered rays.
+
+    The hit is where the ray meets the face's plane, computed in float64 and held to the triangle
+    (at grazing angles the plane's hit may lie beside it). Geometric normals are the faces' own,
+    turned towards the camera; shading normals lie on the geometric normal's side. Faces must
+    have an area.
+    """
+    origin, directions = camera.exact_rays()
+    pixels = np.flatnonzero(face.ravel() >= 0)
+    d = directions.reshape(-1, 3)[pixels]
+    f, local = _numbered(face.ravel()[pixels], len(geometry.faces))
+    planes = _planes(geometry, f, origin)
+
+    t, weights = _meet(planes, local, d, -camera.world_from_camera[:3, 2])
+    normal = planes.normal[local]
+    normal[_dot(normal, d) > 0] *= -1
+    corner = geometry.faces[f][local]
+
+    shape = face.shape
+    return HitRecord(
+        face=np.ascontiguousarray(face, np.int32),
+        item=_image(geometry.face_item[f][local], pixels, shape, np.uint32),
+        depth_z=_image(t, pixels, shape, np.float32),
+        position_world=_image(planes.origin + t[:, None] * d, pixels, shape, np.float32),
+        geo_normal_world=_image(normal, pixels, shape, np.float32),
+        shading_normal_world=_image(
+            _shading_normal(geometry, corner, weights, normal), pixels, shape, np.float32
+        ),
+        uv=_image(_mixed(weights, geometry.uvs, corner), pixels, shape, np.float32),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Planes:
+    """What a ray from origin needs of K faces, float64.
+
+    a, b, c: (K, 3) corners. normal: (K, 3) unit. grad_b, grad_c: (K, 3) gradients of the
+    barycentric coordinates of b and c.
+    """
+
+    origin: NDArray[np.float64]
+    a: NDArray[np.float64]
+    b: NDArray[np.float64]
+    c: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    grad_b: NDArray[np.float64]
+    grad_c: NDArray[np.float64]
+
+
+def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: NDArray[np.float64]) -> _Planes:
+    corner = geometry.faces[faces]
+    a, b, c = (geometry.positions[corner[:, k]].astype(np.float64) for k in range(3))
+    n = np.cross(b - a, c - a)
+    squared = _dot(n, n)[:, None]
+    return _Planes(
+        origin=origin,
+        a=a,
+        b=b,
+        c=c,
+        normal=n / np.sqrt(squared),
+        grad_b=np.cross(c - a, n) / squared,
+        grad_c=np.cross(n, b - a) / squared,
+    )
+
+
+def _meet(
+    planes: _Planes,
+    local: NDArray[np.intp],
+    d: NDArray[np.float64],
+    axis: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(N,) t along d (N, 3) to plane local[n], and (N, 3) weights of a, b, c, all >= 0."""
+    from_a = planes.origin - planes.a
+    along = _dot(planes.normal[local], d)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = -_dot(from_a, planes.normal)[local] / along
+        w_b = _dot(from_a, planes.grad_b)[local] + t * _dot(planes.grad_b[local], d)
+        w_c = _dot(from_a, planes.grad_c)[local] + t * _dot(planes.grad_c[local], d)
+    weights = np.stack([1 - w_b - w_c, w_b, w_c], axis=1)
+
+    # Hold to the triangle what the plane puts beside it; a ray in the plane takes its middle.
+    beside = np.flatnonzero(~((weights >= 0).all(1) & np.isfinite(t)))
+    held = np.nan_to_num(weights[beside], nan=1.0, posinf=1.0, neginf=0.0).clip(0.0, 1.0)
+    held /= held.sum(1, keepdims=True)
+    weights[beside] = held
+    k = local[beside]
+    point = held[:, :1] * planes.a[k] + held[:, 1:2] * planes.b[k] + held[:, 2:] * planes.c[k]
+    t[beside] = (point - planes.origin) @ axis
+    return t, weights
+
+
+def _shading_normal(
+    geometry: Geometry,
+    corner: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    geo_normal: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(N, 3) interpolated vertex normals on the geometric normal's side; that normal where flat."""
+    shading = _mixed(weights, geometry.normals, corner)
+    length = np.sqrt(_dot(shading, shading))
+    smooth = length > 1e-6
+    shading /= np.where(smooth, length, 1.0)[:, None]
+    shading[~smooth] = geo_normal[~smooth]
+    shading[_dot(shading, geo_normal) < 0] *= -1
+    return shading
+
+
+def _mixed(
+    weights: NDArray[np.float64], values: NDArray[np.float32], corner: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """(N, C) values (V, C) at the corners (N, 3), weighted."""
+    mixed = weights[:, :1] * values[corner[:, 0]]
+    for k in (1, 2):
+        mixed += weights[:, k : k + 1] * values[corner[:, k]]
+    return np.asarray(mixed)
+
+
+def _numbered(face: NDArray[np.int32], n_faces: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The distinct faces, ascending, and each pixel's place among them."""
+    seen = np.zeros(n_faces, np.bool_)
+    seen[face] = True
+    place = np.cumsum(seen) - 1
+    return np.flatnonzero(seen), place[face]
+
+
+def _dot(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.einsum("ij,ij->i", x, y))
+
+
+def _image(
+    values: NDArray[Any], pixels: NDArray[np.intp], shape: tuple[int, ...], dtype: type[np.generic]
+) -> NDArray[Any]:
+    """Image of shape + values' own axes, values at the pixels and 0 elsewhere."""
+    image = np.zeros((int(np.prod(shape)), *values.shape[1:]), dtype)
+    image[pixels] = values
+    return image.reshape(*shape, *values.shape[1:])

@@ -1,0 +1,62 @@
+"""RayTracer of the scalar variant, ray by ray: the fallback of machines without LLVM.
+
+Effects: holds a Mitsuba scene. About a million rays a second, 20 times slower than rays.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.raycast.tracer import scene_from_mesh
+from pbrs_farm.raycast.variant import mitsuba
+
+
+class ScalarTracer:
+    """RayTracer of scalar_rgb; the same answers as JitTracer but for ties."""
+
+    def __init__(
+        self, variant: str, positions: NDArray[np.float32], faces: NDArray[np.int32]
+    ) -> None:
+        self._variant = variant
+        self._scene = scene_from_mesh(mitsuba(variant), positions, faces)
+
+    def faces_of_camera(self, camera: Camera) -> NDArray[np.int32]:
+        """(H, W) face seen through each pixel's centre, -1 = nothing."""
+        origin, directions = camera.rays()
+        flat = directions.reshape(-1, 3)
+        origins = np.broadcast_to(origin, flat.shape)
+        reach = np.broadcast_to(np.float32(np.inf), len(flat))
+        _t, face = self.first_hit(origins, flat, reach)
+        return face.reshape(directions.shape[:2])
+
+    def first_hit(
+        self,
+        origins: NDArray[np.float32],
+        directions: NDArray[np.float32],
+        max_distance: NDArray[np.float32],
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """(N,) distance (inf = nothing) and (N,) face (-1 = nothing)."""
+        mi = mitsuba(self._variant)
+        intersect = self._scene.ray_intersect_preliminary
+        distance = np.full(len(origins), np.inf, np.float32)
+        face = np.full(len(origins), -1, np.int32)
+        for index, (o, d) in enumerate(zip(origins.tolist(), directions.tolist(), strict=True)):
+            hit = intersect(mi.Ray3f(mi.Point3f(o), mi.Vector3f(d)))
+            if hit.is_valid() and hit.t <= max_distance[index]:
+                distance[index], face[index] = hit.t, hit.prim_index
+        return distance, face
+
+    def counts(
+        self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
+    ) -> NDArray[np.uint32]:
+        """(n_cameras, n_labels) pixels of each label; label 0 also counts what hits nothing."""
+        counts = np.zeros((len(cameras), n_labels), np.uint32)
+        for row, camera in enumerate(cameras):
+            face = self.faces_of_camera(camera)
+            label = np.where(face >= 0, face_label[face], np.uint32(0))
+            counts[row] = np.bincount(label.ravel(), minlength=n_labels)
+        return counts

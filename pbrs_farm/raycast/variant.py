@@ -1,0 +1,126 @@
+"""Which Mitsuba variant works on this machine, and LLVM's library for it.
+
+Effects: sets DRJIT_LIBLLVM_PATH and Mitsuba's variant of this process.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+from pbrs_farm.core.errors import MachineFailed
+
+MIN_LLVM: Final = 17
+"""Older ones (14 to 16) crash inside Dr.Jit's first compilation."""
+
+_LIBRARY_PLACES: Final = (
+    "/usr/lib/*-linux-gnu/libLLVM*.so*",
+    "/usr/lib/llvm-*/lib/libLLVM*.so*",
+    "/usr/lib64/libLLVM*.so*",
+    "/usr/lib/libLLVM*.so*",
+    "/usr/local/lib/libLLVM*.so*",
+    "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
+    "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
+)
+
+
+def llvm_version(library: Path) -> tuple[int, ...]:
+    """Version of a libLLVM by its real file name (libLLVM.so.19.1, libLLVM-14.0.6.so.1); () unknown."""
+    match = re.search(r"LLVM(?:-|\.so\.|\.)(\d+(?:\.\d+)*)", library.resolve().name)
+    return tuple(int(n) for n in match.group(1).split(".")) if match else ()
+
+
+def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
+    """(version, path) of every libLLVM in the usual places, newest first, one path per file."""
+    environment = Path(sys.prefix)
+    patterns = (*_LIBRARY_PLACES, str(environment / "lib" / "libLLVM*.so*"))
+    found: dict[Path, tuple[int, ...]] = {}
+    for pattern in patterns:
+        for path in Path("/").glob(pattern.lstrip("/")):
+            version = llvm_version(path)
+            if version:
+                found[path.resolve()] = version
+    return sorted(((v, p) for p, v in found.items()), reverse=True)
+
+
+def find_llvm() -> Path | None:
+    """The library Dr.Jit should load: DRJIT_LIBLLVM_PATH when new enough, else the newest found.
+
+    None when there is none of version 17 or later.
+    """
+    named = os.environ.get("DRJIT_LIBLLVM_PATH", "")
+    if named and Path(named).exists():
+        version = llvm_version(Path(named))
+        if not version or version[0] >= MIN_LLVM:
+            return Path(named)
+    good = [path for version, path in llvm_libraries() if version[0] >= MIN_LLVM]
+    return good[0] if good else None
+
+
+@functools.cache
+def choose_variant() -> str:
+    """cuda_ad_rgb if a GPU really works, else llvm_ad_rgb with LLVM >= 17, else scalar_rgb.
+
+    Sets DRJIT_LIBLLVM_PATH before Dr.Jit loads LLVM. Each variant is tried with one ray.
+    Raises MachineFailed when Mitsuba is not installed or no variant works.
+    """
+    library = find_llvm()
+    if library is not None:
+        os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
+    try:
+        dr = importlib.import_module("drjit")
+    except ImportError as error:
+        raise MachineFailed(
+            f"Mitsuba cannot be imported: {error}", hint="pip install 'pbrs-farm[transport]'"
+        ) from error
+    if dr.has_backend(dr.JitBackend.CUDA) and works("cuda_ad_rgb"):
+        return "cuda_ad_rgb"
+    if library is not None and _has_good_llvm(dr) and works("llvm_ad_rgb"):
+        return "llvm_ad_rgb"
+    if works("scalar_rgb"):
+        return "scalar_rgb"
+    raise MachineFailed("no variant of Mitsuba works", hint="run `pbrs-farm doctor`")
+
+
+def mitsuba(variant: str | None = None) -> Any:
+    """The mitsuba module with the variant set; the chosen one when None. Raises MachineFailed."""
+    name = choose_variant() if variant is None else variant
+    try:
+        module = importlib.import_module("mitsuba")
+    except ImportError as error:
+        raise MachineFailed(
+            f"Mitsuba cannot be imported: {error}", hint="pip install 'pbrs-farm[transport]'"
+        ) from error
+    if module.variant() != name:
+        module.set_variant(name)
+    return module
+
+
+def set_threads(n_threads: int) -> None:
+    """Let Dr.Jit use n_threads cores of this process; raises MachineFailed without Dr.Jit."""
+    choose_variant()
+    importlib.import_module("drjit").set_thread_count(n_threads)
+
+
+def _has_good_llvm(dr: Any) -> bool:
+    # Dr.Jit may have loaded another library before we named one: ask it, do not compile yet.
+    if not dr.has_backend(dr.JitBackend.LLVM):
+        return False
+    return bool(dr.detail.llvm_version()[0] >= MIN_LLVM)
+
+
+def works(variant: str) -> bool:
+    """The variant traces a ray on this machine."""
+    try:
+        mi = mitsuba(variant)
+        scene = mi.load_dict({"type": "scene", "shape": {"type": "rectangle"}})
+        ray = mi.Ray3f(mi.Point3f(0, 0, 1), mi.Vector3f(0, 0, -1))
+        t = scene.ray_intersect_preliminary(ray).t
+        return abs(float(t if isinstance(t, float) else t[0]) - 1.0) < 1e-4
+    except (MachineFailed, RuntimeError, ImportError, ValueError, AttributeError):
+        return False

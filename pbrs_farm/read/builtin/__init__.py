@@ -1,0 +1,1 @@
+"""A furnished home made in code; no effects."""

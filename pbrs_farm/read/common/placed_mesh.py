@@ -1,0 +1,79 @@
+"""Meshes of a model's own frame -> surfaces and boxes in the world; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import Box, Surface
+from pbrs_farm.read.mesh.obj import Mesh
+
+_MIN_TWICE_AREA_M2 = 1e-12
+
+
+def placed(
+    mesh: Mesh, world_from_model: NDArray[np.float64], *, name: str, material: int
+) -> Surface | None:
+    """A mesh as a Surface in the world; None if no area is left.
+
+    A mirroring transform turns the winding, so that fronts stay in front. Degenerate faces go.
+    """
+    world = transform_points(world_from_model, mesh.positions).astype(np.float32)
+    faces = mesh.faces
+    if np.linalg.det(world_from_model[:3, :3]) < 0:
+        faces = faces[:, ::-1]
+    p = world[faces].astype(np.float64)
+    twice_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    faces = faces[twice_area > _MIN_TWICE_AREA_M2]
+    if not len(faces):
+        return None
+    return Surface(
+        name=name,
+        positions=world,
+        faces=np.ascontiguousarray(faces),
+        material=material,
+        uvs=None if mesh.uvs is None else mesh.uvs.astype(np.float32),
+        normals=_normals(mesh.normals, world_from_model),
+    )
+
+
+def _normals(
+    normals: NDArray[np.float64], world_from_model: NDArray[np.float64]
+) -> NDArray[np.float32] | None:
+    """Unit normals by the inverse transpose, or None (flat) if one is zero."""
+    n = normals @ np.linalg.inv(world_from_model[:3, :3])
+    length = np.linalg.norm(n, axis=1, keepdims=True)
+    if (length < 1e-12).any():
+        return None
+    unit: NDArray[np.float32] = (n / length).astype(np.float32)
+    return unit
+
+
+def oriented_box(meshes: Sequence[Mesh], world_from_model: NDArray[np.float64]) -> Box | None:
+    """The model's own axis-aligned box in the world; None where the transform shears."""
+    low = np.min([m.positions.min(0) for m in meshes], 0)
+    high = np.max([m.positions.max(0) for m in meshes], 0)
+    scale = np.linalg.norm(world_from_model[:3, :3], axis=0)
+    axes = world_from_model[:3, :3] / scale
+    if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-4):
+        return None
+    if np.linalg.det(axes) < 0:
+        axes = axes * np.array([-1.0, 1.0, 1.0])
+    centre = world_from_model[:3, :3] @ ((low + high) / 2) + world_from_model[:3, 3]
+    return Box(centre, scale * (high - low) / 2, axes)
+
+
+def part_of(surface: Surface, faces: NDArray[np.int32], name: str) -> Surface:
+    """Some faces of a surface with the vertices they use, as a surface of its own."""
+    used, numbers = np.unique(faces, return_inverse=True)
+    return Surface(
+        name=name,
+        positions=surface.positions[used],
+        faces=numbers.reshape(-1, 3).astype(np.int32),
+        material=surface.material,
+        uvs=None if surface.uvs is None else surface.uvs[used],
+        normals=None if surface.normals is None else surface.normals[used],
+    )

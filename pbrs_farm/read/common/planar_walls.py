@@ -1,0 +1,70 @@
+"""A mesh of several planar walls -> an item per plane, so that repair can thicken each; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.read.common.placed_mesh import part_of
+
+MAX_PLANES: Final = 200
+"""A wall of more planes is sculpted, not built of sheets, and stays whole."""
+
+_WELD_M: Final = 1e-4
+
+
+def planar_parts(item: Item) -> tuple[Item, ...]:
+    """An open wall mesh as one item per plane its faces lie in (to a degree and a centimetre).
+
+    A closed wall, a wall of one plane and whatever is no wall come back as they are.
+    """
+    if item.kind is not ItemKind.WALL or _is_closed(item.surfaces):
+        return (item,)
+    plane_of_face = _planes(item.surfaces)
+    n = int(plane_of_face.max(initial=0)) + 1
+    if not 1 < n <= MAX_PLANES:
+        return (item,)
+    ends = np.cumsum([len(s.faces) for s in item.surfaces])[:-1]
+    by_surface = np.split(plane_of_face, ends)
+    found = []
+    for plane in range(n):
+        parts = tuple(
+            part_of(s, s.faces[of_face == plane], s.name)
+            for s, of_face in zip(item.surfaces, by_surface, strict=True)
+            if (of_face == plane).any()
+        )
+        found.append(replace(item, id=f"{item.id}.{plane}", surfaces=parts, lights=(), box=None))
+    return (replace(found[0], lights=item.lights), *found[1:])
+
+
+def _corners(surfaces: tuple[Surface, ...]) -> NDArray[np.float64]:
+    found = [s.positions[s.faces].astype(np.float64) for s in surfaces]
+    return np.concatenate([np.zeros((0, 3, 3)), *found])
+
+
+def _is_closed(surfaces: tuple[Surface, ...]) -> bool:
+    """Whether every edge has a face on either side, vertices within a tenth of a millimetre one."""
+    corners = np.rint(_corners(surfaces).reshape(-1, 3) / _WELD_M)
+    _, vertex = np.unique(corners, axis=0, return_inverse=True)
+    faces = vertex.reshape(-1, 3)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    _, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    return bool(len(count)) and bool((count % 2 == 0).all())
+
+
+def _planes(surfaces: tuple[Surface, ...]) -> NDArray[np.int64]:
+    """(F,) number of the plane each face lies in, either side up, in order of first appearance."""
+    p = _corners(surfaces)
+    n = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
+    leading = np.abs(n).argmax(1)
+    n *= np.sign(n[np.arange(len(n)), leading])[:, None]
+    offset = np.einsum("ij,ij->i", n, p.mean(1))
+    key = np.rint(np.column_stack([n * 50, offset * 100]))
+    _, first, plane = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(np.argsort(first))
+    return np.asarray(order[plane.reshape(-1)], np.int64)

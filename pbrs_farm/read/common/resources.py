@@ -1,0 +1,122 @@
+"""Named contents beside a house's plan: models, textures; reads bytes that are already in memory.
+
+Nothing is trusted: names with `..`, absolute names and entries of absurd size are refused, and a
+compressed entry is never unpacked further than it may be.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from typing import Protocol
+
+from pbrs_farm.core.errors import BadHouse
+
+MAX_ENTRY_BYTES = 256 * 2**20
+MAX_TOTAL_BYTES = 2 * 2**30
+MAX_ENTRIES = 50_000
+
+
+class Resources(Protocol):
+    """Contents by name with "/" between folders."""
+
+    def read(self, name: str) -> bytes | None:
+        """The content's bytes, or None if there is none of that name."""
+        ...
+
+
+class ZipResources:
+    """The entries of a zip archive held in memory; every read is bounded.
+
+    Raises BadHouse for what is no zip, a damaged one, a name that leaves the archive's root, too
+    many entries, or one that is or claims to be larger than MAX_ENTRY_BYTES.
+    """
+
+    def __init__(self, data: bytes, file: str) -> None:
+        self._file = file
+        try:
+            self._zip = zipfile.ZipFile(io.BytesIO(data))
+            entries = self._zip.infolist()
+        except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, EOFError) as error:
+            raise BadHouse(
+                file, "", f"damaged zip archive: {error}", hint="copy or save the file again"
+            ) from None
+        if len(entries) > MAX_ENTRIES:
+            raise BadHouse(file, "", f"{len(entries)} zip entries, at most {MAX_ENTRIES} are read")
+        for entry in entries:
+            self._check(entry)
+        total = sum(e.file_size for e in entries)
+        if total > MAX_TOTAL_BYTES:
+            raise BadHouse(file, "", f"unpacks to {total} bytes, at most {MAX_TOTAL_BYTES}")
+        self._entries = {e.filename: e for e in entries if not e.is_dir()}
+
+    def _check(self, entry: zipfile.ZipInfo) -> None:
+        name = entry.filename
+        place = f"entry {name[:80]!r}"
+        if name.startswith("/") or ".." in name.replace("\\", "/").split("/"):
+            raise BadHouse(self._file, place, "its name leaves the archive")
+        if entry.file_size > MAX_ENTRY_BYTES:
+            raise BadHouse(
+                self._file, place, f"unpacks to {entry.file_size} bytes, at most {MAX_ENTRY_BYTES}"
+            )
+
+    def read(self, name: str) -> bytes | None:
+        """The entry's bytes, or None if there is none; BadHouse if it is damaged."""
+        entry = self._entries.get(name)
+        if entry is None:
+            return None
+        try:
+            with self._zip.open(entry) as stream:
+                data = stream.read(entry.file_size + 1)
+        except (
+            zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError,
+            NotImplementedError, RuntimeError,
+        ) as error:  # fmt: skip
+            raise BadHouse(
+                self._file, f"entry {name[:80]!r}", f"cannot be unpacked: {error}"
+            ) from None
+        if len(data) > entry.file_size:
+            raise BadHouse(
+                self._file, f"entry {name[:80]!r}", "unpacks to more than its directory says"
+            )
+        return data
+
+    def names(self) -> tuple[str, ...]:
+        """Every entry's name, in the archive's order."""
+        return tuple(self._entries)
+
+
+class DictResources:
+    """Contents held in a dictionary."""
+
+    def __init__(self, contents: dict[str, bytes]) -> None:
+        self._contents = dict(contents)
+
+    def read(self, name: str) -> bytes | None:
+        """The content's bytes, or None."""
+        return self._contents.get(name)
+
+
+class Layered:
+    """Contents looked up in several places, the first that has them."""
+
+    def __init__(self, *layers: Resources | None) -> None:
+        self._layers = tuple(layer for layer in layers if layer is not None)
+
+    def read(self, name: str) -> bytes | None:
+        """The content's bytes from the first layer that has it, or None."""
+        for layer in self._layers:
+            data = layer.read(name)
+            if data is not None:
+                return data
+        return None
+
+
+def media_type(data: bytes) -> str:
+    """The picture's media type by its first bytes, or "" if it is none we can read."""
+    if data.startswith(b"\x89PNG\r\n\x1a\n"):
+        return "image/png"
+    if data.startswith(b"\xff\xd8\xff"):
+        return "image/jpeg"
+    return ""

@@ -1,0 +1,138 @@
+"""Floor polygon and heights of a room from its meshes; no effects.
+
+The walkable polygon is the top of the floor's mesh less the walls that stand on it: SUNCG's floor
+slab reaches under the walls (suncg section 1.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import Surface
+
+MAX_OUTLINE_FACES: Final = 20_000
+"""A floor of more triangles is taken by its convex hull, so that time stays bounded."""
+
+_SAME_HEIGHT_M: Final = 0.02
+_CRACK_M: Final = 1e-4
+_SLACK_M: Final = 0.002
+_TRACE_M: Final = 0.005
+
+
+def floor_height(surfaces: Sequence[Surface]) -> float | None:
+    """World y of the walkable surface: of the highest upward faces; None if there are none."""
+    corners = _facing(surfaces, 1)
+    return None if not len(corners) else float(corners[..., 1].mean(1).max())
+
+
+def ceiling_height(surfaces: Sequence[Surface]) -> float | None:
+    """World y of the lowest downward faces; None if there are none."""
+    corners = _facing(surfaces, -1)
+    return None if not len(corners) else float(corners[..., 1].mean(1).min())
+
+
+def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> NDArray[np.float64] | None:
+    """(N, 2) plan (x, z), counter-clockwise, of the largest piece of floor between the walls.
+
+    None if the floor has no area.
+    """
+    corners = _facing(floor, 1)
+    if not len(corners):
+        return None
+    y = corners[..., 1].mean(1)
+    area = _outline(corners[y > y.max() - _SAME_HEIGHT_M])
+    standing = _facing(walls, 1), _facing(walls, -1)
+    between = shapely.difference(area, _outline(np.concatenate(standing)))
+    return polygon_of(between if not between.is_empty else area)
+
+
+def coverage(surface: Surface, polygon: NDArray[np.float64]) -> float:
+    """Share of a plan polygon (N, 2) that lies under or over the surface's level faces."""
+    both = np.concatenate([_facing([surface], 1), _facing([surface], -1)])
+    area: Any = shapely.Polygon(polygon)
+    return float(shapely.area(shapely.intersection(_outline(both), area)) / max(area.area, 1e-9))
+
+
+def floor_polygons(
+    floor: Sequence[Surface], walls: Sequence[Surface], *, min_area_m2: float, min_width_m: float
+) -> list[NDArray[np.float64]]:
+    """Every piece of floor between the walls, planar walls too, that is a room by its size.
+
+    Each as floor_polygon gives it, largest first.
+    """
+    corners = _facing(floor, 1)
+    if not len(corners):
+        return []
+    between = shapely.difference(_outline(corners), _outline(_facing(walls, 1)))
+    between = shapely.difference(between, _outline(_facing(walls, -1)))
+    pieces = shapely.get_parts(shapely.difference(between, _traces(walls)))
+    fit = [p for p in pieces if p.area >= min_area_m2 and not p.buffer(-min_width_m / 2).is_empty]
+    fit.sort(key=lambda p: (-p.area, p.bounds))
+    found = [polygon_of(p.buffer(_TRACE_M, join_style="mitre")) for p in fit]
+    return [p for p in found if p is not None]
+
+
+def _traces(walls: Sequence[Surface]) -> Any:
+    """Where upright faces stand, seen from above, as strips 2 _TRACE_M wide."""
+    found = []
+    for surface in walls:
+        p = surface.positions[surface.faces].astype(np.float64)
+        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        upright = np.abs(normal[:, 1]) < 0.3 * np.linalg.norm(normal, axis=1)
+        found.append(p[upright][:, :, [0, 2]])
+    plan = np.concatenate([np.zeros((0, 3, 2)), *found])[:MAX_OUTLINE_FACES]
+    lines: Any = shapely.linestrings(plan)
+    return shapely.union_all(shapely.buffer(lines, _TRACE_M, cap_style="square"))
+
+
+def enclosed_polygon(walls: Sequence[Surface]) -> NDArray[np.float64] | None:
+    """The largest piece of plan between walls, for a room without a floor; None if there is none."""
+    footprint = _outline(np.concatenate([_facing(walls, 1), _facing(walls, -1)]))
+    return polygon_of(shapely.difference(footprint.convex_hull, footprint))
+
+
+def polygon_of(area: Any) -> NDArray[np.float64] | None:
+    """The outline of the largest polygon of a shapely area: simple, counter-clockwise, no holes."""
+    pieces = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon" and g.area > 1e-4]
+    if not pieces:
+        return None
+    largest = max(pieces, key=lambda g: (g.area, g.bounds))
+    # Opening removes slivers that a wall's bevel leaves; corners of walls stay where they are.
+    opened = largest.buffer(-_SLACK_M, join_style="mitre").buffer(_SLACK_M, join_style="mitre")
+    simple = shapely.simplify(_largest(opened, largest), _SLACK_M)
+    outline = shapely.orient_polygons(shapely.Polygon(simple.exterior))
+    return np.asarray(shapely.get_coordinates(outline)[:-1], np.float64)
+
+
+def _largest(area: Any, otherwise: Any) -> Any:
+    pieces = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon" and g.area > 1e-4]
+    return max(pieces, key=lambda g: (g.area, g.bounds), default=otherwise)
+
+
+def _facing(surfaces: Sequence[Surface], sign: int) -> NDArray[np.float64]:
+    """(F, 3, 3) corners of the faces that look up (sign 1) or down (-1)."""
+    found = [np.zeros((0, 3, 3))]
+    for surface in surfaces:
+        p = surface.positions[surface.faces].astype(np.float64)
+        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        found.append(p[sign * normal[:, 1] > 0.7 * np.linalg.norm(normal, axis=1)])
+    return np.concatenate(found)
+
+
+def _outline(corners: NDArray[np.float64]) -> Any:
+    """The union of triangles seen from above, as a shapely area."""
+    if not len(corners):
+        return shapely.Polygon()
+    plan = corners[:, :, [0, 2]]
+    if len(plan) > MAX_OUTLINE_FACES:
+        return shapely.MultiPoint(plan.reshape(-1, 2)).convex_hull
+    triangles: Any = shapely.polygons(plan)
+    triangles = triangles[shapely.area(triangles) > 1e-10]
+    return shapely.union_all(shapely.buffer(triangles, _CRACK_M, join_style="mitre")).buffer(
+        -_CRACK_M, join_style="mitre"
+    )

@@ -1,0 +1,185 @@
+"""A .glb or .gltf with its buffers, and the placed meshes of its scene; no effects.
+
+Buffers and pictures outside the file come through a function that the caller gives.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.formats.glb import Gltf, entry, gltf_from_glb, view_bytes
+from pbrs_farm.formats.serialise import json_from_bytes
+
+Fetch = Callable[[str], bytes | None]
+"""A relative name -> the bytes of that file beside the scene, or None if there is none."""
+
+MAX_NODES: Final = 200_000
+MAX_DEPTH: Final = 200
+
+UNDERSTOOD: Final = frozenset(
+    {
+        "KHR_lights_punctual",
+        "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_specular",
+        "KHR_materials_transmission",
+        "KHR_materials_unlit",
+        "KHR_mesh_quantization",
+        "KHR_texture_transform",
+        "EXT_texture_webp",
+    }
+)
+"""Extensions that a file may require."""
+
+
+class MissingFile(BadHouse):
+    """A file that a scene names does not exist; recoverable where it is a picture."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A node of the scene. path: its index and those of its ancestors, outermost first."""
+
+    index: int
+    path: tuple[int, ...]
+    world_from_node: NDArray[np.float64]
+
+
+def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
+    """The document and every buffer of a .glb or .gltf.
+
+    Raises BadHouse for a file that is damaged, requires an extension that is not understood, or
+    names a buffer that does not exist.
+    """
+    if data[:4] == b"glTF":
+        gltf = gltf_from_glb(data, file)
+    else:
+        document = json_from_bytes(data, file)
+        gltf = Gltf(document if isinstance(document, dict) else {}, (), file)
+    if not isinstance(gltf.document.get("asset"), dict):
+        raise BadHouse(file, "asset", "is missing; this is no glTF file")
+    required = gltf.document.get("extensionsRequired", [])
+    for name in required if isinstance(required, list) else []:
+        if name not in UNDERSTOOD:
+            raise BadHouse(
+                file,
+                "extensionsRequired",
+                f"{str(name)[:60]!r} is not understood",
+                hint="export again without mesh compression",
+            )
+    buffers = gltf.document.get("buffers", [])
+    if not isinstance(buffers, list):
+        raise BadHouse(file, "buffers", "expected a list")
+    loaded = [_buffer(gltf, i, fetch) for i in range(len(buffers))]
+    return Gltf(gltf.document, tuple(loaded), file)
+
+
+def _buffer(gltf: Gltf, index: int, fetch: Fetch) -> bytes:
+    buffer = entry(gltf, "buffers", index)
+    if "uri" in buffer:
+        return uri_bytes(gltf, buffer["uri"], f"buffers[{index}]", fetch)
+    if index or not gltf.buffers:
+        raise BadHouse(gltf.file, f"buffers[{index}]", "has no bytes")
+    return gltf.buffers[0]
+
+
+def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
+    """The bytes a uri means: a data URI's own, or those of a file beside the scene.
+
+    Raises MissingFile if there is no such file, BadHouse for a uri that is none.
+    """
+    if not isinstance(uri, str):
+        raise BadHouse(gltf.file, place, "uri is no text")
+    if uri.startswith("data:"):
+        head, _, body = uri.partition(",")
+        try:
+            return base64.b64decode(body, validate=True) if head.endswith(";base64") else b""
+        except (binascii.Error, ValueError):
+            raise BadHouse(gltf.file, place, "holds no valid base64") from None
+    if "://" in uri:
+        raise BadHouse(gltf.file, place, f"{uri[:80]!r} is on a network; only files are read")
+    data = fetch(unquote(uri))
+    if data is None:
+        raise MissingFile(gltf.file, place, f"{uri[:80]!r} does not exist")
+    return data
+
+
+def image_bytes(gltf: Gltf, index: Any, fetch: Fetch) -> bytes:
+    """The encoded picture of images[index]."""
+    image = entry(gltf, "images", index)
+    if "bufferView" in image:
+        return view_bytes(gltf, image["bufferView"])
+    return uri_bytes(gltf, image.get("uri"), f"images[{index}]", fetch)
+
+
+def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
+    """Every node of the default scene, parents before children.
+
+    Raises BadHouse for a node that is its own ancestor, a transform that is not affine, or
+    more nodes than MAX_NODES.
+    """
+    scene = gltf.document.get("scene", 0)
+    roots = _indices(gltf, entry(gltf, "scenes", scene), f"scenes[{scene}]", "nodes")
+    stack = [Placed(i, (i,), np.eye(4)) for i in reversed(roots)]
+    n = 0
+    while stack:
+        top = stack.pop()
+        n += 1
+        if n > MAX_NODES or len(top.path) > MAX_DEPTH:
+            text = f"more than {MAX_NODES} nodes or {MAX_DEPTH} levels"
+            raise BadHouse(gltf.file, f"nodes[{top.index}]", text)
+        node = entry(gltf, "nodes", top.index)
+        world = top.world_from_node @ _parent_from_node(gltf, node, top.index)
+        yield Placed(top.index, top.path, world)
+        children = _indices(gltf, node, f"nodes[{top.index}]", "children")
+        for child in reversed(children):
+            if child in top.path:
+                raise BadHouse(gltf.file, f"nodes[{child}]", "is its own ancestor")
+            stack.append(Placed(child, (*top.path, child), world))
+
+
+def _indices(gltf: Gltf, holder: dict[str, Any], place: str, key: str) -> list[int]:
+    value = holder.get(key, [])
+    if not isinstance(value, list) or not all(type(v) is int for v in value):
+        raise BadHouse(gltf.file, f"{place}.{key}", "expected a list of node numbers")
+    return value
+
+
+def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> NDArray[np.float64]:
+    place = f"nodes[{index}]"
+    if "matrix" in node:
+        m = numbers(gltf, node["matrix"], 16, f"{place}.matrix").reshape(4, 4).T
+        if not np.allclose(m[3], [0, 0, 0, 1], atol=1e-6):
+            raise BadHouse(gltf.file, f"{place}.matrix", "is not affine (column-major)")
+        return np.asarray(m)
+    x, y, z, w = numbers(gltf, node.get("rotation", [0, 0, 0, 1]), 4, f"{place}.rotation")
+    length = (x * x + y * y + z * z + w * w) ** 0.5
+    if not 0.5 < length < 2:
+        raise BadHouse(gltf.file, f"{place}.rotation", "is no unit quaternion")
+    x, y, z, w = x / length, y / length, z / length, w / length
+    m = np.eye(4)
+    m[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    m[:3, :3] *= numbers(gltf, node.get("scale", [1, 1, 1]), 3, f"{place}.scale")
+    m[:3, 3] = numbers(gltf, node.get("translation", [0, 0, 0]), 3, f"{place}.translation")
+    return m
+
+
+def numbers(gltf: Gltf, value: Any, n: int, place: str) -> NDArray[np.float64]:
+    """(n,) finite numbers; BadHouse otherwise."""
+    fits = isinstance(value, list) and len(value) == n
+    if not fits or not all(type(v) in (int, float) and abs(v) < 1e12 for v in value):
+        raise BadHouse(gltf.file, place, f"expected {n} finite numbers")
+    return np.array(value, np.float64)

@@ -1,0 +1,126 @@
+"""Primitives of a glTF mesh -> triangle meshes in its own frame; no effects."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.formats.glb import Gltf, accessor_array, entry
+from pbrs_farm.read.gltf.document import numbers
+from pbrs_farm.read.mesh.obj import Mesh
+
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+
+
+def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int | None, Mesh]]:
+    """(material number or None, mesh) of every primitive of meshes[index] that has triangles.
+
+    Raises BadHouse for arrays that do not fit each other, numbers that are not finite, faces out
+    of range, or more than max_triangles.
+    """
+    mesh = entry(gltf, "meshes", index)
+    primitives = mesh.get("primitives")
+    if not isinstance(primitives, list) or not all(isinstance(p, dict) for p in primitives):
+        raise BadHouse(gltf.file, f"meshes[{index}].primitives", "expected a list of objects")
+    found: list[tuple[int | None, Mesh]] = []
+    n_triangles = 0
+    for k, primitive in enumerate(primitives):
+        place = f"meshes[{index}].primitives[{k}]"
+        if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
+            continue  # points and lines have no surface
+        triangles = _mesh(gltf, primitive, place)
+        if triangles is None:
+            continue
+        n_triangles += len(triangles.faces)
+        if n_triangles > max_triangles:
+            text = f"more than {max_triangles} triangles"
+            raise BadHouse(gltf.file, place, text, hint="limit: read.max_model_triangles")
+        found.append((primitive.get("material"), triangles))
+    return found
+
+
+def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
+    attributes = primitive.get("attributes")
+    if not isinstance(attributes, dict) or "POSITION" not in attributes:
+        raise BadHouse(gltf.file, place, "has no positions", hint="or they are compressed")
+    positions = _floats(gltf, attributes["POSITION"], 3, f"{place}.POSITION")
+    faces = _faces(gltf, primitive, len(positions), place)
+    if not len(faces):
+        return None
+    look = _texture_info(gltf, primitive.get("material"))
+    texcoord = look.get("texCoord", 0)
+    uvs = None
+    if f"TEXCOORD_{texcoord}" in attributes:
+        uvs = _floats(gltf, attributes[f"TEXCOORD_{texcoord}"], 2, f"{place}.TEXCOORD")
+        uvs = _transformed(gltf, uvs, look, place) * [1, -1] + [0, 1]  # v up
+    normals = np.zeros_like(positions)  # zero: flat, as glTF asks where there are none
+    if "NORMAL" in attributes:
+        normals = _floats(gltf, attributes["NORMAL"], 3, f"{place}.NORMAL")
+    for array in (uvs, normals):
+        if array is not None and len(array) != len(positions):
+            raise BadHouse(gltf.file, place, "has attributes of different lengths")
+    return Mesh("", "", positions, faces, uvs, normals)
+
+
+def _floats(gltf: Gltf, accessor: Any, width: int, place: str) -> NDArray[np.float64]:
+    raw = accessor_array(gltf, accessor)
+    if raw.shape[1] != width:
+        raise BadHouse(gltf.file, place, f"expected {width} components, got {raw.shape[1]}")
+    values = raw.astype(np.float64)
+    if raw.dtype.kind in "iu" and entry(gltf, "accessors", accessor).get("normalized") is True:
+        values = np.maximum(values / np.iinfo(raw.dtype).max, -1.0)
+    if not (np.abs(values) < 1e9).all():
+        raise BadHouse(gltf.file, place, "holds a number that is not finite")
+    return values
+
+
+def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> NDArray[np.int32]:
+    if "indices" in primitive:
+        raw = accessor_array(gltf, primitive["indices"])
+        if raw.shape[1] != 1 or raw.dtype.kind != "u":
+            raise BadHouse(gltf.file, f"{place}.indices", "are no vertex numbers")
+        order = raw[:, 0].astype(np.int64)
+        if len(order) and order.max() >= n:
+            raise BadHouse(gltf.file, place, "a face names a vertex that does not exist")
+    else:
+        order = np.arange(n)
+    mode = primitive.get("mode", _TRIANGLES)
+    if mode == _TRIANGLES:
+        if len(order) % 3:
+            raise BadHouse(gltf.file, place, f"{len(order)} corners are no triangles")
+        return order.reshape(-1, 3).astype(np.int32)
+    k = np.arange(max(len(order) - 2, 0))
+    if mode == _FAN:
+        corners = np.stack([order[np.zeros_like(k)], order[k + 1], order[k + 2]], 1)
+    else:
+        odd = k % 2
+        corners = np.stack([order[k], order[k + 1 + odd], order[k + 2 - odd]], 1)
+    return corners.reshape(-1, 3).astype(np.int32)
+
+
+def _texture_info(gltf: Gltf, material: Any) -> dict[str, Any]:
+    """baseColorTexture of a material, or nothing."""
+    if material is None:
+        return {}
+    look = entry(gltf, "materials", material).get("pbrMetallicRoughness")
+    info = look.get("baseColorTexture") if isinstance(look, dict) else None
+    return info if isinstance(info, dict) else {}
+
+
+def _transformed(
+    gltf: Gltf, uvs: NDArray[np.float64], info: dict[str, Any], place: str
+) -> NDArray[np.float64]:
+    """uvs after KHR_texture_transform: translation x rotation x scale, v still down."""
+    extensions = info.get("extensions")
+    turn = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
+    if not isinstance(turn, dict):
+        return uvs
+    offset = numbers(gltf, turn.get("offset", [0, 0]), 2, f"{place}: texture offset")
+    scale = numbers(gltf, turn.get("scale", [1, 1]), 2, f"{place}: texture scale")
+    (angle,) = numbers(gltf, [turn.get("rotation", 0)], 1, f"{place}: texture rotation")
+    c, s = np.cos(angle), np.sin(angle)
+    rotation = np.array([[c, s], [-s, c]])
+    return np.asarray((uvs * scale) @ rotation.T + offset)

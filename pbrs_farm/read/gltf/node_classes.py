@@ -1,0 +1,136 @@
+"""What a glTF node is: by its extras, by the user's mapping file, by the words of its name.
+
+No effects. The mapping file is JSON: {"nodes": {"Sofa*": "sofa", "Lamp_2": {"class": "lamp",
+"kind": "lamp"}}}; patterns are as in a shell, the first that fits wins, exact names come first.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any, Final
+
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.formats.serialise import json_from_bytes
+from pbrs_farm.read.common.furniture_classes import kind_of, nyu40_of, words_of
+
+OTHERPROP: Final = 40
+_OTHERSTRUCTURE: Final = NYU40_NAMES.index("otherstructure")
+_STRUCTURE_WORDS: Final = {
+    "wall": ItemKind.WALL,
+    "floor": ItemKind.FLOOR,
+    "ceiling": ItemKind.CEILING,
+    "ground": ItemKind.GROUND,
+    "terrain": ItemKind.GROUND,
+}
+_KIND_OF_CLASS: Final[dict[str, ItemKind]] = {
+    kind.value: kind for kind in ItemKind if kind.value in NYU40_NAMES and kind.value != "object"
+}
+_IDS: Final = {re.sub(r"[ _-]", "", name): i for i, name in enumerate(NYU40_NAMES)} | {
+    "refridgerator": NYU40_NAMES.index("refrigerator"),
+    "void": 0,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class NodeClass:
+    """Class and kind of an item. is_tagged: said by extras or the mapping, not guessed."""
+
+    nyu40: int
+    kind: ItemKind
+    is_tagged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """The user's mapping file: (pattern, class) in order."""
+
+    rows: tuple[tuple[str, NodeClass], ...] = ()
+
+    def of(self, name: str) -> NodeClass | None:
+        """The class of a node's name: exact rows first, then patterns, in order."""
+        for pattern, found in self.rows:
+            if pattern == name:
+                return found
+        for pattern, found in self.rows:
+            if fnmatchcase(name, pattern):
+                return found
+        return None
+
+
+def mapping_from_json(data: bytes, file: str) -> Mapping:
+    """The mapping in a JSON file; BadHouse naming the row that is wrong."""
+    plain = json_from_bytes(data, file)
+    nodes = plain.get("nodes") if isinstance(plain, dict) else None
+    if not isinstance(nodes, dict):
+        raise BadHouse(file, "nodes", 'expected {"nodes": {"name or pattern": "class"}}')
+    return Mapping(tuple((pattern, _row(row, file, pattern)) for pattern, row in nodes.items()))
+
+
+def _row(row: Any, file: str, pattern: str) -> NodeClass:
+    plain = {"class": row} if isinstance(row, (str, int)) else row
+    found = _tagged(plain) if isinstance(plain, dict) else None
+    if found is None:
+        text = f"{str(row)[:60]!r} names no class; one of {', '.join(NYU40_NAMES[1:])}"
+        raise BadHouse(file, f"nodes[{pattern[:60]!r}]", text)
+    return found
+
+
+def class_of_node(name: str, extras: Any, mapping: Mapping) -> NodeClass | None:
+    """extras' `nyu40` or `class` (and `kind`), else the mapping's row, else the name's words."""
+    tagged = _tagged(extras) if isinstance(extras, dict) else None
+    return tagged or mapping.of(name) or _guessed(name)
+
+
+_COLLECTIONS: Final = frozenset(
+    ("furniture", "group", "collection", "scene", "room", "level", "storey", "set")
+)
+
+
+def collection_of(name: str, seen: NodeClass) -> NodeClass | None:
+    """What the members of a node without a mesh are, where its name means several things.
+
+    None: the node is one thing ("Chair"). "Chairs": chairs. "Furniture", "Ground floor" (a storey):
+    no class that members would share, nyu40 0.
+    """
+    words = words_of(name)
+    plurals = {w[:-1] for w in words if w.endswith("s") and w[:-1] in words}
+    if words & _COLLECTIONS or seen.kind in (ItemKind.FLOOR, ItemKind.GROUND):
+        return NodeClass(0, ItemKind.OBJECT, is_tagged=False)
+    if any(nyu40_of("", w) is not None or w in _STRUCTURE_WORDS for w in plurals):
+        return seen
+    return None
+
+
+def _tagged(plain: dict[str, Any]) -> NodeClass | None:
+    kind_word = str(plain.get("kind", "")).lower()
+    kind = next((k for k in ItemKind if k.value == kind_word), None)
+    nyu40 = plain.get("nyu40", plain.get("class"))
+    if isinstance(nyu40, str):
+        word = re.sub(r"[ _-]", "", nyu40.lower())
+        nyu40 = int(word) if word.isascii() and word.isdigit() and len(word) < 3 else _IDS.get(word)
+        if nyu40 is None and word in ("ground", "plant", "stairs"):
+            return NodeClass(OTHERPROP if word == "plant" else 2, ItemKind(word), is_tagged=True)
+    if type(nyu40) is not int or not 0 <= nyu40 < len(NYU40_NAMES):
+        return None
+    named = _KIND_OF_CLASS.get(NYU40_NAMES[nyu40], ItemKind.OBJECT)
+    return NodeClass(nyu40, kind or named, is_tagged=True)
+
+
+def _guessed(name: str) -> NodeClass | None:
+    nyu40 = nyu40_of("", name)
+    if nyu40 is None or nyu40 == _OTHERSTRUCTURE:
+        for word in ("wall", "ceiling", "floor", "ground", "terrain"):
+            if word in words_of(name):
+                kind = _STRUCTURE_WORDS[word]
+                label = 2 if kind is ItemKind.GROUND else NYU40_NAMES.index(kind.value)
+                return NodeClass(label, kind, is_tagged=False)
+    if nyu40 is None:
+        return None
+    is_lamp = NYU40_NAMES[nyu40] == "lamp"
+    is_opening = NYU40_NAMES[nyu40] in ("door", "window")
+    kind = kind_of("", name, nyu40, is_opening=is_opening, is_light=is_lamp)
+    return NodeClass(nyu40, kind, is_tagged=False)

@@ -1,0 +1,204 @@
+"""Nodes of a glTF scene -> items placed in the world; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import (
+    MAX_INSTANCES,
+    Box,
+    Item,
+    ItemKind,
+    LightPart,
+    MaterialKind,
+    Surface,
+)
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.placed_mesh import oriented_box, placed
+from pbrs_farm.read.common.planar_walls import planar_parts
+from pbrs_farm.read.gltf.document import Placed, placed_nodes
+from pbrs_farm.read.gltf.mesh_primitives import meshes_of
+from pbrs_farm.read.gltf.node_classes import (
+    OTHERPROP,
+    Mapping,
+    NodeClass,
+    class_of_node,
+    collection_of,
+)
+from pbrs_farm.read.gltf.pbr_materials import Looks
+from pbrs_farm.read.gltf.punctual_lights import assumed_light, emitted, punctual_light
+from pbrs_farm.read.mesh.obj import Mesh
+
+_UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)
+
+
+@dataclass(slots=True)
+class _Thing:
+    """An item while its nodes are gathered."""
+
+    root: Placed
+    name: str
+    seen: NodeClass
+    extras: dict[str, Any]
+    parts: list[Placed] = field(default_factory=list)
+
+
+def items_of_scene(
+    gltf: Gltf, mapping: Mapping, looks: Looks, notes: Notes, fields: ReadFields
+) -> Iterator[Item]:
+    """The items of the scene, not yet on a level."""
+    known: dict[Any, list[tuple[int | None, Mesh]]] = {}
+    taken: set[str] = set()
+    n_faces = n_items = 0
+    for thing in _things(gltf, mapping):
+        item = _item(gltf, thing, looks, notes, known, fields)
+        if item is None:
+            continue
+        place = f"nodes[{thing.root.index}] ({thing.name[:60]})"
+        if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
+            text = f"stands farther than {fields.max_extent_m:g} m from the origin"
+            raise BadHouse(gltf.file, place, text, hint="limit: read.max_extent_m")
+        n_faces += item.n_faces
+        if n_faces > fields.max_triangles or n_items >= MAX_INSTANCES:
+            text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
+            raise BadHouse(gltf.file, place, text, hint="limit: read.max_triangles")
+        if "unmapped" in item.tags:
+            notes.add("unmapped-class", place, "names no class; it is otherprop")
+        for part in planar_parts(item):
+            unique, k = part.id, 2
+            while unique in taken:
+                unique, k = f"{part.id}.{k}", k + 1
+            taken.add(unique)
+            n_items += 1
+            yield replace(part, id=unique)
+
+
+def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
+    """The scene's nodes gathered by the item they are part of.
+
+    A node belongs to the nearest node above it (or itself) that is an item: the outermost whose
+    class is known, and below it those that are tagged. Members of a collection ("Chairs") that
+    have no class of their own have the collection's.
+    """
+    owner: dict[tuple[int, ...], _Thing] = {}
+    members: dict[tuple[int, ...], NodeClass] = {}
+    found: list[_Thing] = []
+    for node in placed_nodes(gltf):
+        plain = entry(gltf, "nodes", node.index)
+        name = str(plain.get("name", ""))[:200]
+        extras = plain["extras"] if isinstance(plain.get("extras"), dict) else {}
+        above = owner.get(node.path[:-1])
+        seen = class_of_node(name, extras, mapping) or members.get(node.path[:-1])
+        if seen and not seen.is_tagged and "mesh" not in plain:
+            grouped = collection_of(name, seen)
+            if grouped is not None:
+                seen = None
+                if grouped.nyu40 and above is None:
+                    members[node.path] = grouped
+        extensions = plain.get("extensions")
+        has_light = isinstance(extensions, dict) and "KHR_lights_punctual" in extensions
+        has_part = "mesh" in plain or has_light
+        if (seen and (above is None or seen.is_tagged)) or (above is None and has_part):
+            above = _Thing(node, name, seen or _UNMAPPED, extras)
+            found.append(above)
+        if above is not None:
+            owner[node.path] = above
+            above.parts.append(node)
+    return found
+
+
+def _item(
+    gltf: Gltf,
+    thing: _Thing,
+    looks: Looks,
+    notes: Notes,
+    known: dict[Any, list[tuple[int | None, Mesh]]],
+    fields: ReadFields,
+) -> Item | None:
+    surfaces: list[Surface] = []
+    lights: list[LightPart] = []
+    luminance: dict[int, float] = {}
+    boxes: list[Box | None] = []
+    kind = thing.seen.kind
+    clear = MaterialKind.PANE if kind in (ItemKind.WINDOW, ItemKind.DOOR) else MaterialKind.GLASS
+    for part in thing.parts:
+        node = entry(gltf, "nodes", part.index)
+        place = f"nodes[{part.index}]"
+        light = punctual_light(gltf, node, part.world_from_node, place)
+        lights += [light] if light else []
+        if "mesh" not in node:
+            continue
+        if abs(np.linalg.det(part.world_from_node[:3, :3])) < 1e-12:
+            notes.add("flat-node", place, "its scale is 0; left out")
+            continue
+        entry(gltf, "meshes", node["mesh"])
+        if node["mesh"] not in known:
+            known[node["mesh"]] = meshes_of(
+                gltf, node["mesh"], max_triangles=fields.max_model_triangles
+            )
+        meshes = known[node["mesh"]]
+        if meshes:
+            boxes.append(oriented_box([m for _, m in meshes], part.world_from_node))
+        for number, mesh in meshes:
+            material, emission = looks.material(number, clear=clear)
+            emits = emission is not None and not kind.is_structure
+            emits = emits and (emission != 0 or kind is ItemKind.LAMP)
+            index = looks.as_bulb(material) if emits else looks.palette.index(material)
+            name = material.name or f"part {len(surfaces)}"
+            surface = placed(mesh, part.world_from_node, name=name, material=index)
+            if surface is None:
+                continue
+            if emits and emission is not None:
+                luminance[len(surfaces)] = emission
+            surfaces.append(surface)
+    if not surfaces and not lights:
+        return None
+    lights += emitted(surfaces, luminance)
+    return _finished(thing, surfaces, lights, boxes)
+
+
+def _finished(
+    thing: _Thing, surfaces: list[Surface], lights: list[LightPart], boxes: list[Box | None]
+) -> Item:
+    seen = thing.seen
+    if lights and not surfaces:
+        seen = replace(seen, kind=ItemKind.LAMP, nyu40=35)
+    tags = ["unmapped"] if seen is _UNMAPPED else []
+    if any(np.linalg.det(p.world_from_node[:3, :3]) < 0 for p in thing.parts):
+        tags.append("mirrored")
+    item_id, name = thing.extras.get("item"), thing.extras.get("name")
+    item = Item(
+        id=item_id[:100] if isinstance(item_id, str) and item_id else f"n{thing.root.index}",
+        name=name[:200] if isinstance(name, str) else thing.name or f"node {thing.root.index}",
+        kind=seen.kind,
+        level_id="0",
+        surfaces=tuple(surfaces),
+        nyu40=seen.nyu40,
+        source_class=thing.name,
+        lights=tuple(lights),
+        box=_across_last(boxes[0]) if len(boxes) == 1 and boxes[0] else None,
+        tags=tuple(tags),
+    )
+    if seen.kind is ItemKind.LAMP and not lights:
+        return replace(item, lights=(assumed_light(item),), tags=(*item.tags, "assumed_light"))
+    return item
+
+
+def _across_last(box: Box) -> Box:
+    """The box with its thinnest level axis last, so that a door's or window's front is +z."""
+    level = np.flatnonzero(np.abs(box.axes[1]) < 0.1)
+    if len(level) != 2:
+        return box
+    wide, thin = sorted(level, key=lambda k: (-box.half[k], k))
+    order = np.array([wide, 3 - wide - thin, thin])
+    axes = box.axes[:, order]
+    if np.linalg.det(axes) < 0:
+        axes = axes * np.array([-1.0, 1.0, 1.0])
+    return Box(box.centre, box.half[order], axes)

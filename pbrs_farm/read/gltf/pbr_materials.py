@@ -1,0 +1,138 @@
+"""Materials and textures of a glTF scene -> Material and Texture; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.frames import srgb_from_linear
+from pbrs_farm.core.house import Material, MaterialKind, Texture
+from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.read.common.material_library import Palette
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.gltf.document import Fetch, MissingFile, image_bytes, numbers
+
+F0: Final = 0.04
+"""Reflectance of a dielectric at normal incidence, linear (glTF 2.0, appendix B)."""
+
+MAX_SHININESS: Final = 10_000.0
+
+
+class Looks:
+    """Resolves the materials of one scene into its palette."""
+
+    def __init__(self, gltf: Gltf, fetch: Fetch, notes: Notes) -> None:
+        self._gltf = gltf
+        self._fetch = fetch
+        self._notes = notes
+        self.palette = Palette(notes)
+
+    def material(self, number: int | None, *, clear: MaterialKind) -> tuple[Material, float | None]:
+        """(materials[number], its emission in cd m-2 or None). None: glTF's default, white.
+
+        clear: the kind of what lets light through.
+        """
+        if number is None:
+            return Material("default", is_default=True), None
+        plain = entry(self._gltf, "materials", number)
+        place = f"materials[{number}]"
+        look = _object(plain, "pbrMetallicRoughness")
+        factor = numbers(self._gltf, look.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
+        metallic = self._fraction(look, "metallicFactor", 1.0, place)
+        roughness = self._fraction(look, "roughnessFactor", 1.0, place)
+        if "metallicRoughnessTexture" in look:
+            metallic = 0.0  # the factors only scale a picture that this reader does not look at
+        found = self._texture(look.get("baseColorTexture"), place)
+        transmission = _object(_object(plain, "extensions"), "KHR_materials_transmission")
+        passes = self._fraction(transmission, "transmissionFactor", 0.0, place)
+        mode = plain.get("alphaMode", "OPAQUE")
+        opacity = float(np.clip(factor[3], 0, 1)) if mode == "BLEND" else 1.0
+        opacity = min(opacity, 1.0 - passes)
+        colour = np.clip(factor[:3], 0, 1)
+        shininess = min(2.0 / max(roughness, 1e-3) ** 4 - 2.0, MAX_SHININESS)
+        specular = F0 + (colour - F0) * metallic if shininess > 0 else np.zeros(3)
+        material = Material(
+            name=str(plain.get("name", ""))[:100],
+            kind=self._kind(plain, clear, opacity, metallic, roughness),
+            diffuse=_encoded(colour if found else colour * (1 - metallic)),
+            specular=_encoded(specular),
+            shininess=shininess,
+            opacity=opacity,
+            texture_id=found[0].id if found else None,
+            alpha_cutout=bool(found and found[1] and mode != "OPAQUE"),
+            is_default=found is None and "baseColorFactor" not in look,
+        )
+        return material, self._emission(plain, place)
+
+    def _kind(
+        self,
+        plain: dict[str, Any],
+        clear: MaterialKind,
+        opacity: float,
+        metallic: float,
+        roughness: float,
+    ) -> MaterialKind:
+        word = _object(plain, "extras").get("kind")
+        tagged = next((k for k in MaterialKind if k.value == word), None)
+        if tagged is not None:
+            return tagged
+        if opacity < 1:
+            return clear
+        return MaterialKind.MIRROR if metallic > 0.9 and roughness < 0.1 else MaterialKind.OPAQUE
+
+    def _emission(self, plain: dict[str, Any], place: str) -> float | None:
+        """Luminance in cd m-2 where KHR_materials_emissive_strength gives it; 0 = of unknown
+        strength; None = none."""
+        factor = numbers(self._gltf, plain.get("emissiveFactor", [0] * 3), 3, f"{place}: emission")
+        if not (factor > 0).any():
+            return None
+        strength = _object(_object(plain, "extensions"), "KHR_materials_emissive_strength")
+        if "emissiveStrength" not in strength:
+            return 0.0
+        (value,) = numbers(self._gltf, [strength["emissiveStrength"]], 1, f"{place}: emission")
+        return float(max(value, 0.0) * (factor @ [0.2126, 0.7152, 0.0722]))
+
+    def _fraction(self, holder: dict[str, Any], key: str, default: float, place: str) -> float:
+        (value,) = numbers(self._gltf, [holder.get(key, default)], 1, f"{place}: {key}")
+        return float(np.clip(value, 0, 1))
+
+    def _texture(self, info: Any, place: str) -> tuple[Texture, bool] | None:
+        if not isinstance(info, dict):
+            return None
+        texture = entry(self._gltf, "textures", info.get("index"))
+        webp = _object(_object(texture, "extensions"), "EXT_texture_webp")
+        source = webp.get("source", texture.get("source"))
+        if type(source) is not int:
+            self._notes.add("unreadable-texture", place, "its picture is of an unknown kind")
+            return None
+        image = entry(self._gltf, "images", source)
+        key = f"images[{source}]"
+        name = str(image.get("name") or image.get("uri") or key)[:100]
+        return self.palette.texture(
+            key,
+            name=key if name.startswith("data:") else name,
+            place=place,
+            load=lambda: self._picture(source),
+        )
+
+    def _picture(self, source: int) -> bytes | None:
+        try:
+            return image_bytes(self._gltf, source, self._fetch)
+        except MissingFile:
+            return None
+
+    def as_bulb(self, material: Material) -> int:
+        """The index of the material as one that emits."""
+        return self.palette.index(replace(material, kind=MaterialKind.BULB))
+
+
+def _object(holder: dict[str, Any], key: str) -> dict[str, Any]:
+    value = holder.get(key)
+    return value if isinstance(value, dict) else {}
+
+
+def _encoded(linear: Any) -> tuple[float, float, float]:
+    r, g, b = (float(c) for c in np.clip(srgb_from_linear(np.asarray(linear)), 0, 1))
+    return (r, g, b)

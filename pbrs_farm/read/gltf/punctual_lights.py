@@ -1,0 +1,98 @@
+"""Lights of a glTF scene: KHR_lights_punctual and emissive surfaces -> LightPart; no effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import Item, LightPart, Surface
+from pbrs_farm.core.lighting import LightForm, PowerUnit
+from pbrs_farm.formats.glb import Gltf
+from pbrs_farm.read.gltf.document import numbers
+
+ASSUMED_LM: Final = 800.0
+"""Flux of a lamp whose strength the scene does not tell: a 60 W incandescent bulb's."""
+
+_RADIUS_M: Final = 0.0325
+
+
+def punctual_light(
+    gltf: Gltf, node: dict[str, Any], world_from_node: NDArray[np.float64], place: str
+) -> LightPart | None:
+    """The point or spot light of a node; None if it has none, or a directional one (the sun)."""
+    number = _at(_at(node, "extensions"), "KHR_lights_punctual").get("light")
+    lights = _at(_at(gltf.document, "extensions"), "KHR_lights_punctual").get("lights")
+    if type(number) is not int or not isinstance(lights, list) or not 0 <= number < len(lights):
+        return None
+    plain = lights[number]
+    if not isinstance(plain, dict) or plain.get("type") not in ("point", "spot"):
+        return None
+    (intensity,) = numbers(gltf, [plain.get("intensity", 1)], 1, f"{place}: light intensity")
+    colour = np.clip(
+        numbers(gltf, plain.get("color", [1, 1, 1]), 3, f"{place}: light colour"), 0, 1
+    )
+    cutoff = math.pi
+    if plain["type"] == "spot":
+        angle = _at(plain, "spot").get("outerConeAngle", math.pi / 4)
+        cutoff = float(np.clip(numbers(gltf, [angle], 1, f"{place}: cone")[0], 0.01, math.pi))
+    solid_angle = 2 * math.pi * (1 - math.cos(cutoff))
+    direction = -world_from_node[:3, 2] / max(float(np.linalg.norm(world_from_node[:3, 2])), 1e-12)
+    return LightPart(
+        position=_triple(world_from_node[:3, 3]),
+        radius_m=_RADIUS_M,
+        power=max(float(intensity), 0.0) * solid_angle,
+        unit=PowerUnit.LUMEN,
+        rgb_linear=_triple(colour / max(float(colour.max()), 1e-6)),
+        form=LightForm.SPOT if plain["type"] == "spot" else LightForm.POINT,
+        direction=_triple(direction),
+        cutoff_rad=cutoff,
+    )
+
+
+def emitted(surfaces: Sequence[Surface], luminance: dict[int, float]) -> tuple[LightPart, ...]:
+    """A light for every emissive surface. luminance: surface -> cd m-2, 0 = of unknown strength.
+
+    Surfaces of unknown strength share ASSUMED_LM by their area.
+    """
+    area = {k: _area(surfaces[k]) for k in luminance}
+    unknown = sum(area[k] for k, value in luminance.items() if value == 0)
+    found = []
+    for k, value in luminance.items():
+        low, high = surfaces[k].positions.min(0), surfaces[k].positions.max(0)
+        known = math.pi * value * area[k]  # a Lambertian emitter
+        found.append(
+            LightPart(
+                position=_triple((low + high) / 2),
+                radius_m=float(np.mean(high - low)) / 2,
+                power=known if value else ASSUMED_LM * area[k] / max(unknown, 1e-12),
+                unit=PowerUnit.LUMEN,
+                emitting=(k,),
+            )
+        )
+    return tuple(found)
+
+
+def assumed_light(item: Item) -> LightPart:
+    """A light in the middle of a lamp about which the scene tells nothing."""
+    centre = item.bounds.mean(0)
+    return LightPart(_triple(centre), _RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
+
+
+def _area(surface: Surface) -> float:
+    p = surface.positions[surface.faces].astype(np.float64)
+    n = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    return float(np.linalg.norm(n, axis=1).sum() / 2)
+
+
+def _at(holder: dict[str, Any], key: str) -> dict[str, Any]:
+    value = holder.get(key)
+    return value if isinstance(value, dict) else {}
+
+
+def _triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)

@@ -1,0 +1,123 @@
+"""A furnished scene as glTF 2.0 (.glb, .gltf) -> House.
+
+Items are nodes whose extras, mapping row or name tell their class. Effect: read_gltf_file reads
+the file and what lies beside it: `<stem>.classes.json` (gltf_classes) and `<stem>.rooms.json`
+(gltf_rooms), both optional.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import House, Item, ItemKind, Source
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.gltf.document import Fetch, gltf_document
+from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
+from pbrs_farm.read.gltf.node_items import items_of_scene
+from pbrs_farm.read.gltf.pbr_materials import Looks
+from pbrs_farm.read.gltf.scene_rooms import (
+    level_of,
+    levels_of,
+    room_at,
+    rooms_from_floors,
+    rooms_from_json,
+)
+from pbrs_farm.read.suncg.wall_holes import openings
+
+MAX_FILE_BYTES: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What lies beside a scene. mapping, rooms: JSON bytes or None. fetch: other files."""
+
+    fetch: Fetch = lambda _name: None
+    mapping: bytes | None = None
+    rooms: bytes | None = None
+
+
+def read_gltf_file(path: Path, fields: ReadFields) -> House:
+    """The House of a .glb or .gltf file with the mapping and room files beside it.
+
+    Raises BadHouse naming file and place; a name that leads out of the file's folder is refused.
+    """
+    folder = RootFolder(path.parent)
+    data = folder.read(path.name, max_bytes=MAX_FILE_BYTES)
+    if data is None:
+        raise BadHouse(path, "", "no such file")
+    beside = Beside(
+        fetch=lambda name: folder.read(name, max_bytes=MAX_FILE_BYTES),
+        mapping=folder.read(f"{path.stem}.classes.json", max_bytes=MAX_FILE_BYTES),
+        rooms=folder.read(f"{path.stem}.rooms.json", max_bytes=MAX_FILE_BYTES),
+    )
+    house = read_gltf(data, path.name, fields=fields, beside=beside)
+    if folder.n_read > 1:
+        return replace(house, source=replace(house.source, sha256=folder.sha256))
+    return house
+
+
+def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | None = None) -> House:
+    """The House in the bytes of a scene; name: its file name.
+
+    Raises BadHouse naming the place, and when no room is given and no floor is found.
+    """
+    beside = beside or Beside()
+    stem = name.rsplit(".", 1)[0]
+    notes = Notes(name, strict=fields.strict)
+    mapping = Mapping()
+    if beside.mapping is not None:
+        mapping = mapping_from_json(beside.mapping, f"{stem}.classes.json")
+    gltf = gltf_document(data, name, beside.fetch)
+    looks = Looks(gltf, beside.fetch, notes)
+    items = list(items_of_scene(gltf, mapping, looks, notes, fields))
+    rooms = (
+        rooms_from_floors(items)
+        if beside.rooms is None
+        else rooms_from_json(beside.rooms, f"{stem}.rooms.json", items)
+    )
+    if not rooms:
+        raise BadHouse(
+            name,
+            "scene",
+            "has no floor",
+            hint=f"name a node `floor`, map one in {stem}.classes.json, or give {stem}.rooms.json",
+        )
+    levels, numbered = levels_of(rooms)
+    items = [
+        replace(
+            item,
+            level_id=level_of(levels, float(_extent(item)[0, 1])),
+            room_id=None
+            if item.kind is ItemKind.WALL
+            else room_at(numbered, _extent(item).mean(0)),
+        )
+        for item in items
+    ]
+    sha256 = keys.sha256(data)
+    copyright_line = gltf.document["asset"].get("copyright", "")
+    return House(
+        id=keys.house_id(stem, sha256),
+        name=stem,
+        source=Source("gltf", name, sha256, attribution=str(copyright_line)[:500]),
+        levels=levels,
+        rooms=numbered,
+        items=tuple(items),
+        materials=looks.palette.materials,
+        textures=looks.palette.textures,
+        openings=openings(items),
+        notes=notes.all(),
+    )
+
+
+def _extent(item: Item) -> NDArray[np.float64]:
+    """(2, 3) the item's bounds; those of its lights where it has no surfaces."""
+    return item.bounds if item.surfaces else np.tile(item.lights[0].position, (2, 1))

@@ -1,0 +1,208 @@
+"""Rooms and levels of a glTF scene: from the user's polygon file, else from its floors.
+
+No effects. The file is JSON: {"rooms": [{"polygon": [[x, z], ...], "floor_y": 0.0,
+"ceiling_y": 2.5, "name": "Kitchen"}]}, metres, plan coordinates of the scene's own axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import Item, ItemKind, Level, Room, Surface
+from pbrs_farm.formats.serialise import json_from_bytes
+from pbrs_farm.read.common.room_floors import (
+    ceiling_height,
+    coverage,
+    floor_height,
+    floor_polygons,
+    polygon_of,
+)
+
+MIN_ROOM_M2: Final = 1.0
+MIN_ROOM_WIDTH_M: Final = 0.5
+MAX_ROOMS: Final = 1000
+_STOREY_M: Final = 2.5
+_SAME_LEVEL_M: Final = 0.5
+_SLACK_M: Final = 0.3
+_EDGE_M: Final = 0.1
+_NEXT_ROOM: Final = 0.05
+"""A ceiling that covers less of a room than this share is the next room's."""
+
+
+def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]:
+    """The rooms of a polygon file; heights it leaves out are taken from floors and ceilings.
+
+    Raises BadHouse naming the room that is wrong.
+    """
+    plain = json_from_bytes(data, file)
+    rows = plain.get("rooms") if isinstance(plain, dict) else None
+    if not isinstance(rows, list) or not rows or len(rows) > MAX_ROOMS:
+        raise BadHouse(file, "rooms", 'expected {"rooms": [{"polygon": [[x, z], ...]}, ...]}')
+    return [_room(row, file, f"rooms[{i}]", items) for i, row in enumerate(rows)]
+
+
+def _room(row: Any, file: str, place: str, items: Sequence[Item]) -> Room:
+    corners = row.get("polygon") if isinstance(row, dict) else None
+    try:
+        plan = np.array(corners, np.float64)
+    except (ValueError, TypeError):
+        plan = np.zeros(0)
+    if plan.ndim != 2 or plan.shape[1:] != (2,) or not 3 <= len(plan) <= 10_000:
+        raise BadHouse(file, f"{place}.polygon", "expected three or more [x, z]")
+    if not (np.abs(plan) < 1e6).all():
+        raise BadHouse(file, f"{place}.polygon", "holds a number that is not finite")
+    area = shapely.Polygon(plan)
+    polygon = polygon_of(area) if area.is_valid else None
+    if polygon is None:
+        raise BadHouse(file, f"{place}.polygon", "crosses itself or has no area")
+    given = {k: _height(row, k, file, place) for k in ("floor_y", "ceiling_y")}
+    types = row.get("types")
+    return _with_heights(
+        polygon,
+        str(row.get("name", ""))[:60],
+        tuple(str(t)[:60] for t in types) if isinstance(types, list) else (),
+        given,
+        items,
+    )
+
+
+def _height(row: dict[str, Any], key: str, file: str, place: str) -> float | None:
+    value = row.get(key)
+    if value is None:
+        return None
+    if type(value) not in (int, float) or not abs(value) < 1e6:
+        raise BadHouse(file, f"{place}.{key}", "expected a height in metres")
+    return float(value)
+
+
+def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
+    """A room for every piece of floor that walls part from the others."""
+    walls = _surfaces(items, ItemKind.WALL)
+    found: list[Room] = []
+    for item in items:
+        height = floor_height(item.surfaces) if item.kind is ItemKind.FLOOR else None
+        if height is None or len(found) >= MAX_ROOMS:
+            continue
+        standing = [w for w in walls if w.positions[:, 1].max() > height + 1.0]
+        standing = [w for w in standing if w.positions[:, 1].min() < height + 1.0]
+        low, high = item.bounds[:, [0, 2]]
+        standing = _within(standing, low - _EDGE_M, high + _EDGE_M)
+        pieces = floor_polygons(
+            item.surfaces, standing, min_area_m2=MIN_ROOM_M2, min_width_m=MIN_ROOM_WIDTH_M
+        )
+        given = {"floor_y": height, "ceiling_y": None}
+        found += [_with_heights(p, "", (), given, items) for p in pieces]
+    return found[:MAX_ROOMS]
+
+
+def _with_heights(
+    polygon: NDArray[np.float64],
+    name: str,
+    types: tuple[str, ...],
+    given: dict[str, float | None],
+    items: Sequence[Item],
+) -> Room:
+    """The room with heights of the floor and ceiling that lie over its polygon."""
+    floors = _over(items, ItemKind.FLOOR, polygon)
+    floor_y = given["floor_y"]
+    low = floor_height(floors) if floor_y is None else floor_y
+    low = 0.0 if low is None else low
+    above = [s for s in _over(items, ItemKind.CEILING, polygon) if s.positions[:, 1].min() > low]
+    shares = [coverage(s, polygon) for s in above]
+    above = [s for s, share in zip(above, shares, strict=True) if share > _NEXT_ROOM]
+    ceiling = ceiling_height(above)
+    if ceiling is None and above:
+        ceiling = min(float(s.positions[:, 1].min()) for s in above)  # planar, looking up
+    walls = [float(s.positions[:, 1].max()) for s in _over(items, ItemKind.WALL, polygon, _EDGE_M)]
+    nominal = max((y for y in walls if low + 1.0 < y < low + 10.0), default=low + _STOREY_M)
+    high = given["ceiling_y"] or ceiling or nominal
+    return Room(
+        id="",
+        name=name,
+        level_id="",
+        polygon=polygon,
+        floor_y=low,
+        ceiling_y=high if high > low + 0.5 else low + _STOREY_M,
+        types=types,
+        has_floor=bool(floors),
+        has_ceiling=sum(shares) > 0.5,
+    )
+
+
+def _surfaces(items: Sequence[Item], kind: ItemKind) -> list[Surface]:
+    return [s for item in items if item.kind is kind for s in item.surfaces]
+
+
+def _over(
+    items: Sequence[Item], kind: ItemKind, polygon: NDArray[np.float64], slack_m: float = 0.0
+) -> list[Surface]:
+    """The surfaces of a kind whose bounds meet the polygon's in plan."""
+    low, high = polygon.min(0) - slack_m, polygon.max(0) + slack_m
+    return _within(_surfaces(items, kind), low, high)
+
+
+def _within(
+    surfaces: Sequence[Surface], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> list[Surface]:
+    """The surfaces whose plan bounds meet low..high."""
+    plans = [(s, s.positions[:, [0, 2]]) for s in surfaces]
+    return [s for s, p in plans if (p.max(0) > low).all() and (p.min(0) < high).all()]
+
+
+def levels_of(rooms: Sequence[Room]) -> tuple[tuple[Level, ...], tuple[Room, ...]]:
+    """(levels by floor height, from below; the rooms with their ids `<level>_<room>`)."""
+    heights: list[float] = []
+    for y in sorted(r.floor_y for r in rooms):
+        if not heights or y > heights[-1] + _SAME_LEVEL_M:
+            heights.append(y)
+    numbered: list[Room] = []
+    count = [0] * len(heights)
+    for room in rooms:
+        level = int(np.searchsorted(heights, room.floor_y, "right")) - 1
+        room_id = f"{level}_{count[level]}"
+        count[level] += 1
+        numbered.append(
+            Room(
+                room_id,
+                room.name or f"Room {room_id}",
+                str(level),
+                room.polygon,
+                room.floor_y,
+                room.ceiling_y,
+                room.types,
+                room.has_floor,
+                room.has_ceiling,
+            )
+        )
+    levels = []
+    for k, height in enumerate(heights):
+        here = [r.ceiling_y - r.floor_y for r in numbered if r.level_id == str(k)]
+        levels.append(Level(str(k), f"Level {k}", height, float(np.median(here))))
+    return tuple(levels), tuple(numbered)
+
+
+def level_of(levels: Sequence[Level], y: float) -> str:
+    """The highest level at or below a height, half a metre of slack; else the lowest."""
+    below = [x.id for x in levels if x.elevation <= y + _SAME_LEVEL_M]
+    return below[-1] if below else levels[0].id
+
+
+def room_at(rooms: Sequence[Room], point: NDArray[np.float64]) -> str | None:
+    """The room whose polygon and height hold a point (3,) of the world, or None.
+
+    A point in a wall (of a door, a window) belongs to the nearest room on the other side of it.
+    """
+    x, y, z = point
+    here = [r for r in rooms if r.floor_y - _SLACK_M <= y <= r.ceiling_y + _SLACK_M]
+    if not here:
+        return None
+    place: Any = shapely.Point(x, z)
+    distance = [float(shapely.Polygon(r.polygon).distance(place)) for r in here]
+    nearest = int(np.argmin(distance))
+    return here[nearest].id if distance[nearest] <= _SLACK_M else None

@@ -1,0 +1,1 @@
+"""Triangle meshes: OBJ and MTL, triangulation, shading normals, primitive solids."""

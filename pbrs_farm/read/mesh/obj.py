@@ -1,0 +1,232 @@
+"""Wavefront OBJ geometry -> triangle meshes per (group, material), fast, in numpy; no effects.
+
+Understands v, vt, vn, f with any of the four index forms and negative indices, n-gons, g, o, s,
+usemtl, mtllib and line continuations; everything else (l, p, free-form surfaces) is passed over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.read.mesh.shading_normals import crease_normals, face_normals
+from pbrs_farm.read.mesh.triangulate import triangle_corners
+
+DEFAULT_CREASE_RAD = np.radians(45.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Triangles of one group and one material, in the model's own frame.
+
+    positions (V, 3) float64, faces (F, 3) int32, uvs (V, 2) float64 or None (then the file has
+    none), normals (V, 3) float64 unit (computed with a crease angle where the file has none).
+    """
+
+    group: str
+    material: str
+    positions: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    uvs: NDArray[np.float64] | None
+    normals: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObjModel:
+    """meshes in the order of the file; mtllibs: names as written; n_dropped: degenerate faces."""
+
+    meshes: tuple[Mesh, ...]
+    mtllibs: tuple[str, ...]
+    n_dropped: int = 0
+
+
+@dataclass(slots=True)
+class _Part:
+    group: str
+    material: str
+    is_flat: bool
+    lines: list[bytes] = field(default_factory=list)
+    seen: list[tuple[int, int, int]] = field(default_factory=list)
+
+
+def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjModel:
+    """Parse OBJ bytes; file names them in errors.
+
+    Raises BadHouse for a number that is none or not finite, a face index out of range, or more
+    than max_triangles triangles.
+    """
+    for key, most in ((b"\nf", max_triangles), (b"\nv ", 3 * max_triangles)):
+        if data.count(key) > most:
+            raise _too_many(file, data.count(key), key, max_triangles)
+    vertices: list[bytes] = []
+    uvs: list[bytes] = []
+    normals: list[bytes] = []
+    libraries: list[str] = []
+    parts: dict[tuple[str, str, bool], _Part] = {}
+    group, material, is_flat = "", "", False
+    part: _Part | None = None
+    if b"\\\n" in data or b"\\\r\n" in data:
+        data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    for raw in data.splitlines():
+        line = raw.lstrip()
+        key, _, rest = line.partition(b" ")
+        if key == b"v":
+            vertices.append(rest)
+        elif key == b"vn":
+            normals.append(rest)
+        elif key == b"vt":
+            uvs.append(rest)
+        elif key == b"f":
+            if part is None:
+                name = (group, material, is_flat)
+                part = parts.setdefault(name, _Part(*name))
+            part.lines.append(rest)
+            if b"-" in rest:
+                part.seen.append((len(vertices), len(uvs), len(normals)))
+            else:
+                part.seen.append((0, 0, 0))
+        elif b"\t" in key:
+            return parse_obj(data.replace(b"\t", b" "), file, max_triangles=max_triangles)
+        elif key in (b"g", b"o"):
+            group, part = _text(rest), None
+        elif key == b"usemtl":
+            material, part = _text(rest), None
+        elif key == b"s":
+            is_flat, part = rest.strip() in (b"off", b"0"), None
+        elif key == b"mtllib":
+            libraries.append(_text(rest))
+    pools = (
+        _numbers(vertices, 3, file, "v"),
+        _numbers(uvs, 2, file, "vt"),
+        _numbers(normals, 3, file, "vn"),
+    )
+    n_triangles = sum(max(0, len(x.split()) - 2) for p in parts.values() for x in p.lines)
+    if n_triangles > max_triangles:
+        raise _too_many(file, n_triangles, b"", max_triangles)
+    meshes, n_dropped = [], 0
+    for p in parts.values():
+        mesh, dropped = _mesh(p, pools, file)
+        n_dropped += dropped
+        if mesh is not None:
+            meshes.append(mesh)
+    return ObjModel(tuple(meshes), tuple(libraries), n_dropped)
+
+
+def _too_many(file: str, n: int, key: bytes, most: int) -> BadHouse:
+    what = "vertices" if key.startswith(b"\nv") else "triangles or more"
+    return BadHouse(
+        file, "", f"{n} {what}, at most {most} triangles are read", hint="read.max_model_triangles"
+    )
+
+
+def _text(rest: bytes) -> str:
+    return rest.strip().decode("utf-8", "replace")
+
+
+def _numbers(lines: list[bytes], n: int, file: str, what: str) -> NDArray[np.float64]:
+    if not lines:
+        return np.zeros((0, n))
+    tokens = b" ".join(lines).split()
+    per_line = len(tokens) // len(lines)
+    if len(tokens) != per_line * len(lines) or per_line < n:
+        rows = [(line.split() + [b"0"] * n)[:n] for line in lines]
+        tokens, per_line = [t for row in rows for t in row], n
+    elif any(len(line.split()) != per_line for line in lines):
+        tokens = [t for line in lines for t in (line.split() + [b"0"] * n)[:n]]
+        per_line = n
+    try:
+        values = np.array(tokens).astype(np.float64)
+    except ValueError as error:
+        raise BadHouse(file, f"a `{what}` line", f"not a number: {error}") from None
+    numbers = values.reshape(len(lines), per_line)[:, :n]
+    if not np.isfinite(numbers).all():
+        row = int(np.flatnonzero(~np.isfinite(numbers).all(1))[0])
+        raise BadHouse(file, f"`{what}` line {row + 1}", "a coordinate is not a finite number")
+    return numbers
+
+
+def _indices(part: _Part, pools: tuple[NDArray[np.float64], ...], file: str) -> NDArray[np.int64]:
+    # (n corners, 3) vertex, uv and normal index from 0; -1 = none.
+    joined = b" ".join(part.lines).replace(b"//", b"/0/")
+    tokens = joined.split()
+    slashes = {t.count(b"/") for t in tokens}
+    if len(slashes) == 1 and max(slashes) <= 2:
+        columns = 1 + max(slashes)
+        flat = joined.replace(b"/", b" ").split()
+    else:
+        columns = 3
+        flat = [c or b"0" for t in tokens for c in [*t.split(b"/"), b"0", b"0"][:3]]
+    try:
+        given = np.array(flat).astype(np.int64).reshape(len(tokens), columns)
+    except (ValueError, OverflowError) as error:
+        raise BadHouse(file, "an `f` line", f"not an index: {error}") from None
+    indices = np.zeros((len(tokens), 3), np.int64)
+    indices[:, :columns] = given
+    if (given < 0).any():
+        per_line = [len(x.split()) for x in part.lines]
+        seen = np.repeat(np.asarray(part.seen, np.int64).reshape(-1, 3), per_line, axis=0)
+        indices = np.where(indices < 0, indices + seen + 1, indices)
+    for k, what in enumerate(("vertex", "texture", "normal")):
+        low, high = int(indices[:, k].min()), int(indices[:, k].max())
+        if low < (1 if k == 0 else 0) or high > len(pools[k]):
+            if k == 0:
+                bad = low if low < 1 else high
+                raise BadHouse(
+                    file, "an `f` line", f"{what} {bad} of {len(pools[k])} does not exist"
+                )
+            indices[(indices[:, k] > len(pools[k])) | (indices[:, k] < 0), k] = 0
+    return indices - 1
+
+
+def _mesh(
+    part: _Part, pools: tuple[NDArray[np.float64], ...], file: str
+) -> tuple[Mesh | None, int]:
+    sizes = np.array([len(x.split()) for x in part.lines], np.int64)
+    if not sizes.sum():
+        return None, len(sizes)
+    indices = _indices(part, pools, file)
+    corners = triangle_corners(pools[0][indices[:, 0]], sizes)
+    index = indices[corners]
+    v = index[:, :, 0]
+    area = np.linalg.norm(face_normals(pools[0], v), axis=1)
+    keep = area > 0
+    n_dropped = int((~keep).sum())
+    index = index[keep]
+    if not len(index):
+        return None, n_dropped
+    points = pools[0]
+    has_uvs = bool((index[:, :, 1] >= 0).all())
+    if (index[:, :, 2] >= 0).all():
+        normal_pool, normal_index = pools[2], index[:, :, 2]
+    else:
+        crease = 0.0 if part.is_flat else DEFAULT_CREASE_RAD
+        normal_pool, normal_index = crease_normals(points, index[:, :, 0], crease)
+    keys = np.stack(
+        [index[:, :, 0], index[:, :, 1] if has_uvs else 0 * normal_index, normal_index], -1
+    )
+    unique, faces = _unique_rows(keys.reshape(-1, 3))
+    normals = normal_pool[unique[:, 2]]
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    mesh = Mesh(
+        part.group,
+        part.material,
+        points[unique[:, 0]],
+        faces.reshape(-1, 3).astype(np.int32),
+        pools[1][unique[:, 1]] if has_uvs else None,
+        normals / np.where(length > 0, length, 1),
+    )
+    return mesh, n_dropped
+
+
+def _unique_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    # The distinct rows, in sorted order, and for each row its place among them.
+    spans = rows.max(0) + 1
+    if float(spans[0]) * float(spans[1]) * float(spans[2]) > 2.0**62:
+        unique, inverse = np.unique(rows, axis=0, return_inverse=True)
+        return unique, inverse.reshape(-1)
+    code = (rows[:, 0] * spans[1] + rows[:, 1]) * spans[2] + rows[:, 2]
+    _, first, inverse = np.unique(code, return_index=True, return_inverse=True)
+    return rows[first], inverse.reshape(-1)

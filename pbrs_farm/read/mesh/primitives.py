@@ -1,0 +1,156 @@
+"""Small closed meshes in the world frame: boxes, cylinders, spheres, wall prisms; no effects.
+
+Every solid's faces are counter-clockwise seen from outside. Texture coordinates are in metres.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.house import Surface
+
+F64 = NDArray[np.float64]
+
+# Corner i of a box has the sign of bit k of i along axis k; quads seen from outside.
+_BOX_QUADS = np.array(
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+)
+_QUAD = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+
+
+def quads_surface(name: str, quads: F64, material: int) -> Surface:
+    """A surface of (N, 4, 3) planar quads, corners counter-clockwise, uv in metres from corner 0."""
+    quads = np.asarray(quads, np.float64).reshape(-1, 4, 3)
+    u = quads[:, 1] - quads[:, 0]
+    u = u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-12)
+    normal = np.cross(u, quads[:, 3] - quads[:, 0])
+    v = np.cross(normal, u)
+    v = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
+    local = quads - quads[:, :1]
+    uvs = np.stack([(local * u[:, None]).sum(-1), (local * v[:, None]).sum(-1)], -1)
+    faces = _QUAD[None] + 4 * np.arange(len(quads), dtype=np.int32)[:, None, None]
+    return Surface(
+        name,
+        quads.reshape(-1, 3).astype(np.float32),
+        faces.reshape(-1, 3).astype(np.int32),
+        material,
+        uvs.reshape(-1, 2).astype(np.float32),
+    )
+
+
+def box_quads(centre: F64, half: F64, axes: F64 | None = None) -> F64:
+    """(6, 4, 3) quads of an oriented box; axes: (3, 3), columns are unit, right-handed."""
+    signs = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
+    axes = np.eye(3) if axes is None else axes
+    corners = np.asarray(centre) + (signs * np.asarray(half)) @ axes.T
+    return np.asarray(corners[_BOX_QUADS], np.float64)
+
+
+def box(name: str, centre: F64, half: F64, material: int, *, axes: F64 | None = None) -> Surface:
+    """A closed oriented box; centre, half extents (3,) in metres."""
+    return quads_surface(name, box_quads(centre, half, axes), material)
+
+
+def lathe(name: str, profile: F64, centre: F64, material: int, *, n: int = 16) -> Surface:
+    """The (radius, height) profile (P, 2), bottom to top, turned about the vertical through centre.
+
+    Smooth normals across the turn, none along the profile's kinks; closed if it starts and ends
+    on the axis. centre: (3,).
+    """
+    angles = 2 * np.pi * np.arange(n + 1) / n
+    around = np.stack([np.cos(angles), np.zeros(n + 1), -np.sin(angles)], -1)
+    around[-1] = around[0]
+    positions, normals, faces, uvs = [], [], [], []
+    for k, ((r0, y0), (r1, y1)) in enumerate(pairwise(profile)):
+        ring = [around * r + [0, y, 0] + centre for r, y in ((r0, y0), (r1, y1))]
+        slope = around * (y1 - y0) + np.array([0, r0 - r1, 0])
+        slope = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-12)
+        base = k * 2 * (n + 1)
+        i = np.arange(n) + base
+        j = i + n + 1
+        if r0 > 0:
+            faces.append(np.stack([i, i + 1, j + (r1 > 0)], -1))
+        if r1 > 0:
+            faces.append(np.stack([i, j + 1, j], -1))
+        positions += ring
+        normals += [slope, slope]
+        length = angles * max(r0, r1)
+        uvs += [np.stack([length, np.full(n + 1, y)], -1) for y in (y0, y1)]
+    return Surface(
+        name,
+        np.concatenate(positions).astype(np.float32),
+        np.concatenate(faces).astype(np.int32),
+        material,
+        np.concatenate(uvs).astype(np.float32),
+        np.concatenate(normals).astype(np.float32),
+    )
+
+
+def sphere(name: str, centre: F64, radius: float, material: int, *, n: int = 16) -> Surface:
+    """A closed sphere of n segments around, radius in metres."""
+    angles = np.linspace(-np.pi / 2, np.pi / 2, n // 2 + 1)
+    profile = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
+    profile[[0, -1], 0] = 0.0
+    surface = lathe(name, profile, centre, material, n=n)
+    outward = surface.positions - np.asarray(centre, np.float32)
+    outward = outward / np.linalg.norm(outward, axis=1, keepdims=True)
+    return Surface(
+        name, surface.positions, surface.faces, material, surface.uvs, outward.astype(np.float32)
+    )
+
+
+def wall_prism(
+    left: Points2,
+    right: Points2,
+    bottom_y: float,
+    left_top_y: F64,
+    right_top_y: F64,
+    materials: tuple[int, int, int],
+    *,
+    top: int | None = None,
+) -> tuple[Surface, ...]:
+    """A wall as a closed solid: surfaces left, right, top, bottom, start, end.
+
+    left, right: (N, 2) plan points from the wall's start to its end. *_top_y: (N,) heights.
+    materials: of the left side, the right side, and the rest (with the top, unless top is
+    given). u runs to the right of who
+    looks at the side, v is the height above the wall's bottom.
+    """
+    left_low, right_low = _lifted(left, bottom_y), _lifted(right, bottom_y)
+    left_high, right_high = _lifted(left, left_top_y), _lifted(right, right_top_y)
+    rest = materials[2]
+    start = np.stack([left_low[0], right_low[0], right_high[0], left_high[0]])
+    end = np.stack([right_low[-1], left_low[-1], left_high[-1], right_high[-1]])
+    return (
+        _side("left", left_low[::-1], left_high[::-1], materials[0]),
+        _side("right", right_low, right_high, materials[1]),
+        quads_surface("top", _strip(right_high, left_high), rest if top is None else top),
+        quads_surface("bottom", _strip(left_low, right_low), rest),
+        quads_surface("start", start, rest),
+        quads_surface("end", end, rest),
+    )
+
+
+def _lifted(plan: Points2, y: F64 | float) -> F64:
+    points = np.empty((len(plan), 3))
+    points[:, 0], points[:, 1], points[:, 2] = plan[:, 0], y, plan[:, 1]
+    return points
+
+
+def _strip(near: F64, far: F64) -> F64:
+    # Quads between two polylines; counter-clockwise when far lies to the left of near's direction.
+    return np.stack([near[:-1], near[1:], far[1:], far[:-1]], 1)
+
+
+def _side(name: str, low: F64, high: F64, material: int) -> Surface:
+    surface = quads_surface(name, _strip(low, high), material)
+    steps = np.linalg.norm(np.diff(low[:, [0, 2]], axis=0), axis=1)
+    u = np.concatenate([[0.0], np.cumsum(steps)])
+    corner_u = np.stack([u[:-1], u[1:], u[1:], u[:-1]], 1).ravel()
+    corner_v = surface.positions[:, 1] - low[0, 1]
+    uvs = np.stack([corner_u, corner_v], -1).astype(np.float32)
+    return Surface(name, surface.positions, surface.faces, material, uvs)

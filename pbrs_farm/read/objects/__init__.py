@@ -1,0 +1,1 @@
+"""Single models without context -> House of one item."""

@@ -1,0 +1,177 @@
+"""Lists the single models below a folder, and picks some at random. Effect: lists folders, reads
+the catalogue of furniture libraries (.sh3f).
+
+Layouts: ShapeNet's `<synset>/<model id>/models/model_normalized.obj` (or `<model id>/model.obj`),
+`<category>/<name>.obj|.glb`, `<category>/<name>/<any>.obj|.glb`, and Sweet Home 3D libraries.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.read.common.furniture_classes import nyu40_of
+
+OTHERPROP: Final = NYU40_NAMES.index("otherprop")
+_MODEL_SUFFIXES: Final = (".obj", ".glb", ".gltf")
+_PLAIN_FOLDERS: Final = ("models", "")
+_MAX_CATALOGUE_BYTES: Final = 16_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectModel:
+    """One model that can be read. id: unique among those found, fit for a key.
+
+    category: a ShapeNet class or folder's name. path: the model's file, or the library that
+    holds it at entry. root: the folder its textures must lie in. size_m: width, height and depth
+    it is scaled to, or None (as it is).
+    """
+
+    id: str
+    name: str
+    category: str
+    nyu40: int
+    path: Path
+    root: Path
+    entry: str = ""
+    size_m: tuple[float, float, float] | None = None
+    attribution: str = ""
+
+
+def find_models(paths: Sequence[Path]) -> list[ObjectModel]:
+    """Every model below the paths (folders, model files, .sh3f libraries), in order of id.
+
+    Raises BadInput for a path that does not exist, holds no model or is a damaged library.
+    """
+    found: dict[str, ObjectModel] = {}
+    for path in paths:
+        models = _models_at(path)
+        if not models:
+            raise BadInput(path, "", "no model found", hint="OBJ, GLB or .sh3f is looked for")
+        for model in models:
+            found[model.id] = model
+    return [found[name] for name in sorted(found)]
+
+
+def pick_models(
+    models: Sequence[ObjectModel], categories: Sequence[str], count: int, seed: int
+) -> list[ObjectModel]:
+    """count models at random (all when there are fewer) of the named categories (all when none).
+
+    A category is a ShapeNet class or synset id, a folder's name or an NYU40 class. The choice
+    depends on seed and ids alone: more models do not reorder the others. Raises BadInput for a
+    category no model has.
+    """
+    wanted = [c.strip().lower() for c in categories if c.strip()]
+    for category in wanted:
+        if not any(_is_of(model, category) for model in models):
+            raise BadInput("models", category, "no model of this category")
+    chosen = [m for m in models if not wanted or any(_is_of(m, c) for c in wanted)]
+    chosen.sort(key=lambda m: hashlib.sha256(f"{seed}/{m.id}".encode()).digest())
+    return chosen[:count]
+
+
+def _is_of(model: ObjectModel, category: str) -> bool:
+    synset = {row["synset"]: row["name"] for row in _synsets()}.get(category, category)
+    return synset in (model.category.lower(), NYU40_NAMES[model.nyu40])
+
+
+def _models_at(path: Path) -> list[ObjectModel]:
+    if not path.exists():
+        raise BadInput(path, "", "no such file or folder")
+    if path.suffix.lower() == ".sh3f":
+        return _library(path)
+    if path.is_file():
+        return [_model(path, path.parent)] if path.suffix.lower() in _MODEL_SUFFIXES else []
+    models = [
+        _model(file, path)
+        for file in sorted(path.rglob("*"))
+        if file.suffix.lower() in _MODEL_SUFFIXES and file.is_file()
+    ]
+    for library in sorted(path.rglob("*.sh3f")):
+        models += _library(library)
+    return models
+
+
+def _model(file: Path, root: Path) -> ObjectModel:
+    """A model file below root: the folders say its category and its name."""
+    folders = [part for part in file.relative_to(root).parts[:-1] if part not in _PLAIN_FOLDERS]
+    synsets = {row["synset"]: row for row in _synsets()}
+    synset = next((synsets[f] for f in folders if f in synsets), None)
+    if synset is not None:
+        after = folders[folders.index(synset["synset"]) + 1 :]
+        name = after[0] if after else file.stem
+        nyu40 = NYU40_NAMES.index(synset["nyu40"])
+        return ObjectModel(
+            _id(synset["synset"], name), name, synset["name"], nyu40, file, root,
+            attribution="ShapeNet",
+        )  # fmt: skip
+    category = folders[0] if folders else root.name
+    label = nyu40_of("", category) or nyu40_of("", file.stem) or OTHERPROP
+    name = "/".join([*folders[1:], file.stem])
+    return ObjectModel(_id(category, name), file.stem, category, label, file, root)
+
+
+def _library(path: Path) -> list[ObjectModel]:
+    """The pieces of a Sweet Home 3D library whose model is an OBJ in it."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            info = archive.getinfo("PluginFurnitureCatalog.properties")
+            if info.file_size > _MAX_CATALOGUE_BYTES:
+                raise BadInput(path, info.filename, "the catalogue is too large")
+            text = archive.read(info).decode("latin-1")
+            names = set(archive.namelist())
+    except (zipfile.BadZipFile, KeyError, OSError) as error:
+        raise BadInput(path, "", f"is no furniture library: {error}") from None
+    rows: dict[str, dict[str, str]] = {}
+    for line in text.splitlines():
+        key, equals, value = line.partition("=")
+        name, hash_mark, number = key.strip().partition("#")
+        if equals and hash_mark and number.isdigit():
+            rows.setdefault(number, {})[name] = (
+                value.strip().encode("latin-1").decode("unicode_escape", "replace")
+            )
+    return [m for row in rows.values() if (m := _piece(path, row, names)) is not None]
+
+
+def _piece(path: Path, row: dict[str, str], names: set[str]) -> ObjectModel | None:
+    entry = row.get("model", "").lstrip("/")
+    if entry not in names or not entry.lower().endswith(".obj"):
+        return None
+    try:
+        width, height, depth = (float(row[key]) * 0.01 for key in ("width", "height", "depth"))
+    except (KeyError, ValueError):
+        return None
+    title = row.get("name", entry)
+    return ObjectModel(
+        id=_id(path.stem, row.get("id", entry)),
+        name=title,
+        category=row.get("category", ""),
+        nyu40=nyu40_of("", title) or OTHERPROP,
+        path=path,
+        root=path.parent,
+        entry=entry,
+        size_m=(width, height, depth) if min(width, height, depth) > 0 else None,
+        attribution=row.get("creator", ""),
+    )
+
+
+def _id(category: str, name: str) -> str:
+    """`<slugs>-<6 hex>`: readable, and unique for different names."""
+    return f"{keys.slug(f'{category} {name}')}-{keys.sha256(f'{category}/{name}'.encode())[:6]}"
+
+
+@cache
+def _synsets() -> tuple[dict[str, str], ...]:
+    text = files("pbrs_farm.read.objects").joinpath("shapenet-synsets.csv").read_text("utf-8")
+    return tuple(csv.DictReader(text.splitlines()))

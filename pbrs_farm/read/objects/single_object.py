@@ -1,0 +1,164 @@
+"""One model without context -> a House of one item, centred on the origin. Effects: reads the
+model's file and its textures; unpacks a library's model into a temporary folder.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import Box, House, Item, ItemKind, Level, MaterialKind, Source, Surface
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.material_library import Palette
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.placed_mesh import placed
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.gltf.document import gltf_document
+from pbrs_farm.read.gltf.node_classes import Mapping
+from pbrs_farm.read.gltf.node_items import items_of_scene
+from pbrs_farm.read.gltf.pbr_materials import Looks as GltfLooks
+from pbrs_farm.read.objects.model_folders import ObjectModel
+from pbrs_farm.read.suncg.model_files import Models
+from pbrs_farm.read.suncg.model_materials import Looks as ObjLooks
+
+_MAX_FILE_BYTES: Final = 1_000_000_000
+_MAX_UNPACKED_BYTES: Final = 500_000_000
+
+
+def read_object(model: ObjectModel, fields: ReadFields) -> House:
+    """The House of one model: one item, no room, no floor, its box's centre in the origin.
+
+    y is up, as in the file; a library's piece has its catalogue's size. Raises BadHouse for a
+    file that cannot be read, has no triangle or is larger than the fields allow. Lamps' light
+    sources are left out: the sky alone lights an object (paper section 4.1).
+    """
+    file = model.entry or model.path.name
+    notes = Notes(file, strict=fields.strict)
+    with _folder_of(model) as (folder, name):
+        if name.lower().endswith(".obj"):
+            surfaces, palette = _obj(folder, name, notes, fields)
+        else:
+            surfaces, palette = _gltf(folder, name, notes, fields)
+        sha256 = folder.sha256
+    if not surfaces:
+        raise BadHouse(file, "", "has no triangle")
+    surfaces = _centred(surfaces, model.size_m)
+    points = np.concatenate([s.positions for s in surfaces])
+    if not np.isfinite(points).all():
+        raise BadHouse(file, "", "a coordinate is not finite")
+    item = Item(
+        id=model.id,
+        name=model.name,
+        kind=ItemKind.OBJECT,
+        level_id="0",
+        surfaces=tuple(surfaces),
+        nyu40=model.nyu40,
+        source_class=model.category,
+        box=Box(np.zeros(3), np.ptp(points, axis=0).astype(np.float64) / 2, np.eye(3)),
+    )
+    if item.n_faces > fields.max_model_triangles:
+        raise BadHouse(file, "", f"has {item.n_faces} triangles", hint="read.max_model_triangles")
+    return House(
+        id=model.id,
+        name=model.name,
+        source=Source("object", file, sha256, attribution=model.attribution),
+        levels=(Level("0", "", 0.0, 1.0),),
+        rooms=(),
+        items=(item,),
+        materials=palette.materials,
+        textures=palette.textures,
+        notes=notes.all(),
+    )
+
+
+@contextmanager
+def _folder_of(model: ObjectModel) -> Iterator[tuple[RootFolder, str]]:
+    """The folder that holds the model, and the model's name in it."""
+    if not model.entry:
+        yield RootFolder(model.root), model.path.relative_to(model.root).as_posix()
+        return
+    with tempfile.TemporaryDirectory(prefix="pbrs-object-") as scratch:
+        place = posixpath.dirname(model.entry)
+        try:
+            with zipfile.ZipFile(model.path) as archive:
+                members = [i for i in archive.infolist() if posixpath.dirname(i.filename) == place]
+                if sum(i.file_size for i in members) > _MAX_UNPACKED_BYTES:
+                    raise BadHouse(model.path, model.entry, "is too large unpacked")
+                for member in members:
+                    archive.extract(member, scratch)
+        except (zipfile.BadZipFile, OSError, RuntimeError) as error:
+            raise BadHouse(model.path, model.entry, f"cannot be unpacked: {error}") from None
+        yield RootFolder(Path(scratch)), model.entry
+
+
+def _obj(
+    folder: RootFolder, name: str, notes: Notes, fields: ReadFields
+) -> tuple[list[Surface], Palette]:
+    looks = ObjLooks(folder, notes)
+    model = Models(folder, notes, fields).model(name, _material_library(folder, name))
+    if model is None:
+        raise BadHouse(folder.root, name, "no such file")
+    surfaces = []
+    for mesh, slot in zip(model.meshes, model.slots, strict=True):
+        mtl = model.mtl[slot] if slot >= 0 else None
+        material = looks.material(mtl, None, place=name, clear=MaterialKind.GLASS)
+        surface = placed(
+            mesh, np.eye(4), name=mesh.material, material=looks.palette.index(material)
+        )
+        if surface is not None:
+            surfaces.append(surface)
+    return surfaces, looks.palette
+
+
+def _material_library(folder: RootFolder, name: str) -> str:
+    """The first mtllib of an OBJ as a name below the folder; `<stem>.mtl` where it has none."""
+    data = folder.read(name, max_bytes=_MAX_FILE_BYTES) or b""
+    reference = posixpath.splitext(posixpath.basename(name))[0] + ".mtl"
+    at = data.find(b"mtllib ")
+    if at >= 0:
+        reference = data[at + 7 :].split(b"\n", 1)[0].decode("utf-8", "replace").strip()
+    return folder.name_from(posixpath.dirname(name), reference)
+
+
+def _gltf(
+    folder: RootFolder, name: str, notes: Notes, fields: ReadFields
+) -> tuple[list[Surface], Palette]:
+    data = folder.read(name, max_bytes=_MAX_FILE_BYTES)
+    if data is None:
+        raise BadHouse(folder.root, name, "no such file")
+
+    def fetch(reference: str) -> bytes | None:
+        inside = folder.name_from(posixpath.dirname(name), reference)
+        return folder.read(inside, max_bytes=_MAX_FILE_BYTES)
+
+    gltf = gltf_document(data, name, fetch)
+    looks = GltfLooks(gltf, fetch, notes)
+    items = items_of_scene(gltf, Mapping(), looks, notes, fields)
+    return [surface for item in items for surface in item.surfaces], looks.palette
+
+
+def _centred(surfaces: list[Surface], size_m: tuple[float, float, float] | None) -> list[Surface]:
+    """The surfaces moved so that their common box is centred on the origin, and scaled to size."""
+    points = np.concatenate([s.positions for s in surfaces]).astype(np.float64)
+    low, high = points.min(0), points.max(0)
+    extent = np.where(high - low > 1e-9, high - low, 1.0)
+    scale = np.ones(3) if size_m is None else np.asarray(size_m) / extent
+    return [_moved(surface, (low + high) / 2, scale) for surface in surfaces]
+
+
+def _moved(surface: Surface, origin: NDArray[np.float64], scale: NDArray[np.float64]) -> Surface:
+    normals = surface.normals
+    if normals is not None:
+        turned = normals / scale
+        normals = (turned / np.linalg.norm(turned, axis=1, keepdims=True)).astype(np.float32)
+    positions = ((surface.positions - origin) * scale).astype(np.float32)
+    return Surface(surface.name, positions, surface.faces, surface.material, surface.uvs, normals)

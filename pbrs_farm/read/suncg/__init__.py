@@ -1,0 +1,1 @@
+"""SUNCG houses (house.json and what it names) -> House."""

@@ -1,0 +1,342 @@
+"""SUNCG v2's wall/<id>/<id>.arch.json -> structure items and openings (suncg section 1.7).
+
+No effects. Walls become solids of their own depth, outward from their points; floors and ceilings
+slabs upwards from their offset, as v1's released meshes are (the format does not say which way it
+means); holes become openings that repair cuts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Opening, Surface
+from pbrs_farm.formats.serialise import json_from_bytes
+from pbrs_farm.read.common.placed_mesh import placed
+from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
+from pbrs_farm.read.mesh.mtl import ObjMaterial
+from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.mesh.primitives import box_quads, quads_surface
+from pbrs_farm.read.suncg.house_json import JsonReader, Node, Override, world_from_house_of
+from pbrs_farm.read.suncg.model_materials import Looks
+from pbrs_farm.read.suncg.wall_holes import box_between
+
+WALL_DEPTH_M: Final = 0.10
+SLAB_DEPTH_M: Final = 0.05
+MAX_ELEMENTS: Final = 100_000
+_EDGE: Final = ObjMaterial("edge", (0.50196, 0.50196, 0.50196))
+_REACH_M: Final = 0.02
+_BESIDE_M: Final = 0.15
+_MODEL_ROOM: Final = re.compile(r"fr_(\d+)(?:rm|gd)_(\d+)")
+_KINDS: Final = {
+    "Floor": ItemKind.FLOOR,
+    "Ceiling": ItemKind.CEILING,
+    "Ground": ItemKind.GROUND,
+    "Wall": ItemKind.WALL,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Element:
+    """An element of arch.json. points: a wall's two ends, or a slab's outline and its holes.
+
+    depth_m: thickness. height_m: of a wall. holes: (H, 4) along from, up from, along to, up to.
+    """
+
+    kind: str
+    place: str
+    room_id: str
+    points: tuple[NDArray[np.float64], ...]
+    overrides: tuple[Override, ...]
+    depth_m: float
+    height_m: float = 0.0
+    holes: tuple[tuple[float, float, float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arch:
+    """arch.json as read. elements: by the room or ground they belong to, in file order."""
+
+    world_from_house: NDArray[np.float64]
+    elements: dict[str, list[Element]]
+
+
+def arch_from_json(data: bytes, file: str) -> Arch:
+    """The elements of arch.json by room; BadHouse naming the element that is wrong."""
+    plain = json_from_bytes(data, file)
+    if not isinstance(plain, dict):
+        raise BadHouse(file, "", "expected an object; this is no arch.json")
+    reader = JsonReader(file)
+    raw_elements = reader.items(plain, "elements", "")
+    if len(raw_elements) > MAX_ELEMENTS:
+        raise BadHouse(file, "elements", f"more than {MAX_ELEMENTS}")
+    defaults = plain.get("defaults")
+    found: dict[str, list[Element]] = {}
+    for i, raw in enumerate(raw_elements):
+        element = _element(reader, raw, f"element {i}", defaults)
+        if element is not None:
+            found.setdefault(element.room_id, []).append(element)
+    return Arch(world_from_house_of(reader, plain), found)
+
+
+def _element(reader: JsonReader, raw: Any, place: str, defaults: Any) -> Element | None:
+    if not isinstance(raw, dict):
+        raise BadHouse(reader.file, place, "expected an object")
+    kind = raw.get("type")
+    if not isinstance(kind, str) or kind not in _KINDS:
+        return None
+    place = f"{place} ({kind} {str(raw.get('id', ''))[:40]})"
+    usual = defaults.get(kind) if isinstance(defaults, dict) else None
+    usual = usual if isinstance(usual, dict) else {}
+    usual_depth = usual.get("depth", WALL_DEPTH_M if kind == "Wall" else SLAB_DEPTH_M)
+    depth = _length(reader, raw.get("depth", usual_depth), f"{place}, depth")
+    room_id = str(raw.get("roomId", ""))[:60]
+    overrides = reader.overrides(raw.get("materials"), place)
+    if kind == "Wall":
+        points = reader.items(raw, "points", place)
+        if len(points) != 2:
+            raise BadHouse(reader.file, f"{place}, points", "expected two ends")
+        ends = np.array([reader.numbers(p, 3, f"{place}, points") for p in points])
+        extra = _length(reader, usual.get("extraHeight", 0), f"{place}, extraHeight")
+        height = _length(reader, raw.get("height"), f"{place}, height") + extra
+        holes = tuple(
+            _hole(reader, hole, f"{place}, holes[{k}]")
+            for k, hole in enumerate(raw["holes"] if isinstance(raw.get("holes"), list) else [])
+        )
+        return Element(kind, place, room_id, (ends,), overrides, depth, height, holes)
+    rings = _rings(reader, raw, place)
+    return Element(kind, place, room_id, rings, overrides, depth)
+
+
+def _length(reader: JsonReader, value: Any, place: str) -> float:
+    (number,) = reader.numbers([value], 1, place)
+    if not 0 <= number < 1000:
+        raise BadHouse(reader.file, place, f"{number:g} is no length")
+    return float(number)
+
+
+def _hole(reader: JsonReader, raw: Any, place: str) -> tuple[float, float, float, float]:
+    box = raw.get("box") if isinstance(raw, dict) else None
+    if not isinstance(box, dict):
+        raise BadHouse(reader.file, place, "has no box")
+    (u0, v0), (u1, v1) = (
+        reader.numbers(box.get(k), 2, f"{place}, box.{k}") for k in ("min", "max")
+    )
+    return (float(u0), float(v0), float(u1), float(v1))
+
+
+def _rings(reader: JsonReader, raw: dict[str, Any], place: str) -> tuple[NDArray[np.float64], ...]:
+    """Outline and holes in house coordinates; points may be one ring or a list of rings."""
+    points = reader.items(raw, "points", place)
+    nested = bool(points) and all(
+        isinstance(p, list) and p and isinstance(p[0], list) for p in points
+    )
+    offset = reader.numbers(raw.get("offset", [0, 0, 0]), 3, f"{place}, offset")
+    rings = []
+    for ring in points if nested else [points]:
+        corners = [reader.numbers(p, 3, f"{place}, points") for p in ring]
+        if len(corners) < 3:
+            raise BadHouse(reader.file, f"{place}, points", "fewer than three corners")
+        rings.append(np.array(corners) + offset)
+    return tuple(rings)
+
+
+def arch_items(arch: Arch, node: Node, room_id: str, looks: Looks) -> Iterator[Item]:
+    """The structure items of a Room or Ground node."""
+    for item_id, e, outline in _elements_of(arch, node, room_id):
+        frame = _wall_frame(e, outline)
+        surfaces = _slab(arch, e, looks) if frame is None else _wall(arch, e, frame, looks)
+        if not surfaces:
+            continue
+        is_ground = e.kind == "Ground"
+        yield Item(
+            id=item_id,
+            name=f"{e.kind.lower()} {room_id}",
+            kind=_KINDS[e.kind],
+            level_id=node.level_id,
+            surfaces=surfaces,
+            nyu40=0 if is_ground else NYU40_NAMES.index(e.kind.lower()),
+            source_class=f"{node.model_id} {e.kind}",
+            room_id=None if is_ground else room_id,
+            tags=(f"boundary_of:{room_id}",) if e.kind == "Wall" else (),
+        )
+
+
+def arch_openings(
+    arch: Arch, rooms: Iterable[tuple[Node, str]], items: Sequence[Item]
+) -> tuple[Opening, ...]:
+    """The holes of the walls of (node, room id), with the door or window that stands in each."""
+    found = []
+    for node, room_id in rooms:
+        for item_id, e, outline in _elements_of(arch, node, room_id):
+            frame = _wall_frame(e, outline)
+            if frame is None:
+                continue
+            for k, hole in enumerate(e.holes):
+                opening = _opening(arch, e, frame, hole, f"{item_id}_hole{k}", node.level_id)
+                found += [_with_body(opening, items)] if opening is not None else []
+    return tuple(found)
+
+
+def _elements_of(
+    arch: Arch, node: Node, room_id: str
+) -> Iterator[tuple[str, Element, NDArray[np.float64] | None]]:
+    """(item id, element, outline of the room's floor) of every element that is not hidden."""
+    known = _MODEL_ROOM.fullmatch(node.model_id)
+    named = [node.id, *([f"{known[1]}_{known[2]}"] if known else [])]
+    elements = next((arch.elements[n] for n in named if n in arch.elements), [])
+    outline = next((e.points[0] for e in elements if e.kind == "Floor"), None)
+    hides = {"Wall": "Walls", "Ground": "Floor"}
+    n_walls = 0
+    for e in elements:
+        if hides.get(e.kind, e.kind) in node.hidden:
+            continue
+        suffix = {"Wall": f"w{n_walls}", "Floor": "f", "Ceiling": "c", "Ground": ""}[e.kind]
+        n_walls += e.kind == "Wall"
+        yield f"{room_id}{suffix}", e, outline
+
+
+def _look(looks: Looks, e: Element, position: int) -> int:
+    """The material at a position of the element, the first one where there are fewer."""
+    override = e.overrides[min(position, len(e.overrides) - 1)] if e.overrides else None
+    look = looks.material(None, override, place=e.place, clear=MaterialKind.GLASS)
+    return looks.palette.index(look)
+
+
+def _in_world(arch: Arch, surface: Surface) -> Surface | None:
+    mesh = Mesh(
+        "",
+        "",
+        surface.positions.astype(np.float64),
+        surface.faces,
+        None if surface.uvs is None else surface.uvs.astype(np.float64),
+        np.zeros((len(surface.positions), 3)),
+    )
+    return placed(mesh, arch.world_from_house, name=surface.name, material=surface.material)
+
+
+def _kept(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
+    return tuple(s for s in (_in_world(arch, surface) for surface in surfaces) if s is not None)
+
+
+def _slab(arch: Arch, e: Element, looks: Looks) -> tuple[Surface, ...]:
+    """A closed slab from the element's height upwards."""
+    look = _look(looks, e, 0)
+    low = float(e.points[0][:, 1].min())
+    high = low + e.depth_m
+    plans = [counter_clockwise(ring[:, [0, 2]]) for ring in e.points]
+    plans = [plans[0], *(p[::-1] for p in plans[1:])]
+    sides = []
+    for plan in plans:
+        for a, b in zip(plan, np.roll(plan, -1, axis=0), strict=True):
+            sides.append(
+                [[b[0], low, b[1]], [a[0], low, a[1]], [a[0], high, a[1]], [b[0], high, b[1]]]
+            )
+    parts = [
+        horizontal("top", [plans], high, look, up=True),
+        horizontal("bottom", [plans], low, look, up=False),
+    ]
+    if e.depth_m > 0:
+        parts.append(quads_surface("side", np.array(sides), look))
+    return _kept(arch, parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frame:
+    """Where a wall stands: its start, and (3, 3) unit columns along, up, outward; its length."""
+
+    start: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    length: float
+
+
+def _wall_frame(e: Element, outline: NDArray[np.float64] | None) -> _Frame | None:
+    """The frame of a wall with an extent, outward from the room's floor; None for all else."""
+    if e.kind != "Wall":
+        return None
+    start, end = e.points[0]
+    along = (end - start) * [1, 0, 1]
+    length = float(np.linalg.norm(along))
+    if length < 1e-3 or e.height_m <= 0 or e.depth_m <= 0:
+        return None
+    along /= length
+    up = np.array([0.0, 1.0, 0.0])
+    outward = np.cross(along, up)
+    if outline is not None and _is_inside(outline, (start + end) / 2 + 0.05 * outward):
+        outward = -outward
+    return _Frame(start, np.stack([along, up, outward], 1), length)
+
+
+def _wall(arch: Arch, e: Element, frame: _Frame, looks: Looks) -> tuple[Surface, ...]:
+    """The wall's closed box, without its holes."""
+    half = np.array([frame.length, e.height_m, e.depth_m]) / 2
+    right_handed = frame.axes * [np.linalg.det(frame.axes), 1, 1]
+    quads = box_quads(frame.start + frame.axes @ half, half, right_handed)
+    edge = looks.material(_EDGE, None, place=e.place, clear=MaterialKind.GLASS)
+    return _kept(
+        arch,
+        [
+            quads_surface("inside", quads[4:5], _look(looks, e, 0)),
+            quads_surface("outside", quads[5:], _look(looks, e, 1)),
+            quads_surface("edge", quads[:4], looks.palette.index(edge)),
+        ],
+    )
+
+
+def _is_inside(outline: NDArray[np.float64], point: NDArray[np.float64]) -> bool:
+    """Whether a point lies over the outline, by the crossings of a ray along x."""
+    a, b = outline[:, [0, 2]], np.roll(outline[:, [0, 2]], -1, axis=0)
+    x, z = point[[0, 2]]
+    crosses = (a[:, 1] > z) != (b[:, 1] > z)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = a[:, 0] + (z - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool((crosses & (at > x)).sum() % 2)
+
+
+def _opening(
+    arch: Arch,
+    e: Element,
+    frame: _Frame,
+    hole: tuple[float, float, float, float],
+    opening_id: str,
+    level_id: str,
+) -> Opening | None:
+    u0, v0, u1, v1 = hole
+    if u1 - u0 < 0.05 or v1 - v0 < 0.05:
+        return None
+    scale = np.linalg.norm(arch.world_from_house[:3, 0])
+    world_axes = arch.world_from_house[:3, :3] / scale @ frame.axes
+    world_axes = world_axes * [np.linalg.det(world_axes), 1, 1]
+    corners = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)]
+    quad = np.array([frame.start + frame.axes @ [u, v, e.depth_m / 2] for u, v in corners])
+    quad = quad @ arch.world_from_house[:3, :3].T
+    local = quad @ world_axes
+    reach = np.array([0.0, 0.0, e.depth_m / 2 * scale + _REACH_M])
+    return Opening(
+        id=opening_id,
+        level_id=level_id,
+        item_id=None,
+        is_window=v0 > 0.2,
+        cutter=box_between(local.min(0) - reach, local.max(0) + reach, world_axes),
+        quad=quad,
+        normal=world_axes[:, 2],
+    )
+
+
+def _with_body(opening: Opening, items: Sequence[Item]) -> Opening:
+    """The opening with the door or window whose bounds hold its middle, if there is one."""
+    middle = opening.quad.mean(0)
+    for item in items:
+        if item.kind in (ItemKind.DOOR, ItemKind.WINDOW):
+            low, high = item.bounds
+            if (low - _BESIDE_M < middle).all() and (middle < high + _BESIDE_M).all():
+                is_window = item.kind is ItemKind.WINDOW
+                return replace(opening, item_id=item.id, is_window=is_window)
+    return opening

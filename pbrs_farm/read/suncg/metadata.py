@@ -1,0 +1,222 @@
+"""SUNCG's metadata tables, read from the user's own root (suncg section 2); no effects.
+
+No table is shipped: where the root lacks one, the house is read without it and a note says so.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.house import ItemKind, LightPart
+from pbrs_farm.core.lighting import LightForm, PowerUnit
+from pbrs_farm.formats.serialise import json_from_bytes
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.root_folder import RootFolder
+
+OTHERPROP: Final = 40
+_MAX_TABLE_BYTES: Final = 32_000_000
+_NYU40_IDS: Final = {name.replace(" ", "_"): i for i, name in enumerate(NYU40_NAMES)} | {
+    "void": 0,
+    "refridgerator": NYU40_NAMES.index("refrigerator"),
+}
+_KIND_OF_CLASS: Final = {
+    "window": ItemKind.WINDOW,
+    "door": ItemKind.DOOR,
+    "lamp": ItemKind.LAMP,
+    "person": ItemKind.PERSON,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ModelClass:
+    """What ModelCategoryMapping says of a model. structure: empty_struct_obj is 1."""
+
+    name: str
+    nyu40: int
+    kind: ItemKind
+    structure: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LampMaterials:
+    """Positions in the model's mtl of the materials that are bulbs and shades."""
+
+    bulbs: tuple[int, ...]
+    shades: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """Every table by model id. lights: in the model's frame. variants: models.csv's variantIds."""
+
+    classes: dict[str, ModelClass] = field(default_factory=dict)
+    lights: dict[str, tuple[LightPart, ...]] = field(default_factory=dict)
+    lamps: dict[str, LampMaterials] = field(default_factory=dict)
+    variants: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+def read_tables(folder: RootFolder, notes: Notes) -> Tables:
+    """The tables in metadata/ of the root, or beside it in the root itself."""
+    return Tables(
+        classes=_classes(folder, notes),
+        lights=_lights(folder, notes),
+        lamps=_lamps(folder, notes),
+        variants=_variants(folder),
+    )
+
+
+def _table(folder: RootFolder, *names: str) -> tuple[str, bytes] | None:
+    for name in names:
+        for place in (f"metadata/{name}", name):
+            data = folder.read(place, max_bytes=_MAX_TABLE_BYTES)
+            if data is not None:
+                return place, data
+    return None
+
+
+def _rows(name: str, data: bytes) -> list[dict[str, str]]:
+    try:
+        text = data.decode("utf-8-sig")
+        rows = list(csv.DictReader(io.StringIO(text)))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadHouse(name, "", f"no valid table: {error}") from None
+    return [{k: v for k, v in row.items() if isinstance(v, str)} for row in rows]
+
+
+def _classes(folder: RootFolder, notes: Notes) -> dict[str, ModelClass]:
+    found = _table(folder, "ModelCategoryMappingNewActive.csv", "ModelCategoryMapping.csv")
+    if found is None:
+        notes.add("missing-table", "metadata/ModelCategoryMapping.csv", "every object is otherprop")
+        return {}
+    return {row["model_id"]: _class(row) for row in _rows(*found) if row.get("model_id")}
+
+
+def _class(row: dict[str, str]) -> ModelClass:
+    nyu = row.get("nyuv2_40class", "").strip()
+    coarse = row.get("coarse_grained_class", "").strip()
+    kind = _KIND_OF_CLASS.get(nyu, ItemKind.OBJECT)
+    if coarse == "plant" or (row.get("active", "1").strip() == "0" and kind is ItemKind.OBJECT):
+        kind = ItemKind.PLANT
+    elif coarse == "person":
+        kind = ItemKind.PERSON
+    elif coarse == "stairs":
+        kind = ItemKind.STAIRS
+    return ModelClass(
+        name=row.get("fine_grained_class", "").strip() or coarse,
+        nyu40=_NYU40_IDS.get(nyu, OTHERPROP),
+        kind=kind,
+        structure=row.get("empty_struct_obj", "2").strip() == "1",
+    )
+
+
+def _variants(folder: RootFolder) -> dict[str, tuple[str, ...]]:
+    found = _table(folder, "models.csv")
+    if found is None:
+        return {}
+    rows = [(row.get("id", ""), row.get("variantIds", "")) for row in _rows(*found)]
+    return {model: tuple(v.strip() for v in ids.split(",")) for model, ids in rows if ids}
+
+
+def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
+    found = _table(folder, "light_geometry_compact.txt")
+    if found is None:
+        text = "no lamp's bulb material is known; repair adds bulbs"
+        notes.add("missing-table", "metadata/light_geometry_compact.txt", text)
+        return {}
+    name, data = found
+    lamps = {}
+    for number, line in enumerate(data.decode("utf-8", "replace").splitlines(), 1):
+        words = line.split()
+        if not words:
+            continue
+        try:
+            n_bulbs = int(words[1])
+            bulbs = tuple(int(w) for w in words[2 : 2 + n_bulbs])
+            n_shades = int(words[2 + n_bulbs])
+            shades = tuple(int(w) for w in words[3 + n_bulbs : 3 + n_bulbs + n_shades])
+        except (ValueError, IndexError):
+            raise BadHouse(name, f"line {number}", "expected counts and indices") from None
+        lamps[words[0]] = LampMaterials(bulbs, shades)
+    return lamps
+
+
+def _lights(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]]:
+    found = _table(folder, "suncgModelLights.json")
+    if found is None:
+        text = "no lamp's light is known; bulbs get an assumed power"
+        notes.add("missing-table", "metadata/suncgModelLights.json", text)
+        return {}
+    name, data = found
+    plain = json_from_bytes(data, name)
+    if not isinstance(plain, dict):
+        raise BadHouse(name, "", "expected an object")
+    return {
+        model: tuple(_light(light, name, f"{model}[{k}]") for k, light in enumerate(lights))
+        for model, lights in plain.items()
+        if isinstance(lights, list)
+    }
+
+
+_FORMS: Final = {
+    "PointLight": LightForm.POINT,
+    "SpotLight": LightForm.SPOT,
+    "LineLight": LightForm.LINE,
+}
+
+
+def _light(plain: Any, file: str, place: str) -> LightPart:
+    if not isinstance(plain, dict) or str(plain.get("type")) not in _FORMS:
+        raise BadHouse(file, place, f"expected one of {', '.join(_FORMS)}")
+    form = _FORMS[plain["type"]]
+    end = plain.get("position2") if form is LightForm.LINE else None
+    direction = plain.get("direction") if form is not LightForm.POINT else None
+    return LightPart(
+        position=_triple(plain.get("position"), file, f"{place}.position"),
+        radius_m=0.0,
+        power=_number(plain.get("power"), file, f"{place}.power"),
+        unit=PowerUnit.WATT,
+        rgb_linear=_colour(plain.get("color", "#ffffff"), file, f"{place}.color"),
+        form=form,
+        direction=(0.0, -1.0, 0.0)
+        if direction is None
+        else _triple(direction, file, f"{place}.direction"),
+        cutoff_rad=_number(plain.get("cutoffAngle", math.pi), file, f"{place}.cutoffAngle"),
+        dropoff=_number(plain.get("dropoffRate", 0.0), file, f"{place}.dropoffRate"),
+        position_end=None if end is None else _triple(end, file, f"{place}.position2"),
+    )
+
+
+def _number(value: Any, file: str, place: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < 1e6:
+        raise BadHouse(file, place, "expected a number >= 0")
+    return float(value)
+
+
+def _triple(value: Any, file: str, place: str) -> tuple[float, float, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise BadHouse(file, place, "expected three numbers")
+    x, y, z = (
+        float(v) if isinstance(v, (int, float)) and abs(v) < 1e6 else math.nan for v in value
+    )
+    if not math.isfinite(x + y + z):
+        raise BadHouse(file, place, "expected three finite numbers")
+    return (x, y, z)
+
+
+def _colour(value: Any, file: str, place: str) -> tuple[float, float, float]:
+    try:
+        rgb = np.array([int(str(value)[k : k + 2], 16) for k in (1, 3, 5)]) / 255
+    except ValueError:
+        raise BadHouse(file, place, "expected #rrggbb") from None
+    linear = linear_from_srgb(rgb)
+    r, g, b = (float(c) for c in linear / max(linear.max(), 1e-6))
+    return (r, g, b)

@@ -1,0 +1,74 @@
+"""The models a SUNCG house is made of, parsed once each. Effect: reads OBJ and MTL of the root."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass, replace
+
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.mesh.mtl import ObjMaterial, parse_mtl
+from pbrs_farm.read.mesh.obj import Mesh, parse_obj
+
+_MAX_MTL_BYTES = 4_000_000
+_BYTES_PER_TRIANGLE = 150
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """Meshes with their materials. slots: per mesh its material's position in mtl, -1 = unknown."""
+
+    meshes: tuple[Mesh, ...]
+    slots: tuple[int, ...]
+    mtl: tuple[ObjMaterial, ...]
+
+    @property
+    def n_faces(self) -> int:
+        """Triangles over all meshes."""
+        return sum(len(m.faces) for m in self.meshes)
+
+
+class Models:
+    """Parses every model once and remembers it for the nodes that place it again."""
+
+    def __init__(self, folder: RootFolder, notes: Notes, fields: ReadFields) -> None:
+        self._folder = folder
+        self._notes = notes
+        self._max_triangles = fields.max_model_triangles
+        self._known: dict[tuple[str, str], Model | None] = {}
+
+    def model(self, obj_name: str, mtl_name: str) -> Model | None:
+        """The model of an OBJ below the root; None if there is no such OBJ."""
+        key = (obj_name, mtl_name)
+        if key not in self._known:
+            self._known[key] = self._parse(obj_name, mtl_name)
+        return self._known[key]
+
+    def _parse(self, obj_name: str, mtl_name: str) -> Model | None:
+        data = self._folder.read(
+            obj_name,
+            max_bytes=self._max_triangles * _BYTES_PER_TRIANGLE,
+            limit="read.max_model_triangles",
+        )
+        if data is None:
+            return None
+        meshes = parse_obj(data, obj_name, max_triangles=self._max_triangles).meshes
+        mtl = self._mtl(mtl_name)
+        names = {m.name: i for i, m in reversed(list(enumerate(mtl)))}
+        for name in {m.material: None for m in meshes}:
+            if mtl and name not in names:
+                text = f"usemtl {name[:60]!r} is not in {mtl_name}; it is grey"
+                self._notes.add("unknown-material", obj_name, text)
+        return Model(meshes, tuple(names.get(m.material, -1) for m in meshes), mtl)
+
+    def _mtl(self, name: str) -> tuple[ObjMaterial, ...]:
+        data = self._folder.read(name, max_bytes=_MAX_MTL_BYTES)
+        if data is None:
+            self._notes.add("missing-materials", name, "does not exist; the model is grey")
+            return ()
+        at = posixpath.dirname(name)
+        return tuple(
+            replace(m, map_kd=self._folder.name_from(at, m.map_kd)) if m.map_kd else m
+            for m in parse_mtl(data)
+        )

@@ -1,0 +1,95 @@
+"""Lights of a placed SUNCG model, each with the bulbs that emit it (suncg section 2); no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import LightPart, Surface
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.read.common.placed_mesh import part_of
+
+ASSUMED_WATT = 60.0
+"""Power of a lamp that has bulbs but no row in suncgModelLights.json; shared by its bulbs."""
+
+_FALLBACK_RADIUS_M = 0.0325
+
+
+def placed_light(light: LightPart, world_from_model: NDArray[np.float64]) -> LightPart:
+    """A light of a model's frame in the world."""
+    points = (
+        [light.position] if light.position_end is None else [light.position, light.position_end]
+    )
+    world = transform_points(world_from_model, np.array(points))
+    direction = world_from_model[:3, :3] @ np.array(light.direction)
+    direction /= max(float(np.linalg.norm(direction)), 1e-12)
+    return replace(
+        light,
+        position=_triple(world[0]),
+        position_end=None if light.position_end is None else _triple(world[1]),
+        direction=_triple(direction),
+    )
+
+
+def separate_bulbs(bulb: Surface) -> tuple[Surface, ...]:
+    """The connected parts of a bulb material's surface, one per bulb."""
+    _, same = np.unique(bulb.positions, axis=0, return_inverse=True)
+    faces = same.reshape(-1)[bulb.faces]
+    n = len(bulb.positions)
+    links = coo_array(
+        (np.ones(2 * len(faces)), (np.tile(faces[:, 0], 2), faces[:, 1:].T.reshape(-1))),
+        shape=(n, n),
+    )
+    _, part_of_vertex = connected_components(links, directed=False)
+    part_of_face = part_of_vertex[faces[:, 0]]
+    parts = np.unique(part_of_face)
+    if len(parts) == 1:
+        return (bulb,)
+    return tuple(
+        part_of(bulb, bulb.faces[part_of_face == part], f"{bulb.name}_{k}")
+        for k, part in enumerate(parts)
+    )
+
+
+def lit(
+    lights: Sequence[LightPart], surfaces: Sequence[Surface], bulbs: Sequence[int]
+) -> tuple[LightPart, ...]:
+    """lights with the bulbs (indices into surfaces) that emit each.
+
+    Every bulb belongs to the light nearest to it, and a light without one shares the bulb nearest
+    to it. Without lights every bulb is one, of an assumed power; without bulbs none emits, and
+    repair adds them.
+    """
+    if not bulbs:
+        return tuple(replace(light, radius_m=_FALLBACK_RADIUS_M) for light in lights)
+    bounds = [(surfaces[b].positions.min(0), surfaces[b].positions.max(0)) for b in bulbs]
+    centres = np.array([(low + high) / 2 for low, high in bounds], np.float64)
+    radii = [float(np.mean(high - low)) / 2 for low, high in bounds]
+    if not lights:
+        share = 1 / len(bulbs)
+        return tuple(
+            LightPart(_triple(c), r, ASSUMED_WATT, PowerUnit.WATT, share, emitting=(b,))
+            for c, r, b in zip(centres, radii, bulbs, strict=True)
+        )
+    at = np.array([light.position for light in lights])
+    distance = np.linalg.norm(at[:, None] - centres[None], axis=2)
+    light_of_bulb = distance.argmin(0)
+    found = []
+    for k, light in enumerate(lights):
+        mine = np.flatnonzero(light_of_bulb == k)
+        if not len(mine):
+            mine = np.array([distance[k].argmin()])
+        emitting = tuple(bulbs[int(m)] for m in mine)
+        found.append(replace(light, radius_m=radii[int(mine[0])], emitting=emitting))
+    return tuple(found)
+
+
+def _triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)

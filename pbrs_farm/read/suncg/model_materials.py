@@ -1,0 +1,77 @@
+"""Materials and textures of a SUNCG house (suncg sections 1.5, 1.6); reads textures of the root."""
+
+from __future__ import annotations
+
+import posixpath
+from typing import Final
+
+from pbrs_farm.core.house import Material, MaterialKind, Texture
+from pbrs_farm.read.common.material_library import Palette
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.mesh.mtl import ObjMaterial
+from pbrs_farm.read.suncg.house_json import Override
+
+MAX_TEXTURE_BYTES: Final = 64_000_000
+GREY: Final = (0.8, 0.8, 0.8)
+WHITE: Final = (1.0, 1.0, 1.0)
+DEFAULT_WALLS: Final = ("wallp_1_1", "wallp_1_2")
+"""Textures of walls that nobody painted; the published pictures show them white (section 6)."""
+
+
+class Looks:
+    """Resolves the materials of one house's models and nodes into its palette."""
+
+    def __init__(self, folder: RootFolder, notes: Notes) -> None:
+        self._folder = folder
+        self.palette = Palette(notes)
+
+    def material(
+        self, mtl: ObjMaterial | None, override: Override | None, *, place: str, clear: MaterialKind
+    ) -> Material:
+        """The look of a model's material as a node overrides it.
+
+        mtl: the model's, its texture a name below the root; None = grey. clear: the kind of
+        what lets light through (d < 1).
+        """
+        base = mtl or ObjMaterial("")
+        diffuse, reference = base.kd, base.map_kd
+        if override is not None and override.texture is not None:
+            reference = self._override_texture(override.texture)
+            diffuse = override.diffuse or WHITE
+        elif override is not None and override.diffuse is not None:
+            diffuse = override.diffuse
+        elif reference and base.kd == GREY:  # what parse_mtl gives where there is no Kd
+            diffuse = WHITE
+        found = self._texture(reference, place) if reference else None
+        if reference and found is None and diffuse == WHITE:
+            diffuse = GREY
+        return Material(
+            name=(override.name if override is not None else "") or base.name,
+            kind=clear if base.d < 1 else MaterialKind.OPAQUE,
+            diffuse=diffuse,
+            specular=base.ks,
+            shininess=base.ns,
+            opacity=base.d,
+            texture_id=found[0].id if found else None,
+            alpha_cutout=bool(found and found[1]),
+        )
+
+    def is_default_wall(self, mtl: ObjMaterial | None) -> bool:
+        """Whether nobody chose this wall's look: no colour at all, or a default wall texture."""
+        if mtl is None:
+            return True
+        stem = posixpath.splitext(posixpath.basename(mtl.map_kd))[0]
+        return stem in DEFAULT_WALLS or (not mtl.map_kd and mtl.kd == GREY)
+
+    def _override_texture(self, name: str) -> str:
+        png = f"texture/{name}.png"
+        return png if self._folder.path(png) is not None else f"texture/{name}.jpg"
+
+    def _texture(self, name: str, place: str) -> tuple[Texture, bool] | None:
+        return self.palette.texture(
+            name,
+            name=posixpath.basename(name),
+            place=place,
+            load=lambda: self._folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
+        )

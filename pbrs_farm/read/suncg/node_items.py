@@ -1,0 +1,283 @@
+"""Nodes of a SUNCG house -> items placed in the world (suncg sections 1.3-1.6).
+
+Effect: reads the models and textures they name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.placed_mesh import oriented_box, placed
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.mesh.mtl import ObjMaterial
+from pbrs_farm.read.suncg.arch_json import Arch, arch_items
+from pbrs_farm.read.suncg.house_json import Node
+from pbrs_farm.read.suncg.metadata import OTHERPROP, LampMaterials, ModelClass, Tables
+from pbrs_farm.read.suncg.model_files import Model, Models
+from pbrs_farm.read.suncg.model_lights import lit, placed_light, separate_bulbs
+from pbrs_farm.read.suncg.model_materials import Looks
+
+_T = TypeVar("_T")
+
+UNLABELLED: Final = 0
+"""Grounds and boxes have no row in the category table and stay unlabelled, as published."""
+
+_WALL_GROUP: Final = re.compile(r"Wall(?:Inside|Outside)#.*_(\d+)")
+
+BOX_FACES: Final = ((1, 1, 0), (1, -1, 1), (0, 1, 2), (0, -1, 3), (2, 1, 4), (2, -1, 5))
+"""(axis, sign, material) of a Box's faces in sstk's order, which made the published pictures.
+
+GAPS exchanges the materials of -x and +x (suncg section 1.5).
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Stock:
+    """What nodes are built from. house: its id. world_from_house: (4, 4) scale and axes.
+
+    arch: v2's structure; None where the rooms have meshes (v1).
+    """
+
+    house: str
+    folder: RootFolder
+    tables: Tables
+    looks: Looks
+    models: Models
+    notes: Notes
+    world_from_house: NDArray[np.float64]
+    arch: Arch | None = None
+
+
+def object_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
+    """An Object node; None (with a note) where its model is missing or has no area."""
+    found = _object_model(stock, node)
+    if found is None:
+        text = f"object/{node.model_id} does not exist; left out"
+        stock.notes.add("missing-model", node.place, text)
+        return None
+    variant, model = found
+    known = _row(stock.tables.classes, variant, node.model_id)
+    seen = known or ModelClass(node.model_id, OTHERPROP, ItemKind.OBJECT)
+    if known is None and stock.tables.classes:
+        text = "is not in ModelCategoryMapping.csv; it is otherprop"
+        stock.notes.add("unmapped-class", f"object/{node.model_id}", text)
+    lamp = _row(stock.tables.lamps, variant, node.model_id) or LampMaterials((), ())
+    world_from_model = stock.world_from_house @ node.house_from_model
+    surfaces, bulbs = _surfaces(stock, node, model, seen.kind, lamp)
+    if not surfaces:
+        stock.notes.add("empty-model", node.place, f"object/{node.model_id} has no area; left out")
+        return None
+    lights = _row(stock.tables.lights, variant, node.model_id) or ()
+    placed_lights: tuple[LightPart, ...] = ()
+    if lights or bulbs:
+        in_world = [placed_light(light, world_from_model) for light in lights]
+        placed_lights = lit(in_world, surfaces, bulbs)
+    return Item(
+        id=node.id,
+        name=seen.name.replace("_", " ") or node.model_id,
+        kind=seen.kind,
+        level_id=node.level_id,
+        surfaces=surfaces,
+        nyu40=seen.nyu40,
+        source_class=node.model_id,
+        room_id=room_id,
+        lights=placed_lights,
+        box=oriented_box(model.meshes, world_from_model),
+        tags=_tags(stock, node, seen, is_known=known is not None),
+    )
+
+
+def _row(table: dict[str, _T], variant: str, model_id: str) -> _T | None:
+    """The row of a model; a variant such as 122_0 has the row of its model (section 2)."""
+    for name in (variant, model_id, re.sub(r"_\d$", "", model_id)):
+        if name in table:
+            return table[name]
+    return None
+
+
+def _object_model(stock: Stock, node: Node) -> tuple[str, Model] | None:
+    """The mesh of the node's state: state k > 0 is `<id>_<k-1>.obj` where that exists."""
+    base = f"object/{node.model_id}/"
+    names = [node.model_id]
+    if node.state > 0:
+        listed = stock.tables.variants.get(node.model_id, ())
+        names = [*listed[node.state : node.state + 1], node.model_id]
+        names.insert(0, f"{node.model_id}_{node.state - 1}")
+    for name in names:
+        model = stock.models.model(f"{base}{name}.obj", f"{base}{node.model_id}.mtl")
+        if model is not None:
+            return name, model
+    return None
+
+
+def _surfaces(
+    stock: Stock, node: Node, model: Model, kind: ItemKind, lamp: LampMaterials
+) -> tuple[tuple[Surface, ...], list[int]]:
+    """(surfaces in the model's order, the indices of those that are bulbs)."""
+    world_from_model = stock.world_from_house @ node.house_from_model
+    is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
+    clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
+    surfaces: list[Surface] = []
+    bulbs: list[int] = []
+    for mesh, slot in zip(model.meshes, model.slots, strict=True):
+        mtl = model.mtl[slot] if slot >= 0 else None
+        override = node.overrides[slot] if 0 <= slot < len(node.overrides) else None
+        look = stock.looks.material(mtl, override, place=node.place, clear=clear)
+        is_bulb = slot in lamp.bulbs
+        if is_bulb:
+            look = replace(look, kind=MaterialKind.BULB)
+        elif slot in lamp.shades and look.kind is MaterialKind.OPAQUE:
+            look = replace(look, kind=MaterialKind.SHADE)
+        name = mesh.material or "grey"
+        surface = placed(
+            mesh, world_from_model, name=name, material=stock.looks.palette.index(look)
+        )
+        if surface is None:
+            continue
+        parts = separate_bulbs(surface) if is_bulb else (surface,)
+        bulbs += range(len(surfaces), len(surfaces) + len(parts)) if is_bulb else ()
+        surfaces += parts
+    return tuple(surfaces), bulbs
+
+
+def _tags(stock: Stock, node: Node, seen: ModelClass, *, is_known: bool) -> tuple[str, ...]:
+    mirrored = bool(np.linalg.det(node.house_from_model[:3, :3]) < 0)
+    if node.is_mirrored is not None and node.is_mirrored != mirrored:
+        text = f"isMirrored says {node.is_mirrored}, the transform says {mirrored}; it is believed"
+        stock.notes.add("mirrored-differs", node.place, text)
+    tags = ["mirrored"] if mirrored else []
+    tags += [] if is_known else ["unmapped"]
+    tags += ["structure"] if seen.structure else []
+    return tuple(tags)
+
+
+def box_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
+    """A Box node: six faces centred on its origin, uv in metres; None if it has no extent."""
+    half = np.array(node.dimensions) / 2
+    world_from_box = stock.world_from_house @ node.house_from_model
+    surfaces = []
+    for axis, sign, slot in BOX_FACES:
+        override = node.overrides[slot] if slot < len(node.overrides) else None
+        look = stock.looks.material(None, override, place=node.place, clear=MaterialKind.GLASS)
+        index = stock.looks.palette.index(look)
+        if np.count_nonzero(np.delete(half, axis)) == 2:
+            surfaces.append(_box_face(half, axis, sign, world_from_box, index))
+    if not surfaces:
+        stock.notes.add("empty-model", node.place, "a Box without extent; left out")
+        return None
+    return Item(
+        node.id, "box", ItemKind.OBJECT, node.level_id, tuple(surfaces), UNLABELLED, "Box", room_id,
+        tags=("box", "unmapped"),
+    )  # fmt: skip
+
+
+def _box_face(
+    half: NDArray[np.float64], axis: int, sign: int, world_from_box: NDArray[np.float64], index: int
+) -> Surface:
+    a, b = {0: (2, 1), 1: (0, 2), 2: (0, 1)}[axis]
+    corners = np.zeros((4, 3))
+    corners[:, axis] = sign * half[axis]
+    corners[:, a] = np.array([-1, 1, 1, -1]) * half[a]
+    corners[:, b] = np.array([-1, -1, 1, 1]) * half[b]
+    outward = np.cross(np.eye(3)[a], np.eye(3)[b])[axis] * sign > 0
+    is_mirrored = np.linalg.det(world_from_box[:3, :3]) < 0
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    world = corners @ world_from_box[:3, :3].T + world_from_box[:3, 3]
+    return Surface(
+        name=f"{'-+'[sign > 0]}{'xyz'[axis]}",
+        positions=world.astype(np.float32),
+        faces=np.ascontiguousarray(faces if outward != is_mirrored else faces[:, ::-1]),
+        material=index,
+        uvs=(corners[:, [a, b]] + half[[a, b]]).astype(np.float32),
+    )
+
+
+def ground_item(stock: Stock, node: Node) -> Item | None:
+    """A Ground node: `room/<house>/<modelId>f.obj`, already in house coordinates."""
+    if "Floor" in node.hidden:
+        return None
+    if stock.arch is not None:
+        return next(arch_items(stock.arch, node, node.id, stock.looks), None)
+    surfaces = room_surfaces(stock, node, "f", default_walls=False)
+    if not surfaces:
+        return None
+    parts = tuple(s for _, s in surfaces)
+    return Item(node.id, "ground", ItemKind.GROUND, node.level_id, parts, UNLABELLED, node.model_id)
+
+
+def room_surfaces(
+    stock: Stock, node: Node, part: str, *, default_walls: bool
+) -> list[tuple[str, Surface]]:
+    """(group name, surface) of a room's part f, c or w; empty (with a note) if it is missing."""
+    base = f"room/{stock.house}/{node.model_id}{part}"
+    model = stock.models.model(f"{base}.obj", f"{base}.mtl")
+    if model is None:
+        stock.notes.add("missing-room-part", node.place, f"{base}.obj does not exist")
+        return []
+    found = []
+    for mesh, slot in zip(model.meshes, model.slots, strict=True):
+        mtl = model.mtl[slot] if slot >= 0 else None
+        look = _room_look(stock, node, mtl, default_walls=default_walls)
+        index = stock.looks.palette.index(look)
+        name = f"{mesh.group} {mesh.material}".strip()
+        surface = placed(mesh, stock.world_from_house, name=name, material=index)
+        if surface is not None:
+            found.append((mesh.group, surface))
+    return found
+
+
+def _room_look(
+    stock: Stock, node: Node, mtl: ObjMaterial | None, *, default_walls: bool
+) -> Material:
+    look = stock.looks.material(mtl, None, place=node.place, clear=MaterialKind.GLASS)
+    if default_walls and stock.looks.is_default_wall(mtl):
+        look = replace(look, is_default=True)
+    return look
+
+
+def room_items(stock: Stock, node: Node, room_id: str) -> Iterator[Item]:
+    """Floor, ceiling and one item per wall of a Room node; hidden parts are left out."""
+    if stock.arch is not None:
+        yield from arch_items(stock.arch, node, room_id, stock.looks)
+        return
+    parts = (("Floor", "f", ItemKind.FLOOR), ("Ceiling", "c", ItemKind.CEILING))
+    for hidden, part, kind in parts:
+        surfaces = [] if hidden in node.hidden else _part(stock, node, part)
+        if surfaces:
+            yield _structure(node, room_id, part, kind, tuple(s for _, s in surfaces))
+    walls: dict[str, list[Surface]] = {}
+    if "Walls" not in node.hidden:
+        for group, surface in room_surfaces(stock, node, "w", default_walls=True):
+            found = _WALL_GROUP.fullmatch(group)
+            walls.setdefault(found[1] if found else "", []).append(surface)
+    for number, parts_of_wall in walls.items():
+        yield _structure(node, room_id, f"w{number}", ItemKind.WALL, tuple(parts_of_wall))
+
+
+def _part(stock: Stock, node: Node, part: str) -> list[tuple[str, Surface]]:
+    return room_surfaces(stock, node, part, default_walls=False)
+
+
+def _structure(
+    node: Node, room_id: str, part: str, kind: ItemKind, surfaces: tuple[Surface, ...]
+) -> Item:
+    return Item(
+        id=f"{room_id}{part}",
+        name=f"{kind.value} {room_id}",
+        kind=kind,
+        level_id=node.level_id,
+        surfaces=surfaces,
+        nyu40=NYU40_NAMES.index(kind.value),
+        source_class=f"{node.model_id}{part}",
+        room_id=room_id,
+        tags=(f"boundary_of:{room_id}",) if kind is ItemKind.WALL else (),
+    )

@@ -1,0 +1,257 @@
+"""A SUNCG house (v1, or v2 by its arch.json) -> House, after spec/suncg sections 1 and 2. Effect: reads files below root."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.room_floors import (
+    ceiling_height,
+    enclosed_polygon,
+    floor_height,
+    floor_polygon,
+)
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.suncg.arch_json import Arch, arch_from_json, arch_openings
+from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
+from pbrs_farm.read.suncg.metadata import read_tables
+from pbrs_farm.read.suncg.model_files import Models
+from pbrs_farm.read.suncg.model_materials import Looks
+from pbrs_farm.read.suncg.node_items import Stock, box_item, ground_item, object_item, room_items
+from pbrs_farm.read.suncg.wall_holes import openings
+
+MAX_HOUSE_BYTES: Final = 64_000_000
+_HOUSE_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_\-]{0,63}")
+_ROOM_ID: Final = re.compile(r"\d{1,6}_\d{1,6}")
+_STOREY_M: Final = 2.7
+_FLOOR_SLAB_M: Final = 0.05
+
+
+def suncg_houses(root: Path) -> tuple[str, ...]:
+    """The ids of every house below a SUNCG root, sorted; empty if it is none."""
+    return tuple(
+        sorted(p.parent.name for p in root.glob("house/*/house.json") if _is_id(p.parent.name))
+    )
+
+
+def suncg_house_at(path: Path) -> tuple[Path, str] | None:
+    """(root, house id) where path is ROOT/house/<id> or its house.json; None if it is neither."""
+    folder = path.parent if path.name == "house.json" else path
+    folder = folder.absolute()
+    is_house = folder.parent.name == "house" and (folder / "house.json").is_file()
+    return (folder.parent.parent, folder.name) if is_house and _is_id(folder.name) else None
+
+
+def _is_id(name: str) -> bool:
+    return _HOUSE_ID.fullmatch(name) is not None
+
+
+def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
+    """The house ROOT/house/<house_id>/house.json with the rooms, models and tables of its root.
+
+    Recoverable faults (missing models, textures, tables) are the House's notes. Raises BadHouse
+    naming file and place for everything else, for the first note when fields.strict, and for a
+    root without its `room` archive.
+    """
+    if not _is_id(house_id):
+        raise BadHouse(root, "house", f"{house_id[:80]!r} is no house id")
+    folder = RootFolder(root)
+    file = f"house/{house_id}/house.json"
+    data = folder.read(file, max_bytes=MAX_HOUSE_BYTES)
+    if data is None:
+        raise BadHouse(root, file, "does not exist", hint="pass ROOT/house/<id> of a SUNCG root")
+    record = house_record(data, file)
+    notes = Notes(file, strict=fields.strict)
+    if record.id and record.id != house_id:
+        notes.add("id-differs", "id", f"house.json calls itself {record.id[:64]!r}")
+    arch = _arch(folder, house_id, record)
+    stock = Stock(
+        house=house_id,
+        folder=folder,
+        tables=read_tables(folder, notes),
+        looks=Looks(folder, notes),
+        models=Models(folder, notes, fields),
+        notes=notes,
+        world_from_house=record.world_from_house,
+        arch=arch,
+    )
+    rooms, items = _contents(stock, record, fields, file)
+    if not rooms:
+        raise BadHouse(root, file, "has no room with a floor or walls", hint="nothing to render")
+    return House(
+        id=house_id,
+        name=house_id,
+        source=Source("suncg", file, folder.sha256, attribution="SUNCG (Song et al. 2017)"),
+        levels=_levels(record, rooms, items),
+        rooms=tuple(rooms),
+        items=tuple(items),
+        materials=stock.looks.palette.materials,
+        textures=stock.looks.palette.textures,
+        openings=openings(items)
+        if arch is None
+        else arch_openings(arch, _room_nodes(record), items),
+        notes=notes.all(),
+    )
+
+
+def _arch(folder: RootFolder, house_id: str, record: HouseRecord) -> Arch | None:
+    """None where the house's rooms have meshes (v1), else v2's structure; BadHouse without both."""
+    wants = any(n.kind == "Room" for _, nodes in record.levels for n in nodes)
+    if not wants or folder.has_folder(f"room/{house_id}"):
+        return None
+    name = f"wall/{house_id}/{house_id}.arch.json"
+    data = folder.read(name, max_bytes=MAX_HOUSE_BYTES)
+    if data is not None:
+        return arch_from_json(data, name)
+    if folder.has_folder("room"):
+        text, hint = f"room/{house_id} does not exist", "this house's walls and floors are missing"
+    else:
+        text = "room/ does not exist: there are no walls, floors and ceilings"
+        hint = (
+            "SUNCG v1 keeps them in a separate archive, room.zip; unpack it beside house/. "
+            f"v2 keeps them in {name}, which does not exist either"
+        )
+    raise BadHouse(folder.root, f"house/{house_id}/house.json", text, hint=hint)
+
+
+def _contents(
+    stock: Stock, record: HouseRecord, fields: ReadFields, file: str
+) -> tuple[list[Room], list[Item]]:
+    rooms: list[Room] = []
+    items: list[Item] = []
+    ids: set[str] = set()
+    n_faces = 0
+    for number, (_, nodes) in enumerate(record.levels):
+        for node, item in _level_contents(stock, number, nodes, rooms):
+            unique = _unique(item.id, ids)
+            if unique != item.id:
+                stock.notes.add("duplicate-id", node.place, f"becomes {unique}")
+            _check_extent(item, node, fields, file)
+            n_faces += item.n_faces
+            if n_faces > fields.max_triangles or len(items) >= MAX_INSTANCES:
+                text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
+                raise BadHouse(file, node.place, text, hint="limit: read.max_triangles")
+            items.append(replace(item, id=unique))
+    known = {room.id for room in rooms}
+    return rooms, [i if i.room_id in known else replace(i, room_id=None) for i in items]
+
+
+def _unique(name: str, taken: set[str]) -> str:
+    unique, k = name, 2
+    while unique in taken:
+        unique, k = f"{name}.{k}", k + 1
+    taken.add(unique)
+    return unique
+
+
+def _level_contents(
+    stock: Stock, number: int, nodes: tuple[Node, ...], rooms: list[Room]
+) -> Iterator[tuple[Node, Item]]:
+    """The items of a level in the order of its nodes; its rooms are added to rooms."""
+    room_of_index = _room_of_index(stock, number, nodes)
+    taken = {room.id for room in rooms}
+    for node in nodes:
+        room_id = room_of_index.get(node.index)
+        item: Item | None = None
+        if node.kind == "Room":
+            parts = list(room_items(stock, node, _room_id(number, node)))
+            room = _room(stock, node, _room_id(number, node), parts)
+            if room is not None and room.id not in taken:
+                rooms.append(room)
+                taken.add(room.id)
+            yield from ((node, part) for part in parts if room is not None)
+        elif node.kind == "Object":
+            item = object_item(stock, node, room_id)
+        elif node.kind == "Box":
+            item = box_item(stock, node, room_id)
+        else:
+            item = ground_item(stock, node)
+        if item is not None:
+            yield node, item
+
+
+def _room_id(number: int, node: Node) -> str:
+    return node.id if _ROOM_ID.fullmatch(node.id) else f"{number}_{node.index}"
+
+
+def _room_nodes(record: HouseRecord) -> Iterator[tuple[Node, str]]:
+    for number, (_, nodes) in enumerate(record.levels):
+        yield from ((node, _room_id(number, node)) for node in nodes if node.kind == "Room")
+
+
+def _room_of_index(stock: Stock, number: int, nodes: tuple[Node, ...]) -> dict[int, str]:
+    """The room of every node that one lists; the first wins, rooms are never inside rooms."""
+    kinds = {node.index: node.kind for node in nodes}
+    found: dict[int, str] = {}
+    for node in nodes:
+        for index in node.members if node.kind == "Room" else ():
+            if kinds.get(index) == "Room":
+                stock.notes.add("room-in-room", node.place, f"lists node {index}, a room; ignored")
+            elif index in kinds:
+                found.setdefault(index, _room_id(number, node))
+    return found
+
+
+def _check_extent(item: Item, node: Node, fields: ReadFields, file: str) -> None:
+    farthest = float(np.abs(item.bounds).max())
+    if not farthest <= fields.max_extent_m:
+        text = f"stands {farthest:.6g} m from the origin; at most {fields.max_extent_m:g} m"
+        raise BadHouse(file, node.place, text, hint="limit: read.max_extent_m")
+
+
+def _room(stock: Stock, node: Node, room_id: str, parts: list[Item]) -> Room | None:
+    floor, ceiling, walls = (
+        _surfaces(parts, kind) for kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.WALL)
+    )
+    polygon = floor_polygon(floor, walls)
+    if polygon is None:
+        polygon = enclosed_polygon(walls)
+    if polygon is None:
+        stock.notes.add("empty-room", node.place, "has neither floor nor walls; left out")
+        return None
+    bounds = np.concatenate([p.bounds for p in parts])
+    floor_y, ceiling_y = floor_height(floor), ceiling_height(ceiling)
+    low = float(bounds[:, 1].min()) if floor_y is None else floor_y
+    high = float(bounds[:, 1].max()) if ceiling_y is None else ceiling_y
+    return Room(
+        id=room_id,
+        name=node.types[0].replace("_", " ") if node.types else f"Room {room_id}",
+        level_id=node.level_id,
+        polygon=polygon,
+        floor_y=low,
+        ceiling_y=high if high > low + 0.5 else low + _STOREY_M,
+        types=node.types,
+        has_floor=bool(floor),
+        has_ceiling=bool(ceiling),
+    )
+
+
+def _surfaces(parts: Iterable[Item], kind: ItemKind) -> list[Surface]:
+    return [s for p in parts if p.kind is kind for s in p.surfaces]
+
+
+def _levels(record: HouseRecord, rooms: list[Room], items: list[Item]) -> tuple[Level, ...]:
+    """The levels that hold something."""
+    used = {room.level_id for room in rooms} | {item.level_id for item in items}
+    return tuple(
+        _level(level_id, rooms, items) for level_id, _ in record.levels if level_id in used
+    )
+
+
+def _level(level_id: str, rooms: list[Room], items: list[Item]) -> Level:
+    here = [r for r in rooms if r.level_id == level_id]
+    if here:
+        elevation = min(r.floor_y for r in here)
+        height = float(np.median([r.ceiling_y - r.floor_y for r in here]))
+        return Level(level_id, f"Level {level_id}", elevation, height, _FLOOR_SLAB_M)
+    lows = [float(i.bounds[0, 1]) for i in items if i.level_id == level_id]
+    return Level(level_id, f"Level {level_id}", min(lows, default=0.0), _STOREY_M, _FLOOR_SLAB_M)

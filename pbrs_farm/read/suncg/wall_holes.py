@@ -1,0 +1,147 @@
+"""Holes that doors and windows have in released walls, found in the walls' meshes; no effects.
+
+Released walls are cut already (suncg section 1.5): there the quad is the hole itself and the cutter
+its plug, of the wall's thickness. In a wall without a hole they are the door's or window's own size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface
+from pbrs_farm.read.mesh.primitives import box
+
+_HOLE_MARGIN_M: Final = 0.10
+_OVERLAP_M: Final = 0.002
+_REACH_M: Final = 0.02
+_NEAR_M: Final = 0.15
+_PLANAR_M: Final = 0.01
+_THICKER_M: Final = 0.15
+_LEAST_SHARE: Final = 0.02
+_UP: Final = np.array([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _WallFrame:
+    """The upright faces of a wall that look one way, or back. normal: (3,), points: (V, 3) world."""
+
+    level_id: str
+    normal: NDArray[np.float64]
+    points: NDArray[np.float64]
+
+
+def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
+    """An opening for every door and window that has a box and stands in a wall."""
+    frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
+    found = []
+    for item in items:
+        if item.kind in (ItemKind.DOOR, ItemKind.WINDOW) and item.box is not None:
+            opening = _opening(item, item.box, frames)
+            if opening is not None:
+                found.append(opening)
+    return tuple(found)
+
+
+def _frames(item: Item) -> list[_WallFrame]:
+    """A frame for every direction that an item's larger upright faces have, to a degree."""
+    corners = np.concatenate([s.positions[s.faces] for s in item.surfaces]).astype(np.float64)
+    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(n, axis=1)
+    upright = (np.abs(n[:, 1]) < 0.01 * area) & (area > 0)
+    n, area, corners = n[upright], area[upright], corners[upright]
+    degree = np.rint(np.degrees(np.arctan2(n[:, 2], n[:, 0]))).astype(int) % 180
+    found = []
+    for d in np.unique(degree):
+        here = degree == d
+        if area[here].sum() < _LEAST_SHARE * area.sum():
+            continue
+        best = n[here][area[here].argmax()] * [1, 0, 1]
+        points = np.unique(corners[here].reshape(-1, 3), axis=0)
+        found.append(_WallFrame(item.level_id, best / np.linalg.norm(best), points))
+    return found
+
+
+def _axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 3) columns: along the wall, up, across."""
+    return np.stack([np.cross(_UP, normal), _UP, normal], 1)
+
+
+def _opening(item: Item, body: Box, frames: Sequence[_WallFrame]) -> Opening | None:
+    normal = body.axes[:, 2] * [1, 0, 1]  # a model's front is +z, whatever its leaf does
+    if np.linalg.norm(normal) < 0.5:
+        return None  # lies flat: a roof window, which no wall holds
+    normal = normal / np.linalg.norm(normal)
+    axes = _axes(normal)
+    corners = body.corners @ axes
+    low, high = corners.min(0), corners.max(0)
+    standing = [p for f in frames if f.level_id == item.level_id for p in _wall(f, axes, low, high)]
+    if not standing:
+        return None
+    holes = [h for h in (_hole(points, low, high) for points in standing) if h is not None]
+    if holes:
+        low[:2] = np.max([h[0] for h in holes], 0)
+        high[:2] = np.min([h[1] for h in holes], 0)
+    low[2] = min(p[:, 2].min() for p in standing)
+    high[2] = max(p[:, 2].max() for p in standing)
+    if high[2] - low[2] < _PLANAR_M:  # repair makes it a solid, to either side
+        low[2], high[2] = low[2] - _THICKER_M, high[2] + _THICKER_M
+    if (high - low)[:2].min() < 0.05:
+        return None
+    middle = (low[2] + high[2]) / 2
+    quad = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
+    grown = np.array([_OVERLAP_M, _OVERLAP_M, 0.0] if holes else [0.0, 0.0, _REACH_M])
+    return Opening(
+        id=f"{item.id}_hole",
+        level_id=item.level_id,
+        item_id=item.id,
+        is_window=item.kind is ItemKind.WINDOW,
+        cutter=box_between(low - grown, high + grown, axes),
+        quad=np.array([[s, y, middle] for s, y in quad]) @ axes.T,
+        normal=normal,
+        is_cut=len(holes) == len(standing),
+    )
+
+
+def _wall(
+    frame: _WallFrame,
+    axes: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> list[NDArray[np.float64]]:
+    """The wall's points in axes, if it is the one (or one of those) that low..high stands in."""
+    if abs(frame.normal @ axes[:, 2]) < 0.999:
+        return []
+    points = frame.points @ axes
+    beside = (points[:, 2] > low[2] - _NEAR_M) & (points[:, 2] < high[2] + _NEAR_M)
+    points = points[beside]
+    if not len(points):
+        return []
+    wall_low, wall_high = points.min(0), points.max(0)
+    overlap = np.minimum(wall_high - low, high - wall_low)[:2]
+    return [points] if (overlap > _NEAR_M).all() else []
+
+
+def _hole(
+    points: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """(low, high) along and up of the hole that a wall has where low..high stands; None if none."""
+    s, y = points[:, 0], points[:, 1]
+    inner = (s > s.min() + _REACH_M) & (s < s.max() - _REACH_M)
+    near = (s > low[0] - _HOLE_MARGIN_M) & (s < high[0] + _HOLE_MARGIN_M)
+    near &= (y > low[1] - _HOLE_MARGIN_M) & (y < high[1] + _HOLE_MARGIN_M)
+    rim = points[inner & near, :2]
+    if len(rim) < 4 or np.ptp(rim, axis=0).min() < _REACH_M:
+        return None
+    return rim.min(0), rim.max(0)
+
+
+def box_between(
+    low: NDArray[np.float64], high: NDArray[np.float64], axes: NDArray[np.float64]
+) -> Surface:
+    """A closed box; low, high: (3,) along axes, the (3, 3) unit columns along, up, across."""
+    return box("cutter", axes @ ((low + high) / 2), (high - low) / 2, 0, axes=axes)

@@ -1,0 +1,168 @@
+"""Doors and windows -> openings: the solid each cuts from the walls it touches; no effects."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import mapbox_earcut
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.house import Opening, Surface
+from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise
+from pbrs_farm.read.sweethome3d.home_xml import DoorFrame, PlanPiece, PlanWall
+from pbrs_farm.read.sweethome3d.material_collector import Looks
+from pbrs_farm.read.sweethome3d.parse_pieces import FULL_CUT_OUT
+from pbrs_farm.read.sweethome3d.placement import Frame
+from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
+
+F64 = NDArray[np.float64]
+MARGIN_M = 0.005
+REACH_M = 1.0
+MIN_HALF_M = 5e-4
+PARALLEL_SINE = math.sin(math.radians(20.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StandingWall:
+    """A wall's plan polygon with the heights between which it stands."""
+
+    wall: PlanWall
+    polygon: shapely.Geometry
+    low: float
+    high: float
+    board: float
+
+
+def opening_of(
+    piece: PlanPiece,
+    frame: Frame,
+    walls: list[StandingWall],
+    looks: Looks,
+    ids: tuple[str, str, str],
+    material: int,
+    *,
+    is_window: bool,
+) -> Opening | None:
+    """The opening of a door or window, or None (with a note) if it stands in no wall.
+
+    ids: of the opening, of its level, of its item.
+    """
+    assert piece.frame is not None
+    outlines = _outlines(piece, piece.frame, looks)
+    span = _depth_span(frame, piece.frame, walls)
+    if span is None:
+        looks.note("opening-without-wall", piece.place, "touches no wall: it cuts nothing")
+        return None
+    flat = [_local_outline(p, piece.frame, frame) for p in outlines]
+    cutter = _extruded(flat, span, frame, material)
+    low = np.min([p.min(0) for p in flat], axis=0)
+    high = np.max([p.max(0) for p in flat], axis=0)
+    middle = (span[0] + span[1]) / 2
+    corners = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
+    quad = frame.world(np.array([[x, y, middle] for x, y in corners]))
+    opening_id, level_id, item_id = ids
+    return Opening(opening_id, level_id, item_id, is_window, cutter, quad, frame.axes[:, 2])
+
+
+def _outlines(piece: PlanPiece, door: DoorFrame, looks: Looks) -> tuple[Points2, ...]:
+    try:
+        outlines = polygons_from_path(door.cut_out)
+    except ValueError as error:
+        looks.note("bad-cut-out", piece.place, f"cutOutShape: {error}; cut as a rectangle")
+        outlines = ()
+    kept = tuple(
+        p for p in outlines if shapely.Polygon(p).is_valid and shapely.Polygon(p).area > 1e-6
+    )
+    return kept or polygons_from_path(FULL_CUT_OUT)
+
+
+def _local_outline(outline: Points2, door: DoorFrame, frame: Frame) -> Points2:
+    # From the unit square (y down from the top) to the piece's frame, counter-clockwise.
+    x = door.wall_left + outline[:, 0] * door.wall_width
+    y = door.wall_top + outline[:, 1] * door.wall_height
+    local = np.stack([(x - 0.5) * frame.mirror, 0.5 - y], -1) * (2 * frame.half[:2])
+    return counter_clockwise(local)
+
+
+def _depth_span(
+    frame: Frame, door: DoorFrame, walls: list[StandingWall]
+) -> tuple[float, float] | None:
+    # The range along the piece's depth in which the walls it stands in lie.
+    half_x, half_y, half_z = frame.half
+    low_y, high_y = frame.origin[1] - half_y, frame.origin[1] + half_y
+    if min(half_x, half_y) < MIN_HALF_M:
+        return None
+    piece = _rectangle(frame, half_x, max(half_z, MIN_HALF_M))
+    strip = _rectangle(frame, half_x * 0.98, half_z + REACH_M)
+    spans = []
+    for standing in walls:
+        if standing.high < low_y + 0.01 or standing.low > high_y - 0.01:
+            continue
+        shared = shapely.intersection(piece, standing.polygon)
+        smaller = min(piece.area, float(shapely.area(standing.polygon)))
+        if shared.is_empty or shared.area < 1e-4 * smaller:
+            continue
+        z = _depths(shared, frame)
+        if _is_along(standing.wall, frame) and door.cuts_both_sides:
+            parts = shapely.get_parts(shapely.intersection(strip, standing.polygon))
+            near = [p for p in parts if p.intersects(piece)]
+            z = np.concatenate([z, *(_depths(p, frame) for p in near)])
+        board = standing.board if _is_along(standing.wall, frame) else 0.0
+        spans.append((float(z.min()) - board, float(z.max()) + board))
+    if not spans:
+        return None
+    return min(s[0] for s in spans) - MARGIN_M, max(s[1] for s in spans) + MARGIN_M
+
+
+def _is_along(wall: PlanWall, frame: Frame) -> bool:
+    if abs(wall.arc) > 1e-3:
+        return True
+    direction = np.array(wall.end) - np.array(wall.start)
+    direction /= np.linalg.norm(direction)
+    across = frame.axes[[0, 2], 2]
+    return abs(float(direction @ across)) < PARALLEL_SINE * max(float(np.linalg.norm(across)), 1e-6)
+
+
+def _rectangle(frame: Frame, half_x: float, half_z: float) -> shapely.Polygon:
+    local = np.array(
+        [[-half_x, 0, -half_z], [half_x, 0, -half_z], [half_x, 0, half_z], [-half_x, 0, half_z]]
+    )
+    return shapely.Polygon(frame.world(local)[:, [0, 2]])
+
+
+def _depths(shape: shapely.Geometry, frame: Frame) -> F64:
+    plan = shapely.get_coordinates(shape)
+    return np.asarray((plan - frame.origin[[0, 2]]) @ frame.axes[[0, 2], 2])
+
+
+def _extruded(
+    outlines: list[Points2], span: tuple[float, float], frame: Frame, material: int
+) -> Surface:
+    # A closed prism along the piece's depth for each outline (counter-clockwise).
+    positions, faces, n = [], [], 0
+    for outline in outlines:
+        count = len(outline)
+        back = np.column_stack([outline, np.full(count, span[0])])
+        front = np.column_stack([outline, np.full(count, span[1])])
+        cap = np.asarray(
+            mapbox_earcut.triangulate_float64(outline, np.array([count], np.uint32)), np.int32
+        ).reshape(-1, 3)
+        a, b, c = (outline[cap[:, k]] for k in range(3))
+        turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        cap[turn < 0] = cap[turn < 0][:, [0, 2, 1]]
+        i = np.arange(count, dtype=np.int32)
+        j = np.roll(i, -1)
+        sides = np.concatenate(
+            [np.stack([i, j, j + count], -1), np.stack([i, j + count, i + count], -1)]
+        )
+        positions += [back, front]
+        faces += [cap[:, [0, 2, 1]] + n, cap + count + n, sides + n]
+        n += 2 * count
+    world = frame.world(np.concatenate(positions))
+    return Surface(
+        "cutter", world.astype(np.float32), np.concatenate(faces).astype(np.int32), material
+    )

@@ -1,0 +1,178 @@
+"""Rooms -> Room nouns, floors and ceilings; later rooms win where two overlap; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.house import Item, ItemKind, Room, Surface
+from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
+from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
+from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, PlanLevel, PlanRoom, level_of
+from pbrs_farm.read.sweethome3d.material_collector import Looks
+from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
+
+MIN_AREA_M2 = 0.01
+SLIVER_M2 = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReadRoom:
+    """A room of a visible level with its outline as a simple polygon."""
+
+    id: str
+    plan: PlanRoom
+    level: PlanLevel
+    level_id: str
+    outline: shapely.Polygon
+
+
+def read_rooms(plan: Plan, looks: Looks, house_level: dict[str, str]) -> list[ReadRoom]:
+    """The rooms of visible levels, numbered within their level in the file's order."""
+    rooms: list[ReadRoom] = []
+    counts: dict[str, int] = {}
+    for room in plan.rooms:
+        level = level_of(plan, room.level)
+        if not level.is_visible:
+            continue
+        outline = _simple(room, looks)
+        if outline is None:
+            continue
+        level_id = house_level[level.id]
+        number = counts.get(level_id, 0)
+        counts[level_id] = number + 1
+        rooms.append(ReadRoom(f"{level_id}_{number}", room, level, level_id, outline))
+    return rooms
+
+
+def _simple(room: PlanRoom, looks: Looks) -> shapely.Polygon | None:
+    if len(room.points) < 3:
+        looks.note("degenerate-room", room.place, "fewer than three points: left out")
+        return None
+    polygon = shapely.Polygon(room.points)
+    if not polygon.is_valid:
+        parts = _polygons(shapely.make_valid(polygon))
+        looks.note(
+            "room-crosses-itself", room.place, "its outline crosses itself: largest part kept"
+        )
+        polygon = max(parts, key=lambda p: p.area) if parts else shapely.Polygon()
+        polygon = shapely.Polygon(polygon.exterior) if not polygon.is_empty else polygon
+    if polygon.area < MIN_AREA_M2:
+        looks.note("degenerate-room", room.place, f"{polygon.area:.4f} m2: left out")
+        return None
+    return polygon
+
+
+def _polygons(shape: shapely.Geometry) -> list[shapely.Polygon]:
+    return [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > SLIVER_M2]
+
+
+def room_nouns(rooms: list[ReadRoom], ceilings: CeilingHeights) -> tuple[Room, ...]:
+    """The Room of each; its polygon without what later rooms take, if that leaves one piece."""
+    nouns = []
+    for k, room in enumerate(rooms):
+        taken = [r.outline for r in _later(rooms, k)]
+        rest = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
+        outline = room.outline
+        if len(rest) == 1 and not rest[0].interiors:
+            outline = rest[0]
+        polygon = counter_clockwise(_ring(outline.exterior))
+        height = float(np.max(ceilings.heights(room.level, polygon, room.plan.is_ceiling_flat)))
+        nouns.append(
+            Room(
+                id=room.id,
+                name=room.plan.name,
+                level_id=room.level_id,
+                polygon=polygon,
+                floor_y=room.level.elevation,
+                ceiling_y=room.level.elevation + height,
+                types=(room.plan.name,) if room.plan.name else (),
+                has_floor=room.plan.has_floor,
+                has_ceiling=room.plan.has_ceiling,
+            )
+        )
+    return tuple(nouns)
+
+
+def _later(rooms: list[ReadRoom], k: int) -> list[ReadRoom]:
+    # The rooms of the same level that come after the k-th and touch it.
+    after = [r for r in rooms[k + 1 :] if r.level_id == rooms[k].level_id]
+    touch = shapely.intersects(rooms[k].outline, [r.outline for r in after])
+    return [r for r, touches in zip(after, touch, strict=True) if touches]
+
+
+def plane_items(
+    rooms: list[ReadRoom],
+    ceilings: CeilingHeights,
+    looks: Looks,
+    floor_cuts: dict[str, shapely.Geometry],
+    ceiling_cuts: dict[str, shapely.Geometry],
+) -> list[Item]:
+    """Floor and ceiling items. *_cuts: by level id, what staircases take."""
+    items = []
+    for k, room in enumerate(rooms):
+        later = _later(rooms, k)
+        if room.plan.has_floor:
+            taken: list[shapely.Geometry] = [r.outline for r in later if r.plan.has_floor]
+            taken.append(floor_cuts.get(room.level_id, shapely.Polygon()))
+            parts = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
+            items += _floor(room, parts, looks)
+        if room.plan.has_ceiling:
+            taken = [r.outline for r in later if r.plan.has_ceiling]
+            taken.append(ceiling_cuts.get(room.level_id, shapely.Polygon()))
+            parts = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
+            items += _ceiling(room, parts, ceilings, looks)
+    return items
+
+
+def _floor(room: ReadRoom, parts: list[shapely.Polygon], looks: Looks) -> list[Item]:
+    if not parts:
+        return []
+    material = looks.painted(room.plan.floor, "floor", f"{room.plan.place} floor")
+    rings = [_rings(p) for p in parts]
+    surface = horizontal("floor", rings, room.level.elevation, material, up=True)
+    surface = _textured(surface, room.plan.floor)
+    return [_item(room, ItemKind.FLOOR, 2, surface)]
+
+
+def _ceiling(
+    room: ReadRoom, parts: list[shapely.Polygon], ceilings: CeilingHeights, looks: Looks
+) -> list[Item]:
+    if not parts:
+        return []
+    material = looks.painted(room.plan.ceiling, "ceiling", f"{room.plan.place} ceiling")
+    surface = ceilings.surface(
+        room.level, [_rings(p) for p in parts], material, is_flat=room.plan.is_ceiling_flat
+    )
+    return [_item(room, ItemKind.CEILING, 22, _textured(surface, room.plan.ceiling))]
+
+
+def _item(room: ReadRoom, kind: ItemKind, nyu40: int, surface: Surface) -> Item:
+    return Item(
+        id=f"{kind}_{room.id}",
+        name=f"{str(kind).capitalize()} of {room.plan.name or 'room ' + room.id}",
+        kind=kind,
+        level_id=room.level_id,
+        surfaces=(surface,),
+        nyu40=nyu40,
+        source_class=str(kind),
+        room_id=room.id,
+    )
+
+
+def _textured(surface: Surface, paint: Paint) -> Surface:
+    if paint.picture is None or surface.uvs is None:
+        return surface
+    uvs = picture_uvs(surface.uvs.astype(np.float64), paint.picture).astype(np.float32)
+    return Surface(surface.name, surface.positions, surface.faces, surface.material, uvs)
+
+
+def _rings(polygon: shapely.Polygon) -> list[Points2]:
+    return [_ring(polygon.exterior), *(_ring(r) for r in polygon.interiors)]
+
+
+def _ring(ring: shapely.LinearRing) -> Points2:
+    return np.asarray(shapely.get_coordinates(ring)[:-1], np.float64)

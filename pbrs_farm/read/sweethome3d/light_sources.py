@@ -1,0 +1,60 @@
+"""Light sources of lamps -> LightPart in the world; no effects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.house import LightPart
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.read.sweethome3d.home_xml import PlanPiece
+from pbrs_farm.read.sweethome3d.placement import Frame
+
+DEFAULT_RADIUS_M = 0.0325
+
+
+def light_parts(piece: PlanPiece, frame: Frame, emitting: tuple[int, ...]) -> tuple[LightPart, ...]:
+    """One part per light source; none where the lamp is switched off.
+
+    emitting: the item's surfaces that glow; they belong to the first source. A lamp whose model
+    glows but has no source gets one in the middle of its box.
+    """
+    if piece.power <= 0:
+        return ()
+    width, height, depth = 2 * frame.half
+    sources = [
+        (
+            np.array(
+                [
+                    (s.at[0] - 0.5) * width * frame.mirror,
+                    (s.at[2] - 0.5) * height,
+                    (0.5 - s.at[1]) * depth,
+                ]
+            ),
+            s.colour,
+            DEFAULT_RADIUS_M if s.diameter is None else s.diameter * width / 2,
+        )
+        for s in piece.lights
+    ]
+    if not sources and emitting:
+        sources = [(np.zeros(3), (1.0, 1.0, 1.0), DEFAULT_RADIUS_M)]
+    strength = [max(colour) for _, colour, _ in sources]
+    total = sum(strength)
+    parts: list[LightPart] = []
+    for k, (local, colour, radius) in enumerate(sources):
+        if total <= 0 or strength[k] <= 0:
+            continue
+        rgb = linear_from_srgb(np.array(colour) / max(colour))
+        x, y, z = frame.world(local[None])[0]
+        parts.append(
+            LightPart(
+                position=(float(x), float(y), float(z)),
+                radius_m=max(float(radius), 1e-3),
+                power=piece.power,
+                unit=PowerUnit.SWEETHOME3D,
+                share=strength[k] / total,
+                rgb_linear=(float(rgb[0]), float(rgb[1]), float(rgb[2])),
+                emitting=emitting if not parts else (),
+            )
+        )
+    return tuple(parts)

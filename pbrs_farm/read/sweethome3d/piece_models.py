@@ -1,0 +1,170 @@
+"""Models named by a home -> meshes per material with a role; each is parsed once; no effects."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, parse_mtl
+from pbrs_farm.read.mesh.obj import Mesh, ObjModel, parse_obj
+from pbrs_farm.read.sweethome3d.material_collector import Looks
+from pbrs_farm.read.sweethome3d.moving_parts import Transformations, moved
+
+PANE, MIRROR, LIGHT = "pane", "mirror", "light"
+_ROLES = (
+    ("sweethome3d_window_pane", PANE),
+    ("sweethome3d_window_mirror", MIRROR),
+    ("sweethome3d_light", LIGHT),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """meshes in the model's frame; materials by name; folder: of its content, for its pictures."""
+
+    meshes: tuple[Mesh, ...]
+    materials: dict[str, ObjMaterial]
+    material_order: tuple[str, ...]
+    folder: str
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
+def role_of(group: str) -> str:
+    """What the program makes of a group by its name: pane, mirror, light, or "" for nothing."""
+    for word in group.split():
+        for prefix, role in _ROLES:
+            if word.startswith(prefix):
+                return role
+    return ""
+
+
+class Models:
+    """Parsed models by content name; notes what cannot be read."""
+
+    def __init__(self, looks: Looks, file: str, max_triangles: int) -> None:
+        self._looks = looks
+        self._file = file
+        self._max_triangles = max_triangles
+        self._parsed: dict[str, ObjModel | None] = {}
+        self._models: dict[tuple[str, Transformations], Model] = {}
+
+    def get(self, name: str, place: str, transformations: Transformations = ()) -> Model | None:
+        """The model, its parts moved, or None (with a note) if it is missing or cannot be read."""
+        if name not in self._parsed:
+            self._parsed[name] = self._load(name, place)
+        parsed = self._parsed[name]
+        if parsed is None:
+            return None
+        key = (name, transformations)
+        if key not in self._models:
+            if transformations:
+                parsed = replace(parsed, meshes=moved(parsed.meshes, transformations))
+            self._models[key] = self._model(parsed, name)
+        return self._models[key]
+
+    def _load(self, name: str, place: str) -> ObjModel | None:
+        data = self._looks.contents.read(name)
+        if data is None:
+            self._looks.note("missing-model", place, f"no content {name[:120]!r}: left out")
+            return None
+        kind = _kind(data)
+        if kind != "obj":
+            self._looks.note(
+                "unsupported-model", place, f"{name[:120]!r} is {kind}, only OBJ is read: left out"
+            )
+            return None
+        try:
+            parsed = parse_obj(data, name, max_triangles=self._max_triangles)
+        except BadHouse as error:
+            if "at most" in error.message:
+                raise BadHouse(self._file, place, error.message) from None
+            self._looks.note("unreadable-model", place, f"{error.message}: left out")
+            return None
+        if parsed.n_dropped:
+            self._looks.note(
+                "degenerate-faces",
+                f"model {name}",
+                f"{parsed.n_dropped} faces without area dropped",
+            )
+        return parsed
+
+    def _model(self, parsed: ObjModel, name: str) -> Model:
+        folder = posixpath.dirname(name)
+        materials = dict(builtin_materials())
+        order: list[str] = []
+        for library in parsed.mtllibs:
+            data = self._content(folder, library)
+            if data is None:
+                self._looks.note("missing-mtl", f"model {name}", f"no {library[:80]!r}")
+                continue
+            for material in parse_mtl(data):
+                materials[material.name] = material
+                order.append(material.name)
+        used = {m.material for m in parsed.meshes if m.material}
+        unknown = sorted(used - set(materials))
+        if unknown:
+            self._looks.note(
+                "unknown-material", f"model {name}", f"no material {', '.join(unknown)[:120]}"
+            )
+        meshes = _merged(parsed.meshes)
+        corners = [m.positions for m in meshes] or [np.zeros((1, 3))]
+        points = np.concatenate(corners)
+        return Model(meshes, materials, tuple(order), folder, points.min(0), points.max(0))
+
+    def _content(self, folder: str, name: str) -> bytes | None:
+        return self._looks.contents.read(content_name(folder, name))
+
+
+def content_name(folder: str, name: str) -> str:
+    """A file named in a model, as a content name: foreign absolute paths keep their last part."""
+    name = name.strip().strip('"').replace("\\", "/")
+    parts = [p for p in name.split("/") if p not in ("", ".")]
+    if name.startswith("/") or ":" in name or ".." in parts:
+        parts = parts[-1:]
+    return posixpath.join(folder, *parts) if parts else folder
+
+
+def _kind(data: bytes) -> str:
+    head = data[:4096].lstrip()
+    if data[:2] == b"PK":
+        return "a nested zip"
+    if head[:5] == b"<?xml" or b"<COLLADA" in head:
+        return "Collada"
+    if data[:2] == b"MM":
+        return "3DS"
+    if head[:4] in (b"LWSC", b"FORM"):
+        return "LightWave"
+    if head[:4] == b"glTF":
+        return "glTF"
+    return "obj" if b"\0" not in head else "of an unknown kind"
+
+
+def _merged(meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
+    # One mesh per material, role and (having texture coordinates), in order of first use.
+    grouped: dict[tuple[str, str, bool], list[Mesh]] = {}
+    for mesh in meshes:
+        key = (role_of(mesh.group), mesh.material, mesh.uvs is not None)
+        grouped.setdefault(key, []).append(mesh)
+    merged = []
+    for (role, _, has_uvs), parts in grouped.items():
+        first = np.cumsum([0, *(len(p.positions) for p in parts[:-1])])
+        merged.append(
+            replace(
+                parts[0],
+                group=role,
+                positions=np.concatenate([p.positions for p in parts]),
+                faces=np.concatenate(
+                    [p.faces + n for p, n in zip(parts, first, strict=True)]
+                ).astype(np.int32),
+                uvs=np.concatenate([p.uvs for p in parts if p.uvs is not None])
+                if has_uvs
+                else None,
+                normals=np.concatenate([p.normals for p in parts]),
+            )
+        )
+    return tuple(merged)

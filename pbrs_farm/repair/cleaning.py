@@ -1,0 +1,96 @@
+"""The small repairs: persons and plants out, default walls white, faces sound; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import House, Item, ItemKind, Surface
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.repair.report import FacesReport, Removed
+from pbrs_farm.repair.structure.patches import face_areas, face_normals
+from pbrs_farm.repair.structure.walls import BASEBOARD
+
+_MIN_AREA_M2 = 1e-12
+
+
+def without_living(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
+    """The house without persons and plants, as the recipe says (paper section 3)."""
+    kinds = set()
+    if fields.remove_persons:
+        kinds.add(ItemKind.PERSON)
+    if fields.remove_plants:
+        kinds.add(ItemKind.PLANT)
+    removed = [
+        Removed(item_id=i.id, name=i.name, reason=str(i.kind))
+        for i in house.items
+        if i.kind in kinds
+    ]
+    return house.with_items(i for i in house.items if i.kind not in kinds), removed
+
+
+def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[House, int]:
+    """Walls whose source names no colour painted rgb (sRGB); and how many, baseboards aside."""
+    materials = list(house.materials)
+    white: dict[int, int] = {}
+    items: list[Item] = []
+    n = 0
+    for item in house.items:
+        if item.kind is not ItemKind.WALL:
+            items.append(item)
+            continue
+        surfaces = []
+        for s in item.surfaces:
+            material = materials[s.material]
+            if not material.is_default or material.diffuse == rgb:
+                surfaces.append(s)
+                continue
+            if s.material not in white:
+                white[s.material] = len(materials)
+                materials.append(replace(material, name=f"{material.name}_wall", diffuse=rgb, texture_id=None))  # fmt: skip
+            surfaces.append(replace(s, material=white[s.material]))
+        is_board = BASEBOARD in item.tags
+        n += not is_board and any(house.materials[s.material].is_default for s in item.surfaces)
+        items.append(replace(item, surfaces=tuple(surfaces)))
+    return replace(house, items=tuple(items), materials=tuple(materials)), n
+
+
+def with_sound_faces(house: House) -> tuple[House, FacesReport]:
+    """Faces without area or with a corner that is no number dropped; winding made to agree.
+
+    A face that looks against its own shading normals is turned round. Emptied surfaces stay, so
+    that LightPart.emitting keeps its meaning.
+    """
+    n_dropped = n_turned = 0
+    items = []
+    for item in house.items:
+        surfaces = []
+        for surface in item.surfaces:
+            sound, dropped, turned = _sound(surface)
+            n_dropped += dropped
+            n_turned += turned
+            surfaces.append(sound)
+        items.append(replace(item, surfaces=tuple(surfaces)))
+    return house.with_items(items), FacesReport(n_degenerate_dropped=n_dropped, n_turned=n_turned)
+
+
+def _sound(surface: Surface) -> tuple[Surface, int, int]:
+    faces = surface.faces
+    with np.errstate(invalid="ignore", over="ignore"):
+        keep = face_areas(surface.positions, faces) > _MIN_AREA_M2
+    faces = faces[keep]
+    against = _against_normals(surface, faces)
+    n_dropped, n_turned = int((~keep).sum()), int(against.sum())
+    if n_dropped + n_turned == 0:
+        return surface, 0, 0
+    faces = np.where(against[:, None], faces[:, [0, 2, 1]], faces)
+    return replace(surface, faces=np.ascontiguousarray(faces, np.int32)), n_dropped, n_turned
+
+
+def _against_normals(surface: Surface, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
+    if surface.normals is None or not len(faces):
+        return np.zeros(len(faces), np.bool_)
+    mean = surface.normals[faces].astype(np.float64).sum(1)
+    return np.asarray((mean * face_normals(surface.positions, faces)).sum(1) < -1e-6)

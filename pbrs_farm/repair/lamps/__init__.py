@@ -1,0 +1,1 @@
+"""Bulbs, shades, and a light for rooms that have none; no effects."""

@@ -1,0 +1,181 @@
+"""Light sources without an emitting part get a bulb: a sphere that touches nothing of its lamp.
+
+No effects. Paper section 3 marks bulbs by hand; where a source gives only a light's position, a
+sphere stands there, of the source's radius where it fits, else smaller, else a little moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, Surface
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.repair.measure.distance import distance_to_triangles
+from pbrs_farm.repair.report import SourceRepair
+from pbrs_farm.repair.structure.booleans import F64
+
+Faces = NDArray[np.int64]
+
+_CLEARANCE = 0.97
+_LEAST_RADIUS_M = 0.004
+_N_MOVES = 400
+
+
+def with_bulbs(house: House, fields: RepairFields) -> tuple[House, list[SourceRepair]]:
+    """Every light source of every lamp with an emitting surface, and what was done for each."""
+    palette = _Palette(house.materials)
+    items = []
+    sources: list[SourceRepair] = []
+    for item in house.items:
+        if item.lights:
+            item, done = _with_bulbs(item, palette, fields)
+            sources += done
+        items.append(item)
+    return replace(house, items=tuple(items), materials=tuple(palette.materials)), sources
+
+
+class _Palette:
+    """The house's materials, with bulb materials added as they are asked for."""
+
+    def __init__(self, materials: tuple[Material, ...]) -> None:
+        self.materials = list(materials)
+        self._bulbs: dict[tuple[float, float, float], int] = {}
+        self._emitting: dict[int, int] = {}
+
+    def bulb(self, rgb_linear: tuple[float, float, float]) -> int:
+        """Index of a bulb material for light of that colour."""
+        if rgb_linear not in self._bulbs:
+            self._bulbs[rgb_linear] = len(self.materials)
+            name = f"bulb_{len(self._bulbs)}"
+            self.materials.append(Material(name, kind=MaterialKind.BULB))
+        return self._bulbs[rgb_linear]
+
+    def emitting(self, material: int) -> int:
+        """Index of the material as a bulb, with its own colour."""
+        if self.materials[material].kind is MaterialKind.BULB:
+            return material
+        if material not in self._emitting:
+            self._emitting[material] = len(self.materials)
+            old = self.materials[material]
+            self.materials.append(replace(old, name=f"{old.name}_bulb", kind=MaterialKind.BULB))
+        return self._emitting[material]
+
+
+def _with_bulbs(
+    item: Item, palette: _Palette, fields: RepairFields
+) -> tuple[Item, list[SourceRepair]]:
+    surfaces = list(item.surfaces)
+    corners = triangles_of(item)
+    lights, done = [], []
+    for number, light in enumerate(item.lights):
+        given = light.radius_m if light.radius_m > 0 else fields.bulb_radius_m
+        emitting = tuple(k for k in light.emitting if len(surfaces[k].faces))
+        radius, moved = given, 0.0
+        if emitting:
+            for k in emitting:
+                surfaces[k] = replace(surfaces[k], material=palette.emitting(surfaces[k].material))
+        else:
+            centre, radius = _fitting_sphere(np.array(light.position), given, corners)
+            moved = float(np.linalg.norm(centre - np.array(light.position)))
+            emitting = (len(surfaces),)
+            surfaces.append(icosphere("bulb", centre, radius, palette.bulb(light.rgb_linear)))
+            light = replace(light, position=_triple(centre), radius_m=radius)
+            corners = np.concatenate([corners, _corners(surfaces[-1])])
+        done.append(
+            SourceRepair(
+                item_id=item.id,
+                source=number,
+                bulb_added=not light.emitting or emitting != light.emitting,
+                radius_given_m=_rounded(given),
+                radius_m=_rounded(radius),
+                moved_m=_rounded(moved),
+            )
+        )
+        lights.append(replace(light, emitting=emitting))
+    kind = ItemKind.LAMP if not item.kind.is_structure else item.kind
+    return replace(item, kind=kind, surfaces=tuple(surfaces), lights=tuple(lights)), done
+
+
+def _fitting_sphere(position: F64, radius: float, corners: F64) -> tuple[F64, float]:
+    """Centre and radius of a sphere near position that touches none of the triangles (F, 3, 3)."""
+    free = _free(position, corners)
+    if free >= _LEAST_RADIUS_M / _CLEARANCE:
+        return position, min(radius, _CLEARANCE * free)
+    # A mesh passes through the light's centre: the roomiest place within the bulb takes it.
+    near = corners[distance_to_triangles(position, corners) < 4 * radius]
+    rng = np.random.default_rng(0)
+    steps = rng.normal(size=(_N_MOVES, 3))
+    steps *= (radius * rng.random((_N_MOVES, 1)) ** (1 / 3)) / np.linalg.norm(steps, axis=1, keepdims=True)  # fmt: skip
+    room = [_free(position + step, near) for step in steps]
+    best = int(np.argmax(room))
+    return position + steps[best], max(min(radius, _CLEARANCE * room[best]), _LEAST_RADIUS_M / 4)
+
+
+def _free(point: F64, corners: F64) -> float:
+    return float(distance_to_triangles(point, corners).min()) if len(corners) else np.inf
+
+
+def triangles_of(item: Item) -> F64:
+    """(F, 3, 3) corners of all the item's triangles, in double precision."""
+    parts = [_corners(s) for s in item.surfaces if len(s.faces)]
+    return np.concatenate(parts) if parts else np.zeros((0, 3, 3))
+
+
+def _corners(surface: Surface) -> F64:
+    return surface.positions.astype(np.float64)[surface.faces]
+
+
+def icosphere(
+    name: str, centre: F64, radius: float, material: int, *, n_splits: int = 2
+) -> Surface:
+    """A closed sphere of 20 * 4^n_splits triangles whose corners lie on it, smooth normals."""
+    g = (1 + 5**0.5) / 2
+    points = [(s, t * g, 0.0) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
+    points += [(0.0, x, y) for x, y, _ in points[:4]]
+    points += [(y, 0.0, x) for x, y, _ in points[:4]]
+    unit = np.array(points) / np.linalg.norm(points, axis=1, keepdims=True)
+    near = np.linalg.norm(unit[:, None] - unit[None], axis=2) < 1.2
+    faces = np.array(
+        [
+            (i, j, k)
+            for i in range(12)
+            for j in range(i + 1, 12)
+            for k in range(j + 1, 12)
+            if near[i, j] and near[j, k] and near[i, k]
+        ]
+    )
+    for _ in range(n_splits):
+        unit, faces = _split(unit, faces)
+    a, b, c = (unit[faces[:, k]] for k in range(3))
+    inward = (np.cross(b - a, c - a) * a).sum(1) < 0
+    faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
+    return Surface(
+        name,
+        (centre + radius * unit).astype(np.float32),
+        faces.astype(np.int32),
+        material,
+        None,
+        unit.astype(np.float32),
+    )
+
+
+def _split(unit: F64, faces: Faces) -> tuple[F64, Faces]:
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    pairs, inverse = np.unique(edges, axis=0, return_inverse=True)
+    middle = unit[pairs].mean(1)
+    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    ab, bc, ca = np.ravel(inverse).reshape(3, -1) + len(unit)
+    a, b, c = faces.T
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.concatenate([unit, middle]), np.concatenate([np.stack(p, 1) for p in parts])
+
+
+def _triple(v: F64) -> tuple[float, float, float]:
+    return float(v[0]), float(v[1]), float(v[2])
+
+
+def _rounded(value: float) -> float:
+    return round(value, 6)

@@ -1,0 +1,120 @@
+"""Lamps that keep their light: what encloses the bulb becomes a translucent shade. No effects.
+
+Never invisible, and never more than a lamp's own part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.repair.lamps.light_output_ratio import (
+    Escape,
+    LampBench,
+    bench_of_lamps,
+    escape_of_source,
+)
+from pbrs_farm.repair.measure.occluder import Occluder
+from pbrs_farm.repair.report import SourceRepair
+
+_MOST_SHADES = 16
+_LEAST_BLOCKED = 0.02
+
+
+def with_shades(
+    house: House,
+    sources: Sequence[SourceRepair],
+    fields: RepairFields,
+    occluder_from: Callable[[House], Occluder],
+) -> tuple[House, list[SourceRepair]]:
+    """LightPart.escape of every source; shades where less than fields.min_escape gets out."""
+    bench = bench_of_lamps(house, occluder_from)
+    shades: list[int] = []
+    measured: dict[tuple[int, int], tuple[Escape, Escape]] = {}
+    for k, item in enumerate(house.items):
+        for source in range(len(item.lights)):
+            before = escape_of_source(bench, k, source, (), fields.shade_transmission)
+            after = _opened(bench, k, source, shades, fields)
+            measured[k, source] = (before, after)
+    if shades:
+        measured = {
+            key: (before, escape_of_source(bench, *key, shades, fields.shade_transmission))
+            for key, (before, _) in measured.items()
+        }
+    materials = list(house.materials)
+    items: list[Item] = []
+    names: dict[str, tuple[str, ...]] = {}
+    for k, item in enumerate(house.items):
+        mine = [bench.parts[p] for p in shades if bench.parts[p][0] == k]
+        for j in sorted({part[1] for part in mine}):
+            wanted = [part[2] for part in mine if part[1] == j]
+            is_shade = np.isin(bench.labels[k, j], wanted)
+            item = _split_off(item, j, is_shade, _shade_of(item.surfaces[j].material, materials))
+            names[item.id] = (*names.get(item.id, ()), house.items[k].surfaces[j].name)
+        lights = tuple(
+            replace(light, escape=_rounded(measured[k, n][1].share))
+            for n, light in enumerate(item.lights)
+        )
+        items.append(replace(item, lights=lights))
+    index = {item.id: k for k, item in enumerate(house.items)}
+    done = [
+        s.model_copy(
+            update={
+                "escape_before": _rounded(measured[index[s.item_id], s.source][0].share),
+                "escape": _rounded(measured[index[s.item_id], s.source][1].share),
+                "shades": names.get(s.item_id, ()),
+            }
+        )
+        for s in sources
+    ]
+    return replace(house, items=tuple(items), materials=tuple(materials)), done
+
+
+def _opened(
+    bench: LampBench, item: int, source: int, shades: list[int], fields: RepairFields
+) -> Escape:
+    """Add to shades the parts that stop most of this source's light, until enough gets out."""
+    while True:
+        found = escape_of_source(bench, item, source, shades, fields.shade_transmission)
+        worst = int(np.argmax(found.blocked)) if len(found.blocked) else -1
+        mine = sum(bench.parts[p][0] == item for p in shades)
+        if found.share >= fields.min_escape or mine >= _MOST_SHADES:
+            return found
+        if worst < 0 or found.blocked[worst] < _LEAST_BLOCKED:
+            return found
+        shades.append(worst)
+
+
+def _shade_of(material: int, materials: list[Material]) -> int:
+    """Index of the material as a shade, added at the end if it is not there yet."""
+    shade = replace(
+        materials[material], name=f"{materials[material].name}_shade", kind=MaterialKind.SHADE
+    )
+    if shade not in materials:
+        materials.append(shade)
+    return materials.index(shade)
+
+
+def _split_off(item: Item, j: int, is_shade: NDArray[np.bool_], material: int) -> Item:
+    """The item with those faces of its surface j in the shade's material.
+
+    A surface that is split keeps its place, its shade comes last: LightPart.emitting still holds.
+    """
+    surfaces = list(item.surfaces)
+    s: Surface = surfaces[j]
+    if is_shade.all():
+        surfaces[j] = replace(s, material=material)
+    else:
+        surfaces[j] = replace(s, faces=np.ascontiguousarray(s.faces[~is_shade]))
+        faces = np.ascontiguousarray(s.faces[is_shade])
+        surfaces.append(replace(s, name=f"{s.name}_shade", faces=faces, material=material))
+    return replace(item, surfaces=tuple(surfaces))
+
+
+def _rounded(value: float) -> float:
+    return round(value, 5)

@@ -1,0 +1,229 @@
+"""Which rooms are closed, which share their air, and why the others are open; no effects.
+
+A room is closed when full-height walls, or rooms it opens into, bound its polygon, and it has a
+floor and a ceiling of its own or those of the space it opens into (stairwell, hall).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from pbrs_farm.core.house import Room
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.booleans import F64
+from pbrs_farm.repair.structure.planar_surfaces import Lid
+from pbrs_farm.repair.structure.prisms import polygons_of
+from pbrs_farm.repair.structure.slabs import GAP_M
+from pbrs_farm.repair.structure.walls import Wall
+
+_STEP_M = 0.05
+_OPEN_EDGE_M = 0.075
+_OPEN_AREA_M2 = 0.02
+_STOREY_GAP_M = 0.8
+_PROBES_M = (0.02, 0.12, 0.24)
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """Rooms (ids) that share their air. reasons: (room id, why it is open), empty if closed.
+
+    wells: stairwells without a room (ids) that belong to it.
+    """
+
+    rooms: tuple[str, ...]
+    reasons: tuple[tuple[str, str], ...]
+    wells: tuple[str, ...] = ()
+
+    @property
+    def is_closed(self) -> bool:
+        """All its rooms are bounded."""
+        return not self.reasons
+
+    def why(self, room_id: str) -> str:
+        """Why that room is open: its own reason, or the room it opens into."""
+        own = dict(self.reasons).get(room_id)
+        if own is not None or not self.reasons:
+            return own or ""
+        other, reason = self.reasons[0]
+        return f"it opens into {other}, of which {reason}"
+
+
+def spaces_of_rooms(
+    real: Sequence[Room], wells: Sequence[Room], walls: Sequence[Wall], lids: Sequence[Lid]
+) -> tuple[Space, ...]:
+    """Rooms grouped by the air they share, in the order of their first room.
+
+    wells: stairwells that no room covers; a space of wells alone is left out.
+    """
+    rooms = (*real, *wells)
+    areas = [plan.polygon_of_room(r.polygon) for r in rooms]
+    links: list[tuple[int, int]] = []
+    reasons: dict[int, str] = {}
+    for i in range(len(rooms)):
+        found = [
+            _edge(i, rooms, areas, walls, lids),
+            _cover(i, rooms, areas, lids, above=False),
+            _cover(i, rooms, areas, lids, above=True),
+        ]
+        links += [(i, j) for linked, _ in found for j in linked]
+        why = [reason for _, reason in found if reason]
+        if why:
+            reasons[i] = "; ".join(why)
+    rows, columns = np.array([*links, (0, 0)]).T if rooms else (np.zeros(0, int),) * 2
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(len(rooms),) * 2)
+    labels = connected_components(graph, directed=False)[1] if rooms else np.zeros(0, int)
+    members = [np.flatnonzero(labels == k).tolist() for k in dict.fromkeys(labels.tolist())]
+    return tuple(
+        Space(
+            tuple(rooms[i].id for i in group if i < len(real)),
+            tuple((rooms[i].id, reasons[i]) for i in group if i in reasons),
+            tuple(rooms[i].id for i in group if i >= len(real)),
+        )
+        for group in members
+        if group[0] < len(real)
+    )
+
+
+def _edge(
+    i: int,
+    rooms: Sequence[Room],
+    areas: Sequence[plan.Shape],
+    walls: Sequence[Wall],
+    lids: Sequence[Lid],
+) -> tuple[list[int], str]:
+    """Rooms that room i opens into through its edge, and why the edge is open, or ""."""
+    room = rooms[i]
+    points, outward = edge_samples(areas[i])
+    floor = np.full(len(points), room.floor_y)
+    ceiling = _ceiling_at(points, room, lids)
+    bare = ~_walled(points + 0.01 * outward, floor, ceiling, walls)
+    linked = []
+    for j, other in enumerate(rooms):
+        if (
+            j == i
+            or other.floor_y > room.ceiling_y - GAP_M
+            or other.ceiling_y < room.floor_y + GAP_M
+        ):
+            continue
+        near = plan.grown(areas[j], GAP_M)
+        reached = np.zeros(len(points), np.bool_)
+        for step in _PROBES_M:
+            reached |= bare & shapely.contains_xy(near, *(points + step * outward).T)
+        if reached.any():
+            linked.append(j)
+            bare &= ~reached
+    open_m = float(bare.sum() * _STEP_M)
+    reason = f"{open_m:.1f} m of its edge have no full-height wall" if open_m > _OPEN_EDGE_M else ""
+    return linked, reason
+
+
+def edge_samples(area: plan.Shape) -> tuple[F64, F64]:
+    """Points (N, 2) along the edge of area, _STEP_M apart, and unit vectors (N, 2) out of it."""
+    points, outward = [np.zeros((0, 2))], [np.zeros((0, 2))]
+    for polygon in polygons_of(area):
+        oriented = shapely.orient_polygons(polygon)
+        for ring in (oriented.exterior, *oriented.interiors):
+            corners = np.asarray(ring.coords)
+            for a, b in pairwise(corners):
+                length = float(np.linalg.norm(b - a))
+                n = max(round(length / _STEP_M), 1)
+                t = (np.arange(n) + 0.5) / n
+                points.append(a + t[:, None] * (b - a))
+                normal = np.array([b[1] - a[1], a[0] - b[0]]) / max(length, 1e-12)
+                outward.append(np.tile(normal, (n, 1)))
+    return np.concatenate(points), np.concatenate(outward)
+
+
+def _ceiling_at(points: F64, room: Room, lids: Sequence[Lid]) -> F64:
+    # The lowest ceiling above each point that belongs to this room's height.
+    y = np.full(len(points), room.ceiling_y)
+    own = plan.polygon_of_room(room.polygon)
+    for lid in lids:
+        if not lid.is_ceiling or not shapely.intersects(lid.area, own):
+            continue
+        heights = lid.plane.at(points)
+        inside = shapely.contains_xy(plan.grown(lid.area, 0.01), points[:, 0], points[:, 1])
+        y = np.where(inside & (heights < y) & (heights > room.floor_y + 0.1), heights, y)
+    return y
+
+
+def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> NDArray[np.bool_]:
+    """Whether walls stand at each point from low to high, gaps up to GAP_M aside."""
+    reached = low + 2 * GAP_M
+    spans = []
+    for wall in walls:
+        inside = shapely.contains_xy(plan.grown(wall.footprint, GAP_M), points[:, 0], points[:, 1])
+        if inside.any():
+            spans.append((inside, wall.bottom_y, wall.top.at(points)))
+    for inside, bottom, top in sorted(spans, key=lambda s: s[1]):
+        grows = inside & (bottom <= reached + GAP_M)
+        reached = np.where(grows, np.maximum(reached, top), reached)
+    return np.asarray(reached >= high - GAP_M)  # fmt: skip
+
+
+def _cover(
+    i: int,
+    rooms: Sequence[Room],
+    areas: Sequence[plan.Shape],
+    lids: Sequence[Lid],
+    *,
+    above: bool,
+) -> tuple[list[int], str]:
+    """Rooms that room i opens into upwards (or downwards), and why it has no lid there, or ""."""
+    near = _lids_of(rooms[i], lids, above=above)
+    bare = plan.without(areas[i], *(plan.grown(a, GAP_M) for a in near))
+    linked = []
+    for j in _storey_next(rooms[i], rooms, above=above):
+        if plan.common(bare, areas[j]).area > _OPEN_AREA_M2:
+            linked.append(j)
+            bare = plan.without(bare, plan.grown(areas[j], GAP_M))
+    what = "ceiling" if above else "floor"
+    if bare.area <= _OPEN_AREA_M2:
+        return linked, ""
+    exact = plan.common(plan.without(areas[i], *near), plan.grown(bare, 2 * GAP_M))
+    return linked, f"{exact.area:.1f} m2 of it have no {what}"
+
+
+def bare_area(room: Room, rooms: Sequence[Room], lids: Sequence[Lid], *, above: bool) -> plan.Shape:
+    """Plan area of room with neither a lid above (or below) it nor a room of the next storey."""
+    bare = plan.without(plan.polygon_of_room(room.polygon), *_lids_of(room, lids, above=above))
+    beyond = [rooms[j].polygon for j in _storey_next(room, rooms, above=above)]
+    return plan.without(bare, *(plan.grown(plan.polygon_of_room(p), GAP_M) for p in beyond))
+
+
+def _lids_of(room: Room, lids: Sequence[Lid], *, above: bool) -> list[plan.Shape]:
+    return [lid.area for lid in lids if _covers(room, lid, above=above)]
+
+
+def _storey_next(room: Room, rooms: Sequence[Room], *, above: bool) -> list[int]:
+    # Indices of the rooms one storey up (or down), wherever they lie in plan.
+    gaps = [
+        other.floor_y - room.ceiling_y if above else room.floor_y - other.ceiling_y
+        for other in rooms
+    ]
+    return [
+        j for j, gap in enumerate(gaps) if rooms[j] is not room and -GAP_M <= gap <= _STOREY_GAP_M
+    ]
+
+
+def _covers(room: Room, lid: Lid, *, above: bool) -> bool:
+    # A ceiling, or the floor of the storey above, closes a room upwards; and the other way round.
+    corners = shapely.get_coordinates(lid.area)
+    if not len(corners):
+        return False
+    heights = lid.plane.at(corners)
+    if above:
+        if lid.is_ceiling:
+            return bool(heights.min() > room.floor_y + 0.1 and heights.min() < room.ceiling_y + _STOREY_GAP_M)  # fmt: skip
+        return bool(-GAP_M <= heights.min() - room.ceiling_y <= _STOREY_GAP_M)
+    if lid.is_ceiling:
+        return bool(-GAP_M <= room.floor_y - heights.max() <= _STOREY_GAP_M)
+    return bool(abs(heights.max() - room.floor_y) < 2 * GAP_M)

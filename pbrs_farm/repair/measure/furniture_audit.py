@@ -1,0 +1,98 @@
+"""Furniture that shares volume, hangs in the air, or stands twice in one place; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from manifold3d import Manifold
+
+from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.repair.report import Floating, FurnitureAudit, Overlap
+from pbrs_farm.repair.structure.booleans import F64, TagTable, common, united
+from pbrs_farm.repair.structure.closed_shells import closed_bodies
+
+_TOUCH_M = 0.02
+_SAME_M = 0.001
+_MIN_VOLUME_M3 = 1e-4
+_MIN_SHARE = 0.01
+_MAX_FACES = 60_000
+
+
+def furniture_audit(house: House) -> FurnitureAudit:
+    """What is doubtful about where the furniture stands; nothing is changed.
+
+    Overlaps are exact for the closed bodies of each piece; open meshes have no volume and do not
+    count, nor do pieces of more than 60,000 triangles. Floating: its bounding box, grown by 2 cm,
+    meets no other item's.
+    """
+    pieces = [i for i in house.items if _is_furniture(i)]
+    boxes = np.array([i.bounds for i in pieces]).reshape(-1, 2, 3)
+    return FurnitureAudit(
+        overlaps=tuple(_overlaps(pieces, boxes)),
+        floating=tuple(_floating(house, pieces, boxes)),
+        duplicates=tuple(_duplicates(pieces, boxes)),
+    )
+
+
+def _is_furniture(item: Item) -> bool:
+    fixed = item.kind.is_structure or item.kind in (ItemKind.DOOR, ItemKind.WINDOW)
+    return not fixed and item.n_faces > 0
+
+
+def _pairs(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
+    """Indices i < j of boxes (N, 2, 3) that meet when grown by by_m together."""
+    for i in range(len(boxes)):
+        apart = (boxes[i + 1 :, 0] > boxes[i, 1] + by_m) | (boxes[i + 1 :, 1] < boxes[i, 0] - by_m)
+        for j in np.flatnonzero(~apart.any(1)):
+            yield i, i + 1 + int(j)
+
+
+def _overlaps(pieces: Sequence[Item], boxes: F64) -> Iterator[Overlap]:
+    solids: dict[int, Manifold | None] = {}
+    for i, j in _pairs(boxes, -_SAME_M):
+        for k in (i, j):
+            if k not in solids:
+                solids[k] = _solid(pieces[k])
+        a, b = solids[i], solids[j]
+        if a is None or b is None:
+            continue
+        volume = float(common(a, b).volume())
+        share = volume / max(min(float(a.volume()), float(b.volume())), 1e-12)
+        if volume > _MIN_VOLUME_M3 and share > _MIN_SHARE:
+            yield Overlap(
+                a=pieces[i].id,
+                b=pieces[j].id,
+                volume_m3=round(volume, 6),
+                share=round(min(share, 1.0), 4),
+            )
+
+
+def _solid(item: Item) -> Manifold | None:
+    if item.n_faces > _MAX_FACES:
+        return None
+    bodies = closed_bodies(item, TagTable())
+    return united(bodies) if bodies else None
+
+
+def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floating]:
+    others = [i for i in house.items if not _is_furniture(i) and i.n_faces]
+    around = np.concatenate([boxes, np.array([i.bounds for i in others]).reshape(-1, 2, 3)])
+    for k, piece in enumerate(pieces):
+        apart = (around[:, 0] > boxes[k, 1] + _TOUCH_M) | (around[:, 1] < boxes[k, 0] - _TOUCH_M)
+        touched = ~apart.any(1)
+        touched[k] = False
+        if touched.any() or (piece.lights and "fallback" in piece.tags):
+            continue
+        below = ~apart[:, [0, 2]].any(1) & (around[:, 1, 1] <= boxes[k, 0, 1])
+        below[k] = False
+        gap = boxes[k, 0, 1] - around[below, 1, 1].max() if below.any() else np.inf
+        yield Floating(item_id=piece.id, gap_m=round(float(gap), 4) if np.isfinite(gap) else -1.0)
+
+
+def _duplicates(pieces: Sequence[Item], boxes: F64) -> Iterator[tuple[str, str]]:
+    for i, j in _pairs(boxes, 0.0):
+        a, b = pieces[i], pieces[j]
+        same = (a.source_class, a.n_faces) == (b.source_class, b.n_faces)
+        if same and np.abs(boxes[i] - boxes[j]).max() < _SAME_M:
+            yield a.id, b.id

@@ -1,0 +1,205 @@
+"""The leak meter: rays in closed spaces, openings plugged; none may reach the sky. No effects.
+
+The sky's radiance is 1 and everything else is black, so a ray that hits nothing is light that
+leaks in. Rays follow diffuse bounces, so that a crack which is not straight counts too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.house import House, Item, ItemKind, Surface, geometry_from_house
+from pbrs_farm.repair.measure.enclosure import Space
+from pbrs_farm.repair.measure.occluder import Occluder
+from pbrs_farm.repair.measure.room_edges import RoomAir
+from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.booleans import F64
+from pbrs_farm.repair.structure.patches import face_normals
+from pbrs_farm.repair.structure.plan_geometry import Shape
+from pbrs_farm.repair.structure.prisms import Plane, polygons_of
+
+WITHIN_M = 0.005
+_MAX_LEAKS = 50
+
+
+@dataclass(frozen=True, slots=True)
+class LeakMeter:
+    """How closely the meter looks.
+
+    step_m: distance of starts along every edge where walls, floor and ceiling meet; per_start:
+    rays from each; n_inside: random points per space; n_bounces: after the first flight.
+    """
+
+    step_m: float = 0.025
+    per_start: int = 48
+    n_inside: int = 1000
+    per_inside: int = 48
+    n_bounces: int = 2
+
+
+def leaks_of_house(
+    house: House,
+    spaces: Sequence[Space],
+    airs: Mapping[str, Sequence[RoomAir]],
+    plugs: Sequence[Surface],
+    occluder_from: Callable[[House], Occluder],
+    meter: LeakMeter | None = None,
+) -> LeakReport:
+    """Count, for each closed space, the rays that reach the sky. The house is a repaired one.
+
+    airs: by room id. plugs: fill its openings. Only structure and plugs stop rays: furniture hides no leak.
+    """
+    meter = LeakMeter() if meter is None else meter
+    shell = plugged_shell(house, plugs)
+    geometry = geometry_from_house(shell)
+    normals = face_normals(geometry.positions, geometry.faces)
+    closed = [s for s in spaces if s.is_closed]
+    occluder = occluder_from(shell) if closed else None
+    rng = np.random.default_rng(0)
+    found = []
+    for space in closed:
+        inside = [a for r in (*space.rooms, *space.wells) for a in airs[r]]
+        origins, directions = _rays(inside, meter, rng)
+        assert occluder is not None
+        found.append(_measured(space, origins, directions, normals, occluder, meter, rng))
+    areas = {r.id: float(shapely.area(plan.polygon_of_room(r.polygon))) for r in house.rooms}
+    in_closed = sum(areas[r] for s in closed for r in s.rooms)
+    return LeakReport(
+        spaces=tuple(found),
+        n_rays=sum(s.n_rays for s in found),
+        n_blind=sum(s.n_blind for s in found),
+        n_sky=sum(s.n_sky for s in found),
+        closed_share=round(in_closed / max(sum(areas.values()), 1e-9), 4),
+    )
+
+
+def plugged_shell(house: House, plugs: Sequence[Surface]) -> House:
+    """The house's structure alone, its openings filled."""
+    items = [i for i in house.items if i.kind.is_structure and i.kind is not ItemKind.GROUND]
+    plug = Item("plugs", "plugs", ItemKind.WALL, house.levels[0].id, tuple(plugs))
+    return replace(house, items=(*items, plug))
+
+
+def _rays(airs: Sequence[RoomAir], meter: LeakMeter, rng: np.random.Generator) -> tuple[F64, F64]:
+    if not airs:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    edges = np.concatenate([_edge_starts(a, meter.step_m, rng) for a in airs])
+    areas = np.array([a.area.area for a in airs])
+    shares = rng.multinomial(meter.n_inside, areas / areas.sum())
+    inside = np.concatenate([_inside(a, int(n), rng) for a, n in zip(airs, shares, strict=True)])
+    origins = np.concatenate(
+        [np.repeat(edges, meter.per_start, 0), np.repeat(inside, meter.per_inside, 0)]
+    )
+    return origins, _unit(rng.normal(size=origins.shape))
+
+
+def _edge_starts(air: RoomAir, step_m: float, rng: np.random.Generator) -> F64:
+    """Points within 5 mm of the edges where walls, floor and ceiling meet, in the air."""
+    inset = 0.5 * WITHIN_M
+    knee = air.low.raised(air.foot_m + inset)
+    found = [
+        *_along(air.foot, air.low.raised(inset), step_m, rng),
+        *_along(air.area, air.high.raised(-inset), step_m, rng),
+        *_upright(air.area, knee, air.high.raised(-inset), step_m, rng),
+    ]
+    if air.foot_m > 0:
+        found += _upright(air.foot, air.low.raised(inset), knee.raised(-2 * inset), step_m, rng)
+    points = np.concatenate([np.zeros((0, 3)), *found])
+    return np.asarray(points + rng.uniform(-0.4, 0.4, points.shape) * WITHIN_M)
+
+
+def _rings(area: Shape) -> list[shapely.LinearRing]:
+    inner = shapely.buffer(area, -0.5 * WITHIN_M, join_style="mitre", mitre_limit=2.0)
+    return [r for p in polygons_of(inner) for r in (p.exterior, *p.interiors)]
+
+
+def _along(area: Shape, plane: Plane, step_m: float, rng: np.random.Generator) -> list[F64]:
+    found = []
+    for ring in _rings(area):
+        n = max(int(ring.length / step_m), 8)
+        steps = ring.length * (np.arange(n) + rng.random()) / n
+        points = shapely.get_coordinates(shapely.line_interpolate_point(ring, steps))
+        found.append(_lifted(points, plane.at(points)))
+    return found
+
+
+def _upright(
+    area: Shape, low: Plane, high: Plane, step_m: float, rng: np.random.Generator
+) -> list[F64]:
+    found = []
+    for ring in _rings(area):
+        corners = np.asarray(ring.coords)[:-1]
+        for corner, y0, y1 in zip(corners, low.at(corners), high.at(corners), strict=True):
+            n = max(int((y1 - y0) / step_m), 2)
+            y = y0 + (np.arange(n) + rng.random()) / n * (y1 - y0)
+            found.append(_lifted(np.tile(corner, (n, 1)), y))
+    return found
+
+
+def _lifted(plan_points: F64, y: F64) -> F64:
+    return np.stack([plan_points[:, 0], y, plan_points[:, 1]], 1)
+
+
+def _inside(air: RoomAir, n: int, rng: np.random.Generator) -> F64:
+    area = shapely.buffer(air.foot, -0.02)
+    if n == 0 or shapely.is_empty(area):
+        return np.zeros((0, 3))
+    x0, z0, x1, z1 = area.bounds
+    found = np.zeros((0, 2))
+    while len(found) < n:
+        points = rng.uniform((x0, z0), (x1, z1), (4 * n, 2))
+        found = np.concatenate([found, points[shapely.contains_xy(area, *points.T)]])
+    found = found[:n]
+    low, high = air.low.at(found) + 0.02, air.high.at(found) - 0.02
+    return _lifted(found, low + rng.random(n) * (high - low))
+
+
+def _measured(
+    space: Space,
+    origins: F64,
+    directions: F64,
+    normals: F64,
+    occluder: Occluder,
+    meter: LeakMeter,
+    rng: np.random.Generator,
+) -> SpaceLeaks:
+    n_sky = n_blind = 0
+    leaks: list[Leak] = []
+    p, d = origins, directions
+    for flight in range(meter.n_bounces + 1):
+        distance, face = occluder.first_hit(p.astype(np.float32), d.astype(np.float32))
+        gone = ~np.isfinite(distance)
+        n_sky += int(gone.sum())
+        leaks += [
+            Leak(origin=_triple(a), direction=_triple(b))
+            for a, b in zip(p[gone][: _MAX_LEAKS - len(leaks)], d[gone], strict=False)
+        ]
+        # From the front of a face light goes on; behind one it is inside a solid, absorbed.
+        lit = ~gone
+        lit[lit] = (d[lit] * normals[face[lit]]).sum(1) < 0
+        if flight == 0:
+            n_blind = int((~gone & ~lit).sum())
+        reached = p[lit] + d[lit] * distance[lit, None].astype(np.float64)
+        n = normals[face[lit]]
+        d = _unit(_unit(rng.normal(size=n.shape)) + n)
+        p = reached + 1e-4 * n
+    return SpaceLeaks(
+        rooms=space.rooms,
+        n_rays=len(origins),
+        n_blind=n_blind,
+        n_sky=n_sky,
+        leaks=tuple(leaks[:_MAX_LEAKS]),
+    )
+
+
+def _unit(v: F64) -> F64:
+    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12))
+
+
+def _triple(v: F64) -> tuple[float, float, float]:
+    return round(float(v[0]), 5), round(float(v[1]), 5), round(float(v[2]), 5)

@@ -1,0 +1,103 @@
+"""The stage: a house as read in, a house that light cannot leak through out, with a report.
+
+No effects. The ray caster comes as an argument; without one, leaks and escape are not measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from pbrs_farm.core.house import Enclosure, House, Room
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.repair import cleaning as clean
+from pbrs_farm.repair.lamps.bulbs import with_bulbs
+from pbrs_farm.repair.lamps.room_lighting import with_lit_rooms
+from pbrs_farm.repair.lamps.shades import with_shades
+from pbrs_farm.repair.measure.enclosure import Space
+from pbrs_farm.repair.measure.furniture_audit import furniture_audit
+from pbrs_farm.repair.measure.leaks import leaks_of_house
+from pbrs_farm.repair.measure.occluder import Occluder
+from pbrs_farm.repair.report import RepairReport, RoomAudit
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.watertight import repaired_structure, with_structure
+
+
+def repair(
+    house: House,
+    fields: RepairFields,
+    *,
+    occluder_from: Callable[[House], Occluder] | None = None,
+) -> tuple[House, RepairReport]:
+    """The repaired house and everything that was changed (paper section 3).
+
+    A house that is repaired already comes back as it is. occluder_from: builds a ray caster over
+    a house's triangles; None leaves the leak meter and the lamps' escape unmeasured.
+    """
+    if house.is_repaired:
+        return house, RepairReport(house_id=house.id, was_repaired=True)
+
+    # What does not belong, and what is unsound.
+    house, removed = clean.without_living(house, fields)
+    house, faces = clean.with_sound_faces(house)
+    house, n_white = clean.with_white_walls(house, fields.default_wall_rgb)
+
+    # The shell.
+    structure = repaired_structure(house, fields.wall_thickness_m)
+    house, swallowed = with_structure(house, structure)
+
+    # The lights.
+    house, sources = with_bulbs(house, fields)
+    house, given = with_lit_rooms(house, fallback=fields.fallback_light)
+    if occluder_from is not None:
+        house, sources = with_shades(house, sources, fields, occluder_from)
+
+    # What is closed, and whether it is tight.
+    house = replace(house, rooms=_with_enclosure(house.rooms, structure.spaces), is_repaired=True)
+    leaks = None
+    if occluder_from is not None:
+        plugs = [s for plug in structure.plugs.values() for s in plug]
+        leaks = leaks_of_house(house, structure.spaces, structure.airs, plugs, occluder_from)
+    report = RepairReport(
+        house_id=house.id,
+        removed=(*removed, *swallowed),
+        faces=faces,
+        structure=structure.report.model_copy(update={"n_walls_made_white": n_white}),
+        sources=tuple(sources),
+        fallback_lights=tuple(given),
+        rooms=_audit(house.rooms, structure.spaces),
+        is_leaking=None if leaks is None else leaks.n_sky > 0,
+        leaks=leaks,
+        furniture=furniture_audit(house),
+    )
+    return house, report
+
+
+def _with_enclosure(rooms: Sequence[Room], spaces: Sequence[Space]) -> tuple[Room, ...]:
+    found = {}
+    for space in spaces:
+        for room_id in space.rooms:
+            found[room_id] = (Enclosure.CLOSED, "") if space.is_closed else (Enclosure.OPEN, space.why(room_id))  # fmt: skip
+    return tuple(
+        replace(r, enclosure=found[r.id][0], enclosure_reason=found[r.id][1]) for r in rooms
+    )
+
+
+def _audit(rooms: Sequence[Room], spaces: Sequence[Space]) -> tuple[RoomAudit, ...]:
+    space_of = {r: s.rooms for s in spaces for r in s.rooms}
+    return tuple(
+        RoomAudit(
+            room_id=r.id,
+            name=r.name,
+            floor_area_m2=round(_area(r), 3),
+            lit_by=r.lit_by,
+            enclosure=str(r.enclosure),
+            reason=r.enclosure_reason,
+            space=space_of[r.id],
+        )
+        for r in rooms
+    )
+
+
+def _area(room: Room) -> float:
+    return float(plan.polygon_of_room(room.polygon).area)

@@ -1,0 +1,111 @@
+"""A horizontal cut through the walls before and after repair, as SVG text; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.repair.structure.booleans import F64
+
+_GAP_M = 1.0
+_TEXT_M = 0.25
+
+
+def cut_picture(
+    before: House, after: House, level_id: str, *, height_m: float = 1.2, width_px: int = 1600
+) -> str:
+    """Side by side: every wall of before with its outline, and the solid walls of after.
+
+    The cut lies height_m above the level's floor (1.2 m goes through doors and windows). What is
+    wrong shows before: walls that overlap, miss each other or have no thickness. SVG, plan with
+    x right and z down, one unit a metre.
+    """
+    y = before.level(level_id).elevation + height_m
+    parts = [cut_of_items([i], y) for i in before.items if i.kind is ItemKind.WALL]
+    solid = cut_of_items([i for i in after.items if i.kind.is_structure], y)
+    everything = np.concatenate([np.zeros((0, 2, 2)), *parts, solid]).reshape(-1, 2)
+    if not len(everything):
+        everything = np.array([[0.0, 0.0], [1.0, 1.0]])
+    low, high = everything.min(0) - 0.5, everything.max(0) + 0.5
+    size = high - low
+    panels = [
+        _panel("before", low, "".join(_walls(p, "#c98b4a", "0.45", "#5a3210") for p in parts)),
+        _panel("after", low, _walls(solid, "#3d3d3d", "1", "none")),
+    ]
+    total = 2 * size[0] + _GAP_M
+    shifted = f'<g transform="translate({size[0] + _GAP_M:.3f} 0)">{panels[1]}</g>'
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width_px}" '
+        f'height="{round(width_px * size[1] / total)}" viewBox="0 0 {total:.3f} {size[1]:.3f}">'
+        f'<rect width="100%" height="100%" fill="white"/>{panels[0]}{shifted}</svg>\n'
+    )
+
+
+def _panel(title: str, low: F64, body: str) -> str:
+    text = f'<text x="0.2" y="0.35" font-size="{_TEXT_M}" font-family="sans-serif">{title}</text>'
+    return f'{text}<g transform="translate({-low[0]:.3f} {-low[1]:.3f})">{body}</g>'
+
+
+def _walls(segments: F64, fill: str, opacity: str, stroke: str) -> str:
+    # A closed cut is filled; an open one (a planar wall) is a line.
+    polygons = solid_polygons(segments)
+    style = f'fill="{fill}" fill-opacity="{opacity}" stroke="{stroke}" stroke-width="0.012"'
+    if not polygons:
+        lines = "".join(f"M{_xy(a)}L{_xy(b)}" for a, b in segments)
+        return f'<path d="{lines}" fill="none" stroke="#c02020" stroke-width="0.02"/>' if lines else ""  # fmt: skip
+    rings = [r for p in polygons for r in (p.exterior, *p.interiors)]
+    d = "".join("M" + "L".join(_xy(c) for c in r.coords[:-1]) + "Z" for r in rings)
+    return f'<path d="{d}" fill-rule="evenodd" {style}/>'
+
+
+def _xy(point: Sequence[float] | F64) -> str:
+    return f"{point[0]:.4f} {point[1]:.4f}"
+
+
+def cut_of_items(items: Sequence[Item], y: float) -> F64:
+    """(N, 2, 2) plan segments in which the items' triangles meet the height y."""
+    triangles = [s.positions.astype(np.float64)[s.faces] for i in items for s in i.surfaces]
+    corners = np.concatenate([np.zeros((0, 3, 3)), *triangles])
+    above = corners[:, :, 1] > y
+    crossing = above.any(1) & ~above.all(1)
+    corners, above = corners[crossing], above[crossing]
+
+    # Turn each triangle so that corner 0 is alone on its side of the cut.
+    alone = np.where(above.sum(1, keepdims=True) == 1, above, ~above).argmax(1)
+    order = (alone[:, None] + np.arange(3)) % 3
+    a, b, c = np.moveaxis(np.take_along_axis(corners, order[:, :, None], 1), 1, 0)
+    ends = [_meet(a, b, y), _meet(a, c, y)]
+    return np.stack(ends, 1)[:, :, [0, 2]]
+
+
+def _meet(a: F64, b: F64, y: float) -> F64:
+    t = (y - a[:, 1]) / (b[:, 1] - a[:, 1])
+    return np.asarray(a + t[:, None] * (b - a))
+
+
+def solid_polygons(segments: F64) -> list[shapely.Polygon]:
+    """The regions a closed cut bounds that are solid: an odd number of edges lies to their right."""
+    if not len(segments):
+        return []
+    snapped = np.round(segments, 5)
+    lines = shapely.linestrings(snapped[(snapped[:, 0] != snapped[:, 1]).any(1)])
+    noded = shapely.union_all(lines, grid_size=1e-5)
+    cells = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+    return [c for c in cells.tolist() if _is_odd(_inner_point(c), snapped)]
+
+
+def _inner_point(cell: shapely.Polygon) -> F64:
+    point = shapely.point_on_surface(cell)
+    return np.array([point.x, point.y])
+
+
+def _is_odd(point: F64, segments: F64) -> bool:
+    a, b = segments[:, 0] - point, segments[:, 1] - point
+    crosses: NDArray[np.bool_] = (a[:, 1] > 0) != (b[:, 1] > 0)
+    a, b = a[crosses], b[crosses]
+    x = a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    return bool((x > 0).sum() % 2)

@@ -1,0 +1,1 @@
+"""Walls, floors and ceilings as watertight solids, openings cut; no effects."""

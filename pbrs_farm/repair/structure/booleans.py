@@ -1,0 +1,174 @@
+"""Closed solids whose faces remember what they are: patches in, boolean work, patches out.
+
+No effects. The only file that calls manifold3d. Every patch (one surface of one item) is a run
+with its own original id and carries texture coordinates and normals as vertex properties, so
+after any union or difference each face still knows its item, surface, material and uv.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import manifold3d
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import NDArray
+
+from pbrs_farm.repair.structure.sliver_removal import sealed
+
+F64 = NDArray[np.float64]
+
+_WELD_M = 1e-5
+_NUMBER_OF_PROPERTIES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Tag:
+    """What a face is: index of its item in House.items, name of its surface, its material."""
+
+    item: int
+    surface: str
+    material: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """Triangles of one tag. positions (V, 3), faces (F, 3) outward, uvs (V, 2), normals or zeros."""
+
+    tag: Tag
+    positions: F64
+    faces: NDArray[np.int64]
+    uvs: F64
+    normals: F64
+
+
+class TagTable:
+    """Which original id of manifold3d stands for which tag; grows as solids are made."""
+
+    def __init__(self) -> None:
+        self._tags: dict[int, Tag] = {}
+
+    def reserve(self, tags: Sequence[Tag]) -> NDArray[np.uint32]:
+        """A new original id for each tag."""
+        first = Manifold.reserve_ids(len(tags))
+        for k, tag in enumerate(tags):
+            self._tags[first + k] = tag
+        return np.arange(first, first + len(tags), dtype=np.uint32)
+
+    def __getitem__(self, original_id: int) -> Tag:
+        return self._tags[original_id]
+
+
+def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | None:
+    """The closed solid the patches bound, faces turned outward; None if they bound none."""
+    patches = [p for p in patches if len(p.faces)]
+    if not patches:
+        return None
+    for weld_m in (0.0, _WELD_M):
+        solid = _solid(patches, table, weld_m)
+        if solid is not None:
+            return solid
+    return None
+
+
+def _solid(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold | None:
+    vertices, faces, merge_from, merge_to = _welded(patches, weld_m)
+    if _volume(vertices[:, :3], faces) < 0:
+        faces = faces[:, [0, 2, 1]]
+        vertices = vertices * np.array([1.0] * 5 + [-1.0] * 3)
+    mesh = manifold3d.Mesh64(
+        np.ascontiguousarray(vertices),
+        np.ascontiguousarray(faces, np.uint64),
+        merge_from_vert=merge_from,
+        merge_to_vert=merge_to,
+        run_index=3 * np.cumsum([0, *(len(p.faces) for p in patches)]).astype(np.uint64),
+        run_original_id=table.reserve([p.tag for p in patches]),
+    )
+    solid = Manifold(mesh)
+    if solid.status() != manifold3d.Error.NoError or solid.is_empty() or solid.volume() <= 0:
+        return None
+    return solid
+
+
+def _welded(
+    patches: Sequence[Patch], weld_m: float
+) -> tuple[F64, NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint64]]:
+    # One vertex list; equal positions of different patches are declared to be one vertex.
+    positions = np.concatenate([p.positions for p in patches])
+    keys = np.round(positions / weld_m) if weld_m else positions + 0.0
+    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    canonical = first[np.ravel(inverse)]
+    if weld_m:
+        positions = positions[canonical]
+    starts = np.cumsum([0, *(len(p.positions) for p in patches)])
+    faces = np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
+    twins = np.flatnonzero(canonical != np.arange(len(canonical)))
+    uvs = np.concatenate([p.uvs for p in patches])
+    normals = np.concatenate([p.normals for p in patches])
+    vertices = np.concatenate([positions, uvs, normals], 1)
+    return vertices, faces, twins.astype(np.uint64), canonical[twins].astype(np.uint64)
+
+
+def _volume(positions: F64, faces: NDArray[np.int64]) -> float:
+    a, b, c = (positions[faces[:, k]] - positions.mean(0) for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+def united(solids: Iterable[Manifold]) -> Manifold:
+    """The union of solids; faces inside it are gone, of coinciding faces one is left."""
+    return Manifold.batch_boolean(list(solids), manifold3d.OpType.Add)
+
+
+def reduced(solid: Manifold, cutters: Sequence[Manifold]) -> Manifold:
+    """solid without what lies in any of the cutters."""
+    if not cutters:
+        return solid
+    return Manifold.batch_boolean([solid, *cutters], manifold3d.OpType.Subtract)
+
+
+def common(a: Manifold, b: Manifold) -> Manifold:
+    """What lies in both solids."""
+    return a ^ b
+
+
+def bounds(solid: Manifold) -> F64:
+    """(2, 3) axis-aligned minimum and maximum."""
+    return np.array(solid.bounding_box(), np.float64).reshape(2, 3)
+
+
+def overlap_of_bounds(a: F64, b: F64) -> F64:
+    """(3,) extents of the common box of two (2, 3) bounds; negative where they are apart."""
+    return np.asarray(np.minimum(a[1], b[1]) - np.maximum(a[0], b[0]))
+
+
+def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
+    """The solid's surface by tag, in order of item and surface; positions are float32 values."""
+    mesh = solid.to_mesh64()
+    vertices = np.asarray(mesh.vert_properties, np.float64)
+    if vertices.shape[1] < _NUMBER_OF_PROPERTIES:
+        pad = np.zeros((len(vertices), _NUMBER_OF_PROPERTIES - vertices.shape[1]))
+        vertices = np.concatenate([vertices, pad], 1)
+    triangles = np.asarray(mesh.tri_verts, np.int64)
+    tags, tag_of_face = _tags_of_faces(mesh, table)
+    vertices, triangles, tag_of_face = sealed(vertices, triangles, tag_of_face)
+    found = [
+        _compact(tag, vertices, triangles[tag_of_face == k])
+        for k, tag in enumerate(tags)
+        if (tag_of_face == k).any()
+    ]
+    return sorted(found, key=lambda p: (p.tag.item, p.tag.surface, p.tag.material))
+
+
+def _tags_of_faces(mesh: manifold3d.Mesh64, table: TagTable) -> tuple[list[Tag], NDArray[np.int64]]:
+    # Several runs may have one tag: a wall cut by two openings has two runs of reveals.
+    run_index = np.asarray(mesh.run_index, np.int64) // 3
+    tags: dict[Tag, int] = {}
+    of_run = [tags.setdefault(table[int(i)], len(tags)) for i in mesh.run_original_id]
+    return list(tags), np.repeat(np.array(of_run, np.int64), np.diff(run_index)[: len(of_run)])
+
+
+def _compact(tag: Tag, vertices: F64, faces: NDArray[np.int64]) -> Patch:
+    used, inverse = np.unique(faces, return_inverse=True)
+    v = vertices[used]
+    return Patch(tag, v[:, :3], inverse.reshape(-1, 3), v[:, 3:5], v[:, 5:8])

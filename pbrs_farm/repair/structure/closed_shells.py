@@ -1,0 +1,108 @@
+"""The closed bodies a structure item is made of; or that it is flat; or neither. No effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from pbrs_farm.core.house import Item
+from pbrs_farm.repair.structure.booleans import F64, Patch, TagTable, solid_from_patches
+from pbrs_farm.repair.structure.patches import face_areas, face_normals, patch_from_surface
+
+_FLAT_M = 1e-3
+_WELD_M = 1e-5
+
+Body = tuple[Manifold, list[Patch]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlatPatch:
+    """All of an item's triangles, which lie in one plane. normal: (3,) unit, area-weighted."""
+
+    patch: Patch
+    normal: F64
+
+
+def bodies_from_item(item: Item, index: int, table: TagTable) -> list[Body] | None:
+    """The item as closed solids, one per connected body; None if any part of it is not closed."""
+    patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
+    if not patches:
+        return None
+    bodies = []
+    for part in _split(patches, components(patches)):
+        solid = solid_from_patches(part, table)
+        if solid is None:
+            return None
+        bodies.append((solid, part))
+    return bodies
+
+
+def closed_bodies(item: Item, table: TagTable) -> list[Manifold]:
+    """Those connected parts of the item that are closed solids."""
+    patches = [patch_from_surface(s, 0) for s in item.surfaces if len(s.faces)]
+    if not patches:
+        return []
+    solids = (solid_from_patches(part, table) for part in _split(patches, components(patches)))
+    return [s for s in solids if s is not None]
+
+
+def components(patches: Sequence[Patch]) -> list[NDArray[np.int64]]:
+    """For each patch the body (F,) of each face; bodies are faces joined at their corners."""
+    positions = np.concatenate([p.positions for p in patches])
+    keys = np.round(positions / _WELD_M)
+    _, inverse = np.unique(keys, axis=0, return_inverse=True)
+    node = np.ravel(inverse)
+    starts = np.cumsum([0, *(len(p.positions) for p in patches)])
+    faces = np.concatenate([node[p.faces + s] for p, s in zip(patches, starts[:-1], strict=True)])
+    rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    n = int(node.max()) + 1
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
+    label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    ends = np.cumsum([len(p.faces) for p in patches])
+    return [np.asarray(part, np.int64) for part in np.split(label, ends[:-1])]
+
+
+def _split(patches: Sequence[Patch], labels: Sequence[NDArray[np.int64]]) -> list[list[Patch]]:
+    every = np.unique(np.concatenate(labels))
+    if len(every) == 1:
+        return [list(patches)]
+    return [
+        [
+            Patch(p.tag, p.positions, p.faces[part == body], p.uvs, p.normals)
+            for p, part in zip(patches, labels, strict=True)
+            if (part == body).any()
+        ]
+        for body in every
+    ]
+
+
+def flat_patch(item: Item, index: int) -> FlatPatch | None:
+    """The item as one flat patch of its first surface's tag; None if it lies in no one plane."""
+    patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
+    if not patches:
+        return None
+    starts = np.cumsum([0, *(len(p.positions) for p in patches)])
+    positions = np.concatenate([p.positions for p in patches])
+    faces = np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
+    normal = (face_normals(positions, faces) * face_areas(positions, faces)[:, None]).sum(0)
+    length = np.linalg.norm(normal)
+    if length < 1e-9:
+        return None
+    normal = normal / length
+    off = (positions - positions[faces[0, 0]]) @ normal
+    if np.abs(off[np.unique(faces)]).max() > _FLAT_M:
+        return None
+    merged = Patch(
+        patches[0].tag,
+        positions,
+        faces,
+        np.concatenate([p.uvs for p in patches]),
+        np.zeros_like(positions),
+    )
+    return FlatPatch(merged, normal)

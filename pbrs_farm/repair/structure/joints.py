@@ -1,0 +1,142 @@
+"""Where walls meet walls, floors and ceilings: solids inside both, so that joints intersect.
+
+No effects. Joints keep _RECESS_M behind the walls' own faces: where the walls do touch nothing
+of a joint shows, where they do not it fills the gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from manifold3d import Manifold
+
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.booleans import TagTable, solid_from_patches
+from pbrs_farm.repair.structure.planar_surfaces import Sheet
+from pbrs_farm.repair.structure.prisms import level_plane, polygons_of, prism
+from pbrs_farm.repair.structure.slabs import GAP_M
+from pbrs_farm.repair.structure.walls import Wall
+
+_RECESS_M = 0.001
+_OVERLAP_M = 0.01
+_GAP_SEEN_M = 1e-4
+
+
+def joints_between_walls(
+    walls: Sequence[Wall], rooms: plan.Shape, table: TagTable
+) -> tuple[list[tuple[Wall, Manifold]], int]:
+    """A solid across each place where two walls come within GAP_M, with the wall it belongs to.
+
+    rooms: plan area of all rooms, into which no corner is filled.
+
+    Second: how many of them bridge a gap (the others lie inside walls that touch).
+    """
+    found: list[tuple[Wall, Manifold]] = []
+    n_gaps = 0
+    tree = shapely.STRtree([w.footprint for w in walls])
+    for i, a in enumerate(walls):
+        for j in sorted(tree.query(a.footprint, "dwithin", GAP_M).tolist()):
+            if j <= i or walls[j].item == a.item:
+                continue
+            solids = _joint(a, walls[j], rooms, table)
+            found += [(a, s) for s in solids]
+            n_gaps += bool(solids) and a.footprint.distance(walls[j].footprint) > _GAP_SEEN_M
+    return found, n_gaps
+
+
+def _joint(a: Wall, b: Wall, rooms: plan.Shape, table: TagTable) -> list[Manifold]:
+    both = plan.union([a.footprint, b.footprint])
+    near = plan.common(plan.grown(a.footprint, GAP_M), plan.grown(b.footprint, GAP_M))
+    if a.thickened and b.thickened:
+        both, near = _outer_corner(a, b, rooms)
+    inner = plan.grown(plan.closed(both, GAP_M), -_RECESS_M)
+    areas = polygons_of(plan.common(near, inner))
+    if not any(_touches(p, a) and _touches(p, b) for p in areas):
+        areas += polygons_of(_bridge(a, b, rooms))
+    # Across a gap a joint runs on into the slabs below and above.
+    beyond = GAP_M if a.footprint.distance(b.footprint) > _GAP_SEEN_M else -_RECESS_M
+    solids = []
+    for polygon in areas:
+        corners = shapely.get_coordinates(polygon)
+        low = max(a.bottom_y, b.bottom_y) - beyond
+        high = min(float(a.top.at(corners).min()), float(b.top.at(corners).min())) + beyond
+        if high - low < _OVERLAP_M:
+            continue
+        tags = (a.tag("joint"),) * 3
+        solid = solid_from_patches(prism(polygon, level_plane(low), level_plane(high), tags), table)
+        if solid is not None:
+            solids.append(solid)
+    return solids
+
+
+def _touches(area: shapely.Polygon, wall: Wall) -> bool:
+    return bool(area.distance(wall.footprint) < _RECESS_M)
+
+
+def _bridge(a: Wall, b: Wall, rooms: plan.Shape) -> plan.Shape:
+    # Two walls that both end short of their corner: a block from end to end, outside the rooms.
+    ends = [
+        plan.common(x.footprint, plan.grown(y.footprint, 1.5 * GAP_M)) for x, y in ((a, b), (b, a))
+    ]
+    return plan.without(shapely.convex_hull(plan.union(ends)), plan.grown(rooms, _RECESS_M))
+
+
+def _outer_corner(a: Wall, b: Wall, rooms: plan.Shape) -> tuple[plan.Shape, plan.Shape]:
+    # Walls thickened outward touch at an outer corner's edge only: both run on to fill the corner.
+    strips = [_run_on(w) for w in (a, b)]
+    corner = plan.without(plan.common(*strips), rooms)
+    whole = plan.union([a.footprint, b.footprint, corner])
+    return whole, plan.grown(corner, 2 * _OVERLAP_M)
+
+
+def _run_on(wall: Wall) -> plan.Shape:
+    # The wall's footprint made longer at both ends by its own thickness.
+    box = shapely.minimum_rotated_rectangle(wall.footprint)
+    corners = shapely.get_coordinates(box)[:4]
+    sides = np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1)
+    thickness, k = float(sides.min()), int(sides.argmax())
+    along = (corners[(k + 1) % 4] - corners[k]) / max(float(sides.max()), 1e-9)
+    middle = corners.mean(0)
+    outward = np.sign((corners - middle) @ along)[:, None]
+    return plan.on_grid(shapely.Polygon(corners + outward * along * thickness))
+
+
+def joints_with_sheet(
+    sheet: Sheet,
+    ground: plan.Shape,
+    walls: Sequence[Wall],
+    doors: plan.Shape,
+    thickness_m: float,
+    table: TagTable,
+) -> list[tuple[Wall, Manifold]]:
+    """Wall parts that reach half a slab into the floor below or the ceiling above, hidden in it.
+
+    Made where a wall ends within GAP_M of the sheet's plane, so that a gap there is filled too.
+    doors: plan area of openings down to the floor, where a wall has no foot.
+    """
+    depth_m = 0.5 * thickness_m
+    away = 1.0 if sheet.is_ceiling else -1.0
+    found = []
+    for wall in walls:
+        if wall.footprint.distance(ground) > 0:
+            continue
+        area = plan.common(plan.grown(wall.footprint, -_RECESS_M), ground)
+        if not sheet.is_ceiling:
+            area = plan.without(area, doors)
+        for polygon in polygons_of(area):
+            corners = shapely.get_coordinates(polygon)
+            end = wall.top if sheet.is_ceiling else level_plane(wall.bottom_y)
+            gap = away * (sheet.plane.at(corners) - end.at(corners))
+            if gap.max() > GAP_M or gap.max() < -depth_m:
+                continue
+            near, far = end.raised(-away * _OVERLAP_M), sheet.plane.raised(away * depth_m)
+            low, high = (near, far) if sheet.is_ceiling else (far, near)
+            if (high.at(corners) - low.at(corners)).min() < _RECESS_M:
+                continue
+            patches = prism(polygon, low, high, (wall.tag("joint"),) * 3)
+            solid = solid_from_patches(patches, table)
+            if solid is not None:
+                found.append((wall, solid))
+    return found

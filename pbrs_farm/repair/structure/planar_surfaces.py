@@ -1,0 +1,145 @@
+"""Planar floors and ceilings as read: where each lies in plan, its plane, its texture; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from manifold3d import Manifold
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import House, Item, ItemKind, Surface
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.booleans import F64, Patch, Tag, TagTable, bounds
+from pbrs_farm.repair.structure.closed_shells import bodies_from_item
+from pbrs_farm.repair.structure.patches import face_normals
+from pbrs_farm.repair.structure.prisms import Plane, UvMap, level_plane, plane_of_points
+
+_SAME_FACING = 1.0 - 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """One plane's worth of one planar floor or ceiling. area: its plan polygon."""
+
+    item: int
+    room_id: str | None
+    is_ceiling: bool
+    area: plan.Shape
+    plane: Plane
+    uv: UvMap | None
+    material: int
+    surface: str
+
+    def tag(self, surface: str) -> Tag:
+        """The tag of a surface that repair adds to this floor or ceiling."""
+        return Tag(self.item, surface, self.material)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lid:
+    """A floor or a ceiling as rooms feel it: plan area and plane of the face they see."""
+
+    is_ceiling: bool
+    area: plan.Shape
+    plane: Plane
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheets:
+    """All floors and ceilings: planar ones, those that came as solids, and those left as they are.
+
+    lids: plan area and plane of the solid ones' inner faces.
+    """
+
+    planar: list[Sheet]
+    solid: dict[int, list[Manifold]]
+    left: dict[int, str]
+    lids: list[Lid]
+
+
+def sheets_from_house(house: House, table: TagTable) -> Sheets:
+    """Sort every floor, ceiling and ground item into planar, solid, or neither."""
+    found = Sheets([], {}, {}, [])
+    for index, item in enumerate(house.items):
+        if item.kind not in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND):
+            continue
+        bodies = bodies_from_item(item, index, table)
+        if bodies is not None:
+            found.solid[index] = [solid for solid, _ in bodies]
+            if item.kind is not ItemKind.GROUND:
+                found.lids.extend(_lid(item, solid, patches) for solid, patches in bodies)
+        elif item.kind is ItemKind.GROUND:
+            continue
+        else:
+            planar = list(_sheets(item, index))
+            if planar:
+                found.planar.extend(planar)
+            elif item.surfaces:
+                found.left[index] = "it is no closed solid and has no face that lies flat"
+    return found
+
+
+def _lid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> Lid:
+    low, high = bounds(solid)
+    is_ceiling = item.kind is ItemKind.CEILING
+    area = plan.union(plan.polygon_of_triangles(p.positions, p.faces) for p in patches)
+    return Lid(is_ceiling, area, level_plane(float(low[1] if is_ceiling else high[1])))
+
+
+def _sheets(item: Item, index: int) -> Iterator[Sheet]:
+    for surface in item.surfaces:
+        positions = surface.positions.astype(np.float64)
+        for faces in _facets(positions, surface.faces):
+            corners = positions[np.unique(faces)]
+            plane = plane_of_points(corners)
+            area = plan.polygon_of_triangles(positions, faces)
+            if plane is None or shapely.is_empty(area):
+                continue
+            yield Sheet(
+                item=index,
+                room_id=item.room_id,
+                is_ceiling=item.kind is ItemKind.CEILING,
+                area=area,
+                plane=plane,
+                uv=_uv_map(surface, faces),
+                material=surface.material,
+                surface=surface.name,
+            )
+
+
+def _facets(positions: F64, faces: NDArray[np.int32]) -> list[NDArray[np.int32]]:
+    # Faces grouped by their plane, in order of first face; upright faces are no floor.
+    normals = face_normals(positions, faces)
+    normals = normals * np.where(normals[:, 1:2] < 0, -1.0, 1.0)
+    offsets = (normals * positions[faces[:, 0]]).sum(1)
+    groups: list[tuple[F64, float, list[int]]] = []
+    for k in np.flatnonzero(normals[:, 1] > 0.05):
+        for normal, offset, members in groups:
+            if normals[k] @ normal > _SAME_FACING and abs(offsets[k] - offset) < 1e-3:
+                members.append(int(k))
+                break
+        else:
+            groups.append((normals[k], float(offsets[k]), [int(k)]))
+    return [faces[members] for _, _, members in groups]
+
+
+def _uv_map(surface: Surface, faces: NDArray[np.int32]) -> UvMap | None:
+    # The texture as an affine map of the plan, so that it carries on where the sheet grows.
+    if surface.uvs is None:
+        return None
+    used = np.unique(faces)
+    points = surface.positions[used].astype(np.float64)
+    uvs = surface.uvs[used].astype(np.float64)
+    columns = np.stack([points[:, 0], points[:, 2], np.ones(len(points))], 1)
+    affine = np.linalg.lstsq(columns, uvs, rcond=None)[0]
+    if np.abs(columns @ affine - uvs).max() > 1e-3:
+        return None
+
+    def uv(positions: F64) -> F64:
+        flat = np.stack([positions[:, 0], positions[:, 2], np.ones(len(positions))], 1)
+        return np.asarray(flat @ affine)
+
+    return uv

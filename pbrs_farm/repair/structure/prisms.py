@@ -1,0 +1,109 @@
+"""Vertical prisms between two planes over a plan polygon: slabs, joints, plugs; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import manifold3d
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.booleans import F64, Patch, Tag
+
+UvMap = Callable[[F64], F64]
+"""Texture coordinates (N, 2) of positions (N, 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """The heights y = a x + b z + c."""
+
+    a: float
+    b: float
+    c: float
+
+    def at(self, plan: F64) -> F64:
+        """(N,) heights above plan points (N, 2)."""
+        return np.asarray(self.a * plan[:, 0] + self.b * plan[:, 1] + self.c)
+
+    def raised(self, by_m: float) -> Plane:
+        """The plane moved up."""
+        return Plane(self.a, self.b, self.c + by_m)
+
+
+def level_plane(y: float) -> Plane:
+    """The horizontal plane at height y."""
+    return Plane(0.0, 0.0, y)
+
+
+def plane_of_points(points: F64, *, tolerance_m: float = 1e-3) -> Plane | None:
+    """The plane through points (N, 3), exactly level where they are; None if they are on none."""
+    low, high = float(points[:, 1].min()), float(points[:, 1].max())
+    if high - low <= 1e-6:
+        return level_plane(high)
+    columns = np.stack([points[:, 0], points[:, 2], np.ones(len(points))], 1)
+    (a, b, c), _, rank, _ = np.linalg.lstsq(columns, points[:, 1], rcond=None)
+    plane = Plane(float(a), float(b), float(c))
+    off = np.abs(plane.at(points[:, [0, 2]]) - points[:, 1]).max()
+    return plane if rank == 3 and off <= tolerance_m else None
+
+
+def polygons_of(shape: plan.Shape, *, min_area_m2: float = 1e-6) -> list[shapely.Polygon]:
+    """The polygons in any shapely geometry that are worth keeping, in a fixed order."""
+    found = [
+        p
+        for p in shapely.get_parts(shapely.get_parts(shape)).tolist()
+        if isinstance(p, shapely.Polygon) and p.area > min_area_m2
+    ]
+    return sorted(found, key=lambda p: (p.bounds, p.area))
+
+
+def prism(
+    polygon: shapely.Polygon,
+    low: Plane,
+    high: Plane,
+    tags: tuple[Tag, Tag, Tag],
+    uv: UvMap | None = None,
+) -> list[Patch]:
+    """Patches bottom, top and sides of the closed prism. tags: of bottom, top, sides.
+
+    uv: of bottom and top; metres in plan when None. Sides have metres along and up.
+    """
+    polygon = shapely.orient_polygons(polygon)
+    rings = [np.asarray(r.coords)[:-1] for r in (polygon.exterior, *polygon.interiors)]
+    plan = np.concatenate(rings)
+    triangles = np.asarray(manifold3d.triangulate(rings), np.int64).reshape(-1, 3)
+    lows, highs = _lifted(plan, low.at(plan)), _lifted(plan, high.at(plan))
+    bottom_tag, top_tag, side_tag = tags
+    return [
+        _patch(bottom_tag, lows, triangles, lows[:, [0, 2]] if uv is None else uv(lows)),
+        _patch(top_tag, highs, triangles[:, [0, 2, 1]], highs[:, [0, 2]] if uv is None else uv(highs)),
+        _sides(side_tag, rings, lows, highs),
+    ]  # fmt: skip
+
+
+def _lifted(plan: F64, y: F64) -> F64:
+    return np.stack([plan[:, 0], y, plan[:, 1]], 1)
+
+
+def _sides(tag: Tag, rings: list[F64], lows: F64, highs: F64) -> Patch:
+    quads, uvs, first = [], [], 0
+    for ring in rings:
+        i = np.arange(len(ring)) + first
+        j = np.roll(i, -1)
+        quads.append(np.stack([lows[i], highs[i], highs[j], lows[j]], 1))
+        steps = np.linalg.norm(np.roll(ring, -1, 0) - ring, axis=1)
+        start = np.concatenate([[0.0], np.cumsum(steps)[:-1]])
+        u = np.stack([start, start, start + steps, start + steps], 1)
+        uvs.append(np.stack([u, quads[-1][:, :, 1]], -1))
+        first += len(ring)
+    corners = np.concatenate(quads)
+    faces = (np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(corners))[:, None, None])  # fmt: skip
+    return _patch(tag, corners.reshape(-1, 3), faces.reshape(-1, 3), np.concatenate(uvs).reshape(-1, 2))  # fmt: skip
+
+
+def _patch(tag: Tag, positions: F64, faces: NDArray[np.int64], uvs: F64) -> Patch:
+    return Patch(tag, positions, faces, uvs, np.zeros_like(positions))

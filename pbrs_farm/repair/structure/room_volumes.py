@@ -1,0 +1,138 @@
+"""The air of rooms as solids, so that no slab or joint sticks into another room; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from manifold3d import Manifold
+
+from pbrs_farm.core.house import Room
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.booleans import (
+    F64,
+    Tag,
+    TagTable,
+    bounds,
+    overlap_of_bounds,
+    reduced,
+    solid_from_patches,
+)
+from pbrs_farm.repair.structure.planar_surfaces import Sheet
+from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, prism
+from pbrs_farm.repair.structure.slabs import GAP_M, SAME_HEIGHT_M
+from pbrs_farm.repair.structure.walls import Wall
+
+_MARGIN_M = 0.005
+_TOUCH_M = 0.002
+_COINCIDE_M = 0.001
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Air:
+    """A part of a room's air: plan area between two planes.
+
+    items: the floors and ceilings that bound it, whichever room they are listed under.
+    """
+
+    area: shapely.Polygon
+    low: Plane
+    high: Plane
+    items: frozenset[int]
+    bounds: F64
+
+
+def airs_of_rooms(rooms: Sequence[Room], sheets: Sequence[Sheet]) -> list[Air]:
+    """The air of every room, below each plane of its ceiling, and a little of what bounds it.
+
+    What is cut by it then ends inside walls, floor and ceiling, flush with none of them.
+    """
+    margin = _margin(rooms)
+    found = []
+    for room in rooms:
+        area = plan.polygon_of_room(room.polygon)
+        own = frozenset(s.item for s in sheets if _bounds_room(s, room))
+        ceilings = [s for s in sheets if s.is_ceiling and s.room_id == room.id]
+        floor = level_plane(room.floor_y - margin)
+        parts = [(s.area, s.plane.raised(margin)) for s in ceilings]
+        bare = plan.without(area, *(s.area for s in ceilings))
+        parts.append((bare, level_plane(room.ceiling_y + margin)))
+        for shape, high in parts:
+            wide = plan.grown(shape, margin)
+            found += [_air(p, floor, high, own) for p in polygons_of(wide, min_area_m2=1e-3)]
+    return found
+
+
+def _bounds_room(sheet: Sheet, room: Room) -> bool:
+    # At the room's own height whatever it shows is settled in plan (slabs.own_areas).
+    if sheet.room_id == room.id:
+        return True
+    nominal = room.ceiling_y if sheet.is_ceiling else room.floor_y
+    heights = sheet.plane.at(shapely.get_coordinates(sheet.area))
+    return bool(np.abs(heights - nominal).max() < SAME_HEIGHT_M)
+
+
+def _margin(rooms: Sequence[Room]) -> float:
+    # Thin floors (a roof 1 mm above a ceiling) leave no room for a margin of 5 mm.
+    gaps = [
+        upper.floor_y - lower.ceiling_y
+        for lower in rooms
+        for upper in rooms
+        if upper.floor_y > lower.ceiling_y
+    ]
+    return min([_MARGIN_M, *(gap / 3 for gap in gaps)])
+
+
+def _air(area: shapely.Polygon, low: Plane, high: Plane, items: frozenset[int]) -> Air:
+    corners = shapely.get_coordinates(area)
+    x0, z0, x1, z1 = area.bounds
+    box = np.array([[x0, low.at(corners).min(), z0], [x1, high.at(corners).max(), z1]])
+    return Air(area, low, high, items, box)
+
+
+def without_air(
+    solid: Manifold, tag: Tag, item: int | None, airs: Sequence[Air], table: TagTable
+) -> Manifold:
+    """solid less the air of rooms, but not of the room item (a floor or ceiling) belongs to.
+
+    New faces get tag.
+    """
+    cutters = []
+    for air in airs:
+        if item in air.items or (overlap_of_bounds(bounds(solid), air.bounds) < _TOUCH_M).any():
+            continue
+        cutter = solid_from_patches(prism(air.area, air.low, air.high, (tag,) * 3), table)
+        if cutter is not None:
+            cutters.append(cutter)
+    return reduced(solid, cutters)
+
+
+def own_sides_first(walls: Sequence[Wall], rooms: Sequence[Room], table: TagTable) -> list[Wall]:
+    """The walls, those of other rooms drawn back behind each room's own where the two coincide.
+
+    Where every room brings walls of its own (SUNCG), two rooms' walls lie in one plane: each room
+    then sees its own side. Walls that belong to no room stay as they are.
+    """
+    if all(w.room_id is None for w in walls):
+        return list(walls)
+    areas = [(r, plan.polygon_of_room(r.polygon)) for r in rooms]
+    found = []
+    for wall in walls:
+        cutters = []
+        for room, area in areas:
+            apart = room.floor_y > wall.high_y or room.ceiling_y < wall.bottom_y
+            if (
+                wall.room_id in (None, room.id)
+                or apart
+                or wall.footprint.distance(area) > _COINCIDE_M
+            ):
+                continue
+            low, high = level_plane(room.floor_y - GAP_M), level_plane(room.ceiling_y + GAP_M)
+            for polygon in polygons_of(plan.grown(area, _COINCIDE_M)):
+                patches = prism(polygon, low, high, (wall.tag("hidden"),) * 3)
+                cutters.append(solid_from_patches(patches, table))
+        solid = reduced(wall.solid, [c for c in cutters if c is not None])
+        found.append(replace(wall, solid=solid))
+    return found

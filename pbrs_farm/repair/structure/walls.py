@@ -1,0 +1,175 @@
+"""Walls as closed solids with their footprint and height; planar ones thickened. No effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from manifold3d import Manifold
+
+from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.booleans import (
+    F64,
+    Patch,
+    Tag,
+    TagTable,
+    bounds,
+    solid_from_patches,
+)
+from pbrs_farm.repair.structure.closed_shells import bodies_from_item, flat_patch
+from pbrs_farm.repair.structure.patches import face_normals
+from pbrs_farm.repair.structure.prisms import (
+    Plane,
+    level_plane,
+    plane_of_points,
+    polygons_of,
+    prism,
+)
+
+BASEBOARD = "baseboard"
+"""Tag of wall items that are baseboards."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wall:
+    """A wall's solid, uncut. footprint: plan area; bottom_y, high_y: its lowest and
+    highest point; top: its upper plane.
+
+    material: of parts repair adds to it. thickened: it was planar. is_board: a baseboard, which
+    bounds no room and is joined to nothing. room_id: the one room it belongs to, if it does.
+    """
+
+    item: int
+    solid: Manifold
+    footprint: plan.Shape
+    bottom_y: float
+    high_y: float
+    top: Plane
+    material: int
+    thickened: bool = False
+    is_board: bool = False
+    room_id: str | None = None
+
+    def tag(self, surface: str) -> Tag:
+        """The tag of a surface that repair adds to this wall."""
+        return Tag(self.item, surface, self.material)
+
+
+def walls_from_house(
+    house: House, table: TagTable, rooms: plan.Shape, thickness_m: float
+) -> tuple[list[Wall], dict[int, str]]:
+    """A Wall for every closed body of every wall item, and item index -> why it is left as it is.
+
+    rooms: plan area of all rooms; planar walls are thickened away from it.
+    """
+    walls: list[Wall] = []
+    left: dict[int, str] = {}
+    for index, item in enumerate(house.items):
+        if item.kind is not ItemKind.WALL or not item.surfaces:
+            continue
+        bodies = bodies_from_item(item, index, table)
+        if bodies is not None:
+            walls += [_wall(item, index, solid, patches) for solid, patches in bodies]
+            continue
+        thick = _thickened(item, index, table, rooms, thickness_m)
+        if thick is None:
+            left[index] = "its surfaces bound no closed solid and lie in no one plane"
+        else:
+            walls.append(thick)
+    return walls, left
+
+
+def _wall(
+    item: Item, index: int, solid: Manifold, patches: Sequence[Patch], *, thickened: bool = False
+) -> Wall:
+    named = {s.name: s.material for s in reversed(item.surfaces)}
+    low, high = bounds(solid)
+    footprint, top = _footprint_and_top(patches, float(high[1]))
+    return Wall(
+        item=index,
+        solid=solid,
+        footprint=footprint,
+        bottom_y=float(low[1]),
+        high_y=float(high[1]),
+        top=top,
+        material=named.get("left", item.surfaces[0].material),
+        thickened=thickened,
+        is_board=BASEBOARD in item.tags,
+        room_id=item.room_id,
+    )
+
+
+def _footprint_and_top(patches: Sequence[Patch], high_y: float) -> tuple[plan.Shape, Plane]:
+    """Plan area of the faces that look up, and the plane of the wall's upper edge.
+
+    A wall with holes looks up at its sills too: the level top counts if it covers half the plan.
+    """
+    footprint, level_top, points = [], [], []
+    for p in patches:
+        faces = p.faces[face_normals(p.positions, p.faces)[:, 1] > 0.05]
+        at_top = (p.positions[faces][:, :, 1] > high_y - 1e-3).all(1)
+        footprint.append(plan.polygon_of_triangles(p.positions, faces))
+        level_top.append(plan.polygon_of_triangles(p.positions, faces[at_top]))
+        points.append(p.positions[faces].reshape(-1, 3))
+    whole, upward = plan.union(footprint), np.concatenate(points)
+    if plan.union(level_top).area > 0.5 * whole.area or not len(upward):
+        return whole, level_plane(high_y)
+    plane = plane_of_points(upward)
+    return whole, level_plane(float(upward[:, 1].min())) if plane is None else plane
+
+
+def _thickened(
+    item: Item, index: int, table: TagTable, rooms: plan.Shape, thickness_m: float
+) -> Wall | None:
+    """A planar, upright wall made a solid of thickness_m, away from the rooms."""
+    flat = flat_patch(item, index)
+    if flat is None or abs(flat.normal[1]) > 0.2:
+        return None
+    normal = flat.normal / np.linalg.norm(flat.normal)
+    middle = flat.patch.positions.mean(0)[[0, 2]]
+    side = normal[[0, 2]] * 0.05
+    if not rooms.contains(shapely.Point(middle + side)) and rooms.contains(
+        shapely.Point(middle - side)
+    ):
+        normal = -normal
+    patches = extruded(flat.patch, normal, thickness_m)
+    if patches is None:
+        return None
+    solid = solid_from_patches(patches, table)
+    return None if solid is None else _wall(item, index, solid, patches, thickened=True)
+
+
+def extruded(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | None:
+    """The flat patch as a solid: its own face kept, the opposite one thickness_m behind it.
+
+    normal: (3,) unit, out of the face that is kept. uv is carried on by its affine map.
+    """
+    along = np.cross([0.0, 1.0, 0.0], normal)
+    if np.linalg.norm(along) < 1e-6:
+        along = np.array([1.0, 0.0, 0.0])
+    along = along / np.linalg.norm(along)
+    axes = np.stack([along, normal, np.cross(along, normal)])
+    origin = patch.positions[0]
+    local = (patch.positions - origin) @ axes.T
+    columns = np.concatenate([local, np.ones((len(local), 1))], 1)[:, [0, 2, 3]]
+    affine = np.linalg.lstsq(columns, patch.uvs, rcond=None)[0]
+
+    def uv(positions: F64) -> F64:
+        flat = np.stack([positions[:, 0], positions[:, 2], np.ones(len(positions))], 1)
+        return np.asarray(flat @ affine)
+
+    polygons = polygons_of(plan.polygon_of_triangles(local, patch.faces))
+    if not polygons:
+        return None
+    tags = (
+        Tag(patch.tag.item, "back", patch.tag.material),
+        patch.tag,
+        Tag(patch.tag.item, "rim", patch.tag.material),
+    )
+    parts = [
+        p for q in polygons for p in prism(q, level_plane(-thickness_m), level_plane(0.0), tags, uv)
+    ]
+    return [Patch(p.tag, p.positions @ axes + origin, p.faces, p.uvs, p.normals) for p in parts]

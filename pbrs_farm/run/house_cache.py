@@ -1,0 +1,146 @@
+"""What a process keeps of the house it works on: geometry, caster, GL and light scenes, made once.
+
+Effects: reads the store, holds a GL context and Mitsuba scenes; one house at a time.
+"""
+
+from __future__ import annotations
+
+import gc
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import View
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import Geometry, House, geometry_from_house
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.formats.cameras_json import views_from_json
+from pbrs_farm.store.interface import Store
+
+if TYPE_CHECKING:
+    from pbrs_farm.raster import Rasterizer
+    from pbrs_farm.raycast.caster import Caster
+    from pbrs_farm.transport.light_scene import LightScene
+    from pbrs_farm.transport.scene_tables.sky import Sky
+
+
+class LoadedHouse:
+    """A repaired house from the store and what is built from it, each at its first use."""
+
+    def __init__(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> None:
+        """digest: of the house step's marker; another digest means another LoadedHouse."""
+        self.store = store
+        self.recipe = recipe
+        self.house_id = house_id
+        self.digest = digest
+
+    @cached_property
+    def house(self) -> House:
+        """The house as its bundle holds it."""
+        from pbrs_farm.formats.house_bundle import house_from_bundle
+
+        get = self.store.get
+        return house_from_bundle(
+            get(keys.house_key(self.house_id, "house.glb")),
+            get(keys.house_key(self.house_id, "house.json")),
+        )
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """All triangles, panes included."""
+        return geometry_from_house(self.house)
+
+    @cached_property
+    def textures(self) -> dict[str, NDArray[np.uint8]]:
+        """Texture id -> (H, W, 3 or 4) uint8 sRGB; those that cannot be read are left out."""
+        return decoded_textures(self.house)[0]
+
+    @cached_property
+    def caster(self) -> Caster:
+        """The ray caster of labels and item buffers."""
+        from pbrs_farm.raycast.caster import Caster
+
+        return Caster(self.geometry)
+
+    @cached_property
+    def rasterizer(self) -> Rasterizer:
+        """The GL renderer."""
+        from pbrs_farm.raster import Rasterizer
+
+        return Rasterizer(self.house, self.textures, self.recipe.raster)
+
+    @cached_property
+    def light_scene(self) -> LightScene:
+        """The scene that carries light."""
+        from pbrs_farm.transport.light_scene import LightScene
+
+        return LightScene.load(self.house, self.textures, self.recipe, self.sky)
+
+    @cached_property
+    def sky(self) -> Sky:
+        """The sky over this house; BadRecipe when the recipe's panoramas cannot be had."""
+        from pbrs_farm.run.panoramas import panorama_for_house
+        from pbrs_farm.transport.scene_tables.sky import sky_for_house
+
+        panorama = panorama_for_house(self.recipe, self.house_id)
+        return sky_for_house(self.recipe, self.house_id, panorama=panorama)
+
+    def views(self) -> dict[str, View]:
+        """View id -> view, as cameras.json holds them now."""
+        key = keys.house_key(self.house_id, "cameras.json")
+        return views_from_json(self.store.get(key), key)
+
+    def view(self, view_id: str) -> View:
+        """The view of that id; BadInput if the house has none."""
+        views = self.views()
+        if view_id not in views:
+            key = keys.house_key(self.house_id, "cameras.json")
+            raise BadInput(key, view_id, "no such view", hint=f"of {', '.join(views) or 'none'}")
+        return views[view_id]
+
+    def close(self) -> None:
+        """Free what the GPU or Mitsuba holds."""
+        rasterizer = self.__dict__.pop("rasterizer", None)
+        if rasterizer is not None:
+            rasterizer.close()
+        for name in ("light_scene", "caster", "geometry", "house", "textures"):
+            self.__dict__.pop(name, None)
+        gc.collect()
+
+
+def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[str]]:
+    """Decoded textures by id, and the ids of those that cannot be read."""
+    from pbrs_farm.images import decode_texture
+
+    decoded: dict[str, Any] = {}
+    unreadable = []
+    for texture in house.textures.values():
+        try:
+            decoded[texture.id] = decode_texture(texture.data, texture.name, texture.media_type)
+        except BadInput:
+            unreadable.append(texture.id)
+    return decoded, unreadable
+
+
+class Shelf:
+    """The house this process worked on last; asking for another one lets it go."""
+
+    def __init__(self) -> None:
+        self._held: tuple[tuple[str, str, str, str], LoadedHouse] | None = None
+
+    def take(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> LoadedHouse:
+        """The loaded house, the same object as long as nothing it depends on changes."""
+        key = (store.url, house_id, digest, recipe.digest())
+        if self._held is None or self._held[0] != key:
+            self.clear()
+            self._held = (key, LoadedHouse(store, recipe, house_id, digest))
+        return self._held[1]
+
+    def clear(self) -> None:
+        """Let go of the held house."""
+        if self._held is not None:
+            self._held[1].close()
+            self._held = None

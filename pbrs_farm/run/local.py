@@ -1,0 +1,162 @@
+"""A run on this machine, no server: the steps of every house through a pool of processes.
+
+Effects: the store's, and worker processes.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.read.source import SourceRef, resolve
+from pbrs_farm.run import plan
+from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
+from pbrs_farm.run.plan import Wanted
+from pbrs_farm.run.process_pool import Pool
+from pbrs_farm.run.task import Event, Setting, Task
+from pbrs_farm.store import StoreSettings, store_from_url
+
+Observer = Callable[[Event], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What is asked of a local run. homes: words as sources.resolve takes them, sources: resolved."""
+
+    homes: Sequence[str]
+    store_url: str
+    recipe: Recipe
+    want: Wanted = field(default_factory=Wanted)
+    n_jobs: int = 1
+    update: bool = False
+    step_timeout_s: float = 3600.0
+    debug: bool = False
+    store: StoreSettings = field(default_factory=StoreSettings)
+    sources: Sequence[SourceRef] = ()
+
+
+@dataclass(slots=True)
+class Summary:
+    """What came of a run. failures: (what, message, command that reproduces it).
+
+    without_views: (house id, why none of its rooms has a view).
+    """
+
+    houses: list[str] = field(default_factory=list)
+    n_views: int = 0
+    n_done: int = 0
+    n_kept: int = 0
+    peak_mb: float = 0.0
+    failures: list[tuple[str, str, str]] = field(default_factory=list)
+    without_views: list[tuple[str, str]] = field(default_factory=list)
+
+
+def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
+    """Do everything that is not done yet; a fault costs its step and the run goes on.
+
+    Raises BadRecipe when the root holds another recipe, StoreFailed when it cannot be written.
+    """
+    store = store_from_url(run.store_url, run.store)
+    summary = Summary()
+    sources = _resolved(run, summary)
+    if not sources:
+        return summary
+    claim_root(store, run.recipe, update=run.update)
+    n_jobs = max(1, run.n_jobs)
+    n_threads = max(1, (os.cpu_count() or 1) // n_jobs)
+    setting = Setting(run.store_url, run.recipe, n_threads, run.debug, run.store)
+    with Pool(n_jobs, setting, step_timeout_s=run.step_timeout_s) as pool:
+        _Schedule(run, sources, summary, observe).drive(pool)
+    for house_id in summary.houses:
+        finish_house(store, house_id)
+    below = [*store.list("houses/"), *store.list("objects/")]
+    merge_manifests(store, [k.split("/")[1] for k in below if k.endswith("/manifest.jsonl")])
+    return summary
+
+
+def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
+    sources = {s.house_id: s for s in run.sources}
+    for word in run.homes:
+        try:
+            source = resolve(word)
+        except PbrsError as error:
+            summary.failures.append((word, str(error), ""))
+            continue
+        sources.setdefault(source.house_id, source)
+    return list(sources.values())
+
+
+class _Schedule:
+    """Which task next: houses in order, each followed by its cameras and then its views."""
+
+    def __init__(
+        self, run: Run, sources: list[SourceRef], summary: Summary, observe: Observer
+    ) -> None:
+        self._run = run
+        self._summary = summary
+        self._observe = observe
+        self._sources = {s.house_id: s for s in sources}
+        self._waiting = deque(Task(s.house_id, ("house", "cameras"), s) for s in sources)
+
+    def drive(self, pool: Pool) -> None:
+        """Until nothing waits and nobody works."""
+        while self._waiting or pool.n_busy:
+            for held in pool.idle_houses():
+                task = self._next(held, pool.busy_houses())
+                if task is not None:
+                    pool.give(task)
+            for event in pool.events():
+                self._take(event)
+
+    def _next(self, held_house: str, busy: set[str]) -> Task | None:
+        """A waiting task: of the house already in memory, else of one nobody works on, else any."""
+        if not self._waiting:
+            return None
+
+        def rank(task: Task) -> int:
+            return 0 if task.house_id == held_house else 1 + (task.house_id in busy)
+
+        task = min(self._waiting, key=rank)
+        self._waiting.remove(task)
+        return task
+
+    def _take(self, event: Event) -> None:
+        summary = self._summary
+        summary.peak_mb = max(summary.peak_mb, event.peak_mb)
+        if event.kind in ("done", "kept"):
+            summary.n_done += event.kind == "done"
+            summary.n_kept += event.kind == "kept"
+            if event.step == "house":
+                summary.houses.append(event.house_id)
+            if event.step == "cameras":
+                self._add_views(event)
+        elif event.kind == "failed":
+            what = "/".join(x for x in (event.house_id, event.view_id, event.step) if x)
+            summary.failures.append((what, event.message, self._command(event)))
+        self._observe(event)
+
+    def _add_views(self, event: Event) -> None:
+        rows = [(str(v), str(room), float(score)) for v, room, score in event.facts["views"]]
+        views = plan.spread(rows, self._run.want.n_views)
+        self._summary.n_views += len(views)
+        if not views:
+            why = str(event.facts.get("why_none", ""))
+            self._summary.without_views.append((event.house_id, why))
+        source = self._sources[event.house_id]
+        tasks = [
+            Task(event.house_id, plan.view_steps(self._run.want), source, v, self._run.want.layers)
+            for v in views
+        ]
+        self._waiting.extendleft(reversed(tasks))
+
+    def _command(self, event: Event) -> str:
+        source = self._sources[event.house_id].location
+        words = ["pbrs-farm", "step", event.step, source, "--out", self._run.store_url]
+        if event.view_id:
+            words += ["--view", event.view_id]
+        return shlex.join(words)

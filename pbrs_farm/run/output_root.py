@@ -1,0 +1,97 @@
+"""The output root as a whole: its one recipe and its manifests. Effects: the store's."""
+
+from __future__ import annotations
+
+import json
+
+from pydantic import ValidationError
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.keys import StoredFile
+from pbrs_farm.core.recipe import Recipe, differences
+from pbrs_farm.formats.cameras_json import json_bytes
+from pbrs_farm.run.step_cache import read_marker
+from pbrs_farm.store.interface import Store
+
+
+def manifest(store: Store, house_id: str) -> bytes:
+    """manifest.jsonl of a house from its markers, sorted by key.
+
+    A row an object: key, bytes, sha256, step, digest, and the attribution its source asks for.
+    """
+    credit = attribution(store, house_id)
+    rows: list[dict[str, object]] = []
+    for key in store.list(keys.house_key(house_id, "done/")):
+        marker = read_marker(store, key)
+        if marker is not None:
+            rows += [
+                manifest_row(file, marker.step, marker.digest, credit) for file in marker.files
+            ]
+    rows.sort(key=lambda r: str(r["key"]))
+    return "".join(keys.canonical_json(r) + "\n" for r in rows).encode()
+
+
+def manifest_row(file: StoredFile, step: str, digest: str, credit: str) -> dict[str, object]:
+    """One object's line of a manifest."""
+    row: dict[str, object] = {
+        "key": file.key,
+        "bytes": file.n_bytes,
+        "sha256": file.sha256,
+        "step": step,
+        "digest": digest,
+    }
+    return {**row, "attribution": credit} if credit else row
+
+
+def attribution(store: Store, house_id: str) -> str:
+    """The line every product of the house must carry, "" if its source asks for none."""
+    key = keys.house_key(house_id, "house.json")
+    if store.head(key) is None:
+        return ""
+    try:
+        return str(json.loads(store.get(key))["source"]["attribution"])
+    except (ValueError, KeyError, TypeError):
+        return ""
+
+
+def finish_house(store: Store, house_id: str) -> int:
+    """Write the house's manifest if it changed; the number of objects in it."""
+    data = manifest(store, house_id)
+    key = keys.house_key(house_id, keys.MANIFEST)
+    if store.head(key) is None or store.get(key) != data:
+        store.put(key, data)
+    return data.count(b"\n")
+
+
+def merge_manifests(store: Store, house_ids: list[str]) -> None:
+    """Write the root's manifest.jsonl from those of the houses that have one."""
+    parts = []
+    for house_id in sorted(house_ids):
+        key = keys.house_key(house_id, keys.MANIFEST)
+        if store.head(key) is not None:
+            parts.append(store.get(key))
+    store.put(keys.MANIFEST, b"".join(parts))
+
+
+def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
+    """One output root holds one recipe: write recipe.json, or refuse another with what differs.
+
+    update: replace the root's recipe; steps that use the changed fields will run again.
+    Raises BadRecipe.
+    """
+    data = json_bytes(recipe)
+    if store.put_if_absent(keys.RECIPE, data):
+        return
+    try:
+        held = Recipe.model_validate(json.loads(store.get(keys.RECIPE)))
+    except (ValueError, ValidationError):
+        raise BadRecipe(f"{store.url}: recipe.json is no recipe of this version") from None
+    differing = differences(held, recipe)
+    if differing and not update:
+        raise BadRecipe(
+            f"{store.url} holds another recipe: {'; '.join(differing)}",
+            hint="--update renders again what differs, or choose another output",
+        )
+    if differing:
+        store.put(keys.RECIPE, data)

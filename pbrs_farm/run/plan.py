@@ -1,0 +1,126 @@
+"""Which steps a house's work consists of, what each depends on, and their digests; pure.
+
+    house -> cameras -> per view: truth, opengl_dl, opengl_il, light -> develop -> view -> finish
+
+and illuminance, once a house, which the first light step that is done calls for.
+A step's digest covers its version, its ids, the recipe groups it uses and the digests of the
+steps it reads. So a changed recipe field runs again exactly the steps that use it and those after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import LAYER, LAYERS
+from pbrs_farm.core.lighting import ALL_MODES, Mode
+from pbrs_farm.core.recipe import Recipe
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One function of the story. groups: recipe groups it uses; after: steps whose files it reads."""
+
+    name: str
+    version: int
+    groups: tuple[str, ...]
+    after: tuple[str, ...] = ()
+    per_view: bool = True
+
+
+_VIEW_READS: Final = ("cameras", "truth", "opengl_dl", "opengl_il", "light", "develop")
+
+STEPS: Final = {
+    step.name: step
+    for step in (
+        Step("house", 1, ("read", "repair"), per_view=False),
+        Step("cameras", 1, ("cameras",), ("house",), per_view=False),
+        Step("truth", 4, ("image",), ("house", "cameras")),
+        Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
+        Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
+        Step("illuminance", 2, ("sky", "emission", "materials"), ("house",), per_view=False),
+        Step("light", 5, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
+        Step("develop", 4, ("tone", "light"), ("light",)),
+        Step("view", 1, ("histogram",), _VIEW_READS),
+    )
+}
+
+
+PICTURE_GROUPS: Final = tuple(sorted({g for step in STEPS.values() for g in step.groups}))
+"""Every recipe group that something stored depends on (selection judges, it makes nothing)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a run was asked to make. layers: optional layers, by name. n_views: per house, 0 = all."""
+
+    modes: tuple[Mode, ...] = ALL_MODES
+    layers: tuple[str, ...] = ()
+    n_views: int = 0
+
+
+def wanted(modes: Iterable[str], layers: Iterable[str], n_views: int = 0) -> Wanted:
+    """Wanted from words of the command line; raises BadInput for a word that is none of ours."""
+    names = [m.value for m in ALL_MODES]
+    for mode in modes:
+        if mode not in names:
+            raise BadInput("--modes", mode, "no such lighting mode", hint=f"of {', '.join(names)}")
+    optional = [x.name for x in LAYERS if x.optional]
+    for layer in layers:
+        if layer not in LAYER:
+            raise BadInput("--layers", layer, "no such layer", hint=f"of {', '.join(optional)}")
+    chosen = tuple(m for m in ALL_MODES if m.value in set(modes)) or ALL_MODES
+    return Wanted(chosen, tuple(x for x in optional if x in set(layers)), n_views)
+
+
+def view_steps(want: Wanted) -> tuple[str, ...]:
+    """Steps of one view in the order they run. Either light mode makes both: one trace fills both."""
+    names = ["truth"]
+    names += [m.value for m in (Mode.OPENGL_DL, Mode.OPENGL_IL) if m in want.modes]
+    if any(m.groups for m in want.modes):
+        names += ["light", "develop"]
+    return (*names, "view")
+
+
+def step_digest(
+    step: Step,
+    recipe: Recipe,
+    house_id: str,
+    view_id: str | None,
+    inputs: Mapping[str, str],
+    extra: object = None,
+) -> str:
+    """Digest of a step. inputs: step name -> digest of its marker, for those that exist.
+
+    extra: what else it depends on (the source's sha256, the camera, optional layers).
+    """
+    return keys.digest(
+        step.name,
+        step.version,
+        house_id,
+        view_id,
+        recipe.digest(*step.groups),
+        dict(sorted(inputs.items())),
+        extra,
+    )
+
+
+def spread(view_rooms: Iterable[tuple[str, str, float]], n_views: int) -> list[str]:
+    """The n_views views to make of (view id, room id, score): best first, room after room in turn.
+
+    All of them, in the given order, when n_views is 0.
+    """
+    rows = list(view_rooms)
+    if n_views <= 0 or n_views >= len(rows):
+        return [view for view, _room, _score in rows]
+    rounds: dict[str, int] = {}
+    ranked: list[tuple[int, float, str]] = []
+    for view, room, score in sorted(rows, key=lambda r: (-r[2], r[0])):
+        turn = rounds.get(room, 0)
+        rounds[room] = turn + 1
+        ranked.append((turn, -score, view))
+    chosen = {view for _turn, _score, view in sorted(ranked)[:n_views]}
+    return [view for view, _room, _score in rows if view in chosen]

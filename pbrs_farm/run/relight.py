@@ -1,0 +1,139 @@
+"""A stored view under other strengths of lamps and daylight, from its EXR; effects: reads files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import RadianceImage
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.run.output_root import attribution
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.transport.develop.mode_pictures import Negative, develop
+from pbrs_farm.transport.lamp_layers import indoor_from_lamps
+
+
+@dataclass(frozen=True, slots=True)
+class LampFactor:
+    """What a word asks of lamps: which (number, item, name or pattern), and times what (R, G, B)."""
+
+    word: str
+    rgb: tuple[float, float, float]
+
+
+def negative_from_exr(radiance_exr: bytes, place: str) -> Negative:
+    """What `light` stored of a view; BadInput names the place when a layer is missing."""
+    from pbrs_farm.images import layers_from_exr
+
+    return _negative(layers_from_exr(radiance_exr, f"{place}/radiance.exr"), place)
+
+
+def _negative(exr: Mapping[str, NDArray[np.float32]], place: str) -> Negative:
+    outdoor, indoor, albedo = (_layer(exr, name, place) for name in ("outdoor", "indoor", "albedo"))
+    return Negative(outdoor, indoor, albedo, _layer(exr, "normal", place, "XYZ"))
+
+
+def _layer(
+    exr: Mapping[str, NDArray[np.float32]], name: str, place: str, channels: str = "RGB"
+) -> RadianceImage:
+    try:
+        return np.stack([exr[f"{name}.{c}"] for c in channels], -1)
+    except KeyError as error:
+        raise BadInput(f"{place}/radiance.exr", str(error), "no such layer") from None
+
+
+def relit(
+    view: Path,
+    *,
+    indoor: float,
+    outdoor: float,
+    denoise: bool,
+    lamps: Sequence[LampFactor] = (),
+) -> bytes:
+    """PNG of mode mlt_il_ol with each light group and each lamp times its factor.
+
+    view: the folder of a view in an output root, whose recipe tones the picture. lamps: the last
+    word that names a lamp counts; indoor multiplies all of them. Raises BadInput when a file is
+    missing, when the view has no light by lamp or none of a name.
+    """
+    from pbrs_farm.images import layers_from_exr, png_from_array
+
+    root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
+    exr = layers_from_exr(_read(view / "radiance.exr"), f"{view}/radiance.exr")
+    negative = _negative(exr, str(view))
+    if lamps:
+        rows = lamps_of_view(view)
+        factors = lamp_factors(rows, lamps)
+        layers = {int(r["number"]): _layer(exr, r["layer"], str(view)) for r in rows if r["layer"]}
+        lit = indoor_from_lamps(layers, factors, negative.indoor.shape)
+        negative = replace(negative, indoor=lit)
+    tone = Recipe.model_validate_json(_read(root / "recipe.json")).tone
+    prints = develop(negative, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
+    credit = attribution(FolderStore(root), view.resolve().parents[1].name)
+    return png_from_array(prints[Mode.MLT_IL_OL.value].rgb_srgb8, attribution=credit)
+
+
+def lamps_of_view(view: Path) -> list[dict[str, Any]]:
+    """The lamps' rows of a view's view.json (transport/lamp_layers.py); BadInput when it has none."""
+    try:
+        rows: list[dict[str, Any]] = json.loads(_read(view / "view.json"))["modes"]["light"][
+            "lamps"
+        ]
+    except (ValueError, KeyError, TypeError):
+        raise BadInput(
+            view,
+            "",
+            "was stored without the light of each lamp",
+            hint="render it with them: pbrs-farm run HOME --out OUT --groups lamps, and --update if"
+            " OUT is the same",
+        ) from None
+    return rows
+
+
+def lamp_factors(
+    rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor]
+) -> dict[int, NDArray[np.float32]]:
+    """Lamp's number -> (3,) factors. BadInput for a word that names no lamp, saying which exist."""
+    factors: dict[int, NDArray[np.float32]] = {}
+    for asked in words:
+        named = [int(row["number"]) for row in rows if _is_named(row, asked.word)]
+        if not named:
+            exist = ", ".join(f"{row['number']} {row['item']} ({row['name']})" for row in rows)
+            raise BadInput(
+                "--lamp",
+                asked.word,
+                "no such lamp",
+                hint=f"of {exist}" if exist else "there is none",
+            )
+        factors |= {number: np.array(asked.rgb, np.float32) for number in named}
+    return factors
+
+
+def unlit_lamps(view: Path, words: Sequence[LampFactor]) -> list[dict[str, Any]]:
+    """The rows of lamps that words name one by one and that bring no light to a view."""
+    rows = lamps_of_view(view)
+    named = lamp_factors(rows, [w for w in words if "*" not in w.word])
+    return [row for row in rows if int(row["number"]) in named and not row["layer"]]
+
+
+def _is_named(row: Mapping[str, Any], word: str) -> bool:
+    """By number, item (all light sources of one that has several), name, or a pattern of these."""
+    item, name = str(row["item"]), str(row["name"])
+    is_it = word in (str(row["number"]), item, name) or item.startswith(f"{word}/")
+    return is_it or ("*" in word and (fnmatchcase(item, word) or fnmatchcase(name, word)))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise BadInput(path, "", f"cannot be read: {error.strerror}") from None

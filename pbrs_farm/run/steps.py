@@ -1,0 +1,394 @@
+"""The story: get -> pure stage -> put. Each step reads the store, calls one stage, gives files.
+
+Effects: reads the store; run/step_cache.py writes what a step made and its marker.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pbrs_farm
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.errors import BadHouse, BadInput
+from pbrs_farm.core.house import House, Room, geometry_from_house
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.core.lighting import ALL_MODES
+from pbrs_farm.core.recipe import CameraFields, Recipe
+from pbrs_farm.formats.cameras_json import json_bytes, plain_from_view, views_from_json
+from pbrs_farm.read.source import SourceRef, read_house
+from pbrs_farm.run import plan
+from pbrs_farm.run.house_cache import LoadedHouse
+from pbrs_farm.run.output_root import attribution
+from pbrs_farm.run.step_cache import (
+    Made,
+    Outcome,
+    Work,
+    camera_file_text,
+    read_marker,
+    required_source,
+    run_marked,
+)
+from pbrs_farm.run.view_histogram import histogram_json
+
+if TYPE_CHECKING:
+    from pbrs_farm.repair import RepairReport
+    from pbrs_farm.sample import CameraReport
+
+
+def _loaded(work: Work) -> LoadedHouse:
+    marker = read_marker(work.store, keys.marker_key(work.house_id, "house"))
+    if marker is None:
+        raise BadInput(work.house_id, "", "the house has not been read yet")
+    return work.shelf.take(work.store, work.recipe, work.house_id, marker.digest)
+
+
+def _view_at_size(work: Work, loaded: LoadedHouse) -> tuple[View, Camera]:
+    view = loaded.view(work.view_id or "")
+    image = work.recipe.image
+    return view, view.camera.with_size(image.width_px, image.height_px)
+
+
+# The steps, in the order they run.
+
+
+def _house(work: Work) -> Made:
+    from pbrs_farm.formats.house_bundle import bundle_from_house
+
+    source = required_source(work)
+    repaired, report = repaired_house(source, work.recipe)
+    if repaired.id != work.house_id:
+        raise BadInput(source.location, repaired.id, f"expected house {work.house_id}")
+    glb, description = bundle_from_house(repaired)
+    files = {"house.glb": glb, "house.json": description, "repair.json": json_bytes(report)}
+    facts = {
+        "rooms": len(repaired.rooms),
+        "items": len(repaired.items),
+        "notes": len(repaired.notes),
+    }
+    return Made(files, facts)
+
+
+def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
+    """The house of a source, read and repaired, and what was changed. Raises BadHouse."""
+    from pbrs_farm.raycast.caster import Caster
+    from pbrs_farm.repair import RepairReport, repair
+
+    house = read_house(source, recipe.read)
+    _check_strict(house, recipe)
+    if source.kind == "object":
+        return house, RepairReport(house_id=house.id, was_repaired=True)
+
+    def occluder_from(some: House) -> Caster:
+        return Caster(geometry_from_house(some))
+
+    return repair(house, recipe.repair, occluder_from=occluder_from)
+
+
+def _check_strict(house: House, recipe: Recipe) -> None:
+    if recipe.read.strict and house.notes:
+        note = house.notes[0]
+        more = f" and {len(house.notes) - 1} more" if len(house.notes) > 1 else ""
+        raise BadHouse(house.source.file, note.place, f"{note.text}{more}", hint="--strict")
+
+
+def _cameras(work: Work) -> Made:
+    from pbrs_farm.sample import cameras
+
+    loaded = _loaded(work)
+    house, fields = loaded.house, work.recipe.cameras
+    seed = camera_seed(work.house_id, work.recipe)
+    if is_object(work):
+        return _object_cameras(work, house, seed)
+    if fields.source == "file":
+        return _file_cameras(loaded, fields)
+    views, report = cameras(house, fields, seed=seed, counter=loaded.caster.item_counts)
+    made = _made_cameras(views, report.model_dump(mode="json"))
+    return made if views else Made(made.files, {**made.facts, "why_none": why_none(report)})
+
+
+def why_none(report: CameraReport) -> str:
+    """One line that says why no room of a house has a view."""
+    if not report.rooms:
+        return "; ".join(report.notes) or "the house has no rooms"
+    reasons = [
+        f"{room.room_id}: {room.reason or (room.sectors[0].reason if room.sectors else 'no sector')}"
+        for room in report.rooms
+    ]
+    more = f" and {len(reasons) - 3} more rooms" if len(reasons) > 3 else ""
+    return "; ".join(reasons[:3]) + more
+
+
+def _object_cameras(work: Work, house: House, seed: int) -> Made:
+    from pbrs_farm.sample.object_cameras import object_views
+
+    f = work.recipe.cameras
+    intrinsics = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
+    views = object_views(house.items[0].bounds, intrinsics, seed, (house.id,))
+    return _made_cameras(views, {"preset": "objects", "n_views": len(views)})
+
+
+def _file_cameras(loaded: LoadedHouse, fields: CameraFields) -> Made:
+    from pbrs_farm.sample.camera_file import cameras_from_file_text
+    from pbrs_farm.sample.stored_cameras import views_from_cameras
+
+    given = cameras_from_file_text(
+        camera_file_text(fields), fields.file, fields.score_width_px, fields.score_height_px
+    )
+    counter = loaded.caster.item_counts
+    views = views_from_cameras(loaded.house, given, fields, counter, origin="file")
+    return _made_cameras(views, {"source": "file", "n_views": len(views)})
+
+
+def _made_cameras(views: Sequence[View], report: dict[str, Any]) -> Made:
+    plain = {"views": [plain_from_view(v) for v in views], "report": report}
+    facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
+    return Made({"cameras.json": json_bytes(plain)}, facts)
+
+
+def room_of(house: House, view: View) -> Room | None:
+    """The room a view belongs to; None for a camera outside every room, or around an object."""
+    return next((room for room in house.rooms if room.id == view.room_id), None)
+
+
+def is_object(work: Work) -> bool:
+    """The work is on an object without context (paper section 4.1), not on a house."""
+    return work.house_id.startswith(keys.OBJECT_PREFIX)
+
+
+def camera_seed(house_id: str, recipe: Recipe) -> int:
+    """The sampler's seed for a house under a recipe."""
+    return keys.seed(house_id, "cameras", recipe.digest("cameras"))
+
+
+def _truth(work: Work) -> Made:
+    from pbrs_farm import truth
+
+    loaded = _loaded(work)
+    view, camera = _view_at_size(work, loaded)
+    caster, house = loaded.caster, loaded.house
+    hit = caster.hit_record(camera)
+    arrays = truth.layers_from_hit(hit, house, camera)
+    table = truth.view_table(hit.item, house, camera)
+    room = room_of(house, view)
+    if room is not None:
+        table["layout"] = truth.layout_table(room, camera, hit.depth_z)
+    if work.layers:
+        seen = truth.Seen(
+            hit,
+            house,
+            loaded.geometry,
+            camera,
+            lambda skip: caster.hit_record(camera, skip_faces=skip),
+            loaded.textures,
+            keys.seed(work.house_id, view.id, "truth", work.recipe.seed),
+        )
+        arrays |= truth.optional_layers(work.layers, seen)
+        table |= truth.optional_tables(work.layers, house)
+    credit = house.source.attribution
+    files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
+    return Made(files, {"table": table})
+
+
+def layer_bytes(name: str, array: NDArray[Any], credit: str = "") -> bytes:
+    """The file of a label layer: PNG, or an EXR whose channels are named as layers.py says.
+
+    credit: the attribution the file carries.
+    """
+    from pbrs_farm.images import exr_from_layers, png_from_array
+
+    layer = LAYER[name]
+    if layer.file.endswith(".png"):
+        return png_from_array(array, attribution=credit)
+    channels = layer.channels.split()
+    planes = [array] if len(channels) == 1 else list(np.moveaxis(array, -1, 0))
+    named = zip(channels, planes, strict=True)
+    layers = {c: np.ascontiguousarray(plane, np.float32) for c, plane in named}
+    return exr_from_layers(layers, attribution=credit)
+
+
+def _opengl(work: Work, mode: str) -> Made:
+    from pbrs_farm.images import png_from_array
+
+    loaded = _loaded(work)
+    _view, camera = _view_at_size(work, loaded)
+    rasterizer = loaded.rasterizer
+    draw = rasterizer.render_dl if mode == "opengl_dl" else rasterizer.render_il
+    rgb = draw(camera)
+    if is_object(work):
+        rgb = np.where(_missed(loaded, camera), np.uint8(0), rgb)
+    png = png_from_array(rgb, attribution=loaded.house.source.attribution)
+    return Made({LAYER[mode].file: png}, {"renderer": rasterizer.name})
+
+
+def _missed(loaded: LoadedHouse, camera: Camera) -> NDArray[np.bool_]:
+    """(H, W, 1) bool: nothing is seen; of an object without context such pixels are 0."""
+    return np.asarray(loaded.caster.item_buffer(camera) == 0)[..., None]
+
+
+def _opengl_dl(work: Work) -> Made:
+    return _opengl(work, "opengl_dl")
+
+
+def _opengl_il(work: Work) -> Made:
+    return _opengl(work, "opengl_il")
+
+
+def _light(work: Work) -> Made:
+    from pbrs_farm.images import exr_from_layers
+    from pbrs_farm.transport.lamp_layers import layer_name
+
+    loaded = _loaded(work)
+    view, camera = _view_at_size(work, loaded)
+    groups = ("image", "light", "sky", "emission", "materials")
+    # A layer for each lamp changes no random number: the pictures stay what they are without.
+    fields = work.recipe.light.model_copy(update={"groups": "two"})
+    same = work.recipe.model_copy(update={"light": fields})
+    seed = keys.seed(work.house_id, view.id, "light", same.digest(*groups))
+    result = loaded.light_scene.render(camera, view.room_id, work.recipe.light, seed)
+    images = {"outdoor": result.outdoor, "indoor": result.indoor, "albedo": result.albedo}
+    images |= {layer_name(number): image for number, image in result.lamps.items()}
+    layers: dict[str, NDArray[np.float32]] = {}
+    for name, image in images.items():
+        layers |= {f"{name}.{c}": image[..., k] for k, c in enumerate("RGB")}
+    layers |= {f"normal.{c}": result.normal[..., k] for k, c in enumerate("XYZ")}
+    if is_object(work):
+        missed = _missed(loaded, camera)[..., 0]
+        layers = {name: np.where(missed, np.float32(0), plane) for name, plane in layers.items()}
+    facts = {
+        **result.facts,
+        "noise": result.noise,
+        "spp": result.spp,
+        "n_nonfinite": result.n_nonfinite,
+        "variant": loaded.light_scene.variant,
+        "sky": loaded.sky.facts(),
+    }
+    if "lamps" in facts:
+        items = loaded.house.items
+        named = [{**row, "name": items[row["instance"] - 1].name} for row in facts["lamps"]]
+        facts["lamps"] = named
+    room = room_of(loaded.house, view)
+    if room is not None:
+        # Measured once a house, by whichever view's light comes first.
+        lit = run_step("illuminance", replace(work, view_id=None)).marker.facts
+        facts["floor_lux"] = lit["floor_lux"].get(room.id)
+        facts["warnings"] = lit["warnings"].get(room.id, [])
+    if loaded.light_scene.n_lamps == 0:
+        facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
+    exr = exr_from_layers(layers, attribution=loaded.house.source.attribution)
+    return Made({"radiance.exr": exr}, facts)
+
+
+def _illuminance(work: Work) -> Made:
+    """How bright every floor is by each light group: it needs the sky, so repair cannot know it."""
+    from pbrs_farm.transport.illuminance import illuminance_record
+
+    loaded = _loaded(work)
+    lux = loaded.light_scene.floor_lux(
+        loaded.house, seed=keys.seed(work.house_id, "floor_lux", work.recipe.seed)
+    )
+    record = illuminance_record(loaded.house, lux)
+    warnings = {row["room"]: row["warnings"] for row in record["rooms"] if row["warnings"]}
+    return Made(
+        {"illuminance.json": json_bytes({**record, "sky": loaded.sky.facts()})},
+        {"floor_lux": lux, "warnings": warnings},
+    )
+
+
+def _develop(work: Work) -> Made:
+    from pbrs_farm.images import png_from_array
+    from pbrs_farm.run.relight import negative_from_exr
+    from pbrs_farm.transport.develop.mode_pictures import develop
+
+    folder = keys.view_key(work.house_id, work.view_id or "")
+    negative = negative_from_exr(work.store.get(f"{folder}radiance.exr"), folder.rstrip("/"))
+    denoise = work.recipe.light.denoise
+    prints = develop(negative, work.recipe.tone, denoise=denoise)
+    credit = attribution(work.store, work.house_id)
+    return Made(
+        {
+            LAYER[mode].file: png_from_array(made.rgb_srgb8, attribution=credit)
+            for mode, made in prints.items()
+        },
+        {"denoised": denoise} | {mode: made.facts() for mode, made in prints.items()},
+    )
+
+
+def _view(work: Work) -> Made:
+    loaded_views = keys.house_key(work.house_id, "cameras.json")
+    view = views_from_json(work.store.get(loaded_views), loaded_views)[work.view_id or ""]
+    facts = _facts_of_view(work)
+    sheet = {
+        "house": work.house_id,
+        "view": view.id,
+        "room": view.room_id,
+        "sector": view.sector,
+        "origin": view.origin,
+        "score": view.score,
+        **facts.pop("truth", {}).get("table", {}),
+        "recipe": work.recipe.digest(*plan.PICTURE_GROUPS),
+        "modes": facts,
+        "versions": versions(),
+    }
+    files = {"view.json": json_bytes(sheet)}
+    rendered = [m for m in ALL_MODES if m.value in facts or (m.groups and "develop" in facts)]
+    if rendered:
+        house = _loaded(work).house
+        room = room_of(house, view)
+        place = {
+            "house": work.house_id,
+            "view": view.id,
+            "room": view.room_id,
+            "room_type": room.name if room is not None else "",
+        }
+        files["histogram.json"] = histogram_json(
+            work.store, place, rendered, sheet, house.notes, work.recipe.histogram
+        )
+    return Made(files)
+
+
+def _facts_of_view(work: Work) -> dict[str, dict[str, Any]]:
+    """Step -> facts of its marker, for every step of this view that is done."""
+    facts = {}
+    for name in plan.STEPS["view"].after:
+        if plan.STEPS[name].per_view:
+            marker = read_marker(work.store, keys.marker_key(work.house_id, name, work.view_id))
+            if marker is not None:
+                facts[name] = dict(marker.facts)
+    return facts
+
+
+def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
+    """Do one step unless its marker says it is done; see marked.run_marked."""
+    return run_marked(name, work, _FUNCTIONS[name], attempt=attempt)
+
+
+def versions() -> dict[str, str]:
+    """Versions of what makes the pictures."""
+    found = {"pbrs_farm": pbrs_farm.__version__, "python": platform.python_version()}
+    for package in ("mitsuba", "drjit", "moderngl", "pyoidn", "numpy"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "-"
+    return found
+
+
+_FUNCTIONS: Final[Mapping[str, Callable[[Work], Made]]] = {
+    "house": _house,
+    "cameras": _cameras,
+    "truth": _truth,
+    "opengl_dl": _opengl_dl,
+    "opengl_il": _opengl_il,
+    "illuminance": _illuminance,
+    "light": _light,
+    "develop": _develop,
+    "view": _view,
+}

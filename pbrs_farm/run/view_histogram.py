@@ -1,0 +1,75 @@
+"""The view step's histogram.json, from the pictures that the view has. Effects: reads the store."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm import images
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import Note
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.selection import SCORED_MODE, scene_quality, view_record
+from pbrs_farm.store.interface import Store
+
+_MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})
+
+
+def histogram_json(
+    store: Store,
+    place: Mapping[str, str],
+    modes: Iterable[Mode],
+    view_json: Mapping[str, Any],
+    notes: Iterable[Note],
+    settings: HistogramFields,
+) -> bytes:
+    """Bytes of histogram.json of one view (selection.ViewRecord).
+
+    place: "house", "view", "room" and "room_type" (the room's name). modes: those rendered; only
+    SCORED_MODE is opened where it is one of them. view_json: its "instances" and, where light was
+    traced, "noise" of the sum of both groups anywhere below "modes". notes: of the house.
+    Raises BadInput when a picture cannot be read.
+    """
+
+    def picture(layer: str) -> Any:
+        key = keys.view_key(place["house"], place["view"], LAYER[layer].file)
+        return images.array_from_png(store.get(key), key)
+
+    wanted = set(modes)
+    wanted = {SCORED_MODE} if SCORED_MODE in wanted else wanted
+    depth = picture("depth")
+    if depth.ndim != 2 or depth.dtype != np.uint16:
+        raise BadInput(keys.view_key(place["house"], place["view"], "depth.png"), "", "no depth")
+    scene = scene_quality(
+        depth,
+        view_json.get("instances", ()),
+        settings,
+        noise=_noise(view_json),
+        missing_textures=sum(note.kind in _MISSING_TEXTURE for note in notes),
+    )
+    record = view_record(
+        {
+            "house": place["house"],
+            "view": place["view"],
+            "room": place["room"],
+            "room_type": place["room_type"],
+        },
+        {mode: picture(mode.value) for mode in sorted(wanted)},
+        depth,
+        scene,
+        settings,
+    )
+    return record.json_bytes()
+
+
+def _noise(view_json: Mapping[str, Any]) -> float | None:
+    light = (view_json.get("modes") or {}).get("light") or {}
+    noise = light.get("noise")
+    if isinstance(noise, Mapping):
+        noise = noise.get("sum")
+    return float(noise) if isinstance(noise, int | float) else None

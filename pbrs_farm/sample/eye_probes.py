@@ -1,0 +1,103 @@
+"""Whether an eye hangs where no person's could: inside something, or not above a floor.
+
+No effects of its own: it looks with the item counter it is given.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import House, ItemKind
+from pbrs_farm.sample.candidates import cameras_looking
+
+Counter = Callable[[Sequence[Camera]], NDArray[np.uint32]]
+"""Pixels of each item in each camera: (n_cameras, n_items + 1), column 0 = nothing."""
+
+MAX_OBJECT_SHARE: Final = 0.75
+"""An object that covers more of all directions, and whose box holds the eye, encloses it."""
+
+MAX_OBJECT_M3: Final = 12.0
+"""An object whose box is larger is no furniture but a building's shell: being inside is right."""
+
+MAX_STRUCTURE_SHARE: Final = 0.97
+"""A wall, floor or ceiling that covers more of all directions encloses the eye."""
+
+_CUBE_PX: Final = 12
+_COUNTS_PER_CALL: Final = 1 << 22
+_CAMERAS_PER_CALL: Final = 384
+_AXES: Final = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+
+
+def counted(
+    counter: Counter, cameras: Sequence[Camera], n_items: int, *, group: int = 1
+) -> Iterator[tuple[slice, NDArray[np.uint32]]]:
+    """(which cameras, their rows (n, n_items + 1)) in parts of bounded size.
+
+    group: cameras in a row that stay together. A counter may give fewer columns, not more.
+    """
+    most = max(1, min(_CAMERAS_PER_CALL, _COUNTS_PER_CALL // (n_items + 1)) // group) * group
+    for start in range(0, len(cameras), most):
+        part = slice(start, min(start + most, len(cameras)))
+        rows = counter(cameras[part])
+        padded = np.zeros((len(rows), n_items + 1), np.uint32)
+        padded[:, : rows.shape[1]] = rows
+        yield part, padded
+
+
+def not_above_floor(house: House, eyes: NDArray[np.float64], counter: Counter) -> NDArray[np.bool_]:
+    """(N,) bool: straight below the eye (N, 3) the first thing is a wall or a ceiling.
+
+    So it is above a low or sloped ceiling, above a wall, or inside one.
+    """
+    pencil = Intrinsics.from_hfov(1, 1, 1e-4)
+    down = np.array([0.0, -1.0, 0.0])
+    cameras = cameras_looking(pencil, eyes, np.broadcast_to(down, eyes.shape), (0.0, 0.0, 1.0))
+    bad = [i + 1 for i, x in enumerate(house.items) if x.kind in (ItemKind.WALL, ItemKind.CEILING)]
+    above = np.zeros(len(eyes), np.bool_)
+    for part, rows in counted(counter, cameras, len(house.items)):
+        above[part] = rows[:, bad].sum(1) > 0
+    return above
+
+
+def enclosed(house: House, eyes: NDArray[np.float64], counter: Counter) -> NDArray[np.bool_]:
+    """(N,) bool: one item all around the eye (N, 3): a wardrobe's inside, a solid wall's.
+
+    Counts the pixels of the six faces of a cube around the eye.
+    """
+    cube = Intrinsics.from_hfov(_CUBE_PX, _CUBE_PX, math.pi / 2)
+    cameras = [Camera(cube, pose) for pose in _cube_poses(eyes)]
+    bounds, most = _enclosing(house)
+    inside = np.zeros(len(eyes), np.bool_)
+    for part, rows in counted(counter, cameras, len(house.items), group=6):
+        share = rows[:, 1:].reshape(-1, 6, len(house.items)).sum(1) / (6 * _CUBE_PX**2)
+        which = slice(part.start // 6, part.stop // 6)
+        eye = eyes[which, None, :]
+        holds = ((eye >= bounds[:, 0]) & (eye <= bounds[:, 1])).all(2)
+        inside[which] = (holds & (share > most)).any(1)
+    return inside
+
+
+def _cube_poses(eyes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(6 N, 4, 4) poses that look from each eye along the six axes, their pictures a cube."""
+    pencil, zero = Intrinsics.from_hfov(1, 1), np.zeros(3)
+    poses = np.zeros((len(eyes), 6, 4, 4))
+    for k, axis in enumerate(_AXES):
+        up = (0.0, 0.0, 1.0) if axis[1] else (0.0, 1.0, 0.0)
+        poses[:, k] = Camera.look(pencil, zero, np.array(axis, np.float64), up).world_from_camera
+    poses[:, :, :3, 3] = eyes[:, None]
+    return poses.reshape(-1, 4, 4)
+
+
+def _enclosing(house: House) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Each item's bounds (I, 2, 3) and the share of all directions (I,) that makes it enclose."""
+    bounds = np.array([item.bounds for item in house.items], np.float64).reshape(-1, 2, 3)
+    structure = np.array([item.kind.is_structure for item in house.items], np.bool_)
+    with np.errstate(invalid="ignore"):
+        shell = np.prod(bounds[:, 1] - bounds[:, 0], axis=1) > MAX_OBJECT_M3
+    return bounds, np.where(structure | shell, MAX_STRUCTURE_SHARE, MAX_OBJECT_SHARE)

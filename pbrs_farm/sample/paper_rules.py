@@ -1,0 +1,65 @@
+"""The paper's rules for where a camera may be (section 3.1); no effects of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import Geometry, House, Room
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.sample import eye_probes as probes
+from pbrs_farm.sample.candidates import Candidates, Grid
+from pbrs_farm.sample.clearance import near_any_triangle
+from pbrs_farm.sample.eye_probes import Counter
+from pbrs_farm.sample.rejection import Verdict
+
+_CHUNK = 4096
+
+
+def room_grid(room: Room) -> Grid:
+    """The grid over a room's polygon; eye heights count from the floor's surface."""
+    (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
+    return Grid(float(x0), float(z0), float(x1), float(z1), room.floor_y)
+
+
+def room_shape(room: Room) -> shapely.Geometry:
+    """The room's polygon, made valid; empty for fewer than three corners."""
+    if len(room.polygon) < 3 or not np.isfinite(room.polygon).all():
+        return shapely.Polygon()
+    return shapely.make_valid(shapely.Polygon(room.polygon))
+
+
+def refusals(
+    house: House,
+    room: Room,
+    fields: CameraFields,
+    candidates: Candidates,
+    geometry: Geometry,
+    counter: Counter,
+) -> NDArray[np.uint8]:
+    """(N,) verdict of each candidate: the first rule of place that refuses it, or LOWER_SCORE.
+
+    In order: inside the room's polygon, farther than the clearance from every triangle, a floor
+    or furniture below rather than a wall or ceiling, not enclosed by one item. Memory is bounded.
+    """
+    verdict = np.full(len(candidates), Verdict.LOWER_SCORE, np.uint8)
+    eye = candidates.eye
+    inside = shapely.contains_xy(room_shape(room), eye[:, 0], eye[:, 2])
+    verdict[~inside] = Verdict.OUTSIDE_ROOM
+
+    rules: tuple[tuple[Verdict, Callable[[NDArray[np.float64]], NDArray[np.bool_]]], ...] = (
+        (Verdict.NEAR_OBSTACLE, lambda p: near_any_triangle(p, geometry, fields.clearance_m)),
+        (Verdict.NOT_ABOVE_FLOOR, lambda p: probes.not_above_floor(house, p, counter)),
+        (Verdict.ENCLOSED, lambda p: probes.enclosed(house, p, counter)),
+    )
+    places = np.flatnonzero(inside)
+    for start in range(0, len(places), _CHUNK):
+        left = places[start : start + _CHUNK]
+        for rule, refused in rules:
+            bad = refused(eye[left])
+            verdict[left[bad]] = rule
+            left = left[~bad]
+    return verdict

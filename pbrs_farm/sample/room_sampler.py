@@ -1,0 +1,247 @@
+"""One room's views: candidates, the rules that refuse them, the best of each sector.
+
+No effects of its own: pictures come from the counter it is given.
+"""
+
+from __future__ import annotations
+
+from collections import Counter as Tally
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Intrinsics, View
+from pbrs_farm.core.house import Geometry, House, Room
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.sample import paper_rules as paper
+from pbrs_farm.sample import released_rules as released
+from pbrs_farm.sample import sector_choice as choose
+from pbrs_farm.sample.candidates import Candidates, Grid, grid_candidates, n_cells
+from pbrs_farm.sample.eye_probes import Counter, counted
+from pbrs_farm.sample.rejection import REFUSALS, Verdict
+from pbrs_farm.sample.report import RoomReport, SectorReport
+from pbrs_farm.sample.view_score import (
+    Scored,
+    object_columns,
+    overfill,
+    paper_score,
+    released_columns,
+    released_score,
+)
+
+MAX_CELLS = 400_000
+"""A room of more cells (25,000 square metres at 0.25 m) is refused, so that memory is bounded."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomTrace:
+    """Every candidate of a room, for the map. verdict: (N,) uint8 of Verdict."""
+
+    room_id: str
+    candidates: Candidates
+    verdict: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomSampler:
+    """The sampler of one room; fields.preset says by whose rules."""
+
+    house: House
+    room: Room
+    fields: CameraFields
+    seed: int
+    counter: Counter
+    geometry: Geometry
+
+    def why_not(self) -> str:
+        """Why this room is not sampled at all, or ""."""
+        room = self.room
+        if self.house.is_repaired and not room.lit_by:
+            return "nothing lights it: neither lamp nor window nor fallback light"
+        if shapely.area(paper.room_shape(room)) <= 0:
+            return "its polygon has no area"
+        if self.fields.preset == "released" and not (room.has_floor and room.has_ceiling):
+            return "the released sampler needs a floor and a ceiling"
+        n_x, n_z = n_cells(self._grid(), self.fields.cell_m)
+        if n_x * n_z > MAX_CELLS:
+            return f"it has {n_x * n_z} grid cells, more than {MAX_CELLS}: set cameras.cell_m"
+        return ""
+
+    def run(self) -> tuple[list[View], RoomReport, RoomTrace]:
+        """The room's views, its report and all its candidates."""
+        names = (self.seed, self.house.id, self.room.id)
+        candidates = grid_candidates(self._grid(), self.fields, names)
+        rules = released.refusals if self.fields.preset == "released" else paper.refusals
+        verdict = rules(self.house, self.room, self.fields, candidates, self.geometry, self.counter)
+        views: list[View] = []
+        sectors: list[SectorReport] = []
+        for sector in range(self.fields.n_sectors):
+            found, facts = self._sector(sector, candidates, verdict)
+            views += found
+            sectors.append(facts)
+        report = RoomReport(room_id=self.room.id, name=self.room.name, sectors=tuple(sectors))
+        return views, report, RoomTrace(self.room.id, candidates, verdict)
+
+    def _sector(
+        self, sector: int, candidates: Candidates, verdict: NDArray[np.uint8]
+    ) -> tuple[list[View], SectorReport]:
+        """Choose among a sector's candidates; writes their verdicts."""
+        of_sector = np.flatnonzero(candidates.sector == sector)
+        eligible = of_sector[verdict[of_sector] == Verdict.LOWER_SCORE]
+        full = choose.FullScores(lambda which: self._full(candidates, eligible[which]))
+        coarse, share, judged = self._coarse(candidates, eligible)
+        chosen = self._chosen(coarse, share, full)
+
+        # What was seen at full size is judged by that, the others by their coarse picture.
+        for k, rows in full.counts.items():
+            judged[k] = self._judged(rows[None])[0]
+        judged[chosen] = Verdict.WINNER
+        verdict[eligible] = judged
+        views = [
+            self._view(sector, k, candidates, int(eligible[c]), full.counts[c], full.score[c])
+            for k, c in enumerate(chosen)
+        ]
+        return views, self._report(sector, verdict[of_sector], full, views)
+
+    def _chosen(
+        self, coarse: choose.Coarse, share: NDArray[np.float32], full: choose.FullScores
+    ) -> list[int]:
+        best = choose.best_first(coarse, full, margin=None if self._exact else self._margin)
+        chosen = [] if best is None else [best]
+        while chosen and len(chosen) < self.fields.per_sector:
+            more = choose.next_diverse(coarse, share, chosen, full, self.fields.min_object_fraction)
+            if more is None:
+                break
+            chosen.append(more)
+        return chosen
+
+    def _coarse(
+        self, candidates: Candidates, which: NDArray[np.intp]
+    ) -> tuple[choose.Coarse, NDArray[np.float32], NDArray[np.uint8]]:
+        """Coarse scores, each object's share of the picture when several views are wanted, and
+        the verdicts that the coarse pictures give."""
+        columns, fraction = self._columns(), self.fields.min_object_fraction
+        keep = self.fields.per_sector > 1
+        n = len(which)
+        coarse = choose.Coarse(np.zeros(n, np.bool_), np.zeros(n))
+        share = np.zeros((n, len(columns) if keep else 0), np.float32)
+        judged = np.zeros(n, np.uint8)
+        cameras = candidates.cameras(which, self._intrinsics(coarse=True))
+        for part, rows in counted(self.counter, cameras, len(self.house.items)):
+            lenient = paper_score(rows, columns, fraction * choose.COARSE_SLACK)
+            enough = lenient.n_objects >= self.fields.min_objects
+            over = overfill(rows, columns, self.fields)
+            coarse.possible[part] = enough & (over <= self._margin)
+            coarse.score[part] = self._scored(rows).score
+            judged[part] = self._judged(rows)
+            if keep:
+                share[part] = rows[:, columns] / rows.sum(1, keepdims=True)
+        return coarse, share, judged
+
+    def _full(
+        self, candidates: Candidates, which: NDArray[np.intp]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.uint32]]:
+        cameras = candidates.cameras(which, self._intrinsics(coarse=False))
+        parts = [rows for _part, rows in counted(self.counter, cameras, len(self.house.items))]
+        rows = np.concatenate(parts)
+        return self._judged(rows) == Verdict.LOWER_SCORE, self._scored(rows).score, rows
+
+    def _judged(self, rows: NDArray[np.uint32]) -> NDArray[np.uint8]:
+        """(N,) the verdict of the rules about the picture, before any comparison of scores."""
+        scored = self._scored(rows)
+        judged = np.full(len(rows), Verdict.LOWER_SCORE, np.uint8)
+        judged[(scored.n_objects < self.fields.min_objects) | (scored.score <= 0)] = (
+            Verdict.FEW_OBJECTS
+        )
+        judged[overfill(rows, self._columns(), self.fields) > 0] = Verdict.FILLED_BY_ONE
+        return judged
+
+    @property
+    def _margin(self) -> float:
+        """By how much a share of the picture may differ between the sizes."""
+        return choose.COARSE_MARGIN_PX / self.fields.coarse_width_px
+
+    def _scored(self, rows: NDArray[np.uint32]) -> Scored:
+        if self.fields.preset == "released":
+            return released_score(rows, self._columns(), self.fields)
+        return paper_score(rows, self._columns(), self.fields.min_object_fraction)
+
+    def _columns(self) -> NDArray[np.intp]:
+        if self.fields.preset == "released":
+            return released_columns(self.house, self.room)
+        return object_columns(self.house)
+
+    def _grid(self) -> Grid:
+        if self.fields.preset == "released":
+            return released.room_grid(self.house, self.room)
+        return paper.room_grid(self.room)
+
+    @property
+    def _exact(self) -> bool:
+        # The released score jumps at whole multiples of its least count: coarse says too little.
+        return self.fields.exact or self.fields.preset == "released"
+
+    def _intrinsics(self, *, coarse: bool) -> Intrinsics:
+        f = self.fields
+        full = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
+        if not coarse or self._exact:
+            return full
+        return full.resized(f.coarse_width_px, f.coarse_height_px)
+
+    def _view(
+        self,
+        sector: int,
+        k: int,
+        candidates: Candidates,
+        index: int,
+        counts: NDArray[np.uint32],
+        score: float,
+    ) -> View:
+        several = self.fields.per_sector > 1
+        camera = candidates.cameras(np.array([index]), self._intrinsics(coarse=False))[0]
+        columns = object_columns(self.house)
+        return View(
+            id=keys.view_id(self.room.id, sector, k if several else None),
+            room_id=self.room.id,
+            sector=sector,
+            camera=camera,
+            score=self._reported(score),
+            objects={int(i): int(counts[i]) for i in columns if counts[i]},
+        )
+
+    def _reported(self, score: float) -> float:
+        """Paper scores are shares of the picture inside, whole pixels outside."""
+        f = self.fields
+        if f.preset == "released":
+            return score
+        return float(round(score * f.score_width_px * f.score_height_px))
+
+    def _report(
+        self,
+        sector: int,
+        verdict: NDArray[np.uint8],
+        full: choose.FullScores,
+        views: list[View],
+    ) -> SectorReport:
+        tally = Tally(verdict.tolist())
+        ranking = full.ranking
+        refused = {rule.word: tally[rule] for rule in REFUSALS if tally[rule]}
+        return SectorReport(
+            sector=sector,
+            n_candidates=len(verdict),
+            refused=refused,
+            n_kept=tally[Verdict.LOWER_SCORE] + tally[Verdict.WINNER],
+            n_rescored=len(full.score),
+            views=tuple(view.id for view in views),
+            winner_score=views[0].score if views else None,
+            runner_up_score=self._reported(full.score[ranking[1]]) if len(ranking) > 1 else None,
+            reason="" if views else f"every candidate was refused: {_words(refused)}",
+        )
+
+
+def _words(refused: dict[str, int]) -> str:
+    most = sorted(refused.items(), key=lambda pair: -pair[1])
+    return ", ".join(f"{n} {rule.replace('_', ' ')}" for rule, n in most)

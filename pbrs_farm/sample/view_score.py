@@ -1,0 +1,90 @@
+"""From pixels per item to a view's score: which items count, and how (paper section 3.1).
+
+No effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import House, ItemKind, Room
+from pbrs_farm.core.recipe import CameraFields
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scored:
+    """Scores of N views. n_objects: (N,) objects large enough. score: (N,) float64, 0 = none."""
+
+    n_objects: NDArray[np.int64]
+    score: NDArray[np.float64]
+
+
+def object_columns(house: House) -> NDArray[np.intp]:
+    """Instance ids of what the paper calls objects: all but wall, ceiling, floor and ground."""
+    ids = [i + 1 for i, item in enumerate(house.items) if not item.kind.is_structure]
+    return np.array(ids, np.intp)
+
+
+def released_columns(house: House, room: Room) -> NDArray[np.intp]:
+    """Instance ids the published sampler counts in a room (suncg section 3.2 d).
+
+    Objects of this room alone; stairs, columns and boxes are no objects there.
+    """
+    ids = [
+        i + 1
+        for i, item in enumerate(house.items)
+        if item.room_id == room.id
+        and not item.kind.is_structure
+        and item.kind is not ItemKind.STAIRS
+        and "box" not in item.tags
+    ]
+    return np.array(ids, np.intp)
+
+
+def paper_score(
+    counts: NDArray[np.uint32], columns: NDArray[np.intp], min_fraction: float
+) -> Scored:
+    """Paper section 3.1: share of the picture covered by objects, and how many are large enough.
+
+    counts: (N, n_items + 1) pixels; large enough: at least min_fraction of all pixels.
+    """
+    pixels = counts.sum(1, dtype=np.int64)
+    objects = counts[:, columns]
+    n_objects = (objects >= min_fraction * pixels[:, None]).sum(1)
+    return Scored(n_objects, objects.sum(1, dtype=np.int64) / np.maximum(pixels, 1))
+
+
+def overfill(
+    counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: CameraFields
+) -> NDArray[np.float64]:
+    """(N,) by how much of the picture one item covers more than it may; above 0 is a refusal.
+
+    An object may cover max_item_fraction, a wall (floor, ceiling) max_wall_fraction. counts:
+    (N, n_items + 1) pixels. Beyond the paper; 1 switches a rule off.
+    """
+    pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
+    others = np.delete(counts, np.append(columns, 0), axis=1)
+    object_share = counts[:, columns].max(1, initial=0) / pixels
+    wall_share = others.max(1, initial=0) / pixels
+    over_object = object_share - fields.max_item_fraction
+    return np.asarray(np.maximum(over_object, wall_share - fields.max_wall_fraction))
+
+
+def released_score(
+    counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: CameraFields
+) -> Scored:
+    """What the published sampler computed: the sum of ln(n // least), an integer division.
+
+    least = floor(min_object_fraction * pixels). Objects need strictly more than it, and a view
+    needs min_objects of them (4: its code asks for more than 3), else it scores 0.
+    """
+    pixels = int(counts[0].sum()) if len(counts) else 0
+    least = max(1, int(fields.min_object_fraction * pixels))
+    objects = counts[:, columns].astype(np.int64)
+    kept = objects > least
+    score = np.log(np.where(kept, objects // least, 1)).sum(1)
+    n_objects = kept.sum(1)
+    return Scored(n_objects, np.where(n_objects >= fields.min_objects, score, 0.0))

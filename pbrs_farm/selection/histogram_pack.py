@@ -1,0 +1,172 @@
+"""A house's histograms in one small object: what scoring reads, thousands a second; pure.
+
+A pack is a line of JSON, then the counts of all its views, compressed. It is made from the
+histogram.json files of a house and holds all that they hold for one scored mode per view.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.selection.view_record import SCORED_MODE, ViewRecord
+
+_FORMAT: Final = "pbrs_farm pack 2"
+_TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes")
+
+QUALITIES: Final = (
+    "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
+)  # fmt: skip
+"""Columns of HistogramPack.quality."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HistogramPack:
+    """The views of one house as arrays.
+
+    source: digest of what the pack was made from. views, rooms, room_types, modes, faults,
+    classes: (n,) text; modes "" and the fault's text where a view cannot be scored; classes
+    "1:0.53 2:0.21", the share of the picture of each NYU40 class. colour: (n, colour bins) and
+    depth: (n, depth bins) uint32 counts, zero where there are none. quality: (n, len(QUALITIES))
+    float32, NaN where not known.
+    """
+
+    house: str
+    source: str
+    settings: HistogramFields
+    views: tuple[str, ...]
+    rooms: tuple[str, ...]
+    room_types: tuple[str, ...]
+    modes: tuple[str, ...]
+    faults: tuple[str, ...]
+    classes: tuple[str, ...]
+    colour: NDArray[np.uint32]
+    depth: NDArray[np.uint32]
+    quality: NDArray[np.float32]
+
+
+def pack_house(
+    house: str,
+    source: str,
+    settings: HistogramFields,
+    records: Sequence[ViewRecord],
+    *,
+    failed: dict[str, str] | None = None,
+    score_mode: Mode = SCORED_MODE,
+) -> HistogramPack:
+    """The pack of a house's records, by view id.
+
+    failed: view id -> why it cannot be read; such views are kept and marked. A view without
+    SCORED_MODE is taken at score_mode; without that too it is "unscored". Raises ValueError for a
+    record of other settings.
+    """
+    rows = sorted(records, key=lambda r: r.view)
+    if any(r.settings != settings for r in rows):
+        raise ValueError("records of different settings cannot be packed together")
+    lost = sorted((failed or {}).items())
+    n = len(rows) + len(lost)
+    colour = np.zeros((n, settings.colour_bins**3), np.uint32)
+    depth = np.zeros((n, settings.depth_bins), np.uint32)
+    quality = np.full((n, len(QUALITIES)), np.nan, np.float32)
+    modes = [_mode(r, score_mode) for r in rows]
+    for i, (record, mode) in enumerate(zip(rows, modes, strict=True)):
+        depth[i] = record.depth.dense()
+        scene = record.scene
+        quality[i, 2:5] = scene.surface, scene.near, scene.n_objects
+        quality[i, 5] = np.nan if scene.noise is None else scene.noise
+        quality[i, 6] = scene.missing_textures
+        if mode is not None:
+            colour[i] = record.colour[mode].dense()
+            quality[i, :2] = record.picture[mode].brightness, record.picture[mode].blown
+    return HistogramPack(
+        house,
+        source,
+        settings,
+        views=(*(r.view for r in rows), *(view for view, _why in lost)),
+        rooms=(*(r.room for r in rows), *("" for _ in lost)),
+        room_types=(*(r.room_type for r in rows), *("" for _ in lost)),
+        modes=(*(str(m or "") for m in modes), *("" for _ in lost)),
+        faults=(*("" if m else "unscored" for m in modes), *(why for _view, why in lost)),
+        classes=(*(_classes(r) for r in rows), *("" for _ in lost)),
+        colour=colour,
+        depth=depth,
+        quality=quality,
+    )
+
+
+def _classes(record: ViewRecord) -> str:
+    return " ".join(f"{nyu40}:{share:g}" for nyu40, share in record.scene.classes.items())
+
+
+def _mode(record: ViewRecord, score_mode: Mode) -> Mode | None:
+    for mode in (SCORED_MODE, score_mode):
+        if mode in record.colour:
+            return mode
+    return None
+
+
+def bytes_from_pack(pack: HistogramPack) -> bytes:
+    """The pack as one object; equal packs give equal bytes."""
+    head: dict[str, Any] = {
+        "format": _FORMAT,
+        "house": pack.house,
+        "source": pack.source,
+        "settings": pack.settings.model_dump(mode="json"),
+        "views": pack.views,
+        "rooms": pack.rooms,
+        "room_types": pack.room_types,
+        "modes": pack.modes,
+        "faults": pack.faults,
+        "classes": pack.classes,
+    }
+    body = b"".join(
+        np.ascontiguousarray(a, kind).tobytes()
+        for a, kind in ((pack.colour, "<u4"), (pack.depth, "<u4"), (pack.quality, "<f4"))
+    )
+    line = json.dumps(head, sort_keys=True, separators=(",", ":")).encode()
+    return line + b"\n" + zlib.compress(body, 1)
+
+
+def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
+    """The pack in an object; BadInput naming it when it is damaged."""
+    try:
+        line, _, rest = data.partition(b"\n")
+        head = json.loads(line)
+        if head.pop("format") != _FORMAT:
+            raise ValueError("another format")
+        settings = HistogramFields.model_validate(head.pop("settings"))
+        body = zlib.decompress(rest)
+        text = {k: tuple(head[k]) for k in _TEXTS}
+        n = len(text["views"])
+        widths = settings.colour_bins**3, settings.depth_bins, len(QUALITIES)
+        if len(body) != 4 * n * sum(widths) or any(len(t) != n for t in text.values()):
+            raise ValueError("lengths differ")
+        ends = np.cumsum([4 * n * w for w in widths])
+        return HistogramPack(
+            head["house"],
+            head["source"],
+            settings,
+            **text,
+            colour=np.frombuffer(body[: ends[0]], "<u4").reshape(n, widths[0]),
+            depth=np.frombuffer(body[ends[0] : ends[1]], "<u4").reshape(n, widths[1]),
+            quality=np.frombuffer(body[ends[1] :], "<f4").reshape(n, widths[2]),
+        )
+    except (ValueError, KeyError, TypeError, zlib.error) as error:
+        raise BadInput(name, "", f"not a pack of histograms: {error}") from None
+
+
+def pack_source(data: bytes) -> str:
+    """Only the `source` of a pack's object, "" if it has none: is it still up to date?"""
+    try:
+        return str(json.loads(data.partition(b"\n")[0])["source"])
+    except (ValueError, KeyError, TypeError):
+        return ""

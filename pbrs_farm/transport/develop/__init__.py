@@ -1,0 +1,1 @@
+"""Stored radiance -> pictures: denoising, white balance, tone mapping."""

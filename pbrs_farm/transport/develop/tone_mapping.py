@@ -1,0 +1,86 @@
+"""Radiance to 8-bit sRGB: exposure by the log-average, highlights rolled off; pure numpy.
+
+No effects. `released` is Reinhard's global operator as the published images used it
+(spec/suncg.md section 5: key 0.8, burn 0.2); `photo` is this project's default.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import RadianceImage, Srgb8Image
+from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
+from pbrs_farm.core.recipe import ToneFields
+
+_MITSUBA_LUMINANCE: Final = np.array([0.212671, 0.715160, 0.072169])
+_BURN: Final = 0.2
+_SHOULDER: Final = 0.6
+_SPAN: Final = 16.0
+
+
+def tone(
+    radiance: RadianceImage, fields: ToneFields, *, exposure: float | None = None
+) -> Srgb8Image:
+    """(H, W, 3) uint8 sRGB of a radiance picture.
+
+    exposure: a factor common to several pictures (see `exposure_of`); the picture's own when
+    None. A black picture stays black. Not-finite and negative values count as 0.
+    """
+    rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
+    if fields.preset == "released":
+        linear = _reinhard(rgb, fields.key, exposure)
+    else:
+        factor = exposure_of(radiance, fields) if exposure is None else exposure
+        linear = _rolled_off(rgb * factor)
+    return np.round(np.clip(srgb_from_linear(linear), 0, 1) * 255).astype(np.uint8)
+
+
+def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
+    """The factor that brings a picture's log-average luminance to the key; 1 for a black one.
+
+    For `photo` pixels above the 98th percentile (a window, a bulb) count as that, and the part
+    of the picture that is a thousand times darker than it counts as a thousandth.
+    """
+    rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
+    if fields.preset == "released":
+        luminance = rgb @ _MITSUBA_LUMINANCE
+        return fields.key / float(np.exp(np.mean(np.log(luminance + 1e-3))))
+    luminance = rgb @ LUMINANCE
+    if luminance.max() <= 0:
+        return 1.0
+    luminance = luminance[luminance > 0]  # pixels that see nothing say nothing of the light
+    bright = float(np.percentile(luminance, 98))
+    clipped = np.clip(luminance, bright / 1000, bright)
+    return fields.key / float(np.exp(np.mean(np.log(clipped))))
+
+
+def _reinhard(rgb: NDArray[np.float64], key: float, exposure: float | None) -> NDArray[np.float64]:
+    luminance = rgb @ _MITSUBA_LUMINANCE
+    average = float(np.exp(np.mean(np.log(luminance + 1e-3))))
+    scaled = luminance * (key / average if exposure is None else exposure)
+    white = float(scaled.max()) * (1 - _BURN) ** 2
+    if white <= 0:
+        return rgb
+    mapped = scaled * (1 + scaled / white**2) / (1 + scaled)
+    ratio = np.divide(mapped, luminance, out=np.zeros_like(mapped), where=luminance > 0)
+    return np.asarray(rgb * ratio[..., None])
+
+
+def _rolled_off(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Straight up to the shoulder, then a logarithm that reaches 1 at _SPAN times white.
+
+    It works on the largest component and keeps the hue; what is far beyond white fades to white.
+    """
+    top = np.maximum(np.maximum(rgb[..., :1], rgb[..., 1:2]), rgb[..., 2:3])
+    over = np.maximum(top - _SHOULDER, 0.0)
+    room = 1 - _SHOULDER
+    rise = np.log1p(over / room) / np.log1p((_SPAN - _SHOULDER) / room)
+    # Match the slope at the shoulder: a rational start that meets the logarithm's end.
+    soft = _SHOULDER + room * np.maximum(rise, over / (over + room) * (1 - 1 / _SPAN))
+    target = np.where(top > _SHOULDER, np.minimum(soft, 1.0), top)
+    out = rgb * np.divide(target, top, out=np.ones_like(top), where=top > 0)
+    fade = np.clip(np.log2(np.maximum(top, 1e-9) / 2) / 5, 0, 1)
+    return np.asarray(out * (1 - fade) + target * fade)

@@ -1,0 +1,99 @@
+"""Weights of lamps and outdoor techniques for one view, from a small picture per emitter.
+
+No effects. A home has 12 to 18 lamps and most shadow rays of a uniform choice go to other rooms.
+The pilot renders 32x24 pixels with each emitter alone, in one launch, and chooses in proportion to
+the root of the mean square that a path brings from it, with a floor so that nothing is forgotten.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.transport.kernels.device_scene import Stage
+from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, Weights
+from pbrs_farm.transport.path_tracer import Lanes, trace
+
+LAMP_FLOOR: Final = 0.01
+_SUN_FLOOR: Final = 0.1
+_DOME_FLOOR: Final = 0.05
+_PILOT_SIZE: Final = (32, 24)
+
+
+def uniform_weights(n_lamps: int, n_portals: int) -> Weights:
+    """Every lamp and every outdoor technique alike."""
+    n_outdoor = FIRST_PORTAL + n_portals
+    return Weights(np.full(n_lamps, 1 / max(n_lamps, 1)), np.full(n_outdoor, 1 / n_outdoor))
+
+
+def weights_by_distance(
+    balls: NDArray[np.float64], place: NDArray[np.float64], n_portals: int
+) -> Weights:
+    """Lamps by 1 / distance squared (1 m at least) from a place (3,), outdoor techniques alike.
+
+    balls: (L, 4) centre and radius of each lamp.
+    """
+    squared = ((balls[:, :3] - place) ** 2).sum(1)
+    lamps = _with_floors(1 / np.maximum(squared, 1), np.full(len(balls), LAMP_FLOOR))
+    return Weights(lamps, uniform_weights(0, n_portals).outdoor)
+
+
+def pilot_weights(
+    stage: Stage,
+    emitters: Emitters,
+    camera: Camera,
+    n_lamps: int,
+    n_portals: int,
+    fields: LightFields,
+    seed: int,
+) -> Weights:
+    """Weights for a view; those that emitters carry already change the pilot's noise only."""
+    n_outdoor = FIRST_PORTAL + n_portals
+    width, height = _PILOT_SIZE
+    lanes = Lanes(
+        width, height, 0, fields.pilot_spp, seed, n_only_lamps=n_lamps, n_only_outdoor=n_outdoor
+    )
+    sums = trace(stage, emitters, camera.with_size(width, height), lanes, fields)
+    brought = ((sums.outdoor + sums.indoor) @ LUMINANCE / fields.pilot_spp).reshape(
+        width * height, n_lamps + n_outdoor
+    )
+    # A pixel's noise matters relative to its brightness.
+    bright = brought.sum(1, keepdims=True)
+    relative = brought / (bright + max(float(bright.mean()), 1e-12))
+    strength = np.sqrt((relative.astype(np.float64) ** 2).mean(0))
+    lamps = _with_floors(strength[:n_lamps], np.full(n_lamps, LAMP_FLOOR))
+    return Weights(lamps, outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0)))
+
+
+def outdoor_weights(
+    strength: NDArray[np.float64], brought: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Shares of sun, dome and portals from each one's strength and mean contribution.
+
+    Dome and portals are techniques for one emitter, the sky: the better of the two tells how
+    strong it is, and portals take most of it where most of its light comes through them.
+    """
+    portal = strength[FIRST_PORTAL:]
+    by_portals = float(np.sqrt((portal**2).sum()))
+    light = float(brought[DOME])
+    through = min(float(brought[FIRST_PORTAL:].sum()) / light, 1.0) if light > 0 else 0.0
+    share = 0.85 * through if through > 0.5 else 0.0
+    sky = min(float(strength[DOME]), by_portals) if share > 0 else float(strength[DOME])
+    within = portal / portal.sum() if portal.sum() > 0 else np.zeros(len(portal))
+    raw = np.array([float(strength[SUN]), sky * (1 - share), *(sky * share * within)])
+    return _with_floors(raw, np.array([_SUN_FLOOR, _DOME_FLOOR, *[LAMP_FLOOR] * len(portal)]))
+
+
+def _with_floors(strength: NDArray[np.float64], floors: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not len(strength):
+        return strength
+    total = strength.sum()
+    share = strength / total if total > 0 else np.full(len(strength), 1 / len(strength))
+    floored = np.maximum(share, floors)
+    # Round, so that the last bits of a sum never change a picture.
+    return np.asarray(np.round(floored / floored.sum(), 6))

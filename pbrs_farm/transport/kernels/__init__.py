@@ -1,0 +1,1 @@
+"""The parts of a light path as Dr.Jit kernels; no effects."""

@@ -1,0 +1,152 @@
+"""How a surface scatters light: evaluate, density, sample; kernels on Dr.Jit, no effects.
+
+One reflectance model for every material (two-sided, wi.z > 0 in the local frame):
+
+    f(wi, wo) = kd / pi                                       wo.z > 0, without a coat
+              + 28/23 kd/pi (1 - f0) a(wi) a(wo)              wo.z > 0, under a coat
+              + F(wi.h) D(h) G2(wi, wo) / (4 wi.z wo.z)       wo.z > 0, the coat
+              + tau / pi                                      wo.z < 0, translucent
+
+a(w) = 1 - (1 - w.z / 2)^5 (Ashikhmin and Shirley 2000), F is Schlick's, D and G2 are GGX with
+roughness alpha. It is reciprocal and reflects at most what arrives. Mirrors and thin glass are
+deltas, handled by the tracers: thin glass bends nothing, so light goes straight through it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from pbrs_farm.core.frames import LUMINANCE
+
+_SMOOTH_ALPHA = 0.1
+
+
+class Scatter(NamedTuple):
+    """A surface's parameters at a hit. kd, f0, tau: Color3f; alpha: 0 = no coat; kind: UInt32."""
+
+    kd: Any
+    f0: Any
+    tau: Any
+    alpha: Any
+    kind: Any
+
+
+def luminance(rgb: Any) -> Any:
+    """Luminance of linear sRGB."""
+    return rgb[0] * LUMINANCE[0] + rgb[1] * LUMINANCE[1] + rgb[2] * LUMINANCE[2]
+
+
+def evaluate(m: Scatter, wi: Any, wo: Any) -> tuple[Any, Any]:
+    """(f |cos wo|, density of sample() per solid angle); local directions, wi.z > 0."""
+    above = wo.z > 0
+    cos_o = dr.abs(wo.z)
+    has_coat = m.alpha > 0
+
+    # Diffuse below the coat, and through the sheet.
+    coupled = 28 / 23 * (1 - m.f0) * _ashikhmin(wi.z) * _ashikhmin(cos_o)
+    diffuse = m.kd * dr.select(has_coat, coupled, 1.0)
+    value = dr.select(above, diffuse, m.tau) * (cos_o * dr.inv_pi)
+
+    # The coat.
+    h = dr.normalize(wi + wo)
+    d = _ggx_d(h, m.alpha)
+    masking_i, masking_o = _lambda(wi, m.alpha), _lambda(wo, m.alpha)
+    fresnel = _schlick(m.f0, dr.maximum(dr.dot(wi, h), 0))
+    use_coat = has_coat & above
+    value += dr.select(use_coat, fresnel * (d / (4 * wi.z * (1 + masking_i + masking_o))), 0)
+
+    p_diffuse, p_coat = _lobes(m, wi)
+    p_sheet = 1 - p_diffuse - p_coat
+    density = dr.select(above, p_diffuse, p_sheet) * (cos_o * dr.inv_pi)
+    density += dr.select(use_coat, p_coat * d / (4 * wi.z * (1 + masking_i)), 0)
+    return value, density
+
+
+def sample(m: Scatter, wi: Any, lobe: Any, u: Any) -> Any:
+    """A direction wo drawn with the density of evaluate()."""
+    p_diffuse, p_coat = _lobes(m, wi)
+    cosine = mi.warp.square_to_cosine_hemisphere(u)
+    wo = dr.select(lobe < p_diffuse, cosine, mi.Vector3f(cosine.x, cosine.y, -cosine.z))
+    use_coat = (lobe >= p_diffuse) & (lobe < p_diffuse + p_coat)
+    h = _visible_normal(wi, dr.maximum(m.alpha, 1e-4), u)
+    return dr.select(use_coat, 2 * dr.dot(wi, h) * h - wi, wo)
+
+
+def is_smooth_lobe(m: Scatter) -> Any:
+    """Whether what is seen of a surface changes slowly with the direction it is seen from."""
+    return (m.alpha <= 0) | (m.alpha >= _SMOOTH_ALPHA)
+
+
+def steady_density(m: Scatter, ng: Any, w: Any) -> Any:
+    """A density per solid angle like sample()'s that does not depend on wi; world directions.
+
+    Positive wherever sample() may go from wi on the side of ng: a weight of the balance heuristic
+    that stays the same when wi moves.
+    """
+    through = dr.max(m.tau) > 0
+    diffuse, sheet = luminance(m.kd), luminance(m.tau)
+    above = dr.clip(diffuse / dr.maximum(diffuse + sheet, 1e-9), 0.05, 0.95)
+    cos = dr.dot(ng, w)
+    share = dr.select(through, dr.select(cos > 0, above, 1 - above), dr.select(cos > 0, 1, 0))
+    return share * (dr.abs(cos) * dr.inv_pi)
+
+
+def thin_glass_reflectance(cos_i: Any) -> Any:
+    """Share that a thin clear pane of index 1.5 reflects, all inner reflections counted."""
+    fresnel: Any = mi.fresnel
+    r = fresnel(dr.abs(cos_i), mi.Float(1.5))[0]
+    return 2 * r / (1 + r)
+
+
+def _lobes(m: Scatter, wi: Any) -> tuple[Any, Any]:
+    """(probability of the diffuse lobe, of the coat); the rest goes through the sheet."""
+    coat = dr.select(m.alpha > 0, dr.maximum(luminance(_schlick(m.f0, wi.z)), 0.05), 0)
+    diffuse, sheet = luminance(m.kd), luminance(m.tau)
+    total = diffuse + sheet + coat
+    empty = total <= 0
+    scale = dr.rcp(dr.select(empty, 1, total))
+    return dr.select(empty, 1, diffuse * scale), coat * scale
+
+
+def _ashikhmin(cos: Any) -> Any:
+    t = 1 - 0.5 * cos
+    return 1 - dr.square(dr.square(t)) * t
+
+
+def _schlick(f0: Any, cos: Any) -> Any:
+    t = 1 - cos
+    return f0 + (1 - f0) * (dr.square(dr.square(t)) * t)
+
+
+def _ggx_d(h: Any, alpha: Any) -> Any:
+    a2 = dr.square(alpha)
+    t = dr.square(h.z) * (a2 - 1) + 1
+    return dr.select(h.z > 0, a2 / dr.maximum(math.pi * dr.square(t), 1e-20), 0)
+
+
+def _lambda(w: Any, alpha: Any) -> Any:
+    cos2 = dr.maximum(dr.square(w.z), 1e-12)
+    return 0.5 * (dr.sqrt(1 + dr.square(alpha) * dr.maximum(1 - cos2, 0) / cos2) - 1)
+
+
+def _visible_normal(wi: Any, alpha: Any, u: Any) -> Any:
+    """A GGX normal as wi sees them (Heitz 2018)."""
+    v = dr.normalize(mi.Vector3f(alpha * wi.x, alpha * wi.y, wi.z))
+    length2 = dr.square(v.x) + dr.square(v.y)
+    t1 = dr.select(
+        length2 > 1e-12,
+        mi.Vector3f(-v.y, v.x, 0) * dr.rsqrt(dr.maximum(length2, 1e-12)),
+        mi.Vector3f(1, 0, 0),
+    )
+    t2 = dr.cross(v, t1)
+    r = dr.sqrt(u.x)
+    sin_phi, cos_phi = dr.sincos(2 * math.pi * u.y)
+    x = r * cos_phi
+    s = 0.5 * (1 + v.z)
+    y = (1 - s) * dr.safe_sqrt(1 - dr.square(x)) + s * r * sin_phi
+    n = x * t1 + y * t2 + dr.safe_sqrt(1 - dr.square(x) - dr.square(y)) * v
+    return dr.normalize(mi.Vector3f(alpha * n.x, alpha * n.y, dr.maximum(n.z, 1e-6)))

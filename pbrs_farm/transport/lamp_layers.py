@@ -1,0 +1,90 @@
+"""Indoor light by the lamp it comes from: layers, their table, other strengths; pure numpy, no effects.
+
+A lamp's number is its place in the scene, counted from 1. Lamps that bring nothing to a view have
+a row in the table and no layer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import RadianceImage
+from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.transport.light_result import LightResult
+from pbrs_farm.transport.scene_tables.lamp_emission import Lamp
+
+MAX_SUMS: Final = 2**32
+"""Sums of one launch (pixels x lamps x 3): the kernel counts them in 32 bits."""
+
+
+def with_lamps(
+    result: LightResult, sums: NDArray[np.float32] | None, spp: int, lamps: Sequence[Lamp]
+) -> LightResult:
+    """The result with a layer for each lamp that brings light, and indoor their sum to the bit.
+
+    sums: (H * W, L, 3) over spp samples, None in a house without lamps.
+    """
+    shape = result.indoor.shape
+    by_lamp = [] if sums is None else [sums[:, k] for k in range(sums.shape[1])]
+    layers = {
+        number: np.ascontiguousarray((total / np.float32(spp)).reshape(shape))
+        for number, total in enumerate(by_lamp, start=1)
+        if total.any()
+    }
+    indoor = indoor_from_lamps(layers, {}, shape)
+    facts = {**result.facts, "lamps": lamp_table(lamps, layers, indoor)}
+    return replace(result, indoor=indoor, lamps=layers, facts=facts)
+
+
+def indoor_from_lamps(
+    layers: Mapping[int, RadianceImage],
+    factors: Mapping[int, NDArray[np.float32]],
+    shape: tuple[int, ...],
+) -> RadianceImage:
+    """Sum of the lamps' layers in the order of their numbers, each times its factor.
+
+    factors: number -> (3,) of R, G and B; 1 where there is none. shape: (H, W, 3).
+    """
+    total = np.zeros(shape, np.float32)
+    for number in sorted(layers):
+        factor = factors.get(number)
+        total += layers[number] if factor is None else layers[number] * factor
+    return total
+
+
+def lamp_table(
+    lamps: Sequence[Lamp], layers: Mapping[int, RadianceImage], indoor: RadianceImage
+) -> list[dict[str, Any]]:
+    """A row per lamp for view.json: number, item, instance, room, lm, share, layer.
+
+    item: id of the item that holds it, item/0, item/1 where that has several; instance: of the
+    item. lm: its flux. share: its part of the view's indoor light, by mean luminance. layer: its
+    name in radiance.exr, None when it brings nothing.
+    """
+    whole = float((indoor @ LUMINANCE).mean(dtype=np.float64))
+    rows: list[dict[str, Any]] = []
+    for number, lamp in enumerate(lamps, start=1):
+        layer = layers.get(number)
+        mean = 0.0 if layer is None else float((layer @ LUMINANCE).mean(dtype=np.float64))
+        rows.append(
+            {
+                "number": number,
+                "item": lamp.name,
+                "instance": lamp.item + 1,
+                "room": lamp.room_id,
+                "lm": round(lamp.flux_lm, 1),
+                "share": round(mean / whole, 6) if whole > 0 else 0.0,
+                "layer": None if layer is None else layer_name(number),
+            }
+        )
+    return rows
+
+
+def layer_name(number: int) -> str:
+    """The layer of a lamp in radiance.exr."""
+    return f"lamp{number}"

@@ -1,0 +1,155 @@
+"""What a light render gives, and its noise; pure numpy, no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import RadianceImage, UnitVectors
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
+from pbrs_farm.core.recipe import LightFields
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LightResult:
+    """The light of one view by groups, W m-2 sr-1, raw (not denoised).
+
+    outdoor, indoor: (H, W, 3) float32, finite, >= 0. albedo: (H, W, 3) in 0..1 and normal:
+    (H, W, 3) world, of the first surface that is neither mirror nor glass: for the denoiser.
+    noise: relative error of each group and of their sum, estimated from two half buffers.
+    spp: samples (or mutations) per pixel. n_nonfinite: contributions replaced by nothing.
+    facts: for view.json: integrator, weights of lamps, seed.
+    lamps: number -> (H, W, 3), what indoor is the sum of, when light.groups is "lamps".
+    """
+
+    outdoor: RadianceImage
+    indoor: RadianceImage
+    albedo: RadianceImage
+    normal: UnitVectors
+    noise: dict[str, float]
+    spp: int
+    n_nonfinite: int
+    facts: dict[str, Any] = field(default_factory=dict)
+    lamps: Mapping[int, RadianceImage] = field(default_factory=dict)
+
+    def group(self, group: Group) -> RadianceImage:
+        """The picture of one light group."""
+        return self.outdoor if group is Group.OUTDOOR else self.indoor
+
+    def mode(self, mode: Mode) -> RadianceImage:
+        """The sum of the groups that make a lighting mode; ValueError for an OpenGL mode."""
+        groups = GROUPS_OF_MODE[mode]
+        if not groups:
+            raise ValueError(f"{mode} is no sum of light groups")
+        total = self.group(groups[0])
+        for group in groups[1:]:
+            total = total + self.group(group)
+        return total
+
+
+def relative_noise(half_a: NDArray[np.floating], half_b: NDArray[np.floating]) -> float:
+    """Relative error of the mean of two independent halves, (H, W, 3) each; 0 for black pictures.
+
+    The root mean square over pixels of |a - b| / 2 against the pixel's luminance, brought towards
+    the picture's mean by a tenth so that black pixels do not rule; the largest 0.1 % of pixels
+    are left out, as fireflies would make the estimate itself noise.
+    """
+    a, b = half_a @ LUMINANCE, half_b @ LUMINANCE
+    mean = 0.5 * (a + b)
+    level = float(mean.mean())
+    if level <= 0:
+        return 0.0
+    error = np.sort(((0.5 * (a - b)) / (mean + 0.1 * level)).ravel() ** 2)
+    kept = error[: max(int(len(error) * 0.999), 1)]
+    return float(np.sqrt(kept.mean()))
+
+
+class GroupSums(Protocol):
+    """Sums over n samples of each pixel, row by row, (N, 3); *_even: of every second sample."""
+
+    outdoor: NDArray[np.float32]
+    indoor: NDArray[np.float32]
+    outdoor_even: NDArray[np.float32]
+    indoor_even: NDArray[np.float32]
+    albedo: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    n_bad: int
+
+
+def result_from_sums(
+    sums: GroupSums, camera: Camera, spp: int, facts: dict[str, Any]
+) -> LightResult:
+    """Means of spp samples per pixel, with the noise that even and odd samples tell."""
+    shape = (camera.intrinsics.height_px, camera.intrinsics.width_px, 3)
+    n_even = max((spp + 1) // 2, 1)
+    n_odd = max(spp - n_even, 1)
+
+    def picture(values: NDArray[np.float32], n: int) -> NDArray[np.float32]:
+        return np.ascontiguousarray((values / np.float32(n)).reshape(shape))
+
+    even = picture(sums.outdoor_even, n_even), picture(sums.indoor_even, n_even)
+    odd = (
+        picture(sums.outdoor - sums.outdoor_even, n_odd),
+        picture(sums.indoor - sums.indoor_even, n_odd),
+    )
+    normal = picture(sums.normal, spp)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    return LightResult(
+        picture(sums.outdoor, spp),
+        picture(sums.indoor, spp),
+        np.clip(picture(sums.albedo, spp), 0, 1),
+        np.where(length > 0, normal / np.maximum(length, 1e-6), 0).astype(np.float32),
+        _noises(even, odd),
+        spp,
+        sums.n_bad,
+        facts,
+    )
+
+
+def joined_result(
+    direct: LightResult | None,
+    guides: LightResult,
+    halves: Mapping[Group, tuple[RadianceImage, ...]],
+    n_bad: int,
+    facts: dict[str, Any],
+    fields: LightFields,
+) -> LightResult:
+    """Two half buffers of each group, plus direct light when it is separate.
+
+    guides: whose albedo and normal are kept. The noise is that of the halves; direct light's own
+    is left out (it has many more samples).
+    """
+    base = {
+        Group.OUTDOOR: direct.outdoor if direct else np.float32(0),
+        Group.INDOOR: direct.indoor if direct else np.float32(0),
+    }
+    a = [np.asarray(base[g] + halves[g][0], np.float32) for g in Group]
+    b = [np.asarray(base[g] + halves[g][1], np.float32) for g in Group]
+    outdoor, indoor = (np.float32(0.5) * (x + y) for x, y in zip(a, b, strict=True))
+    spp = fields.mutations_per_pixel if fields.integrator == "metropolis" else fields.spp
+    return LightResult(
+        outdoor,
+        indoor,
+        guides.albedo,
+        guides.normal,
+        _noises((a[0], a[1]), (b[0], b[1])),
+        spp,
+        n_bad,
+        facts,
+    )
+
+
+def _noises(
+    a: tuple[RadianceImage, RadianceImage], b: tuple[RadianceImage, RadianceImage]
+) -> dict[str, float]:
+    return {
+        "outdoor": relative_noise(a[0], b[0]),
+        "indoor": relative_noise(a[1], b[1]),
+        "sum": relative_noise(a[0] + a[1], b[0] + b[1]),
+    }

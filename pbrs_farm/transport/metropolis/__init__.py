@@ -1,0 +1,1 @@
+"""Metropolis light transport over the camera path."""

@@ -1,0 +1,1 @@
+"""A house as flat tables that the kernels gather from; pure numpy."""

@@ -1,0 +1,48 @@
+"""The openings through which daylight enters, as rectangles to sample; pure numpy, no effects."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import House, MaterialKind
+
+MAX_PORTALS: Final = 6
+
+
+def portals_of_house(house: House) -> NDArray[np.float64]:
+    """(K, 4, 3) rectangles through which daylight enters: windows, and doors with panes."""
+    glazed = {
+        item.id
+        for item in house.items
+        if any(house.materials[s.material].kind is MaterialKind.PANE for s in item.surfaces)
+    }
+    quads = [
+        np.asarray(o.quad, np.float64)
+        for o in house.openings
+        if (o.is_window or o.item_id in glazed) and _is_rectangle(np.asarray(o.quad))
+    ]
+    return np.array(quads).reshape(-1, 4, 3)
+
+
+def nearest_portals(portals: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
+    """At most MAX_PORTALS of them, those that subtend most at eye (3,)."""
+    if len(portals) <= MAX_PORTALS:
+        return portals
+    area = np.linalg.norm(
+        np.cross(portals[:, 1] - portals[:, 0], portals[:, 3] - portals[:, 0]), axis=1
+    )
+    distance = np.linalg.norm(portals.mean(1) - eye, axis=1)
+    order = np.argsort(-area / np.maximum(distance, 0.1) ** 2, kind="stable")
+    return np.asarray(portals[np.sort(order[:MAX_PORTALS])])
+
+
+def _is_rectangle(quad: NDArray[np.floating]) -> bool:
+    if quad.shape != (4, 3) or not np.isfinite(quad).all():
+        return False
+    a, b = quad[1] - quad[0], quad[3] - quad[0]
+    size = np.linalg.norm(a) * np.linalg.norm(b)
+    closes = np.linalg.norm(quad[0] + a + b - quad[2]) < 1e-3 * (1 + np.sqrt(size))
+    return bool(size > 1e-4 and abs(a @ b) < 1e-2 * size and closes)

@@ -1,0 +1,290 @@
+"""Outdoor light as one latitude-longitude picture of the dome and one sun; no effects.
+
+Both kinds of sky, analytic and panorama, end here on one photometric scale (spec/sky.md): the
+dome without its sun gives `sky_lx` on open level ground, the sun at most `sun_lx` more. Rows run
+from the zenith (+y, row 0) to the nadir, columns with the azimuth atan2(x, -z).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.raycast.variant import choose_variant, mitsuba
+
+DOME_SHAPE: Final = (256, 512)
+SUN_HALF_ANGLE_RAD: Final = math.radians(0.5358 / 2)
+GROUND_ALBEDO: Final = 0.2
+NO_SKIES: Final = ("interior", "studio", "courtyard", "night")
+"""Panoramas of Debian's blender-data that show no daylight sky."""
+
+_SUN_ELEVATION_DEG: Final = (15.0, 60.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sky:
+    """Light from outside, in the world frame.
+
+    name: what it is, for view.json. dome: (H, W, 3) float32 radiance in W m-2 sr-1, sun removed.
+    sun_direction: (3,) unit, towards the sun. sun_irradiance: (3,) W m-2 on a surface that faces
+    the sun, linear RGB; zeros = no sun. sun_half_angle_rad: of its disc. rotation_rad: how far
+    the source was turned about +y. scale: what its radiance was multiplied by.
+    """
+
+    name: str
+    dome: NDArray[np.float32]
+    sun_direction: NDArray[np.float64]
+    sun_irradiance: NDArray[np.float64]
+    sun_half_angle_rad: float = SUN_HALF_ANGLE_RAD
+    rotation_rad: float = 0.0
+    scale: float = 1.0
+
+    @property
+    def sky_lx(self) -> float:
+        """Illuminance of open level ground by the dome alone."""
+        return LM_PER_W * float(horizontal_irradiance(self.dome) @ LUMINANCE)
+
+    @property
+    def sun_lx(self) -> float:
+        """Illuminance of open level ground by the sun alone."""
+        up = max(float(self.sun_direction[1]), 0.0)
+        return LM_PER_W * float(self.sun_irradiance @ LUMINANCE) * up
+
+    def facts(self) -> dict[str, Any]:
+        """What view.json says of the sky."""
+        x, y, z = (float(v) for v in self.sun_direction)
+        return {
+            "name": self.name,
+            "rotation_deg": round(math.degrees(self.rotation_rad), 3),
+            "scale": float(self.scale),
+            "sky_lx": round(self.sky_lx, 1),
+            "sun_lx": round(self.sun_lx, 1),
+            "sun_direction": [round(v, 6) for v in (x, y, z)],
+            "sun_elevation_deg": round(math.degrees(math.asin(max(-1.0, min(1.0, y)))), 3),
+        }
+
+
+def dark_sky() -> Sky:
+    """No light from outside."""
+    return Sky("none", np.zeros((2, 4, 3), np.float32), np.array([0.0, 1.0, 0.0]), np.zeros(3))
+
+
+def uniform_sky(radiance: tuple[float, float, float]) -> Sky:
+    """The same radiance from every direction, no sun: the furnace of the tests."""
+    dome = np.broadcast_to(np.array(radiance, np.float32), (16, 32, 3)).copy()
+    return Sky("uniform", dome, np.array([0.0, 1.0, 0.0]), np.zeros(3))
+
+
+def choose_panorama(names: list[str], house_id: str, seed: int) -> str:
+    """The panorama of a house, the same at every run; known non-skies are passed over.
+
+    Raises BadRecipe when no name is left.
+    """
+    skies = sorted(n for n in names if not any(word in n.lower() for word in NO_SKIES))
+    if not skies:
+        raise BadRecipe(
+            "sky.panoramas: no outdoor panorama in the folder",
+            hint="latitude-longitude .exr or .hdr files; `blender-data` has some",
+        )
+    return skies[keys.seed("panorama", house_id, seed) % len(skies)]
+
+
+def sky_for_house(
+    recipe: Recipe,
+    house_id: str,
+    *,
+    panorama: tuple[str, NDArray[np.floating]] | None = None,
+) -> Sky:
+    """The sky of a house under a recipe; panorama: (name, (H, W, 3) linear radiance, row 0 = up).
+
+    Raises BadRecipe when the recipe wants a panorama and none is given, or its shape is not 2:1.
+    """
+    if recipe.sky.kind == "panorama":
+        if panorama is None:
+            raise BadRecipe(
+                "sky.kind is panorama and no panorama is given",
+                hint="--set sky.panoramas=FOLDER, or --set sky.kind=sunsky",
+            )
+        rotation = _uniform(house_id, recipe.seed, "rotation") * 2 * math.pi
+        return sky_from_panorama(panorama[0], panorama[1], recipe, rotation_rad=rotation)
+    low, high = _SUN_ELEVATION_DEG
+    elevation = math.radians(low + (high - low) * _uniform(house_id, recipe.seed, "elevation"))
+    azimuth = _uniform(house_id, recipe.seed, "azimuth") * 2 * math.pi
+    return sunsky(recipe, elevation_rad=elevation, azimuth_rad=azimuth)
+
+
+def sunsky(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
+    """Hosek and Wilkie's clear sky (Mitsuba's `sunsky`) with the sun at that place."""
+    sun = np.array(
+        [
+            math.cos(elevation_rad) * math.sin(azimuth_rad),
+            math.sin(elevation_rad),
+            -math.cos(elevation_rad) * math.cos(azimuth_rad),
+        ]
+    )
+    dome, sun_rgb = _hosek(sun)
+    dome[dome.shape[0] // 2 :] = 0.0
+    scale = recipe.emission.sky_lx / (LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE))
+    dome *= scale
+
+    # The sun at the zenith gives sun_lx; lower, more air lies before it (optical depth 0.21).
+    air_mass = 1.0 / max(sun[1], 0.05)
+    lux = recipe.emission.sun_lx * math.exp(-0.21 * (air_mass - 1.0))
+    irradiance = sun_rgb / (sun_rgb @ LUMINANCE) * lux / LM_PER_W
+    return _with_ground(Sky("sunsky", dome, sun, irradiance, scale=scale))
+
+
+def sky_from_panorama(
+    name: str, rgb: NDArray[np.floating], recipe: Recipe, *, rotation_rad: float
+) -> Sky:
+    """A panorama with its sun taken out, both on the photometric scale; the ground stays as it is.
+
+    In the preset `released` the picture is used whole, times `released_sky`, unturned.
+    """
+    if rgb.ndim != 3 or rgb.shape[1] != 2 * rgb.shape[0] or rgb.shape[2] < 3:
+        raise BadRecipe(f"panorama {name}: expected (H, 2 H, 3), got {rgb.shape}")
+    picture = np.maximum(np.nan_to_num(np.asarray(rgb[..., :3], np.float64)), 0.0)
+    if recipe.emission.preset == "released":
+        scale = recipe.emission.released_sky
+        return Sky(
+            name,
+            (picture * scale).astype(np.float32),
+            np.array([0.0, 1.0, 0.0]),
+            np.zeros(3),
+            scale=scale,
+        )
+    shift = round(rotation_rad / (2 * math.pi) * picture.shape[1])
+    picture = np.roll(picture, shift, axis=1)
+    dome, sun, irradiance = _without_sun(picture)
+    level = LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE)
+    if level <= 0:
+        raise BadRecipe(f"panorama {name}: its upper half is black")
+    scale = recipe.emission.sky_lx / level
+    irradiance = irradiance * scale
+    level_sun = LM_PER_W * float(irradiance @ LUMINANCE) * max(sun[1], 0.0)
+    if level_sun > recipe.emission.sun_lx:
+        irradiance = irradiance * (recipe.emission.sun_lx / level_sun)
+    return Sky(
+        name,
+        (dome * scale).astype(np.float32),
+        sun,
+        irradiance,
+        rotation_rad=shift / picture.shape[1] * 2 * math.pi,
+        scale=scale,
+    )
+
+
+def directions(height: int, width: int) -> NDArray[np.float64]:
+    """(H, W, 3) unit directions of the texels' centres."""
+    theta = (np.arange(height) + 0.5) / height * math.pi
+    phi = (np.arange(width) + 0.5) / width * 2 * math.pi
+    s = np.sin(theta)[:, None]
+    return np.stack(
+        [
+            s * np.sin(phi),
+            np.broadcast_to(np.cos(theta)[:, None], (height, width)),
+            -s * np.cos(phi),
+        ],
+        -1,
+    )
+
+
+def solid_angles(height: int, width: int) -> NDArray[np.float64]:
+    """(H,) exact solid angle of one texel of each row, sr."""
+    edges = np.cos(np.arange(height + 1) / height * math.pi)
+    return np.asarray((edges[:-1] - edges[1:]) * 2 * math.pi / width)
+
+
+def horizontal_irradiance(dome: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(3,) irradiance of level open ground by the upper half of a latitude-longitude picture."""
+    height, width = dome.shape[:2]
+    up = np.maximum(directions(height, width)[..., 1], 0.0)
+    weight = up * solid_angles(height, width)[:, None]
+    return np.asarray(np.einsum("hwc,hw->c", np.asarray(dome, np.float64), weight))
+
+
+def _with_ground(sky: Sky) -> Sky:
+    # Below the horizon lies grey ground, lit by the whole sky.
+    ground = horizontal_irradiance(sky.dome) + sky.sun_irradiance * max(sky.sun_direction[1], 0.0)
+    dome = sky.dome.copy()
+    dome[dome.shape[0] // 2 :] = (GROUND_ALBEDO * ground / math.pi).astype(np.float32)
+    return Sky(
+        sky.name, dome, sky.sun_direction, sky.sun_irradiance, rotation_rad=0.0, scale=sky.scale
+    )
+
+
+def _hosek(sun: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """(dome (256, 512, 3) unscaled, colour of the sun (3,)) for a sun direction, world frame."""
+    variant = choose_variant()
+    mi = mitsuba(variant)
+    way = directions(*DOME_SHAPE).reshape(-1, 3)
+
+    # Mitsuba's sky has +z up: world (x, y, z) is its (x, -z, y).
+    def turned(v: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.stack([v[..., 0], -v[..., 2], v[..., 1]], -1)
+
+    fields = {"type": "sunsky", "sun_direction": [float(v) for v in turned(sun)]}
+    sky = mi.load_dict({**fields, "sun_scale": 0.0})
+    disc = mi.load_dict({**fields, "sky_scale": 0.0})
+    dome = _evaluated(mi, variant, sky, turned(way)).reshape(*DOME_SHAPE, 3)
+    return dome, _evaluated(mi, variant, disc, turned(sun)[None])[0].astype(np.float64)
+
+
+def _evaluated(
+    mi: Any, variant: str, emitter: Any, ways: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    if variant.startswith("scalar"):
+        rows = []
+        for way in ways:
+            si = mi.SurfaceInteraction3f()
+            si.wi = mi.Vector3f(*(-way))
+            rows.append(np.asarray(emitter.eval(si), np.float32))
+        return np.stack(rows)
+    import drjit as dr
+
+    si = dr.zeros(mi.SurfaceInteraction3f, len(ways))
+    si.wi = mi.Vector3f(*(np.ascontiguousarray(-ways[:, k], np.float32) for k in range(3)))
+    return np.asarray(emitter.eval(si).numpy().T, np.float32)
+
+
+def _without_sun(
+    picture: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """(picture without its sun, unit direction, irradiance facing it) of a panorama.
+
+    The sun is what lies within 4 degrees of the brightest texel and is above 20 times the sky's
+    mean luminance there; it is replaced by the mean of the ring of 4 to 6 degrees around it.
+    """
+    height, width = picture.shape[:2]
+    luminance = picture @ LUMINANCE
+    upper = luminance[: height // 2]
+    way = directions(height, width)
+    row, column = np.unravel_index(int(np.argmax(upper)), upper.shape)
+    peak = way[row, column]
+    near = way @ peak
+    ring = (near < math.cos(math.radians(4))) & (near > math.cos(math.radians(6)))
+    level = float(np.mean(luminance[ring])) if ring.any() else float(np.mean(upper))
+    disc = (near >= math.cos(math.radians(4))) & (luminance > 20 * max(level, 1e-9))
+    if not disc.any():
+        return picture, peak, np.zeros(3)
+    filling = picture[ring].mean(0) if ring.any() else np.full(3, level)
+    weight = np.broadcast_to(solid_angles(height, width)[:, None], disc.shape)[disc]
+    excess = np.maximum(picture[disc] - filling, 0.0)
+    irradiance = np.asarray((excess * weight[:, None]).sum(0))
+    strength = excess @ LUMINANCE * weight
+    sun = (way[disc] * strength[:, None]).sum(0)
+    out = picture.copy()
+    out[disc] = filling
+    return out, sun / np.linalg.norm(sun), irradiance
+
+
+def _uniform(house_id: str, seed: int, what: str) -> float:
+    return keys.seed("sky", what, house_id, seed) / 2**32

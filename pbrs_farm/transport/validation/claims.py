@@ -1,0 +1,279 @@
+"""The claims of `pbrs-farm verify --light`: each measured here and now against what is known.
+
+Rooms are built in code and small. Noisy claims say how many standard errors are allowed: with
+other seeds a correct renderer would miss one of all of them about once in a thousand runs. Seeds
+are fixed, so that one machine says the same at every run. Effects: renders.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.house import House
+from pbrs_farm.core.lighting import Group, Mode
+from pbrs_farm.core.recipe import LightFields, Recipe
+from pbrs_farm.transport.light_result import LightResult
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky, uniform_sky
+from pbrs_farm.transport.validation import known_rooms as rooms
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
+
+_SIGMAS: Final = 5.0
+"""Of a single mean whose error is known from twelve runs; missed by chance once in 2,500."""
+
+_BLOCK_SIGMAS: Final = 5.0
+"""Of the worst of 16 blocks, four runs each, pooled; missed by chance once in 20,000."""
+
+_PATH: Final = LightFields(filter="box", pilot_spp=0, denoise=False)
+_CHAINS: Final = LightFields(
+    integrator="metropolis",
+    filter="box",
+    denoise=False,
+    direct_spp=32,
+    mutations_per_pixel=128,
+    chains=2048,
+)
+_FEW_CHAINS: Final = _CHAINS.model_copy(update={"mutations_per_pixel": 64})
+_SKY_OF_ONE: Final = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """One thing that must hold, what was found, and whether it does. seconds: to find out."""
+
+    text: str
+    measured: str
+    expected: str
+    passed: bool
+    seconds: float = 0.0
+
+
+def light_claims(variant: str) -> Iterator[Claim]:
+    """Every claim, one after the other, in the Mitsuba variant. Under a minute on two cores.
+
+    Raises MachineFailed in a scalar variant: our kernels do not run there.
+    """
+    if variant.startswith("scalar"):
+        raise MachineFailed(
+            "the light's kernels need LLVM or CUDA, nothing to prove in scalar_rgb",
+            hint="sudo apt-get install -y libllvm19",
+        )
+    for prove in _CLAIMS:
+        began = time.perf_counter()
+        claim = prove(variant)
+        yield replace(claim, seconds=round(time.perf_counter() - began, 2))
+
+
+def _rendered(
+    variant: str, room: tuple[House, Camera], sky: Sky, fields: LightFields, *seeds: int
+) -> list[LightResult]:
+    scene = LightScene.load(room[0], {}, Recipe(), sky, variant=variant)
+    return [scene.render(room[1], "0_0", fields, seed) for seed in seeds]
+
+
+def _spp(n: int, **more: object) -> LightFields:
+    return _PATH.model_copy(update={"spp": n, **more})
+
+
+# Closed forms
+
+
+def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], Claim]:
+    def prove(variant: str) -> Claim:
+        results = _rendered(variant, rooms.furnace(albedo), dark_sky(), fields, *range(12))
+        means = [float((r.indoor @ LUMINANCE).mean()) for r in results]
+        expected = sum(albedo**k for k in range(fields.max_depth))
+        error = max(float(np.std(means, ddof=1)) / math.sqrt(len(means)), 5e-4 * expected)
+        return Claim(
+            f"furnace room, {name}: the geometric series, albedo {albedo:g}",
+            f"{np.mean(means):.5f}",
+            f"{expected:.5f} +- {_SIGMAS * error:.5f}",
+            abs(float(np.mean(means)) - expected) <= _SIGMAS * error
+            and error < 0.01 * expected
+            and not any(r.outdoor.any() for r in results),
+        )
+
+    return prove
+
+
+def _floor(variant: str) -> Claim:
+    ground = rooms.quad([(-50, 0, -50), (-50, 0, 50), (50, 0, 50), (50, 0, -50)], 0)
+    house = rooms.house(
+        [ground], [rooms.matte("floor", 0.5), rooms.BULB], lamps=[rooms.bulb((0, 1, 0), 1, 1000.0)]
+    )
+    camera = rooms.camera((1.5, 0.3, 0), (1, 0, 0), 8, 8, 0.01)
+    (result,) = _rendered(variant, (house, camera), dark_sky(), _spp(1024), 1)
+    lux = 1000 / (4 * math.pi) / 2**1.5
+    return _near(
+        "a bulb of 1,000 lm lights a floor by distance and cosine",
+        float((result.indoor @ LUMINANCE).mean()) * math.pi / 0.5 * 179,
+        lux,
+        0.01,
+        "lx",
+    )
+
+
+def _open_ground(variant: str) -> Claim:
+    ground = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
+    house = rooms.house([ground], [rooms.matte("ground", 0.2)], size=(2.0, 2.5, 2.0))
+    sky = sunsky(Recipe(), elevation_rad=math.radians(40), azimuth_rad=0.5)
+    lux = LightScene.load(house, {}, Recipe(), sky, variant=variant).floor_lux(house)["0_0"]
+    text = "open ground has the sky's 10,000 lx and the sun's"
+    return _near(text, lux["outdoor"], sky.sky_lx + sky.sun_lx, 0.02, "lx")
+
+
+def _near(text: str, measured: float, expected: float, tolerance: float, unit: str) -> Claim:
+    return Claim(
+        text,
+        f"{measured:.6g} {unit}",
+        f"{expected:.6g} {unit} +- {tolerance:.0%}",
+        abs(measured - expected) <= tolerance * expected,
+    )
+
+
+# Two estimators, one mean
+
+
+def _window() -> tuple[House, Camera]:
+    return rooms.window_room(0.7, lumen=800)
+
+
+def _sun() -> Sky:
+    return sunsky(Recipe(), elevation_rad=0.6, azimuth_rad=0.35)
+
+
+def _metropolis_is_path(
+    name: str, room: Callable[[], tuple[House, Camera]], sky: Callable[[], Sky]
+) -> Callable[[str], Claim]:
+    def prove(variant: str) -> Claim:
+        path = _spp(256, pilot_spp=4)
+        a = _rendered(variant, room(), sky(), _CHAINS, 50, 51, 52, 53)
+        b = _rendered(variant, room(), sky(), path, 10, 11, 12, 13)
+        return _one_mean(f"Metropolis has the mean of path: {name}", a, b)
+
+    return prove
+
+
+def _direct_and_rest(variant: str) -> Claim:
+    whole = _CHAINS.model_copy(update={"direct_spp": 0, "mutations_per_pixel": 256})
+    a = _rendered(variant, _window(), _sun(), _CHAINS, 20, 21, 22, 23)
+    b = _rendered(variant, _window(), _sun(), whole, 30, 31, 32, 33)
+    return _one_mean("direct by path + the rest by chains = all light by chains", a, b)
+
+
+def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> Claim:
+    worst, n = 0.0, 0
+    for group in Group:
+        x, y = ([blocks(r.group(group)) for r in results] for results in (a, b))
+        lit = (np.mean(x, 0) > 0) & (np.mean(y, 0) > 0)
+        if not np.array_equal(np.mean(x, 0) > 0, np.mean(y, 0) > 0):
+            worst = math.inf
+        if lit.any():
+            z = z_scores([v[lit] for v in x], [v[lit] for v in y])
+            worst, n = max(worst, float(np.abs(z).max())), n + z.size
+    return Claim(
+        text, f"worst |z| {worst:.2f} of {n} blocks", f"< {_BLOCK_SIGMAS:g}", worst < _BLOCK_SIGMAS
+    )
+
+
+# Exact facts
+
+
+def _groups_sum(variant: str) -> Claim:
+    dim = rooms.window_room(0.7, lumen=1e-30)
+    lit = _window()
+    (both,) = _rendered(variant, lit, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
+    (day,) = _rendered(variant, dim, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
+    (night,) = _rendered(variant, lit, dark_sky(), _spp(16), 1)
+    off = float(np.abs(both.mode(Mode.MLT_IL_OL) - (day.outdoor + night.indoor)).max())
+    return Claim(
+        "sky alone + lamps alone = both in one trace, to the bit",
+        f"largest difference {off:g}",
+        "0",
+        off == 0 and bool(both.outdoor.any()) and bool(both.indoor.any()),
+    )
+
+
+def _twice(variant: str) -> Claim:
+    (one,) = _rendered(variant, _window(), uniform_sky((1, 1, 1)), _spp(16), 1)
+    (two,) = _rendered(
+        variant, rooms.window_room(0.7, lumen=1600), uniform_sky((2, 2, 2)), _spp(16), 1
+    )
+    a, b = one.mode(Mode.MLT_IL_OL), two.mode(Mode.MLT_IL_OL)
+    off = float(np.abs(b - 2 * a).max())
+    return Claim(
+        "emitters x 2 = radiance x 2, to the bit",
+        f"mean x {b.mean() / a.mean():.7f}, largest difference {off:g}",
+        "x 2, 0",
+        off == 0 and bool(a.any()),
+    )
+
+
+def _sealed(variant: str) -> Claim:
+    room = rooms.house(rooms.shell((4, 2.5, 4), 0), [rooms.matte("wall", 0.9)])
+    camera = rooms.camera((0.5, 1.5, 0.5), (3.9, 0.2, 3.9))
+    (result,) = _rendered(variant, (room, camera), _sun(), _spp(64), 1)
+    top = float(max(result.outdoor.max(), result.indoor.max()))
+    return Claim("a sealed room under a bright sky is black", f"max {top:g}", "0", top == 0)
+
+
+def _pane(variant: str) -> Claim:
+    glazed = rooms.window_room(0.7, lumen=800, pane=True)
+    (a,) = _rendered(variant, _window(), _sun(), _spp(16), 1)
+    (b,) = _rendered(variant, glazed, _sun(), _spp(16), 1)
+    off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
+    return Claim(
+        "a pane in the window changes no bit", f"largest difference {off:g}", "0", off == 0
+    )
+
+
+def _repeats(variant: str) -> Claim:
+    a, b, c = _rendered(variant, _window(), _sun(), _spp(16), 7, 7, 8)
+    off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
+    differs = bool((a.indoor != c.indoor).any())
+    return Claim(
+        "path: the same seed gives the same bits, another does not",
+        f"largest difference {off:g}, other seed {'differs' if differs else 'is the same'}",
+        "0, differs",
+        off == 0 and differs,
+    )
+
+
+def _nonfinite(variant: str) -> Claim:
+    # A lamp of infinite power beside the window: whatever sees it is no number.
+    room = rooms.window_room(0.7, lumen=math.inf)
+    (path,) = _rendered(variant, room, _sun(), _spp(16), 1)
+    finite = bool(np.isfinite(path.outdoor).all() and np.isfinite(path.indoor).all())
+    n_paths = 16 * path.outdoor.shape[0] * path.outdoor.shape[1]
+    return Claim(
+        "what is not finite is left out and counted",
+        f"{path.n_nonfinite} of {n_paths} paths, picture {'finite' if finite else 'not finite'}",
+        "> 0, finite",
+        finite and 0 < path.n_nonfinite <= n_paths,
+    )
+
+
+_CLAIMS: Final[tuple[Callable[[str], Claim], ...]] = (
+    *(_furnace(_spp(128), "path", albedo) for albedo in (0.0, 0.3, 0.8)),
+    *(_furnace(_FEW_CHAINS, "Metropolis", albedo) for albedo in (0.3, 0.8)),
+    _floor,
+    _open_ground,
+    _metropolis_is_path("sun through a window", _window, _sun),
+    _metropolis_is_path("door ajar", rooms.door_ajar, dark_sky),
+    _direct_and_rest,
+    _groups_sum,
+    _twice,
+    _sealed,
+    _pane,
+    _repeats,
+    _nonfinite,
+)

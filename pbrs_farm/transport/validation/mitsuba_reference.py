@@ -1,0 +1,164 @@
+"""The same light by Mitsuba's own plugins and path integrator: fallback and cross-check.
+
+Effects: holds Mitsuba scenes. `scalar_rgb` has no Dr.Jit arrays, so our kernels cannot run there;
+this renders instead, slowly. In tests it is the independent second opinion: Mitsuba's shapes,
+emitters, materials and integrator, built from the same tables. Coats become `roughplastic`, which
+is like our model but not equal to it; diffuse scenes agree exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.lighting import Group
+from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.raycast.variant import mitsuba
+from pbrs_farm.transport.scene_tables.material_rows import GLASS, HOLE, MIRROR
+from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
+from pbrs_farm.transport.scene_tables.sky import Sky
+
+
+class ReferenceScene:
+    """A house in Mitsuba's plugins, one scene per light group. Textures are their mean colour."""
+
+    def __init__(self, tables: SceneTables, sky: Sky, variant: str) -> None:
+        self._variant = variant
+        self._tables = tables
+        self._sky = sky
+        self._scenes: dict[Group, Any] = {}
+
+    def render(
+        self, camera: Camera, group: Group, fields: LightFields, seed: int
+    ) -> NDArray[np.float32]:
+        """(H, W, 3) radiance of one group; fields.spp, max_depth and rr_depth count."""
+        mi = mitsuba(self._variant)
+        scene = self._scene(group)
+        integrator = mi.load_dict(
+            {"type": "path", "max_depth": fields.max_depth, "rr_depth": fields.rr_depth}
+        )
+        sensor = mi.load_dict(_sensor(mi, camera, fields))
+        image = mi.render(scene, sensor=sensor, integrator=integrator, spp=fields.spp, seed=seed)
+        return np.nan_to_num(np.asarray(image.numpy()[..., :3], np.float32))
+
+    def _scene(self, group: Group) -> Any:
+        if group not in self._scenes:
+            mi = mitsuba(self._variant)
+            scene: dict[str, Any] = {"type": "scene", **self._shapes(mi, group)}
+            if group is Group.OUTDOOR:
+                scene.update(_outdoor(mi, self._sky))
+            self._scenes[group] = mi.load_dict(scene)
+        return self._scenes[group]
+
+    def _shapes(self, mi: Any, group: Group) -> dict[str, Any]:
+        t = self._tables
+        shapes: dict[str, Any] = {}
+        for tag in np.unique(t.face_tags):
+            faces = t.faces[t.face_tags == tag]
+            row = _untextured(t.material_rows[int(tag & 0xFFFF)], t.texels)
+            if int(row[11]) == HOLE:
+                continue
+            fields: dict[str, Any] = {"bsdf": _bsdf(row)}
+            if group is Group.INDOOR and tag >> 16 != NO_LAMP:
+                radiance = [float(v) for v in t.lamp_rows[int(tag >> 16), :3]]
+                fields["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
+            shapes[f"mesh_{tag}"] = _mesh(mi, t.positions, faces, fields)
+        return shapes
+
+
+def _untextured(row: NDArray[np.float32], texels: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """The material with its texture's mean colour in place of the texture."""
+    first = int(row[12:13].view(np.uint32)[0])
+    if first == 0 or int(row[11]) == MIRROR:
+        return row
+    bits = texels[first : first + int(row[13]) * int(row[14])]
+    mean = [np.mean(((bits >> shift & 1023) / 1023) ** 2) for shift in (0, 10, 20)]
+    plain = row.copy()
+    plain[0:3] *= mean
+    plain[8:11] *= mean
+    return plain
+
+
+def _mesh(
+    mi: Any, positions: NDArray[np.float32], faces: NDArray[np.int32], fields: dict[str, Any]
+) -> Any:
+    used, renumbered = np.unique(faces, return_inverse=True)
+    properties = mi.Properties()
+    for name, plugin in fields.items():
+        properties[name] = mi.load_dict(plugin)
+    mesh = mi.Mesh("part", len(used), len(faces), props=properties)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = np.ascontiguousarray(positions[used], np.float32).ravel()
+    parameters["faces"] = renumbered.astype(np.uint32).ravel()
+    parameters.update()
+    return mesh
+
+
+def _bsdf(row: NDArray[np.float32]) -> dict[str, Any]:
+    def rgb(values: NDArray[np.float32]) -> dict[str, Any]:
+        return {"type": "rgb", "value": [float(v) for v in values]}
+
+    if int(row[11]) == MIRROR:
+        return {
+            "type": "twosided",
+            "nested": {"type": "conductor", "material": "none", "specular_reflectance": rgb(row[4:7])},
+        }  # fmt: skip
+    if int(row[11]) == GLASS:
+        return {
+            "type": "thindielectric",
+            "int_ior": 1.5,
+            "ext_ior": 1.0,
+            "specular_transmittance": rgb(row[8:11]),
+        }
+    if row[7] > 0:
+        nested = {
+            "type": "roughplastic",
+            "diffuse_reflectance": rgb(row[0:3]),
+            "alpha": float(row[7]),
+            "nonlinear": False,
+        }
+        return {"type": "twosided", "nested": nested}
+    return {"type": "twosided", "nested": {"type": "diffuse", "reflectance": rgb(row[0:3])}}
+
+
+def _outdoor(mi: Any, sky: Sky) -> dict[str, Any]:
+    # Mitsuba's envmap has our axes: azimuth atan2(x, -z), row 0 up.
+    emitters: dict[str, Any] = {
+        "dome": {"type": "envmap", "bitmap": mi.Bitmap(np.asarray(sky.dome, np.float32))}
+    }
+    if sky.sun_irradiance.max() > 0:
+        emitters["sun"] = {
+            "type": "directional",
+            "direction": [float(-v) for v in sky.sun_direction],
+            "irradiance": {"type": "rgb", "value": [float(v) for v in sky.sun_irradiance]},
+        }
+    return emitters
+
+
+def _sensor(mi: Any, camera: Camera, fields: LightFields) -> dict[str, Any]:
+    i = camera.intrinsics
+    eye = [float(v) for v in camera.eye]
+    target = [float(v) for v in camera.eye + camera.towards]
+    up = [float(v) for v in camera.world_from_camera[:3, 1]]
+    return {
+        "type": "perspective",
+        "fov": math.degrees(2 * math.atan(0.5 * i.width_px / i.fx)),
+        "fov_axis": "x",
+        "near_clip": 1e-3,
+        "far_clip": 1e4,
+        "principal_point_offset_x": -(i.cx / i.width_px - 0.5),
+        "principal_point_offset_y": -(i.cy / i.height_px - 0.5),
+        "to_world": mi.ScalarTransform4f().look_at(eye, target, up),
+        "sampler": {"type": "independent"},
+        "film": {
+            "type": "hdrfilm",
+            "width": i.width_px,
+            "height": i.height_px,
+            "rfilter": {"type": fields.filter},
+            "pixel_format": "rgb",
+        },
+    }

@@ -1,0 +1,148 @@
+"""The layers that are made when asked for, from the same hit record; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import HitRecord, Mask
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.classes import NYU13_FROM_NYU40
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import Geometry, House, MaterialKind
+from pbrs_farm.truth.albedo import albedo_png
+from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
+from pbrs_farm.truth.depth_sensor import sensor_depth
+from pbrs_farm.truth.hha import hha_png
+from pbrs_farm.truth.standard_layers import (
+    depth_mm,
+    encoded_normal,
+    instance_png,
+    normal_png,
+    semantic_png,
+)
+
+HitWithout = Callable[[Mask], HitRecord]
+"""(F,) bool faces that rays pass through -> the hit record of the same camera without them."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Everything the optional layers are made of.
+
+    hit_without: for the layers behind glass. textures: texture id -> (H, W, 3 or 4) uint8 sRGB,
+    row 0 = top, for albedo. seed: for the noise of depth_sensor.
+    """
+
+    hit: HitRecord
+    house: House
+    geometry: Geometry
+    camera: Camera
+    hit_without: HitWithout
+    textures: Mapping[str, NDArray[np.uint8]]
+    seed: int = 0
+
+    @cached_property
+    def behind(self) -> HitRecord:
+        """The hit record behind glass: the first hit that is neither glass nor pane."""
+        clear = see_through_faces(self.geometry, self.house)
+        return self.hit_without(clear) if clear.any() else self.hit
+
+    @cached_property
+    def boundaries(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Occlusion and crease boundaries."""
+        return typed_boundaries(self.hit, self.camera)
+
+
+def see_through_faces(geometry: Geometry, house: House) -> Mask:
+    """(F,) bool: the face's material is glass or a pane."""
+    kinds = (MaterialKind.GLASS, MaterialKind.PANE)
+    clear = np.array([m.kind in kinds for m in house.materials], bool)
+    if not len(clear):
+        return np.zeros(len(geometry.faces), bool)
+    return clear[geometry.face_material]
+
+
+def source_classes(house: House) -> tuple[str, ...]:
+    """The source's own classes in house, sorted; id k of class_source.png is entry k - 1."""
+    return tuple(sorted({item.source_class for item in house.items if item.source_class}))
+
+
+def _class_source(seen: Seen) -> NDArray[np.uint16]:
+    number = {name: k for k, name in enumerate(source_classes(seen.house), start=1)}
+    table = np.array([0, *(number.get(i.source_class, 0) for i in seen.house.items)], np.uint16)
+    return table[seen.hit.item]
+
+
+def _material(seen: Seen) -> NDArray[np.uint16]:
+    if len(seen.house.materials) > 65535:
+        n = len(seen.house.materials)
+        raise BadHouse(
+            seen.house.source.file, "materials", f"{n} materials, a 16-bit layer holds 65535"
+        )
+    if not len(seen.geometry.faces):
+        return np.zeros(seen.hit.face.shape, np.uint16)
+    number = seen.geometry.face_material[seen.hit.face] + 1
+    return np.where(seen.hit.valid, number, 0).astype(np.uint16)
+
+
+def _glass(seen: Seen) -> NDArray[np.uint8]:
+    clear = see_through_faces(seen.geometry, seen.house)
+    if not clear.any():
+        return np.zeros(seen.hit.face.shape, np.uint8)
+    return np.where(seen.hit.valid & clear[seen.hit.face], 255, 0).astype(np.uint8)
+
+
+def _normal(seen: Seen, hit: HitRecord) -> NDArray[np.uint16]:
+    return normal_png(hit.geo_normal_world, seen.camera.world_from_camera)
+
+
+_MAKERS: Mapping[str, Callable[[Seen], NDArray[Any]]] = {
+    "depth_z": lambda s: s.hit.depth_z,
+    "position": lambda s: s.hit.position_world,
+    "normal_shading": lambda s: normal_png(s.hit.shading_normal_world, s.camera.world_from_camera),
+    "normal_world": lambda s: encoded_normal(s.hit.geo_normal_world),
+    "albedo": lambda s: albedo_png(s.hit, s.house, s.geometry, s.textures),
+    "material": _material,
+    "nyu13": lambda s: NYU13_FROM_NYU40[semantic_png(s.hit.item, s.house)],
+    "class_source": _class_source,
+    "glass": _glass,
+    "behind_glass_depth": lambda s: depth_mm(s.behind.depth_z),
+    "behind_glass_normal": lambda s: _normal(s, s.behind),
+    "behind_glass_semantic": lambda s: semantic_png(s.behind.item, s.house),
+    "behind_glass_instance": lambda s: instance_png(s.behind.item, s.house),
+    "boundary_occlusion": lambda s: s.boundaries[0],
+    "boundary_semantic": lambda s: instance_boundary(semantic_png(s.hit.item, s.house)),
+    "boundary_crease": lambda s: s.boundaries[1],
+    "hha": lambda s: hha_png(s.hit, s.camera),
+    "depth_sensor": lambda s: sensor_depth(s.hit, s.camera, seed=s.seed),
+}
+
+OPTIONAL_NAMES = tuple(_MAKERS)
+
+
+def optional_layers(names: Collection[str], seen: Seen) -> dict[str, NDArray[Any]]:
+    """The named optional layers, as layers.py says: PNG arrays, and float32 for the EXR ones.
+
+    Raises KeyError for a name that is no optional label layer.
+    """
+    return {name: _MAKERS[name](seen) for name in names}
+
+
+def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:
+    """What view.json needs to read the named layers: "materials" and "source_classes" by id."""
+    tables: dict[str, Any] = {}
+    if "material" in names:
+        tables["materials"] = {
+            str(k): {"name": m.name, "kind": str(m.kind)}
+            for k, m in enumerate(house.materials, start=1)
+        }
+    if "class_source" in names:
+        classes = source_classes(house)
+        tables["source_classes"] = {str(k): name for k, name in enumerate(classes, start=1)}
+    return tables

@@ -1,0 +1,55 @@
+"""The corners of the room a view stands in, in the world and in the picture; no effects."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pbrs_farm.core.arrays import DepthZ
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import Room
+
+VISIBLE_M = 0.05
+"""A corner is visible when what the picture shows there is at most this much nearer."""
+
+
+def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, Any]]:
+    """A row per corner of the room's polygon, at its floor and at its nominal ceiling.
+
+    corner: number in the polygon. at: "floor" or "ceiling". world: (x, y, z) in metres. pixel:
+    (x, y) in px, also beyond the picture's edges; None behind the camera. visible: it lies in the
+    picture and nothing in depth_z (H, W) hides it. A sloped or stepped ceiling is not followed.
+    """
+    i = camera.intrinsics
+    camera_from_world = np.asarray(np.linalg.inv(camera.world_from_camera), np.float64)
+    rows = []
+    for at, y in (("floor", room.floor_y), ("ceiling", room.ceiling_y)):
+        corners = np.insert(room.polygon, 1, y, axis=1)
+        for number, (world, p) in enumerate(
+            zip(corners, transform_points(camera_from_world, corners), strict=True)
+        ):
+            z = -float(p[2])
+            pixel = [i.fx * p[0] / z + i.cx, -i.fy * p[1] / z + i.cy] if z > 1e-6 else None
+            rows.append(
+                {
+                    "corner": number,
+                    "at": at,
+                    "world": world.tolist(),
+                    "pixel": [float(v) for v in pixel] if pixel else None,
+                    "visible": pixel is not None and _is_visible(pixel, z, depth_z),
+                }
+            )
+    return rows
+
+
+def _is_visible(pixel: list[float], z: float, depth_z: DepthZ) -> bool:
+    column, row = int(np.floor(pixel[0])), int(np.floor(pixel[1]))
+    height, width = depth_z.shape
+    if not (0 <= column < width and 0 <= row < height):
+        return False
+    # A corner lies on the edge of three surfaces: the farthest around it is not in front of it.
+    around = depth_z[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    farthest = float(np.where(around > 0, around, np.inf).max())
+    return farthest >= z - VISIBLE_M

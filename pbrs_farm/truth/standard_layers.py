@@ -1,0 +1,118 @@
+"""Hit record -> depth, normal, valid, semantic, instance, boundary: the layers of every view.
+
+No effects. Every layer is a function of one hit record at pixel centres (architecture, rule 8).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import DepthZ, HitRecord, ItemBuffer, Mask, Matrix4, UnitVectors
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import PUBLISHED_FROM_OPENGL
+from pbrs_farm.core.house import MAX_INSTANCES, House
+from pbrs_farm.truth.boundary import instance_boundary
+
+DEPTH_MAX_MM = 65535
+UNIT_TOLERANCE = 0.1
+"""A normal n is valid while | |n|^2 - 1 | <= this: the published rule (suncg section 5)."""
+
+
+def depth_mm(depth_z: DepthZ) -> NDArray[np.uint16]:
+    """(H, W) uint16 planar z in millimetres, rounded; 0 = nothing.
+
+    Overflow: 65.535 m and beyond is stored as 65535 (layer depth_z keeps the metres). A hit nearer
+    than half a millimetre is stored as 1, so that 0 always means nothing. NaN is nothing.
+    """
+    z = np.where(np.isnan(depth_z), np.float32(0), depth_z)
+    rounded = np.clip(np.rint(z * np.float32(1000.0)), 1, DEPTH_MAX_MM)
+    return np.where(z > 0, rounded, 0).astype(np.uint16)
+
+
+def unit_mask(normal: UnitVectors) -> Mask:
+    """(H, W) bool: the normal is finite and of unit length within UNIT_TOLERANCE."""
+    squared = np.einsum("...i,...i->...", normal, normal)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(squared - 1.0) <= UNIT_TOLERANCE)
+
+
+def normal_png(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArray[np.uint16]:
+    """(H, W, 3) uint16 normals in the published camera frame: round((n + 1) 65535 / 2).
+
+    x right, y forward, z up (suncg section 5). A normal that is not of unit length (nothing there,
+    a triangle without area, NaN) is stored as n = 0: 32768 in all three channels.
+    """
+    published_from_world = PUBLISHED_FROM_OPENGL @ world_from_camera[:3, :3].T
+    normal = _cleaned(normal_world) @ published_from_world.T.astype(np.float32)
+    return encoded_normal(normal)
+
+
+def encoded_normal(normal: UnitVectors) -> NDArray[np.uint16]:
+    """(H, W, 3) uint16 round((n + 1) 65535 / 2), clipped; halves are rounded to even."""
+    scaled = (normal + np.float32(1)) * np.float32(65535 / 2)
+    return np.asarray(np.clip(np.rint(scaled), 0, 65535), np.uint16)
+
+
+def _cleaned(normal: UnitVectors) -> UnitVectors:
+    good = unit_mask(normal)
+    if good.all():
+        return normal
+    return np.where(good[..., None], normal, np.float32(0))
+
+
+def valid_png(hit: HitRecord) -> NDArray[np.uint8]:
+    """(H, W) uint8: 255 where something is hit and its geometric normal is of unit length, else 0."""
+    return np.where(hit.valid & unit_mask(hit.geo_normal_world), 255, 0).astype(np.uint8)
+
+
+def nyu40_of_instance(house: House) -> NDArray[np.uint8]:
+    """(n_items + 1,) uint8 NYU40 class of each instance id; 0 for "nothing" and for items without.
+
+    Raises BadHouse when an item's class is outside 0..40 or there are more than 65,535 items.
+    """
+    check_instances(house)
+    classes = np.array([0, *(item.nyu40 for item in house.items)], np.int64)
+    wrong = np.nonzero((classes < 0) | (classes > 40))[0]
+    if len(wrong):
+        item = house.items[int(wrong[0]) - 1]
+        raise BadHouse(house.source.file, f"item {item.id}", f"NYU40 class {item.nyu40}, not 0..40")
+    return classes.astype(np.uint8)
+
+
+def check_instances(house: House) -> None:
+    """Raise BadHouse when instance ids do not fit in 16 bits."""
+    if len(house.items) > MAX_INSTANCES:
+        raise BadHouse(
+            house.source.file,
+            "items",
+            f"{len(house.items)} items, but a 16-bit instance layer holds {MAX_INSTANCES}",
+            hint="split the house, or merge parts that need no label of their own",
+        )
+
+
+def semantic_png(item: ItemBuffer, house: House) -> NDArray[np.uint8]:
+    """(H, W) uint8 NYU40 id of the item seen, 0 = nothing or an item without a class."""
+    return nyu40_of_instance(house)[item]
+
+
+def instance_png(item: ItemBuffer, house: House) -> NDArray[np.uint16]:
+    """(H, W) uint16 instance id, 0 = nothing; raises BadHouse beyond 65,535 items."""
+    check_instances(house)
+    return item.astype(np.uint16)
+
+
+def layers_from_hit(hit: HitRecord, house: House, camera: Camera) -> dict[str, NDArray[Any]]:
+    """The layers of every view by name: depth, normal, valid, semantic, instance, boundary."""
+    instance = instance_png(hit.item, house)
+    return {
+        "depth": depth_mm(hit.depth_z),
+        "normal": normal_png(hit.geo_normal_world, camera.world_from_camera),
+        "valid": valid_png(hit),
+        "semantic": semantic_png(hit.item, house),
+        "instance": instance,
+        "boundary": instance_boundary(instance),
+    }

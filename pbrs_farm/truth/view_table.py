@@ -1,0 +1,118 @@
+"""The tables of view.json: the camera, and each instance that a view sees; no effects.
+
+The schema is written down in docs/formats.md.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.core.arrays import ItemBuffer
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
+from pbrs_farm.core.frames import opencv_world_from_camera
+from pbrs_farm.core.house import House, Item
+from pbrs_farm.truth.coverage import coverage
+from pbrs_farm.truth.standard_layers import nyu40_of_instance
+
+
+def camera_table(camera: Camera) -> dict[str, Any]:
+    """Size, K and both poses of a camera, as view.json holds them."""
+    i = camera.intrinsics
+    return {
+        "width_px": i.width_px,
+        "height_px": i.height_px,
+        "K": i.k.tolist(),
+        "world_from_camera_opengl": camera.world_from_camera.tolist(),
+        "world_from_camera_opencv": opencv_world_from_camera(camera.world_from_camera).tolist(),
+    }
+
+
+def view_table(
+    item_buffer: ItemBuffer,
+    house: House,
+    camera: Camera,
+    *,
+    with_visible_fraction: bool = True,
+) -> dict[str, Any]:
+    """The part of view.json that labels need: the camera's table and "instances".
+
+    instances: a row for each instance id in item_buffer (H, W), by id: id, item, name, kind, nyu40,
+    class, nyu13, class13, source_class, room, pixels, fraction (of the picture), visible_fraction
+    (pixels / pixels when alone in this picture; None unless with_visible_fraction), truncated (part of
+    it lies outside the picture), box2d (x0, y0, x1, y1 in px, right and bottom exclusive, of the
+    visible pixels) and box3d (centre, half, axes: rows are unit axes; world, metres).
+    An empty view has an empty list.
+    """
+    classes = nyu40_of_instance(house)
+    counts = np.bincount(item_buffer.reshape(-1), minlength=len(house.items) + 1)
+    seen = [int(i) for i in np.nonzero(counts)[0] if i > 0]
+    slices = ndimage.find_objects(item_buffer.astype(np.int32), max_label=len(house.items))
+
+    rows = []
+    for instance in seen:
+        item, pixels = house.items[instance - 1], int(counts[instance])
+        rows.append(
+            {
+                "id": instance,
+                **_item_facts(item, int(classes[instance])),
+                "pixels": pixels,
+                "fraction": pixels / item_buffer.size,
+                "visible_fraction": pixels / max(int(coverage(item, camera).sum()), pixels)
+                if with_visible_fraction
+                else None,
+                "truncated": is_truncated(item, camera),
+                "box2d": _box2d(slices[instance - 1]),
+                "box3d": _box3d(item),
+            }
+        )
+    return {**camera_table(camera), "instances": rows}
+
+
+def _item_facts(item: Item, nyu40: int) -> dict[str, Any]:
+    nyu13 = int(NYU13_FROM_NYU40[nyu40])
+    return {
+        "item": item.id,
+        "name": item.name,
+        "kind": str(item.kind),
+        "nyu40": nyu40,
+        "class": NYU40_NAMES[nyu40],
+        "nyu13": nyu13,
+        "class13": NYU13_NAMES[nyu13],
+        "source_class": item.source_class,
+        "room": item.room_id,
+    }
+
+
+def _box2d(slices: tuple[slice, ...]) -> list[int]:
+    rows, columns = slices
+    return [int(columns.start), int(rows.start), int(columns.stop), int(rows.stop)]
+
+
+def _box3d(item: Item) -> dict[str, Any]:
+    box = item.oriented_box
+    return {"centre": box.centre.tolist(), "half": box.half.tolist(), "axes": box.axes.T.tolist()}
+
+
+def is_truncated(item: Item, camera: Camera) -> bool:
+    """Whether part of the item lies outside the picture: behind the camera, or beyond an edge.
+
+    Exact for a mesh: the view pyramid is convex, so triangles are inside when their vertices are.
+    """
+    return any(not _inside(s.positions, camera) for s in item.surfaces if len(s.positions))
+
+
+def _inside(points: NDArray[np.float32], camera: Camera) -> bool:
+    i = camera.intrinsics
+    p = (points - camera.eye.astype(np.float32)) @ camera.world_from_camera[:3, :3].astype(
+        np.float32
+    )
+    z = -p[:, 2]
+    if z.min() <= 0:
+        return False
+    x, y = i.fx * p[:, 0] / z + i.cx, -i.fy * p[:, 1] / z + i.cy
+    return bool(x.min() >= 0 and x.max() <= i.width_px and y.min() >= 0 and y.max() <= i.height_px)

@@ -1,0 +1,199 @@
+"""A finished folder becomes a sheet and a gallery that show every view, and say what is missing."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pbrs_farm import images
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.formats.output_folder import views_of
+from pbrs_farm.gallery import contact_sheet as sheet
+from pbrs_farm.gallery import label_colours as colours
+from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, filled, gallery, small_jpeg
+from pbrs_farm.gallery.tiles import TILES
+
+
+def write_view(folder: Path, *, without: tuple[str, ...] = (), size: tuple[int, int] = (60, 80)):
+    rng = np.random.default_rng(3)
+    folder.mkdir(parents=True)
+    h, w = size
+    rows = np.arange(h)[:, None] + np.zeros((1, w), int)
+    layers = {
+        "depth": (1000 + 40 * rows).astype(np.uint16),
+        "normal": np.full((h, w, 3), 40000, np.uint16),
+        "semantic": np.where(rows < h // 2, 1, 2).astype(np.uint8),
+        "instance": np.where(rows < h // 2, 7, 300).astype(np.uint16),
+        "boundary": np.where(rows == h // 2, 255, 0).astype(np.uint8),
+    }
+    for mode in ("opengl_dl", "opengl_il", "mlt_ol", "mlt_il_ol"):
+        layers[mode] = rng.integers(0, 255, (h, w, 3), np.uint8)
+    for name, pixels in layers.items():
+        if name not in without:
+            (folder / f"{name}.png").write_bytes(images.png_from_array(pixels))
+    (folder / "view.json").write_text(json.dumps({"room": folder.name.rpartition("_")[0]}))
+
+
+def write_house(root: Path, house: str, views: tuple[str, ...], attribution: str = "") -> Path:
+    folder = root / "houses" / house
+    folder.mkdir(parents=True)
+    rooms = [{"id": "0_0", "name": "Kitchen & <bar>"}, {"id": "0_1", "name": ""}]
+    facts = {"name": f"Home {house}", "rooms": rooms, "source": {"attribution": attribution}}
+    (folder / "house.json").write_text(json.dumps(facts))
+    for view in views:
+        write_view(folder / "views" / view)
+    return folder
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    write_house(tmp_path, "a", ("0_0_1", "0_0_2", "0_1_0"), "Model by A. Person, CC BY 3.0")
+    write_house(tmp_path, "b", ("0_0_4",))
+    return tmp_path
+
+
+def test_sheet_is_a_png_with_a_row_for_each_view(root: Path) -> None:
+    one = images.array_from_png(sheet.contact_sheet(root, max_views=1))
+    four = images.array_from_png(sheet.contact_sheet(root))
+    assert one.shape[1] == four.shape[1]
+    assert four.shape[0] > one.shape[0] + 3 * 60
+
+
+def test_sheet_shows_the_classes_colours(root: Path) -> None:
+    pixels = images.array_from_png(sheet.contact_sheet(root)).reshape(-1, 3)
+    for nyu40 in (1, 2):
+        assert np.all(pixels == colours.NYU40_COLOURS[nyu40], axis=1).sum() > 1000
+
+
+def test_views_are_spread_over_houses_and_rooms(root: Path) -> None:
+    chosen = sheet.spread_views(views_of(root), 3)
+    assert [(v.house.id, v.id) for v in chosen] == [
+        ("a", "0_0_1"),
+        ("a", "0_1_0"),
+        ("b", "0_0_4"),
+    ]
+
+
+def test_a_missing_or_damaged_layer_is_an_empty_tile_that_says_so(tmp_path: Path) -> None:
+    write_house(tmp_path, "a", ())
+    view = tmp_path / "houses/a/views/0_0_1"
+    write_view(view, without=("mlt_ol", "depth"))
+    (view / "normal.png").write_bytes(b"\x89PNG\r\n\x1a\nno")
+    html = gallery(tmp_path)
+    assert html.count("not rendered") == 2
+    assert html.count("cannot be read") == 1
+    assert images.array_from_png(sheet.contact_sheet(tmp_path)).size
+
+
+def test_gallery_names_houses_rooms_and_authors_and_escapes_them(root: Path) -> None:
+    html = gallery(root)
+    assert "Kitchen &amp; &lt;bar&gt;" in html
+    assert "<bar>" not in html
+    assert html.count("Model by A. Person, CC BY 3.0") == 1
+    assert "Room 0_1" in html
+    assert html.count("<article") == 4
+
+
+def test_gallery_links_files_that_exist_and_nothing_outside(root: Path) -> None:
+    html = gallery(root)
+    links = re.findall(r'(?:data-file|href)="([^"]+)"', html)
+    assert len(links) == 4 * (len(TILES) + 1)
+    assert all((root / link).is_file() for link in links)
+    assert not re.findall(r'(?:src|href)="(?:https?:)?//', html)
+    assert "@import" not in html
+    assert not re.findall("@[A-Z]+@", html)
+
+
+def test_gallery_embeds_thumbnails_no_larger_than_320(tmp_path: Path) -> None:
+    write_house(tmp_path, "a", ())
+    write_view(tmp_path / "houses/a/views/0_0_1", size=(480, 640))
+    found = re.findall(r'src="data:image/\w+;base64,([^"]+)"', gallery(tmp_path))
+    pictures = [base64.b64decode(text) for text in found]
+    assert len(pictures) == len(TILES)
+    for data in pictures:
+        # Pure noise is the worst case there is: it too stays within the budget.
+        assert len(data) <= MAX_TILE_BYTES
+        assert max(Image.open(io.BytesIO(data)).size) <= 320
+
+
+def test_small_labels_keep_their_colours_exactly(root: Path) -> None:
+    view = gallery(root).split('data-layer="semantic"><')[1]
+    data = base64.b64decode(re.search(r'base64,([^"]+)"', view)[1])
+    pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+    assert np.array_equal(pixels[0, 0], colours.NYU40_COLOURS[1])
+    assert np.array_equal(pixels[-1, 0], colours.NYU40_COLOURS[2])
+
+
+def test_noise_is_made_small_enough() -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (240, 320, 3), np.uint8)
+    assert len(small_jpeg(noise, 5000)) <= 5000
+
+
+def test_what_is_filled_in_is_not_searched_again() -> None:
+    assert filled("@A@ @media @B@", {"A": "@B@", "B": "2"}) == "@B@ @media 2"
+
+
+def test_nyu40_colours_are_distinct() -> None:
+    table = colours.NYU40_COLOURS.astype(int)
+    apart = np.abs(table[:, None] - table[None]).sum(2) + 999 * np.eye(41, dtype=int)
+    assert table.shape == (41, 3)
+    assert apart.min() >= 48
+
+
+def test_first_200_instances_have_200_colours() -> None:
+    colour = colours.instance_colours(np.arange(201)[None])[0]
+    assert len(np.unique(colour, axis=0)) == 201
+
+
+def test_depth_runs_from_pale_near_to_dark_far_and_marks_nothing() -> None:
+    depth = np.array([[1000, 2000, 4000, 0]], np.uint16)
+    shown = colours.depth_colours(depth, 1.0, 4.0).astype(int)[0]
+    assert shown[0].sum() > shown[1].sum() > shown[2].sum()
+    assert len(set(shown[3])) <= 2
+    assert not np.array_equal(shown[3], shown[2])
+
+
+def test_a_folder_that_is_no_output_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="has no houses"):
+        sheet.contact_sheet(tmp_path)
+    (tmp_path / "houses").mkdir()
+    with pytest.raises(BadInput, match="no view yet"):
+        sheet.contact_sheet(tmp_path)
+
+
+def test_a_damaged_view_json_is_named(root: Path) -> None:
+    (root / "houses/a/views/0_0_1/view.json").write_text("{")
+    with pytest.raises(BadInput, match=r"0_0_1/view\.json"):
+        gallery(root)
+
+
+def test_names_are_drawn_with_letters_the_font_has(tmp_path: Path) -> None:
+    write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – 中")
+    assert sheet._drawable("Modèle d’Élise – 中") == "Modele d'Elise - ?"
+    assert "Modèle d’Élise – 中" in gallery(tmp_path)
+
+
+def test_gallery_shows_what_selection_kept_and_refused(root: Path) -> None:
+    assert 'id="verdict"' not in gallery(root)
+    (root / "selection").mkdir()
+    (root / "selection.json").write_text('{"run": "nyu"}')
+    rows = [
+        {"house": "a", "view": "0_0_1", "reason": ""},
+        {"house": "a", "view": "0_0_2", "reason": "unlike-depth"},
+    ]
+    (root / "selection/nyu.jsonl").write_text("\n".join(json.dumps(r) for r in rows))
+    html = gallery(root)
+    assert 'id="verdict"' in html
+    assert html.count('data-verdict="kept"') == html.count('data-verdict="refused"') == 1
+    assert '<b class="refused">unlike-depth</b>' in html
+    assert html.count('data-verdict=""') == 2
+    (root / "selection/nyu.jsonl").write_text("{")
+    with pytest.raises(BadInput, match=r"nyu\.jsonl"):
+        gallery(root)

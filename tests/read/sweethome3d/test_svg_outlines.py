@@ -1,0 +1,50 @@
+"""SVG paths as outlines."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
+
+
+def area(path: str) -> float:
+    return sum(shapely.Polygon(p).area for p in polygons_from_path(path))
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("M0,0 v1 h1 v-1 z", 1.0),
+        ("m0 0 0 1 1 0 0-1z", 1.0),
+        ("M0 0 L1 0 1 1 0 1", 1.0),
+        ("M0,0H1V1H0Z", 1.0),
+        ("M.25.25h.5v.5h-.5z", 0.25),
+        ("M0,0 h1 v1 h-1 z m2,0 h1 v1 h-1 z", 2.0),
+        ("M0,0 q.5,1 1,0 z", 1 / 3),
+        ("M0,0 c0,1 1,1 1,0 z", 0.6),
+    ],
+)
+def test_a_path_encloses_its_area(path: str, expected: float) -> None:
+    assert area(path) == pytest.approx(expected, rel=0.01)
+
+
+def test_arcs_are_round_and_end_where_they_say() -> None:
+    (circle,) = polygons_from_path("M0,0.5 a0.5,0.5 0 1,0 1,0 a0.5,0.5 0 1,0 -1,0 z")
+    assert np.linalg.norm(circle - 0.5, axis=1) == pytest.approx(0.5)
+    assert shapely.Polygon(circle).area == pytest.approx(math.pi / 4, rel=4e-3)
+
+
+def test_the_sweep_flag_chooses_the_side() -> None:
+    (over,) = polygons_from_path("M0,1 A.5,.5 0 0 1 1,1 z")
+    (under,) = polygons_from_path("M0,1 A.5,.5 0 0 0 1,1 z")
+    assert over[:, 1].min() == pytest.approx(0.5)
+    assert under[:, 1].max() == pytest.approx(1.5)
+
+
+def test_an_arc_too_small_to_reach_is_grown() -> None:
+    (half,) = polygons_from_path("M0,0 a.1,.1 0 0 1 1,0 z")
+    assert shapely.Polygon(half).area == pytest.approx(math.pi / 8, rel=5e-3)

@@ -1,0 +1,42 @@
+"""A word -> a source; a source that changed since it was named is told, whatever its kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.source import read_house, resolve
+
+
+def test_a_suncg_house_that_changed_since_submission_is_told(tmp_path: Path) -> None:
+    house = tmp_path / "house/0a1b/house.json"
+    house.parent.mkdir(parents=True)
+    house.write_text("{}")
+    source = resolve(str(house.parent))
+    house.write_text('{"levels": []}')
+    with pytest.raises(BadHouse, match="changed since the run began"):
+        read_house(source, ReadFields())
+
+
+def test_a_file_that_changed_since_submission_is_told(tmp_path: Path) -> None:
+    home = tmp_path / "home.sh3d"
+    home.write_bytes(b"PK")
+    source = resolve(str(home))
+    home.write_bytes(b"PK2")
+    with pytest.raises(BadHouse, match="changed since the run began"):
+        read_house(source, ReadFields())
+
+
+@pytest.mark.homes
+def test_another_version_of_the_example_homes_is_the_machines_fault() -> None:
+    from pbrs_farm.assets import homes
+    from pbrs_farm.core.errors import MachineFailed
+
+    if homes.cached() is None:
+        pytest.skip("the example homes are not fetched")
+    source = resolve("Studio").model_copy(update={"sha256": "0" * 64})
+    with pytest.raises(MachineFailed, match="another Studio"):
+        read_house(source, ReadFields())

@@ -1,0 +1,32 @@
+"""Steps that do as a test says: the house's "source" location names what goes wrong."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.run.plan import STEPS
+from pbrs_farm.run.step_cache import Made, Outcome, Work, run_marked
+
+
+def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
+    """A step that writes its own name, unless the recipe's name says otherwise for it."""
+    return run_marked(name, work, lambda w: _make(name, w), attempt=attempt)
+
+
+def _make(name: str, work: Work) -> Made:
+    word, _, where = work.recipe.name.partition(":")
+    at = f"{name}.{work.view_id}" if STEPS[name].per_view else name
+    if at == where:
+        if word == "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if word == "hang":
+            time.sleep(60)
+        if word == "refuse":
+            raise BadHouse("some.sh3d", "wall w3", "is made of cheese")
+        if word == "bug":
+            raise ZeroDivisionError("a bug")
+    facts = {"views": [["0_0_0", "0_0", 2.0], ["0_0_1", "0_0", 1.0]]} if name == "cameras" else {}
+    return Made({f"{name}.txt": at.encode()}, facts)

@@ -1,0 +1,118 @@
+"""A local run: what is stored is kept, what fails costs its step only."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.recipe import Recipe, recipe_from_name
+from pbrs_farm.run import local
+from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.task import Setting
+
+FAKE = "tests.run.fakes:run_step"
+N_STEPS = 2 + 2 * 6
+
+
+@pytest.fixture(autouse=True)
+def fake_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    def setting(*args: object) -> Setting:
+        return replace(Setting(*args), runner=FAKE)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(local, "Setting", setting)
+
+
+def named(name: str) -> Recipe:
+    return recipe_from_name("preview").model_copy(update={"name": name})
+
+
+def run(out: Path, name: str = "plain", **fields: object) -> Summary:
+    return run_local(Run(["builtin"], str(out), named(name), **fields))  # type: ignore[arg-type]
+
+
+def markers(out: Path) -> set[str]:
+    return {p.name.removesuffix(".json") for p in out.glob("houses/*/done/*.json")}
+
+
+def test_a_second_run_does_nothing(tmp_path: Path) -> None:
+    first, second = run(tmp_path), run(tmp_path)
+    assert (first.n_done, first.n_kept, first.failures) == (N_STEPS, 0, [])
+    assert (second.n_done, second.n_kept, second.failures) == (0, N_STEPS, [])
+
+
+def test_one_removed_marker_is_one_step_done_again(tmp_path: Path) -> None:
+    run(tmp_path)
+    next(tmp_path.glob("houses/*/done/opengl_dl.0_0_1.json")).unlink()
+    assert run(tmp_path).n_done == 1
+
+
+def test_a_crash_costs_one_step_and_names_the_command(tmp_path: Path) -> None:
+    summary = run(tmp_path, "crash:opengl_il.0_0_0")
+    assert [what.split("/")[1:] for what, _m, _c in summary.failures] == [["0_0_0", "opengl_il"]]
+    assert "SIGSEGV" in summary.failures[0][1]
+    assert summary.failures[0][2].startswith("pbrs-farm step opengl_il builtin --out")
+    assert summary.n_done == N_STEPS - 1
+
+
+def test_a_failed_step_leaves_out_only_what_reads_it(tmp_path: Path) -> None:
+    summary = run(tmp_path, "refuse:light.0_0_1")
+    assert len(summary.failures) == 1
+    assert "wall w3: is made of cheese" in summary.failures[0][1]
+    missing = {"light.0_0_1", "develop.0_0_1"}
+    assert not missing & markers(tmp_path)
+    assert summary.n_done == N_STEPS - len(missing)
+
+
+def test_a_bug_is_told_by_its_type_and_the_run_goes_on(tmp_path: Path) -> None:
+    summary = run(tmp_path, "bug:truth.0_0_0")
+    assert summary.failures[0][1] == "ZeroDivisionError: a bug"
+    assert {"opengl_dl.0_0_1", "view.0_0_1"} <= markers(tmp_path)
+
+
+def test_a_step_that_hangs_is_killed(tmp_path: Path) -> None:
+    summary = run(tmp_path, "hang:opengl_dl.0_0_0", step_timeout_s=3.0)
+    assert "killed" in summary.failures[0][1]
+    assert summary.n_done == N_STEPS - 1
+
+
+def test_a_home_that_is_missing_does_not_stop_the_others(tmp_path: Path) -> None:
+    homes = [str(tmp_path / "nowhere.sh3d"), "builtin"]
+    summary = run_local(Run(homes, str(tmp_path), named("plain")))
+    assert summary.n_done == N_STEPS
+    assert "no such file" in summary.failures[0][1]
+
+
+def test_another_recipe_is_refused_with_the_fields_that_differ(tmp_path: Path) -> None:
+    run(tmp_path)
+    other = recipe_from_name("preview", {"tone.key": "0.3"})
+    with pytest.raises(BadRecipe, match=r"tone\.key: 0\.18 -> 0\.3"):
+        run_local(Run(["builtin"], str(tmp_path), other))
+
+
+def test_update_renders_again_what_differs(tmp_path: Path) -> None:
+    run(tmp_path)
+    other = recipe_from_name("preview", {"tone.key": "0.3"})
+    summary = run_local(Run(["builtin"], str(tmp_path), other, update=True))
+    assert summary.n_done == 4  # develop and view of both views
+    assert summary.n_kept == N_STEPS - 4
+
+
+def test_the_manifest_lists_every_object_of_the_house(tmp_path: Path) -> None:
+    run(tmp_path)
+    rows = [json.loads(line) for line in (tmp_path / "manifest.jsonl").read_text().splitlines()]
+    listed = {row["key"] for row in rows}
+    stored = {str(p.relative_to(tmp_path)) for p in tmp_path.glob("houses/*/**/*.txt")}
+    assert listed == stored
+    assert len(listed) == N_STEPS
+
+
+def test_two_processes_make_what_one_makes(tmp_path: Path) -> None:
+    run(tmp_path / "one")
+    run(tmp_path / "two", n_jobs=2)
+    assert (tmp_path / "one/manifest.jsonl").read_bytes() == (
+        tmp_path / "two/manifest.jsonl"
+    ).read_bytes()

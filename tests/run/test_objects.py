@@ -1,0 +1,78 @@
+"""Objects without context: 20 views, nothing where the ray misses, no light but the sky."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrs_farm.check import verify
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.images import array_from_png, layers_from_exr
+from pbrs_farm.read.objects.model_folders import find_models
+from pbrs_farm.read.source import object_source, resolve
+from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.plan import wanted
+
+CUBE = """
+v -1 0 -1
+v 1 0 -1
+v 1 2 -1
+v -1 2 -1
+v -1 0 1
+v 1 0 1
+v 1 2 1
+v -1 2 1
+f 1 4 3 2
+f 5 6 7 8
+f 1 5 8 4
+f 2 3 7 6
+f 4 8 7 3
+f 1 2 6 5
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+    folder = tmp_path_factory.mktemp("models")
+    (folder / "chair").mkdir()
+    (folder / "chair" / "cube.obj").write_text(CUBE)
+    out = tmp_path_factory.mktemp("out")
+    recipe = recipe_from_name(
+        "preview", {"light.spp": "4", "image.width_px": "64", "image.height_px": "48"}
+    )
+    source = object_source(find_models([folder])[0])
+    assert resolve(source.location) == source
+    return out, run_local(Run([], str(out), recipe, wanted([], [], 2), sources=[source]))
+
+
+def test_a_model_has_twenty_cameras(made: tuple[Path, Summary]) -> None:
+    assert made[1].failures == []
+    (cameras,) = made[0].glob("objects/*/cameras.json")
+    assert len(json.loads(cameras.read_text())["views"]) == 20
+
+
+def test_pixels_that_miss_are_zero_in_every_layer(made: tuple[Path, Summary]) -> None:
+    view = sorted(made[0].glob("objects/*/views/*"))[0]
+    missed = array_from_png((view / "valid.png").read_bytes()) == 0
+    assert missed.any()
+    assert not missed.all()
+    for name in ("depth", "instance", "semantic", "mlt_ol", "mlt_il_ol", "opengl_dl", "opengl_il"):
+        assert not array_from_png((view / f"{name}.png").read_bytes())[missed].any(), name
+    for name, channel in layers_from_exr((view / "radiance.exr").read_bytes()).items():
+        assert not channel[missed].any(), name
+
+
+def test_the_sky_alone_lights_it(made: tuple[Path, Summary]) -> None:
+    view = sorted(made[0].glob("objects/*/views/*"))[0]
+    assert (view / "mlt_ol.png").read_bytes() == (view / "mlt_il_ol.png").read_bytes()
+    seen = array_from_png((view / "valid.png").read_bytes()) > 0
+    assert np.median(array_from_png((view / "mlt_ol.png").read_bytes())[seen]) > 30
+    assert "no lamps" in json.loads((view / "view.json").read_text())["modes"]["light"]["note"]
+
+
+def test_verify_takes_objects_too(made: tuple[Path, Summary]) -> None:
+    certificate = verify(made[0], sample=300)
+    assert certificate.is_clean, certificate.text()

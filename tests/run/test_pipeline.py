@@ -1,0 +1,114 @@
+"""The whole pipeline on the built-in home, small: what a run leaves behind."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrs_farm.check import verify
+from pbrs_farm.core.layers import LAYERS
+from pbrs_farm.core.recipe import Recipe, recipe_from_name
+from pbrs_farm.images import array_from_png, layers_from_exr
+from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.plan import wanted
+
+OPTIONAL = [x.name for x in LAYERS if x.optional and x.step == "truth"]
+
+
+def small() -> Recipe:
+    return recipe_from_name(
+        "preview",
+        {
+            "image.width_px": "96",
+            "image.height_px": "72",
+            "light.spp": "4",
+            "light.pilot_spp": "0",
+            "cameras.cell_m": "1.0",
+            "cameras.score_width_px": "160",
+            "cameras.score_height_px": "120",
+        },
+    )
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+    out = tmp_path_factory.mktemp("out")
+    return out, run_local(Run(["builtin"], str(out), small(), wanted([], OPTIONAL, 2)))
+
+
+@pytest.fixture
+def view(made: tuple[Path, Summary]) -> Path:
+    return sorted(made[0].glob("houses/*/views/*"))[0]
+
+
+def test_nothing_fails(made: tuple[Path, Summary]) -> None:
+    assert made[1].failures == []
+    assert made[1].n_views == 2
+
+
+def test_every_layer_is_there_in_its_type(view: Path) -> None:
+    for layer in LAYERS:
+        data = (view / layer.file).read_bytes()
+        if layer.file.endswith(".png"):
+            assert str(array_from_png(data).dtype) == layer.dtype, layer.name
+        else:
+            channels = layers_from_exr(data).values()
+            assert all(np.isfinite(c).all() and c.shape == (72, 96) for c in channels), layer.name
+
+
+def test_the_pictures_are_lit(view: Path) -> None:
+    for mode in ("opengl_dl", "opengl_il", "mlt_ol", "mlt_il_ol"):
+        assert 20 < array_from_png((view / f"{mode}.png").read_bytes()).mean() < 240, mode
+
+
+def test_every_rooms_illuminance_is_recorded_once_and_each_view_repeats_its_own(
+    made: tuple[Path, Summary],
+) -> None:
+    house = next(made[0].glob("houses/*"))
+    record = json.loads((house / "illuminance.json").read_text())
+    rooms = {row["room"]: row for row in record["rooms"]}
+    described = json.loads((house / "house.json").read_text())
+    assert set(rooms) == {room["id"] for room in described["rooms"]}
+    assert all(row["outdoor_lx"] + row["indoor_lx"] > 0 for row in rooms.values())
+    assert record["sky"]["sky_lx"] == pytest.approx(10_000, rel=1e-3)
+    assert "illuminance.json" in (house / "manifest.jsonl").read_text()
+    for file in house.glob("views/*/view.json"):
+        sheet = json.loads(file.read_text())
+        row, light = rooms[sheet["room"]], sheet["modes"]["light"]
+        assert light["floor_lux"] == {"outdoor": row["outdoor_lx"], "indoor": row["indoor_lx"]}
+        assert light["warnings"] == row["warnings"]
+
+
+def test_labels_agree_with_the_table(view: Path) -> None:
+    table = {row["id"]: row for row in json.loads((view / "view.json").read_text())["instances"]}
+    instance = array_from_png((view / "instance.png").read_bytes())
+    semantic = array_from_png((view / "semantic.png").read_bytes())
+    for number, pixels in zip(*np.unique(instance[instance > 0], return_counts=True), strict=True):
+        assert table[number]["pixels"] == pixels
+        assert set(semantic[instance == number]) == {table[number]["nyu40"]}
+
+
+def test_verify_finds_nothing_wrong(made: tuple[Path, Summary]) -> None:
+    certificate = verify(made[0], sample=500)
+    assert certificate.is_clean, certificate.text()
+
+
+def test_a_second_run_renders_nothing(made: tuple[Path, Summary]) -> None:
+    again = run_local(Run(["builtin"], str(made[0]), small(), wanted([], OPTIONAL, 2)))
+    assert again.n_done == 0
+    assert again.failures == []
+
+
+def test_a_view_made_again_has_the_same_bytes(made: tuple[Path, Summary], tmp_path: Path) -> None:
+    root = tmp_path / "again"
+    shutil.copytree(made[0], root)
+    before = (root / "manifest.jsonl").read_bytes()
+    for marker in root.glob("houses/*/done/*_*.json"):
+        marker.unlink()
+    summary = run_local(Run(["builtin"], str(root), small(), wanted([], OPTIONAL, 2)))
+    assert summary.n_done == 12
+    assert (root / "manifest.jsonl").read_bytes() == before

@@ -1,0 +1,79 @@
+"""The plan: which steps, which digests, which views."""
+
+from __future__ import annotations
+
+import pytest
+
+from pbrs_farm.core.errors import BadInput, BadRecipe
+from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.recipe import differences, recipe_from_name
+from pbrs_farm.run import plan
+
+
+def digest_of(step: str, **overrides: str) -> str:
+    fields = {k.replace("__", "."): v for k, v in overrides.items()}
+    return plan.step_digest(plan.STEPS[step], recipe_from_name("fast", fields), "h", "v", {})
+
+
+def test_a_step_reads_only_steps_that_exist() -> None:
+    for step in plan.STEPS.values():
+        assert set(step.after) <= set(plan.STEPS)
+
+
+def test_changing_the_tone_runs_develop_again_and_nothing_before_it() -> None:
+    changed = {s for s in plan.STEPS if digest_of(s) != digest_of(s, tone__key="0.3")}
+    assert changed == {"develop"}
+
+
+def test_an_input_that_changed_changes_the_digest() -> None:
+    recipe = recipe_from_name("fast")
+    step = plan.STEPS["truth"]
+    assert plan.step_digest(step, recipe, "h", "v", {"house": "a"}) != plan.step_digest(
+        step, recipe, "h", "v", {"house": "b"}
+    )
+
+
+def test_the_name_of_a_recipe_is_no_part_of_its_digest() -> None:
+    by_name = recipe_from_name("preview")
+    by_fields = recipe_from_name(
+        "fast", {"image.width_px": "320", "image.height_px": "240", "light.spp": "16"}
+    )
+    assert by_name.digest() == by_fields.digest()
+    assert differences(by_name, by_fields) == []
+
+
+def test_either_light_mode_asks_for_light() -> None:
+    want = plan.wanted(["mlt_ol"], [])
+    assert plan.view_steps(want) == ("truth", "light", "develop", "view")
+    assert plan.view_steps(plan.wanted(["opengl_il"], [])) == ("truth", "opengl_il", "view")
+
+
+def test_no_modes_named_means_all() -> None:
+    assert plan.wanted([], []).modes == tuple(Mode)
+
+
+@pytest.mark.parametrize("words", [(["mlt"], []), ([], ["depths"])])
+def test_an_unknown_word_is_refused(words: tuple[list[str], list[str]]) -> None:
+    with pytest.raises(BadInput):
+        plan.wanted(*words)
+
+
+def test_few_views_are_spread_over_rooms_best_first() -> None:
+    rows = [("a_0", "a", 5.0), ("a_1", "a", 9.0), ("b_0", "b", 1.0), ("c_0", "c", 2.0)]
+    assert plan.spread(rows, 3) == ["a_1", "b_0", "c_0"]
+    assert plan.spread(rows, 0) == ["a_0", "a_1", "b_0", "c_0"]
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        {"light.spp": "0"},
+        {"light.nonsense": "1"},
+        {"nonsense": "1"},
+        {"tone.key": "NaN"},
+        {"light": "3"},
+    ],
+)
+def test_a_field_that_does_not_fit_is_refused(overrides: dict[str, str]) -> None:
+    with pytest.raises(BadRecipe):
+        recipe_from_name("fast", overrides)

@@ -1,0 +1,114 @@
+"""Tails shown from many pixels: the groups, and that sharing changes no mean."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import House, Material, MaterialKind
+from pbrs_farm.core.lighting import Group
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import dark_sky
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from tests.transport import rooms
+from tests.transport.test_metropolis import METROPOLIS
+from tests.transport.test_path import FIELDS, RECIPE
+
+pytestmark = pytest.mark.skipif(
+    choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
+)
+
+
+@pytest.mark.parametrize(
+    ("height", "width", "n"), [(24, 32, 64), (23, 31, 256), (5, 7, 1024), (4, 4, 1)]
+)
+def test_every_pixel_is_dealt_once_and_groups_are_no_larger_than_asked(
+    height: int, width: int, n: int
+) -> None:
+    from pbrs_farm.transport.metropolis.reconnection import deal
+
+    groups = deal(height, width, n, seed=3)
+    slots, pixels = groups.slots.numpy(), groups.pixels.numpy()
+    assert groups.n <= max(n, 1)
+    assert len(pixels) % groups.n == 0
+    assert np.array_equal(pixels[slots], np.arange(height * width))
+    assert len(np.unique(slots)) == height * width
+
+
+def test_groups_are_spread_and_neighbours_are_apart() -> None:
+    from pbrs_farm.transport.metropolis.reconnection import deal
+
+    groups = deal(64, 64, 256, seed=1)
+    group = (groups.slots.numpy() // groups.n).reshape(64, 64)
+    cells = group.reshape(16, 4, 16, 4).swapaxes(1, 2).reshape(256, 16)
+    assert np.array_equal(np.sort(cells, 1), np.tile(np.arange(16), (256, 1)))
+
+
+def test_importance_is_high_where_it_is_dark_and_bounded() -> None:
+    from pbrs_farm.transport.metropolis.integrator import importance_of
+
+    rng = np.random.default_rng(0)
+    pixels = rng.integers(0, 48 * 64, 30_000).astype(np.uint32)
+    levels = np.where(pixels % 64 < 32, 1.0, 0.01).astype(np.float32)
+    importance = importance_of((48, 64), pixels, levels)
+    assert importance.shape == (48, 64)
+    assert importance[:, :16].mean() < 0.1 * importance[:, 48:].mean()
+    assert importance.min() > 0
+    assert importance.max() <= 20.0
+
+
+def test_a_black_picture_has_even_importance() -> None:
+    from pbrs_farm.transport.metropolis.integrator import importance_of
+
+    importance = importance_of((3, 4), np.zeros(10, np.uint32), np.zeros(10, np.float32))
+    assert np.array_equal(importance, np.ones((3, 4), np.float32))
+
+
+def coated_room() -> tuple[House, Camera]:
+    """Every kind of second vertex: coats rough and smooth, a metal, a translucent sheet, glass."""
+    surfaces = rooms.shell((4.0, 2.5, 4.0), 0)
+    surfaces.append(rooms.box((2.4, 0.0, 2.4), (3.2, 0.6, 3.2), 1, "smooth"))
+    surfaces.append(rooms.box((0.8, 0.0, 2.6), (1.6, 0.9, 3.4), 2, "metal"))
+    surfaces += rooms.panel((0.0, 0.6, 2.0), (1.2, 2.0, 2.02), (0.3, 0.9, 0.5, 1.1), 3)
+    surfaces.append(rooms.sphere((3.2, 1.2, 1.0), 0.3, 4, n=16))
+    materials = [
+        Material("coat", diffuse=(0.7, 0.6, 0.5), specular=(0.5, 0.5, 0.5), shininess=40.0),
+        Material("smooth", diffuse=(0.3, 0.5, 0.6), specular=(0.9, 0.9, 0.9), shininess=900.0),
+        Material("metal", diffuse=(0.05, 0.05, 0.05), specular=(0.8, 0.7, 0.4), shininess=60.0),
+        Material("sheet", diffuse=(0.4, 0.4, 0.4), kind=MaterialKind.SHADE, opacity=0.5),
+        Material("glass", kind=MaterialKind.GLASS, opacity=0.1),
+        rooms.BULB,
+    ]
+    lamps = [rooms.bulb((2.0, 2.0, 2.0), 5, 900.0), rooms.bulb((0.5, 1.2, 2.4), 5, 500.0)]
+    return rooms.house(surfaces, materials, lamps=lamps), rooms.camera(
+        (3.6, 1.5, 0.4), (1.6, 0.8, 3)
+    )
+
+
+def test_tails_of_every_material_leave_the_mean_as_path_has_it() -> None:
+    # Significance: 16 blocks, |z| < 5: missed by chance once in 100,000 runs.
+    house, camera = coated_room()
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    camera = camera.with_size(32, 24)
+    plain = FIELDS.model_copy(update={"spp": 512, "pilot_spp": 4})
+    shown = METROPOLIS.model_copy(update={"tail_pixels": 256, "direct_spp": 128})
+    paths = [scene.render(camera, "0_0", plain, 10 + k) for k in range(4)]
+    chains = [scene.render(camera, "0_0", shown, 50 + k) for k in range(4)]
+    ours = [blocks(r.group(Group.INDOOR)) for r in chains]
+    theirs = [blocks(r.group(Group.INDOOR)) for r in paths]
+    z = z_scores(ours, theirs)
+    assert np.abs(z).max() < 5
+    assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.02)
+
+
+def test_showing_tails_cuts_the_error_of_the_same_chains() -> None:
+    house, camera = rooms.window_room(0.7, lumen=800)
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    camera = camera.with_size(32, 24)
+    noise = []
+    for n in (0, 256):
+        fields = METROPOLIS.model_copy(update={"tail_pixels": n, "direct_spp": 128})
+        noise.append(scene.render(camera, "0_0", fields, 7).noise["indoor"])
+    assert noise[1] < 0.6 * noise[0]

@@ -1,0 +1,1 @@
+"""The farm from outside: submit, watch, steer."""

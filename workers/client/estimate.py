@@ -1,0 +1,53 @@
+"""What a job will cost before it runs: tasks, hours, storage; pure.
+
+The constants were measured on the example homes on two cores (docs/farm.md says when); they are
+there to tell an hour from a month, not to be right to ten per cent.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from pbrs_farm.core.recipe import Recipe
+from workers.job import JobSpec
+from workers.node.view_groups import TARGET_S
+
+# 779,342 views of 45,622 houses, the paper's own count.
+VIEWS_PER_HOUSE: Final = 17.1
+_SECONDS_PER_MEGASAMPLE: Final = 0.6
+_LABELS_S: Final = 1.0
+_HOUSE_S: Final = 60.0
+_BYTES_PER_PIXEL: Final = {"light": 22.0, "labels": 4.0}
+
+
+def seconds_per_view(recipe: Recipe) -> float:
+    """Expected seconds of light for a view on one slot of two cores."""
+    light = recipe.light
+    spp = light.spp if light.integrator == "path" else light.direct_spp + light.mutations_per_pixel
+    megasamples = 2 * spp * recipe.image.width_px * recipe.image.height_px / 1e6
+    return max(1.0, _SECONDS_PER_MEGASAMPLE * megasamples)
+
+
+def estimate(spec: JobSpec, n_slots: int) -> dict[str, float | int | str]:
+    """Expected houses, views, tasks, hours and storage of a job."""
+    per_house = min(spec.n_views, VIEWS_PER_HOUSE) if spec.n_views else VIEWS_PER_HOUSE
+    n_views = round(spec.n_houses * per_house)
+    per_group = max(1.0, TARGET_S / spec.seconds_per_view)
+    n_groups = spec.n_houses * math.ceil(per_house / per_group)
+    n_tasks = 2 * spec.n_houses + n_groups * len(spec.group_stages)
+    has_light = "light" in spec.group_stages
+    seconds = spec.n_houses * _HOUSE_S + n_views * (
+        _LABELS_S + (spec.seconds_per_view if has_light else 0.0)
+    )
+    n_pixels = spec.recipe.image.width_px * spec.recipe.image.height_px
+    per_pixel = _BYTES_PER_PIXEL["labels"] + (_BYTES_PER_PIXEL["light"] if has_light else 0.0)
+    return {
+        "job": spec.job_id,
+        "houses": spec.n_houses,
+        "views": n_views,
+        "tasks": n_tasks,
+        "slot_hours": round(seconds / 3600, 2),
+        "hours": round(seconds / 3600 / max(1, n_slots), 2),
+        "storage_gb": round(n_views * n_pixels * per_pixel / 1e9, 2),
+    }

@@ -1,0 +1,87 @@
+"""What is known of a task, and what keeps it from running. Effects: reads the ledger."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from pbrs_farm.core.errors import BadInput
+from workers.ids import WHOLE, TaskId, queue_of, task_from_text
+from workers.ledger.interface import JobView
+from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.worker_registry import ALIVE_S, Registry
+
+_LETTERS = {
+    "l": "loaded, its house not admitted yet", "w": "ready", "q": "queued", "r": "running",
+    "d": "done", "f": "failed for good", "x": "cancelled",
+}  # fmt: skip
+_WAITING = {_LETTERS[letter] for letter in "lwq"}
+
+
+def why(ledger: RedisLedger, registry: Registry, view: JobView, text: str) -> list[dict[str, Any]]:
+    """A row per task that text names: a task, a house, or a view (HOUSE/VIEW).
+
+    Empty when the house is not in the ledger yet. Raises BadInput for a task or view there is not.
+    """
+    house, _, rest = text.partition("/")
+    states = ledger.unit_states(view.job_id, house)
+    groups = ledger.groups(view.job_id, house)
+    units = {u: at for u, at in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
+    units = {u: at for u, at in units.items() if ":" in at}
+    wanted = rest.partition("/")[0]
+    if states and wanted and wanted not in units:
+        holding = [str(k) for k, views in enumerate(groups) if wanted in views]
+        if not holding:
+            raise BadInput(text, "", "the job has no such task or view")
+        units = {holding[0]: units[holding[0]]}
+    elif wanted:
+        units = {u: at for u, at in units.items() if u == wanted}
+    rows = [_row(ledger, view.job_id, house, u, at, groups) for u, at in sorted(units.items())]
+    for row in rows:
+        if row["state"] in _WAITING and (hindered := _hindrance(registry, view, row["task"])):
+            row["because"] = hindered
+    return rows
+
+
+def _row(
+    ledger: RedisLedger,
+    job: str,
+    house: str,
+    unit: str,
+    at: str,
+    groups: tuple[tuple[str, ...], ...],
+) -> dict[str, Any]:
+    stage, _, letter = at.partition(":")
+    task = str(TaskId(house, unit, stage))
+    facts = ledger.task_facts(job, task)
+    row: dict[str, Any] = {"task": task, "state": _LETTERS.get(letter, letter)}
+    if unit.isdigit():
+        row["views"] = list(groups[int(unit)])
+    if letter == "w" and "not_before" in facts:
+        row["state"] = "waits before it is tried again"
+    if "claim" in facts:
+        _token, row["worker"], since = facts["claim"].split("|")
+        row["for_s"] = round(ledger.now() - float(since), 1)
+    row |= {name: facts[name] for name in ("attempts", "tried") if name in facts}
+    if "fault" in facts:
+        row["fault"] = json.loads(facts["fault"])
+    return row
+
+
+def _hindrance(registry: Registry, view: JobView, task: str) -> str:
+    """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
+    if view.state != "running":
+        return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
+    if sick := registry.breaker():
+        return f"storage is sick: {sick}"
+    queue = queue_of(task_from_text(task).stage, gpu=view.fields.get("gpu") == "1")
+    takers = [
+        w
+        for w in registry.workers()
+        if w.age_s < ALIVE_S and queue in w.fields.get("queues", "").split(",")
+    ]
+    if not takers:
+        return f"no worker takes {queue}"
+    if all(w.fields.get("drain") == "1" for w in takers):
+        return f"every worker that takes {queue} is leaving"
+    return ""

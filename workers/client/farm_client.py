@@ -1,0 +1,308 @@
+"""The farm from outside: submit, watch, steer. What the command line calls, in the same words.
+
+Effects: Redis and the store. To look at a job it imports neither numpy nor celery nor mitsuba, nor
+the recipe's models: `status` is asked often, of machines that are busy.
+
+    farm = Farm(config_from_environment())
+    job = farm.submit(houses, recipe).job_id
+    farm.status(job)
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import pbrs_farm
+from pbrs_farm.core.errors import BadInput, MachineFailed, ObjectMissing
+from pbrs_farm.store import Store, store_from_url
+from workers.client.explain import why
+from workers.config import FarmConfig
+from workers.coordinator.progress_rates import stage_views
+from workers.ids import (
+    check_job_id,
+    failed_key,
+    job_key,
+    log_key,
+    task_from_text,
+)
+from workers.ledger.interface import JobView
+from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.worker_registry import ALIVE_S, Registry
+
+if TYPE_CHECKING:
+    from pbrs_farm.core.recipe import Recipe
+    from workers.job import HouseEntry, JobSpec
+
+
+@dataclass(frozen=True, slots=True)
+class Submitted:
+    """A job that is on the farm. was: its state before, "" when it is new."""
+
+    job_id: str
+    n_houses: int
+    was: str
+
+
+class Farm:
+    """One farm: a Redis and a store. Raises PbrsError with one clear line."""
+
+    def __init__(self, config: FarmConfig) -> None:
+        self.config = config
+        self.ledger = RedisLedger(config)
+        self.registry = Registry(self.ledger)
+
+    @cached_property
+    def store(self) -> Store:
+        """The farm's store; MachineFailed when none is named."""
+        if not self.config.store_url:
+            raise MachineFailed("no store", hint="PBRS_STORE=file:///folder or s3://bucket/prefix")
+        return store_from_url(self.config.store_url, self.config.store)
+
+    def submit(
+        self,
+        houses: Sequence[HouseEntry],
+        spec: JobSpec,
+        *,
+        update: bool = False,
+        tell: Callable[[str], None] = lambda _line: None,
+    ) -> Submitted:
+        """Put a job on the farm; a job that is there already is left alone.
+
+        spec.job_id and n_houses are set here; houses are sorted by id. update: the root's recipe
+        may be replaced. Raises BadRecipe when the root holds another recipe, BadInput when two
+        houses share an id.
+        """
+        from pbrs_farm.run.output_root import claim_root
+        from workers.job import lines_from_houses
+
+        houses, spec = completed(houses, spec)
+        self.ledger.ping()
+        view = self.ledger.view(spec.job_id)
+        if view is not None and view.state in ("running", "paused", "done"):
+            return Submitted(spec.job_id, len(houses), view.state)
+        n_slots = max(self.registry.slots().values(), default=_SLOTS_UNKNOWN)
+        spec = spec.model_copy(
+            update={"min_groups": math.ceil(_GROUPS_PER_SLOT * n_slots / len(houses))}
+        )
+        claim_root(self.store, spec.recipe, update=update)
+        self.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
+        self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
+        return Submitted(spec.job_id, len(houses), self._load(spec, list(houses), tell))
+
+    def recover(self, job: str, tell: Callable[[str], None] = lambda _line: None) -> JobView:
+        """Rebuild the ledger of a job from storage, whatever Redis held of it."""
+        from workers.job import houses_from_lines
+
+        spec = self.spec(job)
+        houses = [*houses_from_lines(self.store.get(job_key(job, "houses.jsonl")))]
+        self._load(spec, houses, tell)
+        view = self.ledger.view(job)
+        assert view is not None
+        return view
+
+    def spec(self, job: str) -> JobSpec:
+        """What the job was submitted with; BadInput when the store knows no such job."""
+        from workers.job import JobSpec
+
+        try:
+            return JobSpec.model_validate_json(self.store.get(job_key(check_job_id(job))))
+        except ObjectMissing:
+            raise BadInput(job, "", f"no such job in {self.store.url}") from None
+
+    def jobs(self) -> list[JobView]:
+        """Every job in the ledger, oldest first."""
+        return [v for j in self.ledger.known_jobs() if (v := self.ledger.view(j)) is not None]
+
+    def newest_job(self) -> str:
+        """The job submitted last; BadInput when there is none."""
+        known = self.ledger.known_jobs()
+        if not known:
+            raise BadInput("farm", "", "no job in the ledger", hint="`submit`, or `recover JOB`")
+        return known[-1]
+
+    def view(self, job: str) -> JobView:
+        """The ledger's view of a job; BadInput for an unknown one."""
+        view = self.ledger.view(check_job_id(job))
+        if view is None:
+            raise BadInput(
+                job, "", "not in the ledger", hint="`recover` rebuilds a job from storage"
+            )
+        return view
+
+    def status(self, job: str) -> dict[str, Any]:
+        """State, stages (done, running, queued, failed, rate, ETA), houses, workers, storage."""
+        view = self.view(job)
+        workers = self.registry.workers()
+        stages = stage_views(view, self.registry.slots())
+        return {
+            "job": job,
+            "state": view.state,
+            "reason": view.fields.get("reason", ""),
+            "recipe": view.fields.get("recipe_name", ""),
+            "houses": {
+                "total": int(view.fields.get("n_houses", 0)),
+                "waiting": view.n_waiting_houses,
+                **{s: int(view.counts.get(f"houses:{s}", 0)) for s in _HOUSE_STATES},
+            },
+            "views_done": int(view.counts.get("views", 0)),
+            "stages": [asdict(stage) for stage in stages],
+            "eta_s": max((s.eta_s for s in stages if s.eta_s is not None), default=None),
+            "failures": _with_prefix(view.counts, "failures:"),
+            "handed_back": _with_prefix(view.counts, "handed_back:"),
+            "workers": len([w for w in workers if w.age_s < ALIVE_S]),
+            "refusing": [
+                {"worker": w.name, "why": w.fields["refuses"]}
+                for w in workers
+                if w.age_s < ALIVE_S and job in w.fields.get("refuses", "")
+            ],
+            "storage": self.registry.breaker() or "ok",
+        }
+
+    def why(self, job: str, text: str) -> list[dict[str, Any]]:
+        """What is known of a task, of all tasks of a house, or of one view (HOUSE/VIEW).
+
+        Says in words what each waits for. Raises BadInput when the job has no such house.
+        """
+        rows = why(self.ledger, self.registry, self.view(job), text)
+        return rows or self._why_not_admitted(job, text.partition("/")[0])
+
+    def logs(self, job: str, text: str, attempt: int | None = None) -> str:
+        """The stored log of a task's attempt (the last one by default); BadInput when none."""
+        task = task_from_text(text)
+        prefix = log_key(job, str(task), 0).removesuffix("0.txt")
+        folder = prefix.rpartition("/")[0] + "/"
+        found = {
+            int(number): key
+            for key in self.store.list(folder)
+            if key.startswith(prefix)
+            and (number := key.removeprefix(prefix).removesuffix(".txt")).isdigit()
+        }
+        chosen = attempt if attempt is not None else max(found, default=0)
+        if chosen not in found:
+            raise BadInput(text, "", "no log stored", hint="logs are kept of failed attempts")
+        return self.store.get(found[chosen]).decode("utf-8", "replace")
+
+    def failures(self, job: str) -> list[dict[str, Any]]:
+        """Tasks that failed for good, grouped by what is alike, most frequent first."""
+        groups: dict[str, dict[str, Any]] = {}
+        for task, fault in self.ledger.faults(job):
+            group = groups.setdefault(
+                fault.fingerprint,
+                {"fingerprint": fault.fingerprint, "class": fault.fault, "n": 0,
+                 "example": fault.message, "log": fault.log, "tasks": []},
+            )  # fmt: skip
+            group["n"] += 1
+            group["tasks"] = sorted([*group["tasks"], task])[:20]
+        return sorted(groups.values(), key=lambda g: (-g["n"], g["fingerprint"]))
+
+    def retry(self, job: str, tasks: Sequence[str] = ()) -> list[str]:
+        """Fresh attempts for these tasks, or for all that failed; those that were put back."""
+        chosen = list(tasks) or [task for task, _fault in self.ledger.faults(job)]
+        again = [t for t in chosen if self.ledger.retry(job, str(task_from_text(t)))]
+        for task in again:
+            self.store.delete(failed_key(job, task))
+        return again
+
+    def pause(self, job: str, reason: str = "by hand") -> str:
+        """Start nothing more; what runs, ends. The job's state afterwards."""
+        return self._steer(job, "pause", reason)
+
+    def resume(self, job: str) -> str:
+        """Go on with a paused job."""
+        return self._steer(job, "resume")
+
+    def cancel(self, job: str, reason: str = "by hand") -> str:
+        """Stop for good: what runs is killed. What is in storage stays; submit takes it up."""
+        return self._steer(job, "cancel", reason)
+
+    def reduce(self, job: str) -> str:
+        """Merge what is there now, of a finished or a running job; its report says what lacks."""
+        return self._steer(job, "reduce")
+
+    def drain(self, worker: str, *, undo: bool = False) -> None:
+        """The worker finishes what it runs and leaves; BadInput when there is no such worker."""
+        if not self.registry.drain(worker, undo=undo):
+            raise BadInput(worker, "", "no such worker", hint="`workers` lists them")
+
+    def workers(self) -> list[dict[str, Any]]:
+        """Workers seen in the last hour."""
+        return [
+            {"worker": w.name, "age_s": round(w.age_s, 1), **w.fields}
+            for w in self.registry.workers()
+        ]
+
+    def _load(self, spec: JobSpec, houses: list[HouseEntry], tell: Callable[[str], None]) -> str:
+        """Enter the job into the ledger, as far along as storage says it is."""
+        from workers.coordinator.recover import rebuild
+        from workers.runner import runner_maker
+
+        was = ""
+        view = self.ledger.view(spec.job_id)
+        if view is not None:
+            was = view.state
+            if was == "loading" and self.ledger.age_s(view) < _LOADING_S:
+                raise BadInput(spec.job_id, "", "is being submitted by somebody else", hint=_WAIT)
+            self.ledger.forget(spec.job_id)
+        if self.ledger.create(spec) != "":
+            raise BadInput(spec.job_id, "", "is being submitted by somebody else", hint=_WAIT)
+        runner = runner_maker(self.config.runner)(self.config, lambda _reason: None)
+        rebuild(self.ledger, self.store, runner, spec, houses, tell)
+        self.ledger.open(spec.job_id, spec.priority)
+        return was
+
+    def _steer(self, job: str, what: str, reason: str = "") -> str:
+        state = self.ledger.steer(check_job_id(job), what, reason)
+        if not state:
+            raise BadInput(job, "", "not in the ledger", hint="`recover` rebuilds it from storage")
+        return state
+
+    def _why_not_admitted(self, job: str, house: str) -> list[dict[str, Any]]:
+        from workers.job import houses_from_lines
+
+        data = self.store.get(job_key(check_job_id(job), "houses.jsonl"))
+        if all(entry.house_id != house for entry in houses_from_lines(data)):
+            raise BadInput(house, "", "the job has no such house")
+        return [{"task": house, "state": "its house is not admitted yet"}]
+
+
+# A submission that takes longer has died; the next one starts afresh.
+_LOADING_S = 900.0
+# A small job is cut finer, so that its last group does not leave the other slots idle.
+_GROUPS_PER_SLOT = 4
+_SLOTS_UNKNOWN = 2
+_WAIT = "wait for it; after 15 minutes it counts as dead"
+_HOUSE_STATES = ("open", "done", "quarantined")
+
+
+def completed(
+    houses: Sequence[HouseEntry], spec: JobSpec
+) -> tuple[tuple[HouseEntry, ...], JobSpec]:
+    """Houses sorted and the spec with its id; BadInput for no house or one named twice."""
+    from workers.job import job_id
+
+    if not houses:
+        raise BadInput("submit", "", "no house")
+    twice = [h for h, n in Counter(h.house_id for h in houses).items() if n > 1]
+    if twice:
+        raise BadInput("submit", twice[0], "named twice")
+    in_order = tuple(sorted(houses, key=lambda h: h.house_id))
+    spec = spec.model_copy(update={"n_houses": len(in_order)})
+    return in_order, spec.model_copy(update={"job_id": job_id(spec, in_order)})
+
+
+def new_spec(recipe: Recipe, **fields: Any) -> JobSpec:
+    """A JobSpec of this version; its id is set by submit."""
+    from workers.job import JobSpec
+
+    return JobSpec.model_validate(
+        {"job_id": "", "version": pbrs_farm.__version__, "recipe": recipe, **fields}
+    )
+
+
+def _with_prefix(counts: Any, prefix: str) -> dict[str, int]:
+    return {k.removeprefix(prefix): int(n) for k, n in counts.items() if k.startswith(prefix)}

@@ -1,0 +1,210 @@
+"""The coordinator: one leader that admits houses, sends messages, and ends the leases of the dead.
+
+Effects: Redis and its broker. It keeps a window of messages in flight, so Redis stays small
+whatever the size of a job; it may be killed at any time, and a standby takes over in 15 seconds.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import platform
+import secrets
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+from pbrs_farm.core.errors import PbrsError
+from workers.config import FarmConfig, config_from_environment
+from workers.coordinator.progress_rates import Rates
+from workers.ids import STAGES, queue_of, task_from_text
+from workers.ledger.interface import JobView, LedgerUnavailable
+from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.worker_registry import Registry
+from workers.liveness import touch
+from workers.logs import log_plainly
+
+_log = logging.getLogger("pbrs.coordinator")
+_BUSY_PAUSE_S: Final = 0.05
+_IDLE_PAUSE_S: Final = 0.5
+_STANDBY_PAUSE_S: Final = 1.0
+_REAP_EVERY_S: Final = 5.0
+_RESEND_EVERY_S: Final = 15.0
+_RATES_EVERY_S: Final = 10.0
+
+
+class Coordinator:
+    """send: puts one message on a queue: send(queue, job, task, recipe digest)."""
+
+    def __init__(
+        self,
+        config: FarmConfig,
+        ledger: RedisLedger,
+        send: Callable[[Iterable[tuple[str, str, str, str]]], None],
+    ) -> None:
+        self._config = config
+        self._ledger = ledger
+        self._registry = Registry(ledger)
+        self._send = send
+        self._token = f"{platform.node()}:{os.getpid()}:{secrets.token_hex(4)}"
+        self._due: dict[str, float] = {}
+        self._slots: dict[str, int] = {}
+        self._rates = Rates()
+        self.leading = False
+
+    def run(self, stop: threading.Event) -> None:
+        """Turn after turn until told to stop; Redis may go away and come back."""
+        while not stop.is_set():
+            try:
+                if self.turn():
+                    stop.wait(_BUSY_PAUSE_S)
+                elif self.leading:
+                    self._ledger.rest(_IDLE_PAUSE_S)
+                else:
+                    stop.wait(_STANDBY_PAUSE_S)
+            except LedgerUnavailable as error:
+                _log.warning("%s; trying again", error)
+                self.leading = False
+                stop.wait(2.0)
+        try:
+            self._ledger.resign(self._token)
+        except LedgerUnavailable as error:
+            _log.warning("%s", error)
+
+    def turn(self) -> int:
+        """One round of duties; how many messages were sent."""
+        if self._is_due("alive", _REAP_EVERY_S):
+            touch(self._config.heartbeat_file)
+        leading = self._ledger.lead(self._token)
+        if leading != self.leading:
+            _log.info("leading" if leading else "not leading; standing by")
+            self.leading = leading
+        if not leading:
+            return 0
+        if self._is_due("slots", _REAP_EVERY_S):
+            self._slots = self._registry.slots()
+            self._ledger.reap(self._token)
+        views = [v for j in self._ledger.active_jobs() if (v := self._ledger.view(j)) is not None]
+        if self._is_due("rates", _RATES_EVERY_S):
+            for view in views:
+                self._ledger.set_rates(view.job_id, self._rates.update(view, time.monotonic()))
+        if self._registry.breaker():
+            return 0
+        n_sent = self._feed(views)
+        if self._is_due("resend", _RESEND_EVERY_S):
+            n_sent += self._resend(views)
+        return n_sent
+
+    def _feed(self, views: list[JobView]) -> int:
+        room = self._room(views)
+        n_sent = 0
+        for view in views:
+            tasks = self._ledger.feed(
+                view.job_id, self._token, max_open=self._max_open(), room=room
+            )
+            if tasks is None:
+                self.leading = False
+                return n_sent
+            self._publish(view, tasks)
+            n_sent += len(tasks)
+            for task in tasks:
+                stage = task.rpartition("/")[2]
+                room[stage] -= 1
+        return n_sent
+
+    def _room(self, views: list[JobView]) -> dict[str, int]:
+        """Stage -> messages that may be sent now, over all jobs."""
+        room = {}
+        for stage in STAGES:
+            in_flight = sum(v.counts.get(f"{stage}:{s}", 0) for v in views for s in "qr")
+            wanted = self._config.window_per_slot * self._slots.get(stage, 0)
+            room[stage] = max(0, int(max(self._config.window_min, wanted) - in_flight))
+        return room
+
+    def _max_open(self) -> int:
+        n_slots = max(self._slots.values(), default=0)
+        return max(self._config.window_min, self._config.window_per_slot * n_slots)
+
+    def _resend(self, views: list[JobView]) -> int:
+        """Messages lost between the ledger and the broker: their queue is empty, they are old."""
+        n_sent = 0
+        for view in views:
+            for stage in STAGES:
+                queue = queue_of(stage, gpu=view.fields.get("gpu") == "1")
+                if not view.counts.get(f"{stage}:q") or self._ledger.queue_length(queue):
+                    continue
+                tasks = self._ledger.resend(view.job_id, self._token, stage, self._config.resend_s)
+                if tasks:
+                    _log.info("sending %d messages of %s again", len(tasks), stage)
+                    self._publish(view, tasks)
+                    n_sent += len(tasks)
+        return n_sent
+
+    def _publish(self, view: JobView, tasks: list[str]) -> None:
+        gpu = view.fields.get("gpu") == "1"
+        recipe = view.fields["recipe"]
+        self._send(
+            (queue_of(task_from_text(task).stage, gpu=gpu), view.job_id, task, recipe)
+            for task in tasks
+        )
+
+    def _is_due(self, what: str, every_s: float) -> bool:
+        now = time.monotonic()
+        if now < self._due.get(what, 0.0):
+            return False
+        self._due[what] = now + every_s
+        return True
+
+
+# Nothing to be declared (a message goes to a queue by its name), and no repr of its words.
+_PLAIN: Final[dict[str, Any]] = {"declare": (), "argsrepr": "", "kwargsrepr": ""}
+
+
+def celery_sender(app: Any) -> Callable[[Iterable[tuple[str, str, str, str]]], None]:
+    """send for a Coordinator, through a Celery application."""
+    from kombu.exceptions import OperationalError
+
+    def send(messages: Iterable[tuple[str, str, str, str]]) -> None:
+        try:
+            pool = app.producer_pool
+            with pool.acquire(block=True, timeout=10) as producer, producer.batch():
+                for queue, job, task, recipe in messages:
+                    app.send_task(
+                        "pbrs.run", args=(job, task, recipe), queue=queue, producer=producer,
+                        **_PLAIN,
+                    )  # fmt: skip
+        except (OperationalError, OSError) as error:
+            # What was not sent stays "q" in the ledger, and is sent again when it is old.
+            raise LedgerUnavailable(f"the broker took no message: {error}") from error
+
+    return send
+
+
+def main() -> int:
+    """`python -m workers.coordinator.leader`: lead, or stand by, until told to leave."""
+    from workers.queue.celery_app import make_app
+
+    log_plainly()
+    try:
+        config = config_from_environment()
+        ledger = RedisLedger(config)
+        ledger.ping()
+    except PbrsError as error:
+        sys.stderr.write(f"pbrs-farm: {error}\n")
+        return 1
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    if config.metrics_port:
+        from workers.coordinator.metrics import serve_metrics
+
+        serve_metrics(config, ledger)
+    Coordinator(config, ledger, celery_sender(make_app(config))).run(stop)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,134 @@
+"""How fast a job goes and when it will end; pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from workers.ids import STAGES
+from workers.ledger.interface import JobView
+
+_TAU_S: Final = 120.0
+
+
+@dataclass(slots=True)
+class Rates:
+    """Tasks finished per second and stage, averaged with a memory of two minutes."""
+
+    _last: dict[str, tuple[float, Mapping[str, float]]] = field(default_factory=dict)
+    _rate: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    def update(self, view: JobView, now_s: float) -> dict[str, float]:
+        """Stage -> tasks per second, from this look at the job and the ones before."""
+        rates = self._rate.setdefault(view.job_id, {})
+        done = {s: view.counts.get(f"done:{s}", 0.0) for s in STAGES}
+        before = self._last.get(view.job_id)
+        self._last[view.job_id] = (now_s, done)
+        if before is None or now_s <= before[0]:
+            return dict(rates)
+        seconds = now_s - before[0]
+        keep = math.exp(-seconds / _TAU_S)
+        for stage in STAGES:
+            rate = max(0.0, done[stage] - before[1].get(stage, 0.0)) / seconds
+            old = rates.get(stage)
+            rates[stage] = rate if old is None else keep * old + (1 - keep) * rate
+        return dict(rates)
+
+
+@dataclass(frozen=True, slots=True)
+class StageView:
+    """One row of `status`. total: expected, from the houses seen so far."""
+
+    stage: str
+    done: int
+    running: int
+    queued: int
+    waiting: int
+    failed: int
+    total: int
+    per_s: float
+    mean_s: float
+    p50_s: float
+    p90_s: float
+    eta_s: float | None
+
+
+def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
+    """The stages of a job: counts, rate, and an ETA from the rate or, at first, from p50."""
+    return [
+        _stage_view(view, stage, slots.get(stage, 0)) for stage in STAGES if _known(view, stage)
+    ]
+
+
+def _known(view: JobView, stage: str) -> bool:
+    return stage not in ("gl", "light") or stage in view.fields.get("stages", "").split(",")
+
+
+def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
+    c = view.counts
+    done, failed = int(c.get(f"done:{stage}", 0)), int(c.get(f"{stage}:f", 0))
+    running, queued = int(c.get(f"{stage}:r", 0)), int(c.get(f"{stage}:q", 0))
+    total = expected_total(view, stage)
+    left = max(0, total - done - failed)
+    counts = _took(view, stage)
+    p50, p90 = quantile_s(counts, 0.5), quantile_s(counts, 0.9)
+    rate = view.rates.get(stage, 0.0)
+    eta: float | None = None
+    if left == 0 and (total or view.state == "done"):
+        eta = 0.0
+    elif rate > 1e-6:
+        eta = left / rate
+    elif n_slots and p50:
+        eta = left * p50 / n_slots
+    return StageView(
+        stage=stage, done=done, running=running, queued=queued,
+        waiting=max(0, left - running - queued), failed=failed, total=total, per_s=rate,
+        mean_s=c.get(f"seconds:{stage}", 0.0) / max(1, sum(counts.values())),
+        p50_s=p50, p90_s=p90, eta_s=eta,
+    )  # fmt: skip
+
+
+def expected_total(view: JobView, stage: str) -> int:
+    """Tasks of a stage in the whole job; groups of houses not yet opened at the mean so far.
+
+    0 while nothing is known. Houses that were given up have none that are still to come.
+    """
+    n_houses = int(view.fields.get("n_houses", 0))
+    if stage == "job":
+        return 1
+    if stage == "shard":
+        return max(1, math.ceil(n_houses / int(view.fields.get("shard_size", 500))))
+    if stage == "geometry":
+        return n_houses
+    n_given_up = int(view.counts.get("houses:quarantined", 0))
+    if stage == "reduce":
+        return n_houses - n_given_up
+    opened = view.counts.get("done:geometry", 0)
+    groups = view.counts.get("groups", 0)
+    unread = view.counts.get("geometry:f", 0) + view.counts.get("geometry:x", 0)
+    return int(groups + (n_houses - opened - unread) * (groups / opened if opened else 0))
+
+
+def _took(view: JobView, stage: str) -> dict[int, float]:
+    prefix = f"took:{stage}:"
+    return {
+        int(name.removeprefix(prefix)): n
+        for name, n in view.counts.items()
+        if name.startswith(prefix)
+    }
+
+
+def quantile_s(counts: Mapping[int, float], share: float) -> float:
+    """Seconds below which `share` of tasks ended, from a histogram over powers of two (upper ends).
+
+    0 when nothing ended yet.
+    """
+    wanted = share * sum(counts.values())
+    seen = 0.0
+    for power in sorted(counts):
+        seen += counts[power]
+        if seen >= wanted and seen > 0:
+            return float(2.0**power)
+    return 0.0

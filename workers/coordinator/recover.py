@@ -1,0 +1,102 @@
+"""The ledger rebuilt from storage: one listing of the markers, one look at each unfinished house.
+
+Effects: reads the store, writes Redis. Attempts start afresh; tasks that had failed for good and
+left a record are tried again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import islice
+from typing import Final
+
+from pbrs_farm.store.interface import Store
+from workers.ids import GEOMETRY, REDUCE
+from workers.job import HouseEntry, JobSpec
+from workers.ledger.interface import HouseState
+from workers.ledger.redis_ledger import RedisLedger
+from workers.runner import StepRunner
+
+_THREADS: Final = 16
+_CHUNK: Final = 1000
+
+
+def rebuild(
+    ledger: RedisLedger,
+    store: Store,
+    runner: StepRunner,
+    spec: JobSpec,
+    houses: list[HouseEntry],
+    tell: Callable[[str], None] = lambda _line: None,
+) -> None:
+    """Enter every house of the job as its markers tell it. The job must have just been created."""
+    done = done_steps(store) if houses else {}
+    tell(f"{sum(map(len, done.values()))} markers of {len(done)} houses")
+    numbered = iter(enumerate(houses))
+    with ThreadPoolExecutor(_THREADS) as pool:
+        while chunk := list(islice(numbered, _CHUNK)):
+            look = partial(_state, runner, spec, done)
+            _enter(ledger, spec.job_id, chunk, list(pool.map(look, chunk)))
+
+
+def done_steps(store: Store) -> dict[str, frozenset[str]]:
+    """House -> names of its markers, from one listing of the store."""
+    names: dict[str, list[str]] = {}
+    for key in store.list("houses/"):
+        parts = key.split("/")
+        if len(parts) == 4 and parts[2] == "done":
+            names.setdefault(parts[1], []).append(parts[3].removesuffix(".json"))
+    return {house: frozenset(found) for house, found in names.items()}
+
+
+def _state(
+    runner: StepRunner,
+    spec: JobSpec,
+    done: dict[str, frozenset[str]],
+    numbered: tuple[int, HouseEntry],
+) -> HouseState | None:
+    """The house as the ledger shall hold it, None when nothing is done."""
+    index, house = numbered
+    names = done.get(house.house_id)
+    survey = runner.survey(spec, house.house_id, names) if names else None
+    if survey is None or survey.groups is None:
+        return None
+    units: dict[str, tuple[str, str]] = {}
+    for unit, stage in survey.missing.items():
+        units[unit] = (stage, "l") if stage else (spec.group_stages[-1], "d")
+    if survey.reduced:
+        units["-"] = (REDUCE, "d")
+    elif all(letter == "d" for _stage, letter in units.values()):
+        units["-"] = (REDUCE, "l")
+    else:
+        units["-"] = (GEOMETRY, "d")
+    return HouseState(index, house.house_id, survey.reduced, survey.groups, units)
+
+
+def _enter(
+    ledger: RedisLedger,
+    job: str,
+    chunk: list[tuple[int, HouseEntry]],
+    states: list[HouseState | None],
+) -> None:
+    """In the job's order: runs of fresh houses and of houses with a past, each in one go."""
+    for fresh, items in _runs(chunk, states):
+        if fresh:
+            ledger.add_houses(job, items[0][0], [house for _index, house, _state in items])
+        else:
+            ledger.load_houses(job, [state for _i, _h, state in items if state is not None])
+
+
+def _runs(
+    chunk: list[tuple[int, HouseEntry]], states: list[HouseState | None]
+) -> Iterator[tuple[bool, list[tuple[int, HouseEntry, HouseState | None]]]]:
+    current: list[tuple[int, HouseEntry, HouseState | None]] = []
+    for (index, house), state in zip(chunk, states, strict=True):
+        if current and (state is None) != (current[0][2] is None):
+            yield current[0][2] is None, current
+            current = []
+        current.append((index, house, state))
+    if current:
+        yield current[0][2] is None, current

@@ -1,0 +1,103 @@
+"""Houses on their way to the workers: words of the user -> entries of a job, files into the store.
+
+Effects: reads the user's files, writes the store; on a worker, fills its cache from the store.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.assets import homes
+from pbrs_farm.assets.debian import cache_folder
+from pbrs_farm.read.source import SourceRef, resolve
+from pbrs_farm.store.interface import Store
+from workers.job import HouseEntry
+
+FOLDER: Final = "jobs/sources/"
+_UPLOADED: Final = (".sh3d", ".xml", ".zip", ".glb")
+
+
+def entries_from_words(words: Sequence[str]) -> list[tuple[HouseEntry, SourceRef]]:
+    """The houses that words name: files, folders of files, example homes, `builtin`.
+
+    Touches no store. Raises BadHouse for a word that names no house.
+    """
+    found: dict[str, tuple[HouseEntry, SourceRef]] = {}
+    for word in words:
+        for one in _expanded(word):
+            ref = resolve(one)
+            entry = HouseEntry(
+                house_id=ref.house_id, source=_placed(ref).model_dump_json(), sha256=ref.sha256
+            )
+            found.setdefault(ref.house_id, (entry, ref))
+    return list(found.values())
+
+
+def upload(store: Store, refs: Sequence[SourceRef]) -> None:
+    """Put into the store what workers elsewhere need: the files, and the example homes' package.
+
+    Folders (SUNCG, .gltf with side files) are not copied: workers must see them at the same path.
+    """
+    for ref in refs:
+        placed = _placed(ref)
+        if placed.location != ref.location:
+            store.put_if_absent(placed.location, Path(ref.location).read_bytes())
+    package = homes.cached()
+    if package is not None and any(ref.kind in ("example", "sweethome3d") for ref in refs):
+        for deb in sorted(cache_folder().glob(f"{homes.PACKAGE}_*.deb")):
+            if store.head(FOLDER + _key_name(deb.name)) is None:
+                store.put_if_absent(FOLDER + _key_name(deb.name), deb.read_bytes())
+
+
+def is_left_in_place(ref: SourceRef) -> bool:
+    """The source is read where it lies, so every worker must see it: SUNCG, .gltf with side files."""
+    return ref.kind in ("suncg", "gltf") and _placed(ref).location == ref.location
+
+
+def placed_reference(path: Path) -> tuple[str, bytes]:
+    """Key and bytes of the reference file a job is to be selected against; BadInput if none."""
+    from pbrs_farm.curate.reference_build import read_reference
+    from pbrs_farm.selection.reference_set import bytes_from_reference
+
+    reference = read_reference(path)
+    return f"{FOLDER}references/{reference.digest}.npz", bytes_from_reference(reference)
+
+
+def fill_cache(store: Store) -> None:
+    """On a worker: take the example homes' package from the store when it is not cached here."""
+    if homes.cached() is not None:
+        return
+    for key in store.list(FOLDER):
+        name = key.removeprefix(FOLDER)
+        if name.startswith(f"{homes.PACKAGE}_") and name.endswith(".deb"):
+            folder = cache_folder()
+            folder.mkdir(parents=True, exist_ok=True)
+            part = folder / f".{name}.part"
+            part.write_bytes(store.get(key))
+            part.replace(folder / name)
+
+
+def _expanded(word: str) -> list[str]:
+    """A folder of house files -> the files; anything else is itself."""
+    path = Path(word)
+    if path.is_dir() and not (path / "house.json").exists():
+        files = sorted(p for p in path.iterdir() if p.suffix.lower() in (".sh3d", ".glb"))
+        if files:
+            return [str(p) for p in files]
+    return [word]
+
+
+def _placed(ref: SourceRef) -> SourceRef:
+    """The source as workers find it: a single file by its key in the store."""
+    path = Path(ref.location)
+    if ref.kind not in ("sweethome3d", "gltf") or path.suffix.lower() not in _UPLOADED:
+        return ref
+    key = f"{FOLDER}{ref.house_id}/{_key_name(path.name)}"
+    return ref.model_copy(update={"location": key})
+
+
+def _key_name(name: str) -> str:
+    """A file name as a segment of a key; the runner gives the file its own name back."""
+    return "".join(c if c.isalnum() or c in "._-+~ " else "_" for c in name).lstrip(".") or "file"

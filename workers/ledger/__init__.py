@@ -1,0 +1,1 @@
+"""What is done, leased and waiting: one interface, and Redis behind it."""

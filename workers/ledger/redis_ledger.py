@@ -1,0 +1,361 @@
+"""The ledger in Redis: every change is one Lua script, so it happens whole or not at all.
+
+Effects: Redis. All keys begin with the farm's prefix; a job's keys share a {job} hash tag. The
+scripts name keys they compute, so a Redis Cluster will not do; one Redis with a replica will.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import redis
+from redis.backoff import ExponentialWithJitterBackoff
+from redis.retry import Retry
+
+import pbrs_farm
+from workers.config import FarmConfig, shown_url
+from workers.ids import LEASES
+from workers.ledger.interface import (
+    Claim,
+    Fault,
+    Finished,
+    HouseState,
+    JobView,
+    LedgerUnavailable,
+    fault_from_json,
+)
+
+if TYPE_CHECKING:
+    from workers.job import HouseEntry, JobSpec
+
+_SCRIPTS: Final = (
+    "claim", "beat", "finish", "fail", "reap", "feed", "resend", "create", "load", "retry",
+    "steer", "lead",
+)  # fmt: skip
+_CHUNK: Final = 1000
+_LEAD_S: Final = 15
+_AGAINST_WORKER: Final = {"crash", "resource", "machine", "timeout", "silent"}
+
+
+def redis_client(config: FarmConfig) -> Any:
+    """A client that tries again for a few seconds and never hangs on a half-open connection.
+
+    Typed Any: redis-py types every answer as str, bytes, None or an awaitable.
+    """
+    url = config.redis_url.reveal()
+    options: dict[str, Any] = {}
+    if url.startswith("rediss:"):
+        options["ssl_cert_reqs"] = "required"
+        if config.redis_ca:
+            options["ssl_ca_certs"] = config.redis_ca
+    return redis.Redis.from_url(
+        url,
+        decode_responses=True,
+        socket_timeout=30,
+        socket_connect_timeout=5,
+        socket_keepalive=True,
+        health_check_interval=25,
+        retry=Retry(ExponentialWithJitterBackoff(cap=2.0, base=0.05), 5),
+        retry_on_error=[redis.ConnectionError, redis.TimeoutError],
+        client_name="pbrs-ledger",
+        **options,
+    )
+
+
+class RedisLedger:
+    """Implements workers.ledger.interface.Ledger; one per process, safe after a fork."""
+
+    def __init__(self, config: FarmConfig, client: Any = None) -> None:
+        self.config = config
+        self.client = client or redis_client(config)
+        self._g = config.prefix
+        self._where = shown_url(config.redis_url.reveal())
+        folder = Path(__file__).with_name("lua")
+        common = (folder / "common.lua").read_text()
+        self._scripts: dict[str, Any] = {
+            name: self.client.register_script(common + (folder / f"{name}.lua").read_text())
+            for name in _SCRIPTS
+        }
+
+    # The job
+
+    def create(self, spec: JobSpec) -> str:
+        """Make the job unless it exists; its state before, "" when it was made now."""
+        rules = spec.rules
+        fields: dict[str, object] = {
+            "version": spec.version,
+            "recipe": spec.recipe.digest(),
+            "recipe_name": spec.recipe.name,
+            "stages": ",".join(spec.group_stages),
+            "priority": spec.priority,
+            "gpu": int(spec.gpu),
+            "max_attempts": rules.max_attempts,
+            "failed_share": rules.failed_share,
+            "max_quarantined": rules.max_quarantined,
+            "quarantined_share": rules.quarantined_share,
+            "max_same_failure": rules.max_same_failure,
+        }
+        flat = [x for pair in fields.items() for x in pair]
+        return str(self._run("create", spec.job_id, spec.n_houses, rules.shard_size, *flat))
+
+    def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None:
+        """Append fresh houses to the job's order; `first` is the index of the first of them."""
+        p = self._p(job)
+        with self.errors():
+            for start in range(0, len(houses), _CHUNK):
+                chunk = houses[start : start + _CHUNK]
+                pipe = self.client.pipeline(transaction=True)
+                pipe.rpush(
+                    f"{p}order", *(f"{first + start + k}|{h.house_id}" for k, h in enumerate(chunk))
+                )
+                sources = {h.house_id: h.source for h in chunk if h.source}
+                if sources:
+                    pipe.hset(f"{p}sources", mapping=sources)
+                pipe.execute()
+
+    def load_houses(self, job: str, houses: Iterable[HouseState]) -> int:
+        """Enter houses as storage tells them, in the job's order; how many were new."""
+        n_new = 0
+        script, keys = self._scripts["load"], self._keys(job)
+        with self.errors():
+            for chunk in _chunks(houses):
+                pipe = self.client.pipeline(transaction=False)
+                for house in chunk:
+                    units = [x for u, at in house.units.items() for x in (u, *at)]
+                    what = "done" if house.done else "loaded"
+                    groups = _text_from_groups(house.groups)
+                    args = [house.index, house.house_id, what, groups, *units]
+                    script(keys=keys, args=args, client=pipe)
+                n_new += sum(pipe.execute())
+        return n_new
+
+    def open(self, job: str, priority: int) -> None:
+        """The job is loaded; the coordinator may feed it."""
+        with self.errors():
+            pipe = self.client.pipeline(transaction=True)
+            pipe.hset(f"{self._p(job)}job", "state", "running")
+            pipe.zadd(f"{self._g}jobs", {job: priority})
+            pipe.zadd(f"{self._g}known", {job: self.now()})
+            pipe.lpush(f"{self._g}wake", "1")
+            pipe.execute()
+
+    def forget(self, job: str) -> None:
+        """Remove all the ledger knows of the job; storage is not touched."""
+        with self.errors():
+            self.client.zrem(f"{self._g}jobs", job)
+            self.client.zrem(f"{self._g}known", job)
+            for name in LEASES:
+                key = f"{self._g}lease:{name}"
+                members = self.client.zscan_iter(key, match=f"{job}|*")
+                for member, _score in members:
+                    self.client.zrem(key, member)
+            batch: list[str] = []
+            for key in self.client.scan_iter(f"{self._p(job)}*", count=_CHUNK):
+                batch.append(key)
+                if len(batch) >= _CHUNK:
+                    self.client.unlink(*batch)
+                    batch = []
+            if batch:
+                self.client.unlink(*batch)
+
+    def steer(self, job: str, what: str, reason: str = "") -> str:
+        """pause, resume, cancel or reduce; the state afterwards, "" for an unknown job."""
+        return str(self._run("steer", job, what, reason))
+
+    def retry(self, job: str, task: str) -> bool:
+        """Fresh attempts for a task that failed for good; False when it had not."""
+        return bool(self._run("retry", job, task))
+
+    # One task
+
+    def claim(self, job: str, task: str, *, token: str, recipe: str, direct: bool = False) -> Claim:
+        """May this worker run the task? The attempt is counted before the answer."""
+        config = self.config
+        version = pbrs_farm.__version__
+        verdict, detail, inputs = self._run(
+            "claim", job, task, token, config.worker, version, recipe, config.lease_s, int(direct)
+        )
+        return Claim(verdict, detail, inputs, token)
+
+    def beat(self, job: str, task: str, token: str) -> str:
+        """Keep the lease: ok, lost (somebody else's by now) or cancelled."""
+        return str(self._run("beat", job, task, token, self.config.lease_s))
+
+    def finish(self, job: str, task: str, token: str, end: Finished, *, sticky: bool) -> str:
+        """Done: what follows becomes ready. Another task of the house to go on with, or ""."""
+        groups = _text_from_groups(end.groups)
+        args = (f"{end.seconds:.3f}", groups, end.n_views, self.config.worker, int(sticky))
+        _verdict, more = self._run("finish", job, task, token, *args)
+        return str(more)
+
+    def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str:
+        """Ended badly: stale, handed back, retry, failed (for good) or cancelled."""
+        blocking = int(fault.fault in _AGAINST_WORKER)
+        args = (fault.fault, fault.fingerprint, fault.json(), self.config.worker)
+        rest = (delay_s, blocking, self.config.forgive_s)
+        return str(self._run("fail", job, task, token, *args, *rest))
+
+    # The coordinator
+
+    def lead(self, token: str) -> bool:
+        """Take or keep the lead for 15 seconds."""
+        return bool(self._run("lead", "", token, _LEAD_S))
+
+    def resign(self, token: str) -> None:
+        """Give up the lead, if it is ours."""
+        with self.errors():
+            if self.client.get(f"{self._g}leader") == token:
+                self.client.delete(f"{self._g}leader")
+
+    def reap(self, token: str) -> int:
+        """End leases that ran out; how many, -1 when not leading."""
+        return int(self._run("reap", "", token, 200, *LEASES))
+
+    def feed(
+        self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
+    ) -> list[str] | None:
+        """Admit houses and take ready tasks to be sent, at most room[stage]; None: not leading."""
+        pairs = [x for pair in room.items() for x in pair]
+        return _tasks(self._run("feed", job, token, max_open, *pairs))
+
+    def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None:
+        """Tasks whose message was sent age_s ago and never claimed; None: not leading."""
+        return _tasks(self._run("resend", job, token, stage, age_s, 500))
+
+    def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
+        """Keep stage -> tasks per second for whoever asks."""
+        if rates:
+            with self.errors():
+                self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
+
+    def rest(self, seconds: float) -> None:
+        """Wait so long at most, less when a task becomes ready meanwhile."""
+        with self.errors():
+            self.client.blpop([f"{self._g}wake"], timeout=seconds)
+
+    def queue_length(self, queue: str) -> int:
+        """Messages waiting on a queue of the broker."""
+        with self.errors():
+            return int(self.client.llen(f"{self._g}{queue}"))
+
+    # Reading
+
+    def view(self, job: str) -> JobView | None:
+        """The job as it is now; a handful of O(1) reads whatever its size."""
+        p = self._p(job)
+        with self.errors():
+            pipe = self.client.pipeline(transaction=False)
+            pipe.hgetall(f"{p}job").hgetall(f"{p}n").hgetall(f"{p}rate").llen(f"{p}order")
+            fields, counts, rates, n_waiting = pipe.execute()
+        if not fields:
+            return None
+        numbers = {k: float(v) for k, v in counts.items()}
+        return JobView(job, fields, numbers, {k: float(v) for k, v in rates.items()}, n_waiting)
+
+    def age_s(self, view: JobView) -> float:
+        """Seconds since the job was entered, by Redis' clock."""
+        with self.errors():
+            return self.now() - float(view.fields.get("created", 0.0))
+
+    def active_jobs(self) -> list[str]:
+        """Jobs that may have work, most urgent first."""
+        with self.errors():
+            return list(self.client.zrange(f"{self._g}jobs", 0, -1))
+
+    def known_jobs(self) -> list[str]:
+        """Every job in the ledger, oldest first."""
+        with self.errors():
+            return list(self.client.zrange(f"{self._g}known", 0, -1))
+
+    def unit_states(self, job: str, house: str) -> dict[str, str]:
+        """The house's hash: unit -> "<stage>:<letter>", and s (state), n, left, nf, i."""
+        with self.errors():
+            return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
+
+    def groups(self, job: str, house: str) -> tuple[tuple[str, ...], ...]:
+        """The house's groups of views, () before they are known."""
+        with self.errors():
+            return groups_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
+
+    def task_facts(self, job: str, task: str) -> dict[str, str]:
+        """What is known of one task beside its state: claim, attempts, tried, not before, fault."""
+        p = self._p(job)
+        with self.errors():
+            pipe = self.client.pipeline(transaction=False)
+            for name in ("claims", "attempts", "tried", "failed"):
+                pipe.hget(p + name, task)
+            pipe.zscore(f"{p}later", task).zscore(f"{p}queued", task)
+            values = pipe.execute()
+        names = ("claim", "attempts", "tried", "fault", "not_before", "sent")
+        return {n: str(v) for n, v in zip(names, values, strict=True) if v is not None}
+
+    def faults(self, job: str) -> Iterator[tuple[str, Fault]]:
+        """Every task that failed for good."""
+        with self.errors():
+            for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
+                yield task, fault_from_json(text)
+
+    def ping(self) -> None:
+        """Raises LedgerUnavailable when Redis does not answer or refuses us."""
+        with self.errors():
+            self.client.ping()
+
+    def now(self) -> float:
+        """Redis' own clock, the only one the farm goes by."""
+        seconds, micros = self.client.time()
+        return float(seconds) + float(micros) / 1e6
+
+    def _p(self, job: str) -> str:
+        return f"{self._g}{{{job}}}:"
+
+    def _keys(self, job: str) -> list[str]:
+        return [self._p(job), self._g]
+
+    def _run(self, name: str, job: str, *args: object) -> Any:
+        with self.errors():
+            return self._scripts[name](keys=self._keys(job), args=list(args))
+
+    @contextmanager
+    def errors(self) -> Iterator[None]:
+        """Inside: whatever Redis refuses or fails at becomes LedgerUnavailable, one clear line."""
+        try:
+            yield
+        except redis.AuthenticationError as error:
+            raise LedgerUnavailable(f"{self._where} refuses these credentials: {error}") from error
+        except redis.exceptions.NoPermissionError as error:
+            raise LedgerUnavailable(f"{self._where} denies: {error}") from error
+        except (redis.ConnectionError, redis.TimeoutError) as error:
+            raise LedgerUnavailable(
+                f"no Redis at {self._where}: {error}", hint="is it running? PBRS_REDIS_URL names it"
+            ) from error
+        except redis.exceptions.OutOfMemoryError as error:
+            raise LedgerUnavailable(
+                f"{self._where} is out of memory: {error}", hint="raise maxmemory"
+            ) from error
+
+
+def groups_from_text(text: str) -> tuple[tuple[str, ...], ...]:
+    """ "a,b;c" -> (("a", "b"), ("c",))."""
+    return tuple(tuple(group.split(",")) for group in text.split(";") if group)
+
+
+def _text_from_groups(groups: Sequence[Sequence[str]]) -> str:
+    return ";".join(",".join(group) for group in groups)
+
+
+def _tasks(answer: object) -> list[str] | None:
+    return [str(task) for task in answer] if isinstance(answer, list) else None
+
+
+def _chunks(items: Iterable[HouseState]) -> Iterator[list[HouseState]]:
+    chunk: list[HouseState] = []
+    for item in items:
+        chunk.append(item)
+        if len(chunk) == _CHUNK:
+            yield chunk
+            chunk = []
+    if chunk:
+        yield chunk

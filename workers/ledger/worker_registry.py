@@ -1,0 +1,110 @@
+"""Who works on the farm: registration, signs of life, draining, and the storage breaker.
+
+Effects: Redis. The ledger's scripts read what stands here (drain, blocked_until, breaker).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+import pbrs_farm
+from workers.ids import QUEUES, stages_of_queue
+from workers.ledger.interface import WorkerView
+from workers.ledger.redis_ledger import RedisLedger
+
+_GONE_S = 3600.0
+ALIVE_S = 45.0
+"""A worker seen no longer ago than this is there."""
+
+
+class Registry:
+    """The farm's workers, as a view on the ledger's Redis."""
+
+    def __init__(self, ledger: RedisLedger) -> None:
+        self._ledger = ledger
+        self._g = ledger.config.prefix
+
+    def beat(self) -> bool:
+        """This worker is alive; True when it is asked to leave."""
+        config, client = self._ledger.config, self._ledger.client
+        key = f"{self._g}worker:{config.worker}"
+        with self._ledger.errors():
+            now = self._ledger.now()
+            pipe = client.pipeline(transaction=False)
+            pipe.zadd(f"{self._g}workers", {config.worker: now})
+            for stage in {s for q in config.queues or QUEUES for s in stages_of_queue(q)}:
+                pipe.zadd(f"{self._g}workers:{stage}", {config.worker: now})
+            fields: Mapping[str, str | int] = {
+                "slots": config.slots,
+                "queues": ",".join(config.queues or QUEUES),
+                "version": pbrs_farm.__version__,
+                "pid": os.getpid(),
+            }
+            pipe.hset(key, mapping=dict(fields))
+            pipe.expire(key, int(2 * _GONE_S))
+            pipe.hget(key, "drain")
+            return bool(pipe.execute()[-1] == "1")
+
+    def leave(self) -> None:
+        """This worker is gone on purpose."""
+        config, client = self._ledger.config, self._ledger.client
+        with self._ledger.errors():
+            for name in ("workers", *(f"workers:{s}" for q in QUEUES for s in stages_of_queue(q))):
+                client.zrem(f"{self._g}{name}", config.worker)
+            client.delete(f"{self._g}worker:{config.worker}")
+
+    def drain(self, worker: str, *, undo: bool = False) -> bool:
+        """Ask a worker to finish what it runs and leave; False when there is no such worker."""
+        with self._ledger.errors():
+            if self._ledger.client.zscore(f"{self._g}workers", worker) is None:
+                return False
+            self._ledger.client.hset(f"{self._g}worker:{worker}", "drain", "0" if undo else "1")
+        return True
+
+    def refused(self, reason: str) -> None:
+        """This worker refused a task of another version; `workers` and `status` show it."""
+        with self._ledger.errors():
+            key = f"{self._g}worker:{self._ledger.config.worker}"
+            self._ledger.client.hset(key, mapping={"refuses": reason})
+
+    def workers(self) -> list[WorkerView]:
+        """Every worker seen in the last hour, by name."""
+        client = self._ledger.client
+        with self._ledger.errors():
+            now = self._ledger.now()
+            client.zremrangebyscore(f"{self._g}workers", "-inf", now - _GONE_S)
+            seen = client.zrange(f"{self._g}workers", 0, -1, withscores=True)
+            pipe = client.pipeline(transaction=False)
+            for name, _beat in seen:
+                pipe.hgetall(f"{self._g}worker:{name}")
+            fields = pipe.execute()
+        return sorted(
+            (
+                WorkerView(name, now - beat, row)
+                for (name, beat), row in zip(seen, fields, strict=True)
+            ),
+            key=lambda worker: worker.name,
+        )
+
+    def slots(self, *, alive_s: float = ALIVE_S) -> dict[str, int]:
+        """Stage -> tasks that workers seen in the last alive_s seconds can run at once."""
+        slots: dict[str, int] = {}
+        for worker in self.workers():
+            if worker.age_s <= alive_s:
+                for queue in worker.fields.get("queues", "").split(","):
+                    for stage in stages_of_queue(queue):
+                        slots[stage] = slots.get(stage, 0) + int(worker.fields.get("slots", 1))
+        return slots
+
+    def storage_sick(self, reason: str) -> None:
+        """Open the breaker: no claims and no feeding until it runs out by itself."""
+        with self._ledger.errors():
+            self._ledger.client.set(
+                f"{self._g}breaker", reason[:300], ex=self._ledger.config.breaker_s
+            )
+
+    def breaker(self) -> str:
+        """Why the farm holds its breath, "" when storage is well."""
+        with self._ledger.errors():
+            return str(self._ledger.client.get(f"{self._g}breaker") or "")

@@ -1,0 +1,45 @@
+"""The liveness probe: `python -m workers.liveness`; 1 when the process's main loop stands still.
+
+Effects: reads the age of one file. Imports little, for it runs every half minute.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Final
+
+STALE_S: Final = 120.0
+
+
+def alive_file(scratch: Path, worker: str) -> Path:
+    """The file a worker's or coordinator's main loop touches."""
+    return scratch / f"pbrs-{worker}.alive"
+
+
+def touch(path: Path) -> None:
+    """Set the file's time to now; it appears if need be."""
+    path.touch()
+    os.utime(path)
+
+
+def main() -> int:
+    """0 while the process on this machine is alive; 1 and a line when not."""
+    scratch = Path(os.environ.get("PBRS_FARM_SCRATCH") or tempfile.gettempdir())
+    path = alive_file(scratch, os.environ.get("PBRS_FARM_WORKER") or platform.node())
+    try:
+        age_s = time.time() - path.stat().st_mtime
+    except FileNotFoundError:
+        age_s = float("inf")
+    if age_s < STALE_S:
+        return 0
+    sys.stderr.write(f"{path}: no sign of life for {age_s:.0f} s\n")
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""A worker's processes: supervisor, slot, renderer."""

@@ -1,0 +1,54 @@
+"""From an exception or a dead renderer to a class of fault and a fingerprint; pure."""
+
+from __future__ import annotations
+
+import re
+import traceback
+from typing import Final
+
+from pbrs_farm.core.errors import (
+    BadInput,
+    BadRecipe,
+    MachineFailed,
+    StoreFailed,
+    StoreRefused,
+    Transient,
+)
+from workers.ledger.interface import FaultClass
+
+_NUMBERS: Final = re.compile(r"0x[0-9a-f]+|[0-9a-f]{8,}|\d+(\.\d+)?")
+_PATHS: Final = re.compile(r"(/[\w.\-+]+)+/?")
+
+
+def class_of(error: BaseException) -> FaultClass:
+    """data: the input's fault, no other try. storage: nobody's, not counted. Else: try again."""
+    if isinstance(error, StoreRefused | Transient):
+        return "storage"
+    if isinstance(error, BadInput | BadRecipe):
+        return "data"
+    if isinstance(error, MemoryError):
+        return "resource"
+    if isinstance(error, MachineFailed):
+        return "machine"
+    return "bug"
+
+
+def fingerprint(error: BaseException) -> str:
+    """Equal for faults alike: type, place in our code, and the message without its numbers."""
+    place = ""
+    for frame in traceback.extract_tb(error.__traceback__):
+        if "pbrs_farm" in frame.filename or "workers" in frame.filename:
+            place = f" in {frame.filename.rpartition('/')[2]}:{frame.name}"
+    return f"{type(error).__name__}{place}: {without_numbers(str(error))}"
+
+
+def without_numbers(text: str) -> str:
+    """text with numbers, ids and paths replaced, at most 160 characters."""
+    return _NUMBERS.sub("#", _PATHS.sub("PATH", " ".join(text.split())))[:160]
+
+
+def one_line(error: BaseException) -> str:
+    """What to tell a person."""
+    text = " ".join(str(error).split()) or "no message"
+    name = "" if isinstance(error, BadInput | StoreFailed) else f"{type(error).__name__}: "
+    return f"{name}{text}"[:500]

@@ -1,0 +1,53 @@
+"""Signs of life of a worker's main loop, and leaving when drained. Effects: Redis, a file."""
+
+from __future__ import annotations
+
+import logging
+import os
+from typing import Any, Final
+
+from celery import bootsteps
+from celery.worker import state
+
+from workers.config import config_from_environment
+from workers.ledger.interface import LedgerUnavailable
+from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.worker_registry import Registry
+from workers.liveness import touch
+
+_log = logging.getLogger("pbrs.worker")
+_EVERY_S: Final = 10.0
+
+
+class SignsOfLife(bootsteps.StartStopStep):  # type: ignore[misc]
+    """Celery boot step: beats for the whole worker, and shuts it down warmly when drained."""
+
+    requires = {"celery.worker.components:Timer"}  # noqa: RUF012 - Celery's own interface
+
+    def __init__(self, parent: Any, **options: Any) -> None:
+        super().__init__(parent, **options)
+        self._config = config_from_environment()
+        self._registry = Registry(RedisLedger(self._config))
+        self._timer: Any = None
+
+    def start(self, parent: Any) -> None:
+        self._beat()
+        self._timer = parent.timer.call_repeatedly(_EVERY_S, self._beat)
+
+    def stop(self, _parent: Any) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        try:
+            self._registry.leave()
+        except LedgerUnavailable as error:
+            _log.warning("%s", error)
+        self._config.heartbeat_file.unlink(missing_ok=True)
+
+    def _beat(self) -> None:
+        touch(self._config.heartbeat_file)
+        try:
+            if self._registry.beat():
+                _log.info("drained: finishing what runs, then leaving")
+                state.should_stop = os.EX_OK
+        except LedgerUnavailable as error:
+            _log.warning("%s", error)

@@ -1,0 +1,203 @@
+"""The farm's real runner: tasks to the steps of run/steps.py, the same a local run does.
+
+Effects: those of the steps, and a scratch file for a house's source. Markers decide what is done.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
+from pbrs_farm.read.source import SourceRef
+from pbrs_farm.run import plan
+from pbrs_farm.run.house_cache import Shelf
+from pbrs_farm.run.output_root import finish_house
+from pbrs_farm.run.plan import Wanted, view_steps, wanted
+from pbrs_farm.run.render_process import limit_threads
+from pbrs_farm.run.step_cache import Work, read_marker
+from pbrs_farm.run.steps import run_step
+from pbrs_farm.store import Store, store_from_url
+from pbrs_farm.store.retrying import PatientStore
+from workers.config import FarmConfig
+from workers.house_files import FOLDER, fill_cache, is_left_in_place
+from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
+from workers.job import JobSpec
+from workers.node.merge_manifests import merge_job, merge_shard
+from workers.node.view_groups import groups_from_views
+from workers.runner import Request, Result, Survey, Tell
+
+_HOUSE_STEPS: Final = ("house", "cameras")
+_LIGHT_STEPS: Final = ("light", "develop")
+
+
+def runner(config: FarmConfig, storage_waits: Tell) -> HouseRunner:
+    """The runner of a worker or of `recover`."""
+    store = store_from_url(config.store_url, config.store)
+    patient = PatientStore(store, config.storage_patience_s, storage_waits)
+    return HouseRunner(patient, n_threads=max(1, (os.cpu_count() or 1) // config.slots))
+
+
+class HouseRunner:
+    """Implements workers.runner.StepRunner; keeps the house it worked on last loaded."""
+
+    def __init__(self, store: Store, *, n_threads: int) -> None:
+        self._store = store
+        self._n_threads = n_threads
+        self._shelf = Shelf()
+        self._spec: Callable[[str], JobSpec] = lru_cache(maxsize=4)(self._read_spec)
+
+    def run(self, request: Request, tell: Tell) -> Result:
+        """One task; raises what its steps raise."""
+        spec = self._spec(request.job_id)
+        if request.stage == GEOMETRY:
+            return self._geometry(request, spec, tell)
+        if request.stage in (GL, LIGHT):
+            for view in request.views:
+                for step in steps_of_stage(spec, request.stage):
+                    self._step(request, spec, tell, step, view=view)
+        elif request.stage == REDUCE:
+            tell("finish")
+            finish_house(self._store, request.house)
+            if spec.reference:
+                self._pack_histograms(request.house, spec, tell)
+        elif request.stage == SHARD:
+            merge_shard(self._store, spec, int(request.unit.removeprefix("s")), tell)
+        elif request.stage == JOB:
+            if spec.reference:
+                self._select(spec, tell)
+            merge_job(self._store, spec, tell)
+        return Result(n_views=len(request.views))
+
+    def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
+        """What the markers' names say of a house: see workers.runner.Survey."""
+        if not done.issuperset(_HOUSE_STEPS):
+            return Survey()
+        groups = self._groups(spec, house)
+        units: dict[str, str] = {}
+        for number, views in enumerate(groups):
+            units[str(number)] = _first_stage_missing(spec, views, done)
+        finished = all(stage == "" for stage in units.values())
+        has_manifest = self._store.head(keys.house_key(house, keys.MANIFEST)) is not None
+        return Survey(groups=groups, missing=units, reduced=finished and has_manifest)
+
+    def _geometry(self, request: Request, spec: JobSpec, tell: Tell) -> Result:
+        fill_cache(self._store)
+        with TemporaryDirectory(prefix="pbrs-source-") as folder:
+            source = self._source(request.source, Path(folder))
+            for step in _HOUSE_STEPS:
+                self._step(request, spec, tell, step, source=source)
+        return Result(groups=self._groups(spec, request.house))
+
+    def _pack_histograms(self, house: str, spec: JobSpec, tell: Tell) -> None:
+        """The house's histograms in one object, so that the job's selection reads one a house."""
+        from pbrs_farm.core.lighting import Mode
+        from pbrs_farm.curate.selection_run import house_pack
+
+        tell("histograms")
+        house_pack(self._store, house, Mode(spec.recipe.selection.score_mode))
+
+    def _select(self, spec: JobSpec, tell: Tell) -> None:
+        """Selection over the views there are; a run of the job's name, so that it adds up."""
+        from pbrs_farm.curate.selection_run import select
+        from pbrs_farm.selection.reference_set import reference_from_bytes
+
+        reference = reference_from_bytes(self._store.get(spec.reference), spec.reference)
+        select(
+            self._store,
+            reference,
+            spec.recipe.selection,
+            reference_name=spec.reference,
+            run=spec.job_id,
+            progress=lambda done, n: tell(f"select {done} of {n}"),
+        )
+
+    def _groups(self, spec: JobSpec, house: str) -> tuple[tuple[str, ...], ...]:
+        marker = read_marker(self._store, keys.marker_key(house, "cameras"))
+        if marker is None:
+            return ()
+        rows = [(str(v), str(room), float(score)) for v, room, score in marker.facts["views"]]
+        rooms = {view: room for view, room, _score in rows}
+        chosen = plan.spread(rows, spec.n_views)
+        placed = [(v, rooms[v]) for v in chosen]
+        return groups_from_views(placed, spec.seconds_per_view, spec.min_groups)
+
+    def _step(
+        self,
+        request: Request,
+        spec: JobSpec,
+        tell: Tell,
+        step: str,
+        *,
+        view: str | None = None,
+        source: SourceRef | None = None,
+    ) -> None:
+        tell(step if view is None else f"{step} {view}")
+        limit_threads(step, self._n_threads)
+        work = Work(
+            store=self._store,
+            recipe=spec.recipe,
+            house_id=request.house,
+            shelf=self._shelf,
+            source=source,
+            view_id=view,
+            layers=spec.layers,
+        )
+        run_step(step, work, attempt=request.attempt)
+
+    def _source(self, text: str, folder: Path) -> SourceRef:
+        """The house's source; when it is kept in the store, on scratch under its own name."""
+        source = SourceRef.model_validate_json(text)
+        if not source.location.startswith(FOLDER):
+            if is_left_in_place(source) and not Path(source.location).exists():
+                raise MachineFailed(
+                    f"this worker does not see {source.location}",
+                    hint="such sources are not uploaded: mount them at the path they were submitted by",
+                )
+            return source
+        name = source.location.rpartition("/")[2]
+        data = self._store.get(source.location)
+        if keys.sha256(data) != source.sha256:
+            raise BadHouse(source.location, "", "not the file that was submitted")
+        path = folder / name
+        path.write_bytes(data)
+        return source.model_copy(update={"location": str(path)})
+
+    def _read_spec(self, job: str) -> JobSpec:
+        try:
+            return JobSpec.model_validate_json(self._store.get(job_key(job)))
+        except ObjectMissing:
+            raise BadHouse(
+                job_key(job), "", "no such job in this store", hint="does PBRS_STORE differ?"
+            ) from None
+
+
+def want_of(spec: JobSpec) -> Wanted:
+    """Modes, layers and number of views of a job, as the plan takes them."""
+    return wanted(spec.modes, spec.layers, spec.n_views)
+
+
+def group_stages(want: Wanted) -> tuple[str, ...]:
+    """The stages a group of views goes through: light only when a mode needs it."""
+    return (GL, LIGHT) if "light" in view_steps(want) else (GL,)
+
+
+def steps_of_stage(spec: JobSpec, stage: str) -> tuple[str, ...]:
+    """The steps of a view that one stage does; the last stage also writes view.json."""
+    steps = view_steps(want_of(spec))
+    last = stage == spec.group_stages[-1]
+    return tuple(
+        s for s in steps if (last if s == "view" else (s in _LIGHT_STEPS) == (stage == LIGHT))
+    )
+
+
+def _first_stage_missing(spec: JobSpec, views: tuple[str, ...], done: frozenset[str]) -> str:
+    for stage in spec.group_stages:
+        if any(f"{s}.{v}" not in done for v in views for s in steps_of_stage(spec, stage)):
+            return stage
+    return ""

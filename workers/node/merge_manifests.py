@@ -1,0 +1,137 @@
+"""House -> shard -> job: manifests merged upward, and what is missing written down.
+
+Effects: the store's. Every object here is rebuilt from those below it, so merging twice is once.
+"""
+
+from __future__ import annotations
+
+import heapq
+import io
+import json
+from collections.abc import Iterator
+from itertools import groupby
+from mmap import ACCESS_READ, mmap
+from tempfile import TemporaryFile
+from typing import IO, Any
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import ObjectMissing
+from pbrs_farm.store.interface import Store
+from workers.ids import job_key
+from workers.job import JobSpec, houses_from_lines
+from workers.runner import Tell
+
+
+def shard_key(job: str, shard: int) -> str:
+    """Key of a shard's merged manifest."""
+    return job_key(job, f"shards/{shard}.jsonl")
+
+
+def house_ids(store: Store, spec: JobSpec) -> list[str]:
+    """The job's houses in its order."""
+    data = store.get(job_key(spec.job_id, "houses.jsonl"))
+    return [house.house_id for house in houses_from_lines(data)]
+
+
+def merge_shard(store: Store, spec: JobSpec, shard: int, tell: Tell) -> None:
+    """Write the manifests of a shard's houses as one; houses without one are left out."""
+    size = spec.rules.shard_size
+    parts = []
+    for house in house_ids(store, spec)[shard * size : (shard + 1) * size]:
+        tell(f"merge {house}")
+        parts.append(_manifest(store, house) or b"")
+    store.put(shard_key(spec.job_id, shard), b"".join(parts))
+
+
+def merge_job(store: Store, spec: JobSpec, tell: Tell) -> None:
+    """Write the root's manifest.jsonl and the job's report.json, which says what is missing.
+
+    Rows of other jobs' houses in the same root are kept. Over a job that still runs, houses that
+    have no manifest yet are missing, and the report says so. What is held is a shard's rows, and the
+    root's former manifest where there is one.
+    """
+    houses = house_ids(store, spec)
+    own = set(houses)
+    missing: list[str] = []
+    n_objects = 0
+    with TemporaryFile() as file:
+        for house, part in _merged(store, own, _new_rows(store, spec, houses, tell)):
+            if part is None:
+                missing.append(house)
+            else:
+                file.write(part)
+                n_objects += part.count(b"\n") if house in own else 0
+        _put_file(store, keys.MANIFEST, file)
+    report: dict[str, Any] = {
+        "job": spec.job_id,
+        "houses": len(houses),
+        "houses_missing": missing,
+        "objects": n_objects,
+        "failed": sorted(_failed(store, spec.job_id), key=lambda row: str(row["task"])),
+    }
+    store.put(job_key(spec.job_id, "report.json"), json.dumps(report, indent=1).encode() + b"\n")
+
+
+def _merged(
+    store: Store, own: set[str], new: Iterator[tuple[str, bytes | None]]
+) -> Iterator[tuple[str, bytes | None]]:
+    """The job's rows and those of other houses of the root, by house, one house at a time."""
+    old = ((house, part) for house, part in _old_rows(store) if house not in own)
+    return heapq.merge(old, new, key=lambda row: row[0])
+
+
+def _put_file(store: Store, key: str, file: IO[bytes]) -> None:
+    """Put a file's bytes without holding them: pages of the file come and go."""
+    file.flush()
+    if file.tell() == 0:
+        store.put(key, b"")
+        return
+    with mmap(file.fileno(), 0, access=ACCESS_READ) as pages, memoryview(pages) as view:
+        store.put(key, view)
+
+
+def _new_rows(
+    store: Store, spec: JobSpec, houses: list[str], tell: Tell
+) -> Iterator[tuple[str, bytes | None]]:
+    """House -> its manifest, through its shard's where that is there; None when it has none."""
+    size = spec.rules.shard_size
+    for first in range(0, len(houses), size):
+        tell(f"merge shard {first // size}")
+        members = houses[first : first + size]
+        merged = _get(store, shard_key(spec.job_id, first // size))
+        found = dict(_by_house(merged)) if merged is not None else {}
+        for house in members:
+            yield house, found.get(house) or _manifest(store, house)
+
+
+def _old_rows(store: Store) -> Iterator[tuple[str, bytes]]:
+    yield from _by_house(_get(store, keys.MANIFEST) or b"")
+
+
+def _by_house(manifest: bytes) -> Iterator[tuple[str, bytes]]:
+    """House -> its rows, in the manifest's order: by house, as every manifest is written."""
+    rows = io.BytesIO(manifest)  # shares the bytes, does not copy them
+    for house, lines in groupby(rows, key=_house_of_row):
+        yield house, b"".join(lines)
+
+
+def _house_of_row(line: bytes) -> str:
+    return str(json.loads(line)["key"]).split("/")[1]
+
+
+def _manifest(store: Store, house: str) -> bytes | None:
+    return _get(store, keys.house_key(house, keys.MANIFEST))
+
+
+def _failed(store: Store, job: str) -> Iterator[dict[str, Any]]:
+    for key in store.list(job_key(job, "failed/")):
+        record = json.loads(store.get(key))
+        task = key.rpartition("/failed/")[2].removesuffix(".json")
+        yield {"task": task, "fault": record["fault"], "message": record["message"]}
+
+
+def _get(store: Store, key: str) -> bytes | None:
+    try:
+        return store.get(key)
+    except ObjectMissing:
+        return None

@@ -1,0 +1,161 @@
+"""A worker's outermost process (PID 1 in a container): starts Celery, and leaves in good order.
+
+Effects: starts and ends processes; files on scratch. TERM: take no more, finish what runs; when
+the grace is nearly over, hand it back to the ledger, uncounted. INT, QUIT: hand back at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import logging
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+from typing import Final
+
+from pbrs_farm.core.errors import MachineFailed, PbrsError
+from workers.config import FarmConfig, config_from_environment
+from workers.ids import QUEUES
+from workers.ledger.redis_ledger import RedisLedger
+from workers.liveness import touch
+from workers.logs import log_plainly
+from workers.node.renderer import die_with_parent
+
+_log = logging.getLogger("pbrs.supervisor")
+_HANDBACK_S: Final = 20.0
+# On scratch when a signal made the worker leave: deploy/slurm/worker.sbatch asks for it.
+PREEMPTED: Final = "preempted"
+
+
+@dataclass(slots=True)
+class _Orders:
+    """What signals asked for. leave_at: when TERM came."""
+
+    leave_at: float | None = None
+    was_told: bool = False
+    at_once: bool = False
+    told: set[str] = field(default_factory=set)
+
+    def on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self.was_told = True
+        self.leave_at = self.leave_at or time.monotonic()
+        self.at_once = self.at_once or number in (signal.SIGINT, signal.SIGQUIT)
+
+
+def command(config: FarmConfig) -> list[str]:
+    """The Celery worker's command line; no secret is on it."""
+    return [
+        sys.executable, "-m", "celery", "--app", "workers.queue.celery_app", "worker",
+        "--concurrency", str(config.slots), "--queues", ",".join(config.queues or QUEUES),
+        "--hostname", f"pbrs@{config.worker}", "--loglevel", "INFO",
+        "--without-gossip", "--without-mingle", "--without-heartbeat",
+    ]  # fmt: skip
+
+
+def check_machine(config: FarmConfig) -> None:
+    """What a worker needs before it takes work: Redis and room on scratch. Raises PbrsError."""
+    RedisLedger(config).ping()
+    if not config.store_url:
+        raise MachineFailed("no store", hint="PBRS_STORE=file:///folder or s3://bucket/prefix")
+    free_mb = shutil.disk_usage(config.scratch).free / 2**20
+    if free_mb < config.min_free_mb:
+        raise MachineFailed(
+            f"{config.scratch}: {free_mb:.0f} MB free, {config.min_free_mb} wanted",
+            hint="PBRS_FARM_SCRATCH names another folder",
+        )
+
+
+def sweep(config: FarmConfig) -> None:
+    """Remove what an earlier life of this worker left on scratch."""
+    config.handback_file.unlink(missing_ok=True)
+    config.heartbeat_file.unlink(missing_ok=True)
+    for folder in config.scratch.glob(f"pbrs-{config.worker}-*"):
+        pid = folder.name.rpartition("-")[2]
+        if pid.isdigit() and not Path(f"/proc/{pid}").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
+    """Run a worker until it is told to leave; Celery's exit status.
+
+    until_s: leave by itself after so many seconds, the grace before them (Slurm's wall time).
+    """
+    orders = _Orders()
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT):
+        signal.signal(number, orders.on_signal)
+    began = time.monotonic()
+    celery = subprocess.Popen(command(config), preexec_fn=lambda: die_with_parent(signal.SIGTERM))
+    while True:
+        code = _reap(celery)
+        if code is not None:
+            sweep(config)
+            return code
+        if until_s is not None and time.monotonic() - began > until_s - config.grace_s:
+            orders.leave_at = orders.leave_at or time.monotonic()
+        if orders.was_told:
+            touch(config.scratch / PREEMPTED)
+        if orders.leave_at is not None:
+            _leave(config, celery, orders, time.monotonic() - orders.leave_at)
+        time.sleep(0.2)
+
+
+def _leave(
+    config: FarmConfig, celery: subprocess.Popen[bytes], orders: _Orders, since_s: float
+) -> None:
+    """The next thing to do on the way out, each once."""
+    steps: list[tuple[str, float, Callable[[], None]]] = [
+        ("finish what runs", 0.0, lambda: celery.send_signal(signal.SIGTERM)),
+        (
+            "hand back what runs",
+            0.0 if orders.at_once else max(0.0, config.grace_s - _HANDBACK_S),
+            lambda: touch(config.handback_file),
+        ),
+        ("kill", config.grace_s if not orders.at_once else _HANDBACK_S, celery.kill),
+    ]
+    for name, after_s, act in steps:
+        if since_s >= after_s and name not in orders.told:
+            orders.told.add(name)
+            _log.info("leaving: %s", name)
+            act()
+
+
+def _reap(celery: subprocess.Popen[bytes]) -> int | None:
+    """Celery's exit status once it has ended; as PID 1, also buries orphans."""
+    if os.getpid() != 1:
+        return celery.poll()
+    with contextlib.suppress(ChildProcessError):
+        while True:
+            pid, status = os.waitpid(-1, os.WNOHANG)
+            if pid == 0:
+                break
+            if pid == celery.pid:
+                celery.returncode = os.waitstatus_to_exitcode(status)
+    return celery.returncode
+
+
+def main(words: list[str] | None = None) -> int:
+    """`python -m workers.node.supervisor [--until SECONDS]`: a worker, until told to leave."""
+    parser = argparse.ArgumentParser(prog="workers.node.supervisor", description=main.__doc__)
+    parser.add_argument("--until", type=float, default=None, metavar="SECONDS")
+    args = parser.parse_args(words)
+    log_plainly()
+    try:
+        config = config_from_environment()
+        sweep(config)
+        check_machine(config)
+    except PbrsError as error:
+        sys.stderr.write(f"pbrs-farm: {error}\n")
+        return 1
+    return supervise(config, until_s=args.until)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

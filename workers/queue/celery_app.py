@@ -1,0 +1,121 @@
+"""The Celery application: how messages travel. Effects: on import, reads the environment.
+
+Celery carries the work; whether it is done, and whether it is tried again, the ledger decides. So
+there are no results, no chords, no countdowns and no Celery retries. Why each setting is as it is
+stands in docs/farm.md.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import ssl
+from typing import Any, Final
+
+from celery import Celery
+from celery.signals import setup_logging, worker_init, worker_process_init
+from kombu import Exchange, Queue
+from kombu.serialization import register
+
+from pbrs_farm.store.s3 import forbid_in_this_process
+from workers.config import FarmConfig, config_from_environment
+from workers.ids import QUEUES
+from workers.node.renderer import die_with_parent
+
+MAX_MESSAGE: Final = 2048
+_VISIBILITY_S: Final = 6 * 3600
+_TASK_LIMIT_S: Final = 5 * 3600
+
+
+def _encode(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"))
+
+
+def _decode(data: str | bytes) -> Any:
+    if len(data) > MAX_MESSAGE:
+        raise ValueError(f"a message of {len(data)} bytes; {MAX_MESSAGE} are allowed")
+    return json.loads(data)
+
+
+register(
+    "pbrs-json",
+    _encode,
+    _decode,
+    content_type="application/x-pbrs-json",
+    content_encoding="utf-8",
+)
+
+
+def make_app(config: FarmConfig) -> Celery:
+    """A Celery application for this farm."""
+    url = config.redis_url.reveal()
+    app = Celery("pbrs_farm", broker=url, include=["workers.queue.task"], set_as_current=False)
+    app.conf.update(
+        accept_content=["pbrs-json"],
+        task_serializer="pbrs-json",
+        task_queues=[Queue(name, Exchange(name), routing_key=name) for name in QUEUES],
+        task_default_queue=QUEUES[0],
+        task_create_missing_queues=False,
+        task_ignore_result=True,
+        task_store_errors_even_if_ignored=False,
+        # A message is acknowledged after its task: a killed worker's comes back.
+        task_acks_late=True,
+        task_reject_on_worker_lost=True,
+        task_acks_on_failure=True,
+        task_acks_on_timeout=True,
+        worker_prefetch_multiplier=1,
+        # The last resort only: the attendant of the renderer has its own, shorter deadlines.
+        task_time_limit=_TASK_LIMIT_S,
+        worker_send_task_events=False,
+        worker_enable_remote_control=False,
+        worker_hijack_root_logger=False,
+        worker_cancel_long_running_tasks_on_connection_loss=False,
+        broker_transport="workers.queue.redis_transport:Transport",
+        broker_connection_retry_on_startup=True,
+        broker_connection_max_retries=None,
+        visibility_timeout=_VISIBILITY_S,
+        broker_transport_options={
+            "visibility_timeout": _VISIBILITY_S,
+            "unacked_restore_interval": 10,
+            "unacked_restore_throttle": 1,
+            "socket_timeout": 30,
+            "socket_connect_timeout": 5,
+            "socket_keepalive": True,
+            "health_check_interval": 25,
+            "sep": ":",
+            "global_keyprefix": config.prefix,
+            "client_name": "pbrs-celery",
+        },
+    )
+    if url.startswith("rediss:"):
+        tls: dict[str, Any] = {"ssl_cert_reqs": ssl.CERT_REQUIRED}
+        app.conf.broker_use_ssl = tls | (
+            {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
+        )
+    from workers.node.heartbeat import SignsOfLife
+
+    app.steps["worker"].add(SignsOfLife)
+    return app
+
+
+@worker_init.connect  # type: ignore[untyped-decorator]
+def _keep_storage_out(**_: object) -> None:
+    """Celery's parent process forks; obstore used before a fork hangs in every child."""
+    forbid_in_this_process()
+
+
+@worker_process_init.connect  # type: ignore[untyped-decorator]
+def _leave_signals_to_the_parent(**_: object) -> None:
+    """Slurm signals every process of a step: only the supervisor decides what TERM means."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    die_with_parent()
+
+
+@setup_logging.connect  # type: ignore[untyped-decorator]
+def _log_plainly(loglevel: int | str = "INFO", **_: object) -> None:
+    from workers.logs import log_plainly
+
+    log_plainly(loglevel)
+
+
+app = make_app(config_from_environment())
