@@ -56,6 +56,12 @@ def _on_support(queries: Shares, references: Shares) -> tuple[Shares, Shares]:
 def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int64]:
     import faiss
 
+    # Nearest in L1 is best intersection where references hold equal shares; a column that the
+    # queries lack makes up for what an empty reference is short of.
+    short = 1 - r.sum(axis=1, keepdims=True)
+    if short.max(initial=0) > 1e-5:
+        q = np.ascontiguousarray(np.hstack([q, np.zeros((len(q), 1), np.float32)]))
+        r = np.ascontiguousarray(np.hstack([r, short]))
     knn: Any = faiss.knn
     if leave_out_self:
         # An image among its own two nearest is left out; a twin of it may stand before it.

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.errors import BadInput
-from pbrs_farm.lighting import Mode
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.lighting import Mode
+from pbrs_farm.selection.histogram_pack import (
+    bytes_from_pack,
+    pack_from_bytes,
+    pack_house,
+    pack_source,
+)
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
-from pbrs_farm.selection.pack import bytes_from_pack, pack_from_bytes, pack_house, pack_source
 from pbrs_farm.selection.scores import SCORES, Scorer, merged, score
 from pbrs_farm.selection.similarity import best_match, intersection
 from tests.selection.histogram_sets import FIELDS, pack, record, reference
@@ -47,6 +52,7 @@ def test_scores_agree_with_ten_lines_of_python(library: str) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(1, 40), st.integers(2, 30), st.integers(2, 70), st.integers(0, 10**6))
+@example(3, 2, 2, 0)  # one reference is empty
 def test_faiss_and_numpy_find_the_same_best(n: int, m: int, bins: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     q, r = (normalised(rng.integers(0, 9, (k, bins))) for k in (n, m))
