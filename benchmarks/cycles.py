@@ -42,11 +42,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import LightFields, Recipe
-from pbrs_farm.images import (
-    exr_from_layers,
-    layers_from_exr,
-    png_from_array,
-)
+from pbrs_farm.images import exr_from_layers, layers_from_exr, png_from_array
 from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables
@@ -246,11 +242,7 @@ def _compared(ours: Run, theirs: Run) -> list[tuple[str, float, str]]:
     return [
         ("mean_luminance", mean[0], "W m-2 sr-1"),
         ("mean_luminance_cycles", mean[1], "W m-2 sr-1"),
-        (
-            "block_ratio_median",
-            float(np.median(parts[1] / parts[0])),
-            "Cycles / ours, 8x6 blocks",
-        ),
+        ("block_ratio_median", float(np.median(parts[1] / parts[0])), "Cycles / ours, 8x6 blocks"),
         ("relmse", float(a.mean()), "-"),
         ("relmse_cycles", float(b.mean()), "-"),
         ("median", median[0], "squared relative error of the median pixel"),

@@ -51,11 +51,7 @@ HOMES = ("2BedroomApartment", "Studio", "3BedroomApartment")
 CAMERAS_PER_HOME = 2
 PLAIN = LightFields(filter="box", denoise=False)
 METROPOLIS = PLAIN.model_copy(
-    update={
-        "integrator": "metropolis",
-        "mutations_per_pixel": MUTATIONS,
-        "chains": CHAINS,
-    }
+    update={"integrator": "metropolis", "mutations_per_pixel": MUTATIONS, "chains": CHAINS}
 )
 
 

@@ -149,11 +149,7 @@ def material(name, part):  # type: ignore[no-untyped-def]
             raise ValueError(f"{part['name']}: textured sheets are not translated")
         # LuxCore lets through kt of what is not reflected.
         through = [t / (1 - r) for t, r in zip(part["tau"], part["kd"], strict=True)]
-        out |= {
-            f"{here}.type": "mattetranslucent",
-            f"{here}.kr": part["kd"],
-            f"{here}.kt": through,
-        }
+        out |= {f"{here}.type": "mattetranslucent", f"{here}.kr": part["kd"], f"{here}.kt": through}
     else:
         out |= {f"{here}.type": "matte", f"{here}.kd": colour("d", part["kd"])}
     if max(part["radiance"]) > 0:

@@ -98,11 +98,7 @@ def judge(
 
 
 def _explained(
-    view: StoredView,
-    labels: Labels,
-    face: Faces,
-    directions: Floats,
-    scene: tuple[Triangles, Rays],
+    view: StoredView, labels: Labels, face: Faces, directions: Floats, scene: tuple[Triangles, Rays]
 ) -> dict[str, Bools]:
     """Per layer whether hitting these faces explains what is stored."""
     triangles, rays = scene
@@ -166,11 +162,7 @@ def normal_is_right(stored: NDArray[np.int64], expected: Floats) -> Bools:
 
 
 def _coincident(
-    labels: Labels,
-    face: Faces,
-    origin: Floats,
-    directions: Floats,
-    scene: tuple[Triangles, Rays],
+    labels: Labels, face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Rays]
 ) -> Faces:
     """(N,) triangle of the stored instance that the ray pierces at the first hit's depth, or -1."""
     triangles, rays = scene

@@ -262,10 +262,7 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "light": {"spp": 16},
     },
     "fast": {"cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55}},
-    "paper": {
-        "light": {"integrator": "metropolis", "denoise": False},
-        "sky": {"kind": "panorama"},
-    },
+    "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},
     "released": {
         "cameras": {
             "preset": "released",

@@ -122,9 +122,7 @@ def joint(
 
 
 def yields(
-    curves: Sequence[tuple[str, str, Sequence[float]]],
-    threshold: float,
-    paper: tuple[float, float],
+    curves: Sequence[tuple[str, str, Sequence[float]]], threshold: float, paper: tuple[float, float]
 ) -> str:
     """Share of views above each threshold 0..1: (name, css class, shares at equal steps).
 

@@ -80,10 +80,7 @@ def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: NDArray[np.floa
 
 
 def _meet(
-    planes: _Planes,
-    local: NDArray[np.intp],
-    d: NDArray[np.float64],
-    axis: NDArray[np.float64],
+    planes: _Planes, local: NDArray[np.intp], d: NDArray[np.float64], axis: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(N,) t along d (N, 3) to plane local[n], and (N, 3) weights of a, b, c, all >= 0."""
     from_a = planes.origin - planes.a

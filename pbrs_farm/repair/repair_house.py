@@ -24,10 +24,7 @@ from pbrs_farm.repair.structure.watertight import repaired_structure, with_struc
 
 
 def repair(
-    house: House,
-    fields: RepairFields,
-    *,
-    occluder_from: Callable[[House], Occluder] | None = None,
+    house: House, fields: RepairFields, *, occluder_from: Callable[[House], Occluder] | None = None
 ) -> tuple[House, RepairReport]:
     """The repaired house and everything that was changed (paper section 3).
 

@@ -52,12 +52,7 @@ def _layer(
 
 
 def relit(
-    view: Path,
-    *,
-    indoor: float,
-    outdoor: float,
-    denoise: bool,
-    lamps: Sequence[LampFactor] = (),
+    view: Path, *, indoor: float, outdoor: float, denoise: bool, lamps: Sequence[LampFactor] = ()
 ) -> bytes:
     """PNG of mode mlt_il_ol with each light group and each lamp times its factor.
 

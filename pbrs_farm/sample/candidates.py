@@ -87,11 +87,7 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
         eyes.append(np.stack([x, grid.base_y + height, z], axis=1))
         directions.append(
             np.stack(
-                [
-                    np.cos(azimuth) * np.cos(tilt),
-                    -np.sin(tilt),
-                    np.sin(azimuth) * np.cos(tilt),
-                ],
+                [np.cos(azimuth) * np.cos(tilt), -np.sin(tilt), np.sin(azimuth) * np.cos(tilt)],
                 axis=1,
             )
         )

@@ -220,11 +220,7 @@ class RoomSampler:
         return float(round(score * f.score_width_px * f.score_height_px))
 
     def _report(
-        self,
-        sector: int,
-        verdict: NDArray[np.uint8],
-        full: choose.FullScores,
-        views: list[View],
+        self, sector: int, verdict: NDArray[np.uint8], full: choose.FullScores, views: list[View]
     ) -> SectorReport:
         tally = Tally(verdict.tolist())
         ranking = full.ranking

@@ -46,12 +46,7 @@ def stored_views(
 
 
 def views_from_cameras(
-    house: House,
-    cameras: Sequence[Camera],
-    fields: CameraFields,
-    counter: Counter,
-    *,
-    origin: str,
+    house: House, cameras: Sequence[Camera], fields: CameraFields, counter: Counter, *, origin: str
 ) -> tuple[View, ...]:
     """Each camera as a view of the room it stands in, scored like a sampled one.
 

@@ -57,11 +57,7 @@ class BinningRow(BaseModel):
 
 
 def binning_table(
-    colour: NDArray[np.integer],
-    depth: NDArray[np.integer],
-    *,
-    min_colour: float,
-    min_depth: float,
+    colour: NDArray[np.integer], depth: NDArray[np.integer], *, min_colour: float, min_depth: float
 ) -> tuple[BinningRow, ...]:
     """A row for each of BINNINGS that the counts colour (n, bins) and depth (n, bins) can be summed to.
 
@@ -116,10 +112,7 @@ def table_text(rows: Sequence[BinningRow], chosen: Binning) -> str:
             f"{r.depth_median:>6.3f}"
         )
     coarsest = rows[0]
-    for name, passing in (
-        ("colour", coarsest.colour_passing),
-        ("depth", coarsest.depth_passing),
-    ):
+    for name, passing in (("colour", coarsest.colour_passing), ("depth", coarsest.depth_passing)):
         if passing < MIN_PASSING:
             lines.append(f"no binning lets {MIN_PASSING:.0%} pass by {name}: the coarsest is taken")
     return "\n".join(lines)

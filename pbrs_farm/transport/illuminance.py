@@ -146,16 +146,7 @@ def _radiosity(
         near = emitters.nearby.seen(p, normal, only.lamp, mi.Bool(True))
         up = mi.Vector3f(0, 0, 1)
         out, lamp = direct(
-            stage,
-            emitters,
-            here,
-            frame,
-            up,
-            numbers,
-            dim,
-            only,
-            near,
-            mi.Bool(True),
+            stage, emitters, here, frame, up, numbers, dim, only, near, mi.Bool(True)
         )
         lit_out, lit_in = out.light, lamp.light
         wo = mi.warp.square_to_cosine_hemisphere(numbers.two(dim + 1))

@@ -17,10 +17,7 @@ _BYTE_OF_LINEAR = np.rint(srgb_from_linear(np.arange(_STEPS + 1) / _STEPS) * 255
 
 
 def albedo_png(
-    hit: HitRecord,
-    house: House,
-    geometry: Geometry,
-    textures: Mapping[str, NDArray[np.uint8]],
+    hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
 ) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 sRGB: diffuse colour times texture, multiplied in linear light; 0 = nothing.
 

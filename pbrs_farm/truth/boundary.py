@@ -72,10 +72,7 @@ def _neighbours(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
 
 
 def _is_gap(
-    hit: HitRecord,
-    rays: NDArray[np.float32],
-    first: tuple[slice, ...],
-    second: tuple[slice, ...],
+    hit: HitRecord, rays: NDArray[np.float32], first: tuple[slice, ...], second: tuple[slice, ...]
 ) -> Mask:
     z_first, z_second = hit.depth_z[first], hit.depth_z[second]
     nearer = np.minimum(z_first, z_second)

@@ -33,11 +33,7 @@ def camera_table(camera: Camera) -> dict[str, Any]:
 
 
 def view_table(
-    item_buffer: ItemBuffer,
-    house: House,
-    camera: Camera,
-    *,
-    with_visible_fraction: bool = True,
+    item_buffer: ItemBuffer, house: House, camera: Camera, *, with_visible_fraction: bool = True
 ) -> dict[str, Any]:
     """The part of view.json that labels need: the camera's table and "instances".
 

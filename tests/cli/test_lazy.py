@@ -30,10 +30,7 @@ def test_the_help_names_every_verb() -> None:
     assert all(f"\n    {verb}" in text for verb in every)
 
 
-@pytest.mark.parametrize(
-    "words",
-    ["status", "why h/0/gl", "pause", "workers"],
-)
+@pytest.mark.parametrize("words", ["status", "why h/0/gl", "pause", "workers"])
 def test_the_farms_small_verbs_import_nothing_heavy(words: str) -> None:
     code = f"""
 import sys

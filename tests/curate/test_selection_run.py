@@ -77,9 +77,7 @@ def test_a_second_run_scores_nothing_and_changes_no_byte(store: MemoryStore) -> 
     assert after == before
 
 
-def test_a_new_house_costs_only_itself_and_gives_what_a_whole_run_gives(
-    store: MemoryStore,
-) -> None:
+def test_a_new_house_costs_only_itself_and_gives_what_a_whole_run_gives(store: MemoryStore) -> None:
     selecting.select(store, reference(), LOW)
     put_house(store, "0", 2)
     assert selecting.select(store, reference(), LOW).n_scored_houses == 1
@@ -131,9 +129,7 @@ def test_other_thresholds_read_the_run_alone(store: MemoryStore) -> None:
     assert low.kept == 7
 
 
-def test_another_reference_is_scored_anew_and_refused_for_judging_again(
-    store: MemoryStore,
-) -> None:
+def test_another_reference_is_scored_anew_and_refused_for_judging_again(store: MemoryStore) -> None:
     selecting.select(store, reference(), LOW)
     with pytest.raises(BadInput, match="another reference"):
         selecting.judge_again(store, reference(seed=3), LOW)

@@ -74,11 +74,7 @@ def test_sheet_shows_the_classes_colours(root: Path) -> None:
 
 def test_views_are_spread_over_houses_and_rooms(root: Path) -> None:
     chosen = sheet.spread_views(views_of(root), 3)
-    assert [(v.house.id, v.id) for v in chosen] == [
-        ("a", "0_0_1"),
-        ("a", "0_1_0"),
-        ("b", "0_0_4"),
-    ]
+    assert [(v.house.id, v.id) for v in chosen] == [("a", "0_0_1"), ("a", "0_1_0"), ("b", "0_0_4")]
 
 
 def test_a_missing_or_damaged_layer_is_an_empty_tile_that_says_so(tmp_path: Path) -> None:

@@ -96,9 +96,7 @@ def test_item_counts_are_the_item_buffers_pixels(variant: str) -> None:
         assert np.abs(row.astype(int) - expected).sum() <= 2  # rays through an edge
 
 
-def test_counts_do_not_depend_on_how_cameras_are_batched(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_counts_do_not_depend_on_how_cameras_are_batched(monkeypatch: pytest.MonkeyPatch) -> None:
     caster = Caster(soup(50, seed=4))
     views = [camera(20, 15, eye=(0, 0, 0.3 * k)) for k in range(9)]
     whole = caster.item_counts(views)

@@ -61,10 +61,7 @@ def test_the_bulb_has_the_sources_radius_where_there_is_room() -> None:
 
 
 @settings(max_examples=20, deadline=None)
-@given(
-    st.tuples(*[st.floats(-0.05, 0.05)] * 3),
-    st.floats(0.01, 0.06),
-)
+@given(st.tuples(*[st.floats(-0.05, 0.05)] * 3), st.floats(0.01, 0.06))
 def test_the_bulb_touches_nothing_of_its_lamp(
     centre: tuple[float, float, float], radius: float
 ) -> None:

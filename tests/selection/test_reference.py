@@ -68,10 +68,7 @@ def test_left_one_out_table_is_what_a_double_loop_gives() -> None:
     for row in rows:
         c = normalised(coarser_colour(colour, row.binning.colour))
         d = normalised(coarser_depth(depth, row.binning.depth))
-        for shares, passing, limit in (
-            (c, row.colour_passing, 0.4),
-            (d, row.depth_passing, 0.5),
-        ):
+        for shares, passing, limit in ((c, row.colour_passing, 0.4), (d, row.depth_passing, 0.5)):
             best = [
                 max(float(intersection(shares[i], shares[j])) for j in range(6) if j != i)
                 for i in range(6)

@@ -23,13 +23,7 @@ from pbrs_farm.store import Store, store_from_url
 from workers.client.explain import why
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
-from workers.ids import (
-    check_job_id,
-    failed_key,
-    job_key,
-    log_key,
-    task_from_text,
-)
+from workers.ids import check_job_id, failed_key, job_key, log_key, task_from_text
 from workers.ledger.interface import JobView
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.worker_registry import ALIVE_S, Registry

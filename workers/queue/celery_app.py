@@ -38,11 +38,7 @@ def _decode(data: str | bytes) -> Any:
 
 
 register(
-    "pbrs-json",
-    _encode,
-    _decode,
-    content_type="application/x-pbrs-json",
-    content_encoding="utf-8",
+    "pbrs-json", _encode, _decode, content_type="application/x-pbrs-json", content_encoding="utf-8"
 )
 
 

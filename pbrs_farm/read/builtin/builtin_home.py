@@ -110,9 +110,7 @@ def _room(room_id: str, name: str, rect: tuple[float, float, float, float], kind
     return Room(room_id, name, "0", _rectangle(rect), 0.0, WALL_HEIGHT_M, types=(kind,))
 
 
-def _rectangle(
-    rect: tuple[float, float, float, float],
-) -> Points2:
+def _rectangle(rect: tuple[float, float, float, float]) -> Points2:
     x0, z0, x1, z1 = rect
     return counter_clockwise(np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]], np.float64))
 

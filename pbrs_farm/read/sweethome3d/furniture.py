@@ -15,12 +15,7 @@ from pbrs_farm.read.sweethome3d.light_sources import light_parts
 from pbrs_farm.read.sweethome3d.material_collector import Looks
 from pbrs_farm.read.sweethome3d.piece_materials import finish_of
 from pbrs_farm.read.sweethome3d.piece_models import PANE, Model, Models
-from pbrs_farm.read.sweethome3d.placement import (
-    Frame,
-    frame_of,
-    local_from_model,
-    placed_surface,
-)
+from pbrs_farm.read.sweethome3d.placement import Frame, frame_of, local_from_model, placed_surface
 
 DOOR, WINDOW = NYU40_NAMES.index("door"), NYU40_NAMES.index("window")
 LAMP, OTHERPROP = NYU40_NAMES.index("lamp"), NYU40_NAMES.index("otherprop")

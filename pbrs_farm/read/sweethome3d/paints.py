@@ -36,9 +36,7 @@ def _paint(a: Attributes, colour: str, texture: str | None, shininess: str | Non
             if not texture or element.get("attribute") == texture:
                 picture = picture_of(a, element)
     return Paint(
-        None if argb is None else argb[1],
-        picture,
-        a.optional(shininess) if shininess else None,
+        None if argb is None else argb[1], picture, a.optional(shininess) if shininess else None
     )
 
 

@@ -170,12 +170,7 @@ def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> NDArray[
 
 
 def _cover(
-    i: int,
-    rooms: Sequence[Room],
-    areas: Sequence[plan.Shape],
-    lids: Sequence[Lid],
-    *,
-    above: bool,
+    i: int, rooms: Sequence[Room], areas: Sequence[plan.Shape], lids: Sequence[Lid], *, above: bool
 ) -> tuple[list[int], str]:
     """Rooms that room i opens into upwards (or downwards), and why it has no lid there, or ""."""
     near = _lids_of(rooms[i], lids, above=above)

@@ -90,11 +90,7 @@ def _same_height(a: Sheet, b: Sheet) -> bool:
 
 
 def slab(
-    sheet: Sheet,
-    ground: plan.Shape,
-    own: plan.Shape,
-    thickness_m: float,
-    table: TagTable,
+    sheet: Sheet, ground: plan.Shape, own: plan.Shape, thickness_m: float, table: TagTable
 ) -> list[Manifold]:
     """The sheet's slab as solids that overlap: the layer with its face, and the base behind it."""
     away = 1.0 if sheet.is_ceiling else -1.0

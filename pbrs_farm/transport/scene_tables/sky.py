@@ -98,10 +98,7 @@ def choose_panorama(names: list[str], house_id: str, seed: int) -> str:
 
 
 def sky_for_house(
-    recipe: Recipe,
-    house_id: str,
-    *,
-    panorama: tuple[str, NDArray[np.floating]] | None = None,
+    recipe: Recipe, house_id: str, *, panorama: tuple[str, NDArray[np.floating]] | None = None
 ) -> Sky:
     """The sky of a house under a recipe; panorama: (name, (H, W, 3) linear radiance, row 0 = up).
 
