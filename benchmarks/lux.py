@@ -11,7 +11,7 @@ from typing import Any
 from benchmarks.report import write_report
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.read.source import resolve
-from pbrs_farm.run.house_cache import Shelf
+from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
@@ -48,10 +48,10 @@ def main() -> None:
 
 def _rooms_of(name: str) -> list[dict[str, Any]]:
     store, recipe, source = MemoryStore(), Recipe(), resolve(name)
-    work = Work(store, recipe, source.house_id, Shelf(), source=source)
+    work = Work(store, recipe, source.house_id, HouseCache(), source=source)
     marker = run_step("house", work).marker
     lit = run_step("illuminance", work).marker.facts["floor_lux"]
-    house = work.shelf.take(store, recipe, source.house_id, marker.digest).house
+    house = work.house_cache.get(store, recipe, source.house_id, marker.digest).house
     rows: list[dict[str, Any]] = []
     print(f"{name}\n  {'room':<28}{'lamps':>8}{'daylight':>10}  lit by")
     for room in house.rooms:
@@ -62,7 +62,7 @@ def _rooms_of(name: str) -> list[dict[str, Any]]:
             flush=True,
         )
         rows.append({"lit_by": room.lit_by, **lux})
-    work.shelf.clear()
+    work.house_cache.clear()
     return rows
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from benchmarks.report import write_report
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.read.source import resolve
-from pbrs_farm.run.house_cache import Shelf
+from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
@@ -24,13 +24,13 @@ def main() -> None:
     the first one beside it.
     """
     store, recipe, source = MemoryStore(), recipe_from_name("fast"), resolve("Studio")
-    work = Work(store, recipe, source.house_id, Shelf(), source=source)
+    work = Work(store, recipe, source.house_id, HouseCache(), source=source)
     run_step("house", work)
     views = [str(row[0]) for row in run_step("cameras", work).marker.facts["views"]][:N_VIEWS]
     rows = []
     print(f"{'view':<10}{'light s':>9}{'develop s':>11}{'labels s':>10}{'GL s':>7}{'noise':>8}")
     for view in views:
-        one = Work(store, recipe, source.house_id, work.shelf, source=source, view_id=view)
+        one = Work(store, recipe, source.house_id, work.house_cache, source=source, view_id=view)
         labels = _seconds(lambda w=one: run_step("truth", w))
         gl = _seconds(lambda w=one: (run_step("opengl_dl", w), run_step("opengl_il", w)))
         light = _seconds(lambda w=one: run_step("light", w))

@@ -228,7 +228,7 @@ def _demo(args: argparse.Namespace) -> int:
 
 def _step(args: argparse.Namespace) -> int:
     from pbrs_farm.read.source import resolve
-    from pbrs_farm.run.house_cache import Shelf
+    from pbrs_farm.run.house_cache import HouseCache
     from pbrs_farm.run.plan import STEPS
     from pbrs_farm.run.step_cache import Work
     from pbrs_farm.run.steps import run_step
@@ -241,7 +241,7 @@ def _step(args: argparse.Namespace) -> int:
     recipe = Recipe.model_validate_json(store.get("recipe.json"))
     source = resolve(args.home)
     work = Work(
-        store=store, recipe=recipe, house_id=source.house_id, shelf=Shelf(), source=source,
+        store=store, recipe=recipe, house_id=source.house_id, house_cache=HouseCache(), source=source,
         view_id=args.view, layers=tuple(args.layers),
     )  # fmt: skip
     outcome = run_step(args.step, work)

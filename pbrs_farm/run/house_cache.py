@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from pbrs_farm.transport.scene_tables.sky import Sky
 
 
-class LoadedHouse:
+class CachedHouse:
     """A repaired house from the store and what is built from it, each at its first use."""
 
     def __init__(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> None:
-        """digest: of the house step's marker; another digest means another LoadedHouse."""
+        """digest: of the house step's marker; another digest means another CachedHouse."""
         self.store = store
         self.recipe = recipe
         self.house_id = house_id
@@ -125,18 +125,18 @@ def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[s
     return decoded, unreadable
 
 
-class Shelf:
+class HouseCache:
     """The house this process worked on last; asking for another one lets it go."""
 
     def __init__(self) -> None:
-        self._held: tuple[tuple[str, str, str, str], LoadedHouse] | None = None
+        self._held: tuple[tuple[str, str, str, str], CachedHouse] | None = None
 
-    def take(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> LoadedHouse:
+    def get(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> CachedHouse:
         """The loaded house, the same object as long as nothing it depends on changes."""
         key = (store.url, house_id, digest, recipe.digest())
         if self._held is None or self._held[0] != key:
             self.clear()
-            self._held = (key, LoadedHouse(store, recipe, house_id, digest))
+            self._held = (key, CachedHouse(store, recipe, house_id, digest))
         return self._held[1]
 
     def clear(self) -> None:

@@ -19,7 +19,7 @@ from typing import Literal
 
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.run import plan
-from pbrs_farm.run.house_cache import Shelf
+from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.task import Event, Setting, Task
 
@@ -32,12 +32,12 @@ def work_forever(pipe: Connection, setting: Setting, log: str) -> None:
     os.dup2(descriptor, 2)
     os.environ.setdefault("LP_NUM_THREADS", str(setting.n_threads))
     threading.Thread(target=_leave_with_parent, args=(os.getppid(),), daemon=True).start()
-    shelf = Shelf()
+    house_cache = HouseCache()
     try:
         while True:
-            do_task(pipe, setting, shelf, pipe.recv())
+            do_task(pipe, setting, house_cache, pipe.recv())
     except (EOFError, BrokenPipeError, ConnectionResetError):
-        shelf.clear()
+        house_cache.clear()
 
 
 def _leave_with_parent(parent: int) -> None:
@@ -47,7 +47,7 @@ def _leave_with_parent(parent: int) -> None:
     os._exit(1)
 
 
-def do_task(pipe: Connection, setting: Setting, shelf: Shelf, task: Task) -> None:
+def do_task(pipe: Connection, setting: Setting, house_cache: HouseCache, task: Task) -> None:
     """Run the steps of one task; a failed one leaves out those that read what it makes."""
     from pbrs_farm.store import store_from_url
 
@@ -56,7 +56,7 @@ def do_task(pipe: Connection, setting: Setting, shelf: Shelf, task: Task) -> Non
         store=store,
         recipe=setting.recipe,
         house_id=task.house_id,
-        shelf=shelf,
+        house_cache=house_cache,
         source=task.source,
         view_id=task.view_id,
         layers=task.layers,

@@ -24,7 +24,7 @@ from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.cameras_json import json_bytes
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
-from pbrs_farm.run.house_cache import Shelf
+from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.store.interface import Store
 
 
@@ -35,7 +35,7 @@ class Work:
     store: Store
     recipe: Recipe
     house_id: str
-    shelf: Shelf
+    house_cache: HouseCache
     source: SourceRef | None = None
     view_id: str | None = None
     layers: tuple[str, ...] = ()

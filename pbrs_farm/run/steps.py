@@ -25,7 +25,7 @@ from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.cameras_json import json_bytes, plain_from_view, views_from_json
 from pbrs_farm.read.source import SourceRef, read_house
 from pbrs_farm.run import plan
-from pbrs_farm.run.house_cache import LoadedHouse
+from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.step_cache import (
     Made,
@@ -43,14 +43,14 @@ if TYPE_CHECKING:
     from pbrs_farm.sample import CameraReport
 
 
-def _loaded(work: Work) -> LoadedHouse:
+def _loaded(work: Work) -> CachedHouse:
     marker = read_marker(work.store, keys.marker_key(work.house_id, "house"))
     if marker is None:
         raise BadInput(work.house_id, "", "the house has not been read yet")
-    return work.shelf.take(work.store, work.recipe, work.house_id, marker.digest)
+    return work.house_cache.get(work.store, work.recipe, work.house_id, marker.digest)
 
 
-def _view_at_size(work: Work, loaded: LoadedHouse) -> tuple[View, Camera]:
+def _view_at_size(work: Work, loaded: CachedHouse) -> tuple[View, Camera]:
     view = loaded.view(work.view_id or "")
     image = work.recipe.image
     return view, view.camera.with_size(image.width_px, image.height_px)
@@ -135,7 +135,7 @@ def _object_cameras(work: Work, house: House, seed: int) -> Made:
     return _made_cameras(views, {"preset": "objects", "n_views": len(views)})
 
 
-def _file_cameras(loaded: LoadedHouse, fields: CameraFields) -> Made:
+def _file_cameras(loaded: CachedHouse, fields: CameraFields) -> Made:
     from pbrs_farm.sample.camera_file import cameras_from_file_text
     from pbrs_farm.sample.stored_cameras import views_from_cameras
 
@@ -228,7 +228,7 @@ def _opengl(work: Work, mode: str) -> Made:
     return Made({LAYER[mode].file: png}, {"renderer": rasterizer.name})
 
 
-def _missed(loaded: LoadedHouse, camera: Camera) -> NDArray[np.bool_]:
+def _missed(loaded: CachedHouse, camera: Camera) -> NDArray[np.bool_]:
     """(H, W, 1) bool: nothing is seen; of an object without context such pixels are 0."""
     return np.asarray(loaded.caster.item_buffer(camera) == 0)[..., None]
 

@@ -16,7 +16,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
-from pbrs_farm.run.house_cache import Shelf
+from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
 from pbrs_farm.run.plan import Wanted, view_steps, wanted
 from pbrs_farm.run.render_process import limit_threads
@@ -49,7 +49,7 @@ class HouseRunner:
     def __init__(self, store: Store, *, n_threads: int) -> None:
         self._store = store
         self._n_threads = n_threads
-        self._shelf = Shelf()
+        self._house_cache = HouseCache()
         self._spec: Callable[[str], JobSpec] = lru_cache(maxsize=4)(self._read_spec)
 
     def run(self, request: Request, tell: Tell) -> Result:
@@ -143,7 +143,7 @@ class HouseRunner:
             store=self._store,
             recipe=spec.recipe,
             house_id=request.house,
-            shelf=self._shelf,
+            house_cache=self._house_cache,
             source=source,
             view_id=view,
             layers=spec.layers,
