@@ -91,7 +91,7 @@ def _seconds_a_view(house: House, cameras: list[Camera]) -> tuple[float, float]:
         for name, array in arrays.items():
             layer_bytes(name, array)
         basic.append(time.perf_counter() - started)
-        seen = truth.Seen(
+        label_inputs = truth.LabelInputs(
             hit,
             house,
             geometry,
@@ -99,7 +99,7 @@ def _seconds_a_view(house: House, cameras: list[Camera]) -> tuple[float, float]:
             lambda skip, camera=camera: caster.hit_record(camera, skip_faces=skip),  # type: ignore[misc]
             textures,
         )
-        for name, array in truth.optional_layers(truth.OPTIONAL_NAMES, seen).items():
+        for name, array in truth.optional_layers(truth.OPTIONAL_NAMES, label_inputs).items():
             layer_bytes(name, array)
         everything.append(time.perf_counter() - started)
     assert set(arrays) | set(truth.OPTIONAL_NAMES) <= set(LAYER)

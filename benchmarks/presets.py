@@ -20,7 +20,7 @@ from pbrs_farm.read.source import resolve
 from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.run.panoramas import panorama_for_house
 from pbrs_farm.run.steps import repaired_house
-from pbrs_farm.transport.develop.mode_pictures import Negative, develop
+from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sky_for_house
 
@@ -72,10 +72,10 @@ def _made(name: str, number: int, recipe: Recipe) -> tuple[NDArray[np.uint8], fl
     scene.render(camera, name, recipe.light.model_copy(update=few), 1)
     began = time.process_time()
     result = scene.render(camera, name, recipe.light, 1)
-    negative = Negative(result.outdoor, result.indoor, result.albedo, result.normal)
-    prints = develop(negative, recipe.tone, denoise=recipe.light.denoise)
+    aovs = LinearAovs(result.outdoor, result.indoor, result.albedo, result.normal)
+    images = develop(aovs, recipe.tone, denoise=recipe.light.denoise)
     cpu_s = time.process_time() - began
-    return prints["mlt_il_ol"].rgb_srgb8, cpu_s, result.noise["sum"]
+    return images["mlt_il_ol"].rgb_srgb8, cpu_s, result.noise["sum"]
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.transport.develop.mode_pictures import Negative, develop
+from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
 from pbrs_farm.transport.lamp_layers import indoor_from_lamps
 
 
@@ -30,16 +30,16 @@ class LampFactor:
     rgb: tuple[float, float, float]
 
 
-def negative_from_exr(radiance_exr: bytes, place: str) -> Negative:
+def aovs_from_exr(radiance_exr: bytes, place: str) -> LinearAovs:
     """What `light` stored of a view; BadInput names the place when a layer is missing."""
     from pbrs_farm.images import layers_from_exr
 
-    return _negative(layers_from_exr(radiance_exr, f"{place}/radiance.exr"), place)
+    return _linear_aovs(layers_from_exr(radiance_exr, f"{place}/radiance.exr"), place)
 
 
-def _negative(exr: Mapping[str, NDArray[np.float32]], place: str) -> Negative:
+def _linear_aovs(exr: Mapping[str, NDArray[np.float32]], place: str) -> LinearAovs:
     outdoor, indoor, albedo = (_layer(exr, name, place) for name in ("outdoor", "indoor", "albedo"))
-    return Negative(outdoor, indoor, albedo, _layer(exr, "normal", place, "XYZ"))
+    return LinearAovs(outdoor, indoor, albedo, _layer(exr, "normal", place, "XYZ"))
 
 
 def _layer(
@@ -64,17 +64,17 @@ def relit(
 
     root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
     exr = layers_from_exr(_read(view / "radiance.exr"), f"{view}/radiance.exr")
-    negative = _negative(exr, str(view))
+    aovs = _linear_aovs(exr, str(view))
     if lamps:
         rows = lamps_of_view(view)
         factors = lamp_factors(rows, lamps)
         layers = {int(r["number"]): _layer(exr, r["layer"], str(view)) for r in rows if r["layer"]}
-        lit = indoor_from_lamps(layers, factors, negative.indoor.shape)
-        negative = replace(negative, indoor=lit)
+        lit = indoor_from_lamps(layers, factors, aovs.indoor.shape)
+        aovs = replace(aovs, indoor=lit)
     tone = Recipe.model_validate_json(_read(root / "recipe.json")).tone
-    prints = develop(negative, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
+    images = develop(aovs, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
     credit = attribution(FolderStore(root), view.resolve().parents[1].name)
-    return png_from_array(prints[Mode.MLT_IL_OL.value].rgb_srgb8, attribution=credit)
+    return png_from_array(images[Mode.MLT_IL_OL.value].rgb_srgb8, attribution=credit)
 
 
 def lamps_of_view(view: Path) -> list[dict[str, Any]]:

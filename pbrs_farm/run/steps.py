@@ -181,7 +181,7 @@ def _truth(work: Work) -> Made:
     if room is not None:
         table["layout"] = truth.layout_table(room, camera, hit.depth_z)
     if work.layers:
-        seen = truth.Seen(
+        label_inputs = truth.LabelInputs(
             hit,
             house,
             loaded.geometry,
@@ -190,7 +190,7 @@ def _truth(work: Work) -> Made:
             loaded.textures,
             keys.seed(work.house_id, view.id, "truth", work.recipe.seed),
         )
-        arrays |= truth.optional_layers(work.layers, seen)
+        arrays |= truth.optional_layers(work.layers, label_inputs)
         table |= truth.optional_tables(work.layers, house)
     credit = house.source.attribution
     files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
@@ -304,20 +304,20 @@ def _illuminance(work: Work) -> Made:
 
 def _develop(work: Work) -> Made:
     from pbrs_farm.images import png_from_array
-    from pbrs_farm.run.relight import negative_from_exr
+    from pbrs_farm.run.relight import aovs_from_exr
     from pbrs_farm.transport.develop.mode_pictures import develop
 
     folder = keys.view_key(work.house_id, work.view_id or "")
-    negative = negative_from_exr(work.store.get(f"{folder}radiance.exr"), folder.rstrip("/"))
+    aovs = aovs_from_exr(work.store.get(f"{folder}radiance.exr"), folder.rstrip("/"))
     denoise = work.recipe.light.denoise
-    prints = develop(negative, work.recipe.tone, denoise=denoise)
+    images = develop(aovs, work.recipe.tone, denoise=denoise)
     credit = attribution(work.store, work.house_id)
     return Made(
         {
             LAYER[mode].file: png_from_array(made.rgb_srgb8, attribution=credit)
-            for mode, made in prints.items()
+            for mode, made in images.items()
         },
-        {"denoised": denoise} | {mode: made.facts() for mode, made in prints.items()},
+        {"denoised": denoise} | {mode: made.facts() for mode, made in images.items()},
     )
 
 

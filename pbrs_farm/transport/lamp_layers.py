@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import RadianceImage
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.transport.light_result import LightResult
-from pbrs_farm.transport.scene_tables.lamp_emission import Lamp
+from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter
 
 MAX_SUMS: Final = 2**32
 """Sums of one launch (pixels x lamps x 3): the kernel counts them in 32 bits."""
 
 
-def with_lamps(
-    result: LightResult, sums: NDArray[np.float32] | None, spp: int, lamps: Sequence[Lamp]
+def with_lamp_layers(
+    result: LightResult, sums: NDArray[np.float32] | None, spp: int, lamps: Sequence[AreaEmitter]
 ) -> LightResult:
     """The result with a layer for each lamp that brings light, and indoor their sum to the bit.
 
@@ -58,7 +58,7 @@ def indoor_from_lamps(
 
 
 def lamp_table(
-    lamps: Sequence[Lamp], layers: Mapping[int, RadianceImage], indoor: RadianceImage
+    lamps: Sequence[AreaEmitter], layers: Mapping[int, RadianceImage], indoor: RadianceImage
 ) -> list[dict[str, Any]]:
     """A row per lamp for view.json: number, item, instance, room, lm, share, layer.
 

@@ -17,11 +17,15 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
-from pbrs_farm.transport.lamp_layers import MAX_SUMS, with_lamps
+from pbrs_farm.transport.lamp_layers import MAX_SUMS, with_lamp_layers
 from pbrs_farm.transport.light_result import LightResult, joined_result, result_from_sums
-from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, lamp_balls, tables_from_house
+from pbrs_farm.transport.scene_tables.scene_tables import (
+    SceneTables,
+    bounding_spheres,
+    tables_from_house,
+)
 from pbrs_farm.transport.scene_tables.sky import Sky
-from pbrs_farm.transport.time_budget import Stopwatch
+from pbrs_farm.transport.time_budget import TimeBudget
 
 _SAMPLES_PER_LAUNCH: Final = 1 << 26
 
@@ -99,7 +103,7 @@ class LightScene:
         n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
         sums, spp = self._path_sums(camera, fields, seed, emitters, n_lamps=n_lamps)
         result = result_from_sums(sums, camera, spp, facts)
-        return with_lamps(result, sums.lamps, spp, self.tables.lamps)
+        return with_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
 
     def _n_lamps_that_fit(self, camera: Camera, room_id: str, seed: int) -> int:
         """The number of lamps; RenderFailed when a sum of each is more than the kernel can count."""
@@ -133,7 +137,7 @@ class LightScene:
 
         i = camera.intrinsics
         per_launch = max(_SAMPLES_PER_LAUNCH // (i.width_px * i.height_px), 1)
-        watch = Stopwatch(fields.time_budget_s)
+        watch = TimeBudget(fields.time_budget_s)
         is_open = watch.runs or fields.noise > 0
         goal = max(fields.spp, fields.max_spp) if is_open else fields.spp
         if fields.noise > 0:
@@ -219,7 +223,7 @@ class LightScene:
         from pbrs_farm.transport.illuminance import floor_points, illuminance_lx
         from pbrs_farm.transport.scene_tables.portals import nearest_portals
 
-        balls = lamp_balls(self.tables)
+        balls = bounding_spheres(self.tables)
         lux: dict[str, dict[str, float]] = {}
         for room in house.rooms:
             points = floor_points(room, 256, seed)

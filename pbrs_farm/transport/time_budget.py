@@ -9,7 +9,7 @@ _FIRST: Final = 4
 """Samples of the first launch, from which the pace is known."""
 
 
-class Stopwatch:
+class TimeBudget:
     """Counts down a budget in seconds from now; a budget of 0 is no budget at all."""
 
     def __init__(self, budget_s: float) -> None:

@@ -5,7 +5,7 @@ from pbrs_farm.truth.coverage import coverage
 from pbrs_farm.truth.depth_sensor import sensor_depth
 from pbrs_farm.truth.optional_layers import (
     OPTIONAL_NAMES,
-    Seen,
+    LabelInputs,
     optional_layers,
     optional_tables,
     see_through_faces,
@@ -25,7 +25,7 @@ from pbrs_farm.truth.view_table import camera_table, is_truncated, view_table
 
 __all__ = [
     "OPTIONAL_NAMES",
-    "Seen",
+    "LabelInputs",
     "camera_table",
     "coverage",
     "depth_mm",

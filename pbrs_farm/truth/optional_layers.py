@@ -32,7 +32,7 @@ HitWithout = Callable[[Mask], HitRecord]
 
 
 @dataclass(frozen=True)
-class Seen:
+class LabelInputs:
     """Everything the optional layers are made of.
 
     hit_without: for the layers behind glass. textures: texture id -> (H, W, 3 or 4) uint8 sRGB,
@@ -73,36 +73,36 @@ def source_classes(house: House) -> tuple[str, ...]:
     return tuple(sorted({item.source_class for item in house.items if item.source_class}))
 
 
-def _class_source(seen: Seen) -> NDArray[np.uint16]:
-    number = {name: k for k, name in enumerate(source_classes(seen.house), start=1)}
-    table = np.array([0, *(number.get(i.source_class, 0) for i in seen.house.items)], np.uint16)
-    return table[seen.hit.item]
+def _class_source(inputs: LabelInputs) -> NDArray[np.uint16]:
+    number = {name: k for k, name in enumerate(source_classes(inputs.house), start=1)}
+    table = np.array([0, *(number.get(i.source_class, 0) for i in inputs.house.items)], np.uint16)
+    return table[inputs.hit.item]
 
 
-def _material(seen: Seen) -> NDArray[np.uint16]:
-    if len(seen.house.materials) > 65535:
-        n = len(seen.house.materials)
+def _material(inputs: LabelInputs) -> NDArray[np.uint16]:
+    if len(inputs.house.materials) > 65535:
+        n = len(inputs.house.materials)
         raise BadHouse(
-            seen.house.source.file, "materials", f"{n} materials, a 16-bit layer holds 65535"
+            inputs.house.source.file, "materials", f"{n} materials, a 16-bit layer holds 65535"
         )
-    if not len(seen.geometry.faces):
-        return np.zeros(seen.hit.face.shape, np.uint16)
-    number = seen.geometry.face_material[seen.hit.face] + 1
-    return np.where(seen.hit.valid, number, 0).astype(np.uint16)
+    if not len(inputs.geometry.faces):
+        return np.zeros(inputs.hit.face.shape, np.uint16)
+    number = inputs.geometry.face_material[inputs.hit.face] + 1
+    return np.where(inputs.hit.valid, number, 0).astype(np.uint16)
 
 
-def _glass(seen: Seen) -> NDArray[np.uint8]:
-    clear = see_through_faces(seen.geometry, seen.house)
+def _glass(inputs: LabelInputs) -> NDArray[np.uint8]:
+    clear = see_through_faces(inputs.geometry, inputs.house)
     if not clear.any():
-        return np.zeros(seen.hit.face.shape, np.uint8)
-    return np.where(seen.hit.valid & clear[seen.hit.face], 255, 0).astype(np.uint8)
+        return np.zeros(inputs.hit.face.shape, np.uint8)
+    return np.where(inputs.hit.valid & clear[inputs.hit.face], 255, 0).astype(np.uint8)
 
 
-def _normal(seen: Seen, hit: HitRecord) -> NDArray[np.uint16]:
-    return normal_png(hit.geo_normal_world, seen.camera.world_from_camera)
+def _normal(inputs: LabelInputs, hit: HitRecord) -> NDArray[np.uint16]:
+    return normal_png(hit.geo_normal_world, inputs.camera.world_from_camera)
 
 
-_MAKERS: Mapping[str, Callable[[Seen], NDArray[Any]]] = {
+_MAKERS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "depth_z": lambda s: s.hit.depth_z,
     "position": lambda s: s.hit.position_world,
     "normal_shading": lambda s: normal_png(s.hit.shading_normal_world, s.camera.world_from_camera),
@@ -126,12 +126,12 @@ _MAKERS: Mapping[str, Callable[[Seen], NDArray[Any]]] = {
 OPTIONAL_NAMES = tuple(_MAKERS)
 
 
-def optional_layers(names: Collection[str], seen: Seen) -> dict[str, NDArray[Any]]:
+def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, NDArray[Any]]:
     """The named optional layers, as layers.py says: PNG arrays, and float32 for the EXR ones.
 
     Raises KeyError for a name that is no optional label layer.
     """
-    return {name: _MAKERS[name](seen) for name in names}
+    return {name: _MAKERS[name](inputs) for name in names}
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:

@@ -53,7 +53,7 @@ def make_root(
         hit = caster.hit_record(camera)
         layers = truth.layers_from_hit(hit, home, camera)
         table = {"house": home.id, "view": name, **truth.view_table(hit.item, home, camera)}
-        seen = truth.Seen(
+        label_inputs = truth.LabelInputs(
             hit,
             home,
             geometry,
@@ -62,7 +62,7 @@ def make_root(
             {},
         )
         names = truth.OPTIONAL_NAMES if with_optional else ()
-        layers |= truth.optional_layers(names, seen)
+        layers |= truth.optional_layers(names, label_inputs)
         table |= truth.optional_tables(names, home)
         made = {LAYER[k].file: encoded(k, v) for k, v in layers.items()}
         made["view.json"] = json.dumps(table).encode()

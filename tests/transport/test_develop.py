@@ -16,8 +16,13 @@ from pbrs_farm.transport.develop.denoiser import denoise_radiance
 from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
 from pbrs_farm.transport.light_result import relative_noise
 from pbrs_farm.transport.scene_tables.blackbody import rgb_from_kelvin
-from pbrs_farm.transport.scene_tables.lamp_emission import lamps_of_house
-from pbrs_farm.transport.scene_tables.material_rows import MAX_ALBEDO, Atlas, atlas, material_rows
+from pbrs_farm.transport.scene_tables.lamp_emission import area_emitters_of_house
+from pbrs_farm.transport.scene_tables.material_rows import (
+    MAX_ALBEDO,
+    TextureAtlas,
+    material_rows,
+    texture_atlas,
+)
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS, nearest_portals, portals_of_house
 from pbrs_farm.transport.scene_tables.sky import (
     choose_panorama,
@@ -29,7 +34,7 @@ from pbrs_farm.transport.scene_tables.sky import (
 from tests.transport import rooms
 
 FAST = recipe_from_name("fast")
-EMPTY = Atlas(np.zeros(1, np.uint32), {})
+EMPTY = TextureAtlas(np.zeros(1, np.uint32), {})
 
 
 def panorama(sun: float = 20_000.0) -> np.ndarray:
@@ -126,7 +131,7 @@ def test_the_released_preset_reads_kd_as_linear_and_glass_as_nothing() -> None:
 def test_texels_keep_every_8_bit_value() -> None:
     ramp = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, -1)
     house = rooms.house([], [Material("t", texture_id="ramp")])
-    packed = atlas(house, {"ramp": ramp})
+    packed = texture_atlas(house, {"ramp": ramp})
     root = (packed.texels[1:] & 1023) / 1023
     v = np.arange(256) / 255
     linear = np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
@@ -142,7 +147,7 @@ def lamp_house(**changes: object) -> House:
 
 def flux_of(house: House) -> float:
     geometry = geometry_from_house(house)
-    (lamp,) = lamps_of_house(house, geometry, np.ones(len(geometry.faces), bool), FAST)
+    (lamp,) = area_emitters_of_house(house, geometry, np.ones(len(geometry.faces), bool), FAST)
     return float(np.array(lamp.radiance) @ LUMINANCE * LM_PER_W * math.pi * lamp.area_m2)
 
 

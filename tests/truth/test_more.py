@@ -14,11 +14,13 @@ from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.truth.hits import camera, hit, house, square
 
 
-def seen_of(home: House, view: Camera, textures: dict | None = None, seed: int = 0) -> truth.Seen:
+def label_inputs_of(
+    home: House, view: Camera, textures: dict | None = None, seed: int = 0
+) -> truth.LabelInputs:
     geometry = geometry_from_house(home)
     caster = Caster(geometry)
     record = caster.hit_record(view)
-    return truth.Seen(
+    return truth.LabelInputs(
         record,
         home,
         geometry,
@@ -49,7 +51,9 @@ def test_the_table_of_layers_names_exactly_what_can_be_made():
 def test_every_layer_has_the_shape_and_type_of_the_table():
     home = builtin_home()
     view = Camera.look(Intrinsics.from_hfov(64, 48), home.cameras[0].eye, home.cameras[0].towards)
-    for name, array in truth.optional_layers(truth.OPTIONAL_NAMES, seen_of(home, view)).items():
+    for name, array in truth.optional_layers(
+        truth.OPTIONAL_NAMES, label_inputs_of(home, view)
+    ).items():
         channels = LAYER[name].channels
         n = 3 if channels in ("RGB", "X Y Z") else 1
         assert array.shape == ((48, 64, 3) if n == 3 else (48, 64)), name
@@ -57,7 +61,7 @@ def test_every_layer_has_the_shape_and_type_of_the_table():
 
 
 def test_behind_glass_the_wall_is_seen_and_the_mask_says_where():
-    layers = truth.optional_layers(truth.OPTIONAL_NAMES, seen_of(glazed(), camera()))
+    layers = truth.optional_layers(truth.OPTIONAL_NAMES, label_inputs_of(glazed(), camera()))
     assert layers["glass"][3, 4] == 255
     assert layers["glass"][0, 0] == 0
     assert (layers["depth_z"][3, 4], layers["behind_glass_depth"][3, 4]) == (2.0, 3000)
@@ -68,9 +72,9 @@ def test_behind_glass_the_wall_is_seen_and_the_mask_says_where():
 
 
 def test_the_sources_classes_and_materials_are_named_in_the_table():
-    seen = seen_of(glazed(), camera())
-    ids = truth.optional_layers(["class_source", "material"], seen)
-    tables = truth.optional_tables(["class_source", "material"], seen.house)
+    label_inputs = label_inputs_of(glazed(), camera())
+    ids = truth.optional_layers(["class_source", "material"], label_inputs)
+    tables = truth.optional_tables(["class_source", "material"], label_inputs.house)
     assert tables["source_classes"][str(ids["class_source"][3, 4])] == "windowSmall"
     assert tables["materials"][str(ids["material"][0, 0])] == {"name": "red", "kind": "opaque"}
 
@@ -80,10 +84,10 @@ def test_a_house_without_glass_or_faces_needs_no_second_cast():
         raise AssertionError
 
     empty = house()
-    seen = truth.Seen(
+    label_inputs = truth.LabelInputs(
         hit(np.zeros((6, 8)), 0.0), empty, geometry_from_house(empty), camera(), never, {}
     )
-    layers = truth.optional_layers(truth.OPTIONAL_NAMES, seen)
+    layers = truth.optional_layers(truth.OPTIONAL_NAMES, label_inputs)
     nothing = ("normal_shading", "normal_world", "behind_glass_normal")
     assert not any(array.any() for name, array in layers.items() if name not in nothing)
     assert all((layers[name] == 32768).all() for name in nothing)
@@ -101,19 +105,21 @@ def test_each_of_the_forty_classes_has_one_of_the_thirteen():
 
 def test_world_normals_do_not_turn_with_the_camera():
     up = hit([[1]], 2.0, (0.0, 1.0, 0.0))
-    seen = truth.Seen(up, house(5), geometry_from_house(house(5)), camera(1, 1), lambda _: up, {})
-    assert truth.optional_layers(["normal_world"], seen)["normal_world"].tolist() == [
+    label_inputs = truth.LabelInputs(
+        up, house(5), geometry_from_house(house(5)), camera(1, 1), lambda _: up, {}
+    )
+    assert truth.optional_layers(["normal_world"], label_inputs)["normal_world"].tolist() == [
         [[32768, 65535, 32768]]
     ]
 
 
-def two_squares(near: float, far: float) -> truth.Seen:
+def two_squares(near: float, far: float) -> truth.LabelInputs:
     home = house(5, 5)
     items = (
         replace(home.items[0], surfaces=(square(near, 1.0),)),
         replace(home.items[1], surfaces=(square(far, 20.0),)),
     )
-    return seen_of(replace(home, items=items), camera())
+    return label_inputs_of(replace(home, items=items), camera())
 
 
 def test_occlusion_belongs_to_the_nearer_side():
@@ -167,10 +173,10 @@ def test_albedo_is_texture_times_colour_in_linear_light():
     textured = replace(home.items[0].surfaces[0], uvs=uvs)
     home = home.with_items([replace(home.items[0], surfaces=(textured,))])
     view = camera(64, 48)
-    albedo = truth.optional_layers(["albedo"], seen_of(home, view, {"t": pixels}))["albedo"]
+    albedo = truth.optional_layers(["albedo"], label_inputs_of(home, view, {"t": pixels}))["albedo"]
     assert albedo[20, 32].tolist() == [255, 128, 255]  # above the middle: the white row
     assert albedo[28, 32].tolist() == [255, 0, 0]
-    plain = truth.optional_layers(["albedo"], seen_of(home, view))["albedo"]
+    plain = truth.optional_layers(["albedo"], label_inputs_of(home, view))["albedo"]
     assert plain[28, 32].tolist() == [255, 128, 255]
     assert plain[0, 0].tolist() == [0, 0, 0]
 
@@ -182,10 +188,10 @@ def test_hha_holds_disparity_height_and_the_angle_with_gravity(normal, angle):
     record = hit([[1, 1, 0]], [[3.1, 6.2, 0.0]], normal)
     position = np.array([[[0, -1.5, 0], [0, -0.5, 0], [0, 0, 0]]], np.float32)
     record = replace(record, position_world=position)
-    seen = truth.Seen(
+    label_inputs = truth.LabelInputs(
         record, house(5), geometry_from_house(house(5)), camera(3, 1), lambda _: record, {}
     )
-    hha = truth.optional_layers(["hha"], seen)["hha"]
+    hha = truth.optional_layers(["hha"], label_inputs)["hha"]
     assert hha[0].tolist() == [[100, 0, angle], [50, 100, angle], [0, 0, 0]]
 
 

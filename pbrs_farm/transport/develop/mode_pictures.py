@@ -17,7 +17,7 @@ from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Negative:
+class LinearAovs:
     """What a picture is developed from. outdoor, indoor: (H, W, 3) raw radiance, W m-2 sr-1.
 
     albedo: (H, W, 3) in 0..1 and normal: (H, W, 3) unit or 0, both noise-free, for the denoiser.
@@ -30,7 +30,7 @@ class Negative:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Print:
+class ToneMappedImage:
     """A developed picture: rgb_srgb8 = tone(radiance * gains * exposure).
 
     gains: (3,) of the white balance. exposure: what radiance was multiplied by before the curve.
@@ -46,38 +46,38 @@ class Print:
 
 
 def develop(
-    negative: Negative,
+    aovs: LinearAovs,
     fields: ToneFields,
     *,
     denoise: bool,
     indoor: float = 1.0,
     outdoor: float = 1.0,
-) -> dict[str, Print]:
+) -> dict[str, ToneMappedImage]:
     """Mode name -> picture of every mode that is a sum of light groups.
 
     Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors.
     """
     groups = {
-        Group.OUTDOOR: negative.outdoor * np.float32(outdoor),
-        Group.INDOOR: negative.indoor * np.float32(indoor),
+        Group.OUTDOOR: aovs.outdoor * np.float32(outdoor),
+        Group.INDOOR: aovs.indoor * np.float32(indoor),
     }
     if denoise:
         # What sees nothing stays black: the denoiser would smear light over it.
-        light = negative.outdoor + negative.indoor
-        seen = np.any(light > 0, -1, keepdims=True) | np.any(negative.albedo > 0, -1, keepdims=True)
+        light = aovs.outdoor + aovs.indoor
+        seen = np.any(light > 0, -1, keepdims=True) | np.any(aovs.albedo > 0, -1, keepdims=True)
         groups = {
-            name: denoise_radiance(radiance, negative.albedo, negative.normal) * seen
+            name: denoise_radiance(radiance, aovs.albedo, aovs.normal) * seen
             for name, radiance in groups.items()
         }
-    prints = {}
+    images = {}
     for mode, names in GROUPS_OF_MODE.items():
         if names:
-            total = sum((groups[name] for name in names), np.zeros_like(negative.outdoor))
-            gains = white_balance(total, negative.albedo, fields.white_balance)
+            total = sum((groups[name] for name in names), np.zeros_like(aovs.outdoor))
+            gains = white_balance(total, aovs.albedo, fields.white_balance)
             exposure = exposure_of(total * gains, fields)
             rgb = tone(total * gains, fields, exposure=exposure)
-            prints[mode.value] = Print(rgb, gains, exposure)
-    return prints
+            images[mode.value] = ToneMappedImage(rgb, gains, exposure)
+    return images
 
 
 def white_balance(

@@ -13,7 +13,7 @@ from pbrs_farm.transport.illuminance import radiosity
 from pbrs_farm.transport.kernels.device_scene import Stage
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.scene_tables.material_rows import SURFACE
-from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables, lamp_balls
+from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables, bounding_spheres
 
 REACH_M: Final = 0.6
 """Faces farther from a bulb are no lamp's inside."""
@@ -68,7 +68,7 @@ def _insides(
     chances: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """(L, 4) balls around each bulb with INSIDE of what its faces send out."""
-    balls = lamp_balls(tables)
+    balls = bounding_spheres(tables)
     reach = np.linalg.norm(_corners(tables, faces) - balls[lamps, None, :3], axis=2).max(1)
     for k, bulb_m in enumerate(balls[:, 3].tolist()):
         mine = np.flatnonzero(lamps == k)
@@ -108,7 +108,7 @@ def _candidates(tables: SceneTables) -> tuple[NDArray[np.int64], NDArray[np.int6
     low, high = corners.min(1), corners.max(1)
     nearest = np.full(len(faces), np.inf)
     lamps = np.zeros(len(faces), np.int64)
-    for k, ball in enumerate(lamp_balls(tables)):
+    for k, ball in enumerate(bounding_spheres(tables)):
         reach = REACH_M + ball[3]
         in_box = (low >= ball[:3] - reach).all(1) & (high <= ball[:3] + reach).all(1)
         within = np.flatnonzero(in_box)

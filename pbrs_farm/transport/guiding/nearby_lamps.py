@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.transport.guiding.guiding_targets import GlowTables, no_glow
 from pbrs_farm.transport.kernels.sampler import device_array
-from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, lamp_balls
+from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, bounding_spheres
 
 MAX_NEAR: Final = 8
 """Lamps that are weighted by where they are."""
@@ -72,7 +72,7 @@ class Nearby:
     """Balls around the lamps of a scene on the device, with the weights of one view."""
 
     def __init__(self, tables: SceneTables) -> None:
-        balls = lamp_balls(tables)
+        balls = bounding_spheres(tables)
         balls[:, 3] = np.maximum(balls[:, 3], _LEAST_M)
         self._n = len(balls)
         self._balls = _rows(balls)

@@ -20,7 +20,7 @@ _MIN_ESCAPE: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lamp:
+class AreaEmitter:
     """One light source: all faces that shine with one radiance.
 
     item: index into House.items. faces: (T,) indices into the geometry's faces; face_areas: (T,)
@@ -38,9 +38,9 @@ class Lamp:
     flux_lm: float
 
 
-def lamps_of_house(
+def area_emitters_of_house(
     house: House, geometry: Geometry, keep: NDArray[np.bool_], recipe: Recipe
-) -> tuple[Lamp, ...]:
+) -> tuple[AreaEmitter, ...]:
     """Every lamp with a shining face, in the order of items and their light parts.
 
     Preset `photometric`: radiance = flux / (179 pi area), the area of a closed bulb being its
@@ -50,7 +50,7 @@ def lamps_of_house(
     released = recipe.emission.preset == "released"
     face_of = _faces_by_surface(geometry, keep)
     number = 0
-    lamps: list[Lamp] = []
+    lamps: list[AreaEmitter] = []
     taken: set[int] = set()
     for index, item in enumerate(house.items):
         for k, part in enumerate(item.lights):
@@ -117,7 +117,7 @@ def _lamp(
     faces: NDArray[np.int64],
     radiated: tuple[float, NDArray[np.float64]],
     recipe: Recipe,
-) -> Lamp:
+) -> AreaEmitter:
     index, k = place
     item = house.items[index]
     areas = _areas(geometry, faces)
@@ -129,17 +129,17 @@ def _lamp(
         radiance = np.full(3, recipe.emission.released_bulb)
         flux = LM_PER_W * math.pi * outside * recipe.emission.released_bulb
     name = f"{item.id}/{k}" if len(item.lights) > 1 else item.id
-    return Lamp(name, index, item.room_id, faces, areas, _triple(radiance), area, flux)
+    return AreaEmitter(name, index, item.room_id, faces, areas, _triple(radiance), area, flux)
 
 
 def _shade(
     house: House, geometry: Geometry, index: int, faces: NDArray[np.int64], recipe: Recipe
-) -> Lamp:
+) -> AreaEmitter:
     item = house.items[index]
     areas = _areas(geometry, faces)
     radiance = np.full(3, recipe.emission.released_shade)
     flux = LM_PER_W * 2 * math.pi * float(areas.sum()) * recipe.emission.released_shade
-    return Lamp(
+    return AreaEmitter(
         f"{item.id}/shade", index, item.room_id, faces, areas, _triple(radiance), float(areas.sum()), flux
     )  # fmt: skip
 

@@ -31,7 +31,7 @@ _MAX_TEXTURE_PX: Final = 2048
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Atlas:
+class TextureAtlas:
     """All textures in one list of texels; slots: texture id -> (first texel, width, height).
 
     A texel holds 10 bits for the square root of each linear component and 2 bits of alpha.
@@ -41,7 +41,7 @@ class Atlas:
     slots: dict[str, tuple[int, int, int]]
 
 
-def atlas(house: House, textures: dict[str, NDArray[np.uint8]]) -> Atlas:
+def texture_atlas(house: House, textures: dict[str, NDArray[np.uint8]]) -> TextureAtlas:
     """Pack the textures that materials use. Textures that were not decoded are left out."""
     parts: list[NDArray[np.uint32]] = [np.zeros(1, np.uint32)]
     slots: dict[str, tuple[int, int, int]] = {}
@@ -54,11 +54,11 @@ def atlas(house: House, textures: dict[str, NDArray[np.uint8]]) -> Atlas:
         slots[texture_id] = (first, texels.shape[1], texels.shape[0])
         parts.append(texels.ravel())
         first += texels.size
-    return Atlas(np.concatenate(parts), slots)
+    return TextureAtlas(np.concatenate(parts), slots)
 
 
 def material_rows(
-    house: House, packed: Atlas, recipe: Recipe
+    house: House, packed: TextureAtlas, recipe: Recipe
 ) -> tuple[NDArray[np.float32], list[str]]:
     """(M, 16) rows and notes on what had to be changed."""
     rows = np.zeros((max(len(house.materials), 1), MATERIAL_FLOATS), np.float32)

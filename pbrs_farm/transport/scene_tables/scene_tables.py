@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Geometry, House, MaterialKind, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.transport.scene_tables.lamp_emission import Lamp, lamps_of_house
+from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter, area_emitters_of_house
 from pbrs_farm.transport.scene_tables.material_rows import (
     MATERIAL_FLOATS,
-    Atlas,
-    atlas,
+    TextureAtlas,
     material_rows,
+    texture_atlas,
 )
 
 FACE_FLOATS: Final = 28
@@ -49,7 +49,7 @@ class SceneTables:
     see_through: NDArray[np.bool_]
     material_rows: NDArray[np.float32]
     texels: NDArray[np.uint32]
-    lamps: tuple[Lamp, ...]
+    lamps: tuple[AreaEmitter, ...]
     lamp_rows: NDArray[np.float32]
     lamp_first: NDArray[np.uint32]
     lamp_faces: NDArray[np.uint32]
@@ -69,9 +69,9 @@ def tables_from_house(
         [f"{int((~keep).sum())} degenerate faces left out of the light"] if (~keep).any() else []
     )
 
-    packed: Atlas = atlas(house, textures)
+    packed: TextureAtlas = texture_atlas(house, textures)
     rows, material_notes = material_rows(house, packed, recipe)
-    lamps = lamps_of_house(house, geometry, keep, recipe)
+    lamps = area_emitters_of_house(house, geometry, keep, recipe)
     faces = geometry.faces[keep]
     face_lamp = np.full(len(geometry.faces), NO_LAMP, np.uint32)
     for index, lamp in enumerate(lamps):
@@ -142,7 +142,7 @@ def _face_rows(geometry: Geometry, faces: NDArray[np.int32]) -> NDArray[np.float
 
 
 def _lamp_triangles(
-    lamps: tuple[Lamp, ...], new_number: NDArray[np.int64]
+    lamps: tuple[AreaEmitter, ...], new_number: NDArray[np.int64]
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]:
     first = np.cumsum([0, *(len(lamp.faces) for lamp in lamps)]).astype(np.uint32)
     faces = [new_number[lamp.faces] for lamp in lamps]
@@ -154,7 +154,7 @@ def _lamp_triangles(
     )
 
 
-def lamp_balls(tables: SceneTables) -> NDArray[np.float64]:
+def bounding_spheres(tables: SceneTables) -> NDArray[np.float64]:
     """(L, 4) centre and radius in m of the box around each lamp's shining faces."""
     balls = np.zeros((len(tables.lamps), 4))
     for k in range(len(tables.lamps)):
