@@ -1,4 +1,4 @@
-"""How a run tells what it does: bars on a terminal, plain lines otherwise, JSON lines for machines.
+"""Progress of a run: bars on a terminal, plain lines otherwise, JSON lines for machines.
 
 Effects: writes to standard output; plain lines of failures to standard error.
 """
@@ -8,8 +8,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from types import TracebackType
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 from rich.console import Console
 from rich.progress import (
@@ -24,51 +23,38 @@ from rich.progress import (
 from pbrs_farm.run.task import Event
 
 
-class Teller(Protocol):
-    """Takes a run's events until it is left."""
+class ProgressReporter(ABC):
+    """Reports a run's events, called with each, until its `with` block ends."""
 
-    def __enter__(self) -> Teller: ...
+    def __enter__(self) -> ProgressReporter:
+        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        tb: TracebackType | None,
-    ) -> None: ...
+    def __exit__(self, *_error: object) -> None:
+        return None
 
+    @abstractmethod
     def __call__(self, event: Event) -> None: ...
 
 
-def teller(n_homes: int, n_views: int, *, as_json: bool) -> Teller:
-    """The teller that fits standard output."""
+def progress_reporter(n_homes: int, n_views: int, *, as_json: bool) -> ProgressReporter:
+    """The reporter that fits standard output. n_views: the limit of views a house, 0 = none."""
     if as_json:
         return _JsonLines()
-    if sys.stdout.isatty():
-        return _Bars(n_homes, n_views)
-    return _PlainLines()
+    return _Bars(n_homes, n_views) if sys.stdout.isatty() else _PlainLines()
 
 
 def _name(event: Event) -> str:
     return "/".join(x for x in (event.house_id, event.view_id) if x)
 
 
-class _Silent:
-    def __enter__(self) -> Teller:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        tb: TracebackType | None,
-    ) -> None:
-        return None
-
-    def __call__(self, event: Event) -> None:
-        """Say nothing."""
+def _write_line(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
 
 
-class _JsonLines(_Silent):
+class _JsonLines(ProgressReporter):
+    """A JSON object a line for each event."""
+
     def __call__(self, event: Event) -> None:
         row = {
             "event": event.kind,
@@ -79,17 +65,16 @@ class _JsonLines(_Silent):
         }
         if event.message:
             row["message"] = event.message
-        sys.stdout.write(json.dumps(row) + "\n")
-        sys.stdout.flush()
+        _write_line(json.dumps(row))
 
 
-class _PlainLines(_Silent):
+class _PlainLines(ProgressReporter):
     """A line per house's step and per finished view; failures on standard error."""
 
     def __init__(self) -> None:
         self._started = time.monotonic()
-        self._seconds: dict[str, float] = {}
-        self._made: dict[str, int] = {}
+        self._seconds: dict[str, float] = {}  # view -> seconds of its steps so far
+        self._made: dict[str, int] = {}  # view -> steps made now, not kept
 
     def __call__(self, event: Event) -> None:
         name = _name(event)
@@ -100,14 +85,10 @@ class _PlainLines(_Silent):
             self._seconds[name] = self._seconds.get(name, 0.0) + event.seconds
             self._made[name] = self._made.get(name, 0) + (event.kind == "done")
             if event.view_id is None:
-                self._say(f"{clock} {name} {event.step}: {_how(event)}{_facts(event)}")
+                _write_line(f"{clock} {name} {event.step}: {_how(event)}{_facts(event)}")
         elif event.kind == "end" and event.view_id is not None:
             seconds, made = self._seconds.pop(name, 0.0), self._made.pop(name, 0)
-            self._say(f"{clock} {name}: {f'{seconds:.1f} s' if made else 'already there'}")
-
-    def _say(self, line: str) -> None:
-        sys.stdout.write(line + "\n")
-        sys.stdout.flush()
+            _write_line(f"{clock} {name}: {f'{seconds:.1f} s' if made else 'already there'}")
 
 
 def _how(event: Event) -> str:
@@ -123,11 +104,11 @@ def _facts(event: Event) -> str:
     return ""
 
 
-class _Bars(_Silent):
+class _Bars(ProgressReporter):
     """A bar for houses and one for views, with rate and time left."""
 
     def __init__(self, n_homes: int, n_views: int) -> None:
-        self._limit = n_views
+        self._limit = n_views  # of views a house, 0 = none
         self._progress = Progress(
             TextColumn("{task.description:<7}"),
             BarColumn(),
@@ -139,20 +120,15 @@ class _Bars(_Silent):
         )
         self._houses = self._progress.add_task("houses", total=n_homes, note="")
         self._views = self._progress.add_task("views", total=None, note="")
-        self._n_views = 0
+        self._n_views = 0  # of all houses whose cameras are known
         self._n_ended = 0
-        self._started = 0.0
+        self._started = 0.0  # when the first view ended; 0 = not yet
 
-    def __enter__(self) -> Teller:
+    def __enter__(self) -> ProgressReporter:
         self._progress.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        tb: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self._progress.stop()
 
     def __call__(self, event: Event) -> None:

@@ -143,7 +143,7 @@ def _run(args: argparse.Namespace) -> int:
 def _run_words(
     args: argparse.Namespace, words: list[str], sources: Sequence[SourceRef] = ()
 ) -> int:
-    from pbrs_farm.progress import teller
+    from pbrs_farm.progress import progress_reporter
     from pbrs_farm.run.local import Run, run_local
     from pbrs_farm.run.plan import wanted
     from pbrs_farm.settings import settings_from_environment
@@ -165,8 +165,9 @@ def _run_words(
     )
     _warn_of_slowness()
     started = time.monotonic()
-    with teller(len(words) + len(sources), args.views, as_json=args.json) as tell:
-        summary = run_local(run, tell)
+    n_homes = len(words) + len(sources)
+    with progress_reporter(n_homes, args.views, as_json=args.json) as report:
+        summary = run_local(run, report)
     seconds = time.monotonic() - started
     _report(args, summary, seconds)
     return 1 if summary.failures or summary.n_views == 0 else 0
@@ -203,7 +204,7 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
     for house, why in summary.without_views:
         complain(f"{house}: no view: {why}")
     for what, message, command in summary.failures:
-        if command:  # the message was told when it happened
+        if command:  # the message was printed when it happened
             complain(f"{what} failed; reproduce: {command}")
         else:
             complain(message if message.startswith(what) else f"{what}: {message}")

@@ -1,4 +1,4 @@
-"""A store that waits for another one to come back. Effects: those of the store it wraps."""
+"""A store that tries again while another one is unavailable. Effects: those of the store it wraps."""
 
 from __future__ import annotations
 
@@ -13,18 +13,44 @@ from pbrs_farm.store.interface import Head, Store
 T = TypeVar("T")
 
 
-class PatientStore:
-    """Tries a call again, with jitter, while the inner store is unavailable.
+def retried(
+    call: Callable[[int], T],
+    timeout_s: float,
+    *,
+    jitter: tuple[float, float] = (0.0, 1.0),
+    max_pause_s: float = 8.0,
+    on_wait: Callable[[str], None] = lambda _reason: None,
+) -> T:
+    """call(number of earlier tries), again while it raises StoreUnavailable, for timeout_s.
 
-    So a finished picture is held in memory through an outage instead of being rendered again.
-    patience_s: then StoreUnavailable is raised.  on_wait: told the reason before each pause.
+    Pauses grow exponentially to max_pause_s, each times a random factor of the range jitter.
+    """
+    deadline = time.monotonic() + timeout_s
+    n_tries = 0
+    while True:
+        try:
+            return call(n_tries)
+        except StoreUnavailable as error:
+            pause_s = random.uniform(*jitter) * min(max_pause_s, 0.2 * 2**n_tries)
+            if time.monotonic() + pause_s > deadline:
+                raise
+            on_wait(str(error))
+        time.sleep(pause_s)
+        n_tries += 1
+
+
+class RetryingStore:
+    """A store that retries each call of the inner store while that is unavailable.
+
+    A finished picture is thus held in memory through an outage and not rendered again.
+    timeout_s: then StoreUnavailable is raised. on_wait: called with the reason before each pause.
     """
 
     def __init__(
-        self, store: Store, patience_s: float, on_wait: Callable[[str], None] = lambda _reason: None
+        self, store: Store, timeout_s: float, on_wait: Callable[[str], None] = lambda _reason: None
     ) -> None:
         self._store = store
-        self._patience_s = patience_s
+        self._timeout_s = timeout_s
         self._on_wait = on_wait
 
     @property
@@ -50,15 +76,11 @@ class PatientStore:
         self._call(lambda: self._store.delete(key))
 
     def _call(self, act: Callable[[], T]) -> T:
-        give_up = time.monotonic() + self._patience_s
-        n_tries = 0
-        while True:
-            try:
-                return act()
-            except StoreUnavailable as error:
-                pause_s = random.uniform(0.5, 1.0) * min(10.0, 0.2 * 2**n_tries)
-                if time.monotonic() + pause_s > give_up:
-                    raise
-                self._on_wait(str(error))
-                time.sleep(pause_s)
-                n_tries += 1
+        # Never pause for less than half: many renderers wait for the same store.
+        return retried(
+            lambda _n: act(),
+            self._timeout_s,
+            jitter=(0.5, 1.0),
+            max_pause_s=10.0,
+            on_wait=self._on_wait,
+        )

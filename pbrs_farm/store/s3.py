@@ -8,8 +8,6 @@ raises in a child instead, and Celery's parent process forbids itself storage al
 from __future__ import annotations
 
 import os
-import random
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
@@ -22,6 +20,7 @@ from pbrs_farm.core.errors import (
     StoreUnavailable,
 )
 from pbrs_farm.store.interface import Head, check_key, check_prefix, content_type
+from pbrs_farm.store.retrying import retried
 from pbrs_farm.store.secret import Secret
 
 T = TypeVar("T")
@@ -33,7 +32,7 @@ class S3Settings:
     """How an S3 store is reached; empty credentials mean the environment's own (AWS_*, IAM).
 
     path_style: https://endpoint/bucket/key, which most vendors want. timeout_s: of one request.
-    patience_s: how long one call is tried again.
+    retry_timeout_s: how long one call is retried.
     """
 
     endpoint: str = ""
@@ -44,7 +43,7 @@ class S3Settings:
     allow_http: bool = False
     path_style: bool = True
     timeout_s: float = 120.0
-    patience_s: float = 60.0
+    retry_timeout_s: float = 60.0
 
 
 @dataclass(slots=True)
@@ -88,7 +87,7 @@ class S3Store:
             ) from None
         self._bucket = bucket
         self._prefix = prefix.strip("/")
-        self._patience_s = settings.patience_s
+        self._retry_timeout_s = settings.retry_timeout_s
         self._obstore: Any = obstore
         self._client: Any = Client(bucket, **_client_options(self._prefix, settings))
 
@@ -159,21 +158,14 @@ class S3Store:
         """act(number of earlier tries) until it does not fail transiently, with full jitter."""
         check_key(key)
         _guard.enter(key)
-        give_up = time.monotonic() + self._patience_s
-        n_tries = 0
-        while True:
+
+        def once(n_tries: int) -> T:
             try:
                 return act(n_tries)
             except (self._obstore.exceptions.BaseError, OSError) as error:
-                failure = self._failure(key, error)
-                pause_s = random.uniform(0.0, min(8.0, 0.2 * 2**n_tries))
-                if (
-                    not isinstance(failure, StoreUnavailable)
-                    or time.monotonic() + pause_s > give_up
-                ):
-                    raise failure from error
-            time.sleep(pause_s)
-            n_tries += 1
+                raise self._failure(key, error) from error
+
+        return retried(once, self._retry_timeout_s)
 
     def _failure(self, key: str, error: Exception) -> StoreFailed:
         kinds = self._obstore.exceptions
@@ -200,7 +192,7 @@ def _client_options(prefix: str, settings: S3Settings) -> dict[str, Any]:
             "connect_timeout": timedelta(seconds=5),
             "allow_http": settings.allow_http,
         },
-        # The loop in _call retries, so that its patience is the only one.
+        # Retry in _call alone, so that retry_timeout_s is the only limit.
         "retry_config": {"max_retries": 1, "retry_timeout": timedelta(seconds=settings.timeout_s)},
     }
     secrets = {

@@ -24,7 +24,7 @@ def s3_store() -> Store:
     if not endpoint:
         pytest.skip("PBRS_S3_ENDPOINT is not set")
     found = settings_from_environment().store
-    settings = replace(found, s3=replace(found.s3, patience_s=5.0))
+    settings = replace(found, s3=replace(found.s3, retry_timeout_s=5.0))
     bucket = os.environ.get("PBRS_S3_BUCKET", "pbrs")
     return store_from_url(f"s3://{bucket}/t-{secrets.token_hex(4)}", settings)
 

@@ -21,7 +21,7 @@ DEAD = StoreSettings(
         access_key="AKIA",
         secret_key=Secret("verysecret"),
         allow_http=True,
-        patience_s=0.3,
+        retry_timeout_s=0.3,
     )
 )
 

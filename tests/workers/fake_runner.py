@@ -16,7 +16,7 @@ from pathlib import Path
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse, StoreUnavailable
 from pbrs_farm.store import Head, Store, store_from_url
-from pbrs_farm.store.retrying import PatientStore
+from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
 from workers.job import JobSpec
 from workers.runner import Request, Result, Survey, Tell
@@ -29,7 +29,7 @@ def control_folder() -> Path:
 def runner(config: FarmConfig, storage_waits: Tell) -> FakeRunner:
     store = SickStore(store_from_url(config.store_url, config.store), control_folder())
     return FakeRunner(
-        PatientStore(store, config.storage_patience_s, storage_waits), control_folder()
+        RetryingStore(store, config.storage_patience_s, storage_waits), control_folder()
     )
 
 

@@ -23,7 +23,7 @@ from pbrs_farm.run.render_process import limit_threads
 from pbrs_farm.run.step_cache import Work, read_marker
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import Store, store_from_url
-from pbrs_farm.store.retrying import PatientStore
+from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
 from workers.house_files import FOLDER, fill_cache, is_left_in_place
 from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
@@ -39,7 +39,7 @@ _LIGHT_STEPS: Final = ("light", "develop")
 def runner(config: FarmConfig, storage_waits: Tell) -> HouseRunner:
     """The runner of a worker or of `recover`."""
     store = store_from_url(config.store_url, config.store)
-    patient = PatientStore(store, config.storage_patience_s, storage_waits)
+    patient = RetryingStore(store, config.storage_patience_s, storage_waits)
     return HouseRunner(patient, n_threads=max(1, (os.cpu_count() or 1) // config.slots))
 
 

@@ -170,7 +170,7 @@ class Slot:
         try:
             if self._store is None:
                 settings = self._config.store
-                hasty = replace(settings, s3=replace(settings.s3, patience_s=5.0))
+                hasty = replace(settings, s3=replace(settings.s3, retry_timeout_s=5.0))
                 self._store = store_from_url(self._config.store_url, hasty)
             self._store.put(key, text.encode())
         except (StoreFailed, PbrsError) as error:
