@@ -23,7 +23,8 @@ check: setup ## lint, types, import contracts: under a minute
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test: check ## check, then the tests
+test: check ## check, then the tests; fetches the example homes for those that need them
+	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
 	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra"
 
 test-slow: setup ## the tests that take minutes
@@ -36,7 +37,7 @@ test-farm: setup ## the farm's tests that really kill processes
 test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm.md)
 	$(BIN)/pytest -m infra -rs
 
-bench: setup ## measure everything but light, cycles, luxcore and farm (NAME=cameras for one), under 25 minutes
+bench: setup ## measure everything but house, light, cycles, luxcore and farm (NAME=cameras for one), under 25 minutes
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## light transport: path, metropolis, denoiser

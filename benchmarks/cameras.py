@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.memory import peak_mb
 from benchmarks.report import write_report
 from pbrs_farm.assets import homes
 from pbrs_farm.assets.debian import cache_folder
@@ -185,9 +185,8 @@ def _sample_home(name: str) -> None:
     caster = Caster(geometry_from_house(house))
     report = sample_cameras(house, CameraFields(), 0, caster.item_counts).report
     seconds = time.perf_counter() - started
-    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     row = {"seconds": seconds, "candidates": report.n_candidates, "views": report.n_views}
-    print(json.dumps(row | {"peak_mb": peak_mb}))
+    print(json.dumps(row | {"peak_mb": round(peak_mb())}))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.memory import peak_mb
 from benchmarks.report import write_report
 
 SUNCG = "suncg300"
@@ -63,8 +64,6 @@ def _measured(name: str) -> dict[str, Any]:
 
 def measure(name: str) -> dict[str, Any]:
     """Read and repair one home on one core of this process."""
-    import resource
-
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     from pbrs_farm.core.house import geometry_from_house
     from pbrs_farm.core.recipe import Recipe
@@ -89,7 +88,7 @@ def measure(name: str) -> dict[str, Any]:
         "read_s": round(read_s, 2),
         "repair_s": round(seconds - read_s, 2),
         "seconds": round(seconds, 2),
-        "mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000),
+        "mb": round(peak_mb()),
         "triangles": sum(item.n_faces for item in repaired.items),
         "n_sky": leaks.n_sky if leaks else -1,
         "n_rays": leaks.n_rays if leaks else 0,

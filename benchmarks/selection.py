@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
 import subprocess
 import sys
 import tempfile
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.memory import peak_mb
 from benchmarks.report import write_report
 from pbrs_farm.core import keys
 from pbrs_farm.core.lighting import Mode
@@ -119,7 +119,7 @@ def score_folder(folder: Path) -> dict[str, float]:
         "judge_s": judging,
         "cpu_s": cpu,
         "json_lines_s": time.perf_counter() - started,
-        "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak_mb": peak_mb(),
     }
 
 

@@ -109,7 +109,6 @@ def test_no_verb_prints_the_help(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("verb", ["run x --out o", "demo", "objects x --out o", "submit x"])
 def test_noise_time_budget_and_groups_are_short_forms_of_the_recipes_fields(verb: str) -> None:
-    pytest.importorskip("celery")
     words = [*verb.split(), "--noise", "0.05", "--time-budget", "30", "--groups", "lamps"]
     light = recipe_of(build_parser().parse_args(words)).light
     assert (light.noise, light.time_budget_s, light.groups) == (0.05, 30.0, "lamps")

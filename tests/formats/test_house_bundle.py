@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from pbrs_farm.assets import homes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import ReadFields
@@ -18,6 +17,7 @@ from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.read.source import read_house, resolve
+from tests.example_homes import example_homes
 from tests.read.small_houses import full_house
 
 
@@ -199,7 +199,6 @@ def test_the_builtin_home_survives_the_bundle() -> None:
 
 @pytest.mark.homes
 def test_an_example_home_survives_the_bundle() -> None:
-    if homes.cached() is None:
-        pytest.skip("example homes not fetched: pbrs-farm homes fetch")
+    example_homes()
     house = read_house(resolve("Studio"), ReadFields())
     assert_same(house, house_from_bundle(*bundle_from_house(house)))

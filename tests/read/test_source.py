@@ -9,6 +9,7 @@ import pytest
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.source import read_house, resolve
+from tests.example_homes import example_homes
 
 
 def test_a_suncg_house_that_changed_since_submission_is_told(tmp_path: Path) -> None:
@@ -32,11 +33,9 @@ def test_a_file_that_changed_since_submission_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.homes
 def test_another_version_of_the_example_homes_is_the_machines_fault() -> None:
-    from pbrs_farm.assets import homes
     from pbrs_farm.core.errors import MachineFailed
 
-    if homes.cached() is None:
-        pytest.skip("the example homes are not fetched")
+    example_homes()
     source = resolve("Studio").model_copy(update={"sha256": "0" * 64})
     with pytest.raises(MachineFailed, match="another Studio"):
         read_house(source, ReadFields())

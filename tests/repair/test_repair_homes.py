@@ -9,6 +9,7 @@ from pbrs_farm.core.house import House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, RepairFields
 from pbrs_farm.read.sweethome3d import read_home
 from pbrs_farm.repair import RepairReport, repair
+from tests.example_homes import example_homes
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.shells import unpaired_edges
 
@@ -17,9 +18,7 @@ QUICK = "Studio"
 
 
 def _repaired(name: str, *, hidden_levels: bool = False) -> tuple[House, RepairReport]:
-    package = homes.cached()
-    if package is None:
-        pytest.skip("example homes not fetched: pbrs-farm homes fetch")
+    package = example_homes()
     data, file = package.home(name)
     fields = ReadFields(hidden_levels=hidden_levels)
     house = read_home(data, file, resources=package.resources(), fields=fields)

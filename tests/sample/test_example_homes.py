@@ -4,12 +4,12 @@ import functools
 
 import pytest
 
-from pbrs_farm.assets import homes
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d import read_home
 from pbrs_farm.repair import repair
+from tests.example_homes import example_homes
 from tests.sample.test_rules import hold_the_rules
 
 pytestmark = pytest.mark.homes
@@ -18,9 +18,7 @@ SMALL = {"score_width_px": 160, "score_height_px": 120, "coarse_width_px": 80, "
 
 @functools.cache
 def repaired(name: str) -> House:
-    package = homes.cached()
-    if package is None:
-        pytest.skip("the example homes are not fetched")
+    package = example_homes()
     data, file = package.home(name)
     recipe = Recipe()
     house = read_home(data, file, resources=package.resources(), fields=recipe.read)

@@ -19,14 +19,13 @@ from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.sweethome3d import read_home
+from tests.example_homes import example_homes
 
 NAMES = [h.name for h in homes.example_homes()]
 
 
 def example(name: str, fields: ReadFields | None = None) -> House:
-    package = homes.cached()
-    if package is None:
-        pytest.skip("example homes not fetched: pbrs-farm homes fetch")
+    package = example_homes()
     data, file = package.home(name)
     return read_home(
         data, file, resources=package.resources(), fields=fields, package=package.label

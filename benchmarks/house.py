@@ -1,0 +1,141 @@
+"""The state of the code itself: size, comments, folders, functions, import cycles, coverage.
+
+Effects: runs the test suite under coverage (about six minutes) and writes out/bench/house.json.
+`python -m benchmarks.house --quick` leaves the tests out and writes nothing.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import json
+import os
+import subprocess
+import sys
+import tokenize
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.report import write_report
+
+PACKAGES = ("pbrs_farm", "workers")
+MARKERS = "not slow and not gpu and not infra"
+PRAGMAS = ("noqa", "type:", "fmt:", "pragma:")
+UNITS = {
+    "house.lines": "lines of .py of pbrs_farm and workers",
+    "house.comments_per_100": "lines with a comment, pragmas apart, per 100 lines",
+    "house.max_folder_files": "files of the fullest folder, one level, __init__ apart",
+    "house.function_p90": "lines, 90th percentile of all functions, docstrings included",
+    "house.function_max": "lines of the longest function",
+    "house.file_max": "lines of the longest file",
+    "house.import_cycles": "groups of modules that import one another, type checking apart",
+    "house.coverage": "% of statements run by the tests, subprocesses counted",
+}
+
+
+def main() -> None:
+    """Measure and write out/bench/house.json."""
+    figures = static_figures()
+    figures["house.coverage"] = coverage_percent()
+    write_report("house", figures, UNITS)
+
+
+def static_figures() -> dict[str, Any]:
+    """What the source says by itself."""
+    texts = {path: path.read_text(encoding="utf-8") for path in sources()}
+    n_lines = sum(len(text.splitlines()) for text in texts.values())
+    n_comments = sum(commented_lines(text) for text in texts.values())
+    lengths = [n for text in texts.values() for n in function_lengths(text)]
+    return {
+        "house.lines": n_lines,
+        "house.comments_per_100": round(100 * n_comments / n_lines, 2),
+        "house.max_folder_files": max(folder_files().values()),
+        "house.function_p90": int(np.percentile(lengths, 90)),
+        "house.function_max": max(lengths),
+        "house.file_max": max(len(text.splitlines()) for text in texts.values()),
+        "house.import_cycles": import_cycles(),
+    }
+
+
+def sources() -> Iterator[Path]:
+    """Every Python file of the packages."""
+    for package in PACKAGES:
+        yield from sorted(Path(package).rglob("*.py"))
+
+
+def commented_lines(text: str) -> int:
+    """Lines that carry a comment which says something to a reader."""
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    comments = (t for t in tokens if t.type == tokenize.COMMENT)
+    return len({t.start[0] for t in comments if not t.string.lstrip("# ").startswith(PRAGMAS)})
+
+
+def function_lengths(text: str) -> Iterator[int]:
+    """Lines of each function and method, from `def` to its last line."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield (node.end_lineno or node.lineno) - node.lineno + 1
+
+
+def folder_files() -> Counter[Path]:
+    """Files per folder of the packages, caches and __init__.py apart."""
+    found: Counter[Path] = Counter()
+    for package in PACKAGES:
+        for path in Path(package).rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts and path.name != "__init__.py":
+                found[path.parent] += 1
+    return found
+
+
+def import_cycles() -> int:
+    """Strongly connected groups of more than one module."""
+    import grimp
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = grimp.build_graph(*PACKAGES, exclude_type_checking_imports=True, cache_dir=None)
+    number = {name: k for k, name in enumerate(sorted(graph.modules))}
+    pairs = [
+        (number[a], number[b]) for a in number for b in graph.find_modules_directly_imported_by(a)
+    ]
+    rows, columns = np.array(pairs).T
+    matrix = coo_array((np.ones(len(pairs)), (rows, columns)), shape=(len(number),) * 2)
+    _, label = connected_components(matrix, directed=True, connection="strong")
+    return int((np.bincount(label) > 1).sum())
+
+
+def coverage_percent() -> float:
+    """Statements run by the tests, those that kill processes included. Raises if a test fails."""
+    folder = Path("out/bench/coverage").resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob(".coverage*"):
+        old.unlink()
+    settings = folder / "coveragerc"
+    settings.write_text(
+        "[run]\nparallel = true\npatch = subprocess\nsigterm = true\n"
+        f"concurrency = multiprocessing,thread\nsource = {','.join(PACKAGES)}\n"
+        f"data_file = {folder}/.coverage\n"
+        "[report]\nexclude_also =\n    if TYPE_CHECKING:\n    @overload\n    \\.\\.\\.$\n"
+    )
+    coverage = [sys.executable, "-m", "coverage"]
+    options = [f"--rcfile={settings}"]
+    env = os.environ | {"COVERAGE_FILE": f"{folder}/.coverage"}
+    tests = ["-m", "pytest", "-n", "2", "-m", MARKERS]
+    subprocess.run([*coverage, "run", *options, *tests], check=True, env=env)
+    subprocess.run([*coverage, "combine", "-q", *options], check=True, env=env)
+    report = folder / "coverage.json"
+    subprocess.run([*coverage, "json", "-q", *options, "-o", str(report)], check=True, env=env)
+    totals = json.loads(report.read_text())["totals"]
+    return round(float(totals["percent_covered"]), 2)
+
+
+if __name__ == "__main__":
+    if "--quick" in sys.argv:
+        for name, value in static_figures().items():
+            print(f"{name:<26}{value}")
+    else:
+        main()
