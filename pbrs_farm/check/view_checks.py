@@ -17,7 +17,7 @@ from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYERS, Layer
 
-BASIC = ("depth", "normal", "valid", "semantic", "instance", "boundary")
+BASIC = tuple(x.name for x in LAYERS if x.step == "truth" and not x.optional)
 
 
 def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | None:
@@ -59,10 +59,10 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
     A light mode may be: without a window, outdoor light alone leaves a room black. That is noted.
     """
     for layer in LAYERS:
-        if layer.step in ("opengl", "light") and layer.name in arrays:
+        if layer.step != "truth" and layer.name in arrays:
             picture = arrays[layer.name]
             constant = bool((picture == picture[0, 0]).all())
-            may_be = layer.step == "light" or not arrays["valid"].any()
+            may_be = layer.step == "develop" or not arrays["valid"].any()
             place = f"{view.place}/{layer.file}"
             tally.expect("pictures", place, not constant or may_be, "is one colour")
             if constant:

@@ -60,6 +60,13 @@ def test_every_layer_is_there_in_its_type(view: Path) -> None:
             assert all(np.isfinite(c).all() and c.shape == (72, 96) for c in channels), layer.name
 
 
+def test_the_table_of_layers_names_the_step_that_writes_each_file(view: Path) -> None:
+    for layer in LAYERS:
+        marker = view.parents[1] / "done" / f"{layer.step}.{view.name}.json"
+        keys = [file["key"] for file in json.loads(marker.read_text())["files"]]
+        assert any(key.endswith(f"/{view.name}/{layer.file}") for key in keys), layer.name
+
+
 def test_the_pictures_are_lit(view: Path) -> None:
     for mode in ("opengl_dl", "opengl_il", "mlt_ol", "mlt_il_ol"):
         assert 20 < array_from_png((view / f"{mode}.png").read_bytes()).mean() < 240, mode
