@@ -51,6 +51,8 @@ class NoopRunner:
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
         """As the real one: a look at the cameras' marker, then names."""
+        if "cameras" not in done:
+            return Survey()  # the benchmark enters houses whose geometry was never run
         self._store.get(keys.marker_key(house, "cameras"))
         missing = {}
         for number in range(len(groups_of(house))):
