@@ -5,15 +5,13 @@ The page needs no network and no script: charts are inline SVG, examples are sma
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Iterable, Sequence
-from html import escape
-from importlib import resources
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from pbrs_farm import images
@@ -32,9 +30,9 @@ from pbrs_farm.curate.selection_summary import (
     summary_of,
     yield_curve,
 )
-from pbrs_farm.gallery.gallery_page import filled, small_jpeg
+from pbrs_farm.gallery.gallery_page import data_url, small_jpeg
 from pbrs_farm.gallery.label_colours import depth_colours
-from pbrs_farm.selection.binning import Binning
+from pbrs_farm.gallery.templates import page
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.reference_set import Reference
 from pbrs_farm.store.interface import Store
@@ -58,144 +56,65 @@ def selection_report(
     table = verdict_table(store, run)
     summary = summary_of(table, run, fields, reference)
     scored = table.filter(table["colour_score"].is_valid())
-    colour, depth = (scored[k].to_numpy() for k in ("colour_score", "depth_score"))
-    kept = scored["kept"].to_numpy(zero_copy_only=False).astype(bool)
+    shown = {"kept": _spread(scored, n_examples), "refused": _refused(scored, n_examples)}
     examples = _Examples(store, reference, fields)
-    good, bad = _spread(scored.filter(scored["kept"]), n_examples), _refused(scored, n_examples)
-    template = resources.files("pbrs_farm.curate").joinpath("selection_report.html")
-    limits = fields.min_colour, fields.min_depth
-    parts = {
-        "RUN": escape(run),
-        "INTRO": _intro(summary),
-        "NUMBERS": _numbers(summary),
-        "COLOUR": charts.distribution(colour, kept, limits[0], "colour score"),
-        "DEPTH": charts.distribution(depth, kept, limits[1], "depth score"),
-        "JOINT": charts.joint(colour, depth, limits),
-        "YIELD": charts.yields(
-            (
-                ("colour and depth", "both", summary.yield_both),
-                ("colour alone", "colour", yield_curve(colour)),
-                ("depth alone", "depth", yield_curve(depth)),
-            ),
-            min(limits),
-            (0.70, PAPER_KEPT / PAPER_VIEWS),
-        ),
-        "REASONS": _reasons(summary),
-        "ROOMS": _tallies(summary.room_types),
-        "HOUSES": _tallies(summary.houses),
-        "KEPT": examples.cards(good),
-        "REFUSED": examples.cards(bad),
-        "REFERENCE": _reference(summary),
-        "BINNINGS": _binnings(summary),
-        "CREDITS": "<br>".join(escape(x) for x in _credits(store, good, bad)),
-    }
-    return filled(template.read_text("utf-8"), parts)
-
-
-def _intro(summary: SelectionSummary) -> str:
-    modes = ", ".join(f"{n:,} on {mode}" for mode, n in summary.modes.items()) or "none"
-    f = summary.fields
-    text = (
-        f"Compared with {summary.reference.photographs:,} photographs of "
-        f"“{summary.reference.source}”; thresholds {f.min_colour:g} for colour and "
-        f"{f.min_depth:g} for depth; scored: {modes}."
+    return page(
+        "pbrs_farm.curate",
+        "selection_report.html",
+        run=run,
+        summary=summary,
+        fields=fields,
+        reference=summary.reference,
+        numbers=_numbers(summary),
+        charts=_charts(scored, summary, fields),
+        reasons=sorted(summary.reasons.items(), key=lambda pair: -pair[1]),
+        room_types=_tally_table(summary.room_types),
+        houses=_tally_table(summary.houses),
+        credits=_credits(store, *shown.values()),
+        **{name: [examples.example(row) for row in t.to_pylist()] for name, t in shown.items()},
     )
-    return escape(text)
 
 
-def _numbers(summary: SelectionSummary) -> str:
-    paper = f"{PAPER_KEPT / PAPER_VIEWS:.1%}"
+def _numbers(summary: SelectionSummary) -> list[tuple[str, str]]:
+    """The large numbers at the top of the page: (number, what it counts)."""
     share = summary.kept / summary.views if summary.views else 0.0
-    rows = (
+    return [
         (f"{summary.views:,}", f"views, houses: {len(summary.houses):,}"),
         (f"{summary.kept:,}", "kept"),
-        (f"{share:.1%}", f"yield (the paper's own pictures: {paper})"),
+        (f"{share:.1%}", f"yield (the paper's own pictures: {PAPER_KEPT / PAPER_VIEWS:.1%})"),
         (_median(summary.colour_quartiles), "median colour score"),
         (_median(summary.depth_quartiles), "median depth score"),
         (f"{summary.views - summary.scored:,}", "views without a score"),
-    )
-    return "".join(f"<div><b>{n}</b><span>{escape(text)}</span></div>" for n, text in rows)
+    ]
 
 
 def _median(quartiles: Sequence[float]) -> str:
     return f"{quartiles[2]:.3f}" if quartiles else "–"
 
 
-def _reasons(summary: SelectionSummary) -> str:
-    if not summary.reasons:
-        return '<p class="faint">No view is refused.</p>'
-    most = max(summary.reasons.values())
-    rows = "".join(
-        f'<tr><td>{escape(name)}</td><td class="n">{n:,}</td><td class="n">'
-        f'{n / summary.views:.1%}</td><td class="bar"><i style="--share:0%;'
-        f'width:{100 * n / most:.1f}%"></i></td></tr>'
-        for name, n in sorted(summary.reasons.items(), key=lambda pair: -pair[1])
+def _charts(scored: Any, summary: SelectionSummary, fields: SelectionFields) -> dict[str, Markup]:
+    colour, depth = (scored[k].to_numpy() for k in ("colour_score", "depth_score"))
+    kept, limits = _is_kept(scored), (fields.min_colour, fields.min_depth)
+    curves = (
+        ("colour and depth", "both", summary.yield_both),
+        ("colour alone", "colour", yield_curve(colour)),
+        ("depth alone", "depth", yield_curve(depth)),
     )
-    head = (
-        '<tr><th>first reason</th><th class="n">views</th><th class="n">of all</th><th></th></tr>'
-    )
-    return f"<table>{head}{rows}</table>"
+    return {
+        "colour": charts.distribution(colour, kept, limits[0], "colour score"),
+        "depth": charts.distribution(depth, kept, limits[1], "depth score"),
+        "joint": charts.joint(colour, depth, limits),
+        "yields": charts.yields(curves, min(limits), (0.70, PAPER_KEPT / PAPER_VIEWS)),
+    }
 
 
-def _tallies(tallies: Sequence[Tally]) -> str:
-    most = max((t.views for t in tallies), default=1)
+def _tally_table(tallies: Sequence[Tally]) -> dict[str, Any]:
+    """shown: the MAX_ROWS largest tallies; rest: the sum of the others; most: views of the largest."""
     ordered = sorted(tallies, key=lambda t: (-t.views, t.name))
-    rows = "".join(
-        f'<tr><td>{escape(t.name or "(unknown)")}</td><td class="n">{t.kept:,} / {t.views:,}</td>'
-        f'<td class="n">{t.kept / t.views:.0%}</td><td class="bar"><i style="width:'
-        f'{100 * t.views / most:.1f}%;--share:{100 * t.kept / t.views:.1f}%"></i></td></tr>'
-        for t in ordered[:MAX_ROWS]
-    )
     rest = ordered[MAX_ROWS:]
-    if rest:
-        kept, views = sum(t.kept for t in rest), sum(t.views for t in rest)
-        rows += (
-            f'<tr><td>{len(rest):,} more</td><td class="n">{kept:,} / {views:,}</td>'
-            f'<td class="n">{kept / views:.0%}</td><td></td></tr>'
-        )
-    head = '<tr><th></th><th class="n">kept / views</th><th class="n">yield</th><th></th></tr>'
-    return f"<table>{head}{rows}</table>"
-
-
-def _reference(summary: SelectionSummary) -> str:
-    r = summary.reference
-    return escape(
-        f"{r.photographs:,} photographs of “{r.source}” (sha256 {r.source_sha256[:16]}). Compared "
-        f"at {_bins(r.binning)}: the finest binning at which at least 95 % of the photographs, "
-        "each left out in turn, pass the threshold themselves; where none passes, the coarsest."
-    )
-
-
-def _bins(binning: Binning) -> str:
-    colour = " x ".join(str(k) for k in binning.colour)
-    return f"{colour} colour bins and {binning.depth} depth bins"
-
-
-def _binnings(summary: SelectionSummary) -> str:
-    chosen = summary.reference.binning
-    rows = []
-    for row in summary.reference.table:
-        colour, depth = row.binning.colour, row.binning.depth
-        marks = " ".join(
-            name
-            for name, used in (
-                ("colour", colour == chosen.colour),
-                ("depth", depth == chosen.depth),
-            )
-            if used
-        )
-        rows.append(
-            f'<tr class="{"chosen" if marks else ""}"><td>{" x ".join(map(str, colour))}</td>'
-            f'<td class="n">{row.colour_passing:.1%}</td><td class="n">{row.colour_median:.3f}</td>'
-            f'<td class="n">{depth}</td><td class="n">{row.depth_passing:.1%}</td>'
-            f'<td class="n">{row.depth_median:.3f}</td><td>{marks}</td></tr>'
-        )
-    head = (
-        '<tr><th>colour bins</th><th class="n">pass</th><th class="n">median</th>'
-        '<th class="n">depth bins</th><th class="n">pass</th><th class="n">median</th>'
-        "<th>chosen for</th></tr>"
-    )
-    return f"<table>{head}{''.join(rows)}</table>"
+    sums = {"n": len(rest), "kept": sum(t.kept for t in rest), "views": sum(t.views for t in rest)}
+    most = max((t.views for t in tallies), default=1)
+    return {"shown": ordered[:MAX_ROWS], "rest": sums if rest else None, "most": most}
 
 
 def _credits(store: Store, *shown: Any) -> list[str]:
@@ -217,8 +136,13 @@ def _worst(table: Any) -> NDArray[np.float64]:
     return np.asarray(np.minimum(colour, depth), np.float64)
 
 
-def _spread(table: Any, n: int) -> Any:
-    """n rows from the best to the worst, at equal steps of rank."""
+def _is_kept(scored: Any) -> NDArray[np.bool_]:
+    return np.asarray(scored["kept"].to_numpy(zero_copy_only=False), np.bool_)
+
+
+def _spread(scored: Any, n: int) -> Any:
+    """n kept rows from the best to the worst, at equal steps of rank."""
+    table = scored.filter(scored["kept"])
     order = np.argsort(-_worst(table), kind="stable")
     picked = np.unique(np.linspace(0, max(len(order) - 1, 0), min(n, len(order))).round())
     return table.take(pa.array(order[picked.astype(np.intp)]))
@@ -226,10 +150,11 @@ def _spread(table: Any, n: int) -> Any:
 
 def _refused(scored: Any, n: int) -> Any:
     """n refused rows, the reasons in turn, of each the views that came nearest first."""
-    table = scored.filter(pa.array(~scored["kept"].to_numpy(zero_copy_only=False).astype(bool)))
+    table = scored.filter(pa.array(~_is_kept(scored)))
     reasons = table["reason"].to_pylist()
+    # Number the views of each reason from the nearest: its turn.
     turns: dict[str, int] = {}
-    ranked: list[tuple[int, int, int]] = []
+    ranked: list[tuple[int, int, int]] = []  # turn, rank among all, row
     for row in np.argsort(-_worst(table), kind="stable"):
         turn = turns[reasons[row]] = turns.get(reasons[row], -1) + 1
         ranked.append((turn, len(ranked), int(row)))
@@ -247,57 +172,42 @@ class _Examples:
         self._colour, self._depth = reference.colour_shares(), reference.depth_shares()
         self._space = reference.facts.settings.colour_space
 
-    def cards(self, table: Any) -> str:
-        """A card for each row of a table of verdicts."""
-        cards = [self._card(row) for row in table.to_pylist()]
-        return "".join(cards) or '<p class="faint">None.</p>'
-
-    def _card(self, row: dict[str, Any]) -> str:
-        what = (
-            f"colour {row['colour_score']:.3f}, depth {row['depth_score']:.3f}"
-            f"{', ' + row['reasons'] if row['reasons'] else ''}"
-        )
-        pictures = self._picture(row, row["mode"]) + self._picture(row, "depth")
-        return (
-            f'<div class="card"><h4>{escape(row["room_type"] or row["room"])} <span>'
-            f"{escape(row['house'])} {escape(row['view'])}: {escape(what)}</span></h4>"
-            f"{pictures}{self._histograms(row)}</div>"
-        )
+    def example(self, row: dict[str, Any]) -> dict[str, Any]:
+        """A row of verdicts with its pictures as data URLs and its histograms as charts."""
+        layers = (row["mode"], "depth")
+        pictures = [(layer, self._picture(row, layer)) for layer in layers]
+        return {"row": row, "pictures": pictures, "histograms": self._histograms(row)}
 
     def _picture(self, row: dict[str, Any], layer: str) -> str:
+        """The layer's thumbnail as a data URL, "" where it cannot be read."""
         key = keys.view_key(row["house"], row["view"], LAYER[layer].file)
         try:
             stored = images.array_from_png(self._store.get(key), key)
         except (ObjectMissing, BadInput):
-            return "<figure>picture missing</figure>"
+            return ""
         pixels = depth_colours(stored) if layer == "depth" else stored[..., :3].astype(np.uint8)
-        data = small_jpeg(images.thumbnail(pixels, max_edge_px=320), 14_000)
-        text = base64.b64encode(data).decode()
-        return f'<figure><img alt="{escape(layer)}" src="data:image/jpeg;base64,{text}"></figure>'
+        return data_url(small_jpeg(images.thumbnail(pixels, max_edge_px=320), 14_000), "jpeg")
 
-    def _histograms(self, row: dict[str, Any]) -> str:
+    def _histograms(self, row: dict[str, Any]) -> list[tuple[Markup | None, str]]:
+        """(chart, nearest photograph) for colour and for depth; no chart where there are none."""
+        names = row["colour_reference"], row["depth_reference"]
         try:
             pack = house_pack(self._store, row["house"], self._mode)
             place = pack.views.index(row["view"])
         except (BadInput, ObjectMissing, KeyError, ValueError):
-            return "<figure>histogram missing</figure>" * 2
+            return [(None, name) for name in names]
         colour = normalised(coarser_colour(pack.colour[place], self._binning.colour))
         depth = normalised(coarser_depth(pack.depth[place], self._binning.depth))
-        other = self._colour[self._places[row["colour_reference"]]]
-        fullest = np.sort(np.argsort(-np.maximum(colour, other), kind="stable")[:_SHOWN_COLOURS])
+        like_colour = self._colour[self._places[names[0]]]
+        like_depth = self._depth[self._places[names[1]]]
+        # Of the colour bins, show only the fullest of either, in their own colours.
+        order = np.argsort(-np.maximum(colour, like_colour), kind="stable")
+        fullest = np.sort(order[:_SHOWN_COLOURS])
         shades = bin_colours(self._binning.colour, self._space)[fullest]
         tuples = [(int(r), int(g), int(b)) for r, g, b in shades]
-        charts_ = (
-            charts.mirrored(colour[fullest], other[fullest], "colour histograms", tuples),
-            charts.mirrored(
-                depth, self._depth[self._places[row["depth_reference"]]], "depth histograms"
-            ),
-        )
-        names = row["colour_reference"], row["depth_reference"]
-        return "".join(
-            f"<figure>{svg}nearest: {escape(name)}</figure>"
-            for svg, name in zip(charts_, names, strict=True)
-        )
+        of_colour = colour[fullest], like_colour[fullest], "colour histograms", tuples
+        drawn = charts.mirrored(*of_colour), charts.mirrored(depth, like_depth, "depth histograms")
+        return list(zip(drawn, names, strict=True))
 
 
 def bin_colours(bins: Iterable[int], space: str) -> NDArray[np.uint8]:

@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
-from pbrs_farm.gallery.gallery_page import gallery
+from pbrs_farm.gallery.gallery_page import attributions, gallery
 from pbrs_farm.gallery.label_colours import NYU40_COLOURS
 from pbrs_farm.gallery.tiles import TILES, Tile, tiles_of
 
@@ -103,7 +103,7 @@ def _classes(rows: Sequence[Sequence[Tile]]) -> list[int]:
 
 
 def _credits(views: Sequence[ViewEntry]) -> list[str]:
-    lines = dict.fromkeys(v.house.attribution for v in views if v.house.attribution)
+    lines = attributions(views)
     return [_drawable(line if len(line) < 260 else line[:257] + "...") for line in lines]
 
 

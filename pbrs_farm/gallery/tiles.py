@@ -23,20 +23,25 @@ class TileKind:
 
     layer: str
     title: str
-    file: str
     is_photo: bool = False
+    is_flat: bool = False  # areas of one value, shown unblurred
+
+    @property
+    def file(self) -> str:
+        """Name of the layer's file."""
+        return f"{self.layer}.png"
 
 
 TILES: Final = (
-    TileKind("opengl_dl", "OpenGL, directional", "opengl_dl.png", True),
-    TileKind("opengl_il", "OpenGL, indoor", "opengl_il.png", True),
-    TileKind("mlt_ol", "Physical, outdoor", "mlt_ol.png", True),
-    TileKind("mlt_il_ol", "Physical, indoor + outdoor", "mlt_il_ol.png", True),
-    TileKind("depth", "Depth", "depth.png"),
-    TileKind("normal", "Normals", "normal.png"),
-    TileKind("semantic", "Classes", "semantic.png"),
-    TileKind("instance", "Instances", "instance.png"),
-    TileKind("boundary", "Boundaries", "boundary.png"),
+    TileKind("opengl_dl", "OpenGL, directional", is_photo=True),
+    TileKind("opengl_il", "OpenGL, indoor", is_photo=True),
+    TileKind("mlt_ol", "Physical, outdoor", is_photo=True),
+    TileKind("mlt_il_ol", "Physical, indoor + outdoor", is_photo=True),
+    TileKind("depth", "Depth"),
+    TileKind("normal", "Normals"),
+    TileKind("semantic", "Classes", is_flat=True),
+    TileKind("instance", "Instances", is_flat=True),
+    TileKind("boundary", "Boundaries", is_flat=True),
 )
 
 _COLOURS: Final[dict[str, Callable[[NDArray[Any]], Srgb8Image]]] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,7 +47,7 @@ def test_the_page_holds_every_part_and_no_script_or_link(store: MemoryStore) -> 
     html = page(store)
     for text in ("Per room type and per house", "Kitchen", "73.0%", "Model by A. &amp; Co"):
         assert text in html
-    assert not re.findall("@[A-Z]+@", html)
+    assert not re.findall("{{|{%|%}", html)
     assert "<script" not in html
     assert "http" not in html
 
@@ -65,6 +66,27 @@ def test_the_numbers_are_those_of_the_run(store: MemoryStore) -> None:
     assert 0 < summary["kept"] < summary["views"] == 8
     assert f"<b>{summary['kept']}</b><span>kept" in html
     assert html.count('<div class="card"><h4>') == 8
+
+
+def test_a_home_a_room_or_a_photograph_called_script_is_escaped() -> None:
+    held, evil = MemoryStore(), "<script>alert(1)</script>"
+    of_evil = record("a", "0_0_0", np.random.default_rng(4)).model_copy(update={"room_type": evil})
+    held.put(keys.view_key("a", "0_0_0", "histogram.json"), of_evil.json_bytes())
+    facts = {"source": {"attribution": evil}}
+    held.put(keys.house_key("a", "house.json"), json.dumps(facts).encode())
+    photographs = reference()
+    names = {"ids": (evil,) * len(photographs.facts.ids), "source": evil}
+    photographs = replace(photographs, facts=photographs.facts.model_copy(update=names))
+    selecting.select(held, photographs, FIELDS)
+    html = selection_report(held, photographs, FIELDS)
+    assert "<script" not in html
+    assert html.count("&lt;script&gt;") >= 5
+
+
+def test_words_in_a_chart_are_escaped() -> None:
+    chart = charts.yields([("<b> & co", "both", [1.0, 0.0])], 0.5, (0.7, 0.7))
+    assert "&lt;b&gt; &amp; co" in chart
+    assert "<b>" not in chart
 
 
 def test_a_missing_picture_is_said(store: MemoryStore) -> None:

@@ -17,7 +17,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.gallery import contact_sheet as sheet
 from pbrs_farm.gallery import label_colours as colours
-from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, filled, gallery, small_jpeg
+from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
 from pbrs_farm.gallery.tiles import TILES
 
 
@@ -104,7 +104,7 @@ def test_gallery_links_files_that_exist_and_nothing_outside(root: Path) -> None:
     assert all((root / link).is_file() for link in links)
     assert not re.findall(r'(?:src|href)="(?:https?:)?//', html)
     assert "@import" not in html
-    assert not re.findall("@[A-Z]+@", html)
+    assert not re.findall("{{|{%|%}", html)
 
 
 def test_gallery_embeds_thumbnails_no_larger_than_320(tmp_path: Path) -> None:
@@ -132,8 +132,16 @@ def test_noise_is_made_small_enough() -> None:
     assert len(small_jpeg(noise, 5000)) <= 5000
 
 
-def test_what_is_filled_in_is_not_searched_again() -> None:
-    assert filled("@A@ @media @B@", {"A": "@B@", "B": "2"}) == "@B@ @media 2"
+def test_a_home_or_room_called_script_is_escaped_everywhere(tmp_path: Path) -> None:
+    evil = "<script>alert('\"&')</script>"
+    folder = write_house(tmp_path, "<script>", ("0_0_1",), attribution=evil)
+    facts = json.loads((folder / "house.json").read_text())
+    facts["name"] = facts["rooms"][0]["name"] = evil
+    (folder / "house.json").write_text(json.dumps(facts))
+    html = gallery(tmp_path)
+    assert html.count("<script") == 1  # the page's own
+    assert "alert('" not in html
+    assert html.count("&lt;script&gt;alert(&#39;&#34;&amp;&#39;)&lt;/script&gt;") > 5
 
 
 def test_nyu40_colours_are_distinct() -> None:
