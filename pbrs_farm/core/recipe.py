@@ -27,7 +27,9 @@ class ReadFields(_Group):
     max_model_triangles: int = Field(2_000_000, gt=0, description="of one model; more is refused")
     max_extent_m: float = Field(1_000.0, gt=0, description="a piece farther out is refused")
     hidden_levels: bool = Field(False, description="Sweet Home 3D: read levels not shown, too")
-    strict: bool = Field(False, description="recoverable faults of a source are errors")
+    strict: bool = Field(
+        False, description="notes of a source are errors but the harmless kinds, docs/houses.md"
+    )
 
 
 class RepairFields(_Group):

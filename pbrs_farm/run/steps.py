@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import pbrs_farm
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
-from pbrs_farm.core.errors import BadHouse, BadInput
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Room, geometry_from_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
@@ -82,7 +82,6 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
     from pbrs_farm.repair import RepairReport, repair
 
     house = read_house(source, recipe.read)
-    _check_strict(house, recipe)
     if source.kind == "object":
         return house, RepairReport(house_id=house.id, was_repaired=True)
 
@@ -90,13 +89,6 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
         return Caster(geometry_from_house(some))
 
     return repair(house, recipe.repair, occluder_from=occluder_from)
-
-
-def _check_strict(house: House, recipe: Recipe) -> None:
-    if recipe.read.strict and house.notes:
-        note = house.notes[0]
-        more = f" and {len(house.notes) - 1} more" if len(house.notes) > 1 else ""
-        raise BadHouse(house.source.file, note.place, f"{note.text}{more}", hint="--strict")
 
 
 def _cameras(work: Work) -> Made:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Points2
@@ -24,10 +25,11 @@ from pbrs_farm.core.house import (
     Room,
     Source,
     StoredCamera,
-    Texture,
 )
 from pbrs_farm.read.builtin import builtin_furniture as furniture
-from pbrs_farm.read.builtin.generated_textures import checks, planks, stripes, texture_from_srgb8
+from pbrs_farm.read.builtin.generated_textures import checks, planks, png_from_srgb8, stripes
+from pbrs_farm.read.common.material_library import MaterialLibrary
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
 from pbrs_farm.read.mesh.primitives import box, wall_prism
 
@@ -42,7 +44,7 @@ BEDROOM = (5.0 + INNER_M, 0.0, 9.0, 4.0)
 
 def builtin_home() -> House:
     """The built-in home, unrepaired; the same on every call."""
-    materials, index, textures = _materials()
+    library, index = _materials()
     walls = _walls(index)
     openings, joinery = _openings(index)
     planes = _planes(index)
@@ -56,8 +58,8 @@ def builtin_home() -> House:
         levels=(Level("0", "Ground floor", 0.0, WALL_HEIGHT_M),),
         rooms=(_room("0_0", "Living room", LIVING, "Living_Room"), _room("0_1", "Bedroom", BEDROOM, "Bedroom")),
         items=items,
-        materials=materials,
-        textures=textures,
+        materials=library.materials,
+        textures=library.textures,
         openings=openings,
         cameras=(
             StoredCamera("Living room", np.array([4.6, 1.6, 3.6]), np.array([-0.8, -0.16, -0.58]), math.radians(65)),
@@ -66,15 +68,17 @@ def builtin_home() -> House:
     )  # fmt: skip
 
 
-def _materials() -> tuple[tuple[Material, ...], dict[str, int], dict[str, Texture]]:
-    floor = texture_from_srgb8("planks", planks())
-    rug = texture_from_srgb8("rug", checks(64, 8, (150, 40, 45), (205, 190, 160)))
-    picture = texture_from_srgb8("picture", stripes(64, 6, (30, 90, 150), (230, 190, 60)))
+def _materials() -> tuple[MaterialLibrary, dict[str, int]]:
+    """The home's materials in a library, and the index of each by its name."""
+    library = MaterialLibrary(Notes("builtin", strict=True))
+    floor = _texture(library, "planks", planks())
+    rug = _texture(library, "rug", checks(64, 8, (150, 40, 45), (205, 190, 160)))
+    picture = _texture(library, "picture", stripes(64, 6, (30, 90, 150), (230, 190, 60)))
     materials = (
         Material("wall_default", is_default=True),
         Material("wall_sand", diffuse=(0.93, 0.88, 0.78)),
         Material("ceiling_default", is_default=True),
-        _glossy("floor_planks", (1.0, 1.0, 1.0), floor.id),
+        _glossy("floor_planks", (1.0, 1.0, 1.0), floor),
         Material("carpet", diffuse=(0.55, 0.57, 0.6)),
         _glossy("wood", (0.72, 0.53, 0.34)),
         _glossy("wood_dark", (0.36, 0.24, 0.16)),
@@ -87,15 +91,20 @@ def _materials() -> tuple[tuple[Material, ...], dict[str, int], dict[str, Textur
         Material("leaf", diffuse=(0.2, 0.45, 0.16)),
         Material("clay", diffuse=(0.7, 0.4, 0.28)),
         Material("shade", diffuse=(0.95, 0.9, 0.8)),
-        Material("rug", texture_id=rug.id),
-        Material("picture", texture_id=picture.id),
+        Material("rug", texture_id=rug),
+        Material("picture", texture_id=picture),
         Material("glass", MaterialKind.GLASS, diffuse=(0.9, 0.95, 0.95), opacity=0.2),
         Material("pane", MaterialKind.PANE, diffuse=(0.9, 0.95, 0.95), opacity=0.2),
         Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9)),
         Material("bulb", MaterialKind.BULB),
     )
-    index = {m.name: k for k, m in enumerate(materials)}
-    return materials, index, {t.id: t for t in (floor, rug, picture)}
+    return library, {m.name: library.index(m) for m in materials}
+
+
+def _texture(library: MaterialLibrary, name: str, rgb_srgb8: NDArray[np.uint8]) -> str | None:
+    png = png_from_srgb8(rgb_srgb8)
+    loaded = library.texture(name, name=name, place=name, load=lambda: png)
+    return loaded and loaded.texture.id
 
 
 def _glossy(

@@ -8,9 +8,6 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core import keys
-from pbrs_farm.core.house import Texture
-
 
 def png_from_srgb8(rgb_srgb8: NDArray[np.uint8]) -> bytes:
     """An 8-bit RGB PNG of (H, W, 3) uint8, row 0 on top."""
@@ -23,12 +20,6 @@ def png_from_srgb8(rgb_srgb8: NDArray[np.uint8]) -> bytes:
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
-def texture_from_srgb8(name: str, rgb_srgb8: NDArray[np.uint8]) -> Texture:
-    """A PNG texture of the picture."""
-    data = png_from_srgb8(rgb_srgb8)
-    return Texture(keys.sha256(data)[:16], name, "image/png", data)
 
 
 def planks(size_px: int = 128, n: int = 8) -> NDArray[np.uint8]:

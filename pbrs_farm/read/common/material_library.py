@@ -1,21 +1,32 @@
-"""The materials and textures of a house while it is read, each once; state: what came up so far."""
+"""The materials and textures of a house while it is read, each once; state: those met so far."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.textures import texture_from_bytes
 
 
-class Palette:
-    """Numbers materials and tries every picture once, in the order they first come up."""
+class LoadedTexture(NamedTuple):
+    """A texture that decodes; has_holes: its alpha falls below one half somewhere."""
+
+    texture: Texture
+    has_holes: bool
+
+
+class MaterialLibrary:
+    """Numbers materials and decodes every picture once, in the order they first come up.
+
+    The one way in for materials and textures of all formats.
+    """
 
     def __init__(self, notes: Notes) -> None:
         self._notes = notes
         self._materials: dict[Material, int] = {}
-        self._tried: dict[str, tuple[Texture, bool] | None] = {}
+        self._loaded: dict[str, LoadedTexture | None] = {}  # by key; None = cannot be used
 
     @property
     def materials(self) -> tuple[Material, ...]:
@@ -26,7 +37,7 @@ class Palette:
     def textures(self) -> dict[str, Texture]:
         """Every texture a material names, by id."""
         used = {m.texture_id for m in self._materials}
-        found = (t[0] for t in self._tried.values() if t is not None)
+        found = (loaded.texture for loaded in self._loaded.values() if loaded is not None)
         return {t.id: t for t in found if t.id in used}
 
     def index(self, material: Material) -> int:
@@ -35,22 +46,23 @@ class Palette:
 
     def texture(
         self, key: str, *, name: str, place: str, load: Callable[[], bytes | None]
-    ) -> tuple[Texture, bool] | None:
-        """(the texture, whether its alpha has holes) of the picture key; None, with a note, where
-        load gives nothing or what it gives cannot be decoded."""
-        if key not in self._tried:
-            self._tried[key] = self._read(key, name, place, load)
-        return self._tried[key]
+    ) -> LoadedTexture | None:
+        """The texture of the picture key; None, with a note, where load gives nothing or what it
+        gives cannot be decoded."""
+        if key not in self._loaded:
+            self._loaded[key] = self._load(key, name, place, load)
+        return self._loaded[key]
 
-    def _read(
+    def _load(
         self, key: str, name: str, place: str, load: Callable[[], bytes | None]
-    ) -> tuple[Texture, bool] | None:
+    ) -> LoadedTexture | None:
         data = load()
+        shown = key[:120]
         if data is None:
-            self._notes.add("missing-texture", place, f"{key} does not exist; the colour is kept")
+            self._notes.add("missing-texture", place, f"{shown} does not exist; the colour is kept")
             return None
         try:
-            return texture_from_bytes(data, name)
+            return LoadedTexture(*texture_from_bytes(data, name))
         except ValueError as error:
-            self._notes.add("unreadable-texture", place, f"{key}: {error}")
+            self._notes.add("unreadable-texture", place, f"{shown}: {error}")
             return None

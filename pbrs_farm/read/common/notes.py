@@ -2,24 +2,45 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Note
 
+HARMLESS: Final = frozenset(
+    {
+        "unmapped-class",  # the item is otherprop
+        "hidden-level",  # left out as the home's author chose (read.hidden_levels)
+        "degenerate-faces",  # faces without area, which nobody could see
+        "unknown-material",  # the surface has its format's default colour
+        "unused-opacity-map",  # the colour map's own alpha is used
+        "package-version",  # of the example homes, another than the tested one
+    }
+)
+"""Kinds of notes that strict reading accepts: nothing that can be seen is missing or guessed."""
+
 
 class Notes:
-    """The notes of one house, each once. With strict, the first one is raised as BadHouse."""
+    """The notes of one house, each once; every reader adds its notes here.
+
+    strict: a note whose kind is not HARMLESS is raised as BadHouse (recipe field read.strict).
+    """
 
     def __init__(self, file: str, *, strict: bool) -> None:
         self.file = file
         self._strict = strict
-        self._notes: dict[Note, None] = {}
+        self._notes: dict[Note, None] = {}  # in the order they first came up
 
     def add(self, kind: str, place: str, text: str) -> None:
-        """Remember a fault, or raise it when strict."""
-        if self._strict:
-            raise BadHouse(self.file, place, text, hint=f"{kind}; an error because of --strict")
+        """Remember a fault; raise it when reading is strict and its kind is not HARMLESS."""
+        if self._strict and kind not in HARMLESS:
+            raise BadHouse(self.file, place, f"{text} ({kind})", hint="read without --strict")
         self._notes[Note(kind, place, text)] = None
 
     def all(self) -> tuple[Note, ...]:
         """Every note in the order it first came up."""
         return tuple(self._notes)
+
+    def count(self, kind: str) -> int:
+        """How many notes are of a kind."""
+        return sum(note.kind == kind for note in self._notes)

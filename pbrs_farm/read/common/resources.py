@@ -111,12 +111,3 @@ class Layered:
             if data is not None:
                 return data
         return None
-
-
-def media_type(data: bytes) -> str:
-    """The picture's media type by its first bytes, or "" if it is none we can read."""
-    if data.startswith(b"\x89PNG\r\n\x1a\n"):
-        return "image/png"
-    if data.startswith(b"\xff\xd8\xff"):
-        return "image/jpeg"
-    return ""

@@ -32,7 +32,7 @@ from pbrs_farm.read.gltf.node_classes import (
     class_of_node,
     collection_of,
 )
-from pbrs_farm.read.gltf.pbr_materials import Looks
+from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.gltf.punctual_lights import assumed_light, emitted, punctual_light
 from pbrs_farm.read.mesh.obj import Mesh
 
@@ -51,14 +51,14 @@ class _Thing:
 
 
 def items_of_scene(
-    gltf: Gltf, mapping: Mapping, looks: Looks, notes: Notes, fields: ReadFields
+    gltf: Gltf, mapping: Mapping, materials: SceneMaterials, notes: Notes, fields: ReadFields
 ) -> Iterator[Item]:
     """The items of the scene, not yet on a level."""
     known: dict[Any, list[tuple[int | None, Mesh]]] = {}
     taken: set[str] = set()
     n_faces = n_items = 0
     for thing in _things(gltf, mapping):
-        item = _item(gltf, thing, looks, notes, known, fields)
+        item = _item(gltf, thing, materials, notes, known, fields)
         if item is None:
             continue
         place = f"nodes[{thing.root.index}] ({thing.name[:60]})"
@@ -117,7 +117,7 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
 def _item(
     gltf: Gltf,
     thing: _Thing,
-    looks: Looks,
+    materials: SceneMaterials,
     notes: Notes,
     known: dict[Any, list[tuple[int | None, Mesh]]],
     fields: ReadFields,
@@ -147,10 +147,10 @@ def _item(
         if meshes:
             boxes.append(oriented_box([m for _, m in meshes], part.world_from_node))
         for number, mesh in meshes:
-            material, emission = looks.material(number, clear=clear)
+            material, emission = materials.material(number, clear=clear)
             emits = emission is not None and not kind.is_structure
             emits = emits and (emission != 0 or kind is ItemKind.LAMP)
-            index = looks.as_bulb(material) if emits else looks.palette.index(material)
+            index = materials.as_bulb(material) if emits else materials.library.index(material)
             name = material.name or f"part {len(surfaces)}"
             surface = placed(mesh, part.world_from_node, name=name, material=index)
             if surface is None:

@@ -8,9 +8,9 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.frames import srgb_from_linear
-from pbrs_farm.core.house import Material, MaterialKind, Texture
+from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
-from pbrs_farm.read.common.material_library import Palette
+from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import Fetch, MissingFile, image_bytes, numbers
 
@@ -20,14 +20,14 @@ F0: Final = 0.04
 MAX_SHININESS: Final = 10_000.0
 
 
-class Looks:
-    """Resolves the materials of one scene into its palette."""
+class SceneMaterials:
+    """Resolves the materials of one scene into its material library."""
 
     def __init__(self, gltf: Gltf, fetch: Fetch, notes: Notes) -> None:
         self._gltf = gltf
         self._fetch = fetch
         self._notes = notes
-        self.palette = Palette(notes)
+        self.library = MaterialLibrary(notes)
 
     def material(self, number: int | None, *, clear: MaterialKind) -> tuple[Material, float | None]:
         """(materials[number], its emission in cd m-2 or None). None: glTF's default, white.
@@ -60,8 +60,8 @@ class Looks:
             specular=_encoded(specular),
             shininess=shininess,
             opacity=opacity,
-            texture_id=found[0].id if found else None,
-            alpha_cutout=bool(found and found[1] and mode != "OPAQUE"),
+            texture_id=found.texture.id if found else None,
+            alpha_cutout=bool(found and found.has_holes and mode != "OPAQUE"),
             is_default=found is None and "baseColorFactor" not in look,
         )
         return material, self._emission(plain, place)
@@ -98,7 +98,7 @@ class Looks:
         (value,) = numbers(self._gltf, [holder.get(key, default)], 1, f"{place}: {key}")
         return float(np.clip(value, 0, 1))
 
-    def _texture(self, info: Any, place: str) -> tuple[Texture, bool] | None:
+    def _texture(self, info: Any, place: str) -> LoadedTexture | None:
         if not isinstance(info, dict):
             return None
         texture = entry(self._gltf, "textures", info.get("index"))
@@ -110,7 +110,7 @@ class Looks:
         image = entry(self._gltf, "images", source)
         key = f"images[{source}]"
         name = str(image.get("name") or image.get("uri") or key)[:100]
-        return self.palette.texture(
+        return self.library.texture(
             key,
             name=key if name.startswith("data:") else name,
             place=place,
@@ -125,7 +125,7 @@ class Looks:
 
     def as_bulb(self, material: Material) -> int:
         """The index of the material as one that emits."""
-        return self.palette.index(replace(material, kind=MaterialKind.BULB))
+        return self.library.index(replace(material, kind=MaterialKind.BULB))
 
 
 def _object(holder: dict[str, Any], key: str) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.gltf.document import Fetch, gltf_document
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
 from pbrs_farm.read.gltf.node_items import items_of_scene
-from pbrs_farm.read.gltf.pbr_materials import Looks
+from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.gltf.scene_rooms import (
     level_of,
     levels_of,
@@ -77,8 +77,8 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
     if beside.mapping is not None:
         mapping = mapping_from_json(beside.mapping, f"{stem}.classes.json")
     gltf = gltf_document(data, name, beside.fetch)
-    looks = Looks(gltf, beside.fetch, notes)
-    items = list(items_of_scene(gltf, mapping, looks, notes, fields))
+    materials = SceneMaterials(gltf, beside.fetch, notes)
+    items = list(items_of_scene(gltf, mapping, materials, notes, fields))
     rooms = (
         rooms_from_floors(items)
         if beside.rooms is None
@@ -111,8 +111,8 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
         levels=levels,
         rooms=numbered,
         items=tuple(items),
-        materials=looks.palette.materials,
-        textures=looks.palette.textures,
+        materials=materials.library.materials,
+        textures=materials.library.textures,
         openings=openings(items),
         notes=notes.all(),
     )

@@ -36,15 +36,15 @@ def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:
             continue
         key = words[0].lower()
         if key == "newmtl":
-            _finish(fields, materials)
+            _append_material(fields, materials)
             fields = {"name": raw.split(None, 1)[1].strip() if len(words) > 1 else ""}
         elif fields is not None:
             _read_line(key, words[1:], raw, fields)
-    _finish(fields, materials)
+    _append_material(fields, materials)
     return tuple(materials)
 
 
-def _finish(fields: dict[str, object] | None, materials: list[ObjMaterial]) -> None:
+def _append_material(fields: dict[str, object] | None, materials: list[ObjMaterial]) -> None:
     if fields is not None:
         materials.append(ObjMaterial(**fields))  # type: ignore[arg-type]
 

@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Box, House, Item, ItemKind, Level, MaterialKind, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.material_library import Palette
+from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.gltf.document import gltf_document
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.node_items import items_of_scene
-from pbrs_farm.read.gltf.pbr_materials import Looks as GltfLooks
+from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.suncg.model_files import Models
-from pbrs_farm.read.suncg.model_materials import Looks as ObjLooks
+from pbrs_farm.read.suncg.model_materials import ModelMaterials
 
 _MAX_FILE_BYTES: Final = 1_000_000_000
 _MAX_UNPACKED_BYTES: Final = 500_000_000
@@ -45,9 +45,9 @@ def read_object(model: ObjectModel, fields: ReadFields) -> House:
     notes = Notes(file, strict=fields.strict)
     with _folder_of(model) as (folder, name):
         if name.lower().endswith(".obj"):
-            surfaces, palette = _obj(folder, name, notes, fields)
+            surfaces, library = _obj(folder, name, notes, fields)
         else:
-            surfaces, palette = _gltf(folder, name, notes, fields)
+            surfaces, library = _gltf(folder, name, notes, fields)
         sha256 = folder.sha256
     if not surfaces:
         raise BadHouse(file, "", "has no triangle")
@@ -74,8 +74,8 @@ def read_object(model: ObjectModel, fields: ReadFields) -> House:
         levels=(Level("0", "", 0.0, 1.0),),
         rooms=(),
         items=(item,),
-        materials=palette.materials,
-        textures=palette.textures,
+        materials=library.materials,
+        textures=library.textures,
         notes=notes.all(),
     )
 
@@ -102,21 +102,21 @@ def _folder_of(model: ObjectModel) -> Iterator[tuple[RootFolder, str]]:
 
 def _obj(
     folder: RootFolder, name: str, notes: Notes, fields: ReadFields
-) -> tuple[list[Surface], Palette]:
-    looks = ObjLooks(folder, notes)
+) -> tuple[list[Surface], MaterialLibrary]:
+    materials = ModelMaterials(folder, notes)
     model = Models(folder, notes, fields).model(name, _material_library(folder, name))
     if model is None:
         raise BadHouse(folder.root, name, "no such file")
     surfaces = []
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         mtl = model.mtl[slot] if slot >= 0 else None
-        material = looks.material(mtl, None, place=name, clear=MaterialKind.GLASS)
+        material = materials.material(mtl, None, place=name, clear=MaterialKind.GLASS)
         surface = placed(
-            mesh, np.eye(4), name=mesh.material, material=looks.palette.index(material)
+            mesh, np.eye(4), name=mesh.material, material=materials.library.index(material)
         )
         if surface is not None:
             surfaces.append(surface)
-    return surfaces, looks.palette
+    return surfaces, materials.library
 
 
 def _material_library(folder: RootFolder, name: str) -> str:
@@ -131,7 +131,7 @@ def _material_library(folder: RootFolder, name: str) -> str:
 
 def _gltf(
     folder: RootFolder, name: str, notes: Notes, fields: ReadFields
-) -> tuple[list[Surface], Palette]:
+) -> tuple[list[Surface], MaterialLibrary]:
     data = folder.read(name, max_bytes=_MAX_FILE_BYTES)
     if data is None:
         raise BadHouse(folder.root, name, "no such file")
@@ -141,9 +141,9 @@ def _gltf(
         return folder.read(inside, max_bytes=_MAX_FILE_BYTES)
 
     gltf = gltf_document(data, name, fetch)
-    looks = GltfLooks(gltf, fetch, notes)
-    items = items_of_scene(gltf, Mapping(), looks, notes, fields)
-    return [surface for item in items for surface in item.surfaces], looks.palette
+    materials = SceneMaterials(gltf, fetch, notes)
+    items = items_of_scene(gltf, Mapping(), materials, notes, fields)
+    return [surface for item in items for surface in item.surfaces], materials.library
 
 
 def _centred(surfaces: list[Surface], size_m: tuple[float, float, float] | None) -> list[Surface]:

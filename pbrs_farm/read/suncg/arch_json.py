@@ -25,7 +25,7 @@ from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.mesh.primitives import box_quads, quads_surface
 from pbrs_farm.read.suncg.house_json import JsonReader, Node, Override, world_from_house_of
-from pbrs_farm.read.suncg.model_materials import Looks
+from pbrs_farm.read.suncg.model_materials import ModelMaterials
 from pbrs_farm.read.suncg.wall_holes import box_between
 
 WALL_DEPTH_M: Final = 0.10
@@ -148,11 +148,11 @@ def _rings(reader: JsonReader, raw: dict[str, Any], place: str) -> tuple[NDArray
     return tuple(rings)
 
 
-def arch_items(arch: Arch, node: Node, room_id: str, looks: Looks) -> Iterator[Item]:
+def arch_items(arch: Arch, node: Node, room_id: str, materials: ModelMaterials) -> Iterator[Item]:
     """The structure items of a Room or Ground node."""
     for item_id, e, outline in _elements_of(arch, node, room_id):
         frame = _wall_frame(e, outline)
-        surfaces = _slab(arch, e, looks) if frame is None else _wall(arch, e, frame, looks)
+        surfaces = _slab(arch, e, materials) if frame is None else _wall(arch, e, frame, materials)
         if not surfaces:
             continue
         is_ground = e.kind == "Ground"
@@ -203,11 +203,11 @@ def _elements_of(
         yield f"{room_id}{suffix}", e, outline
 
 
-def _look(looks: Looks, e: Element, position: int) -> int:
+def _material(materials: ModelMaterials, e: Element, position: int) -> int:
     """The material at a position of the element, the first one where there are fewer."""
     override = e.overrides[min(position, len(e.overrides) - 1)] if e.overrides else None
-    look = looks.material(None, override, place=e.place, clear=MaterialKind.GLASS)
-    return looks.palette.index(look)
+    material = materials.material(None, override, place=e.place, clear=MaterialKind.GLASS)
+    return materials.library.index(material)
 
 
 def _in_world(arch: Arch, surface: Surface) -> Surface | None:
@@ -226,9 +226,9 @@ def _kept(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
     return tuple(s for s in (_in_world(arch, surface) for surface in surfaces) if s is not None)
 
 
-def _slab(arch: Arch, e: Element, looks: Looks) -> tuple[Surface, ...]:
+def _slab(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, ...]:
     """A closed slab from the element's height upwards."""
-    look = _look(looks, e, 0)
+    material = _material(materials, e, 0)
     low = float(e.points[0][:, 1].min())
     high = low + e.depth_m
     plans = [counter_clockwise(ring[:, [0, 2]]) for ring in e.points]
@@ -240,11 +240,11 @@ def _slab(arch: Arch, e: Element, looks: Looks) -> tuple[Surface, ...]:
                 [[b[0], low, b[1]], [a[0], low, a[1]], [a[0], high, a[1]], [b[0], high, b[1]]]
             )
     parts = [
-        horizontal("top", [plans], high, look, up=True),
-        horizontal("bottom", [plans], low, look, up=False),
+        horizontal("top", [plans], high, material, up=True),
+        horizontal("bottom", [plans], low, material, up=False),
     ]
     if e.depth_m > 0:
-        parts.append(quads_surface("side", np.array(sides), look))
+        parts.append(quads_surface("side", np.array(sides), material))
     return _kept(arch, parts)
 
 
@@ -274,18 +274,18 @@ def _wall_frame(e: Element, outline: NDArray[np.float64] | None) -> _Frame | Non
     return _Frame(start, np.stack([along, up, outward], 1), length)
 
 
-def _wall(arch: Arch, e: Element, frame: _Frame, looks: Looks) -> tuple[Surface, ...]:
+def _wall(arch: Arch, e: Element, frame: _Frame, materials: ModelMaterials) -> tuple[Surface, ...]:
     """The wall's closed box, without its holes."""
     half = np.array([frame.length, e.height_m, e.depth_m]) / 2
     right_handed = frame.axes * [np.linalg.det(frame.axes), 1, 1]
     quads = box_quads(frame.start + frame.axes @ half, half, right_handed)
-    edge = looks.material(_EDGE, None, place=e.place, clear=MaterialKind.GLASS)
+    edge = materials.material(_EDGE, None, place=e.place, clear=MaterialKind.GLASS)
     return _kept(
         arch,
         [
-            quads_surface("inside", quads[4:5], _look(looks, e, 0)),
-            quads_surface("outside", quads[5:], _look(looks, e, 1)),
-            quads_surface("edge", quads[:4], looks.palette.index(edge)),
+            quads_surface("inside", quads[4:5], _material(materials, e, 0)),
+            quads_surface("outside", quads[5:], _material(materials, e, 1)),
+            quads_surface("edge", quads[:4], materials.library.index(edge)),
         ],
     )
 

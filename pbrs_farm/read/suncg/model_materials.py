@@ -5,8 +5,8 @@ from __future__ import annotations
 import posixpath
 from typing import Final
 
-from pbrs_farm.core.house import Material, MaterialKind, Texture
-from pbrs_farm.read.common.material_library import Palette
+from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.mesh.mtl import ObjMaterial
@@ -19,17 +19,17 @@ DEFAULT_WALLS: Final = ("wallp_1_1", "wallp_1_2")
 """Textures of walls that nobody painted; the published pictures show them white (section 6)."""
 
 
-class Looks:
-    """Resolves the materials of one house's models and nodes into its palette."""
+class ModelMaterials:
+    """Resolves the materials of one house's models and nodes into its material library."""
 
     def __init__(self, folder: RootFolder, notes: Notes) -> None:
         self._folder = folder
-        self.palette = Palette(notes)
+        self.library = MaterialLibrary(notes)
 
     def material(
         self, mtl: ObjMaterial | None, override: Override | None, *, place: str, clear: MaterialKind
     ) -> Material:
-        """The look of a model's material as a node overrides it.
+        """A model's material as a node overrides it.
 
         mtl: the model's, its texture a name below the root; None = grey. clear: the kind of
         what lets light through (d < 1).
@@ -53,12 +53,12 @@ class Looks:
             specular=base.ks,
             shininess=base.ns,
             opacity=base.d,
-            texture_id=found[0].id if found else None,
-            alpha_cutout=bool(found and found[1]),
+            texture_id=found.texture.id if found else None,
+            alpha_cutout=bool(found and found.has_holes),
         )
 
     def is_default_wall(self, mtl: ObjMaterial | None) -> bool:
-        """Whether nobody chose this wall's look: no colour at all, or a default wall texture."""
+        """Whether nobody chose how this wall looks: no colour at all, or a default wall texture."""
         if mtl is None:
             return True
         stem = posixpath.splitext(posixpath.basename(mtl.map_kd))[0]
@@ -68,8 +68,8 @@ class Looks:
         png = f"texture/{name}.png"
         return png if self._folder.path(png) is not None else f"texture/{name}.jpg"
 
-    def _texture(self, name: str, place: str) -> tuple[Texture, bool] | None:
-        return self.palette.texture(
+    def _texture(self, name: str, place: str) -> LoadedTexture | None:
+        return self.library.texture(
             name,
             name=posixpath.basename(name),
             place=place,

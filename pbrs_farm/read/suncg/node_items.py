@@ -24,7 +24,7 @@ from pbrs_farm.read.suncg.house_json import Node
 from pbrs_farm.read.suncg.metadata import OTHERPROP, LampMaterials, ModelClass, Tables
 from pbrs_farm.read.suncg.model_files import Model, Models
 from pbrs_farm.read.suncg.model_lights import lit, placed_light, separate_bulbs
-from pbrs_farm.read.suncg.model_materials import Looks
+from pbrs_farm.read.suncg.model_materials import ModelMaterials
 
 _T = TypeVar("_T")
 
@@ -41,7 +41,7 @@ GAPS exchanges the materials of -x and +x (suncg section 1.5).
 
 
 @dataclass(frozen=True, slots=True)
-class Stock:
+class ReaderContext:
     """What nodes are built from. house: its id. world_from_house: (4, 4) scale and axes.
 
     arch: v2's structure; None where the rooms have meshes (v1).
@@ -50,33 +50,35 @@ class Stock:
     house: str
     folder: RootFolder
     tables: Tables
-    looks: Looks
+    materials: ModelMaterials
     models: Models
     notes: Notes
     world_from_house: NDArray[np.float64]
     arch: Arch | None = None
 
 
-def object_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
+def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item | None:
     """An Object node; None (with a note) where its model is missing or has no area."""
-    found = _object_model(stock, node)
+    found = _object_model(context, node)
     if found is None:
         text = f"object/{node.model_id} does not exist; left out"
-        stock.notes.add("missing-model", node.place, text)
+        context.notes.add("missing-model", node.place, text)
         return None
     variant, model = found
-    known = _row(stock.tables.classes, variant, node.model_id)
+    known = _row(context.tables.classes, variant, node.model_id)
     seen = known or ModelClass(node.model_id, OTHERPROP, ItemKind.OBJECT)
-    if known is None and stock.tables.classes:
+    if known is None and context.tables.classes:
         text = "is not in ModelCategoryMapping.csv; it is otherprop"
-        stock.notes.add("unmapped-class", f"object/{node.model_id}", text)
-    lamp = _row(stock.tables.lamps, variant, node.model_id) or LampMaterials((), ())
-    world_from_model = stock.world_from_house @ node.house_from_model
-    surfaces, bulbs = _surfaces(stock, node, model, seen.kind, lamp)
+        context.notes.add("unmapped-class", f"object/{node.model_id}", text)
+    lamp = _row(context.tables.lamps, variant, node.model_id) or LampMaterials((), ())
+    world_from_model = context.world_from_house @ node.house_from_model
+    surfaces, bulbs = _surfaces(context, node, model, seen.kind, lamp)
     if not surfaces:
-        stock.notes.add("empty-model", node.place, f"object/{node.model_id} has no area; left out")
+        context.notes.add(
+            "empty-model", node.place, f"object/{node.model_id} has no area; left out"
+        )
         return None
-    lights = _row(stock.tables.lights, variant, node.model_id) or ()
+    lights = _row(context.tables.lights, variant, node.model_id) or ()
     placed_lights: tuple[LightPart, ...] = ()
     if lights or bulbs:
         in_world = [placed_light(light, world_from_model) for light in lights]
@@ -92,7 +94,7 @@ def object_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
         room_id=room_id,
         lights=placed_lights,
         box=oriented_box(model.meshes, world_from_model),
-        tags=_tags(stock, node, seen, is_known=known is not None),
+        tags=_tags(context, node, seen, is_known=known is not None),
     )
 
 
@@ -104,26 +106,26 @@ def _row(table: dict[str, _T], variant: str, model_id: str) -> _T | None:
     return None
 
 
-def _object_model(stock: Stock, node: Node) -> tuple[str, Model] | None:
+def _object_model(context: ReaderContext, node: Node) -> tuple[str, Model] | None:
     """The mesh of the node's state: state k > 0 is `<id>_<k-1>.obj` where that exists."""
     base = f"object/{node.model_id}/"
     names = [node.model_id]
     if node.state > 0:
-        listed = stock.tables.variants.get(node.model_id, ())
+        listed = context.tables.variants.get(node.model_id, ())
         names = [*listed[node.state : node.state + 1], node.model_id]
         names.insert(0, f"{node.model_id}_{node.state - 1}")
     for name in names:
-        model = stock.models.model(f"{base}{name}.obj", f"{base}{node.model_id}.mtl")
+        model = context.models.model(f"{base}{name}.obj", f"{base}{node.model_id}.mtl")
         if model is not None:
             return name, model
     return None
 
 
 def _surfaces(
-    stock: Stock, node: Node, model: Model, kind: ItemKind, lamp: LampMaterials
+    context: ReaderContext, node: Node, model: Model, kind: ItemKind, lamp: LampMaterials
 ) -> tuple[tuple[Surface, ...], list[int]]:
     """(surfaces in the model's order, the indices of those that are bulbs)."""
-    world_from_model = stock.world_from_house @ node.house_from_model
+    world_from_model = context.world_from_house @ node.house_from_model
     is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     surfaces: list[Surface] = []
@@ -131,15 +133,15 @@ def _surfaces(
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         mtl = model.mtl[slot] if slot >= 0 else None
         override = node.overrides[slot] if 0 <= slot < len(node.overrides) else None
-        look = stock.looks.material(mtl, override, place=node.place, clear=clear)
+        material = context.materials.material(mtl, override, place=node.place, clear=clear)
         is_bulb = slot in lamp.bulbs
         if is_bulb:
-            look = replace(look, kind=MaterialKind.BULB)
-        elif slot in lamp.shades and look.kind is MaterialKind.OPAQUE:
-            look = replace(look, kind=MaterialKind.SHADE)
+            material = replace(material, kind=MaterialKind.BULB)
+        elif slot in lamp.shades and material.kind is MaterialKind.OPAQUE:
+            material = replace(material, kind=MaterialKind.SHADE)
         name = mesh.material or "grey"
         surface = placed(
-            mesh, world_from_model, name=name, material=stock.looks.palette.index(look)
+            mesh, world_from_model, name=name, material=context.materials.library.index(material)
         )
         if surface is None:
             continue
@@ -149,30 +151,34 @@ def _surfaces(
     return tuple(surfaces), bulbs
 
 
-def _tags(stock: Stock, node: Node, seen: ModelClass, *, is_known: bool) -> tuple[str, ...]:
+def _tags(
+    context: ReaderContext, node: Node, seen: ModelClass, *, is_known: bool
+) -> tuple[str, ...]:
     mirrored = bool(np.linalg.det(node.house_from_model[:3, :3]) < 0)
     if node.is_mirrored is not None and node.is_mirrored != mirrored:
         text = f"isMirrored says {node.is_mirrored}, the transform says {mirrored}; it is believed"
-        stock.notes.add("mirrored-differs", node.place, text)
+        context.notes.add("mirrored-differs", node.place, text)
     tags = ["mirrored"] if mirrored else []
     tags += [] if is_known else ["unmapped"]
     tags += ["structure"] if seen.structure else []
     return tuple(tags)
 
 
-def box_item(stock: Stock, node: Node, room_id: str | None) -> Item | None:
+def box_item(context: ReaderContext, node: Node, room_id: str | None) -> Item | None:
     """A Box node: six faces centred on its origin, uv in metres; None if it has no extent."""
     half = np.array(node.dimensions) / 2
-    world_from_box = stock.world_from_house @ node.house_from_model
+    world_from_box = context.world_from_house @ node.house_from_model
     surfaces = []
     for axis, sign, slot in BOX_FACES:
         override = node.overrides[slot] if slot < len(node.overrides) else None
-        look = stock.looks.material(None, override, place=node.place, clear=MaterialKind.GLASS)
-        index = stock.looks.palette.index(look)
+        material = context.materials.material(
+            None, override, place=node.place, clear=MaterialKind.GLASS
+        )
+        index = context.materials.library.index(material)
         if np.count_nonzero(np.delete(half, axis)) == 2:
             surfaces.append(_box_face(half, axis, sign, world_from_box, index))
     if not surfaces:
-        stock.notes.add("empty-model", node.place, "a Box without extent; left out")
+        context.notes.add("empty-model", node.place, "a Box without extent; left out")
         return None
     return Item(
         node.id, "box", ItemKind.OBJECT, node.level_id, tuple(surfaces), UNLABELLED, "Box", room_id,
@@ -201,13 +207,13 @@ def _box_face(
     )
 
 
-def ground_item(stock: Stock, node: Node) -> Item | None:
+def ground_item(context: ReaderContext, node: Node) -> Item | None:
     """A Ground node: `room/<house>/<modelId>f.obj`, already in house coordinates."""
     if "Floor" in node.hidden:
         return None
-    if stock.arch is not None:
-        return next(arch_items(stock.arch, node, node.id, stock.looks), None)
-    surfaces = room_surfaces(stock, node, "f", default_walls=False)
+    if context.arch is not None:
+        return next(arch_items(context.arch, node, node.id, context.materials), None)
+    surfaces = room_surfaces(context, node, "f", default_walls=False)
     if not surfaces:
         return None
     parts = tuple(s for _, s in surfaces)
@@ -215,56 +221,56 @@ def ground_item(stock: Stock, node: Node) -> Item | None:
 
 
 def room_surfaces(
-    stock: Stock, node: Node, part: str, *, default_walls: bool
+    context: ReaderContext, node: Node, part: str, *, default_walls: bool
 ) -> list[tuple[str, Surface]]:
     """(group name, surface) of a room's part f, c or w; empty (with a note) if it is missing."""
-    base = f"room/{stock.house}/{node.model_id}{part}"
-    model = stock.models.model(f"{base}.obj", f"{base}.mtl")
+    base = f"room/{context.house}/{node.model_id}{part}"
+    model = context.models.model(f"{base}.obj", f"{base}.mtl")
     if model is None:
-        stock.notes.add("missing-room-part", node.place, f"{base}.obj does not exist")
+        context.notes.add("missing-room-part", node.place, f"{base}.obj does not exist")
         return []
     found = []
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         mtl = model.mtl[slot] if slot >= 0 else None
-        look = _room_look(stock, node, mtl, default_walls=default_walls)
-        index = stock.looks.palette.index(look)
+        material = _room_material(context, node, mtl, default_walls=default_walls)
+        index = context.materials.library.index(material)
         name = f"{mesh.group} {mesh.material}".strip()
-        surface = placed(mesh, stock.world_from_house, name=name, material=index)
+        surface = placed(mesh, context.world_from_house, name=name, material=index)
         if surface is not None:
             found.append((mesh.group, surface))
     return found
 
 
-def _room_look(
-    stock: Stock, node: Node, mtl: ObjMaterial | None, *, default_walls: bool
+def _room_material(
+    context: ReaderContext, node: Node, mtl: ObjMaterial | None, *, default_walls: bool
 ) -> Material:
-    look = stock.looks.material(mtl, None, place=node.place, clear=MaterialKind.GLASS)
-    if default_walls and stock.looks.is_default_wall(mtl):
-        look = replace(look, is_default=True)
-    return look
+    material = context.materials.material(mtl, None, place=node.place, clear=MaterialKind.GLASS)
+    if default_walls and context.materials.is_default_wall(mtl):
+        material = replace(material, is_default=True)
+    return material
 
 
-def room_items(stock: Stock, node: Node, room_id: str) -> Iterator[Item]:
+def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Item]:
     """Floor, ceiling and one item per wall of a Room node; hidden parts are left out."""
-    if stock.arch is not None:
-        yield from arch_items(stock.arch, node, room_id, stock.looks)
+    if context.arch is not None:
+        yield from arch_items(context.arch, node, room_id, context.materials)
         return
     parts = (("Floor", "f", ItemKind.FLOOR), ("Ceiling", "c", ItemKind.CEILING))
     for hidden, part, kind in parts:
-        surfaces = [] if hidden in node.hidden else _part(stock, node, part)
+        surfaces = [] if hidden in node.hidden else _part(context, node, part)
         if surfaces:
             yield _structure(node, room_id, part, kind, tuple(s for _, s in surfaces))
     walls: dict[str, list[Surface]] = {}
     if "Walls" not in node.hidden:
-        for group, surface in room_surfaces(stock, node, "w", default_walls=True):
+        for group, surface in room_surfaces(context, node, "w", default_walls=True):
             found = _WALL_GROUP.fullmatch(group)
             walls.setdefault(found[1] if found else "", []).append(surface)
     for number, parts_of_wall in walls.items():
         yield _structure(node, room_id, f"w{number}", ItemKind.WALL, tuple(parts_of_wall))
 
 
-def _part(stock: Stock, node: Node, part: str) -> list[tuple[str, Surface]]:
-    return room_surfaces(stock, node, part, default_walls=False)
+def _part(context: ReaderContext, node: Node, part: str) -> list[tuple[str, Surface]]:
+    return room_surfaces(context, node, part, default_walls=False)
 
 
 def _structure(

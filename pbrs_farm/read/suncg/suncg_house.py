@@ -25,8 +25,14 @@ from pbrs_farm.read.suncg.arch_json import Arch, arch_from_json, arch_openings
 from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
 from pbrs_farm.read.suncg.metadata import read_tables
 from pbrs_farm.read.suncg.model_files import Models
-from pbrs_farm.read.suncg.model_materials import Looks
-from pbrs_farm.read.suncg.node_items import Stock, box_item, ground_item, object_item, room_items
+from pbrs_farm.read.suncg.model_materials import ModelMaterials
+from pbrs_farm.read.suncg.node_items import (
+    ReaderContext,
+    box_item,
+    ground_item,
+    object_item,
+    room_items,
+)
 from pbrs_farm.read.suncg.wall_holes import openings
 
 MAX_HOUSE_BYTES: Final = 64_000_000
@@ -74,17 +80,17 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     if record.id and record.id != house_id:
         notes.add("id-differs", "id", f"house.json calls itself {record.id[:64]!r}")
     arch = _arch(folder, house_id, record)
-    stock = Stock(
+    context = ReaderContext(
         house=house_id,
         folder=folder,
         tables=read_tables(folder, notes),
-        looks=Looks(folder, notes),
+        materials=ModelMaterials(folder, notes),
         models=Models(folder, notes, fields),
         notes=notes,
         world_from_house=record.world_from_house,
         arch=arch,
     )
-    rooms, items = _contents(stock, record, fields, file)
+    rooms, items = _contents(context, record, fields, file)
     if not rooms:
         raise BadHouse(root, file, "has no room with a floor or walls", hint="nothing to render")
     return House(
@@ -94,8 +100,8 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
         levels=_levels(record, rooms, items),
         rooms=tuple(rooms),
         items=tuple(items),
-        materials=stock.looks.palette.materials,
-        textures=stock.looks.palette.textures,
+        materials=context.materials.library.materials,
+        textures=context.materials.library.textures,
         openings=openings(items)
         if arch is None
         else arch_openings(arch, _room_nodes(record), items),
@@ -124,17 +130,17 @@ def _arch(folder: RootFolder, house_id: str, record: HouseRecord) -> Arch | None
 
 
 def _contents(
-    stock: Stock, record: HouseRecord, fields: ReadFields, file: str
+    context: ReaderContext, record: HouseRecord, fields: ReadFields, file: str
 ) -> tuple[list[Room], list[Item]]:
     rooms: list[Room] = []
     items: list[Item] = []
     ids: set[str] = set()
     n_faces = 0
     for number, (_, nodes) in enumerate(record.levels):
-        for node, item in _level_contents(stock, number, nodes, rooms):
+        for node, item in _level_contents(context, number, nodes, rooms):
             unique = _unique(item.id, ids)
             if unique != item.id:
-                stock.notes.add("duplicate-id", node.place, f"becomes {unique}")
+                context.notes.add("duplicate-id", node.place, f"becomes {unique}")
             _check_extent(item, node, fields, file)
             n_faces += item.n_faces
             if n_faces > fields.max_triangles or len(items) >= MAX_INSTANCES:
@@ -154,27 +160,27 @@ def _unique(name: str, taken: set[str]) -> str:
 
 
 def _level_contents(
-    stock: Stock, number: int, nodes: tuple[Node, ...], rooms: list[Room]
+    context: ReaderContext, number: int, nodes: tuple[Node, ...], rooms: list[Room]
 ) -> Iterator[tuple[Node, Item]]:
     """The items of a level in the order of its nodes; its rooms are added to rooms."""
-    room_of_index = _room_of_index(stock, number, nodes)
+    room_of_index = _room_of_index(context, number, nodes)
     taken = {room.id for room in rooms}
     for node in nodes:
         room_id = room_of_index.get(node.index)
         item: Item | None = None
         if node.kind == "Room":
-            parts = list(room_items(stock, node, _room_id(number, node)))
-            room = _room(stock, node, _room_id(number, node), parts)
+            parts = list(room_items(context, node, _room_id(number, node)))
+            room = _room(context, node, _room_id(number, node), parts)
             if room is not None and room.id not in taken:
                 rooms.append(room)
                 taken.add(room.id)
             yield from ((node, part) for part in parts if room is not None)
         elif node.kind == "Object":
-            item = object_item(stock, node, room_id)
+            item = object_item(context, node, room_id)
         elif node.kind == "Box":
-            item = box_item(stock, node, room_id)
+            item = box_item(context, node, room_id)
         else:
-            item = ground_item(stock, node)
+            item = ground_item(context, node)
         if item is not None:
             yield node, item
 
@@ -188,14 +194,16 @@ def _room_nodes(record: HouseRecord) -> Iterator[tuple[Node, str]]:
         yield from ((node, _room_id(number, node)) for node in nodes if node.kind == "Room")
 
 
-def _room_of_index(stock: Stock, number: int, nodes: tuple[Node, ...]) -> dict[int, str]:
+def _room_of_index(context: ReaderContext, number: int, nodes: tuple[Node, ...]) -> dict[int, str]:
     """The room of every node that one lists; the first wins, rooms are never inside rooms."""
     kinds = {node.index: node.kind for node in nodes}
     found: dict[int, str] = {}
     for node in nodes:
         for index in node.members if node.kind == "Room" else ():
             if kinds.get(index) == "Room":
-                stock.notes.add("room-in-room", node.place, f"lists node {index}, a room; ignored")
+                context.notes.add(
+                    "room-in-room", node.place, f"lists node {index}, a room; ignored"
+                )
             elif index in kinds:
                 found.setdefault(index, _room_id(number, node))
     return found
@@ -208,7 +216,7 @@ def _check_extent(item: Item, node: Node, fields: ReadFields, file: str) -> None
         raise BadHouse(file, node.place, text, hint="limit: read.max_extent_m")
 
 
-def _room(stock: Stock, node: Node, room_id: str, parts: list[Item]) -> Room | None:
+def _room(context: ReaderContext, node: Node, room_id: str, parts: list[Item]) -> Room | None:
     floor, ceiling, walls = (
         _surfaces(parts, kind) for kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.WALL)
     )
@@ -216,7 +224,7 @@ def _room(stock: Stock, node: Node, room_id: str, parts: list[Item]) -> Room | N
     if polygon is None:
         polygon = enclosed_polygon(walls)
     if polygon is None:
-        stock.notes.add("empty-room", node.place, "has neither floor nor walls; left out")
+        context.notes.add("empty-room", node.place, "has neither floor nor walls; left out")
         return None
     bounds = np.concatenate([p.bounds for p in parts])
     floor_y, ceiling_y = floor_height(floor), ceiling_height(ceiling)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.house import Opening, Surface
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import DoorFrame, PlanPiece, PlanWall
-from pbrs_farm.read.sweethome3d.material_collector import Looks
 from pbrs_farm.read.sweethome3d.parse_pieces import FULL_CUT_OUT
 from pbrs_farm.read.sweethome3d.placement import Frame
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
@@ -41,7 +41,7 @@ def opening_of(
     piece: PlanPiece,
     frame: Frame,
     walls: list[StandingWall],
-    looks: Looks,
+    materials: HomeMaterials,
     ids: tuple[str, str, str],
     material: int,
     *,
@@ -52,10 +52,10 @@ def opening_of(
     ids: of the opening, of its level, of its item.
     """
     assert piece.frame is not None
-    outlines = _outlines(piece, piece.frame, looks)
+    outlines = _outlines(piece, piece.frame, materials)
     span = _depth_span(frame, piece.frame, walls)
     if span is None:
-        looks.note("opening-without-wall", piece.place, "touches no wall: it cuts nothing")
+        materials.notes.add("opening-without-wall", piece.place, "touches no wall: it cuts nothing")
         return None
     flat = [_local_outline(p, piece.frame, frame) for p in outlines]
     cutter = _extruded(flat, span, frame, material)
@@ -68,11 +68,11 @@ def opening_of(
     return Opening(opening_id, level_id, item_id, is_window, cutter, quad, frame.axes[:, 2])
 
 
-def _outlines(piece: PlanPiece, door: DoorFrame, looks: Looks) -> tuple[Points2, ...]:
+def _outlines(piece: PlanPiece, door: DoorFrame, materials: HomeMaterials) -> tuple[Points2, ...]:
     try:
         outlines = polygons_from_path(door.cut_out)
     except ValueError as error:
-        looks.note("bad-cut-out", piece.place, f"cutOutShape: {error}; cut as a rectangle")
+        materials.notes.add("bad-cut-out", piece.place, f"cutOutShape: {error}; cut as a rectangle")
         outlines = ()
     kept = tuple(
         p for p in outlines if shapely.Polygon(p).is_valid and shapely.Polygon(p).area > 1e-6

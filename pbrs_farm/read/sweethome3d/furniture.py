@@ -9,11 +9,11 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import Item, MaterialKind, Opening, Surface
 from pbrs_farm.read.common.furniture_classes import kind_of, nyu40_of
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall, opening_of
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
 from pbrs_farm.read.sweethome3d.home_xml import PlanLevel, PlanPiece
 from pbrs_farm.read.sweethome3d.light_sources import light_parts
-from pbrs_farm.read.sweethome3d.material_collector import Looks
-from pbrs_farm.read.sweethome3d.piece_materials import finish_of
+from pbrs_farm.read.sweethome3d.piece_materials import piece_material
 from pbrs_farm.read.sweethome3d.piece_models import PANE, Model, Models
 from pbrs_farm.read.sweethome3d.placement import Frame, frame_of, local_from_model, placed_surface
 
@@ -27,7 +27,7 @@ def piece_item(
     piece: PlanPiece,
     level: PlanLevel,
     models: Models,
-    looks: Looks,
+    materials: HomeMaterials,
     ids: tuple[str, str],
     rooms: list[ReadRoom],
 ) -> tuple[Item, Frame] | None:
@@ -44,16 +44,16 @@ def piece_item(
     surfaces: list[Surface] = []
     emitting: list[int] = []
     for mesh, local in zip(model.meshes, points, strict=True):
-        finish = finish_of(piece, mesh, model, looks)
-        if finish is None:
+        painted = piece_material(piece, mesh, model, materials)
+        if painted is None:
             continue
-        if finish.emits:
+        if painted.emits:
             emitting.append(len(surfaces))
-        surfaces.append(placed_surface(mesh, finish, frame, local, matrix))
-    nyu40, tags = _label(piece, model, looks)
+        surfaces.append(placed_surface(mesh, painted, frame, local, matrix))
+    nyu40, tags = _label(piece, model, materials)
     lights = light_parts(piece, frame, tuple(emitting))
     if not surfaces and not lights:
-        looks.note("empty-model", piece.place, "nothing to see in it: left out")
+        materials.notes.add("empty-model", piece.place, "nothing to see in it: left out")
         return None
     item_id, level_id = ids
     kind = kind_of(
@@ -79,7 +79,7 @@ def piece_item(
     return item, frame
 
 
-def _label(piece: PlanPiece, model: Model, looks: Looks) -> tuple[int, tuple[str, ...]]:
+def _label(piece: PlanPiece, model: Model, materials: HomeMaterials) -> tuple[int, tuple[str, ...]]:
     tags = ["mirrored"] if piece.is_mirrored else []
     label = nyu40_of(piece.catalogue_id, piece.name, piece.group)
     if piece.frame is not None and label not in (DOOR, WINDOW):
@@ -90,7 +90,7 @@ def _label(piece: PlanPiece, model: Model, looks: Looks) -> tuple[int, tuple[str
     if label is None:
         label = OTHERPROP
         tags.append("unmapped")
-        looks.note(
+        materials.notes.add(
             "unmapped-class", piece.place, f"no class for {piece.catalogue_id or piece.name!r}"
         )
     return label, tuple(tags)
@@ -113,18 +113,18 @@ def piece_opening(
     item: Item,
     frame: Frame,
     walls: list[StandingWall],
-    looks: Looks,
+    materials: HomeMaterials,
     material: int,
 ) -> Opening | None:
     """What a door or window cuts out of walls."""
     if piece.frame is None:
         return None
-    kinds = {looks.materials[s.material].kind for s in item.surfaces}
+    kinds = {materials.library.materials[s.material].kind for s in item.surfaces}
     return opening_of(
         piece,
         frame,
         walls,
-        looks,
+        materials,
         (f"opening_{item.id}", item.level_id, item.id),
         material,
         is_window=item.nyu40 == WINDOW or MaterialKind.PANE in kinds,

@@ -11,32 +11,21 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Source
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.read.sweethome3d.cameras import stored_cameras
 from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
 from pbrs_farm.read.sweethome3d.container import open_container
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
 from pbrs_farm.read.sweethome3d.furniture import piece_item, piece_opening
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom, plane_items, read_rooms, room_nouns
 from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, level_of
-from pbrs_farm.read.sweethome3d.material_collector import Looks
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 from pbrs_farm.read.sweethome3d.parse import parse_plan
 from pbrs_farm.read.sweethome3d.piece_models import Models
 from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
 from pbrs_farm.read.sweethome3d.wall_solids import wall_items
-
-HARMLESS = frozenset(
-    {
-        "unmapped-class",
-        "hidden-level",
-        "degenerate-faces",
-        "unknown-material",
-        "unused-opacity-map",
-        "package-version",
-    }
-)
-"""Notes that are no faults: reading strictly passes over them."""
 
 ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
 
@@ -62,33 +51,29 @@ def read_home(
     plan = parse_plan(container.root, file, fields.max_extent_m)
     if fields.hidden_levels:
         plan = replace(plan, levels=tuple(replace(x, is_visible=True) for x in plan.levels))
-    looks = Looks(container.contents)
+    materials = HomeMaterials(container.contents, Notes(file, strict=fields.strict))
     if package_note:
-        looks.note("package-version", package, package_note)
+        materials.notes.add("package-version", package, package_note)
     visible = [level for level in plan.levels if level.is_visible]
     house_level = {level.id: str(k) for k, level in enumerate(visible)} | {"": "0"}
-    _note_hidden_levels(plan, looks)
+    _note_hidden_levels(plan, materials)
 
     outlines = outlines_of(plan.walls)
-    rooms = read_rooms(plan, looks, house_level)
+    rooms = read_rooms(plan, materials, house_level)
     if not rooms:
         raise BadHouse(
             file, "", "no rooms", hint="draw rooms (Plan > Create rooms) and save the home again"
         )
     ceilings = CeilingHeights(plan, outlines)
-    floor_cuts, ceiling_cuts = staircase_cuts(plan, looks, house_level)
-    structure = wall_items(plan, outlines, looks, house_level)
-    structure += plane_items(rooms, ceilings, looks, floor_cuts, ceiling_cuts)
-    pieces, openings = _furniture(plan, looks, outlines, rooms, house_level, file, fields)
+    floor_cuts, ceiling_cuts = staircase_cuts(plan, materials, house_level)
+    structure = wall_items(plan, outlines, materials, house_level)
+    structure += plane_items(rooms, ceilings, materials, floor_cuts, ceiling_cuts)
+    pieces, openings = _furniture(plan, materials, outlines, rooms, house_level, file, fields)
 
     items = (*structure, *pieces)
     if len(items) > MAX_INSTANCES:
         raise BadHouse(file, "", f"{len(items)} items, at most {MAX_INSTANCES} have instance ids")
     sha = keys.sha256(data)
-    faults = [n for n in looks.notes if n.kind not in HARMLESS]
-    if fields.strict and faults:
-        note = faults[0]
-        raise BadHouse(file, note.place, f"{note.text} ({note.kind})", hint="read without --strict")
     return House(
         id=keys.house_id(PurePath(file).stem, sha),
         name=PurePath(plan.name).stem if plan.name else PurePath(file).stem,
@@ -96,11 +81,11 @@ def read_home(
         levels=_levels(plan, house_level),
         rooms=room_nouns(rooms, ceilings),
         items=items,
-        materials=looks.materials,
-        textures=looks.textures,
+        materials=materials.library.materials,
+        textures=materials.library.textures,
         openings=openings,
         cameras=stored_cameras(plan),
-        notes=tuple(looks.notes),
+        notes=materials.notes.all(),
     )
 
 
@@ -114,10 +99,10 @@ def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:
     )
 
 
-def _note_hidden_levels(plan: Plan, looks: Looks) -> None:
+def _note_hidden_levels(plan: Plan, materials: HomeMaterials) -> None:
     for level in plan.levels:
         if not level.is_visible:
-            looks.note(
+            materials.notes.add(
                 "hidden-level",
                 f"level {level.id} '{level.name}'",
                 "not visible: left out (read.hidden_levels)",
@@ -126,16 +111,16 @@ def _note_hidden_levels(plan: Plan, looks: Looks) -> None:
 
 def _furniture(
     plan: Plan,
-    looks: Looks,
+    materials: HomeMaterials,
     outlines: dict[str, Outline],
     rooms: list[ReadRoom],
     house_level: dict[str, str],
     file: str,
     fields: ReadFields,
 ) -> tuple[list[Item], tuple[Opening, ...]]:
-    models = Models(looks, file, fields.max_model_triangles)
+    models = Models(materials, file, fields.max_model_triangles)
     walls = _standing_walls(plan, outlines)
-    cutter_material = looks.painted(Paint(), "cut", "")
+    cutter_material = materials.painted(Paint(), "cut", "")
     items: list[Item] = []
     openings: list[Opening] = []
     n_faces = n_pieces = 0
@@ -145,7 +130,7 @@ def _furniture(
             continue
         n_pieces += 1
         ids = (f"piece_{number}", house_level[level.id])
-        placed = piece_item(piece, level, models, looks, ids, rooms)
+        placed = piece_item(piece, level, models, materials, ids, rooms)
         if placed is None:
             continue
         item, frame = placed
@@ -156,10 +141,10 @@ def _furniture(
                 hint="raise read.max_triangles",
             )  # fmt: skip
         items.append(item)
-        opening = piece_opening(piece, item, frame, walls, looks, cutter_material)
+        opening = piece_opening(piece, item, frame, walls, materials, cutter_material)
         if opening is not None:
             openings.append(opening)
-    missing = sum(n.kind == "missing-model" for n in looks.notes)
+    missing = materials.notes.count("missing-model")
     if n_pieces and missing and not items:
         raise BadHouse(
             file, "", f"none of its {n_pieces} models can be found",

@@ -11,8 +11,8 @@ from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
 from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, PlanLevel, PlanRoom, level_of
-from pbrs_farm.read.sweethome3d.material_collector import Looks
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 MIN_AREA_M2 = 0.01
@@ -30,7 +30,7 @@ class ReadRoom:
     outline: shapely.Polygon
 
 
-def read_rooms(plan: Plan, looks: Looks, house_level: dict[str, str]) -> list[ReadRoom]:
+def read_rooms(plan: Plan, materials: HomeMaterials, house_level: dict[str, str]) -> list[ReadRoom]:
     """The rooms of visible levels, numbered within their level in the file's order."""
     rooms: list[ReadRoom] = []
     counts: dict[str, int] = {}
@@ -38,7 +38,7 @@ def read_rooms(plan: Plan, looks: Looks, house_level: dict[str, str]) -> list[Re
         level = level_of(plan, room.level)
         if not level.is_visible:
             continue
-        outline = _simple(room, looks)
+        outline = _simple(room, materials)
         if outline is None:
             continue
         level_id = house_level[level.id]
@@ -48,20 +48,20 @@ def read_rooms(plan: Plan, looks: Looks, house_level: dict[str, str]) -> list[Re
     return rooms
 
 
-def _simple(room: PlanRoom, looks: Looks) -> shapely.Polygon | None:
+def _simple(room: PlanRoom, materials: HomeMaterials) -> shapely.Polygon | None:
     if len(room.points) < 3:
-        looks.note("degenerate-room", room.place, "fewer than three points: left out")
+        materials.notes.add("degenerate-room", room.place, "fewer than three points: left out")
         return None
     polygon = shapely.Polygon(room.points)
     if not polygon.is_valid:
         parts = _polygons(shapely.make_valid(polygon))
-        looks.note(
+        materials.notes.add(
             "room-crosses-itself", room.place, "its outline crosses itself: largest part kept"
         )
         polygon = max(parts, key=lambda p: p.area) if parts else shapely.Polygon()
         polygon = shapely.Polygon(polygon.exterior) if not polygon.is_empty else polygon
     if polygon.area < MIN_AREA_M2:
-        looks.note("degenerate-room", room.place, f"{polygon.area:.4f} m2: left out")
+        materials.notes.add("degenerate-room", room.place, f"{polygon.area:.4f} m2: left out")
         return None
     return polygon
 
@@ -107,7 +107,7 @@ def _later(rooms: list[ReadRoom], k: int) -> list[ReadRoom]:
 def plane_items(
     rooms: list[ReadRoom],
     ceilings: CeilingHeights,
-    looks: Looks,
+    materials: HomeMaterials,
     floor_cuts: dict[str, shapely.Geometry],
     ceiling_cuts: dict[str, shapely.Geometry],
 ) -> list[Item]:
@@ -119,19 +119,19 @@ def plane_items(
             taken: list[shapely.Geometry] = [r.outline for r in later if r.plan.has_floor]
             taken.append(floor_cuts.get(room.level_id, shapely.Polygon()))
             parts = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
-            items += _floor(room, parts, looks)
+            items += _floor(room, parts, materials)
         if room.plan.has_ceiling:
             taken = [r.outline for r in later if r.plan.has_ceiling]
             taken.append(ceiling_cuts.get(room.level_id, shapely.Polygon()))
             parts = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
-            items += _ceiling(room, parts, ceilings, looks)
+            items += _ceiling(room, parts, ceilings, materials)
     return items
 
 
-def _floor(room: ReadRoom, parts: list[shapely.Polygon], looks: Looks) -> list[Item]:
+def _floor(room: ReadRoom, parts: list[shapely.Polygon], materials: HomeMaterials) -> list[Item]:
     if not parts:
         return []
-    material = looks.painted(room.plan.floor, "floor", f"{room.plan.place} floor")
+    material = materials.painted(room.plan.floor, "floor", f"{room.plan.place} floor")
     rings = [_rings(p) for p in parts]
     surface = horizontal("floor", rings, room.level.elevation, material, up=True)
     surface = _textured(surface, room.plan.floor)
@@ -139,11 +139,11 @@ def _floor(room: ReadRoom, parts: list[shapely.Polygon], looks: Looks) -> list[I
 
 
 def _ceiling(
-    room: ReadRoom, parts: list[shapely.Polygon], ceilings: CeilingHeights, looks: Looks
+    room: ReadRoom, parts: list[shapely.Polygon], ceilings: CeilingHeights, materials: HomeMaterials
 ) -> list[Item]:
     if not parts:
         return []
-    material = looks.painted(room.plan.ceiling, "ceiling", f"{room.plan.place} ceiling")
+    material = materials.painted(room.plan.ceiling, "ceiling", f"{room.plan.place} ceiling")
     surface = ceilings.surface(
         room.level, [_rings(p) for p in parts], material, is_flat=room.plan.is_ceiling_flat
     )

@@ -31,7 +31,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """A surface's finish. hidden: drawn not at all. shininess: 0..1, None = as the model has it."""
+    """A surface's paint. hidden: drawn not at all. shininess: 0..1, None = as the model has it."""
 
     colour: Rgb | None = None
     picture: Picture | None = None
@@ -73,7 +73,7 @@ class Baseboard:
 
 @dataclass(frozen=True, slots=True)
 class PlanWall:
-    """A wall's centre line and finish. height_end: at its end, None = as at its start."""
+    """A wall's centre line and paint. height_end: at its end, None = as at its start."""
 
     id: str
     level: str

@@ -9,19 +9,19 @@ from pbrs_farm.read.sweethome3d.home_xml import Baseboard, Paint, Picture
 
 
 def wall_paint(a: Attributes, side: str) -> Paint:
-    """The finish of a wall's "left" or "right" side, or of its "top"."""
+    """The paint of a wall's "left" or "right" side, or of its "top"."""
     if side == "top":
         return _paint(a, "topColor", None, None)
     return _paint(a, f"{side}SideColor", f"{side}SideTexture", f"{side}SideShininess")
 
 
 def room_paint(a: Attributes, part: str) -> Paint:
-    """The finish of a room's "floor" or "ceiling"."""
+    """The paint of a room's "floor" or "ceiling"."""
     return _paint(a, f"{part}Color", f"{part}Texture", f"{part}Shininess")
 
 
 def piece_paint(a: Attributes) -> Paint:
-    """The finish that overrides a whole piece, or one of its materials."""
+    """The paint that overrides a whole piece, or one of its materials."""
     paint = _paint(a, "color", "", "shininess")
     alpha = a.argb("color")
     is_hidden = a.element.tag == "material" and alpha is not None and alpha[0] == 0

@@ -1,14 +1,15 @@
-"""What a mesh of a piece looks like: its model's material under the home's overrides; no effects."""
+"""The material of a piece's mesh: its model's, under the home's overrides; no effects."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.read.common.material_library import LoadedTexture
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.sweethome3d.home_materials import SHININESS_SCALE, HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import Paint, Picture, PlanPiece
-from pbrs_farm.read.sweethome3d.material_collector import SHININESS_SCALE, Looks
 from pbrs_farm.read.sweethome3d.piece_models import LIGHT, MIRROR, PANE, Model, content_name
 
 PANE_OPACITY = 0.2
@@ -17,17 +18,19 @@ CLEAR = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Finish:
-    """Material index and, where the home lays a texture of its own, how it lies."""
+class PieceMaterial:
+    """The material of one mesh of a piece."""
 
-    name: str
-    material: int
-    picture: Picture | None
+    name: str  # the surface's: role and material
+    material: int  # index in the library
+    picture: Picture | None  # how the home lays a texture of its own; None: by the model's uv
     emits: bool
 
 
-def finish_of(piece: PlanPiece, mesh: Mesh, model: Model, looks: Looks) -> Finish | None:
-    """The finish of one mesh, or None if the home makes it invisible."""
+def piece_material(
+    piece: PlanPiece, mesh: Mesh, model: Model, materials: HomeMaterials
+) -> PieceMaterial | None:
+    """The material of one mesh, or None if the home makes it invisible."""
     base = model.materials.get(mesh.material) or ObjMaterial(mesh.material or "default")
     role = mesh.group
     paint = dict(piece.materials).get(mesh.material, Paint())
@@ -40,13 +43,13 @@ def finish_of(piece: PlanPiece, mesh: Mesh, model: Model, looks: Looks) -> Finis
             piece.paint.shininess if paint.shininess is None else paint.shininess,
         )
     emits = role == LIGHT or mesh.material in piece.light_materials
-    texture, has_alpha, picture = _texture(piece, paint, base, mesh, model, looks)
-    diffuse = (1.0, 1.0, 1.0) if texture else paint.colour or base.kd
+    loaded, picture = _texture(piece, paint, base, mesh, model, materials)
+    diffuse = (1.0, 1.0, 1.0) if loaded else paint.colour or base.kd
     specular, shininess = base.ks, base.ns
     if paint.shininess is not None:
         shine = min(max(paint.shininess, 0.0), 1.0)
         specular, shininess = (shine, shine, shine), shine * SHININESS_SCALE
-    kind = _kind(piece, role, base, emits=emits, is_textured=texture is not None)
+    kind = _kind(piece, role, base, emits=emits, is_textured=loaded is not None)
     opacity = base.d
     if kind in (MaterialKind.PANE, MaterialKind.GLASS) and opacity > CLEAR:
         opacity = PANE_OPACITY
@@ -57,11 +60,11 @@ def finish_of(piece: PlanPiece, mesh: Mesh, model: Model, looks: Looks) -> Finis
         specular=specular,
         shininess=shininess,
         opacity=1.0 if kind in (MaterialKind.OPAQUE, MaterialKind.BULB) else opacity,
-        texture_id=texture,
-        alpha_cutout=has_alpha,
+        texture_id=loaded.texture.id if loaded else None,
+        alpha_cutout=bool(loaded and loaded.has_holes),
     )
     name = f"{role}:{material.name}" if role else material.name
-    return Finish(name, looks.index(material), picture, emits)
+    return PieceMaterial(name, materials.library.index(material), picture, emits)
 
 
 def _kind(
@@ -78,18 +81,22 @@ def _kind(
 
 
 def _texture(
-    piece: PlanPiece, paint: Paint, base: ObjMaterial, mesh: Mesh, model: Model, looks: Looks
-) -> tuple[str | None, bool, Picture | None]:
-    # Texture id, whether its alpha cuts holes, and how the home lays it (None: by the model's uv).
+    piece: PlanPiece,
+    paint: Paint,
+    base: ObjMaterial,
+    mesh: Mesh,
+    model: Model,
+    materials: HomeMaterials,
+) -> tuple[LoadedTexture | None, Picture | None]:
+    """The mesh's texture, and how the home lays it (None: by the model's uv)."""
     if paint.picture is not None:
-        texture = looks.texture_id(paint.picture.image, piece.place)
-        return texture, looks.has_alpha(texture), paint.picture if texture else None
+        loaded = materials.texture(paint.picture.image, piece.place)
+        return loaded, paint.picture if loaded else None
     if paint.colour is not None or not base.map_kd or mesh.uvs is None:
-        return None, False, None
+        return None, None
     place = f"material {base.name}"
-    texture = looks.texture_id(content_name(model.folder, base.map_kd), place)
+    loaded = materials.texture(content_name(model.folder, base.map_kd), place)
     if base.map_d and base.map_d != base.map_kd:
-        looks.note(
-            "unused-opacity-map", place, f"{base.map_d[:80]!r} is not the colour map's alpha"
-        )
-    return texture, looks.has_alpha(texture), None
+        text = f"{base.map_d[:80]!r} is not the colour map's alpha"
+        materials.notes.add("unused-opacity-map", place, text)
+    return loaded, None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, ObjModel, parse_obj
-from pbrs_farm.read.sweethome3d.material_collector import Looks
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.moving_parts import Transformations, moved
 
 PANE, MIRROR, LIGHT = "pane", "mirror", "light"
@@ -28,7 +28,6 @@ class Model:
 
     meshes: tuple[Mesh, ...]
     materials: dict[str, ObjMaterial]
-    material_order: tuple[str, ...]
     folder: str
     low: NDArray[np.float64]
     high: NDArray[np.float64]
@@ -46,8 +45,8 @@ def role_of(group: str) -> str:
 class Models:
     """Parsed models by content name; notes what cannot be read."""
 
-    def __init__(self, looks: Looks, file: str, max_triangles: int) -> None:
-        self._looks = looks
+    def __init__(self, materials: HomeMaterials, file: str, max_triangles: int) -> None:
+        self._materials = materials
         self._file = file
         self._max_triangles = max_triangles
         self._parsed: dict[str, ObjModel | None] = {}
@@ -68,13 +67,15 @@ class Models:
         return self._models[key]
 
     def _load(self, name: str, place: str) -> ObjModel | None:
-        data = self._looks.contents.read(name)
+        data = self._materials.contents.read(name)
         if data is None:
-            self._looks.note("missing-model", place, f"no content {name[:120]!r}: left out")
+            self._materials.notes.add(
+                "missing-model", place, f"no content {name[:120]!r}: left out"
+            )
             return None
         kind = _kind(data)
         if kind != "obj":
-            self._looks.note(
+            self._materials.notes.add(
                 "unsupported-model", place, f"{name[:120]!r} is {kind}, only OBJ is read: left out"
             )
             return None
@@ -83,10 +84,10 @@ class Models:
         except BadHouse as error:
             if "at most" in error.message:
                 raise BadHouse(self._file, place, error.message) from None
-            self._looks.note("unreadable-model", place, f"{error.message}: left out")
+            self._materials.notes.add("unreadable-model", place, f"{error.message}: left out")
             return None
         if parsed.n_dropped:
-            self._looks.note(
+            self._materials.notes.add(
                 "degenerate-faces",
                 f"model {name}",
                 f"{parsed.n_dropped} faces without area dropped",
@@ -96,28 +97,28 @@ class Models:
     def _model(self, parsed: ObjModel, name: str) -> Model:
         folder = posixpath.dirname(name)
         materials = dict(builtin_materials())
-        order: list[str] = []
         for library in parsed.mtllibs:
             data = self._content(folder, library)
             if data is None:
-                self._looks.note("missing-mtl", f"model {name}", f"no {library[:80]!r}")
+                self._materials.notes.add(
+                    "missing-materials", f"model {name}", f"no {library[:80]!r}"
+                )
                 continue
             for material in parse_mtl(data):
                 materials[material.name] = material
-                order.append(material.name)
         used = {m.material for m in parsed.meshes if m.material}
         unknown = sorted(used - set(materials))
         if unknown:
-            self._looks.note(
+            self._materials.notes.add(
                 "unknown-material", f"model {name}", f"no material {', '.join(unknown)[:120]}"
             )
         meshes = _merged(parsed.meshes)
         corners = [m.positions for m in meshes] or [np.zeros((1, 3))]
         points = np.concatenate(corners)
-        return Model(meshes, materials, tuple(order), folder, points.min(0), points.max(0))
+        return Model(meshes, materials, folder, points.min(0), points.max(0))
 
     def _content(self, folder: str, name: str) -> bytes | None:
-        return self._looks.contents.read(content_name(folder, name))
+        return self._materials.contents.read(content_name(folder, name))
 
 
 def content_name(folder: str, name: str) -> str:

@@ -11,7 +11,7 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Surface
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.home_xml import Picture, PlanLevel, PlanPiece
-from pbrs_farm.read.sweethome3d.piece_materials import Finish
+from pbrs_farm.read.sweethome3d.piece_materials import PieceMaterial
 from pbrs_farm.read.sweethome3d.piece_models import Model
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
@@ -82,7 +82,9 @@ def local_from_model(piece: PlanPiece, model: Model) -> F64:
     return matrix
 
 
-def placed_surface(mesh: Mesh, finish: Finish, frame: Frame, local: F64, matrix: F64) -> Surface:
+def placed_surface(
+    mesh: Mesh, painted: PieceMaterial, frame: Frame, local: F64, matrix: F64
+) -> Surface:
     """One mesh of a piece in the world. local: (V, 3) its points in the piece's frame."""
     linear = frame.axes @ matrix[:3, :3]
     inverse = _inverse_transpose(linear)
@@ -93,13 +95,13 @@ def placed_surface(mesh: Mesh, finish: Finish, frame: Frame, local: F64, matrix:
     if np.linalg.det(matrix[:3, :3]) < 0:
         faces = faces[:, [0, 2, 1]]
     uvs = mesh.uvs
-    if finish.picture is not None:
-        uvs = _projected(local, normals @ frame.axes, frame.half, finish.picture)
+    if painted.picture is not None:
+        uvs = _projected(local, normals @ frame.axes, frame.half, painted.picture)
     return Surface(
-        name=finish.name,
+        name=painted.name,
         positions=np.ascontiguousarray(frame.world(local), np.float32),
         faces=np.ascontiguousarray(faces, np.int32),
-        material=finish.material,
+        material=painted.material,
         uvs=None if uvs is None else np.ascontiguousarray(uvs, np.float32),
         normals=np.ascontiguousarray(normals, np.float32),
     )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import Plan, PlanPiece, level_of
-from pbrs_farm.read.sweethome3d.material_collector import Looks
 from pbrs_farm.read.sweethome3d.placement import Frame, frame_of
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
@@ -15,7 +15,9 @@ TOLERANCE_M = 0.01
 Cuts = dict[str, shapely.Geometry]
 
 
-def staircase_cuts(plan: Plan, looks: Looks, house_level: dict[str, str]) -> tuple[Cuts, Cuts]:
+def staircase_cuts(
+    plan: Plan, materials: HomeMaterials, house_level: dict[str, str]
+) -> tuple[Cuts, Cuts]:
     """By level id, what staircases take of its floors and of its ceilings (plan polygons).
 
     A floor is cut by a staircase that starts below it and reaches it, the ceiling under such a
@@ -30,7 +32,7 @@ def staircase_cuts(plan: Plan, looks: Looks, house_level: dict[str, str]) -> tup
         own = level_of(plan, piece.level)
         if not own.is_visible:
             continue
-        hole = _hole(piece, frame_of(piece, own), looks)
+        hole = _hole(piece, frame_of(piece, own), materials)
         if hole is None:
             continue
         foot = own.elevation + piece.elevation
@@ -51,12 +53,14 @@ def _joined(cuts: dict[str, list[shapely.Geometry]]) -> Cuts:
     return {level: shapely.union_all(holes) for level, holes in cuts.items()}
 
 
-def _hole(piece: PlanPiece, frame: Frame, looks: Looks) -> shapely.Geometry | None:
+def _hole(piece: PlanPiece, frame: Frame, materials: HomeMaterials) -> shapely.Geometry | None:
     # The cut-out shape is drawn in the unit square, x to the right, y to the front.
     try:
         outlines = polygons_from_path(piece.staircase_cut_out)
     except ValueError as error:
-        looks.note("bad-cut-out", piece.place, f"staircaseCutOutShape: {error}; nothing is cut")
+        materials.notes.add(
+            "bad-cut-out", piece.place, f"staircaseCutOutShape: {error}; nothing is cut"
+        )
         return None
     shapes = []
     for outline in outlines:

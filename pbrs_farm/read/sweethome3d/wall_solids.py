@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.read.mesh.primitives import wall_prism
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import (
     Baseboard,
     Paint,
@@ -18,7 +19,6 @@ from pbrs_farm.read.sweethome3d.home_xml import (
     PlanWall,
     level_of,
 )
-from pbrs_farm.read.sweethome3d.material_collector import Looks
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 
 F64 = NDArray[np.float64]
@@ -27,7 +27,7 @@ SUNK_M = 0.002
 
 
 def wall_items(
-    plan: Plan, outlines: dict[str, Outline], looks: Looks, house_level: dict[str, str]
+    plan: Plan, outlines: dict[str, Outline], materials: HomeMaterials, house_level: dict[str, str]
 ) -> list[Item]:
     """An item for each wall of a visible level, each followed by its baseboards."""
     items: list[Item] = []
@@ -39,15 +39,17 @@ def wall_items(
         outline = outlines.get(wall.id)
         place = f"wall {wall.id}"
         if outline is None:
-            looks.note("degenerate-wall", place, "no length or no thickness: left out")
+            materials.notes.add("degenerate-wall", place, "no length or no thickness: left out")
             continue
         if max(wall.height, wall.height_end or 0.0) <= 1e-3:
-            looks.note("degenerate-wall", place, "no height: left out")
+            materials.notes.add("degenerate-wall", place, "no height: left out")
             continue
         level_id = house_level[level.id]
-        items.append(_wall_item(wall, outline, level, looks, level_id))
+        items.append(_wall_item(wall, outline, level, materials, level_id))
         for board in wall.baseboards:
-            item = _baseboard_item(wall, board, (outline, widened[wall.id]), level, looks, level_id)
+            item = _baseboard_item(
+                wall, board, (outline, widened[wall.id]), level, materials, level_id
+            )
             if item is not None:
                 items.append(item)
     return items
@@ -68,21 +70,21 @@ def top_heights(wall: PlanWall, points: F64, along: F64) -> F64:
 
 
 def _wall_item(
-    wall: PlanWall, outline: Outline, level: PlanLevel, looks: Looks, level_id: str
+    wall: PlanWall, outline: Outline, level: PlanLevel, materials: HomeMaterials, level_id: str
 ) -> Item:
     place = f"wall {wall.id}"
-    materials = (
-        looks.painted(wall.left, "wall", f"{place} left"),
-        looks.painted(wall.right, "wall", f"{place} right"),
-        looks.painted(wall.right if wall.left.is_empty else wall.left, "wall", place),
+    sides = (
+        materials.painted(wall.left, "wall", f"{place} left"),
+        materials.painted(wall.right, "wall", f"{place} right"),
+        materials.painted(wall.right if wall.left.is_empty else wall.left, "wall", place),
     )
     foot = level.elevation - level.reach_down
     left_top = level.elevation + top_heights(wall, outline.left, outline.along)
     right_top = level.elevation + top_heights(wall, outline.right, outline.along)
     surfaces = wall_prism(
         outline.left, outline.right, foot,
-        np.maximum(left_top, foot + 1e-3), np.maximum(right_top, foot + 1e-3), materials,
-        top=looks.painted(wall.top, "wall top", f"{place} top"),
+        np.maximum(left_top, foot + 1e-3), np.maximum(right_top, foot + 1e-3), sides,
+        top=materials.painted(wall.top, "wall top", f"{place} top"),
     )  # fmt: skip
     painted = tuple(
         _textured(s, paint, level.elevation)
@@ -105,7 +107,7 @@ def _baseboard_item(
     board: Baseboard,
     outlines: tuple[Outline, Outline],
     level: PlanLevel,
-    looks: Looks,
+    materials: HomeMaterials,
     level_id: str,
 ) -> Item | None:
     side = "left" if board.is_left else "right"
@@ -117,7 +119,7 @@ def _baseboard_item(
     paint = board.paint
     if paint.is_empty:
         paint = wall.left if board.is_left else wall.right
-    material = looks.painted(paint, "baseboard", f"wall {wall.id} {side} baseboard")
+    material = materials.painted(paint, "baseboard", f"wall {wall.id} {side} baseboard")
     top = np.full(len(line), level.elevation + height)
     near, far = (front, back) if board.is_left else (back, front)
     surfaces = wall_prism(near, far, level.elevation, top, top, (material,) * 3)

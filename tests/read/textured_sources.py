@@ -1,0 +1,85 @@
+"""One textured source of each format, written as files for the tests all readers share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.read.objects.model_folders import find_models
+from pbrs_farm.read.source import SourceRef, object_source, resolve
+from tests.read.gltf.gltf_scenes import two_rooms
+from tests.read.suncg import suncg_root
+from tests.read.sweethome3d.sh3d_source import BOX_OBJ, home_xml, piece, sh3d
+
+QUAD_OBJ: Final = """mtllib thing.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+usemtl paint
+f 1/1 2/2 3/3 4/4
+"""
+MTL: Final = "newmtl paint\nKd 1 1 1\nmap_Kd picture.any\n"
+
+
+def sweethome3d(folder: Path, picture: bytes | None) -> SourceRef:
+    """A home with one chair that has the picture."""
+    texture = "<texture name='T' width='50' height='50' image='t'/>"
+    contents = {"1": BOX_OBJ} | ({} if picture is None else {"t": picture})
+    path = folder / "home.sh3d"
+    path.write_bytes(sh3d(home_xml(piece("name='Chair'", texture)), contents))
+    return resolve(str(path))
+
+
+def suncg(folder: Path, picture: bytes | None) -> SourceRef:
+    """A SUNCG root of one room with one chair that has the picture."""
+    house_id = suncg_root.write_root(folder)
+    nodes = [
+        suncg_root.room("0_0", "fr_0rm_0", [1], ["Bedroom"]),
+        suncg_root.thing("0_1", "chair", suncg_root.at(1, 0.05, 1)),
+    ]
+    house = suncg_root.house_json() | {"levels": [{"id": "0", "nodes": nodes}]}
+    suncg_root.write(folder / f"house/{house_id}/house.json", json.dumps(house))
+    place = folder / "texture/wood.jpg"
+    place.unlink() if picture is None else place.write_bytes(picture)
+    return resolve(str(folder / "house" / house_id))
+
+
+def gltf(folder: Path, picture: bytes | None) -> SourceRef:
+    """A .glb of two rooms with a sofa whose picture lies beside the file."""
+    scene = two_rooms()
+    colour = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "alphaMode": "MASK"}
+    scene.materials.append(colour)
+    scene.more |= {"textures": [{"source": 0}], "images": [{"uri": "picture.any"}]}
+    scene.node("Sofa", mesh=scene.box([1, 0, 1], [2, 1, 2], 0))
+    return _with_picture(folder, "scene.glb", scene.glb(), picture)
+
+
+def single_object(folder: Path, picture: bytes | None) -> SourceRef:
+    """An OBJ model without context and its MTL, which names the picture."""
+    (folder / "thing.mtl").write_text(MTL)
+    return _with_picture(folder, "thing.obj", QUAD_OBJ.encode(), picture)
+
+
+def _with_picture(folder: Path, name: str, data: bytes, picture: bytes | None) -> SourceRef:
+    (folder / name).write_bytes(data)
+    if picture is not None:
+        (folder / "picture.any").write_bytes(picture)
+    if name.endswith(".obj"):
+        return object_source(find_models([folder])[0])
+    return resolve(str(folder / name))
+
+
+FORMATS: Final[dict[str, Callable[[Path, bytes | None], SourceRef]]] = {
+    "sweethome3d": sweethome3d,
+    "suncg": suncg,
+    "gltf": gltf,
+    "object": single_object,
+}
+"""Format -> writes a source with that picture (None: the file is missing) and names it."""
