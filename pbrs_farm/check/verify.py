@@ -23,6 +23,7 @@ from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
 from pbrs_farm.check.stored_mesh import BadGlb, Triangles, triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView, views_of_house
 from pbrs_farm.check.view_checks import check_consistency, check_pictures, read_labels
+from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 
 SAMPLE = 2000
@@ -47,7 +48,7 @@ def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False)
     one. Checks on files, tables and whole pictures are always complete. Raises BadInput when
     folder is no output root.
     """
-    found = [p for name in ("houses", "objects") for p in (folder / name).glob("*") if p.is_dir()]
+    found = [p for name in keys.FOLDERS for p in (folder / name).glob("*") if p.is_dir()]
     houses = sorted(found, key=lambda p: p.name)
     if not houses:
         raise BadInput(folder, "houses/", "no houses here", hint="give the folder of --out")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import Verb, dump, say
+from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, Recipe, SelectionFields, recipe_from_name
 
@@ -104,7 +105,7 @@ def _reference(args: argparse.Namespace) -> int:
 
 def _select(args: argparse.Namespace) -> int:
     from pbrs_farm.curate.reference_build import read_reference
-    from pbrs_farm.curate.selection_run import run_key, select
+    from pbrs_farm.curate.selection_run import select
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 
@@ -122,14 +123,14 @@ def _select(args: argparse.Namespace) -> int:
         from pbrs_farm.curate.selection_report import selection_report
 
         html = selection_report(store, reference, fields, run=args.run)
-        store.put(run_key(args.run, "html"), html.encode())
+        store.put(keys.selection_key(args.run, "html"), html.encode())
     if args.json:
         dump(summary.model_dump(mode="json"))
         return 0
     say(f"{summary.kept} of {summary.views} views kept, {summary.scored} scored")
     for reason, n in summary.reasons.items():
         say(f"  {n:>6}  {reason}")
-    say(run_key(args.run, "html" if args.report else "parquet"))
+    say(keys.selection_key(args.run, "html" if args.report else "parquet"))
     return 0
 
 

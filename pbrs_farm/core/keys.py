@@ -1,7 +1,12 @@
-"""Ids, the key of every stored object, digests and seeds; no effects.
+"""Ids, the key of every stored object built and parsed, digests and seeds; no effects.
 
 A key is a path with "/" below the output root. Equal inputs give equal digests on every machine:
 digests are over canonical JSON, never over Python's own hash.
+
+    houses/<house>/<file>                        recipe.json   manifest.jsonl
+    houses/<house>/views/<view>/<file>           selection.json
+    houses/<house>/done/<step>[.<view>].json     selection/<run>.<ending>
+    objects/<house>/...  for objects             selection/histograms/<house>.bin
 """
 
 from __future__ import annotations
@@ -9,12 +14,35 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from dataclasses import dataclass
 from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict
 
+from pbrs_farm.core.errors import BadInput
+
 RECIPE: Final = "recipe.json"
 MANIFEST: Final = "manifest.jsonl"
+SELECTION: Final = "selection.json"
+FOLDERS: Final = ("houses", "objects")
+"""The folders of an output root that hold a folder per house and per object without context."""
+
+_HOUSE_KEY: Final = re.compile(
+    r"(?P<root>houses|objects)/(?P<house>[^/]+)/"
+    r"(?:(?P<file>[^/]+)|views/(?P<view>[^/]+)/(?P<view_file>.+)"
+    r"|done/(?P<step>[^/.]+)(?:\.(?P<step_view>[^/]+))?\.json)"
+)
+_RUN_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,60}")
+
+
+@dataclass(frozen=True, slots=True)
+class HouseKey:
+    """What a key below a house's folder names: its file, a view's file, or a step's marker."""
+
+    house: str
+    file: str = ""  # below the house's or the view's folder; "" for a marker
+    view: str | None = None
+    step: str = ""  # of a marker, else ""
 
 
 def slug(name: str) -> str:
@@ -31,8 +59,9 @@ OBJECT_PREFIX: Final = "object_"
 """Ids of objects without context begin so; no house's id can (a slug has no underscore)."""
 
 
-def _root(house: str) -> str:
-    return f"{'objects' if house.startswith(OBJECT_PREFIX) else 'houses'}/{house}"
+def is_object(house: str) -> bool:
+    """The id is of an object without context (paper section 4.1), not of a house."""
+    return house.startswith(OBJECT_PREFIX)
 
 
 def view_id(room_id: str, sector: int, k: int | None = None) -> str:
@@ -42,18 +71,43 @@ def view_id(room_id: str, sector: int, k: int | None = None) -> str:
 
 def house_key(house: str, file: str = "") -> str:
     """Key of a house's file; of its folder, with a trailing slash, when file is ""."""
-    return f"{_root(house)}/{file}"
+    return f"{FOLDERS[is_object(house)]}/{house}/{file}"
 
 
 def view_key(house: str, view: str, file: str = "") -> str:
     """Key of a view's file; of its folder, with a trailing slash, when file is ""."""
-    return f"{_root(house)}/views/{view}/{file}"
+    return house_key(house, f"views/{view}/{file}")
+
+
+def marker_name(step: str, view: str | None = None) -> str:
+    """`<step>` or `<step>.<view>`: a marker's name among those of its house."""
+    return step if view is None else f"{step}.{view}"
 
 
 def marker_key(house: str, step: str, view: str | None = None) -> str:
     """Key of the marker that says a step is done."""
-    name = step if view is None else f"{step}.{view}"
-    return f"{_root(house)}/done/{name}.json"
+    return house_key(house, f"done/{marker_name(step, view)}.json")
+
+
+def parse_house_key(key: str) -> HouseKey | None:
+    """What house_key, view_key or marker_key built the key of; None when none of them did."""
+    match = _HOUSE_KEY.fullmatch(key)
+    if match is None or match["root"] != FOLDERS[is_object(match["house"])]:
+        return None
+    file = match["file"] or match["view_file"] or ""
+    return HouseKey(match["house"], file, match["view"] or match["step_view"], match["step"] or "")
+
+
+def selection_key(run: str, ending: str) -> str:
+    """Key of a selection's "parquet", "jsonl" or "html"; BadInput for a name that is no file name."""
+    if not _RUN_NAME.fullmatch(run):
+        raise BadInput("--run", run, "a run's name holds letters, digits, dots and dashes")
+    return f"selection/{run}.{ending}"
+
+
+def histogram_pack_key(house: str) -> str:
+    """Key of a house's pack of histograms: made by selection, safe to delete."""
+    return f"selection/histograms/{house}.bin"
 
 
 def canonical_json(value: Any) -> str:

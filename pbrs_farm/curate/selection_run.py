@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
@@ -35,25 +34,10 @@ from pbrs_farm.selection.verdicts import verdicts
 from pbrs_farm.selection.view_record import ViewRecord, record_from_json
 from pbrs_farm.store.interface import Store
 
-SUMMARY: Final = "selection.json"
-_VIEW_KEY: Final = re.compile(r"houses/([^/]+)/views/([^/]+)/(histogram|view)\.json")
 _METADATA: Final = b"pbrs_farm"
-_RUN_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,60}")
 
 Progress = Callable[[int, int], None]
 """Called with (houses done, houses in all)."""
-
-
-def run_key(run: str, ending: str) -> str:
-    """Key of a run's file: "parquet", "jsonl" or "html"; BadInput for a name that is no file name."""
-    if not _RUN_NAME.fullmatch(run):
-        raise BadInput("--run", run, "a run's name holds letters, digits, dots and dashes")
-    return f"selection/{run}.{ending}"
-
-
-def pack_key(house: str) -> str:
-    """Key of a house's pack of histograms: made by selection, safe to delete."""
-    return f"selection/histograms/{house}.bin"
 
 
 def select(
@@ -100,10 +84,14 @@ def judge_again(
     """
     table = _stored_run(store, run)
     if table is None:
-        raise BadInput(run_key(run, "parquet"), "", "no such run", hint="`pbrs-farm select` first")
+        raise BadInput(
+            keys.selection_key(run, "parquet"), "", "no such run", hint="`pbrs-farm select` first"
+        )
     facts = {"reference": reference.digest, "score_mode": fields.score_mode}
     if _facts(table) != facts:
-        raise BadInput(run_key(run, "parquet"), "", "scored with another reference or --score-mode")
+        raise BadInput(
+            keys.selection_key(run, "parquet"), "", "scored with another reference or --score-mode"
+        )
     scores = table.select(SCORES.names).cast(SCORES)
     return _write(store, run, scores, fields, facts, reference, n_scored_houses=0)
 
@@ -112,7 +100,9 @@ def verdict_table(store: Store, run: str = "default") -> Any:
     """The stored table of a run (scores.SCORES and the columns of verdicts); BadInput if none."""
     table = _stored_run(store, run)
     if table is None:
-        raise BadInput(run_key(run, "parquet"), "", "no such run", hint="`pbrs-farm select` first")
+        raise BadInput(
+            keys.selection_key(run, "parquet"), "", "no such run", hint="`pbrs-farm select` first"
+        )
     return table
 
 
@@ -122,14 +112,14 @@ def house_pack(store: Store, house: str, score_mode: Mode) -> HistogramPack:
     return _pack(store, house, views, _source(store, house, views, score_mode), score_mode)
 
 
-def _houses(store: Store, below: str = "houses/") -> dict[str, dict[str, bool]]:
+def _houses(store: Store, below: str = f"{keys.FOLDERS[0]}/") -> dict[str, dict[str, bool]]:
     """House id -> view id -> whether it has a histogram.json, in order."""
     found: dict[str, dict[str, bool]] = {}
     for key in store.list(below):
-        match = _VIEW_KEY.fullmatch(key)
-        if match is not None:
-            views = found.setdefault(match[1], {})
-            views[match[2]] = views.get(match[2], False) or match[3] == "histogram"
+        at = keys.parse_house_key(key)
+        if at is not None and at.view is not None and at.file in ("histogram.json", "view.json"):
+            views = found.setdefault(at.house, {})
+            views[at.view] = views.get(at.view, False) or at.file == "histogram.json"
     return {house: dict(sorted(views.items())) for house, views in sorted(found.items())}
 
 
@@ -153,7 +143,7 @@ def _source(store: Store, house: str, views: Mapping[str, bool], score_mode: Mod
 def _pack(
     store: Store, house: str, views: Mapping[str, bool], source: str, score_mode: Mode
 ) -> HistogramPack:
-    key = pack_key(house)
+    key = keys.histogram_pack_key(house)
     try:
         data = store.get(key)
         if pack_source(data) == source:
@@ -190,7 +180,7 @@ def _records(
 
 
 def _stored_run(store: Store, run: str) -> Any:
-    key = run_key(run, "parquet")
+    key = keys.selection_key(run, "parquet")
     try:
         return pq.read_table(io.BytesIO(store.get(key)))
     except ObjectMissing:
@@ -232,10 +222,10 @@ def _write(
     file = io.BytesIO()
     metadata = {_METADATA: keys.canonical_json(facts).encode()}
     pq.write_table(judged.replace_schema_metadata(metadata), file, compression="zstd")
-    store.put(run_key(run, "parquet"), file.getvalue())
-    store.put(run_key(run, "jsonl"), json_lines(judged))
+    store.put(keys.selection_key(run, "parquet"), file.getvalue())
+    store.put(keys.selection_key(run, "jsonl"), json_lines(judged))
     summary = summary_of(judged, run, fields, reference)
-    store.put(SUMMARY, (summary.model_dump_json(indent=1) + "\n").encode())
+    store.put(keys.SELECTION, (summary.model_dump_json(indent=1) + "\n").encode())
     return summary.model_copy(update={"n_scored_houses": n_scored_houses})
 
 

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.coco import write_coco
 from pbrs_farm.export.hdf5 import write_hdf5
@@ -51,7 +52,7 @@ def export(folder: Path, out: Path, form: str, *, selection: str | None = None) 
 
 
 def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
-    file = folder / "selection" / f"{run}.jsonl"
+    file = folder / keys.selection_key(run, "jsonl")
     if not file.is_file():
         raise BadInput(file, "", "no such selection", hint="pbrs-farm select makes one")
     try:

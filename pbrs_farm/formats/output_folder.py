@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 
 
@@ -46,7 +47,7 @@ def views_of(root: Path) -> tuple[ViewEntry, ...]:
 
     Raises BadInput if root is no output folder or a JSON file in it cannot be read.
     """
-    roots = [root / name for name in ("houses", "objects") if (root / name).is_dir()]
+    roots = [root / name for name in keys.FOLDERS if (root / name).is_dir()]
     if not roots:
         raise BadInput(
             root, "", "not an output folder of pbrs-farm: it has no houses", hint="see --out"
@@ -95,9 +96,11 @@ def reasons_of(root: Path) -> dict[tuple[str, str], str]:
 
     Raises BadInput when the selection's files are damaged.
     """
-    run = json_object(root / "selection.json").get("run")
-    path = root / "selection" / f"{run}.jsonl"
-    if not run or not path.is_file():
+    run = json_object(root / keys.SELECTION).get("run")
+    if not run:
+        return {}
+    path = root / keys.selection_key(str(run), "jsonl")
+    if not path.is_file():
         return {}
     try:
         rows = [json.loads(line) for line in path.read_bytes().splitlines()]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import ViewEntry, json_object, views_of
@@ -101,7 +102,7 @@ def _unmapped(folder: Path, houses: set[str]) -> tuple[str, ...]:
     lines = []
     for house in sorted(houses):
         names: dict[str, int] = {}
-        for item in json_object(folder / "houses" / house / "house.json").get("items", ()):
+        for item in json_object(folder / keys.house_key(house, "house.json")).get("items", ()):
             if "unmapped" in item.get("tags", ()):
                 name = str(item.get("source_class") or item.get("name") or item.get("id"))
                 names[name] = names.get(name, 0) + 1

@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.read.source import SourceRef, resolve
@@ -74,8 +75,8 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
         _Schedule(run, sources, summary, observe).drive(pool)
     for house_id in summary.houses:
         finish_house(store, house_id)
-    below = [*store.list("houses/"), *store.list("objects/")]
-    merge_manifests(store, [k.split("/")[1] for k in below if k.endswith("/manifest.jsonl")])
+    below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
+    merge_manifests(store, [at.house for at in below if at and at.file == keys.MANIFEST])
     return summary
 
 

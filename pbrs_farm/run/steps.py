@@ -152,7 +152,7 @@ def room_of(house: House, view: View) -> Room | None:
 
 def is_object(work: Work) -> bool:
     """The work is on an object without context (paper section 4.1), not on a house."""
-    return work.house_id.startswith(keys.OBJECT_PREFIX)
+    return keys.is_object(work.house_id)
 
 
 def camera_seed(house_id: str, recipe: Recipe) -> int:

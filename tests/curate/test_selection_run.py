@@ -188,10 +188,10 @@ def test_a_damaged_run_is_named(store: MemoryStore) -> None:
 
 def test_a_damaged_pack_is_made_again(store: MemoryStore) -> None:
     selecting.select(store, reference(), LOW)
-    good = store.get(selecting.pack_key("a"))
-    store.put(selecting.pack_key("a"), good[:-20])
+    good = store.get(keys.histogram_pack_key("a"))
+    store.put(keys.histogram_pack_key("a"), good[:-20])
     selecting.select(store, reference(), LOW, run="again")
-    assert store.get(selecting.pack_key("a")) == good
+    assert store.get(keys.histogram_pack_key("a")) == good
 
 
 def test_yield_falls_with_the_threshold_and_counts_both_scores(store: MemoryStore) -> None:

@@ -12,6 +12,7 @@ from functools import partial
 from itertools import islice
 from typing import Final
 
+from pbrs_farm.core import keys
 from pbrs_farm.store.interface import Store
 from workers.ids import GEOMETRY, REDUCE
 from workers.job import HouseEntry, JobSpec
@@ -44,10 +45,10 @@ def rebuild(
 def done_steps(store: Store) -> dict[str, frozenset[str]]:
     """House -> names of its markers, from one listing of the store."""
     names: dict[str, list[str]] = {}
-    for key in store.list("houses/"):
-        parts = key.split("/")
-        if len(parts) == 4 and parts[2] == "done":
-            names.setdefault(parts[1], []).append(parts[3].removesuffix(".json"))
+    for key in store.list(f"{keys.FOLDERS[0]}/"):
+        at = keys.parse_house_key(key)
+        if at is not None and at.step:
+            names.setdefault(at.house, []).append(keys.marker_name(at.step, at.view))
     return {house: frozenset(found) for house, found in names.items()}
 
 

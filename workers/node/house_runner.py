@@ -198,6 +198,8 @@ def steps_of_stage(spec: JobSpec, stage: str) -> tuple[str, ...]:
 
 def _first_stage_missing(spec: JobSpec, views: tuple[str, ...], done: frozenset[str]) -> str:
     for stage in spec.group_stages:
-        if any(f"{s}.{v}" not in done for v in views for s in steps_of_stage(spec, stage)):
+        if any(
+            keys.marker_name(s, v) not in done for v in views for s in steps_of_stage(spec, stage)
+        ):
             return stage
     return ""

@@ -116,7 +116,8 @@ def _by_house(manifest: bytes) -> Iterator[tuple[str, bytes]]:
 
 
 def _house_of_row(line: bytes) -> str:
-    return str(json.loads(line)["key"]).split("/")[1]
+    at = keys.parse_house_key(json.loads(line)["key"])
+    return at.house if at is not None else ""
 
 
 def _manifest(store: Store, house: str) -> bytes | None:
