@@ -245,7 +245,7 @@ def _mutation_cost() -> float:
     def mutate(n: int) -> int:
         some = fields.model_copy(update={"mutations_per_pixel": n})
         return markov.metropolis(
-            scene.stage, emitters, camera, Group.OUTDOOR, some, 1, min_segments=1
+            scene.device_scene, emitters, camera, Group.OUTDOOR, some, 1, min_segments=1
         ).n_mutations
 
     # The bootstrap is the same for both counts and drops out of the difference.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import LightFields
-from pbrs_farm.transport.kernels.device_scene import Stage
+from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import Only, fields_row, left_surface, white_hit
 from pbrs_farm.transport.kernels.path_step import advance, direct
@@ -82,17 +82,17 @@ def floor_points(room: Room, n: int, seed: int) -> NDArray[np.float64]:
 
 
 def illuminance_lx(
-    stage: Stage, emitters: Emitters, points: NDArray[np.float64], seed: int
+    scene: DeviceScene, emitters: Emitters, points: NDArray[np.float64], seed: int
 ) -> tuple[float, float]:
     """(outdoor, indoor) mean illuminance of level surfaces at points (N, 3), facing up."""
     up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
-    sent = radiosity(stage, emitters, points, up, _SPP, seed)
+    sent = radiosity(scene, emitters, points, up, _SPP, seed)
     lumens = [float((v @ LUMINANCE).mean()) * LM_PER_W * math.pi for v in sent]
     return lumens[0], lumens[1]
 
 
 def radiosity(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     points: NDArray[np.float64],
     normals: NDArray[np.float64],
@@ -114,7 +114,7 @@ def radiosity(
     key = stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     p, normal = mi.Point3f(*_columns(points)), mi.Vector3f(*_columns(normals))
     fields = fields_row(LightFields(), max_depth=max_depth)
-    sums = _radiosity(stage, emitters, fields, (p, normal), key, only, dr.opaque(mi.UInt32, spp))
+    sums = _radiosity(scene, emitters, fields, (p, normal), key, only, dr.opaque(mi.UInt32, spp))
     dr.eval(*sums)
     outdoor_sum, indoor_sum = (v.numpy().T.astype(np.float64) / spp for v in sums)
     return outdoor_sum, indoor_sum
@@ -126,7 +126,7 @@ def _columns(rows: NDArray[np.float64]) -> list[Any]:
 
 @dr.syntax
 def _radiosity(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     fields: Any,
     place: tuple[Any, Any],
@@ -146,7 +146,7 @@ def _radiosity(
         near = emitters.nearby.seen(p, normal, only.lamp, mi.Bool(True))
         up = mi.Vector3f(0, 0, 1)
         out, lamp = direct(
-            stage, emitters, here, frame, up, numbers, dim, only, near, mi.Bool(True)
+            scene, emitters, here, frame, up, numbers, dim, only, near, mi.Bool(True)
         )
         lit_out, lit_in = out.light, lamp.light
         wo = mi.warp.square_to_cosine_hemisphere(numbers.two(dim + 1))
@@ -154,7 +154,7 @@ def _radiosity(
         walk = left_surface(p, normal, d, wo.z * dr.inv_pi, near)
         active = mi.Bool(True)
         while active:
-            walk, found, alive = advance(stage, emitters, fields, numbers, walk, only, active)
+            walk, found, alive = advance(scene, emitters, fields, numbers, walk, only, active)
             lit_out += dr.select(active, found.met_outdoor + found.lit_outdoor, 0)
             lit_in += dr.select(active, found.met_indoor + found.lit_indoor, 0)
             active = active & alive

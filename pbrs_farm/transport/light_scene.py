@@ -34,7 +34,7 @@ class LightScene:
     """The light of one house under one sky.
 
     tables: geometry, materials and lamps as numbers. notes: what had to be changed or left out.
-    stage: the same on the device; None for scalar variants.
+    device_scene: the same on the device; None for scalar variants.
     """
 
     def __init__(
@@ -46,12 +46,12 @@ class LightScene:
         self.notes = tables.notes
         self._portals = portals
         mitsuba(variant)
-        self.stage: Any = None
+        self.device_scene: Any = None
         self._emitters: Any = None
         if not variant.startswith("scalar"):
-            from pbrs_farm.transport.kernels.device_scene import Stage
+            from pbrs_farm.transport.kernels.device_scene import DeviceScene
 
-            self.stage = Stage(tables)
+            self.device_scene = DeviceScene(tables)
 
     @staticmethod
     def load(
@@ -146,7 +146,7 @@ class LightScene:
         spp = 0
         while spp < goal and (n := watch.fitting(min(per_launch, goal - spp))) > 0:
             lanes = Lanes(i.width_px, i.height_px, spp, n, seed, n_lamps=n_lamps)
-            sums = trace(self.stage, emitters, camera, lanes, fields, max_depth=max_depth)
+            sums = trace(self.device_scene, emitters, camera, lanes, fields, max_depth=max_depth)
             watch.did(n)
             total = sums if total is None else total + sums
             spp += n
@@ -181,7 +181,7 @@ class LightScene:
         for k, group in enumerate(Group):
             deadline = time.monotonic() + budget / 2 if fields.time_budget_s > 0 else None
             rest = metropolis(
-                self.stage,
+                self.device_scene,
                 emitters,
                 camera,
                 group,
@@ -230,7 +230,7 @@ class LightScene:
             portals = nearest_portals(self._portals, points.mean(0))
             weights = weights_by_distance(balls, points.mean(0), len(portals))
             emitters = self._aimed(portals, weights)
-            outdoor, indoor = illuminance_lx(self.stage, emitters, points, seed)
+            outdoor, indoor = illuminance_lx(self.device_scene, emitters, points, seed)
             lux[room.id] = {"outdoor": round(outdoor, 2), "indoor": round(indoor, 2)}
         return lux
 
@@ -279,7 +279,13 @@ class LightScene:
         emitters = self._aimed(portals, weights)
         if fields.pilot_spp > 0:
             weights = pilot_weights(
-                self.stage, emitters, camera, self.n_lamps, len(portals), fields, seed ^ 0x5EED
+                self.device_scene,
+                emitters,
+                camera,
+                self.n_lamps,
+                len(portals),
+                fields,
+                seed ^ 0x5EED,
             )
             emitters.with_weights(weights)
         names = [lamp.name for lamp in self.tables.lamps]
@@ -296,8 +302,8 @@ class LightScene:
             )
 
             self._emitters = Emitters(self.tables, self.sky, portals, weights)
-            glow = glow_tables(self.stage, self._emitters, self.tables, 0)
-            self.stage.set_aims(*densities_by_face(glow))
+            glow = glow_tables(self.device_scene, self._emitters, self.tables, 0)
+            self.device_scene.set_aims(*densities_by_face(glow))
             self._emitters.with_glow(glow)
         else:
             self._emitters.aim(portals, weights)

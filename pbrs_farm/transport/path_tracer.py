@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.bsdf import luminance
-from pbrs_farm.transport.kernels.device_scene import Stage
+from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
     CameraRow,
@@ -101,7 +101,7 @@ class ByLamp(NamedTuple):
 
 
 def trace(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     camera: Camera,
     lanes: Lanes,
@@ -125,7 +125,7 @@ def trace(
         sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
         by_lamp = ByLamp(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
     out = _trace(
-        stage,
+        scene,
         emitters,
         camera_row(camera),
         fields_row(fields, max_depth=max_depth),
@@ -147,7 +147,7 @@ def trace(
 
 @dr.syntax
 def _trace(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     camera: CameraRow,
     fields: FieldsRow,
@@ -179,7 +179,7 @@ def _trace(
         l_out, l_in = dr.select(fresh, mi.Color3f(0), l_out), dr.select(fresh, mi.Color3f(0), l_in)
         seen = seen & ~fresh
 
-        walk, found, alive = advance(stage, emitters, fields, numbers, walk, only, active)
+        walk, found, alive = advance(scene, emitters, fields, numbers, walk, only, active)
         l_out += found.met_outdoor + found.lit_outdoor
         l_in += found.met_indoor + found.lit_indoor
         _add_by_lamp(by_lamp, found, active)

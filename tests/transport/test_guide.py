@@ -99,7 +99,7 @@ def glow_of(house: House) -> tuple[LightScene, GlowTables]:
 
     scene, camera = loaded((house, rooms.camera((0.5, 1.5, 0.5), (2.0, 1.0, 2.0))))
     emitters, _weights = scene.emitters(camera, FIELDS, 0)
-    return scene, glow_tables(scene.stage, emitters, scene.tables, 0)
+    return scene, glow_tables(scene.device_scene, emitters, scene.tables, 0)
 
 
 def test_the_inside_of_an_opaque_shade_is_aimed_at_and_its_outside_is_not() -> None:
@@ -138,7 +138,7 @@ def test_a_lamp_is_chosen_as_often_as_its_density_says() -> None:
     only, on = mi.Int32(-1), mi.Bool(True)
     near = emitters.nearby.seen(p, up, only, on)
     uv = mi.Point2f(rng.next_float32(), rng.next_float32())
-    to = emitters.sample_lamp(scene.stage, near, rng.next_float32(), uv, only, on)
+    to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, only, on)
     # With the densities of all right, the mean of 1 / density is the solid angle of all lamps.
     radius = emitters.nearby.seen(p, up, only, on).at
     assert radius.total.numpy()[0] > 0
@@ -179,7 +179,7 @@ def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
     for _step in range(3):
         asked.append(set())
         walk, found, _alive = advance(
-            scene.stage, emitters, fields_row(FIELDS), Recorded(), walk, only, mi.Bool(True)
+            scene.device_scene, emitters, fields_row(FIELDS), Recorded(), walk, only, mi.Bool(True)
         )
         assert found.hit.valid.numpy()[0]
     assert not asked[0] & asked[1]

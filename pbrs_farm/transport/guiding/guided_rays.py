@@ -25,7 +25,7 @@ import mitsuba as mi
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
 from pbrs_farm.transport.guiding.nearby_lamps import Near, cone_density, drawn, in_cones
 from pbrs_farm.transport.kernels.bsdf import Scatter
-from pbrs_farm.transport.kernels.device_scene import Hit, Stage, offset
+from pbrs_farm.transport.kernels.device_scene import DeviceScene, Hit, offset
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import Walk
 
@@ -87,7 +87,9 @@ def reflected_chance(reflectance: Any, worth: Any) -> Any:
     return dr.clip(worth * reflectance, reflectance, dr.maximum(reflectance, REFLECTED))
 
 
-def guided(guide: Guide, stage: Stage, emitters: Emitters, hit: Hit, u: Any, uv: Any) -> Guided:
+def guided(
+    guide: Guide, scene: DeviceScene, emitters: Emitters, hit: Hit, u: Any, uv: Any
+) -> Guided:
     """A direction by the second or third technique, where u says so."""
     share, coned = guide.share, guide.coned
     is_guided = u < share
@@ -98,7 +100,7 @@ def guided(guide: Guide, stage: Stage, emitters: Emitters, hit: Hit, u: Any, uv:
     v = dr.clip(v, 0, 1 - 1e-7)
     lamp, rest = drawn(guide.near.lamps, guide.near.aims, guide.near.at.aim_total, v)
     at_face = is_guided & ~is_coned
-    aim = emitters.aims.aim(stage, (hit.p, hit.ng), lamp, rest, uv, at_face)
+    aim = emitters.aims.aim(scene, (hit.p, hit.ng), lamp, rest, uv, at_face)
     d = dr.select(is_coned, in_cones(guide.near.cones, v, uv), aim.d)
     target = dr.select(at_face, aim.face, mi.UInt32(NO_FACE))
     return Guided(d, is_guided, own, target, ~at_face | aim.valid)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.transport.kernels.alias_table import alias_rows, pick
-from pbrs_farm.transport.kernels.device_scene import Stage, offset
+from pbrs_farm.transport.kernels.device_scene import DeviceScene, offset
 from pbrs_farm.transport.kernels.sampler import device_array
 
 BACK: Final = 0x80000000
@@ -58,7 +58,7 @@ class Aims:
         self._first = device_array(mi.UInt32, first)
 
     def aim(
-        self, stage: Stage, p_ng: tuple[Any, Any], lamp: Any, u: Any, uv: Any, active: Any
+        self, scene: DeviceScene, p_ng: tuple[Any, Any], lamp: Any, u: Any, uv: Any, active: Any
     ) -> Aim:
         """Towards a point on a glowing side of a lamp; p_ng: vertex and face normal there."""
         first = dr.gather(mi.UInt32, self._first, lamp, active)
@@ -67,7 +67,7 @@ class Aims:
         k, _u = pick(self._alias, first, dr.maximum(count, 1), u, active)
         side = dr.gather(mi.UInt32, self._sides, first + k, active)
         face = side & 0x7FFFFFFF
-        q, n = stage.lamp_point(face, uv, active)
+        q, n = scene.lamp_point(face, uv, active)
         # From where the ray will start, or it would miss what is small and near.
         p, ng = p_ng
         begin = offset(p, dr.select(dr.dot(ng, q - p) > 0, ng, -ng))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.transport.guiding.guiding_targets import BACK, GlowTables, no_glow
 from pbrs_farm.transport.illuminance import radiosity
-from pbrs_farm.transport.kernels.device_scene import Stage
+from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.scene_tables.material_rows import SURFACE
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables, bounding_spheres
@@ -29,7 +29,9 @@ _SPP: Final = 4
 _DEPTH: Final = 3
 
 
-def glow_tables(stage: Stage, emitters: Emitters, tables: SceneTables, seed: int) -> GlowTables:
+def glow_tables(
+    scene: DeviceScene, emitters: Emitters, tables: SceneTables, seed: int
+) -> GlowTables:
     """The face sides near each lamp that send out more of its light than MIN_EXITANCE.
 
     4 points on either side of each face, 4 paths each to its lamp alone.
@@ -40,7 +42,7 @@ def glow_tables(stage: Stage, emitters: Emitters, tables: SceneTables, seed: int
 
     flux = np.array([lamp.flux_lm for lamp in tables.lamps])
     areas = _areas(tables, faces)
-    lumens = _exitance(stage, emitters, tables, faces, lamps, seed) * LM_PER_W
+    lumens = _exitance(scene, emitters, tables, faces, lamps, seed) * LM_PER_W
     keep = (lumens > MIN_EXITANCE * flux[lamps]).ravel()
     power = (lumens * areas).ravel()[keep]
     sides = np.concatenate([faces, faces + BACK])[keep]
@@ -127,7 +129,7 @@ def _candidates(tables: SceneTables) -> tuple[NDArray[np.int64], NDArray[np.int6
 
 
 def _exitance(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     tables: SceneTables,
     faces: NDArray[np.int64],
@@ -147,7 +149,7 @@ def _exitance(
     normals = np.stack([normal, -normal])[:, None].repeat(_POINTS, 1).reshape(-1, 3)
     asked = np.tile(lamps, 2 * _POINTS)
     _outdoor, indoor = radiosity(
-        stage, emitters, points, normals, _SPP, seed, lamps=asked, max_depth=_DEPTH
+        scene, emitters, points, normals, _SPP, seed, lamps=asked, max_depth=_DEPTH
     )
     irradiance = np.pi * (indoor @ LUMINANCE).reshape(2, _POINTS, len(faces)).mean(1)
     rows = tables.material_rows[tables.face_tags[faces] & 0xFFFF]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields
-from pbrs_farm.transport.kernels.device_scene import Stage
+from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, Weights
 from pbrs_farm.transport.path_tracer import Lanes, trace
 
@@ -44,7 +44,7 @@ def weights_by_distance(
 
 
 def pilot_weights(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     camera: Camera,
     n_lamps: int,
@@ -58,7 +58,7 @@ def pilot_weights(
     lanes = Lanes(
         width, height, 0, fields.pilot_spp, seed, n_only_lamps=n_lamps, n_only_outdoor=n_outdoor
     )
-    sums = trace(stage, emitters, camera.with_size(width, height), lanes, fields)
+    sums = trace(scene, emitters, camera.with_size(width, height), lanes, fields)
     brought = ((sums.outdoor + sums.indoor) @ LUMINANCE / fields.pilot_spp).reshape(
         width * height, n_lamps + n_outdoor
     )

@@ -1,6 +1,6 @@
 """What a ray meets: the point, its frame and its material, gathered from the tables; kernels.
 
-No effects beyond the buffers a Stage holds on the device.
+No effects beyond the buffers a DeviceScene holds on the device.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pbrs_farm.raycast.tracer import scene_from_mesh
 from pbrs_farm.transport.kernels.bsdf import Scatter, thin_glass_reflectance
 from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.scene_tables.material_rows import GLASS, HOLE, MIRROR
-from pbrs_farm.transport.scene_tables.scene_tables import FACE_FLOATS, NO_LAMP, SceneTables
+from pbrs_farm.transport.scene_tables.scene_tables import FACE_FLOATS, SceneTables
 
 _RAY_OFFSET = 2e-5
 _MAX_VEILS = 16
@@ -42,7 +42,7 @@ class Hit(NamedTuple):
     aim_lamp: Any
 
 
-class Stage:
+class DeviceScene:
     """The geometry and materials of a house on the device: Mitsuba scenes and buffers."""
 
     def __init__(self, tables: SceneTables) -> None:
@@ -211,6 +211,3 @@ def offset(p: Any, n: Any) -> Any:
 def _ray(o: Any, d: Any, reach: Any) -> Any:
     ray: Any = mi.Ray3f
     return ray(o, d, mi.Float(reach), 0.0, mi.Color0f())
-
-
-__all__ = ["NO_LAMP", "Hit", "Stage", "bent", "offset"]

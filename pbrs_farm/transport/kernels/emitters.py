@@ -22,7 +22,7 @@ from pbrs_farm.core.lighting import Group
 from pbrs_farm.transport.guiding.guiding_targets import Aims, GlowTables, no_glow
 from pbrs_farm.transport.guiding.nearby_lamps import Near, Nearby, Standpoint, drawn
 from pbrs_farm.transport.kernels.alias_table import alias_rows, pick
-from pbrs_farm.transport.kernels.device_scene import Stage
+from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
@@ -109,7 +109,7 @@ class Emitters:
     # Lamps
 
     def sample_lamp(
-        self, stage: Stage, near: Near, u: Any, uv: Any, only: Any, active: Any
+        self, scene: DeviceScene, near: Near, u: Any, uv: Any, only: Any, active: Any
     ) -> Towards:
         """A point on a lamp, seen from p: by place with chance BY_PLACE, else by weight alone."""
         active = active & self._has_lamps
@@ -125,7 +125,7 @@ class Emitters:
         count = dr.gather(mi.UInt32, self._lamp_first, lamp + 1, active) - first
         triangle, _u = pick(self._triangle_alias, first, count, u, active)
         face = dr.gather(mi.UInt32, self._lamp_faces, first + triangle, active)
-        q, n = stage.lamp_point(face, uv, active)
+        q, n = scene.lamp_point(face, uv, active)
 
         to = q - near.at.p
         distance = dr.norm(to)

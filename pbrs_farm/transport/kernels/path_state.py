@@ -14,7 +14,7 @@ from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
 from pbrs_farm.transport.guiding.nearby_lamps import Near, Standpoint, nowhere
 from pbrs_farm.transport.kernels.bsdf import Scatter
-from pbrs_farm.transport.kernels.device_scene import Hit, Stage, offset
+from pbrs_farm.transport.kernels.device_scene import DeviceScene, Hit, offset
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.sampler import opaque3
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
@@ -97,7 +97,7 @@ class Found(NamedTuple):
 class Rules(NamedTuple):
     """What is asked of every path: the scene, the emitters that count, from how many segments."""
 
-    stage: Stage
+    scene: DeviceScene
     emitters: Emitters
     camera: CameraRow
     fields: FieldsRow

@@ -30,7 +30,7 @@ from pbrs_farm.transport.kernels.bsdf import (
     steady_density,
     thin_glass_reflectance,
 )
-from pbrs_farm.transport.kernels.device_scene import Hit, Stage, offset
+from pbrs_farm.transport.kernels.device_scene import DeviceScene, Hit, offset
 from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, Emitters, Towards
 from pbrs_farm.transport.kernels.path_state import FieldsRow, Found, Lit, Only, Walk
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, VERTEX_DIMS, Numbers
@@ -42,7 +42,7 @@ _LOBE, _SCATTER, _ROULETTE, _LAMP, _LAMP_UV, _OUT, _OUT_UV = 0, 1, 3, 4, 5, 7, 8
 
 
 def advance(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     fields: FieldsRow,
     numbers: Numbers,
@@ -56,7 +56,7 @@ def advance(
     may_be_steady: vertices whose share between scattered and shadow ray must not depend on where
     the path came from, where their material allows it.
     """
-    hit = stage.hit(walk.o, walk.d, active)
+    hit = scene.hit(walk.o, walk.d, active)
     missed = active & ~hit.valid
 
     # Kinds of surface.
@@ -99,7 +99,7 @@ def advance(
         guide = guide_at(guiding, m, walk.beta, may_aim)
     own = 1.0 if guide is None else 1 - guide.share
     out, lamp = direct(
-        stage, emitters, hit, frame, wi, numbers, dim, only, near, go_on, own, steady
+        scene, emitters, hit, frame, wi, numbers, dim, only, near, go_on, own, steady
     )
 
     # Scatter. Glass and mirrors keep one direction; what passes glass straight is no vertex.
@@ -108,7 +108,7 @@ def advance(
     if guide is None:
         ahead = mi.Vector3f(frame.to_world(sample(m, wi, lobe, uv)))
     else:
-        to = guided(guide, stage, emitters, hit, lobe, uv)
+        to = guided(guide, scene, emitters, hit, lobe, uv)
         is_guided, target = to.is_guided, to.target
         by_surface = mi.Vector3f(frame.to_world(sample(m, wi, to.own, uv)))
         ahead = dr.select(is_guided, to.d, by_surface)
@@ -177,7 +177,7 @@ def advance(
 
 
 def direct(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     hit: Hit,
     frame: Any,
@@ -202,17 +202,17 @@ def direct(
     if only.lamp is not None and near is not None:
         asks = active & (only.lamp > -2)
         u, uv = numbers.one(dim + _LAMP), numbers.two(dim + _LAMP_UV)
-        lamp = emitters.sample_lamp(stage, near, u, uv, only.lamp, asks)
+        lamp = emitters.sample_lamp(scene, near, u, uv, only.lamp, asks)
     # The pilot draws a portal's light through the portal alone.
     alone = False if only.outdoor is None else only.outdoor >= FIRST_PORTAL
     to_outdoor, to_lamp = (
-        _lit(stage, hit, frame, wi, to, alone, own, steady) for to in (out, lamp)
+        _lit(scene, hit, frame, wi, to, alone, own, steady) for to in (out, lamp)
     )
     return to_outdoor, to_lamp
 
 
 def _lit(
-    stage: Stage,
+    scene: DeviceScene,
     hit: Hit,
     frame: Any,
     wi: Any,
@@ -244,7 +244,7 @@ def _lit(
     is_near = to.distance < dr.inf
     way = dr.select(is_near, aim / reach, to.d)
     far = dr.select(is_near, reach * (1 - 1e-4), dr.inf)
-    clear = stage.transmittance(begin, way, far, lit)
+    clear = scene.transmittance(begin, way, far, lit)
     strength = dr.select(lit, to.radiance * clear * weight, 0)
     return Lit(dr.select(lit & faces, value * strength, 0), to.d, strength, to.lamp)
 

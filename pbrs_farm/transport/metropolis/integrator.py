@@ -33,7 +33,7 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
-from pbrs_farm.transport.kernels.device_scene import Stage
+from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import Only, Rules, camera_row, fields_row
 from pbrs_farm.transport.kernels.sampler import HashedNumbers, device_array, stream_key
@@ -91,7 +91,7 @@ class _Tally:
 
 
 def metropolis(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     camera: Camera,
     group: Group,
@@ -121,7 +121,7 @@ def metropolis(
     # and never at the first two vertices, so that a tail does not depend on its head.
     late = fields.model_copy(update={"rr_depth": max(fields.rr_depth, _RR_DEPTH)})
     segments = dr.opaque(mi.UInt32, min_segments)
-    rules = Rules(stage, emitters, camera_row(camera), fields_row(late), only, segments)
+    rules = Rules(scene, emitters, camera_row(camera), fields_row(late), only, segments)
 
     n_bootstrap = int(np.clip(wanted, *_BOOTSTRAP))
     film = _film(rules, shape, n_bootstrap // 4, seed ^ 0x5BD1E995)
@@ -147,7 +147,7 @@ def metropolis(
             if first % (_LAUNCHES_PER_HEAD * _STEPS_PER_LAUNCH) == 0:
                 heads = first_vertices(rules, film, n_pixels, seed + first)
             groups = deal(*shape, n_tail_pixels, seed + first)
-            show_tails(stage, film, heads, groups, chains, dr.opaque(mi.Float, n))
+            show_tails(scene, film, heads, groups, chains, dr.opaque(mi.Float, n))
         tally.add(sums, n)
 
     n_mutations = tally.n_steps * n_chains

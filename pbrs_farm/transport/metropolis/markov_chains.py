@@ -257,7 +257,7 @@ def _onward(
     before = walk.depth
     may_be_steady = trial.is_straight & (before == 1)
     following, found, alive = advance(
-        rules.stage, rules.emitters, rules.fields, numbers, walk, rules.only, active, may_be_steady
+        rules.scene, rules.emitters, rules.fields, numbers, walk, rules.only, active, may_be_steady
     )
     met = dr.select(before + 1 >= rules.segments, found.met_outdoor + found.met_indoor, 0)
     lit = dr.select(following.depth + 1 >= rules.segments, found.lit_outdoor + found.lit_indoor, 0)

@@ -29,7 +29,7 @@ import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.transport.kernels.bsdf import Scatter, evaluate, thin_glass_reflectance
-from pbrs_farm.transport.kernels.device_scene import Hit, Stage, bent, offset
+from pbrs_farm.transport.kernels.device_scene import DeviceScene, Hit, bent, offset
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
     CameraRow,
@@ -113,14 +113,14 @@ def first_vertices(rules: Rules, film: Film, n_pixels: int, seed: int) -> Any:
     key = stream_key(dr.arange(mi.UInt32, n_pixels), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     numbers = HashedNumbers(key, dr.opaque(mi.UInt32, 7))
     rows = dr.zeros(mi.Float, n_pixels * _HEAD_PACKETS * 4)
-    _trace_heads(rules.stage, rules.emitters, rules.fields, rules.camera, film, numbers, rows)
+    _trace_heads(rules.scene, rules.emitters, rules.fields, rules.camera, film, numbers, rows)
     dr.eval(rows)
     return rows
 
 
 @dr.syntax
 def _trace_heads(
-    stage: Stage,
+    scene: DeviceScene,
     emitters: Emitters,
     fields: FieldsRow,
     camera: CameraRow,
@@ -138,7 +138,7 @@ def _trace_heads(
     active = mi.Bool(True)
     while active:
         before, d = mi.Color3f(walk.beta), mi.Vector3f(walk.d)
-        walk, found, alive = advance(stage, emitters, fields, numbers, walk, off, active)
+        walk, found, alive = advance(scene, emitters, fields, numbers, walk, off, active)
         here = active & found.is_rough & (walk.depth == 1)
         m = found.hit.scatter
         p, n, ng = (
@@ -206,7 +206,7 @@ def close_tail(tail: Any, light: Any, beyond: Any, active: Any) -> None:
 
 
 def show_tails(
-    stage: Stage, film: Film, heads: Any, groups: Groups, chains: Standing, weight: Any
+    scene: DeviceScene, film: Film, heads: Any, groups: Groups, chains: Standing, weight: Any
 ) -> None:
     """Splat every chain's tail at all heads of its pixel's group.
 
@@ -220,7 +220,7 @@ def show_tails(
         some = dr.arange(mi.UInt32, min(per_launch, n_chains - first))
         chain = dr.gather(mi.UInt32, chosen, some + dr.opaque(mi.UInt32, first))
         dr.eval(chain)
-        _show(stage, film, heads, groups, tails, chains.pixel, chain, weight)
+        _show(scene, film, heads, groups, tails, chains.pixel, chain, weight)
 
 
 def _rows(tails: Any, n: int) -> Any:
@@ -232,7 +232,7 @@ def _rows(tails: Any, n: int) -> Any:
 
 
 def _show(
-    stage: Stage,
+    scene: DeviceScene,
     film: Film,
     heads: Any,
     groups: Groups,
@@ -248,7 +248,7 @@ def _show(
     own = dr.gather(mi.UInt32, pixel, which)
     slot = dr.gather(mi.UInt32, groups.slots, own)
     at = dr.gather(mi.UInt32, groups.pixels, slot - slot % n + k)
-    value = _seen(stage, heads, tails, which, at, at != own, at != _NEVER)
+    value = _seen(scene, heads, tails, which, at, at != own, at != _NEVER)
     level = level_of(film, at, value, at != _NEVER)
     good = (level > 0) & dr.isfinite(level)
     total = dr.zeros(mi.Float, dr.width(chain))
@@ -262,7 +262,7 @@ def _show(
 
 
 def _seen(
-    stage: Stage, heads: Any, tails: Any, chain: Any, at: Any, is_other: Any, active: Any
+    scene: DeviceScene, heads: Any, tails: Any, chain: Any, at: Any, is_other: Any, active: Any
 ) -> Any:
     """K of a chain's tail at a head; of its own head as the chain has found it."""
     h = [
@@ -302,7 +302,7 @@ def _seen(
     begin = offset(p1, dr.select(side > 0, ng1, -ng1))
     aim = p2 - begin
     reach = dr.norm(aim)
-    clear = stage.transmittance(begin, aim / reach, reach * (1 - 1e-4), valid)
+    clear = scene.transmittance(begin, aim / reach, reach * (1 - 1e-4), valid)
     value = _colour(h[6]) * value1 * inner * clear * (cos2 / distance2)
     return dr.select(is_other, dr.select(valid, value, 0), _colour(t[8]))
 
