@@ -15,7 +15,7 @@ from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.path_state import Only, fields_row, left_surface, white_hit
+from pbrs_farm.transport.kernels.path_state import Only, fields_row, left_surface, white_interaction
 from pbrs_farm.transport.kernels.path_step import advance, direct
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, SobolNumbers, device_array, stream_key
 
@@ -137,7 +137,7 @@ def _radiosity(
     """Sums over samples."""
     p, normal = place
     frame = mi.Frame3f(normal)
-    here = white_hit(p, normal)
+    here = white_interaction(p, normal)
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     s = mi.UInt32(0)
     while s < spp:

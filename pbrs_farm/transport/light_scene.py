@@ -303,7 +303,7 @@ class LightScene:
 
             self._emitters = Emitters(self.tables, self.sky, portals, weights)
             glow = glow_tables(self.device_scene, self._emitters, self.tables, 0)
-            self.device_scene.set_aims(*densities_by_face(glow))
+            self.device_scene.set_guiding_targets(*densities_by_face(glow))
             self._emitters.with_glow(glow)
         else:
             self._emitters.aim(portals, weights)

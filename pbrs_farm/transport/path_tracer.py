@@ -211,7 +211,7 @@ def _add_by_lamp(by_lamp: ByLamp | None, found: Found, active: Any) -> None:
     """Add what a step found to the lamps it came from; what is not finite is left out."""
     if by_lamp is None:
         return
-    met, lit = (found.met_indoor, found.hit.lamp), (found.lit_indoor, found.to_indoor.lamp)
+    met, lit = (found.met_indoor, found.si.emitter), (found.lit_indoor, found.to_indoor.lamp)
     for light, lamp in (met, lit):
         level = luminance(light)
         brings = active & (level > 0) & dr.isfinite(level)

@@ -17,11 +17,11 @@ pytestmark = pytest.mark.skipif(
 N = 1 << 18
 
 
-def scatter(kd: float, f0: float, alpha: float, tau: float = 0.0) -> Any:
+def bsdf(kd: float, f0: float, alpha: float, tau: float = 0.0) -> Any:
     mi = mitsuba()
-    from pbrs_farm.transport.kernels.bsdf import Scatter
+    from pbrs_farm.transport.kernels.bsdf import Bsdf
 
-    return Scatter(mi.Color3f(kd), mi.Color3f(f0), mi.Color3f(tau), mi.Float(alpha), mi.UInt32(0))
+    return Bsdf(mi.Color3f(kd), mi.Color3f(f0), mi.Color3f(tau), mi.Float(alpha), mi.UInt32(0))
 
 
 def direction(theta: float, phi: float = 0.3) -> Any:
@@ -46,7 +46,7 @@ def test_no_more_light_leaves_than_arrives(model: tuple[float, ...], theta: floa
     mi = mitsuba()
     from pbrs_farm.transport.kernels.bsdf import evaluate, sample
 
-    m, wi = scatter(*model), direction(theta)
+    m, wi = bsdf(*model), direction(theta)
     lobes = mi.Float(np.random.default_rng(1).random(N, np.float32))
     value, density = evaluate(m, wi, sample(m, wi, lobes, uniform_pairs(N, 2)))
     weight = (value[0] / density).numpy()
@@ -64,7 +64,7 @@ def test_samples_follow_the_density_they_name(model: tuple[float, ...], theta: f
     mi = mitsuba()
     from pbrs_farm.transport.kernels.bsdf import evaluate, sample
 
-    m, wi = scatter(*model), direction(theta)
+    m, wi = bsdf(*model), direction(theta)
     lobes = mi.Float(np.random.default_rng(3).random(N, np.float32))
     drawn = sample(m, wi, lobes, uniform_pairs(N, 4))
     uniform = mi.warp.square_to_uniform_sphere(uniform_pairs(8 * N, 5))
@@ -84,7 +84,7 @@ def test_samples_follow_the_density_they_name(model: tuple[float, ...], theta: f
 def test_swapping_the_directions_gives_the_same_reflectance(model: tuple[float, ...]) -> None:
     from pbrs_farm.transport.kernels.bsdf import evaluate
 
-    m = scatter(*model)
+    m = bsdf(*model)
     a, b = direction(0.4, 0.1), direction(1.1, 2.5)
     forth = evaluate(m, a, b)[0][0].numpy()[0] / np.cos(1.1)
     back = evaluate(m, b, a)[0][0].numpy()[0] / np.cos(0.4)

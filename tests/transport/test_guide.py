@@ -181,7 +181,7 @@ def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
         walk, found, _alive = advance(
             scene.device_scene, emitters, fields_row(FIELDS), Recorded(), walk, only, mi.Bool(True)
         )
-        assert found.hit.valid.numpy()[0]
+        assert found.si.valid.numpy()[0]
     assert not asked[0] & asked[1]
     assert not asked[1] & asked[2]
     assert not asked[0] & asked[2]

@@ -24,8 +24,12 @@ import mitsuba as mi
 
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
 from pbrs_farm.transport.guiding.nearby_lamps import Near, cone_density, drawn, in_cones
-from pbrs_farm.transport.kernels.bsdf import Scatter
-from pbrs_farm.transport.kernels.device_scene import DeviceScene, Hit, offset
+from pbrs_farm.transport.kernels.bsdf import Bsdf
+from pbrs_farm.transport.kernels.device_scene import (
+    DeviceScene,
+    SurfaceInteraction,
+    offset_ray_origin,
+)
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import Walk
 
@@ -65,7 +69,7 @@ class Guided(NamedTuple):
     valid: Any
 
 
-def guide_at(near: Near, m: Scatter, beta: Any, may_aim: Any) -> Guide:
+def guide_at(near: Near, m: Bsdf, beta: Any, may_aim: Any) -> Guide:
     """The guide of a vertex that a path of throughput beta has reached."""
     albedo = dr.minimum(m.kd + m.f0 + m.tau, 1)
     # Within a lamp the surface finds the light by itself.
@@ -88,7 +92,7 @@ def reflected_chance(reflectance: Any, worth: Any) -> Any:
 
 
 def guided(
-    guide: Guide, scene: DeviceScene, emitters: Emitters, hit: Hit, u: Any, uv: Any
+    guide: Guide, scene: DeviceScene, emitters: Emitters, si: SurfaceInteraction, u: Any, uv: Any
 ) -> Guided:
     """A direction by the second or third technique, where u says so."""
     share, coned = guide.share, guide.coned
@@ -100,7 +104,7 @@ def guided(
     v = dr.clip(v, 0, 1 - 1e-7)
     lamp, rest = drawn(guide.near.lamps, guide.near.aims, guide.near.at.aim_total, v)
     at_face = is_guided & ~is_coned
-    aim = emitters.aims.aim(scene, (hit.p, hit.ng), lamp, rest, uv, at_face)
+    aim = emitters.aims.aim(scene, (si.p, si.ng), lamp, rest, uv, at_face)
     d = dr.select(is_coned, in_cones(guide.near.cones, v, uv), aim.d)
     target = dr.select(at_face, aim.face, mi.UInt32(NO_FACE))
     return Guided(d, is_guided, own, target, ~at_face | aim.valid)
@@ -117,16 +121,18 @@ def face_chance(guide: Guide) -> Any:
     return guide.share * (1 - guide.coned) / total
 
 
-def kept(emitters: Emitters, walk: Walk, hit: Hit, only: Any, turned: Any, rough: Any) -> Any:
+def kept(
+    emitters: Emitters, walk: Walk, si: SurfaceInteraction, only: Any, turned: Any, rough: Any
+) -> Any:
     """What a walk's throughput keeps where its ray ends; 1 where it passes on.
 
     turned: it ends without meeting what a guided ray may aim at.
     """
     last, d = walk.last, walk.d
-    _level, aim = emitters.nearby.level(hit.aim_lamp, last.p, last.n, only, rough)
-    cos = dr.maximum(dr.abs(dr.dot(hit.ng, d)), 1e-6)
-    begin = offset(last.p, dr.select(dr.dot(last.n, d) > 0, last.n, -last.n))
-    density = aim * hit.aim * dr.squared_norm(hit.p - begin) / cos
+    _level, aim = emitters.nearby.level(si.target_emitter, last.p, last.n, only, rough)
+    cos = dr.maximum(dr.abs(dr.dot(si.ng, d)), 1e-6)
+    begin = offset_ray_origin(last.p, dr.select(dr.dot(last.n, d) > 0, last.n, -last.n))
+    density = aim * si.target_pdf * dr.squared_norm(si.p - begin) / cos
     balanced = dr.select(rough, dr.rcp(1 + walk.aimed * density), 1)
-    astray = (walk.target != NO_FACE) & (turned | (rough & (walk.target != hit.face)))
+    astray = (walk.target != NO_FACE) & (turned | (rough & (walk.target != si.face)))
     return dr.select(astray, 0, balanced)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.transport.kernels.alias_table import alias_rows, pick
-from pbrs_farm.transport.kernels.device_scene import DeviceScene, offset
+from pbrs_farm.transport.kernels.device_scene import DeviceScene, offset_ray_origin
 from pbrs_farm.transport.kernels.sampler import device_array
 
 BACK: Final = 0x80000000
@@ -67,10 +67,10 @@ class Aims:
         k, _u = pick(self._alias, first, dr.maximum(count, 1), u, active)
         side = dr.gather(mi.UInt32, self._sides, first + k, active)
         face = side & 0x7FFFFFFF
-        q, n = scene.lamp_point(face, uv, active)
+        q, n = scene.sample_face(face, uv, active)
         # From where the ray will start, or it would miss what is small and near.
         p, ng = p_ng
-        begin = offset(p, dr.select(dr.dot(ng, q - p) > 0, ng, -ng))
+        begin = offset_ray_origin(p, dr.select(dr.dot(ng, q - p) > 0, ng, -ng))
         d = dr.normalize(q - begin)
         n = dr.select(side >= BACK, -n, n)
         return Aim(d, face, active & (dr.dot(n, d) < 0))

@@ -25,14 +25,14 @@ from pbrs_farm.core.frames import LUMINANCE
 _SMOOTH_ALPHA = 0.1
 
 
-class Scatter(NamedTuple):
-    """A surface's parameters at a hit. kd, f0, tau: Color3f; alpha: 0 = no coat; kind: UInt32."""
+class Bsdf(NamedTuple):
+    """The parameters of the reflectance model at a point, lane by lane."""
 
-    kd: Any
-    f0: Any
-    tau: Any
-    alpha: Any
-    kind: Any
+    kd: Any  # Color3f, diffuse reflectance
+    f0: Any  # Color3f, the coat's reflectance at normal incidence; of a mirror its reflectance
+    tau: Any  # Color3f, diffuse transmittance; of thin glass its colour
+    alpha: Any  # GGX roughness of the coat, 0 = no coat
+    kind: Any  # UInt32, SURFACE, MIRROR, GLASS or HOLE
 
 
 def luminance(rgb: Any) -> Any:
@@ -40,7 +40,7 @@ def luminance(rgb: Any) -> Any:
     return rgb[0] * LUMINANCE[0] + rgb[1] * LUMINANCE[1] + rgb[2] * LUMINANCE[2]
 
 
-def evaluate(m: Scatter, wi: Any, wo: Any) -> tuple[Any, Any]:
+def evaluate(m: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
     """(f |cos wo|, density of sample() per solid angle); local directions, wi.z > 0."""
     above = wo.z > 0
     cos_o = dr.abs(wo.z)
@@ -66,7 +66,7 @@ def evaluate(m: Scatter, wi: Any, wo: Any) -> tuple[Any, Any]:
     return value, density
 
 
-def sample(m: Scatter, wi: Any, lobe: Any, u: Any) -> Any:
+def sample(m: Bsdf, wi: Any, lobe: Any, u: Any) -> Any:
     """A direction wo drawn with the density of evaluate()."""
     p_diffuse, p_coat = _lobes(m, wi)
     cosine = mi.warp.square_to_cosine_hemisphere(u)
@@ -76,12 +76,12 @@ def sample(m: Scatter, wi: Any, lobe: Any, u: Any) -> Any:
     return dr.select(use_coat, 2 * dr.dot(wi, h) * h - wi, wo)
 
 
-def is_smooth_lobe(m: Scatter) -> Any:
+def is_smooth_lobe(m: Bsdf) -> Any:
     """Whether what is seen of a surface changes slowly with the direction it is seen from."""
     return (m.alpha <= 0) | (m.alpha >= _SMOOTH_ALPHA)
 
 
-def steady_density(m: Scatter, ng: Any, w: Any) -> Any:
+def steady_density(m: Bsdf, ng: Any, w: Any) -> Any:
     """A density per solid angle like sample()'s that does not depend on wi; world directions.
 
     Positive wherever sample() may go from wi on the side of ng: a weight of the balance heuristic
@@ -102,7 +102,7 @@ def thin_glass_reflectance(cos_i: Any) -> Any:
     return 2 * r / (1 + r)
 
 
-def _lobes(m: Scatter, wi: Any) -> tuple[Any, Any]:
+def _lobes(m: Bsdf, wi: Any) -> tuple[Any, Any]:
     """(probability of the diffuse lobe, of the coat); the rest goes through the sheet."""
     coat = dr.select(m.alpha > 0, dr.maximum(luminance(_schlick(m.f0, wi.z)), 0.05), 0)
     diffuse, sheet = luminance(m.kd), luminance(m.tau)

@@ -125,7 +125,7 @@ class Emitters:
         count = dr.gather(mi.UInt32, self._lamp_first, lamp + 1, active) - first
         triangle, _u = pick(self._triangle_alias, first, count, u, active)
         face = dr.gather(mi.UInt32, self._lamp_faces, first + triangle, active)
-        q, n = scene.lamp_point(face, uv, active)
+        q, n = scene.sample_face(face, uv, active)
 
         to = q - near.at.p
         distance = dr.norm(to)

@@ -13,8 +13,12 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
 from pbrs_farm.transport.guiding.nearby_lamps import Near, Standpoint, nowhere
-from pbrs_farm.transport.kernels.bsdf import Scatter
-from pbrs_farm.transport.kernels.device_scene import DeviceScene, Hit, offset
+from pbrs_farm.transport.kernels.bsdf import Bsdf
+from pbrs_farm.transport.kernels.device_scene import (
+    DeviceScene,
+    SurfaceInteraction,
+    offset_ray_origin,
+)
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.sampler import opaque3
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
@@ -74,7 +78,7 @@ class Found(NamedTuple):
     met_*: from an emitter the ray met, by `segments` = the walk's depth before + 1 segments;
     lit_*: from shadow rays at the new vertex, one segment more than its depth.
     is_rough: the vertex is neither mirror nor glass; albedo, normal: of it. missed: no surface.
-    hit: the vertex; ahead, density: the direction scattered to, 0 = nowhere; to_outdoor, to_indoor:
+    si: the vertex; ahead, density: the direction scattered to, 0 = nowhere; to_outdoor, to_indoor:
     where the shadow rays went; steady: the vertex was weighted by steady_density (tails.py).
     """
 
@@ -86,7 +90,7 @@ class Found(NamedTuple):
     missed: Any
     albedo: Any
     normal: Any
-    hit: Any
+    si: Any
     ahead: Any
     density: Any
     to_outdoor: Any
@@ -164,7 +168,7 @@ def start(camera: CameraRow, x: Any, y: Any) -> Walk:
 def left_surface(p: Any, n: Any, d: Any, density: Any, near: Near) -> Walk:
     """The walk that leaves a matte surface at p in direction d, drawn with a density."""
     return Walk(
-        o=offset(p, n),
+        o=offset_ray_origin(p, n),
         d=d,
         beta=mi.Color3f(1),
         depth=mi.UInt32(1),
@@ -176,11 +180,13 @@ def left_surface(p: Any, n: Any, d: Any, density: Any, near: Near) -> Walk:
     )
 
 
-def white_hit(p: Any, n: Any) -> Hit:
+def white_interaction(p: Any, n: Any) -> SurfaceInteraction:
     """A white matte surface at p."""
-    white = Scatter(mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.UInt32(0))
+    white = Bsdf(mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.UInt32(0))
     no, none = mi.Bool(False), mi.UInt32(NO_LAMP)
-    return Hit(mi.Bool(True), p, n, n, n, none, white, no, mi.UInt32(0), mi.Float(0), none)
+    return SurfaceInteraction(
+        mi.Bool(True), p, n, n, n, none, white, no, mi.UInt32(0), mi.Float(0), none
+    )
 
 
 def _tent(u: Any) -> Any:

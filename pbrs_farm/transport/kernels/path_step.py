@@ -23,14 +23,18 @@ from pbrs_farm.transport.guiding.guided_rays import (
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
 from pbrs_farm.transport.guiding.nearby_lamps import Near, nowhere
 from pbrs_farm.transport.kernels.bsdf import (
-    Scatter,
+    Bsdf,
     evaluate,
     is_smooth_lobe,
     sample,
     steady_density,
     thin_glass_reflectance,
 )
-from pbrs_farm.transport.kernels.device_scene import DeviceScene, Hit, offset
+from pbrs_farm.transport.kernels.device_scene import (
+    DeviceScene,
+    SurfaceInteraction,
+    offset_ray_origin,
+)
 from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, Emitters, Towards
 from pbrs_farm.transport.kernels.path_state import FieldsRow, Found, Lit, Only, Walk
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, VERTEX_DIMS, Numbers
@@ -56,26 +60,26 @@ def advance(
     may_be_steady: vertices whose share between scattered and shadow ray must not depend on where
     the path came from, where their material allows it.
     """
-    hit = scene.hit(walk.o, walk.d, active)
-    missed = active & ~hit.valid
+    si = scene.intersect(walk.o, walk.d, active)
+    missed = active & ~si.valid
 
     # Kinds of surface.
-    m = hit.scatter
-    solid = hit.valid & ~hit.is_hole
+    m = si.bsdf
+    solid = si.valid & ~si.is_cutout
     glass, mirror = solid & (m.kind == GLASS), solid & (m.kind == MIRROR)
     rough = solid & ~glass & ~mirror
     depth = walk.depth + dr.select(solid & ~glass, mi.UInt32(1), 0)
     # Vertices, glass and holes each have numbers of their own. (What is counted must depend on the
-    # hit: Dr.Jit 1.5 reads local memory at the wrong place by an index that began as a literal.)
+    # surface: Dr.Jit 1.5 reads local memory at the wrong place by an index that began as a literal.)
     count = depth + walk.nulls + dr.select(solid & ~glass, mi.UInt32(0), 1)
     dim = CAMERA_DIMS + VERTEX_DIMS * dr.minimum(count - 1, 64)
-    frame = mi.Frame3f(hit.n)
+    frame = mi.Frame3f(si.n)
     wi = frame.to_local(-walk.d)
     wi.z = dr.maximum(wi.z, 1e-4)
     near = None
     if only.lamp is not None:
         is_sheet = dr.max(m.tau) > 0
-        near = emitters.nearby.seen(hit.p, dr.select(is_sheet, 0, hit.ng), only.lamp, solid)
+        near = emitters.nearby.seen(si.p, dr.select(is_sheet, 0, si.ng), only.lamp, solid)
     guiding = near if may_be_steady is False else None
 
     # Glass: near lamps more rays are reflected, and weigh less.
@@ -89,8 +93,8 @@ def advance(
 
     # Light that comes straight from an emitter.
     if guiding is not None:
-        walk.beta *= kept(emitters, walk, hit, only.lamp, missed | reflected, rough)
-    met_outdoor, met_indoor = _met(emitters, walk, hit, only, missed)
+        walk.beta *= kept(emitters, walk, si, only.lamp, missed | reflected, rough)
+    met_outdoor, met_indoor = _met(emitters, walk, si, only, missed)
     go_on = rough & (depth < fields.max_depth)
     steady = False if may_be_steady is False else may_be_steady & rough & is_smooth_lobe(m)
     guide = None
@@ -98,28 +102,26 @@ def advance(
         may_aim = go_on & (depth + 1 < fields.max_depth)
         guide = guide_at(guiding, m, walk.beta, may_aim)
     own = 1.0 if guide is None else 1 - guide.share
-    out, lamp = direct(
-        scene, emitters, hit, frame, wi, numbers, dim, only, near, go_on, own, steady
-    )
+    out, lamp = direct(scene, emitters, si, frame, wi, numbers, dim, only, near, go_on, own, steady)
 
-    # Scatter. Glass and mirrors keep one direction; what passes glass straight is no vertex.
+    # Bsdf. Glass and mirrors keep one direction; what passes glass straight is no vertex.
     uv = numbers.two(dim + _SCATTER)
     is_guided, target = mi.Bool(False), mi.UInt32(NO_FACE)
     if guide is None:
         ahead = mi.Vector3f(frame.to_world(sample(m, wi, lobe, uv)))
     else:
-        to = guided(guide, scene, emitters, hit, lobe, uv)
+        to = guided(guide, scene, emitters, si, lobe, uv)
         is_guided, target = to.is_guided, to.target
         by_surface = mi.Vector3f(frame.to_world(sample(m, wi, to.own, uv)))
         ahead = dr.select(is_guided, to.d, by_surface)
         go_on &= to.valid
     wo = frame.to_local(ahead)
     value, density = evaluate(m, wi, wo)
-    bounced = go_on & (dr.dot(hit.ng, ahead) * wo.z > 0) & (density > 0)
-    back = walk.d - 2 * dr.dot(hit.n, walk.d) * hit.n
+    bounced = go_on & (dr.dot(si.ng, ahead) * wo.z > 0) & (density > 0)
+    back = walk.d - 2 * dr.dot(si.n, walk.d) * si.n
     may_pass = walk.nulls < MAX_NULLS
-    mirrored = reflected & may_pass & (depth < fields.max_depth) & (dr.dot(back, hit.ng) > 0)
-    passed = ((glass & ~reflected) | (hit.valid & hit.is_hole)) & may_pass
+    mirrored = reflected & may_pass & (depth < fields.max_depth) & (dr.dot(back, si.ng) > 0)
+    passed = ((glass & ~reflected) | (si.valid & si.is_cutout)) & may_pass
     beta = walk.beta * _factor(m, value, density, rough, mirror, glass & passed)
     if guiding is not None:
         share = dr.select(reflected, mirroring / p_mirroring, (1 - mirroring) / (1 - p_mirroring))
@@ -142,12 +144,12 @@ def advance(
 
     weighed = density * own
     if steady is not False:
-        weighed = dr.select(steady, steady_density(m, hit.ng, ahead), density)
+        weighed = dr.select(steady, steady_density(m, si.ng, ahead), density)
     d = dr.select(bounced, ahead, dr.select(mirrored, mi.Vector3f(back), walk.d))
-    outward = dr.select(dr.dot(d, hit.ng) > 0, hit.ng, -hit.ng)
-    here = nowhere(hit.p) if near is None else near.at
+    outward = dr.select(dr.dot(d, si.ng) > 0, si.ng, -si.ng)
+    here = nowhere(si.p) if near is None else near.at
     following = Walk(
-        o=offset(hit.p, outward),
+        o=offset_ray_origin(si.p, outward),
         d=d,
         beta=beta,
         depth=depth,
@@ -165,8 +167,8 @@ def advance(
         rough,
         missed,
         dr.minimum(m.kd + m.f0 + m.tau, 1),
-        hit.n,
-        hit,
+        si.n,
+        si,
         ahead,
         dr.select(bounced, density, 0),
         out,
@@ -179,7 +181,7 @@ def advance(
 def direct(
     scene: DeviceScene,
     emitters: Emitters,
-    hit: Hit,
+    si: SurfaceInteraction,
     frame: Any,
     wi: Any,
     numbers: Numbers,
@@ -198,22 +200,20 @@ def direct(
     if only.outdoor is not None:
         asks = active & (only.outdoor > -2)
         u, uv = numbers.one(dim + _OUT), numbers.two(dim + _OUT_UV)
-        out = emitters.sample_outdoor(hit.p, u, uv, only.outdoor, asks)
+        out = emitters.sample_outdoor(si.p, u, uv, only.outdoor, asks)
     if only.lamp is not None and near is not None:
         asks = active & (only.lamp > -2)
         u, uv = numbers.one(dim + _LAMP), numbers.two(dim + _LAMP_UV)
         lamp = emitters.sample_lamp(scene, near, u, uv, only.lamp, asks)
     # The pilot draws a portal's light through the portal alone.
     alone = False if only.outdoor is None else only.outdoor >= FIRST_PORTAL
-    to_outdoor, to_lamp = (
-        _lit(scene, hit, frame, wi, to, alone, own, steady) for to in (out, lamp)
-    )
+    to_outdoor, to_lamp = (_lit(scene, si, frame, wi, to, alone, own, steady) for to in (out, lamp))
     return to_outdoor, to_lamp
 
 
 def _lit(
     scene: DeviceScene,
-    hit: Hit,
+    si: SurfaceInteraction,
     frame: Any,
     wi: Any,
     to: Towards | None,
@@ -225,21 +225,21 @@ def _lit(
     if to is None:
         return Lit(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
     wo = frame.to_local(to.d)
-    value, density = evaluate(hit.scatter, wi, wo)
+    value, density = evaluate(si.bsdf, wi, wo)
     density *= own
     # Light may not come through the face when the shading normal says it does not.
-    side = dr.dot(hit.ng, to.d)
+    side = dr.dot(si.ng, to.d)
     faces = side * wo.z > 0
     lit = faces & (dr.max(value) > 0)
     if steady is not False:
         # Whatever wi is: what could be lit from some wi is asked for.
-        density = dr.select(steady, steady_density(hit.scatter, hit.ng, to.d), density)
-        lit = dr.select(steady, (side > 0) | (dr.max(hit.scatter.tau) > 0), lit)
+        density = dr.select(steady, steady_density(si.bsdf, si.ng, to.d), density)
+        lit = dr.select(steady, (side > 0) | (dr.max(si.bsdf.tau) > 0), lit)
     lit = lit & to.valid & (to.density > 0)
     weight = 1 / (to.density + dr.select(alone, 0, density))
-    begin = offset(hit.p, dr.select(side > 0, hit.ng, -hit.ng))
+    begin = offset_ray_origin(si.p, dr.select(side > 0, si.ng, -si.ng))
     # Aim again from the moved start: a lamp near by must not shadow itself.
-    aim = hit.p + to.d * to.distance - begin
+    aim = si.p + to.d * to.distance - begin
     reach = dr.norm(aim)
     is_near = to.distance < dr.inf
     way = dr.select(is_near, aim / reach, to.d)
@@ -249,7 +249,9 @@ def _lit(
     return Lit(dr.select(lit & faces, value * strength, 0), to.d, strength, to.lamp)
 
 
-def _met(emitters: Emitters, walk: Walk, hit: Hit, only: Only, missed: Any) -> tuple[Any, Any]:
+def _met(
+    emitters: Emitters, walk: Walk, si: SurfaceInteraction, only: Only, missed: Any
+) -> tuple[Any, Any]:
     """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled."""
     by_scatter = walk.last_density > 0
 
@@ -270,12 +272,12 @@ def _met(emitters: Emitters, walk: Walk, hit: Hit, only: Only, missed: Any) -> t
         sky = sun * weight(sun_density) + dome * weight(dome_density)
         outdoor = dr.select(sees_sky, walk.beta * sky, 0)
     if only.lamp is not None:
-        glows = hit.valid & counts & (only.lamp > -2) & (hit.lamp != NO_LAMP)
+        glows = si.valid & counts & (only.lamp > -2) & (si.emitter != NO_LAMP)
         glow, lamp_density = emitters.hit_lamp(
-            hit.lamp,
+            si.emitter,
             walk.last,
-            dr.norm(hit.p - walk.last.p),
-            dr.dot(walk.d, hit.ng),
+            dr.norm(si.p - walk.last.p),
+            dr.dot(walk.d, si.ng),
             only.lamp,
             glows,
         )
@@ -283,7 +285,7 @@ def _met(emitters: Emitters, walk: Walk, hit: Hit, only: Only, missed: Any) -> t
     return outdoor, indoor
 
 
-def _factor(m: Scatter, value: Any, density: Any, rough: Any, mirror: Any, passed: Any) -> Any:
+def _factor(m: Bsdf, value: Any, density: Any, rough: Any, mirror: Any, passed: Any) -> Any:
     """What the throughput is multiplied by."""
     factor = dr.select(rough, value / density, mi.Color3f(1))
     factor = dr.select(mirror, m.f0, factor)

@@ -266,7 +266,7 @@ def _onward(
     write_tail(tail, found, walk, trial.passes, rules.only, is_second & found.steady)
     head = dr.select(is_second, following.beta, trial.head)
     following.beta = dr.select(is_second, 1, following.beta)
-    is_far = dr.squared_norm(found.hit.p - walk.last.p) > NEAR_M**2
+    is_far = dr.squared_norm(found.si.p - walk.last.p) > NEAR_M**2
     # What reflects, glass too, forgets the density of the direction.
     goes_on = trial.is_straight & (following.last_density > 0)
     is_straight = dr.select(before == 0, found.is_rough, goes_on)
@@ -278,7 +278,7 @@ def _onward(
             head,
             trial.tail + dr.select(is_beyond, met + lit, 0),
             is_straight,
-            trial.passes * dr.select(before == 1, passing_chance(found.hit, walk.d), 1),
+            trial.passes * dr.select(before == 1, passing_chance(found.si, walk.d), 1),
             dr.select(is_second, can_share, trial.is_shared),
         ),
         alive,

@@ -28,8 +28,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from pbrs_farm.transport.kernels.bsdf import Scatter, evaluate, thin_glass_reflectance
-from pbrs_farm.transport.kernels.device_scene import DeviceScene, Hit, bent, offset
+from pbrs_farm.transport.kernels.bsdf import Bsdf, evaluate, thin_glass_reflectance
+from pbrs_farm.transport.kernels.device_scene import (
+    DeviceScene,
+    SurfaceInteraction,
+    bend_normal,
+    offset_ray_origin,
+)
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
     CameraRow,
@@ -140,11 +145,11 @@ def _trace_heads(
         before, d = mi.Color3f(walk.beta), mi.Vector3f(walk.d)
         walk, found, alive = advance(scene, emitters, fields, numbers, walk, off, active)
         here = active & found.is_rough & (walk.depth == 1)
-        m = found.hit.scatter
+        m = found.si.bsdf
         p, n, ng = (
-            dr.select(here, found.hit.p, p),
-            dr.select(here, found.hit.n, n),
-            dr.select(here, found.hit.ng, ng),
+            dr.select(here, found.si.p, p),
+            dr.select(here, found.si.n, n),
+            dr.select(here, found.si.ng, ng),
         )
         wi, beta = dr.select(here, -d, wi), dr.select(here, before, beta)
         kd, f0 = dr.select(here, m.kd, kd), dr.select(here, m.f0, f0)
@@ -164,10 +169,10 @@ def _trace_heads(
         dr.scatter(rows, value, lane * (_HEAD_PACKETS * 4) + k)
 
 
-def passing_chance(hit: Hit, d: Any) -> Any:
+def passing_chance(si: SurfaceInteraction, d: Any) -> Any:
     """Chance that a path goes straight through what it met: below 1 for glass, 1 for all else."""
-    is_glass = hit.valid & ~hit.is_hole & (hit.scatter.kind == GLASS)
-    return dr.select(is_glass, 1 - thin_glass_reflectance(dr.dot(hit.n, d)), 1)
+    is_glass = si.valid & ~si.is_cutout & (si.bsdf.kind == GLASS)
+    return dr.select(is_glass, 1 - thin_glass_reflectance(dr.dot(si.n, d)), 1)
 
 
 def write_tail(tail: Any, found: Found, walk: Walk, passes: Any, only: Only, active: Any) -> None:
@@ -176,17 +181,17 @@ def write_tail(tail: Any, found: Found, walk: Walk, passes: Any, only: Only, act
     walk: as it was when it set out from the first vertex, or from the last sheet of glass on the
     way; passes: chance of having passed those.
     """
-    hit, m = found.hit, found.hit.scatter
-    way = hit.p - walk.last.p
+    si, m = found.si, found.si.bsdf
+    way = si.p - walk.last.p
     to = found.to_outdoor if only.lamp is None else found.to_indoor
     # What turns the contribution into K's measure: the densities of x2 and of leaving it, the
     # chance of the glass between.
-    cos = dr.abs(dr.dot(hit.ng, walk.d))
+    cos = dr.abs(dr.dot(si.ng, walk.d))
     densities = walk.last_density * cos / dr.squared_norm(way) * found.density * passes
     values = (
-        *(hit.p.x, hit.p.y, hit.p.z, densities),
-        *(hit.smooth.x, hit.smooth.y, hit.smooth.z, m.alpha),
-        *(hit.ng.x, hit.ng.y, hit.ng.z, found.ahead.x),
+        *(si.p.x, si.p.y, si.p.z, densities),
+        *(si.n_interpolated.x, si.n_interpolated.y, si.n_interpolated.z, m.alpha),
+        *(si.ng.x, si.ng.y, si.ng.z, found.ahead.x),
         *(m.kd[0], m.kd[1], m.kd[2], found.ahead.y),
         *(m.f0[0], m.f0[1], m.f0[2], found.ahead.z),
         *(m.tau[0], m.tau[1], m.tau[2], to.d.x),
@@ -271,8 +276,8 @@ def _seen(
     t = [dr.gather(mi.Vector4f, tails, chain * (TAIL_FLOATS // 4) + k) for k in range(9)]
     p1, p2 = _point(h[0]), _point(t[0])
     n1, ng1, ng2 = _vector(h[1]), _vector(h[2]), _vector(t[2])
-    m1 = Scatter(_colour(h[3]), _colour(h[4]), _colour(h[5]), h[1][3], mi.UInt32(0))
-    m2 = Scatter(_colour(t[3]), _colour(t[4]), _colour(t[5]), t[1][3], mi.UInt32(0))
+    m1 = Bsdf(_colour(h[3]), _colour(h[4]), _colour(h[5]), h[1][3], mi.UInt32(0))
+    m2 = Bsdf(_colour(t[3]), _colour(t[4]), _colour(t[5]), t[1][3], mi.UInt32(0))
     wi1 = mi.Vector3f(h[2][3], h[3][3], h[4][3])
     way = p2 - p1
     distance2 = dr.squared_norm(way)
@@ -289,7 +294,7 @@ def _seen(
     valid &= (density1 > 0) & (dr.max(value1) > 0) & (cos2 > 0)
 
     # At x2: towards the lamp, and along the tail.
-    frame2 = mi.Frame3f(bent(_vector(t[1]), d))
+    frame2 = mi.Frame3f(bend_normal(_vector(t[1]), d))
     wi2 = frame2.to_local(-d)
     wi2.z = dr.maximum(wi2.z, 1e-4)
     to_lamp = mi.Vector3f(t[5][3], t[6][3], t[7][3])
@@ -299,7 +304,7 @@ def _seen(
     inner = from_lamp * _colour(t[6]) * density2 + from_tail * _colour(t[7])
     valid &= (density2 > 0) & (dr.max(inner) > 0)
 
-    begin = offset(p1, dr.select(side > 0, ng1, -ng1))
+    begin = offset_ray_origin(p1, dr.select(side > 0, ng1, -ng1))
     aim = p2 - begin
     reach = dr.norm(aim)
     clear = scene.transmittance(begin, aim / reach, reach * (1 - 1e-4), valid)
@@ -307,7 +312,7 @@ def _seen(
     return dr.select(is_other, dr.select(valid, value, 0), _colour(t[8]))
 
 
-def _scattered(m: Scatter, frame: Any, ng: Any, wi: Any, d: Any) -> tuple[Any, Any]:
+def _scattered(m: Bsdf, frame: Any, ng: Any, wi: Any, d: Any) -> tuple[Any, Any]:
     """(f |cos|, density) of going on in direction d; nothing where d leaves through the face."""
     wo = frame.to_local(d)
     value, density = evaluate(m, wi, wo)

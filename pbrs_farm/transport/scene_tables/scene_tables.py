@@ -33,7 +33,7 @@ class SceneTables:
 
     positions (V, 3) float32, faces (F, 3) int32: the mesh for Mitsuba, degenerate faces removed.
     face_rows: (F, 28) float32 v0 u0 | e1 v0 | e2 du1 | dv1 du2 dv2 0 | n0 a | n1 b | n2 c; a, b, c
-    are kept free for DeviceScene.set_aims.
+    are kept free for DeviceScene.set_guiding_targets.
     face_tags: (F,) uint32, material + 65536 * lamp (65535 = no lamp).
     see_through: (F,) bool, thin glass and cut-outs: shadow rays may pass.
     material_rows: (M, 16) float32. texels: the packed texture atlas.
