@@ -1,6 +1,6 @@
 """Ground truth: one hit record at pixel centres -> every label layer; pure functions, no effects."""
 
-from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
+from pbrs_farm.truth.boundary import typed_boundaries
 from pbrs_farm.truth.coverage import coverage
 from pbrs_farm.truth.depth_sensor import sensor_depth
 from pbrs_farm.truth.optional_layers import (
@@ -8,41 +8,24 @@ from pbrs_farm.truth.optional_layers import (
     LabelInputs,
     optional_layers,
     optional_tables,
-    see_through_faces,
-    source_classes,
 )
 from pbrs_farm.truth.room_layout import layout_table
-from pbrs_farm.truth.standard_layers import (
-    depth_mm,
-    instance_png,
-    layers_from_hit,
-    normal_png,
-    nyu40_of_instance,
-    semantic_png,
-    valid_png,
-)
-from pbrs_farm.truth.view_table import camera_table, is_truncated, view_table
+from pbrs_farm.truth.standard_layers import depth_mm, instance_png, layers_from_hit, normal_png
+from pbrs_farm.truth.view_table import is_truncated, view_table
 
 __all__ = [
     "OPTIONAL_NAMES",
     "LabelInputs",
-    "camera_table",
     "coverage",
     "depth_mm",
-    "instance_boundary",
     "instance_png",
     "is_truncated",
     "layers_from_hit",
     "layout_table",
     "normal_png",
-    "nyu40_of_instance",
     "optional_layers",
     "optional_tables",
-    "see_through_faces",
-    "semantic_png",
     "sensor_depth",
-    "source_classes",
     "typed_boundaries",
-    "valid_png",
     "view_table",
 ]

@@ -1,4 +1,4 @@
-"""Boundaries between pixels: the published instance boundary and typed ones; no effects."""
+"""Boundary layers: the published instance boundary, occlusion and crease edges; no effects."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import HitRecord, Mask
 from pbrs_farm.core.camera import Camera
 
-OCCLUSION_GAP_M = 0.03
-OCCLUSION_GAP_SHARE = 0.02
-CREASE_RAD = float(np.radians(30))
-OWNER, HIDDEN = 255, 128
+OCCLUSION_GAP_M = 0.03  # least step in depth of an occlusion boundary
+OCCLUSION_GAP_SHARE = 0.02  # the same as a share of the nearer depth: far pixels are far apart
+CREASE_RAD = float(np.radians(30))  # least angle between normals of a crease
+OWNER, HIDDEN = 255, 128  # the side that owns the occluding edge, the side that is occluded
 
 
 def instance_boundary(instance: NDArray[Any]) -> NDArray[np.uint8]:
@@ -23,6 +23,7 @@ def instance_boundary(instance: NDArray[Any]) -> NDArray[np.uint8]:
     different ids; in the last row when it differs from its right, in the last column from its
     lower neighbour; the bottom right corner never is.
     """
+    # Compare each pixel with its right and its lower neighbour.
     right = instance[:, :-1] != instance[:, 1:]
     down = instance[:-1, :] != instance[1:, :]
     return np.where(block_edges(right, down), 255, 0).astype(np.uint8)
@@ -30,11 +31,10 @@ def instance_boundary(instance: NDArray[Any]) -> NDArray[np.uint8]:
 
 def block_edges(right: Mask, down: Mask) -> Mask:
     """(H, W) bool from edges to the right (H, W - 1) and down (H - 1, W): any inside the block."""
-    height, width = right.shape[0], down.shape[1]
-    edge = np.zeros((height, width), bool)
-    edge[:, :-1] |= right
-    edge[:-1, :] |= down
-    edge[:-1, :-1] |= right[1:, :] | down[:, 1:]
+    edge = np.zeros((right.shape[0], down.shape[1]), bool)
+    edge[:, :-1] |= right  # the block's upper pair
+    edge[:-1, :] |= down  # its left pair
+    edge[:-1, :-1] |= right[1:, :] | down[:, 1:]  # its lower and its right pair
     return edge
 
 
@@ -51,13 +51,15 @@ def typed_boundaries(hit: HitRecord, camera: Camera) -> tuple[NDArray[np.uint8],
     _, rays = camera.rays()
     occlusion = np.zeros(hit.face.shape, np.uint8)
     creases = []
-    for axis in (1, 0):
+    for axis in (1, 0):  # pairs along rows, then along columns
         first, second = _neighbours(axis)
         gap = _is_gap(hit, rays, first, second)
+        # Mark both sides of an occlusion; of a pixel in several pairs the owner's mark wins.
         near_first = _nearer(hit.depth_z[first], hit.depth_z[second])
         for side, is_near in ((first, near_first), (second, ~near_first)):
             mark = np.where(gap, np.where(is_near, OWNER, HIDDEN), 0).astype(np.uint8)
             occlusion[side] = np.maximum(occlusion[side], mark)
+        # Mark creases where one surface, or two that touch, turn.
         normal = hit.geo_normal_world
         cosine = np.einsum("...i,...i->...", normal[first], normal[second])
         both = hit.valid[first] & hit.valid[second]
@@ -74,20 +76,23 @@ def _neighbours(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
 def _is_gap(
     hit: HitRecord, rays: NDArray[np.float32], first: tuple[slice, ...], second: tuple[slice, ...]
 ) -> Mask:
+    """Whether depth steps between the pixels of each pair, and no plane explains the step."""
+    # Ask for a step above the absolute and the relative threshold.
     z_first, z_second = hit.depth_z[first], hit.depth_z[second]
     nearer = np.minimum(z_first, z_second)
     threshold = np.maximum(np.float32(OCCLUSION_GAP_M), np.float32(OCCLUSION_GAP_SHARE) * nearer)
     gap: Mask = np.abs(z_first - z_second) > threshold
 
-    # Only where depths differ can a plane explain the difference.
+    # Extend the tangent plane of either side to the other pixel's ray, where depths differ.
     asked = np.nonzero(gap & (nearer > 0))
     ends = [
         (hit.geo_normal_world[side][asked], hit.depth_z[side][asked], rays[side][asked])
         for side in (first, second)
     ]
     miss_second, miss_first = _plane_miss(*ends), _plane_miss(*ends[::-1])
+    # Drop steps that a plane explains: the surface goes on, seen at a grazing angle.
     near = np.minimum(np.abs(miss_first), np.abs(miss_second)) <= threshold[asked]
-    # Both planes beyond what is seen, or both before it: they meet between the two pixels.
+    # Drop corners: both planes beyond what is seen, or both before it, meet between the pixels.
     meet = (miss_first > 0) == (miss_second > 0)
     gap[asked] = ~(near | meet)
     return gap
@@ -99,9 +104,11 @@ _End = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
 def _plane_miss(at: _End, other: _End) -> NDArray[np.float32]:
     """(N,) how far the other's depth lies from the tangent plane here; an end: normal, depth, ray."""
     normal, depth, ray = at
+    # Intersect the other pixel's ray with this pixel's plane n x = n (depth ray).
     with np.errstate(divide="ignore", invalid="ignore"):
         along = np.einsum("ni,ni->n", normal, ray)
         predicted = depth * along / np.einsum("ni,ni->n", normal, other[2])
+    # Count a plane that the ray meets behind the camera, or never, as infinitely far.
     ahead = np.where(predicted > 0, predicted, np.float32(np.inf))
     return np.asarray(ahead - other[1], np.float32)
 

@@ -1,4 +1,4 @@
-"""Which pixels an item would cover if it were alone in the world; no effects.
+"""An item's unoccluded mask: the pixels it would cover if it were alone; no effects.
 
 Exact at pixel centres: a ray through the eye meets a triangle where it lies on the same side of
 the three planes through the eye and the triangle's edges (Olano and Greer 1997), so nothing is
@@ -14,11 +14,12 @@ from pbrs_farm.core.arrays import Mask
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import Item
 
-_CHUNK_ROWS = 500_000
+_CHUNK_ROWS = 500_000  # row intervals handled at once: bounds memory on large meshes
 
 
 def coverage(item: Item, camera: Camera) -> Mask:
     """(H, W) bool: the ray through the pixel's centre meets any triangle of item."""
+    # Count intervals that begin and end along each row; their running sum is the depth of cover.
     i = camera.intrinsics
     starts = np.zeros((i.height_px, i.width_px + 1), np.int32)
     for s in item.surfaces:
@@ -36,6 +37,7 @@ def _camera_space(points: NDArray[np.float32], camera: Camera) -> NDArray[np.flo
 
 def _add_triangles(starts: NDArray[np.int32], corners: NDArray[np.float64], i: Intrinsics) -> None:
     """Add to starts, per row, +1 where a triangle (T, 3, 3) begins and -1 past where it ends."""
+    # Cut the triangles into chunks of bounded rows, one triangle at least.
     first, n_rows = _rows_of_triangles(corners, i)
     kept = np.nonzero(n_rows)[0]
     ends = np.cumsum(n_rows[kept])
@@ -52,11 +54,13 @@ def _rows_of_triangles(
     corners: NDArray[np.float64], i: Intrinsics
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(T,) first row whose pixel centres a triangle may cover, and how many rows follow from it."""
+    # Project triangles that lie wholly before the camera; others may cover any row.
     z = corners[..., 2]
     ahead = (z > 1e-6).all(1)
     y = i.fy * corners[..., 1] / np.where(z > 1e-6, z, 1.0) + i.cy - 0.5
     first = np.where(ahead, np.ceil(y.min(1) - 1e-6), 0)
     last = np.where(ahead, np.floor(y.max(1) + 1e-6), i.height_px - 1)
+    # Hold the rows to the picture; a triangle behind the camera covers none.
     first, last = np.clip(first, 0, i.height_px), np.clip(last, -1, i.height_px - 1)
     n_rows = np.where((z <= 0).all(1), 0, np.maximum(last - first + 1, 0))
     return first.astype(np.int64), n_rows.astype(np.int64)
@@ -69,17 +73,18 @@ def _add_spans(
     n_rows: NDArray[np.int64],
     i: Intrinsics,
 ) -> None:
+    # List one interval for each triangle and row; y is the row's ray at z = 1.
     owner = np.repeat(np.arange(len(corners)), n_rows)
     row = np.arange(len(owner)) - np.repeat(np.cumsum(n_rows) - n_rows - first, n_rows)
     y = (row + 0.5 - i.cy) / i.fy
 
-    # Planes through the eye and each edge, turned so that the triangle is where they are positive.
+    # Span planes by the eye and each edge; turn them so that they are positive in the triangle.
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     planes = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     determinant = np.einsum("ti,ti->t", a, planes[:, 0])
     planes *= np.sign(determinant)[:, None, None]
 
-    # On a row, p x + q >= 0 bounds x from below (p > 0) or above (p < 0).
+    # Intersect the half-lines p x + q >= 0 on each row: bounds from below (p > 0), above (p < 0).
     low = np.full(len(owner), -np.inf)
     high = np.full(len(owner), np.inf)
     for edge in range(3):
@@ -90,6 +95,7 @@ def _add_spans(
         high = np.where(p < 0, np.minimum(high, bound), high)
         low = np.where((p == 0) & (q < 0), np.inf, low)
 
+    # Round inwards to pixel centres and add the interval's two ends.
     left = np.ceil(np.clip(i.fx * low + i.cx - 0.5, 0, i.width_px)).astype(np.int64)
     right = np.floor(np.clip(i.fx * high + i.cx - 0.5, -1, i.width_px - 1)).astype(np.int64)
     covers = (right >= left) & (determinant != 0)[owner]

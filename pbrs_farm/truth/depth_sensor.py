@@ -1,9 +1,7 @@
-"""Depth as a structured-light sensor (first Kinect, NYUv2's) would give it; no effects.
+"""The depth_sensor layer: depth as a structured-light sensor (Kinect 1, NYUv2) has it; no effects.
 
-Edges wander (lateral noise), disparity is noisy and measured in eighths of a pixel, surfaces at
-grazing angles and out of range are lost, and so is what the projector, 7.5 cm beside the camera,
-cannot reach. Models: Handa et al. 2014 (noise, quantisation), Nguyen et al. 2012 (angles),
-Khoshelham and Elberink 2012 (baseline and focal length of the sensor).
+The model has lateral noise, noisy disparity quantised to eighths of a pixel, no return at grazing
+angles and out of range, and none in the shadow of the projector 7.5 cm beside the camera.
 """
 
 from __future__ import annotations
@@ -14,13 +12,13 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import HitRecord, Mask
 from pbrs_farm.core.camera import Camera
 
-FOCAL_PX = 580.0
-BASELINE_M = 0.075
-NEAREST_M, FARTHEST_M = 0.5, 8.0
-LATERAL_PX = 0.5
-DISPARITY_NOISE_PX = 1 / 6
-STEPS_PER_PX = 8
-MAX_ANGLE_RAD = np.radians(82)
+FOCAL_PX = 580.0  # the sensor's infrared camera, Khoshelham and Elberink 2012
+BASELINE_M = 0.075  # from camera to projector, the same source
+NEAREST_M, FARTHEST_M = 0.5, 8.0  # range in which the sensor answers
+LATERAL_PX = 0.5  # standard deviation of the measured place, Handa et al. 2014
+DISPARITY_NOISE_PX = 1 / 6  # standard deviation, the same source
+STEPS_PER_PX = 8  # quantisation of disparity, the same source
+MAX_ANGLE_RAD = np.radians(82)  # from the normal; beyond it nothing returns, Nguyen et al. 2012
 
 
 def sensor_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uint16]:
@@ -29,11 +27,13 @@ def sensor_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uin
     Equal seeds give equal noise. Not modelled: interreflection, sunlight, glass and mirrors
     (they measure as their surface), temperature drift.
     """
+    # Read the depth of a pixel nearby where projector and camera both see the surface.
     rng = np.random.default_rng(seed)
-    reached = hit.valid & ~_grazing(hit, camera) & ~_shadowed(hit.depth_z, camera)
-    rows, columns = _wandered(hit.face.shape, rng)
+    reached = hit.valid & ~_grazing(hit, camera) & ~_in_projector_shadow(hit.depth_z, camera)
+    rows, columns = _laterally_moved(hit.face.shape, rng)
     z = np.where(reached, hit.depth_z, 0)[rows, columns].astype(np.float64)
 
+    # Add noise to the disparity f b / z, quantise it, and turn it back into depth.
     with np.errstate(divide="ignore"):
         disparity = FOCAL_PX * BASELINE_M / z + rng.normal(0, DISPARITY_NOISE_PX, z.shape)
         measured = FOCAL_PX * BASELINE_M / (np.rint(disparity * STEPS_PER_PX) / STEPS_PER_PX)
@@ -47,7 +47,7 @@ def _grazing(hit: HitRecord, camera: Camera) -> Mask:
     return np.asarray(cosine < np.cos(MAX_ANGLE_RAD) * np.linalg.norm(rays, axis=-1))
 
 
-def _shadowed(depth_z: NDArray[np.float32], camera: Camera) -> Mask:
+def _in_projector_shadow(depth_z: NDArray[np.float32], camera: Camera) -> Mask:
     """(H, W) bool: a nearer surface on the same row hides the point from the projector.
 
     The projector stands BASELINE_M to the right of the camera: seen from there, column x moves
@@ -57,15 +57,16 @@ def _shadowed(depth_z: NDArray[np.float32], camera: Camera) -> Mask:
     with np.errstate(divide="ignore"):
         shift = np.where(depth_z > 0, fx * BASELINE_M / depth_z, 0)
     from_projector = np.arange(depth_z.shape[1]) - shift
-    # Reached points keep their order along the row: whatever lies right of a point here must there.
+    # Find points that something on their right overtakes: lit points keep their order along a row.
     leftmost = np.minimum.accumulate(from_projector[:, ::-1], axis=1)[:, ::-1]
     return np.asarray(from_projector > leftmost + 0.5)
 
 
-def _wandered(
+def _laterally_moved(
     shape: tuple[int, ...], rng: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows and columns (H, W) of the pixel each pixel really measures."""
+    # Draw a place around each pixel and hold it to the picture.
     grid = np.indices(shape) + rng.normal(0, LATERAL_PX, (2, *shape))
     limit = np.array(shape).reshape(2, 1, 1) - 1
     rows, columns = np.clip(np.rint(grid), 0, limit).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The layers that are made when asked for, from the same hit record; no effects."""
+"""Optional label layers: made when asked for, from the same hit record; no effects."""
 
 from __future__ import annotations
 
@@ -27,31 +27,26 @@ from pbrs_farm.truth.standard_layers import (
     semantic_png,
 )
 
-HitWithout = Callable[[Mask], HitRecord]
-"""(F,) bool faces that rays pass through -> the hit record of the same camera without them."""
+HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the same camera's hits
 
 
 @dataclass(frozen=True)
 class LabelInputs:
-    """Everything the optional layers are made of.
-
-    hit_without: for the layers behind glass. textures: texture id -> (H, W, 3 or 4) uint8 sRGB,
-    row 0 = top, for albedo. seed: for the noise of depth_sensor.
-    """
+    """What the optional layers of one view are computed from."""
 
     hit: HitRecord
     house: House
-    geometry: Geometry
+    geometry: Geometry  # of house: what hit.face counts in
     camera: Camera
-    hit_without: HitWithout
-    textures: Mapping[str, NDArray[np.uint8]]
-    seed: int = 0
+    hit_without: HitWithout  # for the layers behind glass
+    textures: Mapping[str, NDArray[np.uint8]]  # id -> (H, W, 3 or 4) sRGB, row 0 = top, for albedo
+    seed: int = 0  # of depth_sensor's noise
 
     @cached_property
     def behind(self) -> HitRecord:
         """The hit record behind glass: the first hit that is neither glass nor pane."""
-        clear = see_through_faces(self.geometry, self.house)
-        return self.hit_without(clear) if clear.any() else self.hit
+        transparent = transparent_faces(self.geometry, self.house)
+        return self.hit_without(transparent) if transparent.any() else self.hit
 
     @cached_property
     def boundaries(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
@@ -59,13 +54,13 @@ class LabelInputs:
         return typed_boundaries(self.hit, self.camera)
 
 
-def see_through_faces(geometry: Geometry, house: House) -> Mask:
+def transparent_faces(geometry: Geometry, house: House) -> Mask:
     """(F,) bool: the face's material is glass or a pane."""
     kinds = (MaterialKind.GLASS, MaterialKind.PANE)
-    clear = np.array([m.kind in kinds for m in house.materials], bool)
-    if not len(clear):
+    transparent = np.array([m.kind in kinds for m in house.materials], bool)
+    if not len(transparent):
         return np.zeros(len(geometry.faces), bool)
-    return clear[geometry.face_material]
+    return transparent[geometry.face_material]
 
 
 def source_classes(house: House) -> tuple[str, ...]:
@@ -74,6 +69,7 @@ def source_classes(house: House) -> tuple[str, ...]:
 
 
 def _class_source(inputs: LabelInputs) -> NDArray[np.uint16]:
+    # Look the class's number up by instance id; entry 0 is nothing.
     number = {name: k for k, name in enumerate(source_classes(inputs.house), start=1)}
     table = np.array([0, *(number.get(i.source_class, 0) for i in inputs.house.items)], np.uint16)
     return table[inputs.hit.item]
@@ -87,35 +83,40 @@ def _material(inputs: LabelInputs) -> NDArray[np.uint16]:
         )
     if not len(inputs.geometry.faces):
         return np.zeros(inputs.hit.face.shape, np.uint16)
+    # Count materials from 1, so that 0 is nothing.
     number = inputs.geometry.face_material[inputs.hit.face] + 1
     return np.where(inputs.hit.valid, number, 0).astype(np.uint16)
 
 
 def _glass(inputs: LabelInputs) -> NDArray[np.uint8]:
-    clear = see_through_faces(inputs.geometry, inputs.house)
-    if not clear.any():
+    transparent = transparent_faces(inputs.geometry, inputs.house)
+    if not transparent.any():
         return np.zeros(inputs.hit.face.shape, np.uint8)
-    return np.where(inputs.hit.valid & clear[inputs.hit.face], 255, 0).astype(np.uint8)
+    return np.where(inputs.hit.valid & transparent[inputs.hit.face], 255, 0).astype(np.uint8)
 
 
 def _normal(inputs: LabelInputs, hit: HitRecord) -> NDArray[np.uint16]:
     return normal_png(hit.geo_normal_world, inputs.camera.world_from_camera)
 
 
-_MAKERS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
+_LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
+    # Geometry of the hit.
     "depth_z": lambda s: s.hit.depth_z,
     "position": lambda s: s.hit.position_world,
     "normal_shading": lambda s: normal_png(s.hit.shading_normal_world, s.camera.world_from_camera),
     "normal_world": lambda s: encoded_normal(s.hit.geo_normal_world),
+    # Appearance and classes of the hit.
     "albedo": lambda s: albedo_png(s.hit, s.house, s.geometry, s.textures),
     "material": _material,
     "nyu13": lambda s: NYU13_FROM_NYU40[semantic_png(s.hit.item, s.house)],
     "class_source": _class_source,
     "glass": _glass,
+    # The first hit behind glass.
     "behind_glass_depth": lambda s: depth_mm(s.behind.depth_z),
     "behind_glass_normal": lambda s: _normal(s, s.behind),
     "behind_glass_semantic": lambda s: semantic_png(s.behind.item, s.house),
     "behind_glass_instance": lambda s: instance_png(s.behind.item, s.house),
+    # Edges, and what sensors and encoders make of depth.
     "boundary_occlusion": lambda s: s.boundaries[0],
     "boundary_semantic": lambda s: instance_boundary(semantic_png(s.hit.item, s.house)),
     "boundary_crease": lambda s: s.boundaries[1],
@@ -123,7 +124,7 @@ _MAKERS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "depth_sensor": lambda s: sensor_depth(s.hit, s.camera, seed=s.seed),
 }
 
-OPTIONAL_NAMES = tuple(_MAKERS)
+OPTIONAL_NAMES = tuple(_LAYER_FUNCTIONS)
 
 
 def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, NDArray[Any]]:
@@ -131,7 +132,7 @@ def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, ND
 
     Raises KeyError for a name that is no optional label layer.
     """
-    return {name: _MAKERS[name](inputs) for name in names}
+    return {name: _LAYER_FUNCTIONS[name](inputs) for name in names}
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The corners of the room a view stands in, in the world and in the picture; no effects."""
+"""Room layout: the corners of the camera's room, in the world and in the picture; no effects."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Room
 
-VISIBLE_M = 0.05
-"""A corner is visible when what the picture shows there is at most this much nearer."""
+VISIBLE_M = 0.05  # a corner is visible when the depth at its pixel is at most this much less
 
 
 def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, Any]]:
@@ -20,8 +19,9 @@ def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, 
 
     corner: number in the polygon. at: "floor" or "ceiling". world: (x, y, z) in metres. pixel:
     (x, y) in px, also beyond the picture's edges; None behind the camera. visible: it lies in the
-    picture and nothing in depth_z (H, W) hides it. A sloped or stepped ceiling is not followed.
+    picture and nothing in depth_z (H, W) occludes it. A sloped or stepped ceiling is not followed.
     """
+    # List the polygon's corners at both heights and move them into the camera's frame.
     i = camera.intrinsics
     camera_from_world = np.asarray(np.linalg.inv(camera.world_from_camera), np.float64)
     rows = []
@@ -30,6 +30,7 @@ def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, 
         for number, (world, p) in enumerate(
             zip(corners, transform_points(camera_from_world, corners), strict=True)
         ):
+            # Project with the pinhole model: OpenGL's camera looks along -z, rows count down.
             z = -float(p[2])
             pixel = [i.fx * p[0] / z + i.cx, -i.fy * p[1] / z + i.cy] if z > 1e-6 else None
             rows.append(
@@ -49,7 +50,7 @@ def _is_visible(pixel: list[float], z: float, depth_z: DepthZ) -> bool:
     height, width = depth_z.shape
     if not (0 <= column < width and 0 <= row < height):
         return False
-    # A corner lies on the edge of three surfaces: the farthest around it is not in front of it.
+    # Take the farthest depth around: a corner lies on three surfaces, none of them before it.
     around = depth_z[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
     farthest = float(np.where(around > 0, around, np.inf).max())
     return farthest >= z - VISIBLE_M

@@ -1,7 +1,4 @@
-"""Hit record -> depth, normal, valid, semantic, instance, boundary: the layers of every view.
-
-No effects. Every layer is a function of one hit record at pixel centres (architecture, rule 8).
-"""
+"""Standard label layers, from one hit record at pixel centres (architecture, rule 8); no effects."""
 
 from __future__ import annotations
 
@@ -17,9 +14,8 @@ from pbrs_farm.core.frames import PUBLISHED_FROM_OPENGL
 from pbrs_farm.core.house import MAX_INSTANCES, House
 from pbrs_farm.truth.boundary import instance_boundary
 
-DEPTH_MAX_MM = 65535
-UNIT_TOLERANCE = 0.1
-"""A normal n is valid while | |n|^2 - 1 | <= this: the published rule (suncg section 5)."""
+DEPTH_MAX_MM = 65535  # the largest 16-bit value
+UNIT_TOLERANCE = 0.1  # n is valid while | |n|^2 - 1 | <= this: the published rule (suncg section 5)
 
 
 def depth_mm(depth_z: DepthZ) -> NDArray[np.uint16]:
@@ -28,6 +24,7 @@ def depth_mm(depth_z: DepthZ) -> NDArray[np.uint16]:
     Overflow: 65.535 m and beyond is stored as 65535 (layer depth_z keeps the metres). A hit nearer
     than half a millimetre is stored as 1, so that 0 always means nothing. NaN is nothing.
     """
+    # Round to millimetres; keep 0 for nothing.
     z = np.where(np.isnan(depth_z), np.float32(0), depth_z)
     rounded = np.clip(np.rint(z * np.float32(1000.0)), 1, DEPTH_MAX_MM)
     return np.where(z > 0, rounded, 0).astype(np.uint16)
@@ -46,6 +43,7 @@ def normal_png(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArray
     x right, y forward, z up (suncg section 5). A normal that is not of unit length (nothing there,
     a triangle without area, NaN) is stored as n = 0: 32768 in all three channels.
     """
+    # Turn world normals into the published camera frame.
     published_from_world = PUBLISHED_FROM_OPENGL @ world_from_camera[:3, :3].T
     normal = _cleaned(normal_world) @ published_from_world.T.astype(np.float32)
     return encoded_normal(normal)
@@ -58,10 +56,9 @@ def encoded_normal(normal: UnitVectors) -> NDArray[np.uint16]:
 
 
 def _cleaned(normal: UnitVectors) -> UnitVectors:
-    good = unit_mask(normal)
-    if good.all():
-        return normal
-    return np.where(good[..., None], normal, np.float32(0))
+    # Replace whatever is not of unit length by zero.
+    is_unit = unit_mask(normal)
+    return normal if is_unit.all() else np.where(is_unit[..., None], normal, np.float32(0))
 
 
 def valid_png(hit: HitRecord) -> NDArray[np.uint8]:
@@ -75,6 +72,7 @@ def nyu40_of_instance(house: House) -> NDArray[np.uint8]:
     Raises BadHouse when an item's class is outside 0..40 or there are more than 65,535 items.
     """
     check_instances(house)
+    # Entry 0 is "nothing": instance ids count from 1.
     classes = np.array([0, *(item.nyu40 for item in house.items)], np.int64)
     wrong = np.nonzero((classes < 0) | (classes > 40))[0]
     if len(wrong):

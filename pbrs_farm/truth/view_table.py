@@ -1,7 +1,4 @@
-"""The tables of view.json: the camera, and each instance that a view sees; no effects.
-
-The schema is written down in docs/formats.md.
-"""
+"""Tables of view.json (docs/formats.md): the camera, and each visible instance; no effects."""
 
 from __future__ import annotations
 
@@ -39,28 +36,31 @@ def view_table(
 
     instances: a row for each instance id in item_buffer (H, W), by id: id, item, name, kind, nyu40,
     class, nyu13, class13, source_class, room, pixels, fraction (of the picture), visible_fraction
-    (pixels / pixels when alone in this picture; None unless with_visible_fraction), truncated (part of
-    it lies outside the picture), box2d (x0, y0, x1, y1 in px, right and bottom exclusive, of the
-    visible pixels) and box3d (centre, half, axes: rows are unit axes; world, metres).
+    (pixels / pixels when alone in this picture; None unless with_visible_fraction), truncated (see
+    is_truncated), box2d (x0, y0, x1, y1 in px, right and bottom exclusive, of the visible pixels)
+    and box3d (centre, half, axes: rows are unit axes; world, metres).
     An empty view has an empty list.
     """
+    # Count the pixels and find the pixel box of each visible instance.
     classes = nyu40_of_instance(house)
     counts = np.bincount(item_buffer.reshape(-1), minlength=len(house.items) + 1)
-    seen = [int(i) for i in np.nonzero(counts)[0] if i > 0]
+    visible = [int(i) for i in np.nonzero(counts)[0] if i > 0]
     slices = ndimage.find_objects(item_buffer.astype(np.int32), max_label=len(house.items))
 
+    # Compare the visible pixels with those the item would cover alone.
     rows = []
-    for instance in seen:
+    for instance in visible:
         item, pixels = house.items[instance - 1], int(counts[instance])
+        alone = coverage(item, camera) if with_visible_fraction else None
         rows.append(
             {
                 "id": instance,
                 **_item_facts(item, int(classes[instance])),
                 "pixels": pixels,
                 "fraction": pixels / item_buffer.size,
-                "visible_fraction": pixels / max(int(coverage(item, camera).sum()), pixels)
-                if with_visible_fraction
-                else None,
+                "visible_fraction": None
+                if alone is None
+                else pixels / max(int(alone.sum()), pixels),
                 "truncated": is_truncated(item, camera),
                 "box2d": _box2d(slices[instance - 1]),
                 "box3d": _box3d(item),
@@ -103,12 +103,13 @@ def is_truncated(item: Item, camera: Camera) -> bool:
 
 
 def _inside(points: NDArray[np.float32], camera: Camera) -> bool:
+    # Move into the camera's frame, in float32 as the mesh is.
     i = camera.intrinsics
-    p = (points - camera.eye.astype(np.float32)) @ camera.world_from_camera[:3, :3].astype(
-        np.float32
-    )
+    rotation = camera.world_from_camera[:3, :3].astype(np.float32)
+    p = (points - camera.eye.astype(np.float32)) @ rotation
     z = -p[:, 2]
     if z.min() <= 0:
         return False
+    # Project and compare with the picture's edges.
     x, y = i.fx * p[:, 0] / z + i.cx, -i.fy * p[:, 1] / z + i.cy
     return bool(x.min() >= 0 and x.max() <= i.width_px and y.min() >= 0 and y.max() <= i.height_px)

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pbrs_farm.truth import instance_boundary
+from pbrs_farm.truth.boundary import instance_boundary
 
 
 def by_the_text(ids: np.ndarray) -> np.ndarray:
