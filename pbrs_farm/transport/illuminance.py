@@ -15,9 +15,14 @@ from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.path_state import Only, fields_row, left_surface, white_interaction
+from pbrs_farm.transport.kernels.path_state import (
+    EmitterFilter,
+    device_fields,
+    surface_path,
+    white_interaction,
+)
 from pbrs_farm.transport.kernels.path_step import advance, direct
-from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, SobolNumbers, device_array, stream_key
+from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, SobolSampler, device_array, stream_key
 
 LAMPS_LX: Final = (30.0, 1000.0)
 DAYLIGHT_LX: Final = (20.0, 5000.0)
@@ -110,11 +115,15 @@ def radiosity(
     n = len(points)
     asked = np.full(n, -1) if lamps is None else lamps
     outdoor = np.full(n, -1 if lamps is None else -2)
-    only = Only(*(device_array(mi.Int32, v.astype(np.int32)) for v in (asked, outdoor)))
+    emitter_filter = EmitterFilter(
+        *(device_array(mi.Int32, v.astype(np.int32)) for v in (asked, outdoor))
+    )
     key = stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     p, normal = mi.Point3f(*_columns(points)), mi.Vector3f(*_columns(normals))
-    fields = fields_row(LightFields(), max_depth=max_depth)
-    sums = _radiosity(scene, emitters, fields, (p, normal), key, only, dr.opaque(mi.UInt32, spp))
+    fields = device_fields(LightFields(), max_depth=max_depth)
+    sums = _radiosity(
+        scene, emitters, fields, (p, normal), key, emitter_filter, dr.opaque(mi.UInt32, spp)
+    )
     dr.eval(*sums)
     outdoor_sum, indoor_sum = (v.numpy().T.astype(np.float64) / spp for v in sums)
     return outdoor_sum, indoor_sum
@@ -131,7 +140,7 @@ def _radiosity(
     fields: Any,
     place: tuple[Any, Any],
     key: Any,
-    only: Only,
+    emitter_filter: EmitterFilter,
     spp: Any,
 ) -> tuple[Any, Any]:
     """Sums over samples."""
@@ -141,22 +150,24 @@ def _radiosity(
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     s = mi.UInt32(0)
     while s < spp:
-        numbers = SobolNumbers(key, s)
+        sampler = SobolSampler(key, s)
         dim = mi.UInt32(CAMERA_DIMS)
-        near = emitters.nearby.seen(p, normal, only.lamp, mi.Bool(True))
+        near = emitters.nearby.seen(p, normal, emitter_filter.indoor, mi.Bool(True))
         up = mi.Vector3f(0, 0, 1)
         out, lamp = direct(
-            scene, emitters, here, frame, up, numbers, dim, only, near, mi.Bool(True)
+            scene, emitters, here, frame, up, sampler, dim, emitter_filter, near, mi.Bool(True)
         )
         lit_out, lit_in = out.light, lamp.light
-        wo = mi.warp.square_to_cosine_hemisphere(numbers.two(dim + 1))
+        wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(dim + 1))
         d = mi.Vector3f(frame.to_world(wo))
-        walk = left_surface(p, normal, d, wo.z * dr.inv_pi, near)
+        path = surface_path(p, normal, d, wo.z * dr.inv_pi, near)
         active = mi.Bool(True)
         while active:
-            walk, found, alive = advance(scene, emitters, fields, numbers, walk, only, active)
-            lit_out += dr.select(active, found.met_outdoor + found.lit_outdoor, 0)
-            lit_in += dr.select(active, found.met_indoor + found.lit_indoor, 0)
+            path, result, alive = advance(
+                scene, emitters, fields, sampler, path, emitter_filter, active
+            )
+            lit_out += dr.select(active, result.emitted_outdoor + result.direct_outdoor, 0)
+            lit_in += dr.select(active, result.emitted_indoor + result.direct_indoor, 0)
             active = active & alive
         outdoor += lit_out
         indoor += lit_in

@@ -296,14 +296,11 @@ class LightScene:
         from pbrs_farm.transport.kernels.emitters import Emitters
 
         if self._emitters is None:
-            from pbrs_farm.transport.guiding.lampshade_exitance import (
-                densities_by_face,
-                glow_tables,
-            )
+            from pbrs_farm.transport.guiding.lampshade_exitance import glow_tables, pdfs_by_face
 
             self._emitters = Emitters(self.tables, self.sky, portals, weights)
             glow = glow_tables(self.device_scene, self._emitters, self.tables, 0)
-            self.device_scene.set_guiding_targets(*densities_by_face(glow))
+            self.device_scene.set_guiding_targets(*pdfs_by_face(glow))
             self._emitters.with_glow(glow)
         else:
             self._emitters.aim(portals, weights)

@@ -20,17 +20,17 @@ from pbrs_farm.transport.kernels.bsdf import luminance
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
-    CameraRow,
-    FieldsRow,
-    Found,
-    Only,
-    camera_row,
-    fields_row,
+    DeviceCamera,
+    DeviceFields,
+    EmitterFilter,
+    StepResult,
+    camera_path,
+    device_camera,
+    device_fields,
     film_position,
-    start,
 )
 from pbrs_farm.transport.kernels.path_step import advance
-from pbrs_farm.transport.kernels.sampler import SobolNumbers, stream_key
+from pbrs_farm.transport.kernels.sampler import SobolSampler, stream_key
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,8 +116,8 @@ def trace(
     n_lamps = dr.opaque(mi.Int32, lanes.n_only_lamps)
     asked = dr.opaque(mi.Bool, lanes.n_only > 0)
     is_lamp = which < n_lamps
-    only = Only(
-        lamp=dr.select(asked, dr.select(is_lamp, which, -2), -1),
+    emitter_filter = EmitterFilter(
+        indoor=dr.select(asked, dr.select(is_lamp, which, -2), -1),
         outdoor=dr.select(asked, dr.select(is_lamp, -2, which - n_lamps), -1),
     )
     by_lamp = None
@@ -127,13 +127,13 @@ def trace(
     out = _trace(
         scene,
         emitters,
-        camera_row(camera),
-        fields_row(fields, max_depth=max_depth),
+        device_camera(camera),
+        device_fields(fields, max_depth=max_depth),
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
         stream_key(lane, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF)),
-        only,
+        emitter_filter,
         by_lamp,
     )
     dr.eval(*out)
@@ -149,13 +149,13 @@ def trace(
 def _trace(
     scene: DeviceScene,
     emitters: Emitters,
-    camera: CameraRow,
-    fields: FieldsRow,
+    camera: DeviceCamera,
+    fields: DeviceFields,
     pixel_width: tuple[Any, Any],
     first: Any,
     last: Any,
     key: Any,
-    only: Only,
+    emitter_filter: EmitterFilter,
     by_lamp: ByLamp | None,
 ) -> tuple[Any, ...]:
     # Sums over samples, and the light of the path that is under way.
@@ -168,27 +168,29 @@ def _trace(
     seen = mi.Bool(False)
     active = s < last
     x0, y0 = mi.Float(pixel_width[0] % pixel_width[1]), mi.Float(pixel_width[0] // pixel_width[1])
-    walk = start(camera, x0, y0)
+    path = camera_path(camera, x0, y0)
     fresh = mi.Bool(True)
 
     while active:
         # Start the next sample where the last path has ended.
-        numbers = SobolNumbers(key, s)
-        at = film_position(numbers.two(mi.UInt32(0)), fields.is_tent)
-        walk = dr.select(fresh, start(camera, x0 + at.x, y0 + at.y), walk)
+        sampler = SobolSampler(key, s)
+        at = film_position(sampler.get_2d(mi.UInt32(0)), fields.is_tent)
+        path = dr.select(fresh, camera_path(camera, x0 + at.x, y0 + at.y), path)
         l_out, l_in = dr.select(fresh, mi.Color3f(0), l_out), dr.select(fresh, mi.Color3f(0), l_in)
         seen = seen & ~fresh
 
-        walk, found, alive = advance(scene, emitters, fields, numbers, walk, only, active)
-        l_out += found.met_outdoor + found.lit_outdoor
-        l_in += found.met_indoor + found.lit_indoor
-        _add_by_lamp(by_lamp, found, active)
+        path, result, alive = advance(
+            scene, emitters, fields, sampler, path, emitter_filter, active
+        )
+        l_out += result.emitted_outdoor + result.direct_outdoor
+        l_in += result.emitted_indoor + result.direct_indoor
+        _add_by_lamp(by_lamp, result, active)
 
         # What the denoiser is told of the first surface that is not a mirror or glass.
-        first_rough = found.is_rough & ~seen
-        albedo += dr.select(first_rough, found.albedo, 0)
-        albedo += dr.select(found.missed & ~seen, mi.Color3f(1), 0)
-        normal += dr.select(first_rough, found.normal, 0)
+        first_rough = result.is_rough & ~seen
+        albedo += dr.select(first_rough, result.albedo, 0)
+        albedo += dr.select(result.missed & ~seen, mi.Color3f(1), 0)
+        normal += dr.select(first_rough, result.normal, 0)
         seen = seen | first_rough
 
         # Close the sample where the path ends.
@@ -207,11 +209,14 @@ def _trace(
     return outdoor, indoor, outdoor_even, indoor_even, albedo, normal, n_bad
 
 
-def _add_by_lamp(by_lamp: ByLamp | None, found: Found, active: Any) -> None:
+def _add_by_lamp(by_lamp: ByLamp | None, result: StepResult, active: Any) -> None:
     """Add what a step found to the lamps it came from; what is not finite is left out."""
     if by_lamp is None:
         return
-    met, lit = (found.met_indoor, found.si.emitter), (found.lit_indoor, found.to_indoor.lamp)
+    met, lit = (
+        (result.emitted_indoor, result.si.emitter),
+        (result.direct_indoor, result.indoor_sample.lamp),
+    )
     for light, lamp in (met, lit):
         level = luminance(light)
         brings = active & (level > 0) & dr.isfinite(level)

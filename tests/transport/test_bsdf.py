@@ -1,4 +1,4 @@
-"""The reflectance model: reciprocal, energy conserving, sampled with the density it names."""
+"""The reflectance model: reciprocal, energy conserving, sampled with the pdf it names."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ ANGLES = [0.0, 0.7, 1.2, 1.5]
 @pytest.mark.parametrize("theta", ANGLES)
 def test_no_more_light_leaves_than_arrives(model: tuple[float, ...], theta: float) -> None:
     mi = mitsuba()
-    from pbrs_farm.transport.kernels.bsdf import evaluate, sample
+    from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, sample
 
     m, wi = bsdf(*model), direction(theta)
     lobes = mi.Float(np.random.default_rng(1).random(N, np.float32))
-    value, density = evaluate(m, wi, sample(m, wi, lobes, uniform_pairs(N, 2)))
-    weight = (value[0] / density).numpy()
+    value, pdf = evaluate_bsdf(m, wi, sample(m, wi, lobes, uniform_pairs(N, 2)))
+    weight = (value[0] / pdf).numpy()
     weight = np.where(np.isfinite(weight), weight, 0)
     # 1.01: the diffuse and the specular part of a coat are matched at every angle to 1 %.
     assert weight.mean() < 1.01
@@ -59,19 +59,19 @@ def test_no_more_light_leaves_than_arrives(model: tuple[float, ...], theta: floa
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("theta", ANGLES)
-def test_samples_follow_the_density_they_name(model: tuple[float, ...], theta: float) -> None:
+def test_samples_follow_the_pdf_they_name(model: tuple[float, ...], theta: float) -> None:
     # The integral of g over the sphere by the sampler equals that by uniform directions.
     mi = mitsuba()
-    from pbrs_farm.transport.kernels.bsdf import evaluate, sample
+    from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, sample
 
     m, wi = bsdf(*model), direction(theta)
     lobes = mi.Float(np.random.default_rng(3).random(N, np.float32))
     drawn = sample(m, wi, lobes, uniform_pairs(N, 4))
     uniform = mi.warp.square_to_uniform_sphere(uniform_pairs(8 * N, 5))
-    _value, density = evaluate(m, wi, uniform)
-    weight = density.numpy().astype(np.float64) * 4 * np.pi
-    # A coat's sample below the horizon is no direction: density 0, light lost.
-    is_real = evaluate(m, wi, drawn)[1].numpy() > 0
+    _value, pdf = evaluate_bsdf(m, wi, uniform)
+    weight = pdf.numpy().astype(np.float64) * 4 * np.pi
+    # A coat's sample below the horizon is no direction: pdf 0, light lost.
+    is_real = evaluate_bsdf(m, wi, drawn)[1].numpy() > 0
     d, u = drawn.numpy(), uniform.numpy()
     for axis, power in itertools.product(range(3), (1, 2)):
         ours = (d[axis].astype(np.float64) ** power * is_real).mean()
@@ -82,12 +82,12 @@ def test_samples_follow_the_density_they_name(model: tuple[float, ...], theta: f
 
 @pytest.mark.parametrize("model", MODELS[:4])
 def test_swapping_the_directions_gives_the_same_reflectance(model: tuple[float, ...]) -> None:
-    from pbrs_farm.transport.kernels.bsdf import evaluate
+    from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf
 
     m = bsdf(*model)
     a, b = direction(0.4, 0.1), direction(1.1, 2.5)
-    forth = evaluate(m, a, b)[0][0].numpy()[0] / np.cos(1.1)
-    back = evaluate(m, b, a)[0][0].numpy()[0] / np.cos(0.4)
+    forth = evaluate_bsdf(m, a, b)[0][0].numpy()[0] / np.cos(1.1)
+    back = evaluate_bsdf(m, b, a)[0][0].numpy()[0] / np.cos(0.4)
     assert forth == pytest.approx(back, rel=1e-4)
 
 
@@ -102,13 +102,13 @@ def test_pairs_of_sobol_numbers_fill_every_cell_once() -> None:
     import drjit as dr
 
     mi = mitsuba()
-    from pbrs_farm.transport.kernels.sampler import SobolNumbers, stream_key
+    from pbrs_farm.transport.kernels.sampler import SobolSampler, stream_key
 
     s = dr.arange(mi.UInt32, 64)
     for pixel in (0, 1, 77):
-        numbers = SobolNumbers(stream_key(mi.UInt32(pixel), mi.UInt32(5)), s)
+        sampler = SobolSampler(stream_key(mi.UInt32(pixel), mi.UInt32(5)), s)
         for dim in (0, 12, 30):
-            u = numbers.two(mi.UInt32(dim)).numpy()
+            u = sampler.get_2d(mi.UInt32(dim)).numpy()
             for nx, ny in ((64, 1), (8, 8), (2, 32)):
                 cells = (u[0] * nx).astype(int) * ny + (u[1] * ny).astype(int)
                 assert len(np.unique(cells)) == 64
@@ -118,11 +118,11 @@ def test_neighbouring_streams_are_not_correlated() -> None:
     import drjit as dr
 
     mi = mitsuba()
-    from pbrs_farm.transport.kernels.sampler import HashedNumbers, stream_key
+    from pbrs_farm.transport.kernels.sampler import HashedSampler, stream_key
 
     lanes = dr.arange(mi.UInt32, 1 << 16)
-    u = HashedNumbers(stream_key(lanes, mi.UInt32(0)), mi.UInt32(0)).one(mi.UInt32(3)).numpy()
-    v = HashedNumbers(stream_key(lanes, mi.UInt32(1)), mi.UInt32(0)).one(mi.UInt32(3)).numpy()
+    u = HashedSampler(stream_key(lanes, mi.UInt32(0)), mi.UInt32(0)).get_1d(mi.UInt32(3)).numpy()
+    v = HashedSampler(stream_key(lanes, mi.UInt32(1)), mi.UInt32(0)).get_1d(mi.UInt32(3)).numpy()
     assert abs(np.corrcoef(u[:-1], u[1:])[0, 1]) < 4 / 256
     assert abs(np.corrcoef(u, v)[0, 1]) < 4 / 256
     assert u.mean() == pytest.approx(0.5, abs=0.005)

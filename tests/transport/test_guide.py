@@ -75,11 +75,11 @@ def test_small_faces_far_from_the_origin_lose_no_light() -> None:
     assert abs(wholes[0].mean() - wholes[1].mean()) < 3.5 * error
 
 
-def test_a_direction_drawn_in_a_cone_has_the_density_of_the_cone() -> None:
+def test_a_direction_drawn_in_a_cone_has_the_pdf_of_the_cone() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.guiding.nearby_lamps import Cones, cone_density, in_cones
+    from pbrs_farm.transport.guiding.nearby_lamps import Cones, cone_pdf, in_cones
 
     n = 1 << 18
     rng = mi.PCG32(size=n)
@@ -89,9 +89,9 @@ def test_a_direction_drawn_in_a_cone_has_the_density_of_the_cone() -> None:
         cones = Cones([mi.Float(1)], mi.Float(1), [way], [height])
         uv = mi.Point2f(rng.next_float32(), rng.next_float32())
         d = in_cones(cones, rng.next_float32(), uv)
-        density = cone_density(cones, d).numpy()
+        pdf = cone_pdf(cones, d).numpy()
         expected = 1 / (2 * np.pi * height.numpy()[0])
-        assert density == pytest.approx(expected, rel=1e-4)
+        assert pdf == pytest.approx(expected, rel=1e-4)
 
 
 def glow_of(house: House) -> tuple[LightScene, GlowTables]:
@@ -113,7 +113,7 @@ def test_the_inside_of_an_opaque_shade_is_aimed_at_and_its_outside_is_not() -> N
     assert ((normals[:, [0, 2]] * from_axis[:, [0, 2]]).sum(1) < 0).all()
     assert glow.chances.sum() == pytest.approx(1)
     areas = 0.5 * np.linalg.norm(normals, axis=1)
-    assert (glow.densities * areas).sum() == pytest.approx(1)
+    assert (glow.pdfs * areas).sum() == pytest.approx(1)
     assert 0 < glow.shares[0] <= 1
     assert 0.12 < glow.balls[0, 3] < 0.4
 
@@ -124,7 +124,7 @@ def test_a_bare_bulb_in_a_room_has_nothing_to_aim_at() -> None:
     assert glow.shares.tolist() == [0]
 
 
-def test_a_lamp_is_chosen_as_often_as_its_density_says() -> None:
+def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
     import drjit as dr
     import mitsuba as mi
 
@@ -135,14 +135,14 @@ def test_a_lamp_is_chosen_as_often_as_its_density_says() -> None:
     n = 1 << 16
     rng = mi.PCG32(size=n)
     p, up = mi.Point3f(1.3, 0.5, 2.0), mi.Vector3f(0, 1, 0)
-    only, on = mi.Int32(-1), mi.Bool(True)
-    near = emitters.nearby.seen(p, up, only, on)
+    emitter_filter, on = mi.Int32(-1), mi.Bool(True)
+    near = emitters.nearby.seen(p, up, emitter_filter, on)
     uv = mi.Point2f(rng.next_float32(), rng.next_float32())
-    to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, only, on)
-    # With the densities of all right, the mean of 1 / density is the solid angle of all lamps.
-    radius = emitters.nearby.seen(p, up, only, on).at
+    to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, emitter_filter, on)
+    # With the pdfs of all right, the mean of 1 / pdf is the solid angle of all lamps.
+    radius = emitters.nearby.seen(p, up, emitter_filter, on).at
     assert radius.total.numpy()[0] > 0
-    inverse = dr.select(to.valid, dr.rcp(to.density), 0).numpy()
+    inverse = dr.select(to.valid, dr.rcp(to.pdf), 0).numpy()
     area_over_d2 = sum(
         2 * float(lamp.area_m2) / 4 / ((1 + k - 1.3) ** 2 + 1.5**2)
         for k, lamp in enumerate(scene.tables.lamps)
@@ -153,7 +153,12 @@ def test_a_lamp_is_chosen_as_often_as_its_density_says() -> None:
 def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
     import mitsuba as mi
 
-    from pbrs_farm.transport.kernels.path_state import Only, camera_row, fields_row, start
+    from pbrs_farm.transport.kernels.path_state import (
+        EmitterFilter,
+        camera_path,
+        device_camera,
+        device_fields,
+    )
     from pbrs_farm.transport.kernels.path_step import advance
 
     glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
@@ -166,22 +171,28 @@ def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
     asked: list[set[int]] = []
 
     class Recorded:
-        def one(self, dim: Any) -> Any:
+        def get_1d(self, dim: Any) -> Any:
             asked[-1].add(int(mi.UInt32(dim).numpy()[0]))
             return mi.Float(0.99)
 
-        def two(self, dim: Any) -> Any:
+        def get_2d(self, dim: Any) -> Any:
             asked[-1].update({int(mi.UInt32(dim).numpy()[0]), int(mi.UInt32(dim).numpy()[0]) + 1})
             return mi.Point2f(0.3, 0.6)
 
-    only = Only(mi.Int32(-1), mi.Int32(-1))
-    walk = start(camera_row(camera), mi.Float(16), mi.Float(12))
+    emitter_filter = EmitterFilter(mi.Int32(-1), mi.Int32(-1))
+    path = camera_path(device_camera(camera), mi.Float(16), mi.Float(12))
     for _step in range(3):
         asked.append(set())
-        walk, found, _alive = advance(
-            scene.device_scene, emitters, fields_row(FIELDS), Recorded(), walk, only, mi.Bool(True)
+        path, result, _alive = advance(
+            scene.device_scene,
+            emitters,
+            device_fields(FIELDS),
+            Recorded(),
+            path,
+            emitter_filter,
+            mi.Bool(True),
         )
-        assert found.si.valid.numpy()[0]
+        assert result.si.valid.numpy()[0]
     assert not asked[0] & asked[1]
     assert not asked[1] & asked[2]
     assert not asked[0] & asked[2]

@@ -10,7 +10,7 @@ came before and not on d:
     face    at a point y on a face side that glows           share (1 - CONED) p_face(y) r^2 / cos
 
 and the path's throughput is divided by their sum, the balance heuristic in one-sample form. The
-third density is known only where the ray ends: `kept` applies it there. A ray aimed at a face that
+third pdf is known only where the ray ends: `kept` applies it there. A ray aimed at a face that
 meets another one brings nothing. Cones also catch what reaches a bulb by a reflection in a lamp's
 glass cover. No effects.
 """
@@ -23,7 +23,7 @@ import drjit as dr
 import mitsuba as mi
 
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
-from pbrs_farm.transport.guiding.nearby_lamps import Near, cone_density, drawn, in_cones
+from pbrs_farm.transport.guiding.nearby_lamps import Near, cone_pdf, drawn, in_cones
 from pbrs_farm.transport.kernels.bsdf import Bsdf
 from pbrs_farm.transport.kernels.device_scene import (
     DeviceScene,
@@ -31,7 +31,7 @@ from pbrs_farm.transport.kernels.device_scene import (
     offset_ray_origin,
 )
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.path_state import Walk
+from pbrs_farm.transport.kernels.path_state import PathState
 
 MOST, LEAST = 0.2, 0.1
 """Of the rays scattered at a vertex. In between it takes the rays that roulette would end, so that
@@ -74,21 +74,21 @@ def guide_at(near: Near, m: Bsdf, beta: Any, may_aim: Any) -> Guide:
     albedo = dr.minimum(m.kd + m.f0 + m.tau, 1)
     # Within a lamp the surface finds the light by itself.
     least = LEAST * near.cones.total / dr.maximum(near.at.aim_total, 1e-30)
-    spare = dr.clip(1 - 0.95 * worth(near) * dr.max(beta * albedo), least, MOST)
+    spare = dr.clip(1 - 0.95 * survival_boost(near) * dr.max(beta * albedo), least, MOST)
     # Where lamps send little out by way of their insides, there is little to find.
     matters = dr.minimum(_MATTERS * near.at.aim_total / dr.maximum(near.at.total, 1e-30), 1)
     share = dr.select(may_aim & (near.at.aim_total > 0), spare * matters, 0)
     return Guide(near, share, dr.select(near.cones.total > 0, mi.Float(CONED), 0))
 
 
-def worth(near: Near) -> Any:
+def survival_boost(near: Near) -> Any:
     """How much less often roulette ends a path here: more than 1 near lamps, where it is bright."""
     return dr.clip(_WORTH_M2 * near.at.total, 1, _MOST_WORTH)
 
 
-def reflected_chance(reflectance: Any, worth: Any) -> Any:
+def reflection_probability(reflectance: Any, boost: Any) -> Any:
     """How often a scattered ray is reflected by thin glass: often near lamps, by their covers."""
-    return dr.clip(worth * reflectance, reflectance, dr.maximum(reflectance, REFLECTED))
+    return dr.clip(boost * reflectance, reflectance, dr.maximum(reflectance, REFLECTED))
 
 
 def guided(
@@ -111,8 +111,8 @@ def guided(
 
 
 def cone_chance(guide: Guide, d: Any) -> Any:
-    """Density of the second technique in direction d, chance included."""
-    return guide.share * guide.coned * cone_density(guide.near.cones, d)
+    """Pdf of the second technique in direction d, chance included."""
+    return guide.share * guide.coned * cone_pdf(guide.near.cones, d)
 
 
 def face_chance(guide: Guide) -> Any:
@@ -121,18 +121,18 @@ def face_chance(guide: Guide) -> Any:
     return guide.share * (1 - guide.coned) / total
 
 
-def kept(
-    emitters: Emitters, walk: Walk, si: SurfaceInteraction, only: Any, turned: Any, rough: Any
+def mis_weight(
+    emitters: Emitters, path: PathState, si: SurfaceInteraction, only: Any, turned: Any, rough: Any
 ) -> Any:
     """What a walk's throughput keeps where its ray ends; 1 where it passes on.
 
     turned: it ends without meeting what a guided ray may aim at.
     """
-    last, d = walk.last, walk.d
-    _level, aim = emitters.nearby.level(si.target_emitter, last.p, last.n, only, rough)
+    ref, d = path.reference, path.d
+    _level, aim = emitters.nearby.level(si.target_emitter, ref.p, ref.n, only, rough)
     cos = dr.maximum(dr.abs(dr.dot(si.ng, d)), 1e-6)
-    begin = offset_ray_origin(last.p, dr.select(dr.dot(last.n, d) > 0, last.n, -last.n))
-    density = aim * si.target_pdf * dr.squared_norm(si.p - begin) / cos
-    balanced = dr.select(rough, dr.rcp(1 + walk.aimed * density), 1)
-    astray = (walk.target != NO_FACE) & (turned | (rough & (walk.target != si.face)))
+    begin = offset_ray_origin(ref.p, dr.select(dr.dot(ref.n, d) > 0, ref.n, -ref.n))
+    pdf = aim * si.target_pdf * dr.squared_norm(si.p - begin) / cos
+    balanced = dr.select(rough, dr.rcp(1 + path.guiding_odds * pdf), 1)
+    astray = (path.target_face != NO_FACE) & (turned | (rough & (path.target_face != si.face)))
     return dr.select(astray, 0, balanced)

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.transport.kernels.alias_table import alias_rows, pick
+from pbrs_farm.transport.kernels.alias_table import alias_rows, sample_alias_table
 from pbrs_farm.transport.kernels.device_scene import DeviceScene, offset_ray_origin
 from pbrs_farm.transport.kernels.sampler import device_array
 
@@ -23,14 +23,14 @@ class GlowTables:
     """Face sides that shine in a lamp's light, lamp by lamp.
 
     sides: (S,) uint32 face, + BACK for its back. chances: (S,) of each among its lamp's, sum 1.
-    densities: (S,) per m2. first: (L + 1,) first side of each lamp. shares: (L,) of the lamp's
+    pdfs: (S,) per m2. first: (L + 1,) first side of each lamp. shares: (L,) of the lamp's
     light that they send out, 0..1. balls: (L, 4) centre and radius in m of the lamp's inside: the
     bulb and nine tenths of that light; radius 0 = none.
     """
 
     sides: NDArray[np.uint32]
     chances: NDArray[np.float64]
-    densities: NDArray[np.float64]
+    pdfs: NDArray[np.float64]
     first: NDArray[np.int64]
     shares: NDArray[np.float64]
     balls: NDArray[np.float64]
@@ -60,11 +60,11 @@ class Aims:
     def aim(
         self, scene: DeviceScene, p_ng: tuple[Any, Any], lamp: Any, u: Any, uv: Any, active: Any
     ) -> Aim:
-        """Towards a point on a glowing side of a lamp; p_ng: vertex and face normal there."""
+        """DirectionSample a point on a glowing side of a lamp; p_ng: vertex and face normal there."""
         first = dr.gather(mi.UInt32, self._first, lamp, active)
         count = dr.gather(mi.UInt32, self._first, lamp + 1, active) - first
         active = active & (count > 0)
-        k, _u = pick(self._alias, first, dr.maximum(count, 1), u, active)
+        k, _u = sample_alias_table(self._alias, first, dr.maximum(count, 1), u, active)
         side = dr.gather(mi.UInt32, self._sides, first + k, active)
         face = side & 0x7FFFFFFF
         q, n = scene.sample_face(face, uv, active)

@@ -80,15 +80,15 @@ def _insides(
     return balls
 
 
-def densities_by_face(
+def pdfs_by_face(
     glow: GlowTables,
 ) -> tuple[NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint32]]:
-    """(faces, densities of their fronts, of their backs, lamps), a row a face."""
+    """(faces, pdfs of their fronts, of their backs, lamps), a row a face."""
     faces, row = np.unique(glow.sides & np.uint32(BACK - 1), return_inverse=True)
     lamps = np.zeros(len(faces), np.uint32)
     lamps[row] = np.searchsorted(glow.first, np.arange(len(row)), side="right") - 1
     values = np.zeros((2, len(faces)), np.float32)
-    values[(glow.sides >= BACK).astype(int), row] = glow.densities
+    values[(glow.sides >= BACK).astype(int), row] = glow.pdfs
     return faces, values[0], values[1], lamps
 
 

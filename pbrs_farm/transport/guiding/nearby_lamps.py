@@ -29,7 +29,7 @@ _EDGE: Final = 5e-4
 
 
 @dataclass
-class Standpoint:
+class ReferencePoint:
     """A vertex that lamps are chosen from. n: its normal, 0 where light may come from both sides.
 
     total, aim_total: sums of the levels and aims of Near.
@@ -61,7 +61,7 @@ class Near(NamedTuple):
     rays may aim at (aims.py).
     """
 
-    at: Standpoint
+    at: ReferencePoint
     lamps: list[Any]
     levels: list[Any]
     aims: list[Any]
@@ -115,7 +115,7 @@ class Nearby:
             aims.append(counts * aim)
             total += levels[-1]
             aim_total += aims[-1]
-        at = Standpoint(mi.Point3f(p), n, total, aim_total)
+        at = ReferencePoint(mi.Point3f(p), n, total, aim_total)
         return Near(at, lamps, levels, aims, self._cones(p, lamps, aims, active))
 
     def level(self, lamp: Any, p: Any, n: Any, only: Any, active: Any) -> tuple[Any, Any]:
@@ -147,9 +147,9 @@ class Nearby:
         return Cones(levels, total, ways, heights)
 
 
-def nowhere(p: Any) -> Standpoint:
+def no_reference(p: Any) -> ReferencePoint:
     """Where no lamp is chosen: the camera."""
-    return Standpoint(mi.Point3f(p), mi.Vector3f(0), mi.Float(0), mi.Float(0))
+    return ReferencePoint(mi.Point3f(p), mi.Vector3f(0), mi.Float(0), mi.Float(0))
 
 
 def drawn(values: list[Any], levels: list[Any], total: Any, u: Any) -> tuple[Any, Any]:
@@ -174,15 +174,15 @@ def in_cones(cones: Cones, u: Any, uv: Any) -> Any:
     return mi.Frame3f(way).to_world(mi.Vector3f(s * cos_phi, s * sin_phi, 1 - h))
 
 
-def cone_density(cones: Cones, d: Any) -> Any:
-    """Density of in_cones() per solid angle; 0 where there are none."""
-    density = mi.Float(0)
+def cone_pdf(cones: Cones, d: Any) -> Any:
+    """Pdf of in_cones() per solid angle; 0 where there are none."""
+    pdf = mi.Float(0)
     for level, way, height in zip(cones.levels, cones.ways, cones.heights, strict=True):
         # |d - way|^2 is twice the height; what was drawn at the edge must count as inside.
         inside = dr.squared_norm(d - way) <= (2 + _EDGE) * height
         solid = 2 * math.pi * dr.maximum(height, 1e-9)
-        density += dr.select(inside & (level > 0), level / solid, 0)
-    return density / dr.maximum(cones.total, 1e-30)
+        pdf += dr.select(inside & (level > 0), level / solid, 0)
+    return pdf / dr.maximum(cones.total, 1e-30)
 
 
 def _rows(rows: NDArray[np.float64]) -> Any:

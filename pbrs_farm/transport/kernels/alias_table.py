@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def pick(alias: Any, first: Any, count: Any, u: Any, active: Any) -> tuple[Any, Any]:
+def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) -> tuple[Any, Any]:
     """(index, u made uniform again) of an alias table's part [first, first + count)."""
     x = u * mi.Float(count)
     i = dr.minimum(mi.UInt32(x), count - 1)

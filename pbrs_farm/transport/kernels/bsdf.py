@@ -1,4 +1,4 @@
-"""How a surface scatters light: evaluate, density, sample; kernels on Dr.Jit, no effects.
+"""How a surface scatters light: evaluate, pdf, sample; kernels on Dr.Jit, no effects.
 
 One reflectance model for every material (two-sided, wi.z > 0 in the local frame):
 
@@ -40,8 +40,8 @@ def luminance(rgb: Any) -> Any:
     return rgb[0] * LUMINANCE[0] + rgb[1] * LUMINANCE[1] + rgb[2] * LUMINANCE[2]
 
 
-def evaluate(m: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
-    """(f |cos wo|, density of sample() per solid angle); local directions, wi.z > 0."""
+def evaluate_bsdf(m: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
+    """(f |cos wo|, pdf of sample() per solid angle); local directions, wi.z > 0."""
     above = wo.z > 0
     cos_o = dr.abs(wo.z)
     has_coat = m.alpha > 0
@@ -61,13 +61,13 @@ def evaluate(m: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
 
     p_diffuse, p_coat = _lobes(m, wi)
     p_sheet = 1 - p_diffuse - p_coat
-    density = dr.select(above, p_diffuse, p_sheet) * (cos_o * dr.inv_pi)
-    density += dr.select(use_coat, p_coat * d / (4 * wi.z * (1 + masking_i)), 0)
-    return value, density
+    pdf = dr.select(above, p_diffuse, p_sheet) * (cos_o * dr.inv_pi)
+    pdf += dr.select(use_coat, p_coat * d / (4 * wi.z * (1 + masking_i)), 0)
+    return value, pdf
 
 
 def sample(m: Bsdf, wi: Any, lobe: Any, u: Any) -> Any:
-    """A direction wo drawn with the density of evaluate()."""
+    """A direction wo drawn with the pdf of evaluate()."""
     p_diffuse, p_coat = _lobes(m, wi)
     cosine = mi.warp.square_to_cosine_hemisphere(u)
     wo = dr.select(lobe < p_diffuse, cosine, mi.Vector3f(cosine.x, cosine.y, -cosine.z))
@@ -76,13 +76,13 @@ def sample(m: Bsdf, wi: Any, lobe: Any, u: Any) -> Any:
     return dr.select(use_coat, 2 * dr.dot(wi, h) * h - wi, wo)
 
 
-def is_smooth_lobe(m: Bsdf) -> Any:
+def is_reconnectable(m: Bsdf) -> Any:
     """Whether what is seen of a surface changes slowly with the direction it is seen from."""
     return (m.alpha <= 0) | (m.alpha >= _SMOOTH_ALPHA)
 
 
-def steady_density(m: Bsdf, ng: Any, w: Any) -> Any:
-    """A density per solid angle like sample()'s that does not depend on wi; world directions.
+def view_independent_pdf(m: Bsdf, ng: Any, w: Any) -> Any:
+    """A pdf per solid angle like sample()'s that does not depend on wi; world directions.
 
     Positive wherever sample() may go from wi on the side of ng: a weight of the balance heuristic
     that stays the same when wi moves.

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.transport.guiding.guiding_targets import Aims, GlowTables, no_glow
-from pbrs_farm.transport.guiding.nearby_lamps import Near, Nearby, Standpoint, drawn
-from pbrs_farm.transport.kernels.alias_table import alias_rows, pick
+from pbrs_farm.transport.guiding.nearby_lamps import Near, Nearby, ReferencePoint, drawn
+from pbrs_farm.transport.kernels.alias_table import alias_rows, sample_alias_table
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
@@ -44,17 +44,17 @@ class Weights:
     outdoor: NDArray[np.float64]
 
 
-class Towards(NamedTuple):
+class DirectionSample(NamedTuple):
     """A sampled direction to an emitter.
 
-    d: unit direction; distance; radiance: Color3f from there; density: per solid angle, all
+    d: unit direction; distance; radiance: Color3f from there; pdf: per solid angle, all
     techniques that could have drawn it counted; valid. lamp: its number, None for the sky.
     """
 
     d: Any
     distance: Any
     radiance: Any
-    density: Any
+    pdf: Any
     valid: Any
     lamp: Any = None
 
@@ -81,7 +81,7 @@ class Emitters:
         # The disc's radiance gives its irradiance: integral of the cosine over the cone.
         projected = math.pi * math.sin(sky.sun_half_angle_rad) ** 2
         self._sun_cos = dr.opaque(mi.Float, cos_max)
-        self._sun_density = dr.opaque(mi.Float, 1 / solid)
+        self._sun_pdf = dr.opaque(mi.Float, 1 / solid)
         self._sun_rgb = opaque3(mi.Color3f, sky.sun_irradiance / projected)
         shines = bool(sky.dome.max() > 0 or sky.sun_irradiance.max() > 0)
         self.has_sky = dr.opaque(mi.Bool, shines)
@@ -110,20 +110,20 @@ class Emitters:
 
     def sample_lamp(
         self, scene: DeviceScene, near: Near, u: Any, uv: Any, only: Any, active: Any
-    ) -> Towards:
+    ) -> DirectionSample:
         """A point on a lamp, seen from p: by place with chance BY_PLACE, else by weight alone."""
         active = active & self._has_lamps
         by_place = _by_place(near.at)
         is_near = u < by_place
         rest = dr.select(is_near, u / BY_PLACE, (u - by_place) / (1 - by_place))
         rest = dr.clip(rest, 0, 1 - 1e-7)
-        lamp, v = pick(self._lamp_alias, mi.UInt32(0), self._n_lamps, rest, active)
+        lamp, v = sample_alias_table(self._lamp_alias, mi.UInt32(0), self._n_lamps, rest, active)
         near_lamp, near_v = drawn(near.lamps, near.levels, near.at.total, rest)
         lamp, u = dr.select(is_near, near_lamp, lamp), dr.select(is_near, near_v, v)
         lamp = dr.select(only >= 0, mi.UInt32(only), lamp)
         first = dr.gather(mi.UInt32, self._lamp_first, lamp, active)
         count = dr.gather(mi.UInt32, self._lamp_first, lamp + 1, active) - first
-        triangle, _u = pick(self._triangle_alias, first, count, u, active)
+        triangle, _u = sample_alias_table(self._triangle_alias, first, count, u, active)
         face = dr.gather(mi.UInt32, self._lamp_faces, first + triangle, active)
         q, n = scene.sample_face(face, uv, active)
 
@@ -132,19 +132,19 @@ class Emitters:
         d = to / distance
         cos = dr.abs(dr.dot(n, d))
         valid = active & (distance > 1e-5) & (cos > 1e-5)
-        radiance, density = self._lamp(lamp, near.at, distance, cos, only, valid)
-        return Towards(d, distance, radiance, density, valid, lamp)
+        radiance, pdf = self._lamp(lamp, near.at, distance, cos, only, valid)
+        return DirectionSample(d, distance, radiance, pdf, valid, lamp)
 
     def hit_lamp(
-        self, lamp: Any, at: Standpoint, distance: Any, cos: Any, only: Any, active: Any
+        self, lamp: Any, at: ReferencePoint, distance: Any, cos: Any, only: Any, active: Any
     ) -> tuple[Any, Any]:
-        """(radiance, density of sample_lamp) of a lamp that a ray scattered there met."""
+        """(radiance, pdf of sample_lamp) of a lamp that a ray scattered there met."""
         active = active & (lamp != NO_LAMP)
-        radiance, density = self._lamp(lamp, at, distance, dr.abs(cos), only, active)
-        return dr.select(active, radiance, 0), density
+        radiance, pdf = self._lamp(lamp, at, distance, dr.abs(cos), only, active)
+        return dr.select(active, radiance, 0), pdf
 
     def _lamp(
-        self, lamp: Any, at: Standpoint, distance: Any, cos: Any, only: Any, active: Any
+        self, lamp: Any, at: ReferencePoint, distance: Any, cos: Any, only: Any, active: Any
     ) -> tuple[Any, Any]:
         row = dr.gather(mi.Vector4f, self._lamp_rows, lamp, active)
         weight = dr.gather(mi.Float, self._lamp_weights, lamp, active)
@@ -152,50 +152,50 @@ class Emitters:
         by_place = _by_place(at)
         weight = dr.lerp(weight, level / dr.maximum(at.total, 1e-30), by_place)
         weight = dr.select(only >= 0, 1, weight)
-        density = weight * dr.square(distance) / dr.maximum(row[3] * cos, 1e-12)
+        pdf = weight * dr.square(distance) / dr.maximum(row[3] * cos, 1e-12)
         mine = (only < 0) | (mi.UInt32(only) == lamp)
-        return dr.select(mine, mi.Color3f(row[0], row[1], row[2]), 0), density
+        return dr.select(mine, mi.Color3f(row[0], row[1], row[2]), 0), pdf
 
     # Outdoors
 
-    def sample_outdoor(self, p: Any, u: Any, uv: Any, only: Any, active: Any) -> Towards:
+    def sample_outdoor(self, p: Any, u: Any, uv: Any, only: Any, active: Any) -> DirectionSample:
         """A direction in which outdoor light may come to p."""
         active = active & self.has_sky
-        way, u = pick(self._outdoor_alias, mi.UInt32(0), self._n_outdoor, u, active)
+        way, u = sample_alias_table(self._outdoor_alias, mi.UInt32(0), self._n_outdoor, u, active)
         way = dr.select(only >= 0, mi.UInt32(only), way)
-        texel, _u = pick(self._dome_alias, mi.UInt32(0), self._n_texels, u, active)
+        texel, _u = sample_alias_table(self._dome_alias, mi.UInt32(0), self._n_texels, u, active)
         to_sun = self._sun_frame.to_world(_cone(uv, self._sun_cos))
         to_dome = self._texel_direction(texel, uv)
         to_portal = self._portal_direction(p, way, uv, active)
         d = dr.select(way == SUN, to_sun, dr.select(way == DOME, to_dome, to_portal))
-        sun, sun_density = self.sun(d, only)
-        dome, dome_density = self.dome(p, d, only, active)
+        sun, sun_pdf = self.sun(d, only)
+        dome, dome_pdf = self.dome(p, d, only, active)
         is_sun = way == SUN
-        return Towards(
+        return DirectionSample(
             d,
             mi.Float(dr.inf),
             dr.select(is_sun, sun, dome),
-            dr.select(is_sun, sun_density, dome_density),
+            dr.select(is_sun, sun_pdf, dome_pdf),
             active,
         )
 
     def sun(self, d: Any, only: Any) -> tuple[Any, Any]:
-        """(radiance of the sun's disc in direction d, density of sampling it)."""
+        """(radiance of the sun's disc in direction d, pdf of sampling it)."""
         inside = dr.dot(d, self._sun_frame.n) >= self._sun_cos - 1e-7
         weight = dr.select(only >= 0, 1, self._sun_weight)
         mine = (only < 0) | (only == SUN)
-        return dr.select(inside & mine, self._sun_rgb, 0), weight * self._sun_density
+        return dr.select(inside & mine, self._sun_rgb, 0), weight * self._sun_pdf
 
     def dome(self, p: Any, d: Any, only: Any, active: Any) -> tuple[Any, Any]:
-        """(radiance of the dome in direction d, density of sampling d from p, sun not counted)."""
+        """(radiance of the dome in direction d, pdf of sampling d from p, sun not counted)."""
         radiance, by_texel = self._dome_row(d, active)
         free = only < 0
-        density = dr.select(free, self._dome_weight, dr.select(only == DOME, 1, 0)) * by_texel
+        pdf = dr.select(free, self._dome_weight, dr.select(only == DOME, 1, 0)) * by_texel
         for k in range(MAX_PORTALS):
             weight = dr.gather(mi.Float, self._portal_weights, mi.UInt32(k))
             weight = dr.select(free, weight, dr.select(only == FIRST_PORTAL + k, 1, 0))
-            density += weight * self._portal_density(k, p, d)
-        return dr.select(only == SUN, 0, radiance), density
+            pdf += weight * self._portal_pdf(k, p, d)
+        return dr.select(only == SUN, 0, radiance), pdf
 
     def _portal_direction(self, p: Any, way: Any, uv: Any, active: Any) -> Any:
         is_portal = active & (way >= FIRST_PORTAL)
@@ -206,7 +206,7 @@ class Emitters:
         length = dr.norm(to)
         return dr.select(length > 1e-6, to / length, mi.Vector3f(0, 1, 0))
 
-    def _portal_density(self, k: int, p: Any, d: Any) -> Any:
+    def _portal_pdf(self, k: int, p: Any, d: Any) -> Any:
         rows = [dr.gather(mi.Vector4f, self._portals, mi.UInt32(k * 3 + j)) for j in range(3)]
         c, a, b = (mi.Vector3f(r[0], r[1], r[2]) for r in rows)
         n = dr.cross(a, b)
@@ -231,7 +231,7 @@ class Emitters:
         return mi.Vector3f(s * sin_phi, y, -s * cos_phi)
 
     def _dome_row(self, d: Any, active: Any) -> tuple[Any, Any]:
-        """(radiance blended between texels, density of the texel's technique)."""
+        """(radiance blended between texels, pdf of the texel's technique)."""
         w, h = mi.Int32(self._dome_width), mi.Int32(self._dome_height)
         phi = dr.atan2(d.x, -d.z)
         x = phi * (1 / (2 * math.pi))
@@ -240,7 +240,7 @@ class Emitters:
         nearest_x = dr.clip(mi.Int32(x), 0, w - 1)
         nearest_y = dr.clip(mi.Int32(y), 0, h - 1)
         at = mi.UInt32(nearest_y * w + nearest_x)
-        density = dr.gather(mi.Vector4f, self._dome, at, active)[3]
+        pdf = dr.gather(mi.Vector4f, self._dome, at, active)[3]
         fx, fy = dr.floor(x - 0.5), dr.floor(y - 0.5)
         tx, ty = x - 0.5 - fx, y - 0.5 - fy
         total = mi.Color3f(0)
@@ -250,7 +250,7 @@ class Emitters:
             texel = dr.gather(mi.Vector4f, self._dome, mi.UInt32(row * w + column), active)
             weight = (tx if dx else 1 - tx) * (ty if dy else 1 - ty)
             total += weight * mi.Color3f(texel[0], texel[1], texel[2])
-        return total, density
+        return total, pdf
 
     # Tables
 
@@ -312,7 +312,7 @@ class Emitters:
         self._dome_height_f = dr.opaque(mi.Float, float(height))
 
 
-def _by_place(at: Standpoint) -> Any:
+def _by_place(at: ReferencePoint) -> Any:
     """Chance that a lamp is chosen by where it is."""
     return dr.select(at.total > 0, mi.Float(BY_PLACE), 0)
 

@@ -12,7 +12,7 @@ import numpy as np
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
-from pbrs_farm.transport.guiding.nearby_lamps import Near, Standpoint, nowhere
+from pbrs_farm.transport.guiding.nearby_lamps import Near, ReferencePoint, no_reference
 from pbrs_farm.transport.kernels.bsdf import Bsdf
 from pbrs_farm.transport.kernels.device_scene import (
     DeviceScene,
@@ -24,7 +24,7 @@ from pbrs_farm.transport.kernels.sampler import opaque3
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 
-class CameraRow(NamedTuple):
+class DeviceCamera(NamedTuple):
     """A camera as opaque device values: another camera is no new kernel."""
 
     eye: Any
@@ -33,7 +33,7 @@ class CameraRow(NamedTuple):
     dv: Any
 
 
-class FieldsRow(NamedTuple):
+class DeviceFields(NamedTuple):
     """The recipe's numbers as opaque device values."""
 
     max_depth: Any
@@ -41,78 +41,78 @@ class FieldsRow(NamedTuple):
     is_tent: Any
 
 
-class Only(NamedTuple):
+class EmitterFilter(NamedTuple):
     """Which emitters count: -1 all of the group, -2 none, else that lamp or technique alone.
 
     None instead of a device value: none ever, the kernel is built without that group.
     """
 
-    lamp: Any
+    indoor: Any
     outdoor: Any
 
 
 @dataclass
-class Walk:
+class PathState:
     """A path under way.
 
     o, d: its ray. beta: throughput. depth: vertices so far, glass passed and holes not counted;
-    nulls: those. last, last_density: where and with which density of the surface's own the
+    n_nulls: those. last, last_pdf: where and with which pdf of the surface's own the
     direction was drawn, 0 = behind the camera, a mirror or glass. aimed, target: what guide.kept
-    asks for: chance of having aimed at a face over the density of all else, and that face.
+    asks for: chance of having aimed at a face over the pdf of all else, and that face.
     """
 
     o: mi.Point3f
     d: mi.Vector3f
     beta: mi.Color3f
     depth: mi.UInt32
-    nulls: mi.UInt32
-    last: Standpoint
-    last_density: mi.Float
-    aimed: mi.Float
-    target: mi.UInt32
+    n_nulls: mi.UInt32
+    reference: ReferencePoint
+    bsdf_pdf: mi.Float
+    guiding_odds: mi.Float
+    target_face: mi.UInt32
 
 
-class Found(NamedTuple):
+class StepResult(NamedTuple):
     """What one step brought, throughput included.
 
     met_*: from an emitter the ray met, by `segments` = the walk's depth before + 1 segments;
     lit_*: from shadow rays at the new vertex, one segment more than its depth.
     is_rough: the vertex is neither mirror nor glass; albedo, normal: of it. missed: no surface.
-    si: the vertex; ahead, density: the direction scattered to, 0 = nowhere; to_outdoor, to_indoor:
-    where the shadow rays went; steady: the vertex was weighted by steady_density (tails.py).
+    si: the vertex; ahead, pdf: the direction scattered to, 0 = nowhere; to_outdoor, to_indoor:
+    where the shadow rays went; steady: the vertex was weighted by steady_pdf (tails.py).
     """
 
-    met_outdoor: Any
-    met_indoor: Any
-    lit_outdoor: Any
-    lit_indoor: Any
+    emitted_outdoor: Any
+    emitted_indoor: Any
+    direct_outdoor: Any
+    direct_indoor: Any
     is_rough: Any
     missed: Any
     albedo: Any
     normal: Any
     si: Any
-    ahead: Any
-    density: Any
-    to_outdoor: Any
-    to_indoor: Any
-    steady: Any
+    scattered_d: Any
+    pdf: Any
+    outdoor_sample: Any
+    indoor_sample: Any
+    is_view_independent: Any
 
 
-class Rules(NamedTuple):
+class PathContext(NamedTuple):
     """What is asked of every path: the scene, the emitters that count, from how many segments."""
 
     scene: DeviceScene
     emitters: Emitters
-    camera: CameraRow
-    fields: FieldsRow
-    only: Only
+    camera: DeviceCamera
+    fields: DeviceFields
+    emitter_filter: EmitterFilter
     segments: Any
 
 
-class Lit(NamedTuple):
+class DirectLightSample(NamedTuple):
     """What one shadow ray brought: light scattered along the path, before throughput.
 
-    d: towards the emitter; strength: its radiance times visibility and weight, over the density.
+    d: towards the emitter; strength: its radiance times visibility and weight, over the pdf.
     lamp: the emitter's number, None for the sky.
     """
 
@@ -122,11 +122,11 @@ class Lit(NamedTuple):
     lamp: Any = None
 
 
-def camera_row(camera: Camera) -> CameraRow:
+def device_camera(camera: Camera) -> DeviceCamera:
     """Device values: the direction at pixel coordinates (u, v) is d0 + u du + v dv."""
     i, r = camera.intrinsics, camera.world_from_camera[:3, :3]
     d0 = r @ np.array([-i.cx / i.fx, i.cy / i.fy, -1.0])
-    return CameraRow(
+    return DeviceCamera(
         opaque3(mi.Point3f, camera.eye),
         opaque3(mi.Vector3f, d0),
         opaque3(mi.Vector3f, r[:, 0] / i.fx),
@@ -134,9 +134,9 @@ def camera_row(camera: Camera) -> CameraRow:
     )
 
 
-def fields_row(fields: LightFields, *, max_depth: int | None = None) -> FieldsRow:
+def device_fields(fields: LightFields, *, max_depth: int | None = None) -> DeviceFields:
     """Device values of the fields the kernels use; max_depth replaces the fields' own."""
-    return FieldsRow(
+    return DeviceFields(
         dr.opaque(mi.UInt32, fields.max_depth if max_depth is None else max_depth),
         dr.opaque(mi.UInt32, fields.rr_depth),
         dr.opaque(mi.Bool, fields.filter == "tent"),
@@ -149,34 +149,34 @@ def film_position(u: Any, is_tent: Any) -> Any:
     return dr.select(is_tent, tent, u)
 
 
-def start(camera: CameraRow, x: Any, y: Any) -> Walk:
+def camera_path(camera: DeviceCamera, x: Any, y: Any) -> PathState:
     """The walk that leaves the camera through film position (x, y), in pixels."""
     d = dr.normalize(camera.d0 + x * camera.du + y * camera.dv)
-    return Walk(
+    return PathState(
         mi.Point3f(camera.eye),
         mi.Vector3f(d),
         mi.Color3f(1),
         mi.UInt32(0),
         mi.UInt32(0),
-        nowhere(camera.eye),
+        no_reference(camera.eye),
         mi.Float(0),
         mi.Float(0),
         mi.UInt32(NO_FACE),
     )
 
 
-def left_surface(p: Any, n: Any, d: Any, density: Any, near: Near) -> Walk:
-    """The walk that leaves a matte surface at p in direction d, drawn with a density."""
-    return Walk(
+def surface_path(p: Any, n: Any, d: Any, pdf: Any, near: Near) -> PathState:
+    """The walk that leaves a matte surface at p in direction d, drawn with a pdf."""
+    return PathState(
         o=offset_ray_origin(p, n),
         d=d,
         beta=mi.Color3f(1),
         depth=mi.UInt32(1),
-        nulls=mi.UInt32(0),
-        last=near.at,
-        last_density=mi.Float(density),
-        aimed=mi.Float(0),
-        target=mi.UInt32(NO_FACE),
+        n_nulls=mi.UInt32(0),
+        reference=near.at,
+        bsdf_pdf=mi.Float(pdf),
+        guiding_odds=mi.Float(0),
+        target_face=mi.UInt32(NO_FACE),
     )
 
 

@@ -16,34 +16,34 @@ CAMERA_DIMS = 2
 VERTEX_DIMS = 10
 
 
-class Numbers(Protocol):
+class Sampler(Protocol):
     """Uniform numbers of one path in [0, 1); dim may vary from lane to lane."""
 
-    def one(self, dim: Any) -> Any:
+    def get_1d(self, dim: Any) -> Any:
         """Float of one dimension."""
         ...
 
-    def two(self, dim: Any) -> Any:
+    def get_2d(self, dim: Any) -> Any:
         """Point2f of dimensions dim and dim + 1, well spread as a pair."""
         ...
 
 
-class HashedNumbers:
+class HashedSampler:
     """Independent numbers."""
 
     def __init__(self, key: Any, sample: Any) -> None:
         self._key = hash32(key ^ hash32(sample + 0x9E3779B9))
 
-    def one(self, dim: Any) -> Any:
+    def get_1d(self, dim: Any) -> Any:
         """Float of one dimension."""
         return unit_float(hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B)))
 
-    def two(self, dim: Any) -> Any:
+    def get_2d(self, dim: Any) -> Any:
         """Point2f of dimensions dim and dim + 1."""
-        return mi.Point2f(self.one(dim), self.one(mi.UInt32(dim) + 1))
+        return mi.Point2f(self.get_1d(dim), self.get_1d(mi.UInt32(dim) + 1))
 
 
-class SobolNumbers:
+class SobolSampler:
     """Owen-scrambled, index-shuffled Sobol pairs (Burley 2020): the samples of a pixel are spread
     evenly in every dimension and every pair, and their first halves and quarters are too."""
 
@@ -51,13 +51,13 @@ class SobolNumbers:
         self._key = key
         self._reversed = dr.brev(mi.UInt32(sample))
 
-    def one(self, dim: Any) -> Any:
+    def get_1d(self, dim: Any) -> Any:
         """Float of one dimension."""
         seed = hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B))
         index = dr.brev(_laine_karras(self._reversed, seed))
         return unit_float(dr.brev(_laine_karras(index, hash32(seed + 0x68BC21EB))))
 
-    def two(self, dim: Any) -> Any:
+    def get_2d(self, dim: Any) -> Any:
         """Point2f of dimensions dim and dim + 1."""
         seed = hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B))
         index = dr.brev(_laine_karras(self._reversed, seed))

@@ -35,8 +35,13 @@ from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.path_state import Only, Rules, camera_row, fields_row
-from pbrs_farm.transport.kernels.sampler import HashedNumbers, device_array, stream_key
+from pbrs_farm.transport.kernels.path_state import (
+    EmitterFilter,
+    PathContext,
+    device_camera,
+    device_fields,
+)
+from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
 from pbrs_farm.transport.metropolis.film import Film
 from pbrs_farm.transport.metropolis.markov_chains import STORED_DIMS, Chains, draw_paths, mutate
 from pbrs_farm.transport.metropolis.reconnection import (
@@ -116,16 +121,18 @@ def metropolis(
     wanted = fields.mutations_per_pixel * n_pixels
     n_chains = int(np.clip(wanted // _MIN_STEPS, 16, fields.chains)) & ~1
     on = dr.opaque(mi.Int32, -1)
-    only = Only(on, None) if group is Group.INDOOR else Only(None, on)
+    emitter_filter = EmitterFilter(on, None) if group is Group.INDOOR else EmitterFilter(None, on)
     # Roulette late: where it ends a path early, the path's neighbours are lost to the chain too;
     # and never at the first two vertices, so that a tail does not depend on its head.
     late = fields.model_copy(update={"rr_depth": max(fields.rr_depth, _RR_DEPTH)})
     segments = dr.opaque(mi.UInt32, min_segments)
-    rules = Rules(scene, emitters, camera_row(camera), fields_row(late), only, segments)
+    context = PathContext(
+        scene, emitters, device_camera(camera), device_fields(late), emitter_filter, segments
+    )
 
     n_bootstrap = int(np.clip(wanted, *_BOOTSTRAP))
-    film = _film(rules, shape, n_bootstrap // 4, seed ^ 0x5BD1E995)
-    chains, total = _started(rules, film, n_bootstrap, n_chains, seed)
+    film = _film(context, shape, n_bootstrap // 4, seed ^ 0x5BD1E995)
+    chains, total = _started(context, film, n_bootstrap, n_chains, seed)
     if chains is None:
         return nothing
 
@@ -141,11 +148,11 @@ def metropolis(
         first = tally.n_steps
         n = min(_STEPS_PER_LAUNCH, n_steps - first)
         steps = dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, first + n)
-        chains, sums = mutate(rules, film, chains, steps, p_large, _mutation_seed(seed), shares)
+        chains, sums = mutate(context, film, chains, steps, p_large, _mutation_seed(seed), shares)
         dr.eval(*chains, sums, film.splats)
         if n_tail_pixels > 0:
             if first % (_LAUNCHES_PER_HEAD * _STEPS_PER_LAUNCH) == 0:
-                heads = first_vertices(rules, film, n_pixels, seed + first)
+                heads = first_vertices(context, film, n_pixels, seed + first)
             groups = deal(*shape, n_tail_pixels, seed + first)
             show_tails(scene, film, heads, groups, chains, dr.opaque(mi.Float, n))
         tally.add(sums, n)
@@ -158,13 +165,13 @@ def metropolis(
     return Estimate(halves, mean, tally.n_accepted / n_mutations, n_mutations, tally.n_bad)
 
 
-def _film(rules: Rules, shape: tuple[int, int], n_paths: int, seed: int) -> Film:
+def _film(context: PathContext, shape: tuple[int, int], n_paths: int, seed: int) -> Film:
     """A black film whose importance is known from n_paths independent paths."""
     height, width = shape
     flat = device_array(mi.Float, np.ones(height * width, np.float32))
     splats = dr.zeros(mi.Float, 2 * height * width * 3)
     film = Film(dr.opaque(mi.UInt32, width), dr.opaque(mi.UInt32, height), splats, flat)
-    pilot = _drawn(rules, film, n_paths, seed)
+    pilot = _drawn(context, film, n_paths, seed)
     importance = importance_of(shape, pilot.pixel.numpy(), pilot.level.numpy())
     return film._replace(importance=device_array(mi.Float, importance.ravel()))
 
@@ -204,21 +211,21 @@ def _path_keys(n: int, seed: int) -> Any:
     return stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
 
 
-def _drawn(rules: Rules, film: Film, n: int, seed: int) -> Chains:
+def _drawn(context: PathContext, film: Film, n: int, seed: int) -> Chains:
     """n independent paths."""
-    found = draw_paths(rules, film, HashedNumbers(_path_keys(n, seed), mi.UInt32(0)))
+    found = draw_paths(context, film, HashedSampler(_path_keys(n, seed), mi.UInt32(0)))
     dr.eval(*found)
     return found
 
 
 def _started(
-    rules: Rules, film: Film, n_bootstrap: int, n_chains: int, seed: int
+    context: PathContext, film: Film, n_bootstrap: int, n_chains: int, seed: int
 ) -> tuple[Chains | None, float]:
     """(chains at independent paths, drawn in proportion to I; sum of I over n_bootstrap paths).
 
     None where no path brings light.
     """
-    found = _drawn(rules, film, n_bootstrap, seed)
+    found = _drawn(context, film, n_bootstrap, seed)
     key = _path_keys(n_bootstrap, seed)
     levels = found.level.numpy().astype(np.float64)
     if levels.sum() <= 0:
@@ -232,7 +239,7 @@ def _started(
     index_tail = dr.arange(mi.UInt32, TAIL_FLOATS * n_chains)
     source = index_tail // n_chains * n_bootstrap + dr.gather(mi.UInt32, at, index_tail % n_chains)
     chains = Chains(
-        HashedNumbers(keys, mi.UInt32(0)).one(index // n_chains),
+        HashedSampler(keys, mi.UInt32(0)).get_1d(index // n_chains),
         dr.gather(mi.Color3f, found.light, at),
         dr.gather(mi.Float, found.level, at),
         dr.gather(mi.UInt32, found.pixel, at),

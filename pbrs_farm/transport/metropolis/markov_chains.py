@@ -3,7 +3,7 @@
 The three steps of Metropolis sampling are `mutate`; the estimator they serve is metropolis.py's.
 
 A proposal is never stored: every number is mutated by a hash of (chain, step, dimension) when the
-path asks for it, and again when it is accepted. Numbers beyond STORED_DIMS are fresh in every
+path asks for it, and again when it is accepted. Sampler beyond STORED_DIMS are fresh in every
 proposal, which is a large step in those dimensions. A chain's numbers stay in local memory while
 a launch runs; a lane starts its next mutation as soon as its path ends.
 """
@@ -18,13 +18,13 @@ import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.transport.kernels.bsdf import luminance
-from pbrs_farm.transport.kernels.path_state import CameraRow, Rules, Walk, start
+from pbrs_farm.transport.kernels.path_state import DeviceCamera, PathContext, PathState, camera_path
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import (
     CAMERA_DIMS,
     VERTEX_DIMS,
-    HashedNumbers,
-    Numbers,
+    HashedSampler,
+    Sampler,
     hash32,
     stream_key,
     unit_float,
@@ -43,13 +43,13 @@ _SMALLEST, _LARGEST = 1 / 1024, 1 / 64
 _FILM_STEP: Final = 2.0
 
 
-class MutatedNumbers:
+class MutatedSampler:
     """The numbers of a proposal: the chain's own, each moved a little, or all fresh."""
 
     def __init__(self, chain: Any, key: Any, is_large: Any) -> None:
         self._chain, self._key, self._is_large = chain, key, is_large
 
-    def one(self, dim: Any) -> Any:
+    def get_1d(self, dim: Any) -> Any:
         """Float of one dimension."""
         dim = mi.UInt32(dim)
         fresh = unit_float(hash32(self._key ^ hash32(dim + 0x85EBCA6B)))
@@ -65,9 +65,9 @@ class MutatedNumbers:
         moved = moved - dr.floor(moved)
         return dr.minimum(dr.select(self._is_large | ~stored, fresh, moved), 1 - 2**-24)
 
-    def two(self, dim: Any) -> Any:
+    def get_2d(self, dim: Any) -> Any:
         """Point2f of dimensions dim and dim + 1."""
-        return mi.Point2f(self.one(dim), self.one(mi.UInt32(dim) + 1))
+        return mi.Point2f(self.get_1d(dim), self.get_1d(mi.UInt32(dim) + 1))
 
 
 class Chains(NamedTuple):
@@ -95,7 +95,7 @@ class Trial:
     `passes`; is_shared: see tails.py.
     """
 
-    walk: Walk
+    path: PathState
     light: mi.Color3f
     head: mi.Color3f
     tail: mi.Color3f
@@ -106,7 +106,7 @@ class Trial:
 
 @dr.syntax
 def mutate(
-    rules: Rules,
+    context: PathContext,
     film: Film,
     chains: Chains,
     steps: tuple[Any, Any],
@@ -142,7 +142,7 @@ def mutate(
     n_accepted, n_bad = mi.Float(0), mi.UInt32(0)
     step = mi.UInt32(steps[0])
     chain_key = stream_key(lane, seed)
-    y = _trial(rules.camera, mi.Float(0) * mi.Float(lane), mi.Float(0))
+    y = _trial(context.camera, mi.Float(0) * mi.Float(lane), mi.Float(0))
     fresh = mi.Bool(True)
     active = step < steps[1]
 
@@ -150,10 +150,10 @@ def mutate(
         # 1. Propose; the path's first ray leaves through the film position of dimensions 0 and 1.
         key = hash32(chain_key ^ hash32(step + 0x9E3779B9))
         is_large = unit_float(hash32(key ^ 0x51ED270B)) < p_large
-        proposal = MutatedNumbers(numbers, key, is_large)
-        y_pixel, at = film_point(film, proposal.two(mi.UInt32(0)), rules.fields.is_tent)
-        y = dr.select(fresh, _trial(rules.camera, at.x, at.y), y)
-        y, alive = _onward(rules, proposal, y, y_tail, active)
+        proposal = MutatedSampler(numbers, key, is_large)
+        y_pixel, at = film_point(film, proposal.get_2d(mi.UInt32(0)), context.fields.is_tent)
+        y = dr.select(fresh, _trial(context.camera, at.x, at.y), y)
+        y, alive = _onward(context, proposal, y, y_tail, active)
         done = active & ~alive
 
         # 2. Accept or stay.
@@ -190,7 +190,7 @@ def mutate(
         dim = mi.UInt32(0)
         updating = mi.Bool(accept)
         while updating:
-            numbers.write(proposal.one(dim), dim)
+            numbers.write(proposal.get_1d(dim), dim)
             dim += 1
             updating = updating & (dim < STORED_DIMS)
         dim = mi.UInt32(0)
@@ -220,14 +220,14 @@ def mutate(
 
 
 @dr.syntax
-def draw_paths(rules: Rules, film: Film, numbers: HashedNumbers) -> Chains:
+def draw_paths(context: PathContext, film: Film, numbers: HashedSampler) -> Chains:
     """One path per lane, as where a chain stands; its numbers are not kept."""
-    pixel, at = film_point(film, numbers.two(mi.UInt32(0)), rules.fields.is_tent)
+    pixel, at = film_point(film, numbers.get_2d(mi.UInt32(0)), context.fields.is_tent)
     tail = dr.alloc_local(mi.Float, TAIL_FLOATS)
-    y = _trial(rules.camera, at.x, at.y)
+    y = _trial(context.camera, at.x, at.y)
     active = mi.Bool(True)
     while active:
-        y, alive = _onward(rules, numbers, y, tail, active)
+        y, alive = _onward(context, numbers, y, tail, active)
         active = active & alive
     light = y.light + y.head * y.tail
     level = level_of(film, pixel, light)
@@ -242,35 +242,53 @@ def draw_paths(rules: Rules, film: Film, numbers: HashedNumbers) -> Chains:
     return Chains(mi.Float(0), light, level, pixel, y.is_shared, rows)
 
 
-def _trial(camera: CameraRow, x: Any, y: Any) -> Trial:
+def _trial(camera: DeviceCamera, x: Any, y: Any) -> Trial:
     """The path that leaves the camera through film position (x, y), in pixels."""
     none, one = mi.Color3f(0), mi.Color3f(1)
     no = mi.Bool(False)
-    return Trial(start(camera, x, y), none, one, mi.Color3f(0), no, mi.Float(1), mi.Bool(no))
+    return Trial(camera_path(camera, x, y), none, one, mi.Color3f(0), no, mi.Float(1), mi.Bool(no))
 
 
 def _onward(
-    rules: Rules, numbers: Numbers, trial: Trial, tail: Any, active: Any
+    context: PathContext, numbers: Sampler, trial: Trial, tail: Any, active: Any
 ) -> tuple[Trial, Any]:
     """(the path one vertex on, whether it goes on); its tail is kept in local memory."""
-    walk = trial.walk
-    before = walk.depth
-    may_be_steady = trial.is_straight & (before == 1)
-    following, found, alive = advance(
-        rules.scene, rules.emitters, rules.fields, numbers, walk, rules.only, active, may_be_steady
+    path = trial.path
+    before = path.depth
+    may_reconnect = trial.is_straight & (before == 1)
+    following, result, alive = advance(
+        context.scene,
+        context.emitters,
+        context.fields,
+        numbers,
+        path,
+        context.emitter_filter,
+        active,
+        may_reconnect,
     )
-    met = dr.select(before + 1 >= rules.segments, found.met_outdoor + found.met_indoor, 0)
-    lit = dr.select(following.depth + 1 >= rules.segments, found.lit_outdoor + found.lit_indoor, 0)
+    met = dr.select(
+        before + 1 >= context.segments, result.emitted_outdoor + result.emitted_indoor, 0
+    )
+    lit = dr.select(
+        following.depth + 1 >= context.segments, result.direct_outdoor + result.direct_indoor, 0
+    )
     is_beyond = before >= 2
     is_second = active & (before < 2) & (following.depth == 2)
-    write_tail(tail, found, walk, trial.passes, rules.only, is_second & found.steady)
+    write_tail(
+        tail,
+        result,
+        path,
+        trial.passes,
+        context.emitter_filter,
+        is_second & result.is_view_independent,
+    )
     head = dr.select(is_second, following.beta, trial.head)
     following.beta = dr.select(is_second, 1, following.beta)
-    is_far = dr.squared_norm(found.si.p - walk.last.p) > NEAR_M**2
-    # What reflects, glass too, forgets the density of the direction.
-    goes_on = trial.is_straight & (following.last_density > 0)
-    is_straight = dr.select(before == 0, found.is_rough, goes_on)
-    can_share = found.steady & (found.density > 0) & is_far
+    is_far = dr.squared_norm(result.si.p - path.reference.p) > NEAR_M**2
+    # What reflects, glass too, forgets the pdf of the direction.
+    goes_on = trial.is_straight & (following.bsdf_pdf > 0)
+    is_straight = dr.select(before == 0, result.is_rough, goes_on)
+    can_share = result.is_view_independent & (result.pdf > 0) & is_far
     return (
         Trial(
             following,
@@ -278,7 +296,7 @@ def _onward(
             head,
             trial.tail + dr.select(is_beyond, met + lit, 0),
             is_straight,
-            trial.passes * dr.select(before == 1, passing_chance(found.si, walk.d), 1),
+            trial.passes * dr.select(before == 1, passing_chance(result.si, path.d), 1),
             dr.select(is_second, can_share, trial.is_shared),
         ),
         alive,

@@ -8,8 +8,8 @@ the same tail. In the measure of (film, area at x2, direction out of x2) its con
              V(x1', x2) [ f2(-> lamp) S p2(-> x3) + f2(-> x3) T ]
 
 with B what reaches the eye from x1', V what thin glass between lets through (0 behind a wall), S
-the shadow ray's radiance over its density, T the light that arrives from x3, p2 the density of
-going there: the PSSMLT integrand times the densities of what the head no longer draws. The pixels are dealt into random groups; a chain that stands at a
+the shadow ray's radiance over its pdf, T the light that arrives from x3, p2 the pdf of
+going there: the PSSMLT integrand times the pdfs of what the head no longer draws. The pixels are dealt into random groups; a chain that stands at a
 path in proportion to its luminance I is equally well shown at all heads j of its pixel's group,
 each with weight I_j = luminance of K_j over the group's sum (a Gibbs step over the head, every
 outcome counted at once: it keeps the distribution of the chain). So one tail, dear to find, lights
@@ -28,7 +28,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from pbrs_farm.transport.kernels.bsdf import Bsdf, evaluate, thin_glass_reflectance
+from pbrs_farm.transport.kernels.bsdf import Bsdf, evaluate_bsdf, thin_glass_reflectance
 from pbrs_farm.transport.kernels.device_scene import (
     DeviceScene,
     SurfaceInteraction,
@@ -37,16 +37,16 @@ from pbrs_farm.transport.kernels.device_scene import (
 )
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
-    CameraRow,
-    FieldsRow,
-    Found,
-    Only,
-    Rules,
-    Walk,
-    start,
+    DeviceCamera,
+    DeviceFields,
+    EmitterFilter,
+    PathContext,
+    PathState,
+    StepResult,
+    camera_path,
 )
 from pbrs_farm.transport.kernels.path_step import advance
-from pbrs_farm.transport.kernels.sampler import HashedNumbers, device_array, stream_key
+from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
 from pbrs_farm.transport.metropolis.film import Film, level_of, point_in_pixel
 from pbrs_farm.transport.scene_tables.material_rows import GLASS
 
@@ -110,15 +110,17 @@ def deal(height: int, width: int, n: int, seed: int) -> Groups:
     )
 
 
-def first_vertices(rules: Rules, film: Film, n_pixels: int, seed: int) -> Any:
+def first_vertices(context: PathContext, film: Film, n_pixels: int, seed: int) -> Any:
     """(pixels * 28,) floats: a head of each pixel through a random place in it.
 
     Invalid where a pixel does not see a rough surface first.
     """
     key = stream_key(dr.arange(mi.UInt32, n_pixels), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
-    numbers = HashedNumbers(key, dr.opaque(mi.UInt32, 7))
+    sampler = HashedSampler(key, dr.opaque(mi.UInt32, 7))
     rows = dr.zeros(mi.Float, n_pixels * _HEAD_PACKETS * 4)
-    _trace_heads(rules.scene, rules.emitters, rules.fields, rules.camera, film, numbers, rows)
+    _trace_heads(
+        context.scene, context.emitters, context.fields, context.camera, film, sampler, rows
+    )
     dr.eval(rows)
     return rows
 
@@ -127,35 +129,35 @@ def first_vertices(rules: Rules, film: Film, n_pixels: int, seed: int) -> Any:
 def _trace_heads(
     scene: DeviceScene,
     emitters: Emitters,
-    fields: FieldsRow,
-    camera: CameraRow,
+    fields: DeviceFields,
+    camera: DeviceCamera,
     film: Film,
-    numbers: HashedNumbers,
+    sampler: HashedSampler,
     rows: Any,
 ) -> None:
-    off = Only(None, None)
+    off = EmitterFilter(None, None)
     lane = dr.arange(mi.UInt32, dr.width(rows) // (_HEAD_PACKETS * 4))
-    at = point_in_pixel(film, lane, numbers.two(mi.UInt32(0)), fields.is_tent)
-    walk = start(camera, at.x, at.y)
+    at = point_in_pixel(film, lane, sampler.get_2d(mi.UInt32(0)), fields.is_tent)
+    path = camera_path(camera, at.x, at.y)
     p, n, ng, wi = mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Vector3f(0)
     kd, f0, tau, alpha = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Float(0)
     beta, is_valid = mi.Color3f(0), mi.Bool(False)
     active = mi.Bool(True)
     while active:
-        before, d = mi.Color3f(walk.beta), mi.Vector3f(walk.d)
-        walk, found, alive = advance(scene, emitters, fields, numbers, walk, off, active)
-        here = active & found.is_rough & (walk.depth == 1)
-        m = found.si.bsdf
+        before, d = mi.Color3f(path.beta), mi.Vector3f(path.d)
+        path, result, alive = advance(scene, emitters, fields, sampler, path, off, active)
+        here = active & result.is_rough & (path.depth == 1)
+        m = result.si.bsdf
         p, n, ng = (
-            dr.select(here, found.si.p, p),
-            dr.select(here, found.si.n, n),
-            dr.select(here, found.si.ng, ng),
+            dr.select(here, result.si.p, p),
+            dr.select(here, result.si.n, n),
+            dr.select(here, result.si.ng, ng),
         )
         wi, beta = dr.select(here, -d, wi), dr.select(here, before, beta)
         kd, f0 = dr.select(here, m.kd, kd), dr.select(here, m.f0, f0)
         tau, alpha = dr.select(here, m.tau, tau), dr.select(here, m.alpha, alpha)
         is_valid = is_valid | here
-        active = active & alive & (walk.depth == 0)
+        active = active & alive & (path.depth == 0)
     values = (
         *(p.x, p.y, p.z, dr.select(is_valid, mi.Float(1), 0)),
         *(n.x, n.y, n.z, alpha),
@@ -175,25 +177,32 @@ def passing_chance(si: SurfaceInteraction, d: Any) -> Any:
     return dr.select(is_glass, 1 - thin_glass_reflectance(dr.dot(si.n, d)), 1)
 
 
-def write_tail(tail: Any, found: Found, walk: Walk, passes: Any, only: Only, active: Any) -> None:
+def write_tail(
+    tail: Any,
+    result: StepResult,
+    path: PathState,
+    passes: Any,
+    emitter_filter: EmitterFilter,
+    active: Any,
+) -> None:
     """Keep, in local memory, the second vertex of a path just after it was made.
 
     walk: as it was when it set out from the first vertex, or from the last sheet of glass on the
     way; passes: chance of having passed those.
     """
-    si, m = found.si, found.si.bsdf
-    way = si.p - walk.last.p
-    to = found.to_outdoor if only.lamp is None else found.to_indoor
-    # What turns the contribution into K's measure: the densities of x2 and of leaving it, the
+    si, m = result.si, result.si.bsdf
+    way = si.p - path.reference.p
+    to = result.outdoor_sample if emitter_filter.indoor is None else result.indoor_sample
+    # What turns the contribution into K's measure: the pdfs of x2 and of leaving it, the
     # chance of the glass between.
-    cos = dr.abs(dr.dot(si.ng, walk.d))
-    densities = walk.last_density * cos / dr.squared_norm(way) * found.density * passes
+    cos = dr.abs(dr.dot(si.ng, path.d))
+    pdfs = path.bsdf_pdf * cos / dr.squared_norm(way) * result.pdf * passes
     values = (
-        *(si.p.x, si.p.y, si.p.z, densities),
+        *(si.p.x, si.p.y, si.p.z, pdfs),
         *(si.n_interpolated.x, si.n_interpolated.y, si.n_interpolated.z, m.alpha),
-        *(si.ng.x, si.ng.y, si.ng.z, found.ahead.x),
-        *(m.kd[0], m.kd[1], m.kd[2], found.ahead.y),
-        *(m.f0[0], m.f0[1], m.f0[2], found.ahead.z),
+        *(si.ng.x, si.ng.y, si.ng.z, result.scattered_d.x),
+        *(m.kd[0], m.kd[1], m.kd[2], result.scattered_d.y),
+        *(m.f0[0], m.f0[1], m.f0[2], result.scattered_d.z),
         *(m.tau[0], m.tau[1], m.tau[2], to.d.x),
         *(to.strength[0], to.strength[1], to.strength[2], to.d.y),
     )
@@ -288,10 +297,10 @@ def _seen(
     local = frame1.to_local(wi1)
     local.z = dr.maximum(local.z, 1e-4)
     out = frame1.to_local(d)
-    value1, density1 = evaluate(m1, local, out)
+    value1, pdf1 = evaluate_bsdf(m1, local, out)
     side, cos2 = dr.dot(ng1, d), -dr.dot(ng2, d)
     valid = is_other & active & (h[0][3] > 0) & (distance2 > NEAR_M**2) & (side * out.z > 0)
-    valid &= (density1 > 0) & (dr.max(value1) > 0) & (cos2 > 0)
+    valid &= (pdf1 > 0) & (dr.max(value1) > 0) & (cos2 > 0)
 
     # At x2: towards the lamp, and along the tail.
     frame2 = mi.Frame3f(bend_normal(_vector(t[1]), d))
@@ -299,10 +308,10 @@ def _seen(
     wi2.z = dr.maximum(wi2.z, 1e-4)
     to_lamp = mi.Vector3f(t[5][3], t[6][3], t[7][3])
     ahead = mi.Vector3f(t[2][3], t[3][3], t[4][3])
-    from_lamp, _density = _scattered(m2, frame2, ng2, wi2, to_lamp)
-    from_tail, density2 = _scattered(m2, frame2, ng2, wi2, ahead)
-    inner = from_lamp * _colour(t[6]) * density2 + from_tail * _colour(t[7])
-    valid &= (density2 > 0) & (dr.max(inner) > 0)
+    from_lamp, _pdf = _scattered(m2, frame2, ng2, wi2, to_lamp)
+    from_tail, pdf2 = _scattered(m2, frame2, ng2, wi2, ahead)
+    inner = from_lamp * _colour(t[6]) * pdf2 + from_tail * _colour(t[7])
+    valid &= (pdf2 > 0) & (dr.max(inner) > 0)
 
     begin = offset_ray_origin(p1, dr.select(side > 0, ng1, -ng1))
     aim = p2 - begin
@@ -313,11 +322,11 @@ def _seen(
 
 
 def _scattered(m: Bsdf, frame: Any, ng: Any, wi: Any, d: Any) -> tuple[Any, Any]:
-    """(f |cos|, density) of going on in direction d; nothing where d leaves through the face."""
+    """(f |cos|, pdf) of going on in direction d; nothing where d leaves through the face."""
     wo = frame.to_local(d)
-    value, density = evaluate(m, wi, wo)
+    value, pdf = evaluate_bsdf(m, wi, wo)
     faces = dr.dot(ng, d) * wo.z > 0
-    return dr.select(faces, value, 0), dr.select(faces, density, 0)
+    return dr.select(faces, value, 0), dr.select(faces, pdf, 0)
 
 
 def _point(row: Any) -> Any:
