@@ -8,38 +8,53 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
+from typing import Final, Literal
+
+State = Literal["ok", "degraded", "missing"]
+PROBE_TIMEOUT_S: Final = 120
+
+_PACKAGES: Final = (
+    "numpy", "pydantic", "mitsuba", "drjit", "moderngl", "trimesh", "manifold3d", "pyoidn",
+    "OpenImageIO", "shapely",
+)  # fmt: skip
+_GL_PACKAGES: Final = "libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri"
+_VARIANTS: Final = {
+    "cuda_ad_rgb": "only with an NVIDIA GPU and its driver; not needed",
+    "llvm_ad_rgb": "sudo apt-get install -y libllvm19",
+    "scalar_rgb": "pip install 'pbrs-farm[transport]'",
+}
+"""Mitsuba's variants -> what to do where one does not work."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One part: state "ok", "degraded" (the main job still runs) or "missing"; what to do."""
+    """One part of the machine: its state, what was found, what to do about it."""
 
     part: str
-    state: str
+    state: State  # degraded: the main job still runs
     text: str
     remedy: str = ""
-    needed: bool = False
+    needed: bool = False  # the main job cannot run without it
 
 
 def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
-    """Every part in the order a house meets it. needed: the main job cannot run without it."""
-    findings = [_python(), _packages(), _llvm()]
-    findings += _variants()
-    findings += [
-        _probe(
-            "GL",
-            _GL,
-            "sudo apt-get install -y libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri",
-            needed=True,
-        ),
-        _probe("denoiser", _OIDN, "pip install 'pbrs-farm[transport]'", needed=True),
-        _probe("pictures", _OIIO, "pip install OpenImageIO", needed=True),
+    """Every part, in the order a house meets it."""
+    oidn, oiio = "pip install 'pbrs-farm[transport]'", "pip install OpenImageIO"
+    return [
+        _python(),
+        _packages(),
+        _llvm(),
+        *_variants(),
+        _probe("GL", check_gl, f"sudo apt-get install -y {_GL_PACKAGES}", needed=True),
+        _probe("denoiser", check_denoiser, oidn, needed=True),
+        _probe("pictures", check_pictures, oiio, needed=True),
         _redis(redis_url),
         _store(store_url),
     ]
-    return findings
 
 
 def can_run(findings: list[Finding]) -> bool:
@@ -48,18 +63,13 @@ def can_run(findings: list[Finding]) -> bool:
 
 
 def _python() -> Finding:
-    text = sys.version.split()[0]
-    return Finding(
-        "python", "ok" if sys.version_info >= (3, 11) else "missing", text, "Python 3.11+", True
-    )
-
-
-_PACKAGES = ("numpy", "pydantic", "mitsuba", "drjit", "moderngl", "trimesh", "manifold3d", "pyoidn")
+    state: State = "ok" if sys.version_info >= (3, 11) else "missing"
+    return Finding("python", state, sys.version.split()[0], "Python 3.11+", True)
 
 
 def _packages() -> Finding:
     found, missing = [], []
-    for package in (*_PACKAGES, "OpenImageIO", "shapely"):
+    for package in _PACKAGES:
         try:
             found.append(f"{package} {version(package)}")
         except PackageNotFoundError:
@@ -74,141 +84,131 @@ def _llvm() -> Finding:
     from pbrs_farm.raycast.variant import MIN_LLVM, find_llvm, llvm_libraries
 
     library = find_llvm()
-    remedy = "sudo apt-get install -y libllvm19"
     if library is not None:
         return Finding("LLVM", "ok", str(library))
     old = ", ".join(".".join(map(str, v)) for v, _path in llvm_libraries())
     text = f"only {old}; 14 to 16 crash inside Dr.Jit" if old else "no libLLVM found"
     text += f"; {MIN_LLVM} or later is needed (19 is what we test); running with scalar_rgb, several times slower"
-    return Finding("LLVM", "degraded", text, remedy)
-
-
-_VARIANT = """
-import sys
-from pbrs_farm.transport import variant
-name = sys.argv[1]
-if name.startswith("llvm"):
-    assert variant.find_llvm(), "no LLVM of version 17 or later"
-variant.choose_variant()
-assert variant.works(name), "does not work here"
-print(name)
-"""
+    return Finding("LLVM", "degraded", text, _VARIANTS["llvm_ad_rgb"])
 
 
 def _variants() -> list[Finding]:
     findings = [
-        _probe(f"mitsuba {name}", _VARIANT, remedy, argument=name, state="degraded")
-        for name, remedy in (
-            ("cuda_ad_rgb", "only with an NVIDIA GPU and its driver; not needed"),
-            ("llvm_ad_rgb", "sudo apt-get install -y libllvm19"),
-            ("scalar_rgb", "pip install 'pbrs-farm[transport]'"),
-        )
+        _probe(f"mitsuba {name}", check_variant, remedy, argument=name, state="degraded")
+        for name, remedy in _VARIANTS.items()
     ]
+    # One variant is enough; without any nothing can be rendered.
     if not any(f.state == "ok" for f in findings):
         last = findings[-1]
         findings[-1] = Finding(last.part, "missing", last.text, last.remedy, True)
     return findings
 
 
-_GL = """
-from pbrs_farm.raster.gl_device import open_context
-context = open_context()
-print(context.info["GL_RENDERER"] + ", GL " + str(context.version_code / 100))
-"""
-
-_OIDN = """
-from importlib.metadata import version
-import numpy as np
-from pbrs_farm.transport.develop.denoiser import denoise_radiance
-grey = np.full((32, 32, 3), 0.5, np.float32)
-up = np.zeros((32, 32, 3), np.float32); up[..., 1] = 1
-out = denoise_radiance(grey, grey, up)
-assert abs(float(out.mean()) - 0.5) < 0.05, out.mean()
-print("Open Image Denoise, pyoidn " + version("pyoidn"))
-"""
-
-_OIIO = """
-from importlib.metadata import version
-import numpy as np
-from pbrs_farm.images import array_from_png, png_from_array
-pixels = np.arange(256, dtype=np.uint16).reshape(16, 16)
-assert (array_from_png(png_from_array(pixels)) == pixels).all()
-print("OpenImageIO " + version("OpenImageIO"))
-"""
-
-
-def _probe(
-    part: str,
-    code: str,
-    remedy: str,
-    *,
-    argument: str = "",
-    needed: bool = False,
-    state: str = "missing",
-) -> Finding:
-    """Run code in a process of its own: a crash there is a finding here."""
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", code, argument], capture_output=True, text=True, timeout=120
-        )
-    except subprocess.TimeoutExpired:
-        return Finding(part, state, "did not answer within 120 s", remedy, needed)
-    if done.returncode == 0:
-        return Finding(
-            part,
-            "ok",
-            done.stdout.strip().splitlines()[-1] if done.stdout.strip() else "works",
-            "",
-            needed,
-        )
-    lines = [line for line in done.stderr.strip().splitlines() if line.strip()]
-    text = (
-        lines[-1].removeprefix("AssertionError: ")
-        if lines
-        else f"ended with exit code {done.returncode}"
-    )
-    return Finding(part, state, text[:200], remedy, needed)
-
-
 def _redis(url: str) -> Finding:
-    server = shutil.which("redis-server")
     if url:
-        return _probe(
-            "redis", _PING, "is it running? PBRS_REDIS_URL names it", argument=url, state="degraded"
-        )
-    if server is None:
-        return Finding(
-            "redis",
-            "degraded",
-            "no redis-server (only the farm needs it)",
-            "sudo apt-get install -y redis-server",
-        )
-    return Finding("redis", "ok", f"{server} (only the farm needs it)")
-
-
-_PING = """
-import sys
-from importlib import import_module
-client = import_module("redis").Redis.from_url(sys.argv[1], socket_timeout=5)
-print("answers, version " + client.info("server")["redis_version"])
-"""
+        remedy = "is it running? PBRS_REDIS_URL names it"
+        return _probe("redis", check_redis, remedy, argument=url, state="degraded")
+    server = shutil.which("redis-server")
+    if server is not None:
+        return Finding("redis", "ok", f"{server} (only the farm needs it)")
+    remedy = "sudo apt-get install -y redis-server"
+    return Finding("redis", "degraded", "no redis-server (only the farm needs it)", remedy)
 
 
 def _store(url: str) -> Finding:
     if not url:
         return Finding("store", "ok", "folders (no --out or PBRS_STORE given)")
-    return _probe(
-        "store", _PUT, "check the path, endpoint and credentials", argument=url, needed=True
-    )
+    remedy = "check the path, endpoint and credentials"
+    return _probe("store", check_store, remedy, argument=url, needed=True)
 
 
-_PUT = """
-import sys
-from pbrs_farm.settings import settings_from_environment
-from pbrs_farm.store import store_from_url
-store = store_from_url(sys.argv[1], settings_from_environment().store)
-store.put("doctor/probe.txt", b"ok")
-assert store.get("doctor/probe.txt") == b"ok"
-store.delete("doctor/probe.txt")
-print(store.url + " can be written")
-"""
+def _probe(
+    part: str,
+    check: Callable[[str], str],
+    remedy: str,
+    *,
+    argument: str = "",
+    needed: bool = False,
+    state: State = "missing",
+) -> Finding:
+    """The finding of a check, run in a process of its own: a crash there is a finding here.
+
+    check: a function of this module; it returns what it found, and exits with a fault's text.
+    """
+    code = f"import sys; from {__name__} import {check.__name__} as f; print(f(sys.argv[1]))"
+    command = [sys.executable, "-c", code, argument]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PROBE_TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        text = f"did not answer within {PROBE_TIMEOUT_S} s"
+        return Finding(part, state, text, remedy, needed)
+    if done.returncode == 0:
+        return Finding(part, "ok", done.stdout.strip().splitlines()[-1], "", needed)
+    lines = [line for line in done.stderr.splitlines() if line.strip()]
+    text = lines[-1] if lines else f"ended with exit code {done.returncode}"
+    return Finding(part, state, text[:200], remedy, needed)
+
+
+def check_variant(name: str) -> str:
+    """Mitsuba's variant of that name traces a ray."""
+    from pbrs_farm.raycast import variant
+
+    if name.startswith("llvm") and not variant.find_llvm():
+        raise SystemExit("no LLVM of version 17 or later")
+    variant.choose_variant()
+    if not variant.works(name):
+        raise SystemExit("does not work here")
+    return name
+
+
+def check_gl(_argument: str) -> str:
+    """An OpenGL context opens."""
+    from pbrs_farm.raster.gl_device import open_context
+
+    context = open_context()
+    return f"{context.info['GL_RENDERER']}, GL {context.version_code / 100}"
+
+
+def check_denoiser(_argument: str) -> str:
+    """Open Image Denoise keeps a grey picture grey."""
+    import numpy as np
+
+    from pbrs_farm.transport.develop.denoiser import denoise_radiance
+
+    grey = np.full((32, 32, 3), 0.5, np.float32)
+    normal = np.broadcast_to(np.array([0, 1, 0], np.float32), grey.shape).copy()
+    mean = float(denoise_radiance(grey, grey, normal).mean())
+    if abs(mean - 0.5) >= 0.05:
+        raise SystemExit(f"a grey of 0.5 comes out as {mean}")
+    return f"Open Image Denoise, pyoidn {version('pyoidn')}"
+
+
+def check_pictures(_argument: str) -> str:
+    """OpenImageIO reads back the PNG it wrote."""
+    import numpy as np
+
+    from pbrs_farm.images import array_from_png, png_from_array
+
+    pixels = np.arange(256, dtype=np.uint16).reshape(16, 16)
+    if not np.array_equal(array_from_png(png_from_array(pixels)), pixels):
+        raise SystemExit("a PNG reads back as other pixels")
+    return f"OpenImageIO {version('OpenImageIO')}"
+
+
+def check_redis(url: str) -> str:
+    """The Redis at url answers."""
+    client = import_module("redis").Redis.from_url(url, socket_timeout=5)
+    return f"answers, version {client.info('server')['redis_version']}"
+
+
+def check_store(url: str) -> str:
+    """The store at url keeps an object."""
+    from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.store import store_from_url
+
+    store = store_from_url(url, settings_from_environment().store)
+    store.put("doctor/probe.txt", b"ok")
+    if store.get("doctor/probe.txt") != b"ok":
+        raise SystemExit("an object reads back as other bytes")
+    store.delete("doctor/probe.txt")
+    return f"{store.url} can be written"

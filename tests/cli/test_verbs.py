@@ -1,0 +1,264 @@
+"""The verbs doctor, homes, skies, repair, cameras, reference and select, run as a user runs them."""
+
+from __future__ import annotations
+
+import io
+import json
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrs_farm import doctor, images
+from pbrs_farm.assets import homes
+from pbrs_farm.cli import main
+from pbrs_farm.core import keys
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.formats.house_bundle import house_from_bundle
+from pbrs_farm.store.folder import FolderStore
+from tests.example_homes import example_homes
+from tests.selection.histogram_sets import record
+
+PREVIEW = ("--recipe", "preview", "--set", "cameras.cell_m=0.5")
+
+
+def printed(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> str:
+    capsys.readouterr()
+    assert main(list(words)) == code
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.out + captured.err
+    return captured.err if code else captured.out
+
+
+def test_doctor_finds_what_every_other_test_uses(tmp_path, capsys):
+    words = ["doctor", "--json", "--store", str(tmp_path), "--redis", "redis://127.0.0.1:1/0"]
+    assert main(words) == 0
+    found = json.loads(capsys.readouterr().out)
+    parts = {row["part"]: row for row in found["findings"]}
+    assert found["can_run"]
+    for part in ("python", "packages", "GL", "denoiser", "pictures", "mitsuba scalar_rgb", "store"):
+        assert parts[part]["state"] == "ok", parts[part]
+    assert parts["redis"]["state"] == "degraded"
+    assert "Connection refused" in parts["redis"]["text"]
+    assert not any(tmp_path.rglob("probe.txt"))
+    # A check whose own names are stale says so as an import error: none may.
+    assert not [row for row in parts.values() if "cannot import" in row["text"]]
+
+
+def test_doctor_says_what_to_do_about_what_is_missing(monkeypatch, capsys):
+    findings = [
+        doctor.Finding("GL", "missing", "no EGL", "install it", needed=True),
+        doctor.Finding("LLVM", "degraded", "too old", "take 19"),
+        doctor.Finding("python", "ok", "3.11", "nothing"),
+    ]
+    monkeypatch.setattr(doctor, "examine", lambda *_: findings)
+    assert main(["doctor"]) == 1
+    text = capsys.readouterr().out
+    assert "MISSING   GL" in text
+    assert "-> install it" in text
+    assert "-> take 19" in text
+    assert "-> nothing" not in text
+    assert "cannot render yet" in text
+
+
+def test_a_check_that_crashes_or_exits_is_a_finding():
+    crashed = doctor._probe("x", doctor.check_variant, "do this", argument="no_such_variant")
+    assert (crashed.state, crashed.remedy) == ("missing", "do this")
+    unknown = doctor._probe("store", doctor.check_store, "look", argument="ftp://x", needed=True)
+    assert "not a store" in unknown.text
+    assert not doctor.can_run([unknown])
+
+
+def test_a_machine_without_variants_llvm_or_redis_is_told(monkeypatch):
+    broken = doctor.Finding("x", "degraded", "does not work")
+    monkeypatch.setattr(doctor, "_probe", lambda *_args, **_kwargs: broken)
+    assert [f.needed for f in doctor._variants()] == [False, False, True]
+    monkeypatch.setattr("pbrs_farm.raycast.variant.find_llvm", lambda: None)
+    old = [((15, 0, 6), Path("libLLVM-15.so"))]
+    monkeypatch.setattr("pbrs_farm.raycast.variant.llvm_libraries", lambda: old)
+    assert "only 15.0.6" in doctor._llvm().text
+    monkeypatch.setattr("shutil.which", lambda _name: None)
+    assert doctor._redis("").state == "degraded"
+    monkeypatch.setattr(doctor, "_PACKAGES", ("numpy", "no-such-package"))
+    assert doctor._packages().text == "not installed: no-such-package"
+
+
+def test_homes_lists_the_nine_homes_and_how_to_fetch_them(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
+    rows = json.loads(printed(capsys, "homes", "--json"))
+    assert len(rows) == 9
+    assert {"name": "Studio", "n_levels": 1, "n_rooms": 5} in rows
+    text = printed(capsys, "homes")
+    assert all(row["name"] in text for row in rows)
+    assert "not fetched yet: pbrs-farm homes --fetch" in text
+
+
+def test_homes_fetch_without_apt_says_where_to_put_the_package(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
+    monkeypatch.setenv("PATH", "")
+    assert "put Debian's sweethome3d_" in printed(capsys, "homes", "--fetch", code=1)
+
+
+def test_homes_fetch_unpacks_the_package_and_notes_another_version(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
+    write_deb(tmp_path / "sweethome3d_9.9-1_all.deb", {homes.JAR: b"a jar"})
+    text = printed(capsys, "homes", "--fetch")
+    assert "fetched: sweethome3d 9.9-1" in text
+    assert "not the tested version" in text
+
+
+@pytest.mark.homes
+def test_homes_tells_which_package_was_fetched(capsys):
+    assert example_homes().label in printed(capsys, "homes")
+
+
+def write_deb(path: Path, files: dict[str, bytes]) -> None:
+    """A Debian package of files: an ar archive whose data.tar is not compressed."""
+    tar = io.BytesIO()
+    with tarfile.open(fileobj=tar, mode="w") as archive:
+        for name, data in files.items():
+            entry = tarfile.TarInfo(f"./{name}")
+            entry.size = len(data)
+            archive.addfile(entry, io.BytesIO(data))
+    data = tar.getvalue()
+    head = f"{'data.tar':<16}{'0':<12}{'0':<6}{'0':<6}{'100644':<8}{len(data):<10}`\n"
+    path.write_bytes(b"!<arch>\n" + head.encode() + data)
+
+
+def test_skies_unpacks_the_outdoor_panoramas_and_says_how_to_use_them(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
+    names = ("city", "forest", "sunrise", "sunset", "studio")
+    files = {f"usr/share/studiolights/world/{name}.exr": name.encode() for name in names}
+    write_deb(tmp_path / "blender-data_3.4.1+dfsg-2_all.deb", files)
+    text = printed(capsys, "skies")
+    assert f"--set sky.panoramas={tmp_path / 'skies'}" in text
+    kept = sorted((tmp_path / "skies").iterdir())
+    assert [p.stem for p in kept] == ["city", "forest", "sunrise", "sunset"]
+    assert kept[1].read_bytes() == b"forest"
+    assert printed(capsys, "skies") == text  # from the folder, this time
+
+
+def test_skies_names_a_package_that_holds_none(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
+    write_deb(tmp_path / "blender-data_3_all.deb", {"usr/share/doc/readme": b""})
+    assert "holds no city.exr" in printed(capsys, "skies", code=1)
+
+
+def test_repair_writes_the_bundle_the_report_and_a_cut_of_each_level(tmp_path, capsys):
+    text = printed(capsys, "repair", "builtin", "--out", str(tmp_path))
+    written = {p.name: p.read_bytes() for p in tmp_path.iterdir() if p.is_file()}
+    assert set(written) == {"house.glb", "house.json", "repair.json", "cut_0.svg"}
+    assert all(name in text for name in written)
+    assert "No light leaks" in text
+    house = house_from_bundle(written["house.glb"], written["house.json"])
+    report = json.loads(written["repair.json"])
+    assert report["house_id"] == house.id
+    assert written["cut_0.svg"].startswith(b"<svg")
+
+
+def test_repair_names_a_home_that_does_not_exist(tmp_path, capsys):
+    assert "no.sh3d" in printed(capsys, "repair", "no.sh3d", "--out", str(tmp_path), code=1)
+
+
+@pytest.fixture(scope="module")
+def chosen(tmp_path_factory):
+    """The cameras of the built-in home: (folder of cameras.json and the map, JSON)."""
+    folder = tmp_path_factory.mktemp("cameras")
+    words = ["cameras", "builtin", "--out", str(folder / "cameras.json")]
+    assert main([*words, "--map", str(folder / "plan.png"), *PREVIEW]) == 0
+    return folder, json.loads((folder / "cameras.json").read_text())
+
+
+def test_cameras_writes_the_views_and_a_map(chosen):
+    folder, written = chosen
+    assert {p.name for p in folder.iterdir() if p.is_file()} == {
+        "cameras.json", "plan.png", "plan.svg",
+    }  # fmt: skip
+    assert len(written["views"]) == written["report"]["n_views"] > 0
+    assert images.array_from_png((folder / "plan.png").read_bytes()).ndim == 3
+
+
+def test_cameras_prints_the_same_views_as_json(chosen, capsys):
+    assert json.loads(printed(capsys, "cameras", "builtin", "--json", *PREVIEW)) == chosen[1]
+
+
+def test_cameras_says_of_each_sector_why_candidates_were_rejected(chosen, capsys):
+    text = printed(capsys, "cameras", "builtin", *PREVIEW)
+    report = chosen[1]["report"]
+    assert text.count("  sector ") == sum(len(room["sectors"]) for room in report["rooms"])
+    assert "Living room" in text
+    assert "near_obstacle" in text
+    assert f"{report['n_views']} views of {report['n_candidates']} candidates" in text
+
+
+def test_cameras_stored_in_a_home_are_taken(capsys):
+    text = printed(capsys, "cameras", "builtin", "--cameras", "stored", "--json", *PREVIEW)
+    assert json.loads(text)["views"]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """An output folder of six views with histograms and no pictures."""
+    store, rng = FolderStore(tmp_path / "root"), np.random.default_rng(4)
+    settings = ("histogram.colour_bins=4", "histogram.depth_bins=16")
+    recipe = recipe_from_name("fast", dict(pair.split("=") for pair in settings))
+    store.put("recipe.json", recipe.model_dump_json().encode())
+    for k in range(6):
+        view = f"0_{k // 3}_{k % 3}"
+        store.put(keys.view_key("a", view, "histogram.json"), record("a", view, rng).json_bytes())
+    return tmp_path / "root"
+
+
+@pytest.fixture
+def photographs(tmp_path: Path) -> Path:
+    """A folder of four RGB-D pairs."""
+    for k in range(4):
+        rng = np.random.default_rng(k)
+        rgb = (rng.integers(40, 200, 3) + rng.integers(0, 20, (24, 32, 3))).astype(np.uint8)
+        depth = rng.integers(600, 5000, (24, 32)).astype(np.uint16)
+        for folder, pixels in (("rgb", rgb), ("depth", depth)):
+            path = tmp_path / "photographs" / folder / f"p{k}.png"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(images.png_from_array(pixels))
+    return tmp_path / "photographs"
+
+
+LOW = ("--set", "selection.min_colour=0.01", "--set", "selection.min_depth=0.01")
+
+
+def test_select_by_a_reference_that_was_built_writes_the_run_and_its_report(
+    root, photographs, tmp_path, capsys
+):
+    reference = tmp_path / "photographs.npz"
+    bins = ("--set", "histogram.colour_bins=4", "--set", "histogram.depth_bins=16")
+    words = ("reference", "build", str(photographs), "--out", str(reference), *bins)
+    text = printed(capsys, *words)
+    assert "4 photographs" in text
+    assert "colour bins" in text
+    words = ("select", str(root), "--reference", str(reference), *LOW)
+    text = printed(capsys, *words, "--run", "low", "--report")
+    summary = json.loads((root / "selection.json").read_text())
+    assert f"{summary['kept']} of 6 views kept, 6 scored" in text
+    assert text.splitlines()[-1] == "selection/low.html"
+    assert len((root / "selection/low.jsonl").read_text().splitlines()) == 6
+    assert "<h1>Selection “low”</h1>" in (root / "selection/low.html").read_text()
+
+
+def test_select_takes_photographs_and_options_and_prints_json(root, photographs, capsys):
+    words = ("select", str(root), "--reference", str(photographs), *LOW, "--json")
+    options = ("--per-room-cap", "1", "--balance", "none", "--score-mode", "mlt_ol")
+    summary = json.loads(printed(capsys, *words, *options))
+    assert (summary["views"], summary["kept"]) == (6, 2)
+    assert summary["reasons"] == {"room-cap": 4}
+    assert summary["fields"]["per_room_cap"] == 1
+    assert summary["fields"]["score_mode"] == "mlt_ol"
+
+
+def test_select_names_a_wrong_word_and_a_missing_file(root, tmp_path, capsys):
+    words = ("select", str(root), "--reference", str(tmp_path / "no.npz"))
+    assert "no.npz" in printed(capsys, *words, code=1)
+    error = printed(capsys, *words, "--set", "light.spp=4", code=1)
+    assert "expected histogram.FIELD=value or selection.FIELD=value" in error
