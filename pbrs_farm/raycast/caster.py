@@ -1,8 +1,7 @@
 """The ray caster over a house's triangles: hit records, item buffers, item counts, first hits.
 
-Effects: holds a Mitsuba scene. Mitsuba says which face a ray hits; everything else in a hit
-record is computed here, in double precision, from that face's float32 vertices: the labels are
-the same bits for every variant and as exact as the geometry.
+Effects: holds a Mitsuba scene. Mitsuba finds the face that a ray hits; the rest of a hit record is
+computed in double precision from that face's float32 vertices, the same bits in every variant.
 """
 
 from __future__ import annotations
@@ -21,48 +20,48 @@ from pbrs_farm.raycast.scalar_tracer import ScalarTracer
 from pbrs_farm.raycast.tracer import JitTracer, RayTracer
 from pbrs_farm.raycast.variant import choose_variant
 
-_FACES_AT_ONCE: Final = 1 << 18
+_FACES_PER_CHUNK: Final = 1 << 18  # bounds the memory of the area test
+_MIN_TWICE_AREA_M2: Final = 1e-12  # below it float32 cannot tell a triangle from a line
 
 
 class Caster:
-    """Rays over one Geometry, panes included; face numbers are Geometry's.
+    """The ray caster of one Geometry, panes included; face numbers are Geometry's.
 
-    Degenerate triangles and those with a vertex that is no finite number are never hit.
-    A geometry without faces is allowed: every ray then hits nothing.
+    variant: a Mitsuba variant; the best that works here when None. No ray hits a degenerate
+    triangle or one with a vertex that is not finite; without faces no ray hits anything.
     """
 
     def __init__(self, geometry: Geometry, *, variant: str | None = None) -> None:
-        """variant: a Mitsuba variant; the best that works here when None."""
         self.geometry = geometry
         self.variant = choose_variant() if variant is None else variant
         self.n_items = int(geometry.face_item.max()) if len(geometry.face_item) else 0
         self._tracer = _tracer(self.variant, geometry, _hittable(geometry))
-        self._without: tuple[bytes, RayTracer | None] = (b"", None)
+        self._without: tuple[bytes, RayTracer | None] = (b"", None)  # skipped faces, their tracer
 
     def hit_record(
         self, camera: Camera, *, skip_faces: NDArray[np.bool_] | None = None
     ) -> HitRecord:
-        """What the ray through each pixel's centre hits first (rule 8).
+        """The first hit of the ray through each pixel's centre (rule 8).
 
-        skip_faces: (F,) bool, faces that rays pass through: with the panes' faces this is the
-        hit behind glass. Raises ValueError if it is not one entry per face.
+        skip_faces: (F,) bool, faces to ignore; with the transparent ones ignored this is the hit
+        behind glass. Raises ValueError if it is not one entry per face.
         """
         tracer = self._tracer if skip_faces is None else self._tracer_without(skip_faces)
         return hit_record_from_faces(self.geometry, camera, _faces(tracer, camera))
 
     def item_buffer(self, camera: Camera) -> ItemBuffer:
-        """(H, W) uint32 instance id seen through each pixel's centre, 0 = nothing."""
+        """(H, W) uint32 instance id at each pixel's centre, 0 = nothing."""
         face = _faces(self._tracer, camera)
         if not len(self.geometry.face_item):
             return np.zeros(face.shape, np.uint32)
         return np.where(face >= 0, self.geometry.face_item[face], np.uint32(0))
 
     def item_counts(self, cameras: Sequence[Camera]) -> NDArray[np.uint32]:
-        """(n_cameras, n_items + 1) pixels each item covers; column 0 counts nothing.
+        """(n_cameras, n_items + 1) pixels each item covers; column 0 counts rays that miss.
 
         n_items is the largest instance id of the geometry. Cameras may differ in size. The
-        result aside, memory does not grow with the number of cameras. Rays through edges may
-        fall otherwise than in item_buffer: 9 of a million pixels differed (see rays.py).
+        result aside, memory does not grow with the number of cameras. At edges single pixels may
+        differ from item_buffer (see JitTracer).
         """
         if self._tracer is None or not cameras:
             counts = np.zeros((len(cameras), self.n_items + 1), np.uint32)
@@ -85,16 +84,16 @@ class Caster:
         n = len(origins)
         if self._tracer is None or n == 0:
             return np.full(n, np.inf, np.float32), np.full(n, -1, np.int32)
+        rays = np.asarray(origins, np.float32), np.asarray(directions, np.float32)
         reach = np.broadcast_to(np.asarray(max_distance, np.float32), (n,))
-        return self._tracer.first_hit(
-            np.asarray(origins, np.float32), np.asarray(directions, np.float32), reach
-        )
+        return self._tracer.first_hit(*rays, reach)
 
     def _tracer_without(self, skip_faces: NDArray[np.bool_]) -> RayTracer | None:
         if skip_faces.shape != (len(self.geometry.faces),):
             raise ValueError(
                 f"skip_faces: expected ({len(self.geometry.faces)},), got {skip_faces.shape}"
             )
+        # Keep the last tracer: the views of a house skip the same faces.
         key = np.packbits(skip_faces).tobytes()
         if self._without[0] != key:
             keep = _hittable(self.geometry) & ~skip_faces
@@ -105,7 +104,7 @@ class Caster:
 def _tracer(variant: str, geometry: Geometry, keep: NDArray[np.bool_]) -> RayTracer | None:
     if not keep.any():
         return None
-    # A face that must not be hit keeps its number but collapses to a point.
+    # Collapse a face that must not be hit to a point, so that all others keep their number.
     faces = np.where(keep[:, None], geometry.faces, geometry.faces[np.argmax(keep), :1])
     positions = np.where(np.isfinite(geometry.positions), geometry.positions, np.float32(0))
     build = ScalarTracer if variant.startswith("scalar") else JitTracer
@@ -113,15 +112,16 @@ def _tracer(variant: str, geometry: Geometry, keep: NDArray[np.bool_]) -> RayTra
 
 
 def _hittable(geometry: Geometry) -> NDArray[np.bool_]:
-    """(F,) bool: finite vertices and an area above what float32 can tell from none."""
+    """(F,) bool: finite vertices and an area."""
     keep = np.zeros(len(geometry.faces), np.bool_)
-    for start in range(0, len(keep), _FACES_AT_ONCE):
-        part = slice(start, start + _FACES_AT_ONCE)
+    for start in range(0, len(keep), _FACES_PER_CHUNK):
+        part = slice(start, start + _FACES_PER_CHUNK)
+        # Measure twice the area by the cross product of two edges, in float64.
         corners = geometry.positions[geometry.faces[part]].astype(np.float64)
         with np.errstate(invalid="ignore", over="ignore"):
             edges = corners[:, [1, 2]] - corners[:, :1]
             twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-            keep[part] = np.isfinite(corners).all((1, 2)) & (twice_area > 1e-12)
+            keep[part] = np.isfinite(corners).all((1, 2)) & (twice_area > _MIN_TWICE_AREA_M2)
     return keep
 
 

@@ -1,4 +1,4 @@
-"""From the face each pixel's ray hits to a full hit record; pure numpy, no effects."""
+"""Hit records: from the face each pixel's ray hits to depth, normals and uv; numpy, no effects."""
 
 from __future__ import annotations
 
@@ -14,24 +14,26 @@ from pbrs_farm.core.house import Geometry
 
 
 def hit_record_from_faces(geometry: Geometry, camera: Camera, face: NDArray[np.int32]) -> HitRecord:
-    """The record of face (H, W), int32, -1 = nothing, seen by the camera's unjittered rays.
+    """The record of the camera's unjittered rays. face: (H, W) int32, -1 = nothing.
 
-    The hit is where the ray meets the face's plane, computed in float64 and held to the triangle
-    (at grazing angles the plane's hit may lie beside it). Geometric normals are the faces' own,
-    turned towards the camera; shading normals lie on the geometric normal's side. Faces must
-    have an area.
+    The hit is where the ray meets the face's plane, computed in float64 and clamped to the
+    triangle (at grazing angles the plane's hit may lie beside it). Geometric normals are the
+    faces' own, turned towards the camera; shading normals lie on their side. Faces have an area.
     """
+    # Set up each distinct face's plane once; most pixels share a face.
     origin, directions = camera.exact_rays()
     pixels = np.flatnonzero(face.ravel() >= 0)
     d = directions.reshape(-1, 3)[pixels]
-    f, local = _numbered(face.ravel()[pixels], len(geometry.faces))
+    f, local = _distinct(face.ravel()[pixels], len(geometry.faces))
     planes = _planes(geometry, f, origin)
 
-    t, weights = _meet(planes, local, d, -camera.world_from_camera[:3, 2])
+    # Intersect every ray with its plane and turn the normal towards the camera.
+    t, weights = _intersect(planes, local, d, -camera.world_from_camera[:3, 2])
     normal = planes.normal[local]
     normal[_dot(normal, d) > 0] *= -1
     corner = geometry.faces[f][local]
 
+    # Write the pixels that hit something into images of zeros.
     shape = face.shape
     return HitRecord(
         face=np.ascontiguousarray(face, np.int32),
@@ -48,41 +50,32 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: NDArray[np.i
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Planes:
-    """What a ray from origin needs of K faces, float64.
+    """The planes of K triangles, as rays from one origin need them; float64."""
 
-    a, b, c: (K, 3) corners. normal: (K, 3) unit. grad_b, grad_c: (K, 3) gradients of the
-    barycentric coordinates of b and c.
-    """
-
-    origin: NDArray[np.float64]
-    a: NDArray[np.float64]
+    origin: NDArray[np.float64]  # (3,) of all rays
+    a: NDArray[np.float64]  # (K, 3) corners
     b: NDArray[np.float64]
     c: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    grad_b: NDArray[np.float64]
-    grad_c: NDArray[np.float64]
+    normal: NDArray[np.float64]  # (K, 3) unit
+    grad_b: NDArray[np.float64]  # (K, 3) gradient of the barycentric coordinate of b
+    grad_c: NDArray[np.float64]  # (K, 3) and of c
 
 
 def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: NDArray[np.float64]) -> _Planes:
     corner = geometry.faces[faces]
     a, b, c = (geometry.positions[corner[:, k]].astype(np.float64) for k in range(3))
+    # Divide by |n|^2: the gradient of b is 1 at b and 0 along the edge a c.
     n = np.cross(b - a, c - a)
     squared = _dot(n, n)[:, None]
-    return _Planes(
-        origin=origin,
-        a=a,
-        b=b,
-        c=c,
-        normal=n / np.sqrt(squared),
-        grad_b=np.cross(c - a, n) / squared,
-        grad_c=np.cross(n, b - a) / squared,
-    )
+    grad_b, grad_c = np.cross(c - a, n) / squared, np.cross(n, b - a) / squared
+    return _Planes(origin, a, b, c, n / np.sqrt(squared), grad_b, grad_c)
 
 
-def _meet(
+def _intersect(
     planes: _Planes, local: NDArray[np.intp], d: NDArray[np.float64], axis: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(N,) t along d (N, 3) to plane local[n], and (N, 3) weights of a, b, c, all >= 0."""
+    # Solve the plane's equation for t and evaluate the barycentric coordinates there.
     from_a = planes.origin - planes.a
     along = _dot(planes.normal[local], d)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -91,7 +84,7 @@ def _meet(
         w_c = _dot(from_a, planes.grad_c)[local] + t * _dot(planes.grad_c[local], d)
     weights = np.stack([1 - w_b - w_c, w_b, w_c], axis=1)
 
-    # Hold to the triangle what the plane puts beside it; a ray in the plane takes its middle.
+    # Clamp to the triangle what falls beside it; a ray within the plane takes its middle.
     beside = np.flatnonzero(~((weights >= 0).all(1) & np.isfinite(t)))
     held = np.nan_to_num(weights[beside], nan=1.0, posinf=1.0, neginf=0.0).clip(0.0, 1.0)
     held /= held.sum(1, keepdims=True)
@@ -109,10 +102,12 @@ def _shading_normal(
     geo_normal: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """(N, 3) interpolated vertex normals on the geometric normal's side; that normal where flat."""
+    # Interpolate and normalise; opposite vertex normals may cancel out.
     shading = _mixed(weights, geometry.normals, corner)
     length = np.sqrt(_dot(shading, shading))
     smooth = length > 1e-6
     shading /= np.where(smooth, length, 1.0)[:, None]
+    # Fall back to the geometric normal, then turn all to its side.
     shading[~smooth] = geo_normal[~smooth]
     shading[_dot(shading, geo_normal) < 0] *= -1
     return shading
@@ -128,12 +123,12 @@ def _mixed(
     return np.asarray(mixed)
 
 
-def _numbered(face: NDArray[np.int32], n_faces: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The distinct faces, ascending, and each pixel's place among them."""
-    seen = np.zeros(n_faces, np.bool_)
-    seen[face] = True
-    place = np.cumsum(seen) - 1
-    return np.flatnonzero(seen), place[face]
+def _distinct(face: NDArray[np.int32], n_faces: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The distinct faces, ascending, and each pixel's index into them."""
+    is_hit = np.zeros(n_faces, np.bool_)
+    is_hit[face] = True
+    index = np.cumsum(is_hit) - 1
+    return np.flatnonzero(is_hit), index[face]
 
 
 def _dot(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:

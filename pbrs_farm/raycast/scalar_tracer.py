@@ -1,6 +1,6 @@
-"""RayTracer of the scalar variant, ray by ray: the fallback of machines without LLVM.
+"""The ray tracer of the scalar variant, ray by ray: the fallback of machines without LLVM.
 
-Effects: holds a Mitsuba scene. About a million rays a second, 20 times slower than rays.py.
+Effects: holds a Mitsuba scene. About a million rays a second, 20 times slower than JitTracer.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ class ScalarTracer:
         self._scene = scene_from_mesh(mitsuba(variant), positions, faces)
 
     def faces_of_camera(self, camera: Camera) -> NDArray[np.int32]:
-        """(H, W) face seen through each pixel's centre, -1 = nothing."""
         origin, directions = camera.rays()
         flat = directions.reshape(-1, 3)
         origins = np.broadcast_to(origin, flat.shape)
@@ -39,11 +38,11 @@ class ScalarTracer:
         directions: NDArray[np.float32],
         max_distance: NDArray[np.float32],
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """(N,) distance (inf = nothing) and (N,) face (-1 = nothing)."""
         mi = mitsuba(self._variant)
         intersect = self._scene.ray_intersect_preliminary
         distance = np.full(len(origins), np.inf, np.float32)
         face = np.full(len(origins), -1, np.int32)
+        # Intersect ray by ray and compare the distance with the ray's reach afterwards.
         for index, (o, d) in enumerate(zip(origins.tolist(), directions.tolist(), strict=True)):
             hit = intersect(mi.Ray3f(mi.Point3f(o), mi.Vector3f(d)))
             if hit.is_valid() and hit.t <= max_distance[index]:
@@ -53,7 +52,6 @@ class ScalarTracer:
     def counts(
         self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
     ) -> NDArray[np.uint32]:
-        """(n_cameras, n_labels) pixels of each label; label 0 also counts what hits nothing."""
         counts = np.zeros((len(cameras), n_labels), np.uint32)
         for row, camera in enumerate(cameras):
             face = self.faces_of_camera(camera)

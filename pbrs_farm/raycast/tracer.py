@@ -1,8 +1,7 @@
-"""Rays against one triangle mesh through Mitsuba: which face each ray hits first.
+"""Ray tracers over one triangle mesh, by Mitsuba: the face that each ray hits first.
 
 Effects: holds a Mitsuba scene; the first call compiles (or loads from Dr.Jit's cache) its kernel.
-One mesh per scene, so that the kernel is the same for every house and the primitive's number is
-the face's number.
+A scene has one mesh, so that one kernel serves every house and a primitive's number is its face's.
 """
 
 from __future__ import annotations
@@ -17,16 +16,17 @@ from numpy.typing import NDArray
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.raycast.variant import mitsuba
 
-_RAYS_PER_LAUNCH: Final = 1 << 22
-_COUNTS_PER_LAUNCH: Final = 1 << 24
-_TILE: Final = 4
+_RAYS_PER_LAUNCH: Final = 1 << 22  # both bound the memory of one kernel launch
+_COUNTS_PER_LAUNCH: Final = 1 << 24  # cameras x labels
+_TILE: Final = 4  # px, edge of the tiles in which a packet of rays walks the picture
+_D0, _DU, _DV, _EYE, _RAY_FLOATS = 0, 3, 6, 9, 12  # columns of _ray_table
 
 
 class RayTracer(Protocol):
-    """What a variant offers over one mesh; distances are in lengths of each ray's direction."""
+    """Rays against one mesh in a Mitsuba variant; distances are in lengths of the direction."""
 
     def faces_of_camera(self, camera: Camera) -> NDArray[np.int32]:
-        """(H, W) face seen through each pixel's centre, -1 = nothing."""
+        """(H, W) face hit through each pixel's centre, -1 = nothing."""
         ...
 
     def first_hit(
@@ -60,10 +60,10 @@ def scene_from_mesh(
 
 
 class JitTracer:
-    """RayTracer of the llvm and cuda variants: many rays a launch, memory bounded by the batch.
+    """The RayTracer of the llvm and cuda variants: many rays a launch, in bounded memory.
 
     Labels and first hits use Embree's watertight test. Counts, which only rank cameras, use its
-    quicker one: 9 of a million pixels differed, a quarter more rays a second.
+    faster one: 9 of a million pixels differed, a quarter more rays a second.
     """
 
     def __init__(
@@ -77,11 +77,10 @@ class JitTracer:
         return scene_from_mesh(mitsuba(self._variant), *self._mesh)
 
     @cached_property
-    def _quick(self) -> Any:
+    def _fast(self) -> Any:
         return scene_from_mesh(mitsuba(self._variant), *self._mesh, watertight=False)
 
     def faces_of_camera(self, camera: Camera) -> NDArray[np.int32]:
-        """(H, W) face seen through each pixel's centre, -1 = nothing."""
         origin, directions = camera.rays()
         flat = directions.reshape(-1, 3)
         origins = np.broadcast_to(origin, flat.shape)
@@ -94,7 +93,6 @@ class JitTracer:
         directions: NDArray[np.float32],
         max_distance: NDArray[np.float32],
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """(N,) distance (inf = nothing) and (N,) face (-1 = nothing)."""
         distance = np.full(len(origins), np.inf, np.float32)
         face = np.full(len(origins), -1, np.int32)
         for start in range(0, len(origins), _RAYS_PER_LAUNCH):
@@ -107,7 +105,7 @@ class JitTracer:
     def counts(
         self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
     ) -> NDArray[np.uint32]:
-        """(n_cameras, n_labels) pixels of each label; label 0 also counts what hits nothing."""
+        # Launch as many cameras of one size together as memory allows.
         counts = np.zeros((len(cameras), n_labels), np.uint32)
         for i, members in _by_intrinsics(cameras).items():
             n_pixels = i.width_px * i.height_px
@@ -150,9 +148,10 @@ class JitTracer:
         width, height = cameras[0].intrinsics.width_px, cameras[0].intrinsics.height_px
         n_tiles = -(-width // _TILE) * -(-height // _TILE)
 
-        # Number the lanes camera by camera and tile by tile: neighbours in a packet stay together.
+        # Number the lanes camera by camera, tile by tile: the rays of a packet stay neighbours.
         lane = dr.arange(mi.UInt32, len(cameras) * n_tiles * _TILE * _TILE)
         pixel, tile = lane % (_TILE * _TILE), lane // (_TILE * _TILE)
+        # Pass sizes as opaque values: they are no part of the kernel, which stays the same.
         tiles, columns = dr.opaque(mi.UInt32, n_tiles), dr.opaque(mi.UInt32, -(-width // _TILE))
         which, tile = tile // tiles, tile % tiles
         x = (tile % columns) * _TILE + pixel % _TILE
@@ -161,14 +160,15 @@ class JitTracer:
 
         # Turn each pixel's centre into a ray whose direction has unit length along the axis.
         table = mi.Float(_ray_table(cameras).ravel())
-        row = [dr.gather(mi.Float, table, which * 12 + k) for k in range(12)]
+        row = [dr.gather(mi.Float, table, which * _RAY_FLOATS + k) for k in range(_RAY_FLOATS)]
         u, v = mi.Float(x) + 0.5, mi.Float(y) + 0.5
         ray = mi.Ray3f(
-            mi.Point3f(*row[9:12]),
-            mi.Vector3f(*(row[k] + u * row[3 + k] + v * row[6 + k] for k in range(3))),
+            mi.Point3f(*row[_EYE:]),
+            mi.Vector3f(*(row[_D0 + k] + u * row[_DU + k] + v * row[_DV + k] for k in range(3))),
         )
 
-        hit = self._quick.ray_intersect_preliminary(ray, True, inside)
+        # Add one to the label of the face each ray hits, label 0 where it hits nothing.
+        hit = self._fast.ray_intersect_preliminary(ray, True, inside)
         valid = inside & hit.is_valid()
         label = dr.gather(mi.UInt32, mi.UInt32(face_label), hit.prim_index, valid)
         counts = dr.zeros(mi.UInt32, len(cameras) * n_labels)
@@ -178,10 +178,8 @@ class JitTracer:
 
 
 def _ray_table(cameras: Sequence[Camera]) -> NDArray[np.float32]:
-    """(n, 12) d0, du, dv, eye: the direction at pixel coordinates (u, v) is d0 + u du + v dv.
-
-    Of cameras that share their intrinsics.
-    """
+    """(n, 12) of cameras of one size: d0, du, dv, eye; the direction at (u, v) is d0 + u du + v dv."""
+    # Derive the three vectors from the intrinsics, then turn them into the world.
     i = cameras[0].intrinsics
     poses = np.stack([camera.world_from_camera for camera in cameras])
     axes = np.array(
@@ -190,7 +188,7 @@ def _ray_table(cameras: Sequence[Camera]) -> NDArray[np.float32]:
     table = np.empty((len(cameras), 4, 3), np.float32)
     table[:, :3] = np.einsum("nij,kj->nki", poses[:, :3, :3], axes)
     table[:, 3] = poses[:, :3, 3]
-    return table.reshape(-1, 12)
+    return table.reshape(-1, _RAY_FLOATS)
 
 
 def _by_intrinsics(cameras: Sequence[Camera]) -> dict[Intrinsics, list[int]]:

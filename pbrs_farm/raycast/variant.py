@@ -1,4 +1,4 @@
-"""Which Mitsuba variant works on this machine, and LLVM's library for it.
+"""Choice of the Mitsuba variant that works on this machine, and of LLVM's library for it.
 
 Effects: sets DRJIT_LIBLLVM_PATH and Mitsuba's variant of this process.
 """
@@ -15,9 +15,7 @@ from typing import Any, Final
 
 from pbrs_farm.core.errors import MachineFailed
 
-MIN_LLVM: Final = 17
-"""Older ones (14 to 16) crash inside Dr.Jit's first compilation."""
-
+MIN_LLVM: Final = 17  # older ones (14 to 16) crash inside Dr.Jit's first compilation
 _LIBRARY_PLACES: Final = (
     "/usr/lib/*-linux-gnu/libLLVM*.so*",
     "/usr/lib/llvm-*/lib/libLLVM*.so*",
@@ -53,6 +51,7 @@ def find_llvm() -> Path | None:
 
     None when there is none of version 17 or later.
     """
+    # Honour the user's choice unless that library is known to crash.
     named = os.environ.get("DRJIT_LIBLLVM_PATH", "")
     if named and Path(named).exists():
         version = llvm_version(Path(named))
@@ -69,6 +68,7 @@ def choose_variant() -> str:
     Sets DRJIT_LIBLLVM_PATH before Dr.Jit loads LLVM. Each variant is tried with one ray.
     Raises MachineFailed when Mitsuba is not installed or no variant works.
     """
+    # Name the library first: Dr.Jit loads LLVM when it is imported.
     library = find_llvm()
     if library is not None:
         os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
@@ -78,6 +78,7 @@ def choose_variant() -> str:
         raise MachineFailed(
             f"Mitsuba cannot be imported: {error}", hint="pip install 'pbrs-farm[transport]'"
         ) from error
+    # Prefer the GPU, then LLVM, then Mitsuba without Dr.Jit's arrays.
     if dr.has_backend(dr.JitBackend.CUDA) and works("cuda_ad_rgb"):
         return "cuda_ad_rgb"
     if library is not None and _has_good_llvm(dr) and works("llvm_ad_rgb"):
@@ -108,7 +109,7 @@ def set_threads(n_threads: int) -> None:
 
 
 def _has_good_llvm(dr: Any) -> bool:
-    # Dr.Jit may have loaded another library before we named one: ask it, do not compile yet.
+    # Ask Dr.Jit which library it holds: it may have loaded another before we named one.
     if not dr.has_backend(dr.JitBackend.LLVM):
         return False
     return bool(dr.detail.llvm_version()[0] >= MIN_LLVM)
