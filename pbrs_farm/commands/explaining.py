@@ -56,8 +56,8 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _repair(args: argparse.Namespace) -> int:
-    from pbrs_farm.formats.cameras_json import json_bytes
     from pbrs_farm.formats.house_bundle import bundle_from_house
+    from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.read.source import read_house, resolve
     from pbrs_farm.repair import cut_picture, plain_words
     from pbrs_farm.run.steps import repaired_house
@@ -83,7 +83,8 @@ def _repair(args: argparse.Namespace) -> int:
 def _cameras(args: argparse.Namespace) -> int:
     from pbrs_farm.core import keys
     from pbrs_farm.core.house import geometry_from_house
-    from pbrs_farm.formats.cameras_json import json_bytes, plain_from_view
+    from pbrs_farm.formats.cameras_json import cameras_document
+    from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.images import png_from_array
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.read.source import resolve
@@ -96,18 +97,15 @@ def _cameras(args: argparse.Namespace) -> int:
     house, _report = repaired_house(resolve(args.home), recipe)
     counter = Caster(geometry_from_house(house)).item_counts
     sampling = sample_cameras(house, recipe.cameras, camera_seed(house.id, recipe), counter)
-    plain = {
-        "views": [plain_from_view(v) for v in sampling.views],
-        "report": sampling.report.model_dump(mode="json"),
-    }
+    document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))
     if args.out is not None:
-        FolderStore(args.out.parent).put(args.out.name, json_bytes(plain))
+        FolderStore(args.out.parent).put(args.out.name, json_bytes(document))
     if args.map is not None:
         folder, name = FolderStore(args.map.parent), keys.slug(args.map.stem)
         folder.put(f"{name}.png", png_from_array(camera_map_rgb(house, sampling)))
         folder.put(f"{name}.svg", camera_map_svg(house, sampling).encode())
     if args.json:
-        dump(plain)
+        dump(document)
     else:
         _tell(sampling.report)
     return 0

@@ -17,7 +17,7 @@ import re
 from dataclasses import dataclass
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from pbrs_farm.core.errors import BadInput
 
@@ -130,33 +130,3 @@ def digest(*parts: Any) -> str:
 def seed(*parts: str | int) -> int:
     """A 32-bit seed from names: seed(house, view, mode, recipe digest), rule 7."""
     return int(digest(*parts)[:8], 16)
-
-
-class StoredFile(BaseModel):
-    """One object a step wrote."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    key: str
-    n_bytes: int
-    sha256: str
-
-
-class Marker(BaseModel):
-    """Written last and if-absent: this step is done with these inputs (architecture rule 4).
-
-    digest: of ids, recipe fields the step uses, the step's version and its inputs' digests.
-    facts: what later steps or view.json need to know; equal for equal inputs, no clock.
-    seconds, worker, attempt, finished_utc: the only clocks in the whole output.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    step: str
-    house_id: str
-    view_id: str | None = None
-    digest: str
-    files: tuple[StoredFile, ...] = ()
-    facts: dict[str, Any] = {}
-    seconds: float = 0.0
-    worker: str = ""
-    attempt: int = 1
-    finished_utc: str = ""

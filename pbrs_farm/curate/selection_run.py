@@ -21,6 +21,7 @@ from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.curate.selection_summary import SelectionSummary, summary_of
+from pbrs_farm.formats.manifest import sha256_by_key
 from pbrs_farm.selection.histogram_pack import (
     HistogramPack,
     bytes_from_pack,
@@ -125,12 +126,8 @@ def _houses(store: Store, below: str = f"{keys.FOLDERS[0]}/") -> dict[str, dict[
 
 def _source(store: Store, house: str, views: Mapping[str, bool], score_mode: Mode) -> str:
     """Digest of what the house's scores depend on: from its manifest, else from the files."""
-    hashes: dict[str, str] = {}
     try:
-        manifest = store.get(keys.house_key(house, keys.MANIFEST))
-        for line in manifest.splitlines():
-            row = json.loads(line)
-            hashes[row["key"]] = row["sha256"]
+        hashes = sha256_by_key(store.get(keys.house_key(house, keys.MANIFEST)))
     except (ObjectMissing, ValueError, KeyError, TypeError):
         hashes = {}
     told = {}

@@ -1,25 +1,29 @@
-"""cameras.json: views and the sampler's report as plain values, and back; pure."""
+"""cameras.json: the views of a house and the sampler's report, written and read; pure."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.formats.serialise import json_bytes
 
 
-def json_bytes(value: Any) -> bytes:
-    """Readable JSON, keys sorted: equal values give equal bytes."""
-    if isinstance(value, BaseModel):
-        value = value.model_dump(mode="json")
-    return (json.dumps(value, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode()
+def cameras_document(views: Iterable[View], report: Mapping[str, Any]) -> dict[str, Any]:
+    """What cameras.json says. report: why the other candidates were rejected, as JSON values."""
+    return {"views": [_json_of_view(view) for view in views], "report": report}
 
 
-def plain_from_view(view: View) -> dict[str, Any]:
+def cameras_json(views: Iterable[View], report: Mapping[str, Any]) -> bytes:
+    """The file, written by the step `cameras`."""
+    return json_bytes(cameras_document(views, report))
+
+
+def _json_of_view(view: View) -> dict[str, Any]:
     """A view as JSON values; the pose keeps every bit (repr of float64)."""
     i = view.camera.intrinsics
     return {
@@ -37,25 +41,25 @@ def plain_from_view(view: View) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def view_from_plain(plain: dict[str, Any]) -> View:
-    """The view that plain_from_view wrote; KeyError or ValueError when it is none."""
-    pose = np.array(plain["world_from_camera_opengl"], np.float64)
+def _view_from_json(row: dict[str, Any]) -> View:
+    """The view that _json_of_view wrote; KeyError or ValueError when it is none."""
+    pose = np.array(row["world_from_camera_opengl"], np.float64)
     if pose.shape != (4, 4):
         raise ValueError(f"a pose has (4, 4) numbers, got {pose.shape}")
     return View(
-        id=plain["id"],
-        room_id=plain["room"],
-        sector=plain["sector"],
-        camera=Camera(Intrinsics(**plain["intrinsics"]), pose),
-        origin=plain["origin"],
-        score=plain["score"],
-        objects={int(k): n for k, n in plain["objects"].items()},
+        id=row["id"],
+        room_id=row["room"],
+        sector=row["sector"],
+        camera=Camera(Intrinsics(**row["intrinsics"]), pose),
+        origin=row["origin"],
+        score=row["score"],
+        objects={int(k): n for k, n in row["objects"].items()},
     )
 
 
 def views_from_json(data: bytes, key: str) -> dict[str, View]:
     """View id -> view of a cameras.json, in its order; BadInput names the key."""
     try:
-        return {v["id"]: view_from_plain(v) for v in json.loads(data)["views"]}
+        return {v["id"]: _view_from_json(v) for v in json.loads(data)["views"]}
     except (KeyError, TypeError, ValueError) as error:
         raise BadInput(key, "views", f"not a cameras.json: {error}") from None

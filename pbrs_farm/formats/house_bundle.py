@@ -19,9 +19,9 @@ from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_glb import V_DOWN, glb_from_house
 from pbrs_farm.formats.serialise import (
     json_from_bytes,
-    plain_from_value,
+    json_from_value,
     pretty_json,
-    value_from_plain,
+    value_from_json,
 )
 
 FORMAT: Final = "pbrs_farm house 1"
@@ -33,33 +33,33 @@ def bundle_from_house(house: House) -> tuple[bytes, bytes]:
     Raises BadHouse naming the item whose geometry is not finite or whose faces are out of range.
     """
     glb_bytes = glb_from_house(house)
-    plain = _plain_house(house)
-    plain["format"] = FORMAT
-    plain["glb_sha256"] = keys.sha256(glb_bytes)
-    plain["classes"] = {str(i): NYU40_NAMES[i] for i in sorted({x.nyu40 for x in house.items})}
-    return glb_bytes, pretty_json(plain).encode()
+    data = _json_of_house(house)
+    data["format"] = FORMAT
+    data["glb_sha256"] = keys.sha256(glb_bytes)
+    data["classes"] = {str(i): NYU40_NAMES[i] for i in sorted({x.nyu40 for x in house.items})}
+    return glb_bytes, pretty_json(data).encode()
 
 
-def _plain_house(house: House) -> dict[str, Any]:
-    """The plain data of house without the arrays of its surfaces and the bytes of its textures."""
-    plain: dict[str, Any] = {
-        name: plain_from_value(getattr(house, name))
+def _json_of_house(house: House) -> dict[str, Any]:
+    """The JSON values of house without the arrays of its surfaces and the bytes of its textures."""
+    data: dict[str, Any] = {
+        name: json_from_value(getattr(house, name))
         for name in House.__slots__
         if name not in ("items", "textures")
     }
-    plain["items"] = [_plain_item(item, i + 1) for i, item in enumerate(house.items)]
-    plain["textures"] = [
+    data["items"] = [_json_of_item(item, i + 1) for i, item in enumerate(house.items)]
+    data["textures"] = [
         {"key": key, "id": t.id, "name": t.name, "media_type": t.media_type}
         for key, t in house.textures.items()
     ]
-    return plain
+    return data
 
 
-def _plain_item(item: Item, instance: int) -> dict[str, Any]:
-    plain = {
-        name: plain_from_value(getattr(item, name)) for name in Item.__slots__ if name != "surfaces"
+def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
+    data = {
+        name: json_from_value(getattr(item, name)) for name in Item.__slots__ if name != "surfaces"
     }
-    plain["surfaces"] = [
+    data["surfaces"] = [
         {
             "name": s.name,
             "material": int(s.material),
@@ -68,7 +68,7 @@ def _plain_item(item: Item, instance: int) -> dict[str, Any]:
         }
         for s in item.surfaces
     ]
-    return plain | {"instance": instance, "class": NYU40_NAMES[item.nyu40]}
+    return data | {"instance": instance, "class": NYU40_NAMES[item.nyu40]}
 
 
 def house_from_bundle(glb_data: bytes, json_data: bytes) -> House:
@@ -77,23 +77,23 @@ def house_from_bundle(glb_data: bytes, json_data: bytes) -> House:
     Raises BadHouse naming house.json or house.glb and the place that is damaged, and when the
     two files do not belong together.
     """
-    plain = json_from_bytes(json_data, "house.json")
-    if not isinstance(plain, dict) or plain.get("format") != FORMAT:
+    data = json_from_bytes(json_data, "house.json")
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise BadHouse("house.json", "format", f"expected {FORMAT!r}; this is no house bundle")
-    if plain.get("glb_sha256") != keys.sha256(glb_data):
+    if data.get("glb_sha256") != keys.sha256(glb_data):
         raise BadHouse("house.json", "glb_sha256", "house.glb is not the one it was written with")
     gltf = glb.gltf_from_glb(glb_data, "house.glb")
-    plain["items"] = [
-        _item_with_arrays(gltf, item, i) for i, item in enumerate(_dicts(plain, "items"))
+    data["items"] = [
+        _item_with_arrays(gltf, item, i) for i, item in enumerate(_dicts(data, "items"))
     ]
-    plain["textures"] = _textures_with_data(gltf, _dicts(plain, "textures"))
-    house: House = value_from_plain(House, plain, "house.json", "")
+    data["textures"] = _textures_with_data(gltf, _dicts(data, "textures"))
+    house: House = value_from_json(House, data, "house.json", "")
     _check_references(house)
     return house
 
 
-def _dicts(plain: dict[str, Any], key: str) -> list[dict[str, Any]]:
-    entries = plain.get(key)
+def _dicts(data: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    entries = data.get(key)
     if not isinstance(entries, list) or not all(isinstance(e, dict) for e in entries):
         raise BadHouse("house.json", key, "expected a list of objects")
     return entries

@@ -15,7 +15,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface
 from pbrs_farm.formats import glb
-from pbrs_farm.formats.serialise import plain_from_value
+from pbrs_farm.formats.serialise import json_from_value
 
 GLTF_IMAGES: Final = ("image/png", "image/jpeg")
 """The only pictures glTF knows; others stay in the file but no material shows them."""
@@ -65,7 +65,7 @@ def _asset(house: House) -> dict[str, Any]:
     asset: dict[str, Any] = {
         "version": "2.0",
         "generator": "pbrs_farm",
-        "extras": plain_from_value(source),
+        "extras": json_from_value(source),
     }
     line = source.attribution or ", ".join(x for x in (source.author, source.licence) if x)
     return asset | {"copyright": line} if line else asset
@@ -129,7 +129,7 @@ def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]
     }
     if material.texture_id in images:
         look["baseColorTexture"] = {"index": images[material.texture_id]}
-    plain: dict[str, Any] = {
+    gltf_material: dict[str, Any] = {
         "name": material.name,
         "pbrMetallicRoughness": look,
         "doubleSided": True,
@@ -137,8 +137,8 @@ def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]
         "extras": {"kind": material.kind.value},
     }
     if material.kind is MaterialKind.BULB:
-        plain["emissiveFactor"] = _linear(material.diffuse)
-    return plain
+        gltf_material["emissiveFactor"] = _linear(material.diffuse)
+    return gltf_material
 
 
 def _linear(rgb: tuple[float, float, float]) -> list[float]:

@@ -1,4 +1,4 @@
-"""Frozen values <-> plain JSON data, directed by the types of their fields; no effects."""
+"""Frozen dataclasses <-> JSON values, directed by the types of their fields; JSON as bytes; no effects."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from enum import Enum
 from typing import Any, Final
 
 import numpy as np
+from pydantic import BaseModel
+from pydantic_core import to_jsonable_python
 
 from pbrs_farm.core.errors import BadHouse
 
@@ -32,21 +34,22 @@ SHAPES: Final[dict[tuple[str, str], tuple[int | None, ...]]] = {
 """Shape of an array field by class and field (None = any length)."""
 
 
-def plain_from_value(value: Any) -> Any:
-    """Dicts, lists, numbers and strings that say the same as value (a frozen dataclass)."""
-    if isinstance(value, Enum):
-        return value.value
-    if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain_from_value(getattr(value, f.name)) for f in fields(value)}
-    if isinstance(value, np.ndarray):
+def json_from_value(value: Any) -> Any:
+    """Dicts, lists, numbers and strings that say the same as value, a frozen dataclass with arrays."""
+    return to_jsonable_python(value, fallback=_list_from_array, inf_nan_mode="constants")
+
+
+def _list_from_array(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, (tuple, list)):
-        return [plain_from_value(v) for v in value]
-    if isinstance(value, dict):
-        return {str(k): plain_from_value(v) for k, v in value.items()}
-    return value
+    raise TypeError(f"{type(value).__name__} is no JSON value")
+
+
+def json_bytes(value: Any) -> bytes:
+    """Readable JSON, keys sorted: equal values give equal bytes. value: a model or JSON values."""
+    if isinstance(value, BaseModel):
+        value = value.model_dump(mode="json")
+    return (json.dumps(value, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def pretty_json(value: Any) -> str:
@@ -88,28 +91,28 @@ def _refuse_constant(name: str) -> float:
     raise ValueError(f"{name} is not a number")
 
 
-def value_from_plain(hint: Any, plain: Any, file: str, place: str) -> Any:
-    """The value of type hint that plain says; arrays and bytes that stand in plain pass through.
+def value_from_json(hint: Any, data: Any, file: str, place: str) -> Any:
+    """The value of type hint that JSON values say; arrays and bytes among them pass through.
 
-    Raises BadHouse naming file and place where plain does not fit the type. Keys that the type
+    Raises BadHouse naming file and place where they do not fit the type. Keys that the type
     does not know are ignored; missing fields take the type's default.
     """
     origin = typing.get_origin(hint)
     if origin is np.ndarray:
         dtype = typing.get_args(typing.get_args(hint)[1])[0]
-        return _array(dtype, plain, file, place)
+        return _array(dtype, data, file, place)
     if origin in (typing.Union, types.UnionType):
         kinds = [a for a in typing.get_args(hint) if a is not type(None)]
-        return None if plain is None else value_from_plain(kinds[0], plain, file, place)
+        return None if data is None else value_from_json(kinds[0], data, file, place)
     if origin is tuple:
-        return _tuple(typing.get_args(hint), plain, file, place)
+        return _tuple(typing.get_args(hint), data, file, place)
     if origin is dict:
-        return _dict(typing.get_args(hint)[1], plain, file, place)
+        return _dict(typing.get_args(hint)[1], data, file, place)
     if isinstance(hint, type) and is_dataclass(hint):
-        return _dataclass(hint, plain, file, place)
+        return _dataclass(hint, data, file, place)
     if isinstance(hint, type) and issubclass(hint, Enum):
-        return _enum(hint, plain, file, place)
-    return _scalar(hint, plain, file, place)
+        return _enum(hint, data, file, place)
+    return _scalar(hint, data, file, place)
 
 
 @functools.cache
@@ -117,19 +120,19 @@ def _hints(cls: type) -> dict[str, Any]:
     return typing.get_type_hints(cls)
 
 
-def _dataclass(cls: type, plain: Any, file: str, place: str) -> Any:
-    if not isinstance(plain, dict):
-        raise _misfit(file, place, "an object", plain)
+def _dataclass(cls: type, data: Any, file: str, place: str) -> Any:
+    if not isinstance(data, dict):
+        raise _misfit(file, place, "an object", data)
     hints = _hints(cls)
     found: dict[str, Any] = {}
     field: Field[Any]
     for field in fields(cls):
         inner = f"{place}.{field.name}" if place else field.name
-        if field.name not in plain:
+        if field.name not in data:
             if field.default is MISSING and field.default_factory is MISSING:
                 raise BadHouse(file, inner, "is missing")
             continue
-        value = value_from_plain(hints[field.name], plain[field.name], file, inner)
+        value = value_from_json(hints[field.name], data[field.name], file, inner)
         shape = SHAPES.get((cls.__name__, field.name))
         if shape is not None and value is not None:
             value = _shaped(value, shape, file, inner)
@@ -137,17 +140,17 @@ def _dataclass(cls: type, plain: Any, file: str, place: str) -> Any:
     return cls(**found)
 
 
-def _array(dtype: Any, plain: Any, file: str, place: str) -> np.ndarray[Any, Any]:
-    if isinstance(plain, np.ndarray):
-        if plain.dtype != dtype:
-            raise BadHouse(file, place, f"expected {np.dtype(dtype)}, got {plain.dtype}")
-        return plain
+def _array(dtype: Any, data: Any, file: str, place: str) -> np.ndarray[Any, Any]:
+    if isinstance(data, np.ndarray):
+        if data.dtype != dtype:
+            raise BadHouse(file, place, f"expected {np.dtype(dtype)}, got {data.dtype}")
+        return data
     try:
-        wide = np.array(plain, np.int64 if np.issubdtype(dtype, np.integer) else np.float64)
+        wide = np.array(data, np.int64 if np.issubdtype(dtype, np.integer) else np.float64)
         with np.errstate(over="ignore"):  # what overflows is told below
             array = wide.astype(dtype)
     except (ValueError, TypeError, OverflowError):
-        raise _misfit(file, place, f"an array of {np.dtype(dtype)}", plain) from None
+        raise _misfit(file, place, f"an array of {np.dtype(dtype)}", data) from None
     if not np.isfinite(array).all() or (wide.dtype.kind == "i" and (array != wide).any()):
         raise BadHouse(file, place, "holds a number that is not finite or out of range")
     return array
@@ -166,48 +169,46 @@ def _shaped(
     return array
 
 
-def _tuple(args: tuple[Any, ...], plain: Any, file: str, place: str) -> tuple[Any, ...]:
-    if not isinstance(plain, (list, tuple)):
-        raise _misfit(file, place, "a list", plain)
+def _tuple(args: tuple[Any, ...], data: Any, file: str, place: str) -> tuple[Any, ...]:
+    if not isinstance(data, (list, tuple)):
+        raise _misfit(file, place, "a list", data)
     if len(args) == 2 and args[1] is Ellipsis:
-        return tuple(
-            value_from_plain(args[0], v, file, f"{place}[{i}]") for i, v in enumerate(plain)
-        )
-    if len(plain) != len(args):
-        raise BadHouse(file, place, f"expected {len(args)} values, got {len(plain)}")
+        return tuple(value_from_json(args[0], v, file, f"{place}[{i}]") for i, v in enumerate(data))
+    if len(data) != len(args):
+        raise BadHouse(file, place, f"expected {len(args)} values, got {len(data)}")
     return tuple(
-        value_from_plain(a, v, file, f"{place}[{i}]") for i, (a, v) in enumerate(zip(args, plain))
+        value_from_json(a, v, file, f"{place}[{i}]") for i, (a, v) in enumerate(zip(args, data))
     )
 
 
-def _dict(hint: Any, plain: Any, file: str, place: str) -> dict[str, Any]:
-    if not isinstance(plain, dict):
-        raise _misfit(file, place, "an object", plain)
-    return {k: value_from_plain(hint, v, file, f"{place}.{k}") for k, v in plain.items()}
+def _dict(hint: Any, data: Any, file: str, place: str) -> dict[str, Any]:
+    if not isinstance(data, dict):
+        raise _misfit(file, place, "an object", data)
+    return {k: value_from_json(hint, v, file, f"{place}.{k}") for k, v in data.items()}
 
 
-def _enum(hint: type[Enum], plain: Any, file: str, place: str) -> Enum:
+def _enum(hint: type[Enum], data: Any, file: str, place: str) -> Enum:
     try:
-        return hint(plain)
+        return hint(data)
     except ValueError:
         known = ", ".join(str(e.value) for e in hint)
-        raise _misfit(file, place, f"one of {known}", plain) from None
+        raise _misfit(file, place, f"one of {known}", data) from None
 
 
-def _scalar(hint: Any, plain: Any, file: str, place: str) -> Any:
-    if hint is float and isinstance(plain, (int, float)) and not isinstance(plain, bool):
+def _scalar(hint: Any, data: Any, file: str, place: str) -> Any:
+    if hint is float and isinstance(data, (int, float)) and not isinstance(data, bool):
         try:
-            number = float(plain)
+            number = float(data)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
             raise BadHouse(file, place, "is not a finite number")
         return number
-    if hint is int and isinstance(plain, bool):
-        raise _misfit(file, place, "an int", plain)
-    if not isinstance(plain, hint):
-        raise _misfit(file, place, f"a {hint.__name__}", plain)
-    return plain
+    if hint is int and isinstance(data, bool):
+        raise _misfit(file, place, "an int", data)
+    if not isinstance(data, hint):
+        raise _misfit(file, place, f"a {hint.__name__}", data)
+    return data
 
 
 def _misfit(file: str, place: str, wanted: str, got: Any) -> BadHouse:

@@ -8,40 +8,11 @@ from pydantic import ValidationError
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
-from pbrs_farm.core.keys import StoredFile
 from pbrs_farm.core.recipe import Recipe, differences
-from pbrs_farm.formats.cameras_json import json_bytes
-from pbrs_farm.run.step_cache import read_marker
+from pbrs_farm.formats.manifest import manifest_from_markers
+from pbrs_farm.formats.marker import read_marker
+from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.store.interface import Store
-
-
-def manifest(store: Store, house_id: str) -> bytes:
-    """manifest.jsonl of a house from its markers, sorted by key.
-
-    A row an object: key, bytes, sha256, step, digest, and the attribution its source asks for.
-    """
-    credit = attribution(store, house_id)
-    rows: list[dict[str, object]] = []
-    for key in store.list(keys.house_key(house_id, "done/")):
-        marker = read_marker(store, key)
-        if marker is not None:
-            rows += [
-                manifest_row(file, marker.step, marker.digest, credit) for file in marker.files
-            ]
-    rows.sort(key=lambda r: str(r["key"]))
-    return "".join(keys.canonical_json(r) + "\n" for r in rows).encode()
-
-
-def manifest_row(file: StoredFile, step: str, digest: str, credit: str) -> dict[str, object]:
-    """One object's line of a manifest."""
-    row: dict[str, object] = {
-        "key": file.key,
-        "bytes": file.n_bytes,
-        "sha256": file.sha256,
-        "step": step,
-        "digest": digest,
-    }
-    return {**row, "attribution": credit} if credit else row
 
 
 def attribution(store: Store, house_id: str) -> str:
@@ -57,7 +28,9 @@ def attribution(store: Store, house_id: str) -> str:
 
 def finish_house(store: Store, house_id: str) -> int:
     """Write the house's manifest if it changed; the number of objects in it."""
-    data = manifest(store, house_id)
+    found = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
+    markers = [marker for marker in found if marker is not None]
+    data = manifest_from_markers(markers, attribution(store, house_id))
     key = keys.house_key(house_id, keys.MANIFEST)
     if store.head(key) is None or store.get(key) != data:
         store.put(key, data)

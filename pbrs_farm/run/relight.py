@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -12,10 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import RadianceImage
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.formats.layer_file import layer_bytes
+from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
+from pbrs_farm.formats.radiance_exr import RadianceExr, radiance_from_exr
+from pbrs_farm.formats.view_json import lamps_from_view_json
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
@@ -30,25 +32,10 @@ class LampFactor:
     rgb: tuple[float, float, float]
 
 
-def aovs_from_exr(radiance_exr: bytes, place: str) -> LinearAovs:
-    """What `light` stored of a view; BadInput names the place when a layer is missing."""
-    from pbrs_farm.images import layers_from_exr
-
-    return _linear_aovs(layers_from_exr(radiance_exr, f"{place}/radiance.exr"), place)
-
-
-def _linear_aovs(exr: Mapping[str, NDArray[np.float32]], place: str) -> LinearAovs:
-    outdoor, indoor, albedo = (_layer(exr, name, place) for name in ("outdoor", "indoor", "albedo"))
-    return LinearAovs(outdoor, indoor, albedo, _layer(exr, "normal", place, "XYZ"))
-
-
-def _layer(
-    exr: Mapping[str, NDArray[np.float32]], name: str, place: str, channels: str = "RGB"
-) -> RadianceImage:
-    try:
-        return np.stack([exr[f"{name}.{c}"] for c in channels], -1)
-    except KeyError as error:
-        raise BadInput(f"{place}/radiance.exr", str(error), "no such layer") from None
+def linear_aovs(radiance: RadianceExr) -> LinearAovs:
+    """What `develop` reads of a radiance.exr; BadInput when an image is missing."""
+    image = radiance.image
+    return LinearAovs(image("outdoor"), image("indoor"), image("albedo"), image("normal"))
 
 
 def relit(
@@ -60,38 +47,26 @@ def relit(
     word that names a lamp counts; indoor multiplies all of them. Raises BadInput when a file is
     missing, when the view has no light by lamp or none of a name.
     """
-    from pbrs_farm.images import layers_from_exr, png_from_array
-
     root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
-    exr = layers_from_exr(_read(view / "radiance.exr"), f"{view}/radiance.exr")
-    aovs = _linear_aovs(exr, str(view))
+    file = view / RADIANCE_EXR
+    radiance = radiance_from_exr(_read(file), str(file))
+    aovs = linear_aovs(radiance)
     if lamps:
         rows = lamps_of_view(view)
         factors = lamp_factors(rows, lamps)
-        layers = {int(r["number"]): _layer(exr, r["layer"], str(view)) for r in rows if r["layer"]}
+        layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
         lit = indoor_from_lamps(layers, factors, aovs.indoor.shape)
         aovs = replace(aovs, indoor=lit)
     tone = Recipe.model_validate_json(_read(root / "recipe.json")).tone
     images = develop(aovs, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
     credit = attribution(FolderStore(root), view.resolve().parents[1].name)
-    return png_from_array(images[Mode.MLT_IL_OL.value].rgb_srgb8, attribution=credit)
+    mode = Mode.MLT_IL_OL.value
+    return layer_bytes(mode, images[mode].rgb_srgb8, credit)
 
 
 def lamps_of_view(view: Path) -> list[dict[str, Any]]:
     """The lamps' rows of a view's view.json (transport/lamp_layers.py); BadInput when it has none."""
-    try:
-        rows: list[dict[str, Any]] = json.loads(_read(view / "view.json"))["modes"]["light"][
-            "lamps"
-        ]
-    except (ValueError, KeyError, TypeError):
-        raise BadInput(
-            view,
-            "",
-            "was stored without the light of each lamp",
-            hint="render it with them: pbrs-farm run HOME --out OUT --groups lamps, and --update if"
-            " OUT is the same",
-        ) from None
-    return rows
+    return lamps_from_view_json(_read(view / "view.json"), view)
 
 
 def lamp_factors(

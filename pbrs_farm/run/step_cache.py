@@ -15,13 +15,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import ValidationError
-
 from pbrs_farm.core import keys
-from pbrs_farm.core.errors import BadInput, PbrsError, StoreFailed
-from pbrs_farm.core.keys import Marker, StoredFile
+from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.recipe import CameraFields, Recipe
-from pbrs_farm.formats.cameras_json import json_bytes
+from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
@@ -90,18 +87,8 @@ def run_marked(
         attempt=attempt,
         finished_utc=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    work.store.put_if_absent(key, json_bytes(marker))
+    work.store.put_if_absent(key, marker.json_bytes())
     return Outcome(marker, was_done=False)
-
-
-def read_marker(store: Store, key: str) -> Marker | None:
-    """The marker at key, None if there is none. Raises StoreFailed when it is damaged."""
-    if store.head(key) is None:
-        return None
-    try:
-        return Marker.model_validate_json(store.get(key))
-    except ValidationError:
-        raise StoreFailed(key, "not a marker", hint="remove it to do the step again") from None
 
 
 def _inputs(step: plan.Step, work: Work) -> dict[str, str]:

@@ -22,7 +22,14 @@ from pbrs_farm.core.house import House, Room, geometry_from_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.recipe import CameraFields, Recipe
-from pbrs_farm.formats.cameras_json import json_bytes, plain_from_view, views_from_json
+from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
+from pbrs_farm.formats.illuminance_json import illuminance_json
+from pbrs_farm.formats.layer_file import layer_bytes
+from pbrs_farm.formats.marker import read_marker
+from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
+from pbrs_farm.formats.radiance_exr import radiance_exr, radiance_from_exr
+from pbrs_farm.formats.serialise import json_bytes
+from pbrs_farm.formats.view_json import view_description, view_json
 from pbrs_farm.read.source import SourceRef, read_house
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import CachedHouse
@@ -32,7 +39,6 @@ from pbrs_farm.run.step_cache import (
     Outcome,
     Work,
     camera_file_text,
-    read_marker,
     required_source,
     run_marked,
 )
@@ -140,9 +146,8 @@ def _file_cameras(loaded: CachedHouse, fields: CameraFields) -> Made:
 
 
 def _made_cameras(views: Sequence[View], report: dict[str, Any]) -> Made:
-    plain = {"views": [plain_from_view(v) for v in views], "report": report}
     facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
-    return Made({"cameras.json": json_bytes(plain)}, facts)
+    return Made({"cameras.json": cameras_json(views, report)}, facts)
 
 
 def room_of(house: House, view: View) -> Room | None:
@@ -189,26 +194,7 @@ def _truth(work: Work) -> Made:
     return Made(files, {"table": table})
 
 
-def layer_bytes(name: str, array: NDArray[Any], credit: str = "") -> bytes:
-    """The file of a label layer: PNG, or an EXR whose channels are named as layers.py says.
-
-    credit: the attribution the file carries.
-    """
-    from pbrs_farm.images import exr_from_layers, png_from_array
-
-    layer = LAYER[name]
-    if layer.file.endswith(".png"):
-        return png_from_array(array, attribution=credit)
-    channels = layer.channels.split()
-    planes = [array] if len(channels) == 1 else list(np.moveaxis(array, -1, 0))
-    named = zip(channels, planes, strict=True)
-    layers = {c: np.ascontiguousarray(plane, np.float32) for c, plane in named}
-    return exr_from_layers(layers, attribution=credit)
-
-
 def _opengl(work: Work, mode: str) -> Made:
-    from pbrs_farm.images import png_from_array
-
     loaded = _loaded(work)
     _view, camera = _view_at_size(work, loaded)
     rasterizer = loaded.rasterizer
@@ -216,7 +202,7 @@ def _opengl(work: Work, mode: str) -> Made:
     rgb = draw(camera)
     if is_object(work):
         rgb = np.where(_missed(loaded, camera), np.uint8(0), rgb)
-    png = png_from_array(rgb, attribution=loaded.house.source.attribution)
+    png = layer_bytes(mode, rgb, loaded.house.source.attribution)
     return Made({LAYER[mode].file: png}, {"renderer": rasterizer.name})
 
 
@@ -234,7 +220,6 @@ def _opengl_il(work: Work) -> Made:
 
 
 def _light(work: Work) -> Made:
-    from pbrs_farm.images import exr_from_layers
     from pbrs_farm.transport.lamp_layers import layer_name
 
     loaded = _loaded(work)
@@ -245,15 +230,16 @@ def _light(work: Work) -> Made:
     same = work.recipe.model_copy(update={"light": fields})
     seed = keys.seed(work.house_id, view.id, "light", same.digest(*groups))
     result = loaded.light_scene.render(camera, view.room_id, work.recipe.light, seed)
-    images = {"outdoor": result.outdoor, "indoor": result.indoor, "albedo": result.albedo}
-    images |= {layer_name(number): image for number, image in result.lamps.items()}
-    layers: dict[str, NDArray[np.float32]] = {}
-    for name, image in images.items():
-        layers |= {f"{name}.{c}": image[..., k] for k, c in enumerate("RGB")}
-    layers |= {f"normal.{c}": result.normal[..., k] for k, c in enumerate("XYZ")}
+    images = {
+        "outdoor": result.outdoor,
+        "indoor": result.indoor,
+        "albedo": result.albedo,
+        "normal": result.normal,
+        **{layer_name(number): image for number, image in result.lamps.items()},
+    }
     if is_object(work):
-        missed = _missed(loaded, camera)[..., 0]
-        layers = {name: np.where(missed, np.float32(0), plane) for name, plane in layers.items()}
+        missed = _missed(loaded, camera)
+        images = {name: np.where(missed, np.float32(0), image) for name, image in images.items()}
     facts = {
         **result.facts,
         "noise": result.noise,
@@ -274,8 +260,8 @@ def _light(work: Work) -> Made:
         facts["warnings"] = lit["warnings"].get(room.id, [])
     if loaded.light_scene.n_lamps == 0:
         facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
-    exr = exr_from_layers(layers, attribution=loaded.house.source.attribution)
-    return Made({"radiance.exr": exr}, facts)
+    exr = radiance_exr(images, attribution=loaded.house.source.attribution)
+    return Made({RADIANCE_EXR: exr}, facts)
 
 
 def _illuminance(work: Work) -> Made:
@@ -289,24 +275,23 @@ def _illuminance(work: Work) -> Made:
     record = illuminance_record(loaded.house, lux)
     warnings = {row["room"]: row["warnings"] for row in record["rooms"] if row["warnings"]}
     return Made(
-        {"illuminance.json": json_bytes({**record, "sky": loaded.sky.facts()})},
+        {"illuminance.json": illuminance_json(record, loaded.sky.facts())},
         {"floor_lux": lux, "warnings": warnings},
     )
 
 
 def _develop(work: Work) -> Made:
-    from pbrs_farm.images import png_from_array
-    from pbrs_farm.run.relight import aovs_from_exr
+    from pbrs_farm.run.relight import linear_aovs
     from pbrs_farm.transport.develop.mode_pictures import develop
 
-    folder = keys.view_key(work.house_id, work.view_id or "")
-    aovs = aovs_from_exr(work.store.get(f"{folder}radiance.exr"), folder.rstrip("/"))
+    key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
+    aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
     denoise = work.recipe.light.denoise
     images = develop(aovs, work.recipe.tone, denoise=denoise)
     credit = attribution(work.store, work.house_id)
     return Made(
         {
-            LAYER[mode].file: png_from_array(made.rgb_srgb8, attribution=credit)
+            LAYER[mode].file: layer_bytes(mode, made.rgb_srgb8, credit)
             for mode, made in images.items()
         },
         {"denoised": denoise} | {mode: made.facts() for mode, made in images.items()},
@@ -317,19 +302,14 @@ def _view(work: Work) -> Made:
     loaded_views = keys.house_key(work.house_id, "cameras.json")
     view = views_from_json(work.store.get(loaded_views), loaded_views)[work.view_id or ""]
     facts = _facts_of_view(work)
-    sheet = {
-        "house": work.house_id,
-        "view": view.id,
-        "room": view.room_id,
-        "sector": view.sector,
-        "origin": view.origin,
-        "score": view.score,
-        **facts.pop("truth", {}).get("table", {}),
-        "recipe": work.recipe.digest(*plan.PICTURE_GROUPS),
-        "modes": facts,
-        "versions": versions(),
-    }
-    files = {"view.json": json_bytes(sheet)}
+    description = view_description(
+        view,
+        work.house_id,
+        facts,
+        recipe_digest=work.recipe.digest(*plan.PICTURE_GROUPS),
+        versions=versions(),
+    )
+    files = {"view.json": view_json(description)}
     rendered = [m for m in ALL_MODES if m.value in facts or (m.groups and "develop" in facts)]
     if rendered:
         house = _loaded(work).house
@@ -341,7 +321,7 @@ def _view(work: Work) -> Made:
             "room_type": room.name if room is not None else "",
         }
         files["histogram.json"] = histogram_json(
-            work.store, place, rendered, sheet, house.notes, work.recipe.histogram
+            work.store, place, rendered, description, house.notes, work.recipe.histogram
         )
     return Made(files)
 

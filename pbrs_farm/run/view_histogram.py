@@ -7,13 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm import images
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Note
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.selection import SCORED_MODE, scene_quality, view_record
 from pbrs_farm.store.interface import Store
 
@@ -38,7 +38,7 @@ def histogram_json(
 
     def picture(layer: str) -> Any:
         key = keys.view_key(place["house"], place["view"], LAYER[layer].file)
-        return images.array_from_png(store.get(key), key)
+        return layer_from_bytes(layer, store.get(key), key)
 
     wanted = set(modes)
     wanted = {SCORED_MODE} if SCORED_MODE in wanted else wanted

@@ -9,13 +9,13 @@ from pbrs_farm import truth
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, geometry_from_house
-from pbrs_farm.core.keys import Marker, StoredFile
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.formats.house_bundle import bundle_from_house
+from pbrs_farm.formats.manifest import manifest_from_markers
+from pbrs_farm.formats.marker import Marker, StoredFile
 from pbrs_farm.images import exr_from_layers, png_from_array
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.run.output_root import manifest_row
 
 SIZE = (128, 96)
 
@@ -79,7 +79,7 @@ def make_root(
 
 def sign(root: Path, house: Path) -> None:
     """Make manifest and markers agree with the files as they are now."""
-    rows = []
+    markers = []
     for marker in sorted((house / "done").glob("*.json")):
         old = json.loads(marker.read_text())["files"]
         names = [f if isinstance(f, str) else f["key"].split("/", 2)[2] for f in old]
@@ -93,10 +93,10 @@ def sign(root: Path, house: Path) -> None:
             step=step, house_id=house.name, view_id=view or None, digest="0", files=tuple(stored)
         )
         marker.write_text(whole.model_dump_json())
-        rows += [manifest_row(f, step, "0", "") for f in stored]
-    lines = "".join(keys.canonical_json(r) + "\n" for r in sorted(rows, key=lambda r: r["key"]))
-    (house / "manifest.jsonl").write_text(lines)
-    (root / "manifest.jsonl").write_text(lines)
+        markers.append(whole)
+    lines = manifest_from_markers(markers, "")
+    (house / "manifest.jsonl").write_bytes(lines)
+    (root / "manifest.jsonl").write_bytes(lines)
 
 
 def changed_pixel(file: Path, row: int, column: int, by: int) -> None:

@@ -14,13 +14,14 @@ from typing import Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
+from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
 from pbrs_farm.run.plan import Wanted, view_steps, wanted
 from pbrs_farm.run.render_process import limit_threads
-from pbrs_farm.run.step_cache import Work, read_marker
+from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.retrying import RetryingStore

@@ -6,16 +6,15 @@ Effects: the store's. Every object here is rebuilt from those below it, so mergi
 from __future__ import annotations
 
 import heapq
-import io
 import json
 from collections.abc import Iterator
-from itertools import groupby
 from mmap import ACCESS_READ, mmap
 from tempfile import TemporaryFile
 from typing import IO, Any
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing
+from pbrs_farm.formats.manifest import lines_by_house
 from pbrs_farm.store.interface import Store
 from workers.ids import job_key
 from workers.job import JobSpec, houses_from_lines
@@ -99,25 +98,13 @@ def _new_rows(
         tell(f"merge shard {first // size}")
         members = houses[first : first + size]
         merged = _get(store, shard_key(spec.job_id, first // size))
-        found = dict(_by_house(merged)) if merged is not None else {}
+        found = dict(lines_by_house(merged)) if merged is not None else {}
         for house in members:
             yield house, found.get(house) or _manifest(store, house)
 
 
 def _old_rows(store: Store) -> Iterator[tuple[str, bytes]]:
-    yield from _by_house(_get(store, keys.MANIFEST) or b"")
-
-
-def _by_house(manifest: bytes) -> Iterator[tuple[str, bytes]]:
-    """House -> its rows, in the manifest's order: by house, as every manifest is written."""
-    rows = io.BytesIO(manifest)  # shares the bytes, does not copy them
-    for house, lines in groupby(rows, key=_house_of_row):
-        yield house, b"".join(lines)
-
-
-def _house_of_row(line: bytes) -> str:
-    at = keys.parse_house_key(json.loads(line)["key"])
-    return at.house if at is not None else ""
+    yield from lines_by_house(_get(store, keys.MANIFEST) or b"")
 
 
 def _manifest(store: Store, house: str) -> bytes | None:

@@ -1,0 +1,36 @@
+"""The files of a view's layers, PNG or EXR as core/layers.py says: pictures and labels. Pure.
+
+Written by `truth`, `opengl_dl`, `opengl_il` and `develop`; radiance.exr is in radiance_exr.py.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, png_from_array
+
+
+def layer_bytes(name: str, array: NDArray[Any], attribution: str = "") -> bytes:
+    """The file of layer name: (H, W) or (H, W, 3). attribution: the file's copyright."""
+    layer = LAYER[name]
+    if layer.file.endswith(".png"):
+        return png_from_array(array, attribution=attribution)
+    channels = layer.channels.split()
+    planes = [array] if len(channels) == 1 else list(np.moveaxis(array, -1, 0))
+    named = zip(channels, planes, strict=True)
+    layers = {c: np.ascontiguousarray(plane, np.float32) for c, plane in named}
+    return exr_from_layers(layers, attribution=attribution)
+
+
+def layer_from_bytes(name: str, data: bytes, place: str) -> NDArray[Any]:
+    """The array that layer_bytes wrote; BadInput names place when data is no such file."""
+    layer = LAYER[name]
+    if layer.file.endswith(".png"):
+        return array_from_png(data, place)
+    planes = layers_from_exr(data, place)
+    arrays = [planes[channel] for channel in layer.channels.split()]
+    return arrays[0] if len(arrays) == 1 else np.stack(arrays, axis=-1)

@@ -1,0 +1,58 @@
+"""done/<step>[.<view>].json: the marker that says a step is done (architecture rule 4).
+
+Effects: read_marker reads the store.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from pbrs_farm.core.errors import StoreFailed
+from pbrs_farm.formats.serialise import json_bytes
+from pbrs_farm.store.interface import Store
+
+
+class StoredFile(BaseModel):
+    """One object a step wrote."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    key: str
+    n_bytes: int
+    sha256: str
+
+
+class Marker(BaseModel):
+    """What a step was done with and what it wrote; itself written last and if-absent.
+
+    digest: of ids, recipe fields the step uses, the step's version and its inputs' digests.
+    facts: what later steps or view.json need to know; equal for equal inputs, no clock.
+    seconds, worker, attempt, finished_utc: the only clocks in the whole output.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    step: str
+    house_id: str
+    view_id: str | None = None
+    digest: str
+    files: tuple[StoredFile, ...] = ()
+    facts: dict[str, Any] = {}
+    seconds: float = 0.0
+    worker: str = ""
+    attempt: int = 1
+    finished_utc: str = ""
+
+    def json_bytes(self) -> bytes:
+        """The file."""
+        return json_bytes(self)
+
+
+def read_marker(store: Store, key: str) -> Marker | None:
+    """The marker at key, None if there is none. Raises StoreFailed when it is damaged."""
+    if store.head(key) is None:
+        return None
+    try:
+        return Marker.model_validate_json(store.get(key))
+    except ValidationError:
+        raise StoreFailed(key, "not a marker", hint="remove it to do the step again") from None

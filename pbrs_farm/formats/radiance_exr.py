@@ -1,0 +1,54 @@
+"""radiance.exr: the linear images of a view's light, written by `light`, read by `develop` and relight.
+
+Pure. Channels are `<image>.<channel>`: outdoor, indoor, albedo and lamp<N> have R, G, B, normal
+has X, Y, Z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.images import exr_from_layers, layers_from_exr
+
+FILE: Final = LAYER["radiance"].file
+
+
+def _channels(image: str) -> str:
+    return "XYZ" if image == "normal" else "RGB"
+
+
+def radiance_exr(images: Mapping[str, NDArray[np.float32]], *, attribution: str = "") -> bytes:
+    """The file of images by name, (H, W, 3) float32 each. attribution: the file's copyright."""
+    planes = {
+        f"{name}.{channel}": image[..., k]
+        for name, image in images.items()
+        for k, channel in enumerate(_channels(name))
+    }
+    return exr_from_layers(planes, attribution=attribution)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RadianceExr:
+    """The channels of a radiance.exr."""
+
+    planes: Mapping[str, NDArray[np.float32]]  # "indoor.R" -> (H, W)
+    place: str  # of the file, for messages
+
+    def image(self, name: str) -> NDArray[np.float32]:
+        """(H, W, 3) float32 image of that name; BadInput when the file has none."""
+        try:
+            return np.stack([self.planes[f"{name}.{c}"] for c in _channels(name)], -1)
+        except KeyError as error:
+            raise BadInput(self.place, str(error), "no such layer") from None
+
+
+def radiance_from_exr(data: bytes, place: str) -> RadianceExr:
+    """What radiance_exr wrote; BadInput names place when data is no EXR."""
+    return RadianceExr(layers_from_exr(data, place), place)

@@ -1,0 +1,53 @@
+"""view.json: which view this is, its camera, tables and facts (docs/formats.md), written by `view`; pure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from pbrs_farm.core.camera import View
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.formats.serialise import json_bytes
+
+
+def view_description(
+    view: View,
+    house_id: str,
+    facts: Mapping[str, Mapping[str, Any]],
+    *,
+    recipe_digest: str,
+    versions: Mapping[str, str],
+) -> dict[str, Any]:
+    """What view.json says. facts: step -> facts of its marker; "table" of `truth` stands at the top."""
+    table = facts.get("truth", {}).get("table", {})
+    return {
+        "house": house_id,
+        "view": view.id,
+        "room": view.room_id,
+        "sector": view.sector,
+        "origin": view.origin,
+        "score": view.score,
+        **table,
+        "recipe": recipe_digest,
+        "modes": {step: said for step, said in facts.items() if step != "truth"},
+        "versions": versions,
+    }
+
+
+def view_json(description: Mapping[str, Any]) -> bytes:
+    """The file."""
+    return json_bytes(description)
+
+
+def lamps_from_view_json(data: bytes, place: object) -> list[dict[str, Any]]:
+    """The rows of the house's lamps (transport/lamp_layers.py); BadInput names place if none."""
+    try:
+        rows: list[dict[str, Any]] = json.loads(data)["modes"]["light"]["lamps"]
+    except (ValueError, KeyError, TypeError):
+        hint = (
+            "render it with them: pbrs-farm run HOME --out OUT --groups lamps, and --update if"
+            " OUT is the same"
+        )
+        raise BadInput(place, "", "was stored without the light of each lamp", hint=hint) from None
+    return rows
