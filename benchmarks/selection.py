@@ -26,7 +26,8 @@ from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.curate.selection_run import json_lines, select
 from pbrs_farm.curate.selection_summary import PAPER_VIEWS
-from pbrs_farm.selection import SceneQuality, histogram, view_record
+from pbrs_farm.formats.histogram_json import SceneQuality
+from pbrs_farm.selection import histogram, view_record
 from pbrs_farm.selection.binning import BINNINGS
 from pbrs_farm.selection.histogram_pack import HistogramPack, bytes_from_pack, pack_from_bytes
 from pbrs_farm.selection.histograms import normalised

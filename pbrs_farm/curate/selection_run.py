@@ -21,6 +21,7 @@ from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.curate.selection_summary import SelectionSummary, summary_of
+from pbrs_farm.formats.histogram_json import ViewRecord, record_from_json
 from pbrs_farm.formats.manifest import sha256_by_key
 from pbrs_farm.selection.histogram_pack import (
     HistogramPack,
@@ -32,7 +33,6 @@ from pbrs_farm.selection.histogram_pack import (
 from pbrs_farm.selection.reference_set import Reference, check_comparable
 from pbrs_farm.selection.scores import SCORES, Scorer, merged
 from pbrs_farm.selection.verdicts import verdicts
-from pbrs_farm.selection.view_record import ViewRecord, record_from_json
 from pbrs_farm.store.interface import Store
 
 _METADATA: Final = b"pbrs_farm"

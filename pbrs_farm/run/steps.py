@@ -42,7 +42,7 @@ from pbrs_farm.run.step_cache import (
     required_source,
     run_marked,
 )
-from pbrs_farm.run.view_histogram import histogram_json
+from pbrs_farm.run.view_histogram import view_histogram
 
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
@@ -320,7 +320,7 @@ def _view(work: Work) -> Made:
             "room": view.room_id,
             "room_type": room.name if room is not None else "",
         }
-        files["histogram.json"] = histogram_json(
+        files["histogram.json"] = view_histogram(
             work.store, place, rendered, description, house.notes, work.recipe.histogram
         )
     return Made(files)

@@ -13,14 +13,15 @@ from pbrs_farm.core.house import Note
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.formats.histogram_json import SCORED_MODE
 from pbrs_farm.formats.layer_file import layer_from_bytes
-from pbrs_farm.selection import SCORED_MODE, scene_quality, view_record
+from pbrs_farm.selection import scene_quality, view_record
 from pbrs_farm.store.interface import Store
 
 _MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})
 
 
-def histogram_json(
+def view_histogram(
     store: Store,
     place: Mapping[str, str],
     modes: Iterable[Mode],
@@ -28,7 +29,7 @@ def histogram_json(
     notes: Iterable[Note],
     settings: HistogramFields,
 ) -> bytes:
-    """Bytes of histogram.json of one view (selection.ViewRecord).
+    """Bytes of histogram.json of one view (formats.histogram_json.ViewRecord).
 
     place: "house", "view", "room" and "room_type" (the room's name). modes: those rendered; only
     SCORED_MODE is opened where it is one of them. view_json: its "instances" and, where light was

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
-from pbrs_farm.selection.view_record import SCORED_MODE, ViewRecord
+from pbrs_farm.formats.histogram_json import SCORED_MODE, ViewRecord
 
 _FORMAT: Final = "pbrs_farm pack 2"
 _TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes")

@@ -7,40 +7,14 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.formats.histogram_json import PictureQuality, SceneQuality
 
 _SATURATED: Final = 254
-
-
-class PictureQuality(BaseModel):
-    """Of one lighting mode. brightness: median sRGB luma, 0..1. blown: share with a channel >= 254."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    brightness: float
-    blown: float
-
-
-class SceneQuality(BaseModel):
-    """Of a view, whatever its light. All shares are of the picture.
-
-    surface: share of the largest instance. near: share nearer than near_m (a camera inside an
-    object sees little else). n_objects: objects (no walls, floors, ceilings) of object_fraction.
-    noise: relative error of the raw light, None where none was traced. missing_textures: of the
-    house. classes: NYU40 id (1..40) -> its share.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    surface: float
-    near: float
-    n_objects: int
-    noise: float | None = None
-    missing_textures: int = 0
-    classes: dict[int, float] = {}
 
 
 def picture_quality(rgb_srgb8: Srgb8Image) -> PictureQuality:

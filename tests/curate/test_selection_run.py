@@ -17,8 +17,8 @@ from pbrs_farm.core.house import Note
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.curate import selection_run as selecting
-from pbrs_farm.run.view_histogram import histogram_json
-from pbrs_farm.selection.view_record import record_from_json
+from pbrs_farm.formats.histogram_json import record_from_json
+from pbrs_farm.run.view_histogram import view_histogram
 from pbrs_farm.store import MemoryStore
 from tests.selection.histogram_sets import FIELDS, record, reference
 
@@ -215,7 +215,7 @@ def test_the_view_step_writes_what_selection_reads() -> None:
         "modes": {"light": {"noise": {"outdoor": 1.0, "sum": 0.125}}},
     }
     notes = [Note("missing-texture", "chair", "wood.jpg"), Note("unmapped", "x", "y")]
-    data = histogram_json(store, place, tuple(Mode), facts, notes, fields)
+    data = view_histogram(store, place, tuple(Mode), facts, notes, fields)
     read = record_from_json(data, "x")
     assert (read.room_type, read.scene.noise, read.scene.missing_textures) == ("Kitchen", 0.125, 1)
     assert read.colour[Mode.MLT_IL_OL].counts == (48,)

@@ -6,11 +6,10 @@ import numpy as np
 
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
+from pbrs_farm.formats.histogram_json import PictureQuality, SceneQuality, SparseCounts, ViewRecord
 from pbrs_farm.selection.histogram_pack import HistogramPack, pack_house
 from pbrs_farm.selection.histograms import Histogram
-from pbrs_farm.selection.quality import PictureQuality, SceneQuality
 from pbrs_farm.selection.reference_set import Reference, reference_from_histograms
-from pbrs_farm.selection.view_record import SparseCounts, ViewRecord
 
 FIELDS = HistogramFields(colour_bins=4, depth_bins=16)
 GOOD = SceneQuality(surface=0.4, near=0.0, n_objects=5, noise=0.1, missing_textures=0)

@@ -15,6 +15,7 @@ from pbrs_farm import selection
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.formats.histogram_json import SparseCounts, ViewRecord, record_from_json
 from pbrs_farm.selection.histograms import (
     coarser_colour,
     coarser_depth,
@@ -22,7 +23,6 @@ from pbrs_farm.selection.histograms import (
     depth_counts,
     normalised,
 )
-from pbrs_farm.selection.view_record import SparseCounts
 
 RNG = np.random.default_rng(5)
 PICTURE = RNG.integers(0, 256, (30, 40, 3), np.uint8)
@@ -114,7 +114,7 @@ def test_sparse_counts_give_back_the_dense_ones(counts: list[int]) -> None:
     assert np.array_equal(SparseCounts.of(dense).dense(), dense)
 
 
-def record(modes: tuple[Mode, ...] = (Mode.MLT_IL_OL,)) -> selection.ViewRecord:
+def record(modes: tuple[Mode, ...] = (Mode.MLT_IL_OL,)) -> ViewRecord:
     return selection.view_record(
         {"house": "h", "view": "0_0_1", "room": "0_0", "room_type": "Kitchen"},
         dict.fromkeys(modes, PICTURE),
@@ -126,7 +126,7 @@ def record(modes: tuple[Mode, ...] = (Mode.MLT_IL_OL,)) -> selection.ViewRecord:
 
 def test_a_record_survives_its_file_and_is_about_a_kilobyte_for_a_plain_picture() -> None:
     one = record()
-    assert selection.record_from_json(one.json_bytes(), "x") == one
+    assert record_from_json(one.json_bytes(), "x") == one
     assert one.json_bytes() == record().json_bytes()
     flat = np.zeros((48, 64, 3), np.uint8)
     flat[:, 32:] = 200
@@ -158,7 +158,7 @@ def test_a_damaged_record_is_named() -> None:
     ]
     for data in wrong:
         with pytest.raises(BadInput, match="h/0_0_1/histogram"):
-            selection.record_from_json(data, "h/0_0_1/histogram.json")
+            record_from_json(data, "h/0_0_1/histogram.json")
 
 
 def test_quality_numbers_are_those_of_the_definition() -> None:
