@@ -11,6 +11,7 @@ from typing import Final
 
 from pbrs_farm.assets import homes
 from pbrs_farm.assets.debian import cache_folder
+from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve
 from pbrs_farm.store.interface import Store
 from workers.job import HouseEntry
@@ -25,11 +26,12 @@ def entries_from_words(words: Sequence[str]) -> list[tuple[HouseEntry, SourceRef
     Touches no store. Raises BadHouse for a word that names no house.
     """
     found: dict[str, tuple[HouseEntry, SourceRef]] = {}
+    files = SourceFiles()
     for word in words:
         for one in _expanded(word):
-            ref = resolve(one)
+            ref = resolve(one, files)
             entry = HouseEntry(
-                house_id=ref.house_id, source=_placed(ref).model_dump_json(), sha256=ref.sha256
+                house_id=ref.house_id, source=_placed(ref).model_dump_json(), sha256=ref.fingerprint
             )
             found.setdefault(ref.house_id, (entry, ref))
     return list(found.values())
@@ -38,7 +40,7 @@ def entries_from_words(words: Sequence[str]) -> list[tuple[HouseEntry, SourceRef
 def upload(store: Store, refs: Sequence[SourceRef]) -> None:
     """Put into the store what workers elsewhere need: the files, and the example homes' package.
 
-    Folders (SUNCG, .gltf with side files) are not copied: workers must see them at the same path.
+    Folders (SUNCG, glTF with side files) are not copied: workers must see them at the same path.
     """
     for ref in refs:
         placed = _placed(ref)
@@ -52,7 +54,7 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
 
 
 def is_left_in_place(ref: SourceRef) -> bool:
-    """The source is read where it lies, so every worker must see it: SUNCG, .gltf with side files."""
+    """The source is read where it lies, so every worker must see it: SUNCG, glTF with side files."""
     return ref.kind in ("suncg", "gltf") and _placed(ref).location == ref.location
 
 
@@ -92,7 +94,12 @@ def _expanded(word: str) -> list[str]:
 def _placed(ref: SourceRef) -> SourceRef:
     """The source as workers find it: a single file by its key in the store."""
     path = Path(ref.location)
-    if ref.kind not in ("sweethome3d", "gltf") or path.suffix.lower() not in _UPLOADED:
+    has_side_files = ref.kind == "gltf" and bool(ref.companions)
+    if (
+        has_side_files
+        or ref.kind not in ("sweethome3d", "gltf")
+        or path.suffix.lower() not in _UPLOADED
+    ):
         return ref
     key = f"{FOLDER}{ref.house_id}/{_key_name(path.name)}"
     return ref.model_copy(update={"location": key})

@@ -254,6 +254,7 @@ def _step(args: argparse.Namespace) -> int:
 
 
 def _objects(args: argparse.Namespace) -> int:
+    from pbrs_farm.read.common.companion_files import SourceFiles
     from pbrs_farm.read.objects.model_folders import find_models, pick_models
     from pbrs_farm.read.source import object_source
 
@@ -261,5 +262,6 @@ def _objects(args: argparse.Namespace) -> int:
         raise BadInput("--count", str(args.count), "expected at least one model")
     categories = args.categories.split(",") if args.categories else []
     models = find_models(args.models)
+    files = SourceFiles()
     chosen = pick_models(models, categories, args.count, recipe_of(args).seed)
-    return _run_words(args, [], [object_source(model) for model in chosen])
+    return _run_words(args, [], [object_source(model, files) for model in chosen])

@@ -5,7 +5,6 @@ Effects: reads files, and the example homes' package from the cache (or through 
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -16,18 +15,22 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.companion_files import SourceFiles
+from pbrs_farm.read.common.root_folder import RootFolder
 
 if TYPE_CHECKING:
+    from pbrs_farm.assets.homes import Package
     from pbrs_farm.read.objects.model_folders import ObjectModel
 
 Kind = Literal["builtin", "example", "sweethome3d", "suncg", "gltf", "object"]
 
 
 class SourceRef(BaseModel):
-    """A house before it is read. location: a path, an example home's name, or "builtin"; of an
-    object without context the JSON of its ObjectModel.
+    """A house before it is read.
 
-    sha256: of the source's bytes, "" where the source is a folder (SUNCG: of its house.json).
+    location: a path, an example home's name, or "builtin"; of an object without context the JSON
+    of its ObjectModel. sha256: of the file's bytes (SUNCG: of house.json). companions: digest of
+    all other files that reading opens, "" = none, None = not known (named by an earlier version).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -35,26 +38,84 @@ class SourceRef(BaseModel):
     location: str
     house_id: str
     sha256: str
+    companions: str | None = None
+
+    @property
+    def fingerprint(self) -> str:
+        """Digest of every file the source reads; without companions that of its own file."""
+        return f"{self.sha256}+{self.companions}" if self.companions else self.sha256
 
 
-def resolve(word: str) -> SourceRef:
-    """The source a word names: "builtin", an example home's name, or a path. Raises BadHouse."""
-    if word.startswith("{"):
-        return object_source(_object_model(word))
+def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
+    """The source a word names: "builtin", an example home's name, or a path. Raises BadHouse.
+
+    files: what was looked at before, for many words that share files.
+    """
     path = Path(word)
-    if word == "builtin":
+    kind: Kind
+    if word.startswith("{"):
+        kind = "object"
+    elif word == "builtin":
+        kind = "builtin"
+    elif not path.exists() and not path.suffix and "/" not in word:
+        kind = "example"
+    elif path.is_dir() or path.name == "house.json":
+        kind, word = "suncg", str((path.parent if path.name == "house.json" else path).resolve())
+    else:
+        kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
+        word = str(path.resolve())
+    return _reference(kind, word, files or SourceFiles())
+
+
+def _reference(kind: Kind, location: str, files: SourceFiles) -> SourceRef:
+    """The source at a location of a known kind, with the digests of its files."""
+    if kind == "builtin":
         from pbrs_farm.read.builtin.builtin_home import builtin_home
 
         home = builtin_home()
-        return SourceRef(kind="builtin", location=word, house_id=home.id, sha256=home.source.sha256)
-    if not path.exists() and not path.suffix and "/" not in word:
-        return _example(word)
-    if path.is_dir() or path.name == "house.json":
-        return _suncg(path)
-    sha = _sha256(path)
-    kind: Kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
-    house_id = keys.house_id(path.stem, sha)
-    return SourceRef(kind=kind, location=str(path.resolve()), house_id=house_id, sha256=sha)
+        return SourceRef(kind=kind, location=location, house_id=home.id, sha256=home.source.sha256)
+    if kind == "suncg":
+        return _suncg(Path(location), files)
+    if kind == "object":
+        return object_source(_object_model(location), files)
+    if kind == "example":
+        from pbrs_farm.assets import homes
+
+        package = homes.fetch()
+        data, name = package.home(location)
+        companions = _package_digest(package)
+    else:
+        path = Path(location)
+        data, name = _bytes(path), path.name
+        companions = _companions(kind, path, data, files)
+    sha = keys.sha256(data)
+    house_id = keys.house_id(Path(name).stem, sha)
+    return SourceRef(
+        kind=kind, location=location, house_id=house_id, sha256=sha, companions=companions
+    )
+
+
+def _companions(kind: Kind, path: Path, data: bytes, files: SourceFiles) -> str:
+    """Digest of what a scene or a home reads beside its own file."""
+    if kind == "gltf":
+        from pbrs_farm.read.gltf.document import files_of_gltf
+        from pbrs_farm.read.gltf.scene import side_files
+
+        names = [*side_files(path), *files_of_gltf(data, path.name)]
+        return files.digest(RootFolder(path.parent), names)
+    from pbrs_farm.assets import homes
+    from pbrs_farm.read.sweethome3d.container import needs_program
+
+    return _package_digest(homes.cached()) if needs_program(data, path.name) else ""
+
+
+def _package_digest(package: Package | None) -> str:
+    """Digest of the package of example homes and models; "" for the tested version.
+
+    The tested version is part of a release: one that tests another raises the house step's version.
+    """
+    is_tested = package is not None and not package.note
+    return "" if is_tested else keys.sha256((package.label if package else "none").encode())
 
 
 def suncg_list(root: Path, list_file: Path) -> list[str]:
@@ -68,41 +129,57 @@ def suncg_list(root: Path, list_file: Path) -> list[str]:
 
 
 def read_house(source: SourceRef, fields: ReadFields) -> House:
-    """The house as its source gives it, unrepaired. Raises BadHouse with the place."""
+    """The house as its source gives it, unrepaired.
+
+    Raises BadHouse with the place, also where a file of the source has changed since it was named.
+    """
+    _check_unchanged(source)
+    path = Path(source.location)
     if source.kind == "object":
         return _read_object(source, fields)
-    path = Path(source.location)
     if source.kind == "builtin":
         from pbrs_farm.read.builtin.builtin_home import builtin_home
 
         return builtin_home()
-    if source.kind == "example":
-        return _read_example(source, fields)
     if source.kind == "suncg":
         from pbrs_farm.read.suncg.suncg_house import read_suncg
 
-        _check_unchanged(path / "house.json", _bytes(path / "house.json"), source)
         return read_suncg(path.parent.parent, path.name, fields)
-    data = _bytes(path)
-    _check_unchanged(path, data, source)
     if source.kind == "gltf":
         from pbrs_farm.read.gltf.scene import read_gltf_file
 
         return read_gltf_file(path, fields)
+    return _read_home(source, fields)
+
+
+def _read_home(source: SourceRef, fields: ReadFields) -> House:
+    """A Sweet Home 3D home, with the program's own models where they are cached."""
     from pbrs_farm.assets import homes
     from pbrs_farm.read.sweethome3d import read_home
 
-    package = homes.cached()
-    resources = package.resources() if package else None
-    return read_home(data, path.name, resources=resources, fields=fields)
+    if source.kind == "example":
+        package = homes.fetch()
+        data, file = package.home(source.location)
+        return read_home(
+            data, file, resources=package.resources(), fields=fields,
+            package=package.label, package_note=package.note,
+        )  # fmt: skip
+    path, cached = Path(source.location), homes.cached()
+    resources = cached.resources() if cached else None
+    return read_home(_bytes(path), path.name, resources=resources, fields=fields)
 
 
-def object_source(model: ObjectModel) -> SourceRef:
-    """The source of an object without context."""
-    location = TypeAdapter(type(model)).dump_json(model).decode()
-    house_id = keys.OBJECT_PREFIX + model.id
+def object_source(model: ObjectModel, files: SourceFiles | None = None) -> SourceRef:
+    """The source of an object without context; files as in resolve."""
+    from pbrs_farm.read.objects.single_object import object_companions
+
+    files = files or SourceFiles()
     return SourceRef(
-        kind="object", location=location, house_id=house_id, sha256=_sha256(model.path)
+        kind="object",
+        location=TypeAdapter(type(model)).dump_json(model).decode(),
+        house_id=keys.OBJECT_PREFIX + model.id,
+        sha256=_sha256(model.path, files),
+        companions=files.digest(RootFolder(model.root), object_companions(model, files)),
     )
 
 
@@ -122,50 +199,36 @@ def _read_object(source: SourceRef, fields: ReadFields) -> House:
     return replace(house, id=source.house_id, is_repaired=True)
 
 
-def _check_unchanged(path: Path, data: bytes, source: SourceRef) -> None:
-    if keys.sha256(data) != source.sha256:
-        raise BadHouse(path, "", "changed since the run began", hint="run, or submit, again")
-
-
-def _read_example(source: SourceRef, fields: ReadFields) -> House:
-    from pbrs_farm.assets import homes
-    from pbrs_farm.read.sweethome3d import read_home
-
-    package = homes.fetch()
-    data, file = package.home(source.location)
-    if keys.sha256(data) != source.sha256:
+def _check_unchanged(source: SourceRef) -> None:
+    """Raise where a file of the source is not what it was when the source was named."""
+    now = _reference(source.kind, source.location, SourceFiles())
+    is_known = source.companions is not None
+    if now.sha256 == source.sha256 and (not is_known or now.companions == source.companions):
+        return
+    if source.kind == "example" or (source.kind == "sweethome3d" and now.sha256 == source.sha256):
+        # The file is the same or comes from the package: this machine's package differs.
         raise MachineFailed(
-            f"{package.label} holds another {source.location} than was asked for",
+            f"the package here holds another {source.location} or other models than was asked for",
             hint="another version of the package; `pbrs-farm homes --fetch`",
         )
-    resources = package.resources()
-    return read_home(
-        data,
-        file,
-        resources=resources,
-        fields=fields,
-        package=package.label,
-        package_note=package.note,
-    )
+    raise BadHouse(source.location, "", "changed since the run began", hint="run, or submit, again")
 
 
-def _example(name: str) -> SourceRef:
-    from pbrs_farm.assets import homes
+def _suncg(folder: Path, files: SourceFiles) -> SourceRef:
+    from pbrs_farm.read.suncg.companion_files import suncg_companions
 
-    data, file = homes.fetch().home(name)
-    sha = keys.sha256(data)
-    house_id = keys.house_id(Path(file).stem, sha)
-    return SourceRef(kind="example", location=name, house_id=house_id, sha256=sha)
-
-
-def _suncg(path: Path) -> SourceRef:
-    folder = path.parent if path.name == "house.json" else path
     if not (folder / "house.json").exists():
         raise BadHouse(
             folder, "", "holds no house.json and no home file", hint=_folder_hint(folder)
         )
-    sha = _sha256(folder / "house.json")
-    return SourceRef(kind="suncg", location=str(folder.resolve()), house_id=folder.name, sha256=sha)
+    root = RootFolder(folder.parent.parent)
+    return SourceRef(
+        kind="suncg",
+        location=str(folder),
+        house_id=folder.name,
+        sha256=_sha256(folder / "house.json", files),
+        companions=files.digest(root, suncg_companions(root, folder.name, files)),
+    )
 
 
 def _folder_hint(folder: Path) -> str:
@@ -174,14 +237,20 @@ def _folder_hint(folder: Path) -> str:
     return "a SUNCG house folder, or .sh3d, .glb files"
 
 
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(_bytes(path)).hexdigest()
+def _sha256(path: Path, files: SourceFiles) -> str:
+    try:
+        return files.file_digest(path)
+    except OSError as error:
+        raise _unreadable(path, error) from None
 
 
 def _bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except FileNotFoundError:
-        raise BadHouse(path, "", "no such file") from None
     except OSError as error:
-        raise BadHouse(path, "", f"cannot be read: {error.strerror}") from None
+        raise _unreadable(path, error) from None
+
+
+def _unreadable(path: Path, error: OSError) -> BadHouse:
+    is_missing = isinstance(error, FileNotFoundError)
+    return BadHouse(path, "", "no such file" if is_missing else f"cannot be read: {error.strerror}")

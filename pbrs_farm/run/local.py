@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve
 from pbrs_farm.run import plan
 from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
@@ -82,9 +83,10 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
 
 def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
     sources = {s.house_id: s for s in run.sources}
+    files = SourceFiles()
     for word in run.homes:
         try:
-            source = resolve(word)
+            source = resolve(word, files)
         except PbrsError as error:
             summary.failures.append((word, str(error), ""))
             continue

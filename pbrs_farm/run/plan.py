@@ -95,7 +95,7 @@ def step_digest(
 ) -> str:
     """Digest of a step. inputs: step name -> digest of its marker, for those that exist.
 
-    extra: what else it depends on (the source's sha256, the camera, optional layers).
+    extra: what else it depends on (the source's fingerprint, the camera, optional layers).
     """
     return keys.digest(
         step.name,

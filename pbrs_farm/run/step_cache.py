@@ -110,7 +110,7 @@ _NEEDED: Final = {"develop": ("light",), "view": ("truth",)}
 def _extra(name: str, work: Work) -> object:
     """What a step depends on beside recipe fields and other steps."""
     if name == "house":
-        return required_source(work).sha256
+        return required_source(work).fingerprint
     if name == "truth":
         return work.layers
     if name == "cameras" and work.recipe.cameras.source == "file":

@@ -45,6 +45,13 @@ class RootFolder:
         """Whether a folder of that name exists below root."""
         return (self.root / self.name_from("", name)).is_dir()
 
+    def names(self, folder: str, suffixes: tuple[str, ...]) -> list[str]:
+        """Names of the files directly in a folder below root, by suffix; [] without the folder."""
+        below = self.root / self.name_from("", folder)
+        if not below.is_dir():
+            return []
+        return [f"{folder}/{p.name}" for p in below.iterdir() if p.suffix in suffixes]
+
     def read(self, name: str, *, max_bytes: int, limit: str = "") -> bytes | None:
         """The file's bytes, or None if there is none. limit: the field that sets max_bytes."""
         path = self.path(name)

@@ -60,11 +60,7 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
     Raises BadHouse for a file that is damaged, requires an extension that is not understood, or
     names a buffer that does not exist.
     """
-    if data[:4] == b"glTF":
-        gltf = gltf_from_glb(data, file)
-    else:
-        document = json_from_bytes(data, file)
-        gltf = Gltf(document if isinstance(document, dict) else {}, (), file)
+    gltf = _parsed(data, file)
     if not isinstance(gltf.document.get("asset"), dict):
         raise BadHouse(file, "asset", "is missing; this is no glTF file")
     required = gltf.document.get("extensionsRequired", [])
@@ -81,6 +77,25 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
         raise BadHouse(file, "buffers", "expected a list")
     loaded = [_buffer(gltf, i, fetch) for i in range(len(buffers))]
     return Gltf(gltf.document, tuple(loaded), file)
+
+
+def _parsed(data: bytes, file: str) -> Gltf:
+    if data[:4] == b"glTF":
+        return gltf_from_glb(data, file)
+    document = json_from_bytes(data, file)
+    return Gltf(document if isinstance(document, dict) else {}, (), file)
+
+
+def files_of_gltf(data: bytes, file: str) -> list[str]:
+    """Relative names of the buffers and pictures outside a .glb or .gltf; [] if it is damaged."""
+    try:
+        document = _parsed(data, file).document
+    except BadHouse:
+        return []
+    lists = [document.get(key) for key in ("buffers", "images")]
+    entries = [e for entries in lists if isinstance(entries, list) for e in entries]
+    uris = [str(e["uri"]) for e in entries if isinstance(e, dict) and "uri" in e]
+    return [unquote(uri) for uri in uris if not uri.startswith("data:") and "://" not in uri]
 
 
 def _buffer(gltf: Gltf, index: int, fetch: Fetch) -> bytes:

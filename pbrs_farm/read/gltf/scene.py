@@ -54,15 +54,21 @@ def read_gltf_file(path: Path, fields: ReadFields) -> House:
     data = folder.read(path.name, max_bytes=MAX_FILE_BYTES)
     if data is None:
         raise BadHouse(path, "", "no such file")
+    mapping, rooms = side_files(path)
     beside = Beside(
         fetch=lambda name: folder.read(name, max_bytes=MAX_FILE_BYTES),
-        mapping=folder.read(f"{path.stem}.classes.json", max_bytes=MAX_FILE_BYTES),
-        rooms=folder.read(f"{path.stem}.rooms.json", max_bytes=MAX_FILE_BYTES),
+        mapping=folder.read(mapping, max_bytes=MAX_FILE_BYTES),
+        rooms=folder.read(rooms, max_bytes=MAX_FILE_BYTES),
     )
     house = read_gltf(data, path.name, fields=fields, beside=beside)
     if folder.n_read > 1:
         return replace(house, source=replace(house.source, sha256=folder.sha256))
     return house
+
+
+def side_files(path: Path) -> tuple[str, str]:
+    """Names of a scene's class mapping and of its room file, both optional."""
+    return f"{path.stem}.classes.json", f"{path.stem}.rooms.json"
 
 
 def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | None = None) -> House:

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Box, House, Item, ItemKind, Level, MaterialKind, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.gltf.document import gltf_document
+from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.node_items import items_of_scene
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
@@ -80,6 +81,23 @@ def read_object(model: ObjectModel, fields: ReadFields) -> House:
     )
 
 
+def object_companions(model: ObjectModel, files: SourceFiles) -> Iterator[str]:
+    """Names below the model's root of all files beside its own that reading it may open."""
+    if model.entry:
+        return  # in a furniture library, which is one file
+    folder, name = RootFolder(model.root), model.path.relative_to(model.root).as_posix()
+    try:
+        if name.lower().endswith(".obj"):
+            library = material_library(folder, name)
+            yield from (library, *files.pictures(folder, library))
+        else:
+            data = folder.read(name, max_bytes=_MAX_FILE_BYTES) or b""
+            for reference in files_of_gltf(data, name):
+                yield folder.name_from(posixpath.dirname(name), reference)
+    except BadHouse:
+        return  # the reader will say what is wrong with it
+
+
 @contextmanager
 def _folder_of(model: ObjectModel) -> Iterator[tuple[RootFolder, str]]:
     """The folder that holds the model, and the model's name in it."""
@@ -104,7 +122,7 @@ def _obj(
     folder: RootFolder, name: str, notes: Notes, fields: ReadFields
 ) -> tuple[list[Surface], MaterialLibrary]:
     materials = ModelMaterials(folder, notes)
-    model = Models(folder, notes, fields).model(name, _material_library(folder, name))
+    model = Models(folder, notes, fields).model(name, material_library(folder, name))
     if model is None:
         raise BadHouse(folder.root, name, "no such file")
     surfaces = []
@@ -119,7 +137,7 @@ def _obj(
     return surfaces, materials.library
 
 
-def _material_library(folder: RootFolder, name: str) -> str:
+def material_library(folder: RootFolder, name: str) -> str:
     """The first mtllib of an OBJ as a name below the folder; `<stem>.mtl` where it has none."""
     data = folder.read(name, max_bytes=_MAX_FILE_BYTES) or b""
     reference = posixpath.splitext(posixpath.basename(name))[0] + ".mtl"

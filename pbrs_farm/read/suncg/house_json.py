@@ -14,7 +14,9 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.serialise import json_from_bytes
 
 NODE_TYPES: Final = ("Room", "Object", "Ground", "Box")
-_MODEL_ID: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}")
+NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}")
+"""What a model or a texture may be called; a file name that stays in its folder."""
+
 _COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
 MAX_NODES: Final = 100_000
 
@@ -178,7 +180,7 @@ class JsonReader:
         if kind == "Box":
             return ""
         model_id = raw.get("modelId")
-        if not isinstance(model_id, str) or not _MODEL_ID.fullmatch(model_id):
+        if not isinstance(model_id, str) or not NAME.fullmatch(model_id):
             raise BadHouse(self.file, place, f"modelId {str(model_id)[:60]!r} is no model's name")
         return model_id
 
@@ -207,7 +209,7 @@ class JsonReader:
     def _override(self, entry: dict[str, Any], place: str) -> Override:
         texture, diffuse = entry.get("texture"), entry.get("diffuse")
         rgb = None
-        if texture is not None and not (isinstance(texture, str) and _MODEL_ID.fullmatch(texture)):
+        if texture is not None and not (isinstance(texture, str) and NAME.fullmatch(texture)):
             raise BadHouse(self.file, place, f"texture {str(texture)[:60]!r} is no texture's name")
         if diffuse is not None:
             if not isinstance(diffuse, str) or not _COLOUR.fullmatch(diffuse):

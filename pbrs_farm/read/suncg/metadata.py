@@ -22,6 +22,10 @@ from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 
+CLASS_TABLES: Final = ("ModelCategoryMappingNewActive.csv", "ModelCategoryMapping.csv")
+VARIANT_TABLE: Final = "models.csv"
+LAMP_TABLE: Final = "light_geometry_compact.txt"
+LIGHT_TABLE: Final = "suncgModelLights.json"
 OTHERPROP: Final = 40
 _MAX_TABLE_BYTES: Final = 32_000_000
 _NYU40_IDS: Final = {name.replace(" ", "_"): i for i, name in enumerate(NYU40_NAMES)} | {
@@ -74,9 +78,14 @@ def read_tables(folder: RootFolder, notes: Notes) -> Tables:
     )
 
 
+def table_places(name: str) -> tuple[str, str]:
+    """Where a table may stand below the root; the first goes first."""
+    return f"metadata/{name}", name
+
+
 def _table(folder: RootFolder, *names: str) -> tuple[str, bytes] | None:
     for name in names:
-        for place in (f"metadata/{name}", name):
+        for place in table_places(name):
             data = folder.read(place, max_bytes=_MAX_TABLE_BYTES)
             if data is not None:
                 return place, data
@@ -93,7 +102,7 @@ def _rows(name: str, data: bytes) -> list[dict[str, str]]:
 
 
 def _classes(folder: RootFolder, notes: Notes) -> dict[str, ModelClass]:
-    found = _table(folder, "ModelCategoryMappingNewActive.csv", "ModelCategoryMapping.csv")
+    found = _table(folder, *CLASS_TABLES)
     if found is None:
         notes.add("missing-table", "metadata/ModelCategoryMapping.csv", "every object is otherprop")
         return {}
@@ -119,7 +128,7 @@ def _class(row: dict[str, str]) -> ModelClass:
 
 
 def _variants(folder: RootFolder) -> dict[str, tuple[str, ...]]:
-    found = _table(folder, "models.csv")
+    found = _table(folder, VARIANT_TABLE)
     if found is None:
         return {}
     rows = [(row.get("id", ""), row.get("variantIds", "")) for row in _rows(*found)]
@@ -127,7 +136,7 @@ def _variants(folder: RootFolder) -> dict[str, tuple[str, ...]]:
 
 
 def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
-    found = _table(folder, "light_geometry_compact.txt")
+    found = _table(folder, LAMP_TABLE)
     if found is None:
         text = "no lamp's bulb material is known; repair adds bulbs"
         notes.add("missing-table", "metadata/light_geometry_compact.txt", text)
@@ -150,7 +159,7 @@ def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
 
 
 def _lights(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]]:
-    found = _table(folder, "suncgModelLights.json")
+    found = _table(folder, LIGHT_TABLE)
     if found is None:
         text = "no lamp's light is known; bulbs get an assumed power"
         notes.add("missing-table", "metadata/suncgModelLights.json", text)

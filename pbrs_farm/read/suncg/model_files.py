@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import posixpath
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.mtl_files import read_mtl
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.mesh.mtl import ObjMaterial, parse_mtl
+from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 
-_MAX_MTL_BYTES = 4_000_000
 _BYTES_PER_TRIANGLE = 150
 
 
@@ -63,12 +62,7 @@ class Models:
         return Model(meshes, tuple(names.get(m.material, -1) for m in meshes), mtl)
 
     def _mtl(self, name: str) -> tuple[ObjMaterial, ...]:
-        data = self._folder.read(name, max_bytes=_MAX_MTL_BYTES)
-        if data is None:
+        materials = read_mtl(self._folder, name)
+        if materials is None:
             self._notes.add("missing-materials", name, "does not exist; the model is grey")
-            return ()
-        at = posixpath.dirname(name)
-        return tuple(
-            replace(m, map_kd=self._folder.name_from(at, m.map_kd)) if m.map_kd else m
-            for m in parse_mtl(data)
-        )
+        return materials or ()

@@ -22,6 +22,7 @@ from pbrs_farm.read.common.room_floors import (
 )
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.suncg.arch_json import Arch, arch_from_json, arch_openings
+from pbrs_farm.read.suncg.companion_files import MAX_HOUSE_BYTES, arch_file
 from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
 from pbrs_farm.read.suncg.metadata import read_tables
 from pbrs_farm.read.suncg.model_files import Models
@@ -35,7 +36,6 @@ from pbrs_farm.read.suncg.node_items import (
 )
 from pbrs_farm.read.suncg.wall_holes import openings
 
-MAX_HOUSE_BYTES: Final = 64_000_000
 _HOUSE_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_\-]{0,63}")
 _ROOM_ID: Final = re.compile(r"\d{1,6}_\d{1,6}")
 _STOREY_M: Final = 2.7
@@ -114,7 +114,7 @@ def _arch(folder: RootFolder, house_id: str, record: HouseRecord) -> Arch | None
     wants = any(n.kind == "Room" for _, nodes in record.levels for n in nodes)
     if not wants or folder.has_folder(f"room/{house_id}"):
         return None
-    name = f"wall/{house_id}/{house_id}.arch.json"
+    name = arch_file(house_id)
     data = folder.read(name, max_bytes=MAX_HOUSE_BYTES)
     if data is not None:
         return arch_from_json(data, name)

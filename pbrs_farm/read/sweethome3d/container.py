@@ -6,6 +6,7 @@ zip entries are bounded (read.resources).
 
 from __future__ import annotations
 
+import posixpath
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, ParseError
 
@@ -45,6 +46,17 @@ def open_container(data: bytes, file: str, resources: Resources | None) -> Conta
     if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return Container(_parsed(data, file, ""), Layered(resources))
     raise BadHouse(file, "", "neither a .sh3d archive (zip) nor a Home.xml", hint=_RESAVE)
+
+
+def needs_program(data: bytes, file: str) -> bool:
+    """Whether a home names models or pictures that its file does not hold: the program's own."""
+    try:
+        root = open_container(data, file, None).root
+        held = ZipResources(data, file).names() if data.startswith(b"PK") else ()
+        named = {e.get(key) for e in root.iter() for key in ("model", "image")}
+        return not {posixpath.normpath(name) for name in named if name} <= set(held)
+    except BadHouse:
+        return False  # the reader will say what is wrong with it
 
 
 def _parsed(xml: bytes, file: str, entry: str) -> Element:
