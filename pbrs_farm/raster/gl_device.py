@@ -1,6 +1,6 @@
-"""The OpenGL objects the rasterizer draws with: context, render targets, textures.
+"""OpenGL objects of the rasterizer: context, render targets, textures.
 
-Effects: opens an EGL context; everything here lives on it.
+Effects: opens an EGL context; all objects belong to it.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.frames import srgb_from_linear
 
-_SRGB8_ALPHA8: Final = 0x8C43
-_MAX_TEXTURE_PX: Final = 4096
+_SRGB8_ALPHA8: Final = 0x8C43  # OpenGL's internal format: the GPU decodes sRGB when it samples
+_MAX_TEXTURE_PX: Final = 4096  # every OpenGL 3.3 driver takes as much
 
 
 def n_samples(context: Any, wanted: int) -> int:
-    """Samples a pixel that the context can give: 2 at least, so that pictures are multisampled."""
+    """Samples a pixel: as wanted or what the context can give, 2 at least."""
     return max(2, min(wanted, int(context.max_samples)))
 
 
@@ -39,14 +39,13 @@ def open_context() -> Any:
 
 
 def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
-    """A repeating, mipmapped sRGB texture from (H, W, 3 or 4) uint8, row 0 = top.
-
-    The GPU decodes to linear light before it filters. Larger than 4096 px is thinned out.
-    """
+    """A repeating, mipmapped sRGB texture from (H, W, 3 or 4) uint8, row 0 = top."""
+    # Take every n-th texel of what is larger than OpenGL must accept.
     step = -(-max(pixels.shape[:2]) // _MAX_TEXTURE_PX)
     thinned = pixels[::step, ::step]
     rgba = np.full((*thinned.shape[:2], 4), 255, np.uint8)
     rgba[..., : thinned.shape[2]] = thinned
+    # Upload bottom row first, as OpenGL counts v.
     size = (rgba.shape[1], rgba.shape[0])
     texture = context.texture(size, 4, rgba[::-1].tobytes(), internal_format=_SRGB8_ALPHA8)
     texture.build_mipmaps()
@@ -55,34 +54,36 @@ def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
     return texture
 
 
-class Target:
-    """What is drawn into: colour in half floats, multisampled, resolved on read; or ids.
+class RenderTarget:
+    """A framebuffer: colour in half floats, multisampled, resolved on read; or depth and ids.
 
-    nearest: for colour, the depth texture that a first pass over the house fills.
+    prepass_depth: for colour, the depth texture that a first pass over the house fills.
     """
 
     def __init__(self, context: Any, size: tuple[int, int], kind: str, samples: int) -> None:
         self._context, self._size = context, size
-        self.nearest: Any = None
+        self.prepass_depth: Any = None
+        # For ids, keep depth_z and the instance id of each pixel's centre: one sample, no blending.
         if kind == "ids":
             planes = [context.renderbuffer(size, 1, dtype=t) for t in ("f4", "u4")]
             self._drawn = context.framebuffer(planes, context.depth_renderbuffer(size))
             self._resolved = self._drawn
             return
+        # For colour, draw into several samples a pixel and resolve into a second framebuffer.
         plane = context.renderbuffer(size, 4, dtype="f2", samples=samples)
         depth = context.depth_renderbuffer(size, samples=samples)
         self._drawn = context.framebuffer([plane], depth)
         self._resolved = context.framebuffer([context.renderbuffer(size, 4, dtype="f2")])
-        self.nearest = context.depth_texture(size, samples=samples)
-        self._depths = context.framebuffer([], self.nearest)
+        self.prepass_depth = context.depth_texture(size, samples=samples)
+        self._depths = context.framebuffer([], self.prepass_depth)
 
-    def begin_depths(self) -> None:
-        """Draw depth into nearest from now on."""
+    def begin_depth_prepass(self) -> None:
+        """Clear prepass_depth and draw depth into it from now on."""
         self._depths.use()
         self._depths.clear(depth=1.0)
 
     def begin(self, colour: tuple[float, ...]) -> None:
-        """Draw here from now on, over this colour."""
+        """Clear to this colour and draw here from now on."""
         self._drawn.use()
         self._drawn.clear(*colour, depth=1.0)
 
@@ -107,6 +108,6 @@ def _encoding_table() -> NDArray[np.uint8]:
 _SRGB8_OF_HALF: Final = _encoding_table()
 
 
-def encoded(linear: NDArray[np.float16]) -> Srgb8Image:
+def srgb8_from_half(linear: NDArray[np.float16]) -> Srgb8Image:
     """sRGB bytes of linear half floats."""
     return _SRGB8_OF_HALF[linear.view(np.uint16)]

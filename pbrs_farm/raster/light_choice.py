@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart
 from pbrs_farm.core.lighting import LightForm, flux_lm
 
-SOFT_M = 0.35
+SOFTENING_M = 0.35
 """Added in quadrature to every distance: a lamp's own shade does not burn out."""
 
 FLOOR_LEVEL = 0.6
@@ -64,7 +64,7 @@ def best_lights(
         point = lights[:, 0:3] * (1 - t) + lights[:, 12:15] * t
         gap = np.maximum(np.maximum(low[:, None] - point, point - high[:, None]), 0.0)
         squared = np.minimum(squared, np.einsum("nlk,nlk->nl", gap, gap))
-    reach = brightest / (squared + SOFT_M**2)
+    reach = brightest / (squared + SOFTENING_M**2)
     return np.argsort(-reach, axis=1, kind="stable")[:, :n_best]
 
 
@@ -87,7 +87,7 @@ def illuminance(
     spot = np.where(leaving >= lights[..., 11], leaving ** lights[..., 7], 0.0)
     spot = np.where(lights[..., 3] == _FORM_NUMBER[LightForm.SPOT], spot, 1.0)
     candela = lights[..., 4:7].max(axis=2)
-    return np.asarray((candela * spot * cosine / (squared + SOFT_M**2)).sum(1))
+    return np.asarray((candela * spot * cosine / (squared + SOFTENING_M**2)).sum(1))
 
 
 def brightness_scale(house: House, n_best: int) -> float:

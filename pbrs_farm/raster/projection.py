@@ -1,7 +1,4 @@
-"""Camera -> OpenGL clip space on the pixel grid of Camera.rays(); which boxes it can see.
-
-No effects.
-"""
+"""Projection: camera to OpenGL clip space on Camera.rays()' pixel grid, frustum culling; no effects."""
 
 from __future__ import annotations
 
@@ -11,12 +8,12 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import Matrix4
 from pbrs_farm.core.camera import Camera
 
-NEAR_M = 0.02
+NEAR_M = 0.02  # near plane: closer than any camera stands to a wall
 
 
 def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
-    """(4, 4) world -> clip. OpenGL samples at pixel centres, so row 0 of the picture (OpenGL's last)
-    and column 0 are hit at (0.5, 0.5) in the pixel coordinates of K."""
+    """(4, 4) world to clip space; pixel centres lie at +0.5 in the coordinates of K, row 0 on top."""
+    # Shift the principal point: clip space runs from -1 to 1, upwards, across the picture.
     i = camera.intrinsics
     w, h, n, f = i.width_px, i.height_px, NEAR_M, far_m
     clip_from_camera = np.array(
@@ -31,9 +28,10 @@ def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
 
 
 def far_plane(camera: Camera, low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
-    """Depth just beyond every box (N, 3), and at least a metre, for the camera."""
+    """Depth of a far plane just beyond every box (N, 3) for the camera, and at least a metre."""
     if not len(low):
         return 1.0
+    # Measure to the farthest corner of the box around all boxes.
     reach = np.maximum(np.abs(low.min(0) - camera.eye), np.abs(high.max(0) - camera.eye))
     return max(1.0, 1.01 * float(np.linalg.norm(reach)))
 
@@ -41,9 +39,11 @@ def far_plane(camera: Camera, low: NDArray[np.float64], high: NDArray[np.float64
 def boxes_in_view(
     clip: Matrix4, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """(N,) bool: the box is not wholly outside one plane of the view pyramid."""
+    """(N,) bool: the box is not wholly outside one plane of the view frustum."""
+    # Read the six planes off the clip matrix (Gribb and Hartmann 2001).
     planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])
     normal, offset = planes[:, :3], planes[:, 3]
+    # Test the corner of each box that lies farthest inwards.
     farthest = np.where(normal[:, None] > 0, high, low)
     return np.asarray((np.einsum("pk,pnk->pn", normal, farthest) + offset[:, None] >= 0).all(0))
 

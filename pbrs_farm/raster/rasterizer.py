@@ -1,8 +1,7 @@
-"""A house in OpenGL: pictures under the modes' lights, and depth and items at pixel centres.
+"""The rasterizer: OpenGL pictures of a house, and depth and items at pixel centres.
 
 Effects: holds an EGL context, on the GPU when there is one, else on the CPU (Mesa's llvmpipe).
-Light is added up in linear half floats, 4 samples a pixel, resolved in linear light, and encoded
-to sRGB once, at the end.
+Light is summed in linear half floats, 4 samples a pixel, resolved in linear light, encoded last.
 """
 
 from __future__ import annotations
@@ -19,22 +18,32 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import RasterFields
-from pbrs_farm.raster.gl_device import Target, encoded, n_samples, open_context, texture_from_pixels
+from pbrs_farm.raster.gl_device import (
+    RenderTarget,
+    n_samples,
+    open_context,
+    srgb8_from_half,
+    texture_from_pixels,
+)
 from pbrs_farm.raster.light_choice import LIGHT_FLOATS, brightness_scale
 from pbrs_farm.raster.projection import boxes_in_view, clip_from_world, distance_to_boxes, far_plane
 from pbrs_farm.raster.shader_features import (
-    CUTOUT,
-    SEE_THROUGH,
-    features_of_kind,
-    kind_of_material,
+    ALPHA_CUTOUT,
+    TRANSPARENT,
+    feature_names,
+    features_of_material,
     light_features,
 )
-from pbrs_farm.raster.shader_programs import plain_program, surface_program
-from pbrs_farm.raster.uniform_blocks import LOOK_FLOATS, aligned_rows, item_lights, looks
+from pbrs_farm.raster.shader_programs import buffer_program, surface_program
+from pbrs_farm.raster.uniform_blocks import (
+    MATERIAL_FLOATS,
+    aligned_rows,
+    light_blocks,
+    material_blocks,
+)
 from pbrs_farm.raster.vertex_buffers import mesh_from_house
 
-SKY_SRGB = (0.78, 0.87, 0.96)
-"""Colour of what lies behind windows and beyond the house."""
+SKY_SRGB = (0.78, 0.87, 0.96)  # background: behind windows and beyond the house
 
 
 class Rasterizer:
@@ -57,38 +66,39 @@ class Rasterizer:
         self._mesh = mesh_from_house(house)
         self._white_per_lx = brightness_scale(house, n_lights)
         self._sky = tuple(linear_from_srgb(np.array(SKY_SRGB)))
-        self._kind = np.array(
-            [kind_of_material(m, is_textured=m.texture_id in textures) for m in house.materials],
-            int,
-        )
+        kinds = [
+            features_of_material(m, is_textured=m.texture_id in textures) for m in house.materials
+        ]
+        self._kind = np.array(kinds, int)  # feature bits of each material
         self._light_features = light_features(house)
-        self._programs: dict[tuple[str, int], tuple[Any, Any]] = {}
+        self._programs: dict[tuple[str, int], tuple[Any, Any]] = {}  # (mode, kind) -> program, VAO
         self._queries = [self._context.query(samples=True) for _ in range(self._mesh.n_draws)]
-        self._targets: dict[tuple[int, int, str], Target] = {}
+        self._targets: dict[tuple[int, int, str], RenderTarget] = {}  # (width, height, kind)
         self._upload(house, textures, n_lights)
 
     def _upload(
         self, house: House, textures: Mapping[str, NDArray[np.uint8]], n_lights: int
     ) -> None:
         gl, alignment = self._context, self._context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
+        # Upload the mesh; OpenGL takes no empty buffer.
         self._vertices = gl.buffer(self._mesh.vertices.tobytes() or bytes(32))
         self._indices = gl.buffer(self._mesh.indices.tobytes() or bytes(12))
-        look_rows = aligned_rows(looks(house), alignment)
-        light_rows = aligned_rows(item_lights(house, n_lights), alignment)
-        self._looks, self._look_step = (
-            gl.buffer(look_rows.tobytes() or bytes(4)),
-            look_rows[:1].nbytes,
-        )
+        # Upload the uniform blocks, one row a material and one an item.
+        material_rows = aligned_rows(material_blocks(house), alignment)
+        light_rows = aligned_rows(light_blocks(house, n_lights), alignment)
+        self._materials = gl.buffer(material_rows.tobytes() or bytes(4))
+        self._material_step = material_rows[:1].nbytes
         self._lights, self._light_step = gl.buffer(light_rows.tobytes()), light_rows[:1].nbytes
         self._light_bytes = 4 * (4 + LIGHT_FLOATS * n_lights)
+        # Upload the textures in use; a material without one samples a white texel.
         used = {m.texture_id for m in house.materials}
-        pictures = {
+        uploaded = {
             name: texture_from_pixels(gl, pixels)
             for name, pixels in sorted(textures.items())
             if name in used
         }
         white = texture_from_pixels(gl, np.full((1, 1, 3), 255, np.uint8))
-        self._pictures = [pictures.get(m.texture_id or "", white) for m in house.materials]
+        self._textures = [uploaded.get(m.texture_id or "", white) for m in house.materials]
 
     def __enter__(self) -> Rasterizer:
         return self
@@ -129,9 +139,10 @@ class Rasterizer:
             target = self._target(camera, "ids")
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))
             target.begin((0.0, 0.0, 0.0, 0.0))
+            # Write the instance id of each draw as a uniform.
             program, vao = self._program("ids", 0)
             _set(program, clip_from_world=clip)
-            for draw in self._near_to_far(camera, clip):
+            for draw in self._front_to_back(camera, clip):
                 program["item"] = int(self._mesh.draw_item[draw])
                 self._draw(vao, draw)
             depth_z, item = target.read("f4", 0, 1), target.read("u4", 1, 1)
@@ -141,47 +152,51 @@ class Rasterizer:
         with self._context:
             target = self._target(camera, "colour")
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))
-            order = self._near_to_far(camera, clip)
+            order = self._front_to_back(camera, clip)
             if mode == "il":
-                order = self._unhidden(target, order, clip)
+                order = self._visible_draws(target, order, clip)
+            # Draw opaque surfaces program by program, then blend the transparent ones over them.
             kind = self._kind[self._mesh.draw_material[order]]
             target.begin((*self._sky, 1.0))
             for number in np.unique(kind):
                 self._begin_surfaces(mode, int(number), camera, clip)
-                if number & SEE_THROUGH:
+                if number & TRANSPARENT:
                     continue
                 for draw in order[kind == number]:
                     self._bind(mode, int(draw))
                     self._draw(self._program(mode, int(number))[1], int(draw))
-            if (kind & SEE_THROUGH).any():
-                self._draw_glass(mode, order[(kind & SEE_THROUGH) > 0], camera)
-            return encoded(target.read("f2", 0, 3))
+            if (kind & TRANSPARENT).any():
+                self._blend_transparent(mode, order[(kind & TRANSPARENT) > 0], camera)
+            return srgb8_from_half(target.read("f2", 0, 3))
 
     @property
     def _boxes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return self._mesh.draw_low, self._mesh.draw_high
 
-    def _near_to_far(self, camera: Camera, clip: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Numbers of the draws in view, nearest box first, so that hidden pixels are never lit."""
-        seen = np.nonzero(boxes_in_view(clip, *self._boxes))[0]
+    def _front_to_back(self, camera: Camera, clip: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Numbers of the draws in the frustum, nearest box first, so that hidden pixels are not lit."""
+        draws = np.nonzero(boxes_in_view(clip, *self._boxes))[0]
         low, high = self._boxes
-        return seen[np.argsort(distance_to_boxes(camera.eye, low[seen], high[seen]), kind="stable")]
+        distance = distance_to_boxes(camera.eye, low[draws], high[draws])
+        return draws[np.argsort(distance, kind="stable")]
 
-    def _unhidden(
-        self, target: Target, draws: NDArray[np.int64], clip: NDArray[np.float64]
+    def _visible_draws(
+        self, target: RenderTarget, draws: NDArray[np.int64], clip: NDArray[np.float64]
     ) -> NDArray[np.int64]:
-        """The draws of which any sample is seen, after a first pass that draws nothing but depth.
+        """The draws with a visible sample, by occlusion queries in a depth pre-pass.
 
-        A software renderer pays for light on all that is hidden when samples are several.
+        A software renderer lights every hidden sample of a multisampled picture.
         """
+        # Draw opaque surfaces into the depth texture and count the samples that pass.
         program, vao = self._program("depth", 0)
         _set(program, clip_from_world=clip)
-        is_solid = (self._kind[self._mesh.draw_material[draws]] & (SEE_THROUGH | CUTOUT)) == 0
-        target.begin_depths()
+        is_solid = (self._kind[self._mesh.draw_material[draws]] & (TRANSPARENT | ALPHA_CUTOUT)) == 0
+        target.begin_depth_prepass()
         for draw in draws[is_solid]:
             with self._queries[draw]:
                 self._draw(vao, int(draw))
-        target.nearest.use(1)
+        target.prepass_depth.use(1)
+        # Keep whatever may be seen through, unasked.
         kept = ~is_solid
         kept[is_solid] = [self._queries[draw].samples > 0 for draw in draws[is_solid]]
         return np.asarray(draws[kept])
@@ -200,20 +215,21 @@ class Rasterizer:
 
     def _bind(self, mode: str, draw: int) -> None:
         material = int(self._mesh.draw_material[draw])
-        self._looks.bind_to_uniform_block(
-            0, offset=material * self._look_step, size=4 * LOOK_FLOATS
+        self._materials.bind_to_uniform_block(
+            0, offset=material * self._material_step, size=4 * MATERIAL_FLOATS
         )
         if mode == "il":
             offset = int(self._mesh.draw_item[draw]) * self._light_step
             self._lights.bind_to_uniform_block(1, offset=offset, size=self._light_bytes)
-        self._pictures[material].use(0)
+        self._textures[material].use(0)
 
     def _draw(self, vao: Any, draw: int) -> None:
         count, first = int(self._mesh.draw_count[draw]), int(self._mesh.draw_first[draw])
         vao.render(vertices=3 * count, first=3 * first)
 
-    def _draw_glass(self, mode: str, draws: NDArray[np.int64], camera: Camera) -> None:
-        """Blend every see-through triangle in view, farthest first, without writing depth."""
+    def _blend_transparent(self, mode: str, draws: NDArray[np.int64], camera: Camera) -> None:
+        """Blend every transparent triangle in view, farthest first, without writing depth."""
+        # List the triangles of all transparent draws and sort them by the depth of their middle.
         gl, mesh = self._context, self._mesh
         counts = mesh.draw_count[draws]
         triangle = np.concatenate(
@@ -225,11 +241,13 @@ class Rasterizer:
         order = np.argsort(-depth, kind="stable")
         triangle, owner = triangle[order], owner[order]
 
+        # Build an index buffer in that order, and a vertex array for each program.
         indices = gl.buffer(np.ascontiguousarray(mesh.indices[triangle]).tobytes())
         kinds = self._kind[mesh.draw_material[owner]]
         vaos = {
             int(k): self._vao(self._program(mode, int(k))[0], indices) for k in np.unique(kinds)
         }
+        # Draw runs of triangles that share a draw; colours are premultiplied by alpha.
         gl.enable(gl.BLEND)
         gl.blend_func = gl.ONE, gl.ONE_MINUS_SRC_ALPHA
         gl.depth_mask = False
@@ -244,24 +262,25 @@ class Rasterizer:
         indices.release()
 
     def _program(self, mode: str, kind: int) -> tuple[Any, Any]:
-        """Program and vertex array of a mode ("dl", "il", "ids") for a kind of material."""
+        """Program and vertex array of a mode ("dl", "il", "ids", "depth") for feature bits kind."""
         if (mode, kind) not in self._programs:
             if mode in ("ids", "depth"):
-                program = plain_program(self._context, mode)
+                program = buffer_program(self._context, mode)
             else:
-                features = [f"MODE_{mode.upper()}", *features_of_kind(kind)]
+                features = [f"MODE_{mode.upper()}", *feature_names(kind)]
                 features += self._light_features if mode == "il" else []
                 n_lights = self._fields.lights_per_object
                 program = surface_program(self._context, features, n_lights, self._samples)
-                if "nearest" in program:
-                    program["nearest"] = 1
-                for block, binding in (("Look", 0), ("Lights", 1)):
+                if "prepass_depth" in program:
+                    program["prepass_depth"] = 1
+                for block, binding in (("Material", 0), ("Lights", 1)):
                     if block in program:
                         program[block].binding = binding
             self._programs[mode, kind] = program, self._vao(program, self._indices)
         return self._programs[mode, kind]
 
     def _vao(self, program: Any, indices: Any) -> Any:
+        # Skip the bytes of attributes that the program does not read.
         names = [n if n in program else None for n in ("in_position", "in_normal", "in_uv")]
         layout = " ".join(
             size if name else f"{4 * int(size[0])}x"
@@ -271,12 +290,12 @@ class Rasterizer:
             program, [(self._vertices, layout, *[n for n in names if n])], indices
         )
 
-    def _target(self, camera: Camera, kind: str) -> Target:
+    def _target(self, camera: Camera, kind: str) -> RenderTarget:
         i = camera.intrinsics
         key = (i.width_px, i.height_px, kind)
         if key not in self._targets:
             size = (i.width_px, i.height_px)
-            self._targets[key] = Target(self._context, size, kind, self._samples)
+            self._targets[key] = RenderTarget(self._context, size, kind, self._samples)
         return self._targets[key]
 
 

@@ -9,31 +9,25 @@ from collections.abc import Iterable
 from importlib.resources import files
 from typing import Any
 
-from pbrs_farm.raster.light_choice import SOFT_M
+from pbrs_farm.raster.light_choice import SOFTENING_M
 
-DL_SCALE = 2 / 3
-"""A white wall that faces the headlight (0.5) and the key light (1) is exactly white."""
-
-IL_WHITE = 8.0
-"""OpenGL-IL is compressed by x (1 + x / w^2) / (1 + x) with this w (Reinhard et al. 2002)."""
-
-IL_HEADLIGHT = 0.06
-"""Faint headlight of OpenGL-IL: what no lamp reaches is dim, not black."""
-
-PANE_OPACITY = 0.08
-PANE_MIRROR = 0.5
-GLASS_MIRROR = 0.7
+DL_SCALE = 2 / 3  # a white wall that faces the headlight (0.5) and the key light (1) is just white
+IL_WHITE = 8.0  # w of OpenGL-IL's tone curve x (1 + x / w^2) / (1 + x) (Reinhard et al. 2002)
+IL_HEADLIGHT = 0.06  # faint headlight of OpenGL-IL: what no lamp reaches is dim, not black
+PANE_OPACITY = 0.08  # most that a window pane hides of what is behind it
+PANE_MIRROR = 0.5  # share of the sky's colour in a pane's reflection
+GLASS_MIRROR = 0.7  # and in that of other glass
 
 _VERSION = "#version 330\n"
 
 
 def surface_program(context: Any, features: Iterable[str], n_lights: int, n_samples: int) -> Any:
-    """Program that lights surfaces. features: one of MODE_DL, MODE_IL; then any of GLOSSY, CUTOUT,
-    SEE_THROUGH, WITH_SPOTS, WITH_LINES: on a CPU what is not needed must not be there."""
+    """Program that lights surfaces. features: MODE_DL or MODE_IL, and any of shader_features."""
+    # Pass constants and features as #defines, so that code without use is not compiled in.
     defines = {
         "N_LIGHTS": n_lights,
         "N_SAMPLES": n_samples,
-        "SOFT2": SOFT_M**2,
+        "SOFTENING2": SOFTENING_M**2,
         "DL_SCALE": DL_SCALE,
         "WHITE": IL_WHITE,
         "IL_HEADLIGHT": IL_HEADLIGHT,
@@ -49,8 +43,8 @@ def surface_program(context: Any, features: Iterable[str], n_lights: int, n_samp
     )
 
 
-def plain_program(context: Any, name: str) -> Any:
-    """Program "ids" (writes depth_z and the item's id at pixel centres) or "depth" (only depth)."""
+def buffer_program(context: Any, name: str) -> Any:
+    """Program "ids" (depth_z and instance id at pixel centres) or "depth" (depth alone)."""
     return context.program(
         vertex_shader=_VERSION + _source("surface.vert.glsl"),
         fragment_shader=_VERSION + _source(f"{name}.frag.glsl"),

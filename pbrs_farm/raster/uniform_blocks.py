@@ -1,4 +1,4 @@
-"""What the shaders are told about each material and each item, as uniform blocks; no effects."""
+"""Uniform blocks of the shaders: one of each material, one of each item's lights; no effects."""
 
 from __future__ import annotations
 
@@ -9,43 +9,45 @@ from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.raster.light_choice import LIGHT_FLOATS, best_lights, light_table
 
-LOOK_FLOATS = 16
-LAMP_TRANSMISSION = 0.1
-"""Share of light that a lamp shows on the far side of its own parts: shades look lit."""
+MATERIAL_FLOATS = 16  # four vec4, as surface.frag.glsl declares them
+_HEADER_FLOATS = 4  # before the lights: their number, transmission, 0, 0
+LAMP_TRANSMISSION = 0.1  # share of light that passes through a lamp's own parts: shades look lit
 
-_GLOW = {MaterialKind.BULB: 1.0, MaterialKind.SHADE: 0.5}
-
-
-def looks(house: House) -> NDArray[np.float32]:
-    """(n_materials, 16) the Look block of each material."""
-    rows = [_look(m) for m in house.materials]
-    return np.array(rows, np.float32).reshape(-1, LOOK_FLOATS)
+_EMISSION = {MaterialKind.BULB: 1.0, MaterialKind.SHADE: 0.5}
 
 
-def _look(material: Material) -> list[float]:
+def material_blocks(house: House) -> NDArray[np.float32]:
+    """(n_materials, 16) the Material block of each material."""
+    rows = [_material_block(m) for m in house.materials]
+    return np.array(rows, np.float32).reshape(-1, MATERIAL_FLOATS)
+
+
+def _material_block(material: Material) -> list[float]:
+    # Decode colours to linear light; a black highlight gets exponent 0, which switches it off.
     diffuse = linear_from_srgb(np.array(material.diffuse))
     specular = linear_from_srgb(np.array(material.specular))
-    glow = _GLOW.get(material.kind, 0.0) * diffuse
+    emission = _EMISSION.get(material.kind, 0.0) * diffuse
     exponent = material.shininess if specular.any() else 0.0
     is_pane = material.kind is MaterialKind.PANE
     return [
         *diffuse, material.opacity,
         *specular, exponent,
-        *glow, 0.0,
+        *emission, 0.0,
         float(is_pane), 0.0, 0.0, 0.0,
     ]  # fmt: skip
 
 
-def item_lights(house: House, n_best: int) -> NDArray[np.float32]:
-    """(n_items + 1, 4 + 16 n_best) the Lights block of each instance id: the best lights for it."""
+def light_blocks(house: House, n_best: int) -> NDArray[np.float32]:
+    """(n_items + 1, 4 + 16 n_best) the Lights block of each instance id: its best lights."""
     lights = light_table(house)
-    block = np.zeros((len(house.items) + 1, 4 + LIGHT_FLOATS * n_best), np.float32)
+    block = np.zeros((len(house.items) + 1, _HEADER_FLOATS + LIGHT_FLOATS * n_best), np.float32)
     if len(lights) and house.items:
         bounds = np.array([item.bounds for item in house.items])
         best = best_lights(lights, bounds[:, 0], bounds[:, 1], n_best)
         block[1:, 0] = best.shape[1]
         block[1:, 1] = [LAMP_TRANSMISSION if item.lights else 0.0 for item in house.items]
-        block[1:, 4 : 4 + LIGHT_FLOATS * best.shape[1]] = lights[best].reshape(len(best), -1)
+        end = _HEADER_FLOATS + LIGHT_FLOATS * best.shape[1]
+        block[1:, _HEADER_FLOATS:end] = lights[best].reshape(len(best), -1)
     return block
 
 

@@ -5,7 +5,7 @@ from pbrs_farm.core.house import ItemKind, LightPart, Material, Surface
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.raster.light_choice import (
     FLOOR_LEVEL,
-    SOFT_M,
+    SOFTENING_M,
     best_lights,
     brightness_scale,
     illuminance,
@@ -37,8 +37,8 @@ def test_a_point_light_follows_the_inverse_square_of_the_softened_distance():
     lights = table(lamp(0.0, 4 * np.pi * 100))
     points, up = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), np.array([[0.0, 1.0, 0.0]] * 2)
     lx = illuminance(points, up, np.stack([lights, lights]))
-    assert lx[0] == pytest.approx(100 / (4 + SOFT_M**2), rel=1e-6)
-    assert lx[1] == pytest.approx(100 * np.cos(np.pi / 4) / (8 + SOFT_M**2), rel=1e-6)
+    assert lx[0] == pytest.approx(100 / (4 + SOFTENING_M**2), rel=1e-6)
+    assert lx[1] == pytest.approx(100 * np.cos(np.pi / 4) / (8 + SOFTENING_M**2), rel=1e-6)
 
 
 def test_a_spot_lights_only_inside_its_cone():
@@ -64,4 +64,4 @@ def test_doubling_every_lamp_leaves_the_brightness_as_it_is():
         scales.append(brightness_scale(scene, 8) * lumen)
     assert scales[0] == pytest.approx(scales[1])
     # The lamp stands 2 m above the middle: the median lies below the brightest point.
-    assert brightness_scale(scene, 8) > FLOOR_LEVEL / (1600 / (4 * np.pi) / (4 + SOFT_M**2))
+    assert brightness_scale(scene, 8) > FLOOR_LEVEL / (1600 / (4 * np.pi) / (4 + SOFTENING_M**2))
