@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart
 from pbrs_farm.core.lighting import LightForm, flux_lm
+from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
 
 SOFTENING_M = 0.35
 """Added in quadrature to every distance: a lamp's own shade does not burn out."""
@@ -116,11 +117,10 @@ def _spread_points(
     corners, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
     for number, item in enumerate(items):
         for s in item.surfaces:
-            corners.append(s.positions[s.faces].astype(np.float64))
+            corners.append(triangle_corners(s.positions, s.faces))
             owners.append(np.full(len(s.faces), number))
     triangles, owner = np.concatenate(corners), np.concatenate(owners)
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    area = np.nan_to_num(np.linalg.norm(cross, axis=1))
+    area = np.nan_to_num(face_areas(triangles))
     if not area.sum() > 0:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)
     rng = np.random.default_rng(0)
@@ -130,4 +130,4 @@ def _spread_points(
     uv = np.where(uv.sum(1, keepdims=True) > 1, 1 - uv, uv)
     t = triangles[face]
     points = t[:, 0] + uv[:, :1] * (t[:, 1] - t[:, 0]) + uv[:, 1:] * (t[:, 2] - t[:, 0])
-    return points, cross[face] / area[face][:, None], owner[face]
+    return points, unit_normals(t), owner[face]

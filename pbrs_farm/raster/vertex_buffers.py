@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, Surface
+from pbrs_farm.core.mesh import triangle_corners, unit_normals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +83,9 @@ def _vertices(surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.int64]]
     normals = surface.normals
     if normals is None or not _all_unit(normals[faces.reshape(-1)]):
         corner = faces.reshape(-1)
-        flat = np.repeat(_face_normals(points, faces), 3, axis=0)
+        own = unit_normals(triangle_corners(points, faces))
+        own[~own.any(1)] = (0.0, 1.0, 0.0)  # up, where a triangle has no area
+        flat = np.repeat(own.astype(np.float32), 3, axis=0)
         if normals is not None:
             kept = normals[corner]
             flat = np.where(_unit_rows(kept)[:, None], kept, flat)
@@ -99,12 +102,3 @@ def _unit_rows(normals: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 def _all_unit(normals: NDArray[np.float32]) -> bool:
     return bool(_unit_rows(normals).all())
-
-
-def _face_normals(points: NDArray[np.float32], faces: NDArray[np.int64]) -> NDArray[np.float32]:
-    """(F, 3) unit normals; +y for triangles without area."""
-    a, b, c = (points[faces[:, k]].astype(np.float64) for k in range(3))
-    cross = np.cross(b - a, c - a)
-    length = np.linalg.norm(cross, axis=1, keepdims=True)
-    unit = np.where(length > 0, cross / np.maximum(length, 1e-300), [0.0, 1.0, 0.0])
-    return unit.astype(np.float32)

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import HitRecord, ItemBuffer
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
+from pbrs_farm.core.mesh import faces_with_area, triangle_corners
 from pbrs_farm.raycast.hit_record import hit_record_from_faces
 from pbrs_farm.raycast.scalar_tracer import ScalarTracer
 from pbrs_farm.raycast.tracer import JitTracer, RayTracer
 from pbrs_farm.raycast.variant import choose_variant
 
 _FACES_PER_CHUNK: Final = 1 << 18  # bounds the memory of the area test
-_MIN_TWICE_AREA_M2: Final = 1e-12  # below it float32 cannot tell a triangle from a line
+_MIN_AREA_M2: Final = 0.5e-12  # below it float32 cannot tell a triangle from a line
 
 
 class Caster:
@@ -116,12 +117,8 @@ def _hittable(geometry: Geometry) -> NDArray[np.bool_]:
     keep = np.zeros(len(geometry.faces), np.bool_)
     for start in range(0, len(keep), _FACES_PER_CHUNK):
         part = slice(start, start + _FACES_PER_CHUNK)
-        # Measure twice the area by the cross product of two edges, in float64.
-        corners = geometry.positions[geometry.faces[part]].astype(np.float64)
-        with np.errstate(invalid="ignore", over="ignore"):
-            edges = corners[:, [1, 2]] - corners[:, :1]
-            twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-            keep[part] = np.isfinite(corners).all((1, 2)) & (twice_area > _MIN_TWICE_AREA_M2)
+        corners = triangle_corners(geometry.positions, geometry.faces[part])
+        keep[part] = faces_with_area(corners, _MIN_AREA_M2)
     return keep
 
 

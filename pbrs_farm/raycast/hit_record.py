@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import HitRecord
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
+from pbrs_farm.core.mesh import area_vectors, triangle_corners
 
 
 def hit_record_from_faces(geometry: Geometry, camera: Camera, face: NDArray[np.int32]) -> HitRecord:
@@ -62,10 +63,10 @@ class _Planes:
 
 
 def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: NDArray[np.float64]) -> _Planes:
-    corner = geometry.faces[faces]
-    a, b, c = (geometry.positions[corner[:, k]].astype(np.float64) for k in range(3))
+    corners = triangle_corners(geometry.positions, geometry.faces[faces])
+    a, b, c = np.moveaxis(corners, 1, 0)
     # Divide by |n|^2: the gradient of b is 1 at b and 0 along the edge a c.
-    n = np.cross(b - a, c - a)
+    n = area_vectors(corners)
     squared = _dot(n, n)[:, None]
     grad_b, grad_c = np.cross(c - a, n) / squared, np.cross(n, b - a) / squared
     return _Planes(origin, a, b, c, n / np.sqrt(squared), grad_b, grad_c)

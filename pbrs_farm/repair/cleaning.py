@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
+from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.report import FacesReport, Removed
-from pbrs_farm.repair.structure.patches import face_areas, face_normals
 from pbrs_farm.repair.structure.walls import BASEBOARD
 
 _MIN_AREA_M2 = 1e-12
@@ -78,8 +78,7 @@ def with_sound_faces(house: House) -> tuple[House, FacesReport]:
 
 def _sound(surface: Surface) -> tuple[Surface, int, int]:
     faces = surface.faces
-    with np.errstate(invalid="ignore", over="ignore"):
-        keep = face_areas(surface.positions, faces) > _MIN_AREA_M2
+    keep = faces_with_area(triangle_corners(surface.positions, faces), _MIN_AREA_M2)
     faces = faces[keep]
     against = _against_normals(surface, faces)
     n_dropped, n_turned = int((~keep).sum()), int(against.sum())
@@ -93,4 +92,5 @@ def _against_normals(surface: Surface, faces: NDArray[np.int32]) -> NDArray[np.b
     if surface.normals is None or not len(faces):
         return np.zeros(len(faces), np.bool_)
     mean = surface.normals[faces].astype(np.float64).sum(1)
-    return np.asarray((mean * face_normals(surface.positions, faces)).sum(1) < -1e-6)
+    own = unit_normals(triangle_corners(surface.positions, faces))
+    return np.asarray((mean * own).sum(1) < -1e-6)

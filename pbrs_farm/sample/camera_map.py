@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.sample.drawing import Drawing, Mark
 from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.rejection import Verdict
@@ -117,10 +118,8 @@ def _footprint(item: Item, panel: _Panel) -> list[Mark]:
     if item.kind is ItemKind.WALL:
         marks = []
         for surface in item.surfaces:
-            corners = surface.positions[surface.faces].astype(np.float64)
-            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            level = np.abs(normal[:, 1]) > 0.5 * np.linalg.norm(normal, axis=1)
-            for triangle in corners[level]:
+            corners = triangle_corners(surface.positions, surface.faces)
+            for triangle in corners[np.abs(unit_normals(corners)[:, 1]) > 0.5]:
                 points = tuple(panel(x, z) for x, _y, z in triangle)
                 marks.append(Mark("polygon", points, _WALL))
         return marks

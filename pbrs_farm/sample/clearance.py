@@ -1,4 +1,4 @@
-"""Distance from points to triangles in three dimensions; no effects."""
+"""Which points have a triangle within a distance of them; no effects."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import Geometry
+from pbrs_farm.core.mesh import distances_to_triangles
 
 _PAIRS: Final = 1 << 19
 _POINTS: Final = 1 << 12
@@ -38,8 +39,7 @@ def near_any_triangle(
         point, triangle = point[kept], triangle[kept]
         for first in range(0, len(point), _PAIRS):
             i, t = point[first : first + _PAIRS], triangle[first : first + _PAIRS]
-            squared = squared_distance(part[i], corners[t])
-            near[start + i[squared <= distance_m**2]] = True
+            near[start + i[distances_to_triangles(part[i], corners[t]) <= distance_m]] = True
     return near
 
 
@@ -53,39 +53,3 @@ def _corners_around(
         meets = (corners.max(1) >= low).all(1) & (corners.min(1) <= high).all(1)
     chosen = corners[meets].astype(np.float64)
     return np.asarray(chosen[np.isfinite(chosen).all((1, 2))])
-
-
-def squared_distance(p: NDArray[np.float64], triangle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) squared distance of p (N, 3) to triangle (N, 3, 3); degenerate ones are segments.
-
-    The nearest point is inside, when p projects into the triangle, else on one of its edges.
-    """
-    a, b, c = triangle[:, 0], triangle[:, 1], triangle[:, 2]
-    on_edges = np.minimum(
-        _squared_to_segment(p, a, b),
-        np.minimum(_squared_to_segment(p, b, c), _squared_to_segment(p, c, a)),
-    )
-    normal = np.cross(b - a, c - a)
-    area = _dot(normal, normal)
-    inside = (
-        (_dot(np.cross(b - a, p - a), normal) >= 0)
-        & (_dot(np.cross(c - b, p - b), normal) >= 0)
-        & (_dot(np.cross(a - c, p - c), normal) >= 0)
-        & (area > 0)
-    )
-    to_plane = _dot(p - a, normal) ** 2 / np.where(area > 0, area, 1.0)
-    return np.where(inside, to_plane, on_edges)
-
-
-def _squared_to_segment(
-    p: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    edge = b - a
-    length = _dot(edge, edge)
-    t = np.clip(_dot(p - a, edge) / np.where(length > 0, length, 1.0), 0, 1)
-    offset = p - (a + t[:, None] * edge)
-    return _dot(offset, offset)
-
-
-def _dot(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.einsum("ij,ij->i", x, y))

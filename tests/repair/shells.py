@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, geometry_from_house
-from pbrs_farm.repair.structure.patches import face_areas, face_normals
+from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
 from tests.repair.embree import EmbreeOccluder
 
 F64 = NDArray[np.float64]
@@ -62,7 +62,7 @@ def coinciding_share(house: House, origin: tuple[float, float, float]) -> float:
     shell = structure_of(house)
     occluder = EmbreeOccluder(shell)
     g = geometry_from_house(shell)
-    normals = face_normals(g.positions, g.faces)
+    normals = unit_normals(triangle_corners(g.positions, g.faces))
     origins, directions = rays_from(origin)
     first, face = occluder.first_hit(origins.astype(np.float32), directions.astype(np.float32))
     hit = (face >= 0) & ((directions * normals[face]).sum(1) < -0.2)
@@ -76,7 +76,7 @@ def leaning_area(house: House) -> float:
     area = 0.0
     for item in structure_of(house).items:
         for s in item.surfaces:
-            up = np.abs(face_normals(s.positions, s.faces)[:, 1])
-            sizes = face_areas(s.positions, s.faces)
+            up = np.abs(unit_normals(triangle_corners(s.positions, s.faces))[:, 1])
+            sizes = face_areas(triangle_corners(s.positions, s.faces))
             area += float(sizes[(up > 0.01) & (up < 0.9999) & (sizes > 1e-4)].sum())
     return area

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.house import Enclosure, House, ItemKind, MaterialKind, geometry_from_house
+from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair import RepairReport, repair
-from pbrs_farm.repair.structure.patches import face_areas
 from tests.repair.shells import leaning_area, unpaired_edges
 
 Repaired = tuple[House, RepairReport]
@@ -58,8 +58,8 @@ def test_uv_area_is_surface_area_on_every_wall(repaired: Repaired) -> None:
         for s in item.surfaces:
             assert s.uvs is not None
             flat = np.concatenate([s.uvs, np.zeros((len(s.uvs), 1), np.float32)], 1)
-            assert face_areas(flat, s.faces) == pytest.approx(
-                face_areas(s.positions, s.faces), abs=1e-5
+            assert face_areas(flat[s.faces]) == pytest.approx(
+                face_areas(triangle_corners(s.positions, s.faces)), abs=1e-5
             )
 
 
@@ -72,7 +72,7 @@ def test_openings_go_through_both_faces_and_have_reveals(repaired: Repaired) -> 
     house, report = repaired
     assert report.structure.n_openings_cut == report.structure.n_openings == 4
     wall = next(i for i in house.items if i.id == "wall_0")
-    area = {s.name: face_areas(s.positions, s.faces).sum() for s in wall.surfaces}
+    area = {s.name: face_areas(triangle_corners(s.positions, s.faces)).sum() for s in wall.surfaces}
     # wall_0 is 9.0 x 2.5 m inside and 9.4 x 2.5 m outside; its window 1.8 x 1.2 m, 0.2 m deep.
     assert area["left"] == pytest.approx(9.4 * 2.5 - 1.8 * 1.2, abs=1e-4)
     assert area["reveal"] == pytest.approx(0.2 * 2 * (1.8 + 1.2), abs=1e-4)

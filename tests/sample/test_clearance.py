@@ -1,38 +1,12 @@
-"""Point-to-triangle distance against closed forms, and near_any_triangle against brute force."""
+"""near_any_triangle against the nearest of all triangles."""
 
 import numpy as np
-import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.sample.clearance import near_any_triangle, squared_distance
+from pbrs_farm.sample.clearance import near_any_triangle
 from tests.raycast.scenes import geometry, soup
-
-TRIANGLE = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]])
-
-
-@pytest.mark.parametrize(
-    ("point", "distance"),
-    [
-        ((0.5, 0.5, 0.3), 0.3),  # above the inside
-        ((0.5, 0.5, 0.0), 0.0),  # in it
-        ((-3.0, -4.0, 0.0), 5.0),  # nearest to a corner
-        ((1.0, -0.7, 0.0), 0.7),  # nearest to an edge
-        ((2.0, 2.0, 0.0), np.sqrt(2.0)),  # nearest to the slanted edge
-        ((3.0, 0.0, 1.0), np.sqrt(2.0)),  # nearest to a corner, off the plane
-    ],
-)
-def test_the_distance_is_that_of_geometry(point: tuple[float, ...], distance: float) -> None:
-    squared = squared_distance(np.array([point]), TRIANGLE[None])
-    assert np.sqrt(squared[0]) == pytest.approx(distance, abs=1e-12)
-
-
-def test_a_triangle_without_area_is_a_segment_or_a_point() -> None:
-    segment = np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
-    assert squared_distance(np.array([[1.5, 3.0, 4.0]]), segment)[0] == pytest.approx(25)
-    dot = np.zeros((1, 3, 3))
-    assert squared_distance(np.array([[0.0, 3.0, 4.0]]), dot)[0] == pytest.approx(25)
 
 
 @settings(max_examples=15, deadline=None)

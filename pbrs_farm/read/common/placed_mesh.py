@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Box, Surface
+from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.read.mesh.obj import Mesh
 
-_MIN_TWICE_AREA_M2 = 1e-12
+_MIN_AREA_M2 = 0.5e-12
 
 
 def placed(
@@ -25,9 +26,7 @@ def placed(
     faces = mesh.faces
     if np.linalg.det(world_from_model[:3, :3]) < 0:
         faces = faces[:, ::-1]
-    p = world[faces].astype(np.float64)
-    twice_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    faces = faces[twice_area > _MIN_TWICE_AREA_M2]
+    faces = faces[face_areas(triangle_corners(world, faces)) > _MIN_AREA_M2]
     if not len(faces):
         return None
     return Surface(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.core.mesh import area_vectors, closed_edge_share, triangle_corners
 from pbrs_farm.read.common.placed_mesh import part_of
 
 MAX_PLANES: Final = 200
@@ -42,24 +43,19 @@ def planar_parts(item: Item) -> tuple[Item, ...]:
 
 
 def _corners(surfaces: tuple[Surface, ...]) -> NDArray[np.float64]:
-    found = [s.positions[s.faces].astype(np.float64) for s in surfaces]
+    found = [triangle_corners(s.positions, s.faces) for s in surfaces]
     return np.concatenate([np.zeros((0, 3, 3)), *found])
 
 
 def _is_closed(surfaces: tuple[Surface, ...]) -> bool:
     """Whether every edge has a face on either side, vertices within a tenth of a millimetre one."""
-    corners = np.rint(_corners(surfaces).reshape(-1, 3) / _WELD_M)
-    _, vertex = np.unique(corners, axis=0, return_inverse=True)
-    faces = vertex.reshape(-1, 3)
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-    return bool(len(count)) and bool((count % 2 == 0).all())
+    return closed_edge_share(np.rint(_corners(surfaces) / _WELD_M)) == 1
 
 
 def _planes(surfaces: tuple[Surface, ...]) -> NDArray[np.int64]:
     """(F,) number of the plane each face lies in, either side up, in order of first appearance."""
     p = _corners(surfaces)
-    n = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    n = area_vectors(p)
     n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
     leading = np.abs(n).argmax(1)
     n *= np.sign(n[np.arange(len(n)), leading])[:, None]

@@ -14,6 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import Surface
+from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 
 MAX_OUTLINE_FACES: Final = 20_000
 """A floor of more triangles is taken by its convex hull, so that time stays bounded."""
@@ -81,9 +82,8 @@ def _traces(walls: Sequence[Surface]) -> Any:
     """Where upright faces stand, seen from above, as strips 2 _TRACE_M wide."""
     found = []
     for surface in walls:
-        p = surface.positions[surface.faces].astype(np.float64)
-        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-        upright = np.abs(normal[:, 1]) < 0.3 * np.linalg.norm(normal, axis=1)
+        p = triangle_corners(surface.positions, surface.faces)
+        upright = np.abs(area_vectors(p)[:, 1]) < 0.3 * (2 * face_areas(p))
         found.append(p[upright][:, :, [0, 2]])
     plan = np.concatenate([np.zeros((0, 3, 2)), *found])[:MAX_OUTLINE_FACES]
     lines: Any = shapely.linestrings(plan)
@@ -118,9 +118,8 @@ def _facing(surfaces: Sequence[Surface], sign: int) -> NDArray[np.float64]:
     """(F, 3, 3) corners of the faces that look up (sign 1) or down (-1)."""
     found = [np.zeros((0, 3, 3))]
     for surface in surfaces:
-        p = surface.positions[surface.faces].astype(np.float64)
-        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-        found.append(p[sign * normal[:, 1] > 0.7 * np.linalg.norm(normal, axis=1)])
+        p = triangle_corners(surface.positions, surface.faces)
+        found.append(p[sign * area_vectors(p)[:, 1] > 0.7 * (2 * face_areas(p))])
     return np.concatenate(found)
 
 

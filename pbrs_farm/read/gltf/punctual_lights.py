@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.house import Item, LightPart, Surface
 from pbrs_farm.core.lighting import LightForm, PowerUnit
+from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.gltf.document import numbers
 
@@ -83,9 +84,7 @@ def assumed_light(item: Item) -> LightPart:
 
 
 def _area(surface: Surface) -> float:
-    p = surface.positions[surface.faces].astype(np.float64)
-    n = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    return float(np.linalg.norm(n, axis=1).sum() / 2)
+    return float(face_areas(triangle_corners(surface.positions, surface.faces)).sum())
 
 
 def _at(holder: dict[str, Any], key: str) -> dict[str, Any]:

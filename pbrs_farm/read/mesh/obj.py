@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.mesh.shading_normals import crease_normals, face_normals
+from pbrs_farm.core.mesh import face_areas
+from pbrs_farm.read.mesh.shading_normals import crease_normals
 from pbrs_farm.read.mesh.triangulate import triangle_corners
 
 DEFAULT_CREASE_RAD = np.radians(45.0)
@@ -191,8 +192,7 @@ def _mesh(
     corners = triangle_corners(pools[0][indices[:, 0]], sizes)
     index = indices[corners]
     v = index[:, :, 0]
-    area = np.linalg.norm(face_normals(pools[0], v), axis=1)
-    keep = area > 0
+    keep = face_areas(pools[0][v]) > 0
     n_dropped = int((~keep).sum())
     index = index[keep]
     if not len(index):

@@ -1,4 +1,4 @@
-"""Face normals and shading normals with a crease angle; no effects."""
+"""Shading normals with a crease angle; no effects."""
 
 from __future__ import annotations
 
@@ -7,11 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-
-def face_normals(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(F, 3) normals whose length is twice the face's area."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return np.asarray(np.cross(b - a, c - a))
+from pbrs_farm.core.mesh import unit_normals
 
 
 def crease_normals(
@@ -23,9 +19,7 @@ def crease_normals(
     than crease_rad (or through a chain of such edges around the vertex). Faces are weighted by
     their angle at the vertex. Vertices at equal positions count as one.
     """
-    areas = face_normals(points, faces)
-    length = np.linalg.norm(areas, axis=1, keepdims=True)
-    unit = areas / np.where(length > 0, length, 1)
+    unit = unit_normals(points[faces])
     n_faces = len(faces)
     if crease_rad <= 0:
         return unit, np.repeat(np.arange(n_faces), 3).reshape(-1, 3)

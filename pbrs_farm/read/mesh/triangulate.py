@@ -6,6 +6,8 @@ import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.mesh import area_vectors
+
 MAX_EAR_CUT = 5_000
 """Polygons of more corners become fans: ear cutting may take the square of their number."""
 
@@ -74,7 +76,6 @@ def _ear_cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
     ).reshape(-1, 3)
     if not len(cut):
         return np.stack([np.zeros(n - 2, np.int64), np.arange(1, n - 1), np.arange(2, n)], -1)
-    a, b, c = (polygon[cut[:, k]] for k in range(3))
-    against = np.cross(b - a, c - a) @ normal < 0
+    against = area_vectors(polygon[cut]) @ normal < 0
     cut[against] = cut[against][:, [0, 2, 1]]
     return cut

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface
+from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 from pbrs_farm.read.mesh.primitives import box
 
 _HOLE_MARGIN_M: Final = 0.10
@@ -49,10 +50,9 @@ def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
 
 def _frames(item: Item) -> list[_WallFrame]:
     """A frame for every direction that an item's larger upright faces have, to a degree."""
-    corners = np.concatenate([s.positions[s.faces] for s in item.surfaces]).astype(np.float64)
-    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(n, axis=1)
-    upright = (np.abs(n[:, 1]) < 0.01 * area) & (area > 0)
+    corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in item.surfaces])
+    n, area = area_vectors(corners), face_areas(corners)
+    upright = (np.abs(n[:, 1]) < 0.01 * (2 * area)) & (area > 0)
     n, area, corners = n[upright], area[upright], corners[upright]
     degree = np.rint(np.degrees(np.arctan2(n[:, 2], n[:, 0]))).astype(int) % 180
     found = []

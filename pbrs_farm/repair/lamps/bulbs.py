@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, Surface
+from pbrs_farm.core.mesh import area_vectors, distances_to_triangles, triangle_corners
 from pbrs_farm.core.recipe import RepairFields
-from pbrs_farm.repair.measure.distance import distance_to_triangles
 from pbrs_farm.repair.report import SourceRepair
 from pbrs_farm.repair.structure.booleans import F64
 
@@ -83,7 +83,8 @@ def _with_bulbs(
             emitting = (len(surfaces),)
             surfaces.append(icosphere("bulb", centre, radius, palette.bulb(light.rgb_linear)))
             light = replace(light, position=_triple(centre), radius_m=radius)
-            corners = np.concatenate([corners, _corners(surfaces[-1])])
+            bulb = triangle_corners(surfaces[-1].positions, surfaces[-1].faces)
+            corners = np.concatenate([corners, bulb])
         done.append(
             SourceRepair(
                 item_id=item.id,
@@ -105,7 +106,7 @@ def _fitting_sphere(position: F64, radius: float, corners: F64) -> tuple[F64, fl
     if free >= _LEAST_RADIUS_M / _CLEARANCE:
         return position, min(radius, _CLEARANCE * free)
     # A mesh passes through the light's centre: the roomiest place within the bulb takes it.
-    near = corners[distance_to_triangles(position, corners) < 4 * radius]
+    near = corners[distances_to_triangles(position, corners) < 4 * radius]
     rng = np.random.default_rng(0)
     steps = rng.normal(size=(_N_MOVES, 3))
     steps *= (radius * rng.random((_N_MOVES, 1)) ** (1 / 3)) / np.linalg.norm(steps, axis=1, keepdims=True)  # fmt: skip
@@ -115,17 +116,13 @@ def _fitting_sphere(position: F64, radius: float, corners: F64) -> tuple[F64, fl
 
 
 def _free(point: F64, corners: F64) -> float:
-    return float(distance_to_triangles(point, corners).min()) if len(corners) else np.inf
+    return float(distances_to_triangles(point, corners).min()) if len(corners) else np.inf
 
 
 def triangles_of(item: Item) -> F64:
     """(F, 3, 3) corners of all the item's triangles, in double precision."""
-    parts = [_corners(s) for s in item.surfaces if len(s.faces)]
+    parts = [triangle_corners(s.positions, s.faces) for s in item.surfaces if len(s.faces)]
     return np.concatenate(parts) if parts else np.zeros((0, 3, 3))
-
-
-def _corners(surface: Surface) -> F64:
-    return surface.positions.astype(np.float64)[surface.faces]
 
 
 def icosphere(
@@ -149,8 +146,7 @@ def icosphere(
     )
     for _ in range(n_splits):
         unit, faces = _split(unit, faces)
-    a, b, c = (unit[faces[:, k]] for k in range(3))
-    inward = (np.cross(b - a, c - a) * a).sum(1) < 0
+    inward = (area_vectors(unit[faces]) * unit[faces[:, 0]]).sum(1) < 0
     faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
     return Surface(
         name,

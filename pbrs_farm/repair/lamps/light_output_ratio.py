@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, Item, MaterialKind, Surface
+from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.closed_shells import components
-from pbrs_farm.repair.structure.patches import face_areas, face_normals, patch_from_surface
+from pbrs_farm.repair.structure.patches import patch_from_surface
 
 N_RAYS = 4000
 _SEE_THROUGH = frozenset({MaterialKind.GLASS, MaterialKind.PANE, MaterialKind.BULB})
@@ -125,9 +126,8 @@ def escape_of_source(
 def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) -> tuple[F64, F64]:
     """n rays (origins, unit directions) that leave the surfaces' fronts as a diffuse emitter's."""
     sound = [s for s in surfaces if len(s.faces)]
-    corners = np.concatenate([s.positions.astype(np.float64)[s.faces] for s in sound])
-    flat, faces = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
-    areas, normals = face_areas(flat, faces), face_normals(flat, faces)
+    corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in sound])
+    areas, normals = face_areas(corners), unit_normals(corners)
     chosen = rng.choice(len(areas), n, p=areas / areas.sum())
     u, v = np.sqrt(rng.random(n)), rng.random(n)
     weights = np.stack([1 - u, u * (1 - v), u * v], 1)

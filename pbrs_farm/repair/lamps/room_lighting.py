@@ -19,8 +19,8 @@ from pbrs_farm.core.house import (
     Room,
 )
 from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.mesh import distances_to_triangles
 from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of
-from pbrs_farm.repair.measure.distance import distance_to_triangles
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.prisms import polygons_of
@@ -92,7 +92,7 @@ def _fallback_light(house: House, room: Room, area: plan.Shape, material: int) -
     radius = _RADIUS_M
     near = [i for i in house.items if _within(i, centre, 2 * radius)]
     for item in near:
-        free = distance_to_triangles(centre, triangles_of(item)).min()
+        free = distances_to_triangles(centre, triangles_of(item)).min()
         radius = max(min(radius, 0.9 * float(free)), 0.01)
     light = LightPart(
         position=(float(centre[0]), float(centre[1]), float(centre[2])),

@@ -13,13 +13,13 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.house import House, Item, ItemKind, Surface, geometry_from_house
+from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.measure.room_edges import RoomAir
 from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64
-from pbrs_farm.repair.structure.patches import face_normals
 from pbrs_farm.repair.structure.plan_geometry import Shape
 from pbrs_farm.repair.structure.prisms import Plane, polygons_of
 
@@ -57,7 +57,7 @@ def leaks_of_house(
     meter = LeakMeter() if meter is None else meter
     shell = plugged_shell(house, plugs)
     geometry = geometry_from_house(shell)
-    normals = face_normals(geometry.positions, geometry.faces)
+    normals = unit_normals(triangle_corners(geometry.positions, geometry.faces))
     closed = [s for s in spaces if s.is_closed]
     occluder = occluder_from(shell) if closed else None
     rng = np.random.default_rng(0)

@@ -15,6 +15,7 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
+from pbrs_farm.core.mesh import signed_volume
 from pbrs_farm.repair.structure.sliver_removal import sealed
 
 F64 = NDArray[np.float64]
@@ -74,7 +75,7 @@ def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | 
 
 def _solid(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold | None:
     vertices, faces, merge_from, merge_to = _welded(patches, weld_m)
-    if _volume(vertices[:, :3], faces) < 0:
+    if signed_volume(vertices[faces, :3], vertices[:, :3].mean(0)) < 0:
         faces = faces[:, [0, 2, 1]]
         vertices = vertices * np.array([1.0] * 5 + [-1.0] * 3)
     mesh = manifold3d.Mesh64(
@@ -108,11 +109,6 @@ def _welded(
     normals = np.concatenate([p.normals for p in patches])
     vertices = np.concatenate([positions, uvs, normals], 1)
     return vertices, faces, twins.astype(np.uint64), canonical[twins].astype(np.uint64)
-
-
-def _volume(positions: F64, faces: NDArray[np.int64]) -> float:
-    a, b, c = (positions[faces[:, k]] - positions.mean(0) for k in range(3))
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
 def united(solids: Iterable[Manifold]) -> Manifold:

@@ -12,8 +12,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import face_areas, unit_normals
 from pbrs_farm.repair.structure.booleans import F64, Patch, TagTable, solid_from_patches
-from pbrs_farm.repair.structure.patches import face_areas, face_normals, patch_from_surface
+from pbrs_farm.repair.structure.patches import patch_from_surface
 
 _FLAT_M = 1e-3
 _WELD_M = 1e-5
@@ -90,7 +91,8 @@ def flat_patch(item: Item, index: int) -> FlatPatch | None:
     starts = np.cumsum([0, *(len(p.positions) for p in patches)])
     positions = np.concatenate([p.positions for p in patches])
     faces = np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
-    normal = (face_normals(positions, faces) * face_areas(positions, faces)[:, None]).sum(0)
+    corners = positions[faces]
+    normal = (unit_normals(corners) * face_areas(corners)[:, None]).sum(0)
     length = np.linalg.norm(normal)
     if length < 1e-9:
         return None

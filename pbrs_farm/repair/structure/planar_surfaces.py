@@ -11,10 +11,10 @@ from manifold3d import Manifold
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
+from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64, Patch, Tag, TagTable, bounds
 from pbrs_farm.repair.structure.closed_shells import bodies_from_item
-from pbrs_farm.repair.structure.patches import face_normals
 from pbrs_farm.repair.structure.prisms import Plane, UvMap, level_plane, plane_of_points
 
 _SAME_FACING = 1.0 - 1e-6
@@ -112,7 +112,7 @@ def _sheets(item: Item, index: int) -> Iterator[Sheet]:
 
 def _facets(positions: F64, faces: NDArray[np.int32]) -> list[NDArray[np.int32]]:
     # Faces grouped by their plane, in order of first face; upright faces are no floor.
-    normals = face_normals(positions, faces)
+    normals = unit_normals(positions[faces])
     normals = normals * np.where(normals[:, 1:2] < 0, -1.0, 1.0)
     offsets = (normals * positions[faces[:, 0]]).sum(1)
     groups: list[tuple[F64, float, list[int]]] = []

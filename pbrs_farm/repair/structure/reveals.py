@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure.booleans import Patch
-from pbrs_farm.repair.structure.patches import face_normals
 
 REVEAL = "reveal"
 ADDED = frozenset({REVEAL, "joint", "hidden", "back", "rim"})
@@ -21,12 +21,12 @@ def with_metric_uv(patch: Patch) -> Patch:
     """
     if patch.tag.surface not in ADDED:
         return patch
-    normals = face_normals(patch.positions, patch.faces)
+    corners = patch.positions[patch.faces]
+    normals = unit_normals(corners)
     up = np.where(np.abs(normals[:, 1:2]) < 0.7, [[0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0]])
     u = np.cross(up, normals)
     u = u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-12)
     v = np.cross(normals, u)
-    corners = patch.positions[patch.faces]
     uvs = np.stack([np.einsum("fki,fi->fk", corners, axis) for axis in (u, v)], -1)
     n = len(patch.faces)
     return replace(

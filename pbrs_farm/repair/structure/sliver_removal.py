@@ -13,6 +13,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from pbrs_farm.core.mesh import face_areas
+
 F64 = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
@@ -77,8 +79,7 @@ class _Mesh:
 
     def _slivers(self) -> list[int]:
         vertices = np.array(self._vertices)[:, :3]
-        a, b, c = (vertices[np.array(self._faces, np.int64)[:, k]] for k in range(3))
-        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        area = face_areas(vertices[np.array(self._faces, np.int64)])
         return np.flatnonzero((area <= MIN_AREA_M2) & np.array(self._alive)).tolist()
 
     def _dissolve_one(self, f: int) -> None:

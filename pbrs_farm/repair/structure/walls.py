@@ -10,6 +10,7 @@ import shapely
 from manifold3d import Manifold
 
 from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import (
     F64,
@@ -20,7 +21,6 @@ from pbrs_farm.repair.structure.booleans import (
     solid_from_patches,
 )
 from pbrs_farm.repair.structure.closed_shells import bodies_from_item, flat_patch
-from pbrs_farm.repair.structure.patches import face_normals
 from pbrs_farm.repair.structure.prisms import (
     Plane,
     level_plane,
@@ -109,7 +109,7 @@ def _footprint_and_top(patches: Sequence[Patch], high_y: float) -> tuple[plan.Sh
     """
     footprint, level_top, points = [], [], []
     for p in patches:
-        faces = p.faces[face_normals(p.positions, p.faces)[:, 1] > 0.05]
+        faces = p.faces[unit_normals(p.positions[p.faces])[:, 1] > 0.05]
         at_top = (p.positions[faces][:, :, 1] > high_y - 1e-3).all(1)
         footprint.append(plan.polygon_of_triangles(p.positions, faces))
         level_top.append(plan.polygon_of_triangles(p.positions, faces[at_top]))

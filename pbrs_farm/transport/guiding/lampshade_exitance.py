@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
+from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
 from pbrs_farm.transport.guiding.guiding_targets import BACK, GlowTables, no_glow
 from pbrs_farm.transport.illuminance import radiosity
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
@@ -41,7 +42,7 @@ def glow_tables(
         return no_glow(len(tables.lamps))
 
     flux = np.array([lamp.flux_lm for lamp in tables.lamps])
-    areas = _areas(tables, faces)
+    areas = face_areas(_corners(tables, faces))
     lumens = _exitance(scene, emitters, tables, faces, lamps, seed) * LM_PER_W
     keep = (lumens > MIN_EXITANCE * flux[lamps]).ravel()
     power = (lumens * areas).ravel()[keep]
@@ -93,12 +94,7 @@ def pdfs_by_face(
 
 
 def _corners(tables: SceneTables, faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    return tables.positions[tables.faces[faces]].astype(np.float64)
-
-
-def _areas(tables: SceneTables, faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    c = _corners(tables, faces)
-    return np.asarray(0.5 * np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1))
+    return triangle_corners(tables.positions, tables.faces[faces])
 
 
 def _candidates(tables: SceneTables) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -123,7 +119,7 @@ def _candidates(tables: SceneTables) -> tuple[NDArray[np.int64], NDArray[np.int6
     near = np.isfinite(nearest)
     # Take the faces that look largest from their lamp, should there be very many.
     faces, lamps = faces[near], lamps[near]
-    size = _areas(tables, faces) / np.maximum(nearest[near], 0.02) ** 2
+    size = face_areas(_corners(tables, faces)) / np.maximum(nearest[near], 0.02) ** 2
     kept = np.sort(np.argsort(-size, kind="stable")[: _MAX_FACES * max(len(tables.lamps), 1)])
     return faces[kept], lamps[kept]
 
@@ -140,8 +136,7 @@ def _exitance(
     rng = np.random.default_rng(seed)
     corners = _corners(tables, faces)
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(e1, e2)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = unit_normals(corners)
     uv = np.sort(rng.random((_POINTS, len(faces), 2)), axis=2)
     a, b = uv[..., :1], uv[..., 1:] - uv[..., :1]
     points = corners[:, 0] + a * e1 + b * e2

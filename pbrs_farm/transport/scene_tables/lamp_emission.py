@@ -13,10 +13,13 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import Geometry, House, Item, LightPart, MaterialKind
 from pbrs_farm.core.lighting import flux_lm
+from pbrs_farm.core.mesh import closed_edge_share, face_areas, triangle_corners
 from pbrs_farm.core.recipe import EmissionFields, Recipe
 from pbrs_farm.transport.scene_tables.blackbody import rgb_from_kelvin
 
 _MIN_ESCAPE: Final = 0.25
+_PLACE_DIGITS: Final = 5  # corners that agree to 10 micrometres are one
+_CLOSED: Final = 0.95  # share of closed edges from which a mesh has an inside
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,10 +123,13 @@ def _lamp(
 ) -> AreaEmitter:
     index, k = place
     item = house.items[index]
-    areas = _areas(geometry, faces)
+    corners = _corners(geometry, faces)
+    areas = face_areas(corners)
     area = float(areas.sum())
     flux, rgb = radiated
-    outside = area if _is_closed(geometry, faces) else 2 * area
+    # Count both sides of an open mesh, the outside of one that is closed but for a few edges.
+    is_closed = closed_edge_share(np.round(corners.astype(np.float32), _PLACE_DIGITS)) > _CLOSED
+    outside = area if is_closed else 2 * area
     radiance = rgb * (flux / (LM_PER_W * math.pi * outside))
     if recipe.emission.preset == "released":
         radiance = np.full(3, recipe.emission.released_bulb)
@@ -136,7 +142,7 @@ def _shade(
     house: House, geometry: Geometry, index: int, faces: NDArray[np.int64], recipe: Recipe
 ) -> AreaEmitter:
     item = house.items[index]
-    areas = _areas(geometry, faces)
+    areas = face_areas(_corners(geometry, faces))
     radiance = np.full(3, recipe.emission.released_shade)
     flux = LM_PER_W * 2 * math.pi * float(areas.sum()) * recipe.emission.released_shade
     return AreaEmitter(
@@ -144,23 +150,8 @@ def _shade(
     )  # fmt: skip
 
 
-def _areas(geometry: Geometry, faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    corners = geometry.positions[geometry.faces[faces]].astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(0.5 * np.linalg.norm(cross, axis=1))
-
-
-def _is_closed(geometry: Geometry, faces: NDArray[np.int64]) -> bool:
-    """Whether the faces bound a volume: every edge, vertices merged by place, is met twice."""
-    corners = geometry.positions[geometry.faces[faces]].reshape(-1, 3)
-    _points, merged = np.unique(np.round(corners, 5), axis=0, return_inverse=True)
-    triangles = merged.reshape(-1, 3)
-    edges = np.sort(
-        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1
-    )
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    _unique, counts = np.unique(edges, axis=0, return_counts=True)
-    return bool(len(counts) and np.mean(counts % 2 == 0) > 0.95)
+def _corners(geometry: Geometry, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    return triangle_corners(geometry.positions, geometry.faces[faces])
 
 
 def _triple(v: NDArray[np.float64]) -> tuple[float, float, float]:

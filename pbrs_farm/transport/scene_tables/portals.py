@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, MaterialKind
+from pbrs_farm.core.mesh import face_areas
 
 MAX_PORTALS: Final = 6
 
@@ -31,9 +32,7 @@ def nearest_portals(portals: NDArray[np.float64], eye: NDArray[np.float64]) -> N
     """At most MAX_PORTALS of them, those that subtend most at eye (3,)."""
     if len(portals) <= MAX_PORTALS:
         return portals
-    area = np.linalg.norm(
-        np.cross(portals[:, 1] - portals[:, 0], portals[:, 3] - portals[:, 0]), axis=1
-    )
+    area = 2 * face_areas(portals[:, [0, 1, 3]])
     distance = np.linalg.norm(portals.mean(1) - eye, axis=1)
     order = np.argsort(-area / np.maximum(distance, 0.1) ** 2, kind="stable")
     return np.asarray(portals[np.sort(order[:MAX_PORTALS])])

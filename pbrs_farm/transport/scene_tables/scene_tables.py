@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Geometry, House, MaterialKind, geometry_from_house
+from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter, area_emitters_of_house
 from pbrs_farm.transport.scene_tables.material_rows import (
@@ -102,18 +103,13 @@ def tables_from_house(
 
 def _solid_faces(geometry: Geometry) -> NDArray[np.bool_]:
     """(F,) bool: finite, and wide enough that the plane of the face is known."""
-    corners = geometry.positions[geometry.faces].astype(np.float64)
-    with np.errstate(invalid="ignore", over="ignore"):
-        edges = corners[:, [1, 2]] - corners[:, :1]
-        twice = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-        return np.asarray(np.isfinite(corners).all((1, 2)) & (twice > 1e-10))
+    return faces_with_area(triangle_corners(geometry.positions, geometry.faces), 0.5e-10)
 
 
 def _face_rows(geometry: Geometry, faces: NDArray[np.int32]) -> NDArray[np.float32]:
-    corners = geometry.positions[faces].astype(np.float64)
+    corners = triangle_corners(geometry.positions, faces)
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    flat = np.cross(e1, e2)
-    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+    flat = unit_normals(corners)
 
     # Take the face's own normal where a vertex has none or one that is no unit vector.
     normals = geometry.normals[faces].astype(np.float64)

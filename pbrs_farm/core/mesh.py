@@ -1,0 +1,111 @@
+"""Area, normal, volume, closedness and distance of triangles, for every stage; no effects.
+
+Trimesh has these too, and tests hold both against each other. What it computes to the last bit as
+here is taken from it (0.5 s to import, hence inside the functions). Its normals are multiplied by
+a rounded reciprocal, and its closest_point has an absolute tolerance that takes triangles below
+half a millimetre for their edges; both reach stored bits, so those two formulas stand here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+
+_TINY = 1e-300  # divides a zero vector to zero
+
+
+def triangle_corners(positions: NDArray[np.floating], faces: NDArray[np.integer]) -> F64:
+    """(F, 3, 3) corners of the faces (F, 3) of a mesh, in double precision."""
+    return np.asarray(positions[faces], np.float64)
+
+
+def area_vectors(corners: F64) -> F64:
+    """(F, 3) normals of triangles (F, 3, 3), twice the area long; their front is anticlockwise."""
+    return np.asarray(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+
+
+def face_areas(corners: F64) -> F64:
+    """(F,) areas of triangles (F, 3, 3) in square metres; NaN where a corner is."""
+    from trimesh.triangles import area
+
+    return np.asarray(area(crosses=area_vectors(corners)), np.float64)
+
+
+def unit_normals(corners: F64) -> F64:
+    """(F, 3) unit normals of triangles (F, 3, 3); (0, 0, 0) where a face has no area."""
+    n = area_vectors(corners)
+    return np.asarray(n / np.maximum(np.linalg.norm(n, axis=1, keepdims=True), _TINY))
+
+
+def faces_with_area(corners: F64, least_m2: float) -> NDArray[np.bool_]:
+    """(F,) whether a triangle (F, 3, 3) has finite corners and an area above least_m2."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(np.isfinite(corners).all((1, 2)) & (face_areas(corners) > least_m2))
+
+
+def signed_volume(corners: F64, origin: F64) -> float:
+    """Volume in cubic metres that closed triangles (F, 3, 3) bound; negative if they face inward.
+
+    origin: (3,) a point near the mesh, so that rounding stays small.
+    """
+    a, b, c = np.moveaxis(corners - origin, 1, 0)
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+def closed_edge_share(places: NDArray[np.floating]) -> float:
+    """Share of edges that an even number of triangles meets: 1 for a closed mesh, 0 for no mesh.
+
+    places: (F, 3, 3) corners, rounded by the caller so that corners of one place are equal.
+    Winding is not asked for; edges that begin and end in one place are none.
+    """
+    from trimesh.geometry import faces_to_edges
+
+    _, vertex = np.unique(places.reshape(-1, 3), axis=0, return_inverse=True)
+    edges = np.sort(faces_to_edges(vertex.reshape(-1, 3)), axis=1)
+    _, n_faces = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
+    return float(np.mean(n_faces % 2 == 0)) if len(n_faces) else 0.0
+
+
+def distances_to_triangles(points: F64, corners: F64) -> F64:
+    """(F,) distance in metres from each point to the triangle (F, 3, 3) of the same row.
+
+    points: (F, 3), or (3,) for one point and all triangles. A triangle without area is the
+    segment it covers.
+    """
+    # Put the components first and the point at the origin: corner k is from_point[k], (3, F).
+    from_point = np.ascontiguousarray(np.moveaxis(corners - points[..., None, :], 0, -1))
+    a = from_point[0]
+    ab, ac = (np.ascontiguousarray((corners[:, k] - corners[:, 0]).T) for k in (1, 2))
+    normal = _cross(ab, ac)
+    has_area = _dot(normal, normal) > 0
+    squared = np.maximum(_dot(normal, normal), _TINY)
+
+    # Go straight to the plane where the foot lies inside the triangle.
+    foot = normal * (_dot(a, normal) / squared)
+    to_foot = foot - a
+    u = _dot(_cross(to_foot, ac), normal) / squared
+    v = _dot(_cross(ab, to_foot), normal) / squared
+    inside = has_area & (u >= 0) & (v >= 0) & (u + v <= 1)
+
+    # Go to the nearest edge from anywhere else.
+    to_edge = np.full(len(corners), np.inf)
+    for k in range(3):
+        start, along = from_point[k], from_point[(k + 1) % 3] - from_point[k]
+        t = -_dot(start, along) / np.maximum(_dot(along, along), _TINY)
+        nearest = start + np.clip(t, 0.0, 1.0) * along
+        to_edge = np.minimum(to_edge, _dot(nearest, nearest))
+    return np.asarray(np.sqrt(np.where(inside, _dot(foot, foot), to_edge)))
+
+
+def _dot(x: F64, y: F64) -> F64:
+    # (F,) of vectors (3, F).
+    return np.asarray(x[0] * y[0] + x[1] * y[1] + x[2] * y[2])
+
+
+def _cross(x: F64, y: F64) -> F64:
+    # (3, F) of vectors (3, F).
+    return np.stack(
+        [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+    )

@@ -1,0 +1,113 @@
+"""Area, normal, volume, closedness and distance of triangles against closed forms and trimesh."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pbrs_farm.core.mesh import (
+    area_vectors,
+    closed_edge_share,
+    distances_to_triangles,
+    face_areas,
+    faces_with_area,
+    signed_volume,
+    triangle_corners,
+    unit_normals,
+)
+
+TRIANGLE = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]])
+SEGMENT = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+POINT = np.zeros((3, 3))
+CORNERS = np.stack([TRIANGLE, TRIANGLE[::-1], SEGMENT, POINT])
+
+
+def test_areas_and_normals_are_those_of_geometry() -> None:
+    assert face_areas(CORNERS).tolist() == [2, 2, 0, 0]
+    assert area_vectors(CORNERS)[:, 2].tolist() == [4, -4, 0, 0]
+    assert unit_normals(CORNERS).tolist() == [[0, 0, 1], [0, 0, -1], [0, 0, 0], [0, 0, 0]]
+
+
+def test_corners_are_taken_in_double_precision() -> None:
+    faces = np.array([[0, 1, 2], [2, 1, 0]], np.int32)
+    corners = triangle_corners(TRIANGLE.astype(np.float32), faces)
+    assert corners.dtype == np.float64
+    np.testing.assert_array_equal(corners, CORNERS[:2])
+
+
+def test_a_face_with_a_corner_that_is_no_number_has_no_area() -> None:
+    broken = np.repeat(TRIANGLE[None], 4, axis=0)
+    broken[1, 0, 0], broken[2, 0, 0], broken[3, 2, 1] = np.nan, np.inf, 1e-13
+    assert faces_with_area(broken, 1e-12).tolist() == [True, False, False, False]
+
+
+def box(extents: tuple[float, float, float]) -> np.ndarray:
+    return np.asarray(trimesh.creation.box(extents).triangles, np.float64)
+
+
+def test_volume_is_negative_inside_out_and_the_same_far_away() -> None:
+    corners = box((1.0, 2.0, 3.0))
+    far = np.array([1e4, 0.0, -1e4])
+    assert signed_volume(corners, np.zeros(3)) == pytest.approx(6)
+    assert signed_volume(corners[:, ::-1], np.zeros(3)) == pytest.approx(-6)
+    assert signed_volume(corners + far, far) == pytest.approx(6)
+
+
+def test_a_box_is_closed_without_a_face_it_is_open() -> None:
+    corners = box((1.0, 1.0, 1.0))
+    assert closed_edge_share(corners) == 1
+    assert closed_edge_share(corners[1:]) == pytest.approx(15 / 18)
+    assert closed_edge_share(corners[:0]) == 0
+
+
+def test_turned_and_collapsed_faces_do_not_open_a_mesh() -> None:
+    corners = box((1.0, 1.0, 1.0))
+    collapsed = corners[0][[0, 0, 1]]
+    turned = np.concatenate([corners[:1, ::-1], corners[1:], collapsed[None]])
+    assert closed_edge_share(turned) == 1
+
+
+@pytest.mark.parametrize(
+    ("point", "distance"),
+    [
+        ((0.5, 0.5, 0.3), 0.3),  # above the inside
+        ((0.5, 0.5, 0.0), 0.0),  # in it
+        ((-3.0, -4.0, 0.0), 5.0),  # nearest to a corner
+        ((1.0, -0.7, 0.0), 0.7),  # nearest to an edge
+        ((2.0, 2.0, 0.0), np.sqrt(2.0)),  # nearest to the slanted edge
+        ((3.0, 0.0, 1.0), np.sqrt(2.0)),  # nearest to a corner, off the plane
+    ],
+)
+def test_the_distance_is_that_of_geometry(point: tuple[float, ...], distance: float) -> None:
+    found = distances_to_triangles(np.array(point), TRIANGLE[None])
+    assert found[0] == pytest.approx(distance, abs=1e-12)
+
+
+def test_a_triangle_without_area_is_a_segment_or_a_point() -> None:
+    points = np.array([[1.5, 3.0, 4.0], [0.0, 3.0, 4.0]])
+    assert distances_to_triangles(points, np.stack([SEGMENT, POINT])).tolist() == [5, 5]
+
+
+@given(seed=st.integers(0, 10_000))
+def test_areas_normals_and_distances_agree_with_trimesh(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-3, 3, (50, 3, 3))
+    points = rng.uniform(-3, 3, (50, 3))
+    nearest = trimesh.triangles.closest_point(corners, points)
+    np.testing.assert_allclose(face_areas(corners), trimesh.triangles.area(corners), atol=1e-12)
+    np.testing.assert_allclose(
+        unit_normals(corners), trimesh.triangles.normals(corners)[0], atol=1e-9
+    )
+    np.testing.assert_allclose(
+        distances_to_triangles(points, corners), np.linalg.norm(nearest - points, axis=1), atol=1e-9
+    )
+
+
+def test_small_triangles_are_as_exact_as_large_ones() -> None:
+    # trimesh.triangles.closest_point is not: it takes these for their edges.
+    rng = np.random.default_rng(0)
+    corners, points = rng.uniform(-1, 1, (100, 3, 3)), rng.uniform(-1, 1, (100, 3))
+    large = distances_to_triangles(points, corners)
+    small = distances_to_triangles(1e-4 * points, 1e-4 * corners)
+    np.testing.assert_allclose(small, 1e-4 * large, rtol=1e-9)
