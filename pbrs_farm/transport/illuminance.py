@@ -152,7 +152,7 @@ def _radiosity(
     while s < spp:
         sampler = SobolSampler(key, s)
         dim = mi.UInt32(CAMERA_DIMS)
-        near = emitters.nearby.seen(p, normal, emitter_filter.indoor, mi.Bool(True))
+        near = emitters.nearby.at_vertex(p, normal, emitter_filter.indoor, mi.Bool(True))
         up = mi.Vector3f(0, 0, 1)
         out, lamp = direct(
             scene, emitters, here, frame, up, sampler, dim, emitter_filter, near, mi.Bool(True)

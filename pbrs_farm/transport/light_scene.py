@@ -229,7 +229,7 @@ class LightScene:
             points = floor_points(room, 256, seed)
             portals = nearest_portals(self._portals, points.mean(0))
             weights = weights_by_distance(balls, points.mean(0), len(portals))
-            emitters = self._aimed(portals, weights)
+            emitters = self._emitters_of_view(portals, weights)
             outdoor, indoor = illuminance_lx(self.device_scene, emitters, points, seed)
             lux[room.id] = {"outdoor": round(outdoor, 2), "indoor": round(indoor, 2)}
         return lux
@@ -276,7 +276,7 @@ class LightScene:
 
         portals = nearest_portals(self._portals, camera.eye)
         weights = uniform_weights(self.n_lamps, len(portals))
-        emitters = self._aimed(portals, weights)
+        emitters = self._emitters_of_view(portals, weights)
         if fields.pilot_spp > 0:
             weights = pilot_weights(
                 self.device_scene,
@@ -287,21 +287,21 @@ class LightScene:
                 fields,
                 seed ^ 0x5EED,
             )
-            emitters.with_weights(weights)
+            emitters.set_weights(weights)
         names = [lamp.name for lamp in self.tables.lamps]
         return emitters, {n: float(w) for n, w in zip(names, weights.lamps, strict=True)}
 
-    def _aimed(self, portals: NDArray[np.float64], weights: Any) -> Any:
+    def _emitters_of_view(self, portals: NDArray[np.float64], weights: Any) -> Any:
         """The emitters, their tables built once, with the portals and weights of a view."""
         from pbrs_farm.transport.kernels.emitters import Emitters
 
         if self._emitters is None:
-            from pbrs_farm.transport.guiding.lampshade_exitance import glow_tables, pdfs_by_face
+            from pbrs_farm.transport.guiding.lampshade_exitance import guiding_targets, pdfs_by_face
 
             self._emitters = Emitters(self.tables, self.sky, portals, weights)
-            glow = glow_tables(self.device_scene, self._emitters, self.tables, 0)
-            self.device_scene.set_guiding_targets(*pdfs_by_face(glow))
-            self._emitters.with_glow(glow)
+            targets = guiding_targets(self.device_scene, self._emitters, self.tables, 0)
+            self.device_scene.set_guiding_targets(*pdfs_by_face(targets))
+            self._emitters.set_targets(targets)
         else:
-            self._emitters.aim(portals, weights)
+            self._emitters.set_view(portals, weights)
         return self._emitters

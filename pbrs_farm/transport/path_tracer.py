@@ -215,7 +215,7 @@ def _add_by_lamp(by_lamp: ByLamp | None, result: StepResult, active: Any) -> Non
         return
     met, lit = (
         (result.emitted_indoor, result.si.emitter),
-        (result.direct_indoor, result.indoor_sample.lamp),
+        (result.direct_indoor, result.indoor_sample.emitter),
     )
     for light, lamp in (met, lit):
         level = luminance(light)

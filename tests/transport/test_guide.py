@@ -13,7 +13,7 @@ from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.guiding import guided_rays as guide
-from pbrs_farm.transport.guiding.guiding_targets import BACK, GlowTables
+from pbrs_farm.transport.guiding.guiding_targets import BACK_SIDE, GuidingTargets
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
@@ -33,9 +33,9 @@ def loaded(room: tuple[House, Camera]) -> tuple[LightScene, Camera]:
 
 
 def unguided(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guide, "MOST", 0.0)
-    monkeypatch.setattr(guide, "LEAST", 0.0)
-    monkeypatch.setattr(guide, "_MOST_WORTH", 1.0)
+    monkeypatch.setattr(guide, "MAX_SHARE", 0.0)
+    monkeypatch.setattr(guide, "MIN_SHARE", 0.0)
+    monkeypatch.setattr(guide, "_MAX_BOOST", 1.0)
 
 
 @pytest.mark.parametrize("room", [hard_rooms.open_shade, hard_rooms.covered_cup])
@@ -79,7 +79,7 @@ def test_a_direction_drawn_in_a_cone_has_the_pdf_of_the_cone() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.guiding.nearby_lamps import Cones, cone_pdf, in_cones
+    from pbrs_farm.transport.guiding.nearby_lamps import Cones, cone_pdf, sample_cones
 
     n = 1 << 18
     rng = mi.PCG32(size=n)
@@ -88,40 +88,40 @@ def test_a_direction_drawn_in_a_cone_has_the_pdf_of_the_cone() -> None:
         way = dr.normalize(mi.Vector3f(0.3, -0.5, 0.7))
         cones = Cones([mi.Float(1)], mi.Float(1), [way], [height])
         uv = mi.Point2f(rng.next_float32(), rng.next_float32())
-        d = in_cones(cones, rng.next_float32(), uv)
+        d = sample_cones(cones, rng.next_float32(), uv)
         pdf = cone_pdf(cones, d).numpy()
         expected = 1 / (2 * np.pi * height.numpy()[0])
         assert pdf == pytest.approx(expected, rel=1e-4)
 
 
-def glow_of(house: House) -> tuple[LightScene, GlowTables]:
-    from pbrs_farm.transport.guiding.lampshade_exitance import glow_tables
+def targets_of(house: House) -> tuple[LightScene, GuidingTargets]:
+    from pbrs_farm.transport.guiding.lampshade_exitance import guiding_targets
 
     scene, camera = loaded((house, rooms.camera((0.5, 1.5, 0.5), (2.0, 1.0, 2.0))))
     emitters, _weights = scene.emitters(camera, FIELDS, 0)
-    return scene, glow_tables(scene.device_scene, emitters, scene.tables, 0)
+    return scene, guiding_targets(scene.device_scene, emitters, scene.tables, 0)
 
 
 def test_the_inside_of_an_opaque_shade_is_aimed_at_and_its_outside_is_not() -> None:
-    scene, glow = glow_of(hard_rooms.open_shade()[0])
-    faces = (glow.sides & np.uint32(BACK - 1)).astype(np.int64)
+    scene, targets = targets_of(hard_rooms.open_shade()[0])
+    faces = (targets.sides & np.uint32(BACK_SIDE - 1)).astype(np.int64)
     corners = scene.tables.positions[scene.tables.faces[faces]].astype(np.float64)
     from_axis = corners.mean(1) - np.array([2.0, 0.0, 2.2])
     assert np.hypot(from_axis[:, 0], from_axis[:, 2]).max() < 0.121
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals[glow.sides >= BACK] *= -1
+    normals[targets.sides >= BACK_SIDE] *= -1
     assert ((normals[:, [0, 2]] * from_axis[:, [0, 2]]).sum(1) < 0).all()
-    assert glow.chances.sum() == pytest.approx(1)
+    assert targets.probabilities.sum() == pytest.approx(1)
     areas = 0.5 * np.linalg.norm(normals, axis=1)
-    assert (glow.pdfs * areas).sum() == pytest.approx(1)
-    assert 0 < glow.shares[0] <= 1
-    assert 0.12 < glow.balls[0, 3] < 0.4
+    assert (targets.pdfs * areas).sum() == pytest.approx(1)
+    assert 0 < targets.shares[0] <= 1
+    assert 0.12 < targets.interiors[0, 3] < 0.4
 
 
 def test_a_bare_bulb_in_a_room_has_nothing_to_aim_at() -> None:
-    _scene, glow = glow_of(rooms.window_room(lumen=800)[0])
-    assert not len(glow.sides)
-    assert glow.shares.tolist() == [0]
+    _scene, targets = targets_of(rooms.window_room(lumen=800)[0])
+    assert not len(targets.sides)
+    assert targets.shares.tolist() == [0]
 
 
 def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
@@ -136,11 +136,11 @@ def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
     rng = mi.PCG32(size=n)
     p, up = mi.Point3f(1.3, 0.5, 2.0), mi.Vector3f(0, 1, 0)
     emitter_filter, on = mi.Int32(-1), mi.Bool(True)
-    near = emitters.nearby.seen(p, up, emitter_filter, on)
+    near = emitters.nearby.at_vertex(p, up, emitter_filter, on)
     uv = mi.Point2f(rng.next_float32(), rng.next_float32())
     to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, emitter_filter, on)
     # With the pdfs of all right, the mean of 1 / pdf is the solid angle of all lamps.
-    radius = emitters.nearby.seen(p, up, emitter_filter, on).at
+    radius = emitters.nearby.at_vertex(p, up, emitter_filter, on).at
     assert radius.total.numpy()[0] > 0
     inverse = dr.select(to.valid, dr.rcp(to.pdf), 0).numpy()
     area_over_d2 = sum(

@@ -1,18 +1,18 @@
-"""Guided rays: a part of the scattered rays goes to where lamps light their own insides; kernels.
+"""Guided rays: a part of the scattered rays goes to the lit insides of lamps; kernels, no effects.
 
 A bulb deep in its shade lights a room by way of the shade. Shadow rays to the bulb are blocked, and
-a ray scattered by the surface alone meets the shade once in a hundred tries: a firefly. So every
-direction d out of a vertex is drawn by one of three techniques, with shares that depend on what
-came before and not on d:
+a ray drawn by the surface alone meets the shade once in a hundred tries: a firefly. So a direction d
+out of a vertex is drawn by one of three techniques, with shares that depend on what came before
+and not on d:
 
-    own     by the surface (bsdf.sample), after roulette     (1 - share) q(d) p_own(d)
-    cone    uniform in the cone around a lamp's inside       share CONED p_cone(d)
-    face    at a point y on a face side that glows           share (1 - CONED) p_face(y) r^2 / cos
+    bsdf    by the surface (sample_bsdf), after roulette       (1 - share) q(d) p_bsdf(d)
+    cone    uniform in the cone around a lamp's interior       share CONE_SHARE p_cone(d)
+    target  at a point y on a guiding target                   share (1 - CONE_SHARE) p(y) r^2 / cos
 
-and the path's throughput is divided by their sum, the balance heuristic in one-sample form. The
-third pdf is known only where the ray ends: `kept` applies it there. A ray aimed at a face that
-meets another one brings nothing. Cones also catch what reaches a bulb by a reflection in a lamp's
-glass cover. No effects.
+The path's throughput is divided by their sum, the balance heuristic in one-sample form (Veach
+1997, section 9.2.4). The third pdf is known only where the ray ends: `mis_weight` applies it there.
+A ray aimed at a target that meets another face brings nothing. Cones also catch what reaches a bulb
+by a reflection in a lamp's glass cover.
 """
 
 from __future__ import annotations
@@ -23,7 +23,12 @@ import drjit as dr
 import mitsuba as mi
 
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
-from pbrs_farm.transport.guiding.nearby_lamps import Near, cone_pdf, drawn, in_cones
+from pbrs_farm.transport.guiding.nearby_lamps import (
+    NearbyLamps,
+    cone_pdf,
+    sample_cones,
+    sample_discrete,
+)
 from pbrs_farm.transport.kernels.bsdf import Bsdf
 from pbrs_farm.transport.kernels.device_scene import (
     DeviceScene,
@@ -33,106 +38,124 @@ from pbrs_farm.transport.kernels.device_scene import (
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import PathState
 
-MOST, LEAST = 0.2, 0.1
-"""Of the rays scattered at a vertex. In between it takes the rays that roulette would end, so that
-daylight, which is not guided, loses little."""
+MAX_SHARE, MIN_SHARE = 0.2, 0.1
+"""Guided part of the rays scattered at a vertex. In between it takes the rays that roulette would
+end, so that daylight, which is not guided, loses little."""
 
-CONED: Final = 0.3
+CONE_SHARE: Final = 0.3
 """Of the guided rays, into cones."""
 
-REFLECTED: Final = 0.5
-"""At most, of the scattered rays that meet thin glass near a lamp."""
+MAX_REFLECTED: Final = 0.5
+"""Of the scattered rays that meet thin glass near a lamp."""
 
-_MOST_WORTH, _WORTH_M2 = 100.0, 5.0
+_MAX_BOOST, _BOOST_M2 = 100.0, 5.0
 """How much longer paths live: 5 where the one lamp that matters is 1 m off, 100 within 22 cm."""
 
-_MATTERS = 4.0
-"""Guiding is at its full share where lamps send a quarter of their light out by their insides."""
+_FULL_GUIDING: Final = 4.0
+"""Guiding has its full share where lamps send a quarter of their light out by their interiors."""
 
 
-class Guide(NamedTuple):
-    """What guides the rays of one vertex. share: of all its rays; coned: of those, into cones."""
+class Guiding(NamedTuple):
+    """How the rays of one vertex are guided."""
 
-    near: Near
-    share: Any
-    coned: Any
+    near: NearbyLamps
+    share: Any  # guided part of all its rays
+    cone_share: Any  # of the guided ones, into cones
 
 
-class Guided(NamedTuple):
-    """A direction and how it came about. is_guided: not drawn by the surface; own: the surface's
-    random number made uniform again; target: the face aimed at, NO_FACE = none; valid."""
+class GuidedSample(NamedTuple):
+    """A guided direction, and how it came about."""
 
-    d: Any
-    is_guided: Any
-    own: Any
-    target: Any
+    d: Any  # unit Vector3f
+    is_guided: Any  # Bool: not to be drawn by the surface
+    u_bsdf: Any  # the random number made uniform again, for the surface
+    target_face: Any  # UInt32, the face aimed at, NO_FACE = none
     valid: Any
 
 
-def guide_at(near: Near, m: Bsdf, beta: Any, may_aim: Any) -> Guide:
-    """The guide of a vertex that a path of throughput beta has reached."""
-    albedo = dr.minimum(m.kd + m.f0 + m.tau, 1)
+def guiding_at(near: NearbyLamps, bsdf: Bsdf, beta: Any, may_aim: Any) -> Guiding:
+    """The guiding of a vertex that a path of throughput beta has reached."""
+    albedo = dr.minimum(bsdf.kd + bsdf.f0 + bsdf.tau, 1)
     # Within a lamp the surface finds the light by itself.
-    least = LEAST * near.cones.total / dr.maximum(near.at.aim_total, 1e-30)
-    spare = dr.clip(1 - 0.95 * survival_boost(near) * dr.max(beta * albedo), least, MOST)
-    # Where lamps send little out by way of their insides, there is little to find.
-    matters = dr.minimum(_MATTERS * near.at.aim_total / dr.maximum(near.at.total, 1e-30), 1)
-    share = dr.select(may_aim & (near.at.aim_total > 0), spare * matters, 0)
-    return Guide(near, share, dr.select(near.cones.total > 0, mi.Float(CONED), 0))
+    reference = near.reference
+    least = MIN_SHARE * near.cones.total / dr.maximum(reference.guided_total, 1e-30)
+    spare = dr.clip(1 - 0.95 * survival_boost(near) * dr.max(beta * albedo), least, MAX_SHARE)
+    # Where lamps send little out by way of their interiors, there is little to find.
+    gain = dr.minimum(
+        _FULL_GUIDING * reference.guided_total / dr.maximum(reference.total, 1e-30), 1
+    )
+    share = dr.select(may_aim & (reference.guided_total > 0), spare * gain, 0)
+    return Guiding(near, share, dr.select(near.cones.total > 0, mi.Float(CONE_SHARE), 0))
 
 
-def survival_boost(near: Near) -> Any:
+def survival_boost(near: NearbyLamps) -> Any:
     """How much less often roulette ends a path here: more than 1 near lamps, where it is bright."""
-    return dr.clip(_WORTH_M2 * near.at.total, 1, _MOST_WORTH)
+    return dr.clip(_BOOST_M2 * near.reference.total, 1, _MAX_BOOST)
 
 
 def reflection_probability(reflectance: Any, boost: Any) -> Any:
     """How often a scattered ray is reflected by thin glass: often near lamps, by their covers."""
-    return dr.clip(boost * reflectance, reflectance, dr.maximum(reflectance, REFLECTED))
+    return dr.clip(boost * reflectance, reflectance, dr.maximum(reflectance, MAX_REFLECTED))
 
 
-def guided(
-    guide: Guide, scene: DeviceScene, emitters: Emitters, si: SurfaceInteraction, u: Any, uv: Any
-) -> Guided:
+def sample_guided(
+    guiding: Guiding,
+    scene: DeviceScene,
+    emitters: Emitters,
+    si: SurfaceInteraction,
+    u: Any,
+    uv: Any,
+) -> GuidedSample:
     """A direction by the second or third technique, where u says so."""
-    share, coned = guide.share, guide.coned
+    # Choose the technique; use what is left of u for the surface, or for the lamp.
+    share, cone_share = guiding.share, guiding.cone_share
     is_guided = u < share
-    own = dr.select(is_guided, 0, (u - share) / (1 - share))
+    u_bsdf = dr.select(is_guided, 0, (u - share) / (1 - share))
     v = u / dr.maximum(share, 1e-6)
-    is_coned = is_guided & (v < coned)
-    v = dr.select(is_coned, v / CONED, (v - coned) / (1 - coned))
+    is_cone = is_guided & (v < cone_share)
+    v = dr.select(is_cone, v / CONE_SHARE, (v - cone_share) / (1 - cone_share))
     v = dr.clip(v, 0, 1 - 1e-7)
-    lamp, rest = drawn(guide.near.lamps, guide.near.aims, guide.near.at.aim_total, v)
-    at_face = is_guided & ~is_coned
-    aim = emitters.aims.aim(scene, (si.p, si.ng), lamp, rest, uv, at_face)
-    d = dr.select(is_coned, in_cones(guide.near.cones, v, uv), aim.d)
-    target = dr.select(at_face, aim.face, mi.UInt32(NO_FACE))
-    return Guided(d, is_guided, own, target, ~at_face | aim.valid)
+    # Choose a lamp, and a point on one of its targets.
+    near = guiding.near
+    lamp, rest = sample_discrete(near.lamps, near.guided, near.reference.guided_total, v)
+    is_target = is_guided & ~is_cone
+    target = emitters.targets.sample(scene, si.p, si.ng, lamp, rest, uv, is_target)
+    d = dr.select(is_cone, sample_cones(near.cones, v, uv), target.d)
+    face = dr.select(is_target, target.face, mi.UInt32(NO_FACE))
+    return GuidedSample(d, is_guided, u_bsdf, face, ~is_target | target.valid)
 
 
-def cone_chance(guide: Guide, d: Any) -> Any:
-    """Pdf of the second technique in direction d, chance included."""
-    return guide.share * guide.coned * cone_pdf(guide.near.cones, d)
+def cone_technique_pdf(guiding: Guiding, d: Any) -> Any:
+    """Pdf of the second technique in direction d, its share included."""
+    return guiding.share * guiding.cone_share * cone_pdf(guiding.near.cones, d)
 
 
-def face_chance(guide: Guide) -> Any:
-    """Chance of the third technique, over what the aims of all lamps add up to."""
-    total = dr.maximum(guide.near.at.aim_total, 1e-30)
-    return guide.share * (1 - guide.coned) / total
+def target_technique_share(guiding: Guiding) -> Any:
+    """Share of the third technique over the sum of guided importances."""
+    total = dr.maximum(guiding.near.reference.guided_total, 1e-30)
+    return guiding.share * (1 - guiding.cone_share) / total
 
 
 def mis_weight(
-    emitters: Emitters, path: PathState, si: SurfaceInteraction, only: Any, turned: Any, rough: Any
+    emitters: Emitters,
+    path: PathState,
+    si: SurfaceInteraction,
+    only: Any,
+    reflected: Any,
+    rough: Any,
 ) -> Any:
-    """What a walk's throughput keeps where its ray ends; 1 where it passes on.
+    """What remains of a path's throughput where its ray ends; 1 where it passes on.
 
-    turned: it ends without meeting what a guided ray may aim at.
+    reflected: the ray ends, but not on a face that it may have been aimed at.
     """
+    # Compute the pdf with which the third technique would have aimed here.
     ref, d = path.reference, path.d
-    _level, aim = emitters.nearby.level(si.target_emitter, ref.p, ref.n, only, rough)
+    _importance, guided = emitters.nearby.importance(si.target_emitter, ref.p, ref.n, only, rough)
     cos = dr.maximum(dr.abs(dr.dot(si.ng, d)), 1e-6)
     begin = offset_ray_origin(ref.p, dr.select(dr.dot(ref.n, d) > 0, ref.n, -ref.n))
-    pdf = aim * si.target_pdf * dr.squared_norm(si.p - begin) / cos
+    pdf = guided * si.target_pdf * dr.squared_norm(si.p - begin) / cos
     balanced = dr.select(rough, dr.rcp(1 + path.guiding_odds * pdf), 1)
-    astray = (path.target_face != NO_FACE) & (turned | (rough & (path.target_face != si.face)))
-    return dr.select(astray, 0, balanced)
+    # Drop the ray that was aimed at one face and met another.
+    is_aimed = path.target_face != NO_FACE
+    missed = is_aimed & (reflected | (rough & (path.target_face != si.face)))
+    return dr.select(missed, 0, balanced)

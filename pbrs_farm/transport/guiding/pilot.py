@@ -1,4 +1,4 @@
-"""Weights of lamps and outdoor techniques for one view, from a small picture per emitter.
+"""EmitterWeights of lamps and outdoor techniques for one view, from a small picture per emitter.
 
 No effects. A home has 12 to 18 lamps and most shadow rays of a uniform choice go to other rooms.
 The pilot renders 32x24 pixels with each emitter alone, in one launch, and chooses in proportion to
@@ -16,7 +16,7 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
-from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, Weights
+from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, EmitterWeights
 from pbrs_farm.transport.path_tracer import Lanes, trace
 
 LAMP_FLOOR: Final = 0.01
@@ -25,22 +25,22 @@ _DOME_FLOOR: Final = 0.05
 _PILOT_SIZE: Final = (32, 24)
 
 
-def uniform_weights(n_lamps: int, n_portals: int) -> Weights:
+def uniform_weights(n_lamps: int, n_portals: int) -> EmitterWeights:
     """Every lamp and every outdoor technique alike."""
     n_outdoor = FIRST_PORTAL + n_portals
-    return Weights(np.full(n_lamps, 1 / max(n_lamps, 1)), np.full(n_outdoor, 1 / n_outdoor))
+    return EmitterWeights(np.full(n_lamps, 1 / max(n_lamps, 1)), np.full(n_outdoor, 1 / n_outdoor))
 
 
 def weights_by_distance(
     balls: NDArray[np.float64], place: NDArray[np.float64], n_portals: int
-) -> Weights:
+) -> EmitterWeights:
     """Lamps by 1 / distance squared (1 m at least) from a place (3,), outdoor techniques alike.
 
     balls: (L, 4) centre and radius of each lamp.
     """
     squared = ((balls[:, :3] - place) ** 2).sum(1)
     lamps = _with_floors(1 / np.maximum(squared, 1), np.full(len(balls), LAMP_FLOOR))
-    return Weights(lamps, uniform_weights(0, n_portals).outdoor)
+    return EmitterWeights(lamps, uniform_weights(0, n_portals).outdoor)
 
 
 def pilot_weights(
@@ -51,8 +51,8 @@ def pilot_weights(
     n_portals: int,
     fields: LightFields,
     seed: int,
-) -> Weights:
-    """Weights for a view; those that emitters carry already change the pilot's noise only."""
+) -> EmitterWeights:
+    """EmitterWeights for a view; those that emitters carry already change the pilot's noise only."""
     n_outdoor = FIRST_PORTAL + n_portals
     width, height = _PILOT_SIZE
     lanes = Lanes(
@@ -67,7 +67,7 @@ def pilot_weights(
     relative = brought / (bright + max(float(bright.mean()), 1e-12))
     strength = np.sqrt((relative.astype(np.float64) ** 2).mean(0))
     lamps = _with_floors(strength[:n_lamps], np.full(n_lamps, LAMP_FLOOR))
-    return Weights(lamps, outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0)))
+    return EmitterWeights(lamps, outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0)))
 
 
 def outdoor_weights(

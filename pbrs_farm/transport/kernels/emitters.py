@@ -1,9 +1,9 @@
-"""Choosing and evaluating emitters inside the kernels: lamps, the sky's dome, portals, the sun.
+"""Sampling and evaluating emitters: lamps, the sun, the sky's dome, portals; kernels.
 
 Outdoor directions are drawn by one of several techniques: 0 the sun's disc, 1 the dome by its
-brightness, 2 and on the window openings as portals. Which lamp and which technique is a matter of
-weights that belong to a view (pilot.py); any positive weights are unbiased. No effects beyond the
-buffers held on the device.
+brightness, 2 and on the window openings as portals (Bitterli et al. 2015). How often each lamp and
+each technique is chosen belongs to a view (pilot.py); any positive weights are unbiased.
+Effects: holds buffers on the device.
 """
 
 from __future__ import annotations
@@ -19,8 +19,13 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
-from pbrs_farm.transport.guiding.guiding_targets import Aims, GlowTables, no_glow
-from pbrs_farm.transport.guiding.nearby_lamps import Near, Nearby, ReferencePoint, drawn
+from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, TargetSampler, no_targets
+from pbrs_farm.transport.guiding.nearby_lamps import (
+    NearbyLamps,
+    NearbyLampSampler,
+    ReferencePoint,
+    sample_discrete,
+)
 from pbrs_farm.transport.kernels.alias_table import alias_rows, sample_alias_table
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
@@ -29,60 +34,51 @@ from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky, solid_angles
 
 SUN, DOME, FIRST_PORTAL = 0, 1, 2
-BY_PLACE = 0.5
-"""Of the shadow rays to lamps; the others go by the weights of the view alone (walls hide lamps)."""
+"""Outdoor techniques; those from FIRST_PORTAL on are portals."""
+
+NEARBY_SHARE = 0.5
+"""Of the shadow rays to lamps, those that go by where the lamps are; the others go by the weights
+of the view alone (walls hide lamps)."""
+
+_PORTAL_PACKETS = 3  # corner, first edge, second edge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Weights:
-    """How often each lamp and each outdoor technique is chosen; each sums to 1 (or is empty).
+class EmitterWeights:
+    """How often each lamp and each outdoor technique is chosen; each sums to 1 (or is empty)."""
 
-    lamps: (L,). outdoor: (2 + number of portals,).
-    """
-
-    lamps: NDArray[np.float64]
-    outdoor: NDArray[np.float64]
+    lamps: NDArray[np.float64]  # (L,)
+    outdoor: NDArray[np.float64]  # (2 + number of portals,)
 
 
 class DirectionSample(NamedTuple):
-    """A sampled direction to an emitter.
+    """A sampled direction to an emitter."""
 
-    d: unit direction; distance; radiance: Color3f from there; pdf: per solid angle, all
-    techniques that could have drawn it counted; valid. lamp: its number, None for the sky.
-    """
-
-    d: Any
+    d: Any  # unit Vector3f
     distance: Any
-    radiance: Any
-    pdf: Any
+    radiance: Any  # Color3f from there
+    pdf: Any  # per solid angle, of all techniques that could have drawn it
     valid: Any
-    lamp: Any = None
+    emitter: Any = None  # UInt32 number of the lamp, None for the sky
 
 
 class Emitters:
     """The lamps and the sky of a scene on the device, with the weights of one view.
 
-    only: a lamp's or a technique's number per lane, or -1: the pilot asks for one at a time.
+    Every method takes only: the one lamp or outdoor technique that counts, lane by lane, or -1
+    (the pilot asks for one at a time).
     """
 
     def __init__(
-        self, tables: SceneTables, sky: Sky, portals: NDArray[np.float64], weights: Weights
+        self, tables: SceneTables, sky: Sky, portals: NDArray[np.float64], weights: EmitterWeights
     ) -> None:
-        self.nearby = Nearby(tables)
-        self.aims = Aims(no_glow(len(tables.lamps)))
+        self.nearby = NearbyLampSampler(tables)
+        self.targets = TargetSampler(no_targets(len(tables.lamps)))
         self._set_lamps(tables, weights.lamps)
         self._set_dome(sky)
         self._set_portals(portals)
         self._set_outdoor_weights(weights.outdoor)
-        s = sky.sun_direction
-        self._sun_frame = mi.Frame3f(opaque3(mi.Vector3f, s))
-        cos_max = math.cos(sky.sun_half_angle_rad)
-        solid = 2 * math.pi * (1 - cos_max)
-        # The disc's radiance gives its irradiance: integral of the cosine over the cone.
-        projected = math.pi * math.sin(sky.sun_half_angle_rad) ** 2
-        self._sun_cos = dr.opaque(mi.Float, cos_max)
-        self._sun_pdf = dr.opaque(mi.Float, 1 / solid)
-        self._sun_rgb = opaque3(mi.Color3f, sky.sun_irradiance / projected)
+        self._set_sun(sky)
         shines = bool(sky.dome.max() > 0 or sky.sun_irradiance.max() > 0)
         self.has_sky = dr.opaque(mi.Bool, shines)
         self._has_group = {Group.OUTDOOR: shines, Group.INDOOR: len(tables.lamps) > 0}
@@ -91,137 +87,142 @@ class Emitters:
         """Whether anything of a group shines at all."""
         return self._has_group[group]
 
-    def aim(self, portals: NDArray[np.float64], weights: Weights) -> None:
+    def set_view(self, portals: NDArray[np.float64], weights: EmitterWeights) -> None:
         """Set the portals and weights of another view; lamps and sky stay."""
         self._set_portals(portals)
-        self.with_weights(weights)
+        self.set_weights(weights)
 
-    def with_weights(self, weights: Weights) -> None:
+    def set_weights(self, weights: EmitterWeights) -> None:
         """Set other weights; the scene stays."""
         self._set_lamp_weights(weights.lamps)
         self._set_outdoor_weights(weights.outdoor)
 
-    def with_glow(self, glow: GlowTables) -> None:
+    def set_targets(self, targets: GuidingTargets) -> None:
         """Set what guided rays aim at."""
-        self.aims = Aims(glow)
-        self.nearby.with_glow(glow)
-
-    # Lamps
+        self.targets = TargetSampler(targets)
+        self.nearby.set_targets(targets)
 
     def sample_lamp(
-        self, scene: DeviceScene, near: Near, u: Any, uv: Any, only: Any, active: Any
+        self, scene: DeviceScene, near: NearbyLamps, u: Any, uv: Any, only: Any, active: Any
     ) -> DirectionSample:
-        """A point on a lamp, seen from p: by place with chance BY_PLACE, else by weight alone."""
+        """A point on a lamp: of those nearby with chance NEARBY_SHARE, else by weight alone."""
+        # Choose a lamp both ways, and take one.
         active = active & self._has_lamps
-        by_place = _by_place(near.at)
-        is_near = u < by_place
-        rest = dr.select(is_near, u / BY_PLACE, (u - by_place) / (1 - by_place))
+        nearby_share = _nearby_share(near.reference)
+        is_near = u < nearby_share
+        rest = dr.select(is_near, u / NEARBY_SHARE, (u - nearby_share) / (1 - nearby_share))
         rest = dr.clip(rest, 0, 1 - 1e-7)
         lamp, v = sample_alias_table(self._lamp_alias, mi.UInt32(0), self._n_lamps, rest, active)
-        near_lamp, near_v = drawn(near.lamps, near.levels, near.at.total, rest)
+        near_lamp, near_v = sample_discrete(
+            near.lamps, near.importances, near.reference.total, rest
+        )
         lamp, u = dr.select(is_near, near_lamp, lamp), dr.select(is_near, near_v, v)
         lamp = dr.select(only >= 0, mi.UInt32(only), lamp)
+        # Choose a triangle of it by area, and a point on that.
         first = dr.gather(mi.UInt32, self._lamp_first, lamp, active)
         count = dr.gather(mi.UInt32, self._lamp_first, lamp + 1, active) - first
         triangle, _u = sample_alias_table(self._triangle_alias, first, count, u, active)
         face = dr.gather(mi.UInt32, self._lamp_faces, first + triangle, active)
         q, n = scene.sample_face(face, uv, active)
 
-        to = q - near.at.p
+        to = q - near.reference.p
         distance = dr.norm(to)
         d = to / distance
         cos = dr.abs(dr.dot(n, d))
         valid = active & (distance > 1e-5) & (cos > 1e-5)
-        radiance, pdf = self._lamp(lamp, near.at, distance, cos, only, valid)
+        radiance, pdf = self._eval_lamp(lamp, near.reference, distance, cos, only, valid)
         return DirectionSample(d, distance, radiance, pdf, valid, lamp)
 
-    def hit_lamp(
-        self, lamp: Any, at: ReferencePoint, distance: Any, cos: Any, only: Any, active: Any
+    def eval_lamp(
+        self, lamp: Any, reference: ReferencePoint, distance: Any, cos: Any, only: Any, active: Any
     ) -> tuple[Any, Any]:
-        """(radiance, pdf of sample_lamp) of a lamp that a ray scattered there met."""
+        """(radiance, pdf of sample_lamp) of a lamp that a ray from the reference point meets."""
         active = active & (lamp != NO_LAMP)
-        radiance, pdf = self._lamp(lamp, at, distance, dr.abs(cos), only, active)
+        radiance, pdf = self._eval_lamp(lamp, reference, distance, dr.abs(cos), only, active)
         return dr.select(active, radiance, 0), pdf
 
-    def _lamp(
-        self, lamp: Any, at: ReferencePoint, distance: Any, cos: Any, only: Any, active: Any
+    def _eval_lamp(
+        self, lamp: Any, reference: ReferencePoint, distance: Any, cos: Any, only: Any, active: Any
     ) -> tuple[Any, Any]:
-        row = dr.gather(mi.Vector4f, self._lamp_rows, lamp, active)
+        row = dr.gather(mi.Vector4f, self._lamp_rows, lamp, active)  # r g b area
+        # Blend the chances of both ways to choose the lamp, per area, then per solid angle.
         weight = dr.gather(mi.Float, self._lamp_weights, lamp, active)
-        level, _aim = self.nearby.level(lamp, at.p, at.n, only, active)
-        by_place = _by_place(at)
-        weight = dr.lerp(weight, level / dr.maximum(at.total, 1e-30), by_place)
+        importance, _guided = self.nearby.importance(lamp, reference.p, reference.n, only, active)
+        nearby = importance / dr.maximum(reference.total, 1e-30)
+        weight = dr.lerp(weight, nearby, _nearby_share(reference))
         weight = dr.select(only >= 0, 1, weight)
         pdf = weight * dr.square(distance) / dr.maximum(row[3] * cos, 1e-12)
-        mine = (only < 0) | (mi.UInt32(only) == lamp)
-        return dr.select(mine, mi.Color3f(row[0], row[1], row[2]), 0), pdf
-
-    # Outdoors
+        counts = (only < 0) | (mi.UInt32(only) == lamp)
+        return dr.select(counts, mi.Color3f(row[0], row[1], row[2]), 0), pdf
 
     def sample_outdoor(self, p: Any, u: Any, uv: Any, only: Any, active: Any) -> DirectionSample:
         """A direction in which outdoor light may come to p."""
         active = active & self.has_sky
-        way, u = sample_alias_table(self._outdoor_alias, mi.UInt32(0), self._n_outdoor, u, active)
-        way = dr.select(only >= 0, mi.UInt32(only), way)
+        technique, u = sample_alias_table(
+            self._outdoor_alias, mi.UInt32(0), self._n_outdoor, u, active
+        )
+        technique = dr.select(only >= 0, mi.UInt32(only), technique)
+        is_sun = technique == SUN
+        # Draw a direction by every technique, and take one.
         texel, _u = sample_alias_table(self._dome_alias, mi.UInt32(0), self._n_texels, u, active)
         to_sun = self._sun_frame.to_world(_cone(uv, self._sun_cos))
         to_dome = self._texel_direction(texel, uv)
-        to_portal = self._portal_direction(p, way, uv, active)
-        d = dr.select(way == SUN, to_sun, dr.select(way == DOME, to_dome, to_portal))
-        sun, sun_pdf = self.sun(d, only)
-        dome, dome_pdf = self.dome(p, d, only, active)
-        is_sun = way == SUN
-        return DirectionSample(
-            d,
-            mi.Float(dr.inf),
-            dr.select(is_sun, sun, dome),
-            dr.select(is_sun, sun_pdf, dome_pdf),
-            active,
-        )
+        to_portal = self._portal_direction(p, technique, uv, active)
+        d = dr.select(is_sun, to_sun, dr.select(technique == DOME, to_dome, to_portal))
+        # The sun and the dome are two emitters, each with a pdf of its own.
+        sun, sun_pdf = self.eval_sun(d, only)
+        dome, dome_pdf = self.eval_dome(p, d, only, active)
+        radiance, pdf = dr.select(is_sun, sun, dome), dr.select(is_sun, sun_pdf, dome_pdf)
+        return DirectionSample(d, mi.Float(dr.inf), radiance, pdf, active)
 
-    def sun(self, d: Any, only: Any) -> tuple[Any, Any]:
+    def eval_sun(self, d: Any, only: Any) -> tuple[Any, Any]:
         """(radiance of the sun's disc in direction d, pdf of sampling it)."""
         inside = dr.dot(d, self._sun_frame.n) >= self._sun_cos - 1e-7
         weight = dr.select(only >= 0, 1, self._sun_weight)
-        mine = (only < 0) | (only == SUN)
-        return dr.select(inside & mine, self._sun_rgb, 0), weight * self._sun_pdf
+        counts = (only < 0) | (only == SUN)
+        return dr.select(inside & counts, self._sun_rgb, 0), weight * self._sun_pdf
 
-    def dome(self, p: Any, d: Any, only: Any, active: Any) -> tuple[Any, Any]:
+    def eval_dome(self, p: Any, d: Any, only: Any, active: Any) -> tuple[Any, Any]:
         """(radiance of the dome in direction d, pdf of sampling d from p, sun not counted)."""
-        radiance, by_texel = self._dome_row(d, active)
+        radiance, texel_pdf = self._dome_row(d, active)
         free = only < 0
-        pdf = dr.select(free, self._dome_weight, dr.select(only == DOME, 1, 0)) * by_texel
+        pdf = dr.select(free, self._dome_weight, dr.select(only == DOME, 1, 0)) * texel_pdf
         for k in range(MAX_PORTALS):
             weight = dr.gather(mi.Float, self._portal_weights, mi.UInt32(k))
             weight = dr.select(free, weight, dr.select(only == FIRST_PORTAL + k, 1, 0))
             pdf += weight * self._portal_pdf(k, p, d)
         return dr.select(only == SUN, 0, radiance), pdf
 
-    def _portal_direction(self, p: Any, way: Any, uv: Any, active: Any) -> Any:
-        is_portal = active & (way >= FIRST_PORTAL)
-        k = way - FIRST_PORTAL
-        rows = [dr.gather(mi.Vector4f, self._portals, k * 3 + j, is_portal) for j in range(3)]
-        c, a, b = (mi.Vector3f(r[0], r[1], r[2]) for r in rows)
-        to = mi.Point3f(c + uv.x * a + uv.y * b) - p
+    def _portal_direction(self, p: Any, technique: Any, uv: Any, active: Any) -> Any:
+        is_portal = active & (technique >= FIRST_PORTAL)
+        corner, a, b = self._portal(technique - FIRST_PORTAL, is_portal)
+        to = mi.Point3f(corner + uv.x * a + uv.y * b) - p
         length = dr.norm(to)
         return dr.select(length > 1e-6, to / length, mi.Vector3f(0, 1, 0))
 
     def _portal_pdf(self, k: int, p: Any, d: Any) -> Any:
-        rows = [dr.gather(mi.Vector4f, self._portals, mi.UInt32(k * 3 + j)) for j in range(3)]
-        c, a, b = (mi.Vector3f(r[0], r[1], r[2]) for r in rows)
+        corner, a, b = self._portal(mi.UInt32(k))
+        # Intersect the ray with the portal's plane: q in its edges' coordinates.
         n = dr.cross(a, b)
         along = dr.dot(n, d)
-        t = dr.dot(n, mi.Point3f(c) - p) / along
-        q = p + t * d - c
+        t = dr.dot(n, mi.Point3f(corner) - p) / along
+        q = p + t * d - corner
         s, r = dr.dot(q, a) / dr.squared_norm(a), dr.dot(q, b) / dr.squared_norm(b)
         crosses = (t > 0) & (s >= 0) & (s <= 1) & (r >= 0) & (r <= 1) & (dr.abs(along) > 1e-9)
+        # |n| is the portal's area: its pdf per area, times distance^2 / cosine.
         return dr.select(crosses, dr.square(t) / dr.abs(along), 0)
+
+    def _portal(self, k: Any, active: Any = True) -> tuple[Any, ...]:
+        """(corner, first edge, second edge) of a portal."""
+        first = k * _PORTAL_PACKETS
+        rows = [dr.gather(mi.Vector4f, self._portals, first + j, active) for j in range(3)]
+        return tuple(mi.Vector3f(r[0], r[1], r[2]) for r in rows)
 
     def _texel_direction(self, texel: Any, uv: Any) -> Any:
         width = self._dome_width
         row, column = texel // width, texel % width
         phi = (mi.Float(column) + uv.x) * (2 * math.pi) / mi.Float(width)
-        # Uniform in solid angle inside the texel: uniform in the height of the row.
+        # Draw uniformly in solid angle inside the texel: uniform in the height of the row.
         step = math.pi / self._dome_height_f
         top = dr.cos(mi.Float(row) * step)
         bottom = dr.cos((mi.Float(row) + 1) * step)
@@ -231,7 +232,8 @@ class Emitters:
         return mi.Vector3f(s * sin_phi, y, -s * cos_phi)
 
     def _dome_row(self, d: Any, active: Any) -> tuple[Any, Any]:
-        """(radiance blended between texels, pdf of the texel's technique)."""
+        """(radiance blended between texels, pdf of the dome's technique)."""
+        # Look the pdf up in the nearest texel.
         w, h = mi.Int32(self._dome_width), mi.Int32(self._dome_height)
         phi = dr.atan2(d.x, -d.z)
         x = phi * (1 / (2 * math.pi))
@@ -241,6 +243,7 @@ class Emitters:
         nearest_y = dr.clip(mi.Int32(y), 0, h - 1)
         at = mi.UInt32(nearest_y * w + nearest_x)
         pdf = dr.gather(mi.Vector4f, self._dome, at, active)[3]
+        # Blend the radiance of four texels; longitude repeats, latitude ends.
         fx, fy = dr.floor(x - 0.5), dr.floor(y - 0.5)
         tx, ty = x - 0.5 - fx, y - 0.5 - fy
         total = mi.Color3f(0)
@@ -252,32 +255,26 @@ class Emitters:
             total += weight * mi.Color3f(texel[0], texel[1], texel[2])
         return total, pdf
 
-    # Tables
-
     def _set_lamps(self, tables: SceneTables, weights: NDArray[np.float64]) -> None:
+        # One lamp more than there are, so that a house without lamps has a row, too.
+        def padded(kind: Any, rows: NDArray[Any], last: NDArray[Any]) -> Any:
+            return device_array(kind, np.concatenate([rows, last]).ravel())
+
         n = len(tables.lamps)
         self._n_lamps = dr.opaque(mi.UInt32, max(n, 1))
         self._has_lamps = dr.opaque(mi.Bool, n > 0)
-        self._lamp_rows = device_array(
-            mi.Float, np.concatenate([tables.lamp_rows.ravel(), np.ones(4, np.float32)])
-        )
-        self._lamp_first = device_array(
-            mi.UInt32, np.concatenate([tables.lamp_first, tables.lamp_first[-1:]])
-        )
-        self._lamp_faces = device_array(
-            mi.UInt32, np.concatenate([tables.lamp_faces, np.zeros(1, np.uint32)])
-        )
-        alias = [
+        self._lamp_rows = padded(mi.Float, tables.lamp_rows.ravel(), np.ones(4, np.float32))
+        self._lamp_first = padded(mi.UInt32, tables.lamp_first, tables.lamp_first[-1:])
+        self._lamp_faces = padded(mi.UInt32, tables.lamp_faces, np.zeros(1, np.uint32))
+        alias = [np.zeros((0, 2), np.float32)] + [
             alias_rows(np.diff(tables.lamp_areas[a:b], prepend=0.0))
             for a, b in zip(tables.lamp_first[:-1], tables.lamp_first[1:], strict=True)
         ]
-        self._triangle_alias = device_array(
-            mi.Float, np.concatenate([*alias, np.ones((1, 2), np.float32)]).ravel()
-        )
+        self._triangle_alias = padded(mi.Float, np.concatenate(alias), np.ones((1, 2), np.float32))
         self._set_lamp_weights(weights)
 
     def _set_portals(self, portals: NDArray[np.float64]) -> None:
-        rows = np.zeros((MAX_PORTALS, 12), np.float32)
+        rows = np.zeros((MAX_PORTALS, 4 * _PORTAL_PACKETS), np.float32)
         rows[: len(portals), 0:3] = portals[:, 0]
         rows[: len(portals), 4:7] = portals[:, 1] - portals[:, 0]
         rows[: len(portals), 8:11] = portals[:, 3] - portals[:, 0]
@@ -285,7 +282,7 @@ class Emitters:
 
     def _set_lamp_weights(self, weights: NDArray[np.float64]) -> None:
         padded = weights if len(weights) else np.ones(1)
-        self.nearby.with_weights(weights)
+        self.nearby.set_weights(weights)
         self._lamp_weights = device_array(mi.Float, padded.astype(np.float32))
         self._lamp_alias = device_array(mi.Float, alias_rows(padded).ravel())
 
@@ -298,23 +295,32 @@ class Emitters:
         self._sun_weight = dr.opaque(mi.Float, float(weights[SUN]))
         self._dome_weight = dr.opaque(mi.Float, float(weights[DOME]))
 
+    def _set_sun(self, sky: Sky) -> None:
+        self._sun_frame = mi.Frame3f(opaque3(mi.Vector3f, sky.sun_direction))
+        cos_max = math.cos(sky.sun_half_angle_rad)
+        # The disc's radiance gives its irradiance: integral of the cosine over the cone.
+        projected = math.pi * math.sin(sky.sun_half_angle_rad) ** 2
+        self._sun_cos = dr.opaque(mi.Float, cos_max)
+        self._sun_pdf = dr.opaque(mi.Float, 1 / (2 * math.pi * (1 - cos_max)))
+        self._sun_rgb = opaque3(mi.Color3f, sky.sun_irradiance / projected)
+
     def _set_dome(self, sky: Sky) -> None:
         height, width = sky.dome.shape[:2]
-        chance = dome_chances(sky.dome)
-        rows = np.empty((height, width, 4), np.float32)
+        probability = dome_probabilities(sky.dome)
+        rows = np.empty((height, width, 4), np.float32)  # r g b pdf
         rows[..., :3] = sky.dome
-        rows[..., 3] = chance / solid_angles(height, width)[:, None]
+        rows[..., 3] = probability / solid_angles(height, width)[:, None]
         self._dome = device_array(mi.Float, rows.ravel())
-        self._dome_alias = device_array(mi.Float, alias_rows(chance.ravel()).ravel())
+        self._dome_alias = device_array(mi.Float, alias_rows(probability.ravel()).ravel())
         self._n_texels = dr.opaque(mi.UInt32, height * width)
         self._dome_width = dr.opaque(mi.UInt32, width)
         self._dome_height = dr.opaque(mi.UInt32, height)
         self._dome_height_f = dr.opaque(mi.Float, float(height))
 
 
-def _by_place(at: ReferencePoint) -> Any:
-    """Chance that a lamp is chosen by where it is."""
-    return dr.select(at.total > 0, mi.Float(BY_PLACE), 0)
+def _nearby_share(reference: ReferencePoint) -> Any:
+    """Chance that a lamp is chosen by where it is; 0 where none is nearby."""
+    return dr.select(reference.total > 0, mi.Float(NEARBY_SHARE), 0)
 
 
 def _cone(uv: Any, cos_max: Any) -> Any:
@@ -322,10 +328,11 @@ def _cone(uv: Any, cos_max: Any) -> Any:
     return warp(uv, cos_max)
 
 
-def dome_chances(dome: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(H, W) chance of each texel: brightness (of it and its neighbours) times solid angle."""
+def dome_probabilities(dome: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(H, W) probability of each texel: brightness (of it and its neighbours) times solid angle."""
     height, width = dome.shape[:2]
     luminance = np.asarray(dome, np.float64) @ LUMINANCE
+    # Take the brightest of the texels that the radiance is blended from.
     widest = luminance
     for shift in (-1, 1):
         widest = np.maximum(widest, np.roll(luminance, shift, 1))

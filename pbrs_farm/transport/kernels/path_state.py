@@ -12,7 +12,7 @@ import numpy as np
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
-from pbrs_farm.transport.guiding.nearby_lamps import Near, ReferencePoint, no_reference
+from pbrs_farm.transport.guiding.nearby_lamps import NearbyLamps, ReferencePoint, no_reference
 from pbrs_farm.transport.kernels.bsdf import Bsdf
 from pbrs_farm.transport.kernels.device_scene import (
     DeviceScene,
@@ -119,7 +119,7 @@ class DirectLightSample(NamedTuple):
     light: Any
     d: Any
     strength: Any
-    lamp: Any = None
+    emitter: Any = None
 
 
 def device_camera(camera: Camera) -> DeviceCamera:
@@ -165,7 +165,7 @@ def camera_path(camera: DeviceCamera, x: Any, y: Any) -> PathState:
     )
 
 
-def surface_path(p: Any, n: Any, d: Any, pdf: Any, near: Near) -> PathState:
+def surface_path(p: Any, n: Any, d: Any, pdf: Any, near: NearbyLamps) -> PathState:
     """The walk that leaves a matte surface at p in direction d, drawn with a pdf."""
     return PathState(
         o=offset_ray_origin(p, n),
@@ -173,7 +173,7 @@ def surface_path(p: Any, n: Any, d: Any, pdf: Any, near: Near) -> PathState:
         beta=mi.Color3f(1),
         depth=mi.UInt32(1),
         n_nulls=mi.UInt32(0),
-        reference=near.at,
+        reference=near.reference,
         bsdf_pdf=mi.Float(pdf),
         guiding_odds=mi.Float(0),
         target_face=mi.UInt32(NO_FACE),

@@ -12,16 +12,16 @@ import drjit as dr
 import mitsuba as mi
 
 from pbrs_farm.transport.guiding.guided_rays import (
-    cone_chance,
-    face_chance,
-    guide_at,
-    guided,
+    cone_technique_pdf,
+    guiding_at,
     mis_weight,
     reflection_probability,
+    sample_guided,
     survival_boost,
+    target_technique_share,
 )
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
-from pbrs_farm.transport.guiding.nearby_lamps import Near, no_reference
+from pbrs_farm.transport.guiding.nearby_lamps import NearbyLamps, no_reference
 from pbrs_farm.transport.kernels.bsdf import (
     Bsdf,
     evaluate_bsdf,
@@ -85,7 +85,7 @@ def advance(
     near = None
     if emitter_filter.indoor is not None:
         is_sheet = dr.max(m.tau) > 0
-        near = emitters.nearby.seen(
+        near = emitters.nearby.at_vertex(
             si.p, dr.select(is_sheet, 0, si.ng), emitter_filter.indoor, solid
         )
     guiding = near if may_reconnect is False else None
@@ -112,7 +112,7 @@ def advance(
     guide = None
     if guiding is not None:
         may_aim = go_on & (depth + 1 < fields.max_depth)
-        guide = guide_at(guiding, m, path.beta, may_aim)
+        guide = guiding_at(guiding, m, path.beta, may_aim)
     bsdf_share = 1.0 if guide is None else 1 - guide.share
     out, lamp = direct(
         scene,
@@ -129,15 +129,15 @@ def advance(
         is_view_independent,
     )
 
-    # Bsdf. Glass and mirrors keep one direction; what passes glass straight is no vertex.
+    # Scatter. Glass and mirrors keep one direction; what passes glass straight is no vertex.
     uv = sampler.get_2d(dim + _SCATTER)
     is_guided, target = mi.Bool(False), mi.UInt32(NO_FACE)
     if guide is None:
         ahead = mi.Vector3f(frame.to_world(sample(m, wi, lobe, uv)))
     else:
-        to = guided(guide, scene, emitters, si, lobe, uv)
-        is_guided, target = to.is_guided, to.target
-        by_surface = mi.Vector3f(frame.to_world(sample(m, wi, to.own, uv)))
+        to = sample_guided(guide, scene, emitters, si, lobe, uv)
+        is_guided, target = to.is_guided, to.target_face
+        by_surface = mi.Vector3f(frame.to_world(sample(m, wi, to.u_bsdf, uv)))
         ahead = dr.select(is_guided, to.d, by_surface)
         go_on &= to.valid
     wo = frame.to_local(ahead)
@@ -163,8 +163,8 @@ def advance(
     chance = bsdf_share * dr.select(tested, dr.maximum(q, 1e-6), 1)
     aimed = mi.Float(0)
     if guide is not None:
-        chance += cone_chance(guide, ahead) / dr.maximum(pdf, 1e-30)
-        aimed = face_chance(guide) / (chance * pdf)
+        chance += cone_technique_pdf(guide, ahead) / dr.maximum(pdf, 1e-30)
+        aimed = target_technique_share(guide) / (chance * pdf)
     beta = dr.select(bounced, beta / chance, beta)
 
     weighed = pdf * bsdf_share
@@ -172,7 +172,7 @@ def advance(
         weighed = dr.select(is_view_independent, view_independent_pdf(m, si.ng, ahead), pdf)
     d = dr.select(bounced, ahead, dr.select(mirrored, mi.Vector3f(back), path.d))
     outward = dr.select(dr.dot(d, si.ng) > 0, si.ng, -si.ng)
-    here = no_reference(si.p) if near is None else near.at
+    here = no_reference(si.p) if near is None else near.reference
     following = PathState(
         o=offset_ray_origin(si.p, outward),
         d=d,
@@ -212,7 +212,7 @@ def direct(
     sampler: Sampler,
     dim: Any,
     emitter_filter: EmitterFilter,
-    near: Near | None,
+    near: NearbyLamps | None,
     active: Any,
     bsdf_share: Any = 1.0,
     is_view_independent: Any = False,
@@ -273,7 +273,9 @@ def _lit(
     far = dr.select(is_near, reach * (1 - 1e-4), dr.inf)
     clear = scene.transmittance(begin, way, far, lit)
     strength = dr.select(lit, to.radiance * clear * weight, 0)
-    return DirectLightSample(dr.select(lit & faces, value * strength, 0), to.d, strength, to.lamp)
+    return DirectLightSample(
+        dr.select(lit & faces, value * strength, 0), to.d, strength, to.emitter
+    )
 
 
 def _met(
@@ -295,8 +297,10 @@ def _met(
         counts |= False if asked is None else asked == -1
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     if emitter_filter.outdoor is not None:
-        sun, sun_pdf = emitters.sun(path.d, emitter_filter.outdoor)
-        dome, dome_pdf = emitters.dome(path.reference.p, path.d, emitter_filter.outdoor, missed)
+        sun, sun_pdf = emitters.eval_sun(path.d, emitter_filter.outdoor)
+        dome, dome_pdf = emitters.eval_dome(
+            path.reference.p, path.d, emitter_filter.outdoor, missed
+        )
         # The pilot of a portal counts what is drawn through it only.
         wanted = (emitter_filter.outdoor > -2) & (emitter_filter.outdoor < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & wanted
@@ -304,7 +308,7 @@ def _met(
         outdoor = dr.select(sees_sky, path.beta * sky, 0)
     if emitter_filter.indoor is not None:
         glows = si.valid & counts & (emitter_filter.indoor > -2) & (si.emitter != NO_LAMP)
-        glow, lamp_pdf = emitters.hit_lamp(
+        glow, lamp_pdf = emitters.eval_lamp(
             si.emitter,
             path.reference,
             dr.norm(si.p - path.reference.p),

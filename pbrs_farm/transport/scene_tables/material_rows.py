@@ -18,6 +18,8 @@ from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.recipe import Recipe
 
 MATERIAL_FLOATS: Final = 16
+KD, F0, ALPHA, TAU, KIND = slice(0, 3), slice(4, 7), 7, slice(8, 11), 11
+FIRST_TEXEL, TEXTURE_SIZE, IS_CUT = 12, slice(13, 15), 15
 
 SURFACE, MIRROR, GLASS, HOLE = 0, 1, 2, 3
 """Kinds of the kernels: diffuse, specular and translucent; delta mirror; thin glass; nothing."""
@@ -72,9 +74,9 @@ def material_rows(
                 scaled.append(material.name)
         slot = packed.slots.get(material.texture_id or "")
         if slot is not None:
-            row[12] = np.array([slot[0]], np.uint32).view(np.float32)[0]
-            row[13:15] = slot[1:]
-            row[15] = float(material.alpha_cutout)
+            row[FIRST_TEXEL] = np.array([slot[0]], np.uint32).view(np.float32)[0]
+            row[TEXTURE_SIZE] = slot[1:]
+            row[IS_CUT] = float(material.alpha_cutout)
         rows[index] = row
     notes = [f"material {n!r}: Kd + Ks above 1, scaled to conserve energy" for n in scaled]
     return rows, notes
@@ -92,19 +94,19 @@ def _physical(material: Material, recipe: Recipe) -> tuple[NDArray[np.float32], 
     kd = np.minimum(kd, MAX_ALBEDO)
     ks_encoded = np.clip(np.nan_to_num(material.specular), 0, 1)
     ks = linear_from_srgb(ks_encoded)
-    row[11] = SURFACE
+    row[KIND] = SURFACE
     if material.kind is MaterialKind.MIRROR:
         tint = ks if ks @ LUMINANCE > 0.3 else np.full(3, _MIRROR_REFLECTANCE)
-        row[4:7], row[11] = np.minimum(tint, 0.98), MIRROR
+        row[F0], row[KIND] = np.minimum(tint, 0.98), MIRROR
         return row, False
     if material.kind is MaterialKind.GLASS:
         # Opacity is how much of the glass's own colour the light takes on.
-        row[8:11], row[11] = 1 - material.opacity * (1 - kd), GLASS
+        row[TAU], row[KIND] = 1 - material.opacity * (1 - kd), GLASS
         return row, False
     if material.kind is MaterialKind.SHADE:
         transmitted = recipe.repair.shade_transmission * kd
-        row[8:11] = transmitted
-        row[0:3] = np.minimum(0.9 * kd, 1 - recipe.repair.shade_transmission) * 0.9
+        row[TAU] = transmitted
+        row[KD] = np.minimum(0.9 * kd, 1 - recipe.repair.shade_transmission) * 0.9
         return row, False
     too_much = bool(np.any(kd + ks > 1 + 1e-6))
     has_coat = material.shininess > 1 and float(ks.max()) > 0
@@ -118,10 +120,10 @@ def _physical(material: Material, recipe: Recipe) -> tuple[NDArray[np.float32], 
         kd, f0 = kd * scale, ks * scale
     else:
         f0 = 0.08 * ks_encoded
-    row[0:3] = kd
+    row[KD] = kd
     if has_coat:
-        row[4:7] = f0
-        row[7] = max(math.sqrt(2 / (min(material.shininess, 1e4) + 2)), _MIN_ALPHA)
+        row[F0] = f0
+        row[ALPHA] = max(math.sqrt(2 / (min(material.shininess, 1e4) + 2)), _MIN_ALPHA)
     return row, too_much and has_coat
 
 
@@ -129,8 +131,8 @@ def _released(material: Material) -> NDArray[np.float32]:
     """The preset `released`: diffuse, Kd taken as linear, a texture replaces it, glass is nothing."""
     row = np.zeros(MATERIAL_FLOATS, np.float32)
     transparent = material.opacity < 1 or material.kind in (MaterialKind.GLASS, MaterialKind.PANE)
-    row[11] = HOLE if transparent else SURFACE
-    row[0:3] = 1.0 if material.texture_id else np.clip(np.nan_to_num(material.diffuse), 0, 1)
+    row[KIND] = HOLE if transparent else SURFACE
+    row[KD] = 1.0 if material.texture_id else np.clip(np.nan_to_num(material.diffuse), 0, 1)
     return row
 
 
