@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from typing import Final
 
 import pbrs_farm
-from pbrs_farm.commands.arguments import Handler, complain
+from pbrs_farm.commands.arguments import Handler, warn
 from pbrs_farm.core.errors import PbrsError
 
 MODULES: Final = {
@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     verb = words[0] if words else ""
     module = next((name for name, verbs in MODULES.items() if verb in verbs), None)
     if module in _OF_THE_FARM and not _has_farm():
-        complain(f'{verb} needs celery and redis: pip install "pbrs-farm[workers]"')
+        warn(f'{verb} needs celery and redis: pip install "pbrs-farm[workers]"')
         return 1
     parser = build_parser(module)
     args = parser.parse_args(words)
@@ -55,10 +55,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except PbrsError as error:
         if args.debug:
             traceback.print_exc()
-        complain(str(error))
+        warn(str(error))
         return 1
     except KeyboardInterrupt:
-        complain("interrupted; the same command goes on where it stopped")
+        warn("interrupted; the same command goes on where it stopped")
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,6 +1,6 @@
-"""What the verbs share: how they print, and the words that name a recipe or a farm. Effects: prints.
+"""What the verbs share: how they print, and the options that several of them take. Effects: prints.
 
-Imports little, for every command does: a recipe's models only where a recipe is asked for.
+It imports little, since every command imports it: a recipe's models only where one is asked for.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from pbrs_farm.core.errors import BadInput
 
@@ -23,20 +23,24 @@ Handler = Callable[[argparse.Namespace], int]
 Verb = Callable[[str, Handler, str], argparse.ArgumentParser]
 """(name, handler, help) -> the verb's parser."""
 
+HOME: Final = "file, SUNCG house folder, example home's name, or `builtin`"
+VIEW: Final = "a view's folder: OUT/houses/<house>/views/<view>"
+"""Help of arguments that name a home, and a view."""
 
-def complain(text: str) -> None:
-    """A line on standard error."""
+
+def warn(text: str) -> None:
+    """Write a line to standard error."""
     sys.stderr.write(f"pbrs-farm: {text}\n")
 
 
-def say(text: str = "") -> None:
-    """A line on standard output."""
+def echo(text: str = "") -> None:
+    """Write a line to standard output."""
     sys.stdout.write(text + "\n")
 
 
-def dump(value: Any) -> None:
-    """A value as JSON on standard output."""
-    say(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False))
+def echo_json(value: Any) -> None:
+    """Write a value as JSON to standard output."""
+    echo(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False))
 
 
 def counted(n: int, noun: str) -> str:
@@ -44,75 +48,119 @@ def counted(n: int, noun: str) -> str:
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
+def at_least(name: str, value: int, least: int) -> None:
+    """Raise BadInput, naming the option, where its value is below the least that makes sense."""
+    if value < least:
+        raise BadInput(name, str(value), f"expected {least} or more")
+
+
+def add_home(p: argparse.ArgumentParser) -> None:
+    """The home that a verb looks at."""
+    p.add_argument("home", help=HOME)
+
+
+def add_cameras(p: argparse.ArgumentParser) -> None:
+    """Where viewpoints come from (cameras.source)."""
+    p.add_argument("--cameras", choices=("sampled", "stored"), help="where viewpoints come from")
+
+
 def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
-    """The words of a recipe."""
+    """The recipe by name, and what overrides its fields."""
     from pbrs_farm.core.recipe import RECIPE_NAMES
 
-    p.add_argument(
-        "--recipe", default=default, help=f"{', '.join(RECIPE_NAMES)} (default {default})"
-    )
-    p.add_argument(
-        "--set", action="append", default=[], metavar="GROUP.FIELD=VALUE", help="override a field"
-    )
-    p.add_argument("--seed", type=int, default=None, help="the recipe's seed (default 0)")
-    p.add_argument("--size", default=None, metavar="WxH", help="picture size, e.g. 640x480")
-    p.add_argument("--strict", action="store_true", help="recoverable faults of a home are errors")
+    add = p.add_argument
+    add("--recipe", default=default, help=f"{', '.join(RECIPE_NAMES)} (default {default})")
+    add_set(p, "GROUP.FIELD=VALUE", "override a field")
+    add("--seed", type=int, help="the recipe's seed (default 0)")
+    add("--size", metavar="WxH", help="picture size, e.g. 640x480")
+    add("--strict", action="store_true", help="recoverable faults of a home are errors")
+
+
+def add_set(p: argparse.ArgumentParser, metavar: str, text: str) -> None:
+    """--set, repeatable: fields of the recipe."""
+    p.add_argument("--set", action="append", default=[], metavar=metavar, help=text)
 
 
 def add_light(p: argparse.ArgumentParser) -> None:
-    """How long a view's light is carried and by what parts: short forms of fields of the recipe."""
-    p.add_argument(
-        "--noise", default=None, metavar="E",
+    """How long light is traced and which groups are stored: short forms of the recipe's fields."""
+    add = p.add_argument
+    add(
+        "--noise", metavar="E",
         help="add samples until the estimated relative error is below E, e.g. 0.05"
         " (light.noise; path only)",
     )  # fmt: skip
-    p.add_argument(
-        "--time-budget", default=None, metavar="S",
+    add(
+        "--time-budget", metavar="S",
         help="seconds of light a view, instead of samples or mutations (light.time_budget_s)",
     )  # fmt: skip
-    p.add_argument(
-        "--groups", choices=("two", "lamps"), default=None,
+    add(
+        "--groups", choices=("two", "lamps"),
         help="lamps: store the light of each lamp, too, for `relight VIEW --lamp` (light.groups;"
         " path only; default two: outdoor and indoor)",
     )  # fmt: skip
 
 
+def add_output(p: argparse.ArgumentParser) -> None:
+    """What of each house is made: lighting modes, label layers, number of views."""
+    add = p.add_argument
+    modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all)"
+    add("--modes", nargs="+", default=[], metavar="MODE", help=modes)
+    layers = "optional layers to write too"
+    add("--layers", nargs="+", default=[], metavar="LAYER", help=layers)
+    add("--views", type=int, default=0, metavar="N", help="at most N views a house")
+
+
+def home_arguments(homes: list[str], houses: str | None) -> list[str]:
+    """The homes asked for; with --houses, those of the list below the SUNCG root."""
+    from pbrs_farm.read.source import suncg_list
+
+    if not houses:
+        return list(homes)
+    if len(homes) != 1:
+        raise BadInput("--houses", houses, "needs the SUNCG root as the one HOME")
+    return suncg_list(Path(homes[0]), Path(houses))
+
+
+_SHORT_FORMS: Final = {
+    "noise": "light.noise",
+    "time_budget": "light.time_budget_s",
+    "groups": "light.groups",
+    "seed": "seed",
+    "cameras": "cameras.source",
+    "per_sector": "cameras.per_sector",
+}
+"""Options that are short forms -> the recipe's field."""
+
+
 def recipe_of(args: argparse.Namespace) -> Recipe:
-    """The recipe named by the words of a command; raises BadRecipe."""
+    """The recipe that a command's options name; raises BadRecipe."""
     from pbrs_farm.core.recipe import recipe_from_name
 
     overrides: dict[str, str] = {}
-    for word in args.set:
-        path, equals, text = word.partition("=")
+    for pair in args.set:
+        path, equals, text = pair.partition("=")
         if not equals:
-            raise BadInput("--set", word, "expected group.field=value")
+            raise BadInput("--set", pair, "expected group.field=value")
         overrides[path] = text
+    # Let the options that are short forms of fields win over --set.
     if args.size is not None:
         width, _, height = args.size.partition("x")
         overrides |= {"image.width_px": width, "image.height_px": height}
-    if getattr(args, "noise", None) is not None:
-        overrides["light.noise"] = args.noise
-    if getattr(args, "time_budget", None) is not None:
-        overrides["light.time_budget_s"] = args.time_budget
-    if getattr(args, "groups", None) is not None:
-        overrides["light.groups"] = args.groups
-    if args.seed is not None:
-        overrides["seed"] = str(args.seed)
+    for option, field in _SHORT_FORMS.items():
+        value = getattr(args, option, None)
+        if value is not None:
+            overrides[field] = str(value)
     if args.strict:
         overrides["read.strict"] = "true"
-    if getattr(args, "cameras", None):
-        overrides["cameras.source"] = args.cameras
     if getattr(args, "camera_file", None):
         overrides |= {"cameras.source": "file", "cameras.file": json.dumps(str(args.camera_file))}
-    if getattr(args, "per_sector", None):
-        overrides["cameras.per_sector"] = str(args.per_sector)
     if getattr(args, "exact", False):
         overrides["cameras.exact"] = "true"
     return recipe_from_name(args.recipe, overrides)
 
 
 def add_farm(p: argparse.ArgumentParser) -> None:
-    """The words every verb of the farm takes."""
+    """The options that every verb of the farm takes."""
     p.add_argument("--store", default="", metavar="URL", help="default: $PBRS_STORE")
     p.add_argument("--json", action="store_true", help="for machines")
 

@@ -6,7 +6,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import Verb, add_recipe, dump, recipe_of, say
+from pbrs_farm.commands.arguments import (
+    Verb,
+    add_cameras,
+    add_home,
+    add_recipe,
+    echo,
+    echo_json,
+    recipe_of,
+)
 
 if TYPE_CHECKING:
     from pbrs_farm.sample import CameraReport
@@ -15,43 +23,23 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add repair and cameras."""
-    p = verb(
-        "repair",
-        _repair,
-        "read and repair a home: bundle, report in plain words, a cut through the walls",
-    )
-    p.add_argument("home", help="file, SUNCG house folder, example home's name, or `builtin`")
-    p.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        help="folder for house.glb, house.json, repair.json, cut_<level>.svg",
-    )
+    text = "read and repair a home: bundle, report in plain words, a cut through the walls"
+    p = verb("repair", _repair, text)
+    add_home(p)
+    text = "folder for house.glb, house.json, repair.json, cut_<level>.svg"
+    p.add_argument("--out", type=Path, required=True, help=text)
     add_recipe(p)
-    p = verb("cameras", _cameras, "choose views and say why every other candidate was refused")
-    p.add_argument("home", help="file, SUNCG house folder, example home's name, or `builtin`")
-    p.add_argument(
-        "--map",
-        type=Path,
-        default=None,
-        metavar="FILE",
-        help="floor plan with candidates, refusals and winners: FILE.png and FILE.svg",
-    )
-    p.add_argument(
-        "--out",
-        type=Path,
-        default=None,
-        metavar="FILE",
-        help="write the views to FILE (cameras.json)",
-    )
-    p.add_argument(
-        "--per-sector", type=int, default=None, metavar="K", help="K diverse views a sector"
-    )
-    p.add_argument("--exact", action="store_true", help="score every candidate at full size")
-    p.add_argument(
-        "--cameras", choices=("sampled", "stored"), default=None, help="where viewpoints come from"
-    )
-    p.add_argument("--json", action="store_true", help="views and report as JSON")
+
+    p = verb("cameras", _cameras, "choose views and say why every other candidate was rejected")
+    add_home(p)
+    add = p.add_argument
+    text = "floor plan with candidates, rejections and winners: FILE.png and FILE.svg"
+    add("--map", type=Path, metavar="FILE", help=text)
+    add("--out", type=Path, metavar="FILE", help="write the views to FILE (cameras.json)")
+    add("--per-sector", type=int, metavar="K", help="K diverse views a sector")
+    add("--exact", action="store_true", help="score every candidate at full size")
+    add_cameras(p)
+    add("--json", action="store_true", help="views and report as JSON")
     add_recipe(p)
 
 
@@ -66,17 +54,19 @@ def _repair(args: argparse.Namespace) -> int:
     recipe = recipe_of(args)
     source = resolve(args.home)
     house, report = repaired_house(source, recipe)
+    # Write the repaired house and what was done to it.
     store = FolderStore(args.out)
     glb, description = bundle_from_house(house)
     store.put("house.glb", glb)
     store.put("house.json", description)
     store.put("repair.json", json_bytes(report))
+    # Draw each level's walls before and after.
     before = read_house(source, recipe.read)
     cuts = [f"cut_{level.id}.svg" for level in house.levels]
     for level, name in zip(house.levels, cuts, strict=True):
         store.put(name, cut_picture(before, house, level.id).encode())
-    say(plain_words(report))
-    say(f"{args.out}: house.glb house.json repair.json {' '.join(cuts)}")
+    echo(plain_words(report))
+    echo(f"{args.out}: house.glb house.json repair.json {' '.join(cuts)}")
     return 1 if report.is_leaking else 0
 
 
@@ -105,19 +95,21 @@ def _cameras(args: argparse.Namespace) -> int:
         folder.put(f"{name}.png", png_from_array(camera_map_rgb(house, sampling)))
         folder.put(f"{name}.svg", camera_map_svg(house, sampling).encode())
     if args.json:
-        dump(document)
+        echo_json(document)
     else:
-        _tell(sampling.report)
+        _echo_report(sampling.report)
     return 0
 
 
-def _tell(report: CameraReport) -> None:
+def _echo_report(report: CameraReport) -> None:
+    """Print each room and, of each of its sectors, the outcome and the rejections by rule."""
     for room in report.rooms:
-        say(f"{room.room_id} {room.name}" + (f": no cameras: {room.reason}" if room.reason else ""))
+        reason = f": no cameras: {room.reason}" if room.reason else ""
+        echo(f"{room.room_id} {room.name}{reason}")
         for s in room.sectors:
-            refused = ", ".join(f"{n} {why}" for why, n in s.refused.items() if n)
-            say(f"  sector {s.sector}: {_outcome(s)}; {s.n_candidates} candidates: {refused}")
-    say(f"{report.n_views} views of {report.n_candidates} candidates")
+            rejected = ", ".join(f"{n} {rule}" for rule, n in s.refused.items() if n)
+            echo(f"  sector {s.sector}: {_outcome(s)}; {s.n_candidates} candidates: {rejected}")
+    echo(f"{report.n_views} views of {report.n_candidates} candidates")
 
 
 def _outcome(sector: SectorReport) -> str:

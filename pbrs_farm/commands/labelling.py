@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pbrs_farm.commands.arguments import Verb, dump, say
+from pbrs_farm.commands.arguments import VIEW, Verb, echo, echo_json
 from pbrs_farm.core.errors import BadInput
 
 FORMS = ("coco", "hdf5", "webdataset", "released")
@@ -14,16 +14,19 @@ FORMS = ("coco", "hdf5", "webdataset", "released")
 def add_verbs(verb: Verb) -> None:
     """Add export, classes and label-sheet."""
     p = verb("export", _export, "finished views in the form another tool reads")
-    p.add_argument("folder", type=Path)
-    p.add_argument("--to", required=True, choices=FORMS, help="docs/formats.md tells the forms")
-    p.add_argument("--out", type=Path, default=None, help="new folder (default FOLDER_<form>)")
-    p.add_argument("--selection", default=None, metavar="RUN", help="only what this run keeps")
+    add = p.add_argument
+    add("folder", type=Path)
+    add("--to", required=True, choices=FORMS, help="docs/formats.md describes the forms")
+    add("--out", type=Path, help="new folder (default FOLDER_<form>)")
+    add("--selection", metavar="RUN", help="only what this run keeps")
+
     p = verb("classes", _classes, "how often each class is seen, and what has no class")
     p.add_argument("folder", type=Path)
     p.add_argument("--json", action="store_true", help="as JSON")
+
     p = verb("label-sheet", _label_sheet, "a view's labels over its picture, an edge magnified")
-    p.add_argument("view", type=Path, help="a view's folder: OUT/houses/<house>/views/<view>")
-    p.add_argument("--out", type=Path, default=None, help="PNG (default VIEW_labels.png here)")
+    p.add_argument("view", type=Path, help=VIEW)
+    p.add_argument("--out", type=Path, help="PNG (default VIEW_labels.png here)")
 
 
 def _export(args: argparse.Namespace) -> int:
@@ -31,7 +34,7 @@ def _export(args: argparse.Namespace) -> int:
 
     out = args.out or Path(f"{args.folder.resolve().name}_{args.to}")
     n_views, n_files = export(args.folder, out, args.to, selection=args.selection)
-    say(f"{out}: {n_views} views, {n_files} files")
+    echo(f"{out}: {n_views} views, {n_files} files")
     return 0
 
 
@@ -40,9 +43,9 @@ def _classes(args: argparse.Namespace) -> int:
 
     statistics = class_statistics(args.folder)
     if args.json:
-        dump(statistics.model_dump(mode="json"))
+        echo_json(statistics.model_dump(mode="json"))
     else:
-        say(statistics.text())
+        echo(statistics.text())
     return 0
 
 
@@ -59,5 +62,5 @@ def _label_sheet(args: argparse.Namespace) -> int:
         raise BadInput(args.view, "", "no view's folder", hint="OUT/houses/<house>/views/<view>")
     out = args.out or Path(f"{folder.name}_labels.png")
     FolderStore(out.parent).put(out.name, png_from_array(label_sheet(view)))
-    say(str(out))
+    echo(str(out))
     return 0

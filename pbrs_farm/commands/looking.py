@@ -7,7 +7,7 @@ import json
 import os
 from dataclasses import asdict
 
-from pbrs_farm.commands.arguments import Verb, dump, say
+from pbrs_farm.commands.arguments import Verb, echo, echo_json
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, recipe_from_name
 
 
@@ -32,15 +32,15 @@ def _doctor(args: argparse.Namespace) -> int:
     findings = examine(args.store, args.redis)
     fine = can_run(findings)
     if args.json:
-        dump({"can_run": fine, "findings": [asdict(f) for f in findings]})
+        echo_json({"can_run": fine, "findings": [asdict(f) for f in findings]})
         return 0 if fine else 1
     for f in findings:
         mark = {"ok": "ok      ", "degraded": "degraded", "missing": "MISSING "}[f.state]
-        say(f"{mark}  {f.part:<20} {f.text}")
+        echo(f"{mark}  {f.part:<20} {f.text}")
         if f.state != "ok" and f.remedy:
-            say(f"{'':<32}-> {f.remedy}")
-    say()
-    say(
+            echo(f"{'':<32}-> {f.remedy}")
+    echo()
+    echo(
         "This machine can render." if fine else "This machine cannot render yet: see MISSING above."
     )
     return 0 if fine else 1
@@ -53,16 +53,16 @@ def _homes(args: argparse.Namespace) -> int:
         homes.fetch()
     rows = homes.example_homes()
     if args.json:
-        dump([asdict(row) for row in rows])
+        echo_json([asdict(row) for row in rows])
         return 0
     package = homes.cached()
     for row in rows:
-        say(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
-    say()
-    say(f"fetched: {package.label}" if package else "not fetched yet: pbrs-farm homes --fetch")
+        echo(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
+    echo()
+    echo(f"fetched: {package.label}" if package else "not fetched yet: pbrs-farm homes --fetch")
     if package and package.note:
-        say(package.note)
-    say("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
+        echo(package.note)
+    echo("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
     return 0
 
 
@@ -71,28 +71,28 @@ def _skies(_args: argparse.Namespace) -> int:
 
     folder = fetch_skies()
     for path in sorted(folder.glob("*.exr")):
-        say(str(path))
-    say(f"use them with: --set sky.kind=panorama --set sky.panoramas={folder}")
+        echo(str(path))
+    echo(f"use them with: --set sky.kind=panorama --set sky.panoramas={folder}")
     return 0
 
 
 def _recipes(args: argparse.Namespace) -> int:
     recipe = recipe_from_name(args.name)
-    say(f"# recipe {args.name}; --set group.field=value overrides any field")
+    echo(f"# recipe {args.name}; --set group.field=value overrides any field")
     for group, info in Recipe.model_fields.items():
         value = getattr(recipe, group)
         if not hasattr(type(value), "model_fields"):
-            say(f"{group} = {json.dumps(value)}")
+            echo(f"{group} = {json.dumps(value)}")
             continue
-        say(f"\n# {info.annotation.__doc__ if info.annotation else ''}")
+        echo(f"\n# {info.annotation.__doc__ if info.annotation else ''}")
         for name, field in type(value).model_fields.items():
             text = f"{group}.{name} = {json.dumps(getattr(value, name))}"
-            say(f"{text:<48} # {field.description}" if field.description else text)
+            echo(f"{text:<48} # {field.description}" if field.description else text)
     return 0
 
 
 def _layers(_args: argparse.Namespace) -> int:
     from pbrs_farm.core.layers import table
 
-    say(table())
+    echo(table())
     return 0

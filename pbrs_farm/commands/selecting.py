@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import Verb, dump, say
+from pbrs_farm.commands.arguments import Verb, add_set, echo, echo_json
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, Recipe, SelectionFields, recipe_from_name
@@ -18,64 +18,42 @@ if TYPE_CHECKING:
 def add_verbs(verb: Verb) -> None:
     """Add reference and select."""
     p = verb("reference", _reference, "photographs -> a small reference file of histograms")
-    p.add_argument("action", choices=("build",))
-    p.add_argument("source", type=Path, help="folder of RGB-D pairs, or nyu_depth_v2_labeled.mat")
-    p.add_argument("--out", type=Path, required=True, help="the reference file to write")
-    p.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="FIELD=VALUE",
-        help="histogram.FIELD or selection.FIELD",
-    )
-    _add_photo_words(p)
+    add = p.add_argument
+    add("action", choices=("build",))
+    add("source", type=Path, help="folder of RGB-D pairs, or nyu_depth_v2_labeled.mat")
+    add("--out", type=Path, required=True, help="the reference file to write")
+    add_set(p, "FIELD=VALUE", "histogram.FIELD or selection.FIELD")
+    _add_photographs(p)
+
     p = verb("select", _select, "keep the views that look like photographs (paper section 3.3)")
-    p.add_argument("folder", help="output folder or store URL")
-    p.add_argument(
-        "--reference",
-        type=Path,
-        required=True,
-        help="a reference file, a folder of RGB-D pairs, or a .mat",
-    )
-    p.add_argument("--run", default="default", help="name of the selection's files")
-    p.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="FIELD=VALUE",
-        help="selection.FIELD, e.g. selection.min_depth=0.6",
-    )
-    p.add_argument("--score-mode", default=None, help="mode to score where a view lacks mlt_il_ol")
-    p.add_argument(
-        "--per-room-cap", type=int, default=None, metavar="N", help="best views kept per room"
-    )
-    p.add_argument(
-        "--balance", choices=("none", "classes"), default=None, help="keep classes in balance"
-    )
-    p.add_argument("--report", action="store_true", help="write selection/<run>.html too")
-    p.add_argument("--json", action="store_true", help="the summary as JSON")
-    _add_photo_words(p)
+    add = p.add_argument
+    add("folder", help="output folder or store URL")
+    text = "a reference file, a folder of RGB-D pairs, or a .mat"
+    add("--reference", type=Path, required=True, help=text)
+    add("--run", default="default", help="name of the selection's files")
+    add_set(p, "FIELD=VALUE", "selection.FIELD, e.g. selection.min_depth=0.6")
+    add("--score-mode", help="mode to score where a view lacks mlt_il_ol")
+    add("--per-room-cap", type=int, metavar="N", help="best views kept per room")
+    add("--balance", choices=("none", "classes"), help="keep classes in balance")
+    add("--report", action="store_true", help="write selection/<run>.html too")
+    add("--json", action="store_true", help="the summary as JSON")
+    _add_photographs(p)
 
 
-def _add_photo_words(p: argparse.ArgumentParser) -> None:
-    p.add_argument(
-        "--depth-scale",
-        type=float,
-        default=None,
-        help="depth units per metre (default by file kind)",
-    )
-    p.add_argument(
-        "--sun-rgbd", action="store_true", help="undo SUN RGB-D's rotation of depth bits"
-    )
-    p.add_argument("--no-crop", action="store_true", help="keep the registration border")
+def _add_photographs(p: argparse.ArgumentParser) -> None:
+    """How photographs are read."""
+    add = p.add_argument
+    add("--depth-scale", type=float, help="depth units per metre (default by file kind)")
+    add("--sun-rgbd", action="store_true", help="undo SUN RGB-D's rotation of depth bits")
+    add("--no-crop", action="store_true", help="keep the registration border")
 
 
-def _overrides(words: list[str]) -> dict[str, str]:
+def _overrides(arguments: list[str]) -> dict[str, str]:
     pairs = {}
-    for word in words:
-        name, equals, text = word.partition("=")
+    for pair in arguments:
+        name, equals, text = pair.partition("=")
         if not equals or not name.startswith(("histogram.", "selection.")):
-            raise BadInput("--set", word, "expected histogram.FIELD=value or selection.FIELD=value")
+            raise BadInput("--set", pair, "expected histogram.FIELD=value or selection.FIELD=value")
         pairs[name] = text
     return pairs
 
@@ -98,8 +76,8 @@ def _reference(args: argparse.Namespace) -> int:
     recipe = recipe_from_name("fast", _overrides(args.set))
     reference = _built(args, recipe.histogram, recipe.selection)
     FolderStore(args.out.parent).put(args.out.name, bytes_from_reference(reference))
-    say(table_text(reference.facts.table, reference.facts.binning))
-    say(f"{args.out}: {len(reference.facts.ids)} photographs")
+    echo(table_text(reference.facts.table, reference.facts.binning))
+    echo(f"{args.out}: {len(reference.facts.ids)} photographs")
     return 0
 
 
@@ -125,22 +103,20 @@ def _select(args: argparse.Namespace) -> int:
         html = selection_report(store, reference, fields, run=args.run)
         store.put(keys.selection_key(args.run, "html"), html.encode())
     if args.json:
-        dump(summary.model_dump(mode="json"))
+        echo_json(summary.model_dump(mode="json"))
         return 0
-    say(f"{summary.kept} of {summary.views} views kept, {summary.scored} scored")
+    echo(f"{summary.kept} of {summary.views} views kept, {summary.scored} scored")
     for reason, n in summary.reasons.items():
-        say(f"  {n:>6}  {reason}")
-    say(keys.selection_key(args.run, "html" if args.report else "parquet"))
+        echo(f"  {n:>6}  {reason}")
+    echo(keys.selection_key(args.run, "html" if args.report else "parquet"))
     return 0
 
 
 def _fields(recipe: Recipe, args: argparse.Namespace) -> SelectionFields:
+    """The thresholds: the stored recipe's, then --set, then the options."""
     changed = _overrides(args.set)
-    if args.score_mode is not None:
-        changed["selection.score_mode"] = args.score_mode
-    if args.balance is not None:
-        changed["selection.balance"] = args.balance
-    if args.per_room_cap is not None:
-        changed["selection.per_room_cap"] = str(args.per_room_cap)
+    for field in ("score_mode", "balance", "per_room_cap"):
+        if getattr(args, field) is not None:
+            changed[f"selection.{field}"] = str(getattr(args, field))
     held = {f"selection.{k}": str(v) for k, v in recipe.selection.model_dump(mode="json").items()}
     return recipe_from_name("fast", held | changed).selection

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from pbrs_farm.commands.arguments import Handler, Verb, add_farm, dump, farm_of, say
+from pbrs_farm.commands.arguments import Handler, Verb, add_farm, echo, echo_json, farm_of
 from workers.client.text import failures_text, status_text, why_text, workers_text
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def add_verbs(verb: Verb) -> None:
     _add_job(p, flag=True)
     p = farm_verb("logs", _logs, "the log of a failed or long task")
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
-    p.add_argument("--attempt", type=int, default=None)
+    p.add_argument("--attempt", type=int)
     _add_job(p, flag=True)
     _add_job(farm_verb("failures", _failures, "what failed for good, alike together"))
     p = farm_verb("retry", _retry, "fresh attempts for failed tasks (all, unless named)")
@@ -58,7 +58,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("job")
     verb("coordinator", _coordinator, "lead the farm, or stand by")
     p = verb("worker", _worker, "work for the farm until told to leave")
-    p.add_argument("--until", type=float, default=None, metavar="S", help="leave after S seconds")
+    p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
 
 
 _STEERING = {
@@ -85,9 +85,9 @@ def _farm_and_job(args: argparse.Namespace) -> tuple[Farm, str]:
 def _show(args: argparse.Namespace, value: Any, text: Callable[[], str]) -> None:
     """value as JSON when asked, else the text for people; at once, for who watches a pipe."""
     if args.json:
-        dump(value)
+        echo_json(value)
     else:
-        say(text())
+        echo(text())
     sys.stdout.flush()
 
 
@@ -96,9 +96,9 @@ def _status(args: argparse.Namespace) -> int:
     while True:
         status = farm.status(job)
         if args.watch and args.json:
-            say(json.dumps(status, sort_keys=True))
+            echo(json.dumps(status, sort_keys=True))
         elif args.watch and sys.stdout.isatty():
-            say(f"\x1b[H\x1b[2J{status_text(status)}")
+            echo(f"\x1b[H\x1b[2J{status_text(status)}")
         else:
             _show(args, status, lambda s=status: status_text(s))  # type: ignore[misc]
         sys.stdout.flush()

@@ -10,15 +10,17 @@ from pbrs_farm.commands.arguments import (
     Verb,
     add_farm,
     add_light,
+    add_output,
     add_recipe,
-    complain,
+    at_least,
     counted,
-    dump,
+    echo,
+    echo_json,
     farm_of,
+    home_arguments,
     recipe_of,
-    say,
+    warn,
 )
-from pbrs_farm.core.errors import BadInput
 
 if TYPE_CHECKING:
     from workers.job import JobSpec
@@ -29,14 +31,11 @@ def add_verbs(verb: Verb) -> None:
     p = verb("submit", _submit, "put houses on the farm")
     add_farm(p)
     p.add_argument("homes", nargs="+", metavar="HOME", help="files, folders, example homes")
-    p.add_argument(
-        "--houses", metavar="LIST", help="file with a SUNCG house id a line (HOME: root)"
-    )
+    text = "file with a SUNCG house id a line (HOME: root)"
+    p.add_argument("--houses", metavar="LIST", help=text)
     add_recipe(p)
     add_light(p)
-    p.add_argument("--modes", nargs="+", default=[], metavar="MODE", help="default: all four")
-    p.add_argument("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers")
-    p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views a house")
+    add_output(p)
     p.add_argument("--reference", type=Path, help="reference file: select when the job ends")
     p.add_argument("--gpu", action="store_true", help="light goes to the queue light.gpu")
     p.add_argument("--priority", type=int, default=5, choices=range(10), help="0 goes first")
@@ -51,20 +50,21 @@ def _submit(args: argparse.Namespace) -> int:
     from workers.house_files import entries_from_words, is_left_in_place, placed_reference, upload
 
     spec = _spec(args)
-    found = entries_from_words(_words(args))
+    found = entries_from_words(home_arguments(args.homes, args.houses))
     reference = placed_reference(args.reference) if args.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
     houses = [entry for entry, _ref in found]
     in_place = [ref for _entry, ref in found if is_left_in_place(ref)]
     if in_place:
-        lie = f"{counted(len(in_place), 'house')} not uploaded: {in_place[0].location}"
-        complain(f"{lie}{' ...' if len(in_place) > 1 else ''}; workers must see that path")
+        where = f"{in_place[0].location}{' ...' if len(in_place) > 1 else ''}"
+        count = counted(len(in_place), "house")
+        warn(f"{count} not uploaded: {where}; workers must see that path")
     if args.dry_run:
         plan = estimate(completed(houses, spec)[1], args.slots)
         if args.json:
-            dump(plan)
+            echo_json(plan)
         else:
-            say("\n".join(f"{k:<14}{v}" for k, v in plan.items()))
+            echo("\n".join(f"{k:<14}{v}" for k, v in plan.items()))
         return 0
     farm = farm_of(args)
     farm.ledger.ping()
@@ -73,22 +73,12 @@ def _submit(args: argparse.Namespace) -> int:
         farm.store.put_if_absent(*reference)
     job = farm.submit(houses, spec, update=args.update)
     if args.json:
-        dump({"job": job.job_id, "houses": job.n_houses, "was": job.was})
+        echo_json({"job": job.job_id, "houses": job.n_houses, "was": job.was})
         return 0
     if job.was:
-        complain(f"this job is there already, {job.was}")
-    say(job.job_id)
+        warn(f"this job is there already, {job.was}")
+    echo(job.job_id)
     return 0
-
-
-def _words(args: argparse.Namespace) -> list[str]:
-    from pbrs_farm.read.source import suncg_list
-
-    if not args.houses:
-        return list(args.homes)
-    if len(args.homes) != 1:
-        raise BadInput("--houses", args.houses, "needs the SUNCG root as the one HOME")
-    return suncg_list(Path(args.homes[0]), Path(args.houses))
 
 
 def _spec(args: argparse.Namespace) -> JobSpec:
@@ -98,9 +88,8 @@ def _spec(args: argparse.Namespace) -> JobSpec:
     from workers.client.farm_client import new_spec
     from workers.node.house_runner import group_stages
 
-    for name, value, least in (("--views", args.views, 0), ("--slots", args.slots, 1)):
-        if value < least:
-            raise BadInput(name, str(value), f"expected {least} or more")
+    at_least("--views", args.views, 0)
+    at_least("--slots", args.slots, 1)
     want = wanted(args.modes, args.layers, args.views)
     recipe = recipe_of(args)
     return new_spec(
