@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadInput, MachineFailed
 
 MAX_PIXELS: Final = 16384 * 16384
-"""A picture that says it is larger is refused before its pixels are read."""
+"""A picture that says it is larger is rejected before its pixels are read."""
 
 _FIXED_DATE: Final = "2000:01:01 00:00:00"
 

@@ -97,7 +97,7 @@ def distribution(
     for k in range(50):
         x0, x1 = edges[k] + 0.002, edges[k + 1] - 0.002
         frame.box((x0, 0, x1, good[k] / top), "kept")
-        frame.box((x0, good[k] / top, x1, whole[k] / top), "refused")
+        frame.box((x0, good[k] / top, x1, whole[k] / top), "rejected")
     frame.threshold(threshold)
     return frame.svg()
 
@@ -116,7 +116,7 @@ def joint(
         inside = (i + 0.5) / n > limits[0] and (j + 0.5) / n > limits[1]
         opacity = 0.15 + 0.85 * np.log1p(cells[i, j]) / top
         at = (i / n, j / n, (i + 1) / n, (j + 1) / n)
-        frame.box(at, "kept" if inside else "refused", f"opacity:{opacity:.2f}")
+        frame.box(at, "kept" if inside else "rejected", f"opacity:{opacity:.2f}")
     frame.line([(limits[0], 0), (limits[0], 1)], "limit")
     frame.line([(0, limits[1]), (1, limits[1])], "limit")
     # Write the vertical axis's title upwards.

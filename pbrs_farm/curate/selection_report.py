@@ -49,14 +49,14 @@ def selection_report(
     run: str = "default",
     n_examples: int = 8,
 ) -> str:
-    """HTML of a run as it stands in the store; n_examples kept and as many refused views are shown.
+    """HTML of a run as it stands in the store; n_examples kept and as many rejected views are shown.
 
     fields: the thresholds the run was judged with. Raises BadInput when there is no such run.
     """
     table = verdict_table(store, run)
     summary = summary_of(table, run, fields, reference)
     scored = table.filter(table["colour_score"].is_valid())
-    shown = {"kept": _spread(scored, n_examples), "refused": _refused(scored, n_examples)}
+    shown = {"kept": _spread(scored, n_examples), "rejected": _rejected(scored, n_examples)}
     examples = _Examples(store, reference, fields)
     return page(
         "pbrs_farm.curate",
@@ -148,8 +148,8 @@ def _spread(scored: Any, n: int) -> Any:
     return table.take(pa.array(order[picked.astype(np.intp)]))
 
 
-def _refused(scored: Any, n: int) -> Any:
-    """n refused rows, the reasons in turn, of each the views that came nearest first."""
+def _rejected(scored: Any, n: int) -> Any:
+    """n rejected rows, the reasons in turn, of each the views that came nearest first."""
     table = scored.filter(pa.array(~_is_kept(scored)))
     reasons = table["reason"].to_pylist()
     # Number the views of each reason from the nearest: its turn.

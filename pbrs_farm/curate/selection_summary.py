@@ -42,7 +42,7 @@ class ReferenceSummary(BaseModel):
 
 
 class SelectionSummary(BaseModel):
-    """selection.json. reasons: refused views by their first reason.
+    """selection.json. reasons: rejected views by their first reason.
 
     modes: scored views by the lighting mode they were scored on. yield_both: share of the scored
     views whose two scores are above each of THRESHOLDS, whatever their image quality.

@@ -68,7 +68,7 @@ def _options(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
 
 
 def _card(root: Path, view: ViewEntry, tiles: Sequence[Tile], reason: str | None) -> dict[str, Any]:
-    """A view for the template. reason: why it is refused, "" if kept, None if nobody judged it."""
+    """A view for the template. reason: why it is rejected, "" if kept, None if nobody judged it."""
     classes = next((tile.classes for tile in tiles if tile.classes), ())
     names = " ".join(NYU40_NAMES[i] for i, _share in classes)
     words = f"{view.house.id} {view.house.name} {view.room_name} {view.id} {names}"
@@ -76,7 +76,7 @@ def _card(root: Path, view: ViewEntry, tiles: Sequence[Tile], reason: str | None
         "view": view,
         "link": quote(view.folder.relative_to(root).as_posix()),
         "reason": reason,
-        "verdict": "" if reason is None else "refused" if reason else "kept",
+        "verdict": "" if reason is None else "rejected" if reason else "kept",
         "search_text": words.lower(),
         "tiles": [
             {"kind": t.kind, "note": t.note, "missing": t.missing, "source": _tile_url(t)}

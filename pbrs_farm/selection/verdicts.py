@@ -1,7 +1,7 @@
 """Scores -> which views are kept, and why the others are not; no effects.
 
 A verdict is a function of the scores and the thresholds alone: other thresholds need no histogram.
-Refused views are marked, never dropped.
+Rejected views are marked, never dropped.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ REASONS: Final = (
     "too-noisy", "missing-textures", "unlike-colour", "unlike-depth", "room-cap",
     "class-balance",
 )  # fmt: skip
-"""Why a view is refused, in the order in which the first is named."""
+"""Why a view is rejected, in the order in which the first is named."""
 
 
 def verdicts(scores: Any, fields: SelectionFields) -> Any:
@@ -30,10 +30,10 @@ def verdicts(scores: Any, fields: SelectionFields) -> Any:
     "" when kept) and reasons (all of them, with commas).
 
     A view is kept when its colour and its depth score are both above their thresholds (paper
-    section 3.3) and no quality number is beyond its own. A number that is not known refuses nothing.
+    section 3.3) and no quality number is beyond its own. A number that is not known rejects nothing.
     """
-    refused = _refusals(scores, fields)
-    table = np.stack(list(refused.values()), axis=1)
+    rejected = _rejections(scores, fields)
+    table = np.stack(list(rejected.values()), axis=1)
     kept = np.asarray(~table.any(axis=1), np.bool_)
     beyond = _beyond_cap(scores, kept, fields.per_room_cap)
     kept &= ~beyond
@@ -49,7 +49,7 @@ def verdicts(scores: Any, fields: SelectionFields) -> Any:
     return scores
 
 
-def _refusals(scores: Any, fields: SelectionFields) -> Mapping[str, NDArray[np.bool_]]:
+def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, NDArray[np.bool_]]:
     number = {name: _floats(scores, name) for name in _NUMBERS}
     faults = scores["fault"].to_numpy()
     unscored = np.asarray(faults == "unscored", bool)

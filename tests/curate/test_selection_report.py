@@ -97,7 +97,7 @@ def test_a_missing_picture_is_said(store: MemoryStore) -> None:
 
 def test_an_empty_run_has_a_page_too() -> None:
     html = page(MemoryStore())
-    assert "No view is refused" in html
+    assert "No view is rejected" in html
     assert not re.search(r"\bnan\b", html)
 
 
@@ -109,10 +109,10 @@ def test_no_run_is_an_error(store: MemoryStore) -> None:
 def test_bars_of_a_distribution_add_up_to_the_views() -> None:
     scores = np.array([0.1, 0.1, 0.9, 1.0])
     svg = ET.fromstring(charts.distribution(scores, scores > 0.5, 0.5, "score"))
-    heights = {"kept": 0.0, "refused": 0.0}
+    heights = {"kept": 0.0, "rejected": 0.0}
     for box in svg.iter("rect"):
         heights[box.get("class", "")] += float(box.get("height", "0"))
-    assert heights["kept"] == pytest.approx(heights["refused"])
+    assert heights["kept"] == pytest.approx(heights["rejected"])
 
 
 def test_bin_colours_lie_in_their_own_bins() -> None:

@@ -129,7 +129,9 @@ def test_other_thresholds_read_the_run_alone(store: MemoryStore) -> None:
     assert low.kept == 7
 
 
-def test_another_reference_is_scored_anew_and_refused_for_judging_again(store: MemoryStore) -> None:
+def test_another_reference_is_scored_anew_and_rejected_for_judging_again(
+    store: MemoryStore,
+) -> None:
     selecting.select(store, reference(), LOW)
     with pytest.raises(BadInput, match="another reference"):
         selecting.judge_again(store, reference(seed=3), LOW)
@@ -174,7 +176,7 @@ def test_an_empty_root_gives_an_empty_run() -> None:
     assert rows(store) == []
 
 
-def test_a_run_name_that_is_no_file_name_is_refused(store: MemoryStore) -> None:
+def test_a_run_name_that_is_no_file_name_is_rejected(store: MemoryStore) -> None:
     for run in ("../x", "", "a/b", ".hidden"):
         with pytest.raises(BadInput, match="--run"):
             selecting.select(store, reference(), LOW, run=run)

@@ -184,7 +184,7 @@ def test_names_are_drawn_with_letters_the_font_has(tmp_path: Path) -> None:
     assert "Modèle d’Élise – 中" in gallery(tmp_path)
 
 
-def test_gallery_shows_what_selection_kept_and_refused(root: Path) -> None:
+def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:
     assert 'id="verdict"' not in gallery(root)
     (root / "selection").mkdir()
     (root / "selection.json").write_text('{"run": "nyu"}')
@@ -195,8 +195,8 @@ def test_gallery_shows_what_selection_kept_and_refused(root: Path) -> None:
     (root / "selection/nyu.jsonl").write_text("\n".join(json.dumps(r) for r in rows))
     html = gallery(root)
     assert 'id="verdict"' in html
-    assert html.count('data-verdict="kept"') == html.count('data-verdict="refused"') == 1
-    assert '<b class="refused">unlike-depth</b>' in html
+    assert html.count('data-verdict="kept"') == html.count('data-verdict="rejected"') == 1
+    assert '<b class="rejected">unlike-depth</b>' in html
     assert html.count('data-verdict=""') == 2
     (root / "selection/nyu.jsonl").write_text("{")
     with pytest.raises(BadInput, match=r"nyu\.jsonl"):

@@ -86,7 +86,7 @@ def test_coarser_bins_are_exact_sums() -> None:
     )
 
 
-def test_bins_that_do_not_divide_are_refused() -> None:
+def test_bins_that_do_not_divide_are_rejected() -> None:
     with pytest.raises(ValueError, match="cannot be summed"):
         coarser_colour(np.zeros(512, np.uint32), (16, 16, 16))
     with pytest.raises(ValueError, match="cannot be summed"):
@@ -98,7 +98,7 @@ def test_normalised_sums_to_one_and_nothing_stays_nothing() -> None:
     assert shares.tolist() == [[0.25, 0.75, 0.0], [0.0, 0.0, 0.0]]
 
 
-def test_wrong_pictures_are_refused() -> None:
+def test_wrong_pictures_are_rejected() -> None:
     with pytest.raises(ValueError, match="uint8"):
         selection.histogram(PICTURE.astype(np.float32), DEPTH, FIELDS)
     with pytest.raises(ValueError, match="millimetres"):

@@ -120,7 +120,7 @@ def test_where_none_passes_the_coarsest_is_taken() -> None:
     assert "by depth" not in table_text(rows, chosen)
 
 
-def test_an_empty_a_single_and_a_blind_set_are_refused() -> None:
+def test_an_empty_a_single_and_a_blind_set_are_rejected() -> None:
     some = random_histogram(np.random.default_rng(0), FINE)
     blind = Histogram(some.colour, np.zeros(128, np.uint32))
     for ids, sets, text in (
@@ -146,7 +146,7 @@ def test_other_settings_are_an_error_that_names_file_and_fields() -> None:
             check_comparable(ref, other, "nyu.npz")
 
 
-def test_bins_coarser_than_the_reference_compares_are_refused() -> None:
+def test_bins_coarser_than_the_reference_compares_are_rejected() -> None:
     twins = [random_histogram(np.random.default_rng(0), FINE)] * 3
     ref = reference_from_histograms(
         "abc", twins, FINE, SelectionFields(), source=("photos", "0" * 64)

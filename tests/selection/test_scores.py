@@ -122,7 +122,7 @@ def test_merging_is_associative_commutative_and_idempotent() -> None:
     assert merged().equals(SCORES.empty_table())
 
 
-def test_two_different_scores_of_one_view_are_refused() -> None:
+def test_two_different_scores_of_one_view_are_rejected() -> None:
     a, b = score([pack("a", 2)], reference(seed=0)), score([pack("a", 2)], reference(seed=1))
     with pytest.raises(ValueError, match="two different values"):
         merged(a, b)

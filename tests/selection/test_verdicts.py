@@ -1,4 +1,4 @@
-"""A view is kept for the paper's reason or refused for one that is named with its number."""
+"""A view is kept for the paper's reason or rejected for one that is named with its number."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_good_view_is_kept() -> None:
         ({"fault": "unscored"}, "unscored"),
     ],
 )
-def test_each_number_beyond_its_threshold_refuses_with_its_reason(
+def test_each_number_beyond_its_threshold_rejects_with_its_reason(
     row: dict[str, Any], reason: str
 ) -> None:
     judged = verdicts(table(row), SelectionFields()).to_pylist()[0]
@@ -66,7 +66,7 @@ def test_a_score_at_the_threshold_is_not_above_it() -> None:
     assert reasons({"blown": 0.5, "surface": 0.85, "n_objects": 3.0}) == [""]
 
 
-def test_an_unknown_number_refuses_nothing() -> None:
+def test_an_unknown_number_rejects_nothing() -> None:
     assert reasons({"noise": None, "brightness": None}) == [""]
 
 
