@@ -47,7 +47,7 @@ def _repair(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.house_bundle import bundle_from_house
     from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.read.source import read_house, resolve
-    from pbrs_farm.repair import cut_picture, plain_words
+    from pbrs_farm.repair import section_svg, summary_of_report
     from pbrs_farm.run.steps import repaired_house
     from pbrs_farm.store.folder import FolderStore
 
@@ -64,8 +64,8 @@ def _repair(args: argparse.Namespace) -> int:
     before = read_house(source, recipe.read)
     cuts = [f"cut_{level.id}.svg" for level in house.levels]
     for level, name in zip(house.levels, cuts, strict=True):
-        store.put(name, cut_picture(before, house, level.id).encode())
-    echo(plain_words(report))
+        store.put(name, section_svg(before, house, level.id).encode())
+    echo(summary_of_report(report))
     echo(f"{args.out}: house.glb house.json repair.json {' '.join(cuts)}")
     return 1 if report.is_leaking else 0
 

@@ -3,7 +3,7 @@
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.repair_house import repair
 from pbrs_farm.repair.report import RepairReport
-from pbrs_farm.repair.section_drawing import cut_picture
-from pbrs_farm.repair.summary_text import plain_words
+from pbrs_farm.repair.section_drawing import section_svg
+from pbrs_farm.repair.summary_text import summary_of_report
 
-__all__ = ["Occluder", "RepairReport", "cut_picture", "plain_words", "repair"]
+__all__ = ["Occluder", "RepairReport", "repair", "section_svg", "summary_of_report"]

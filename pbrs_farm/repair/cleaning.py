@@ -16,7 +16,7 @@ from pbrs_farm.repair.structure.walls import BASEBOARD
 _MIN_AREA_M2 = 1e-12
 
 
-def without_living(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
+def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
     """The house without persons and plants, as the recipe says (paper section 3)."""
     kinds = set()
     if fields.remove_persons:

@@ -1,6 +1,6 @@
-"""The stage: a house as read in, a house that light cannot leak through out, with a report.
+"""The repair pipeline: a house as read -> a house that light cannot leak through, with a report.
 
-No effects. The ray caster comes as an argument; without one, leaks and escape are not measured.
+No effects. The ray caster is an argument; without one, leaks and light output are not measured.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from dataclasses import replace
 
 from pbrs_farm.core.house import Enclosure, House, Room
 from pbrs_farm.core.recipe import RepairFields
-from pbrs_farm.repair import cleaning as clean
+from pbrs_farm.repair.cleaning import with_sound_faces, with_white_walls, without_persons_and_plants
 from pbrs_farm.repair.lamps.bulbs import with_bulbs
-from pbrs_farm.repair.lamps.room_lighting import with_lit_rooms
+from pbrs_farm.repair.lamps.room_lighting import with_room_lighting
 from pbrs_farm.repair.lamps.shades import with_shades
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
@@ -29,32 +29,32 @@ def repair(
     """The repaired house and everything that was changed (paper section 3).
 
     A house that is repaired already comes back as it is. occluder_from: builds a ray caster over
-    a house's triangles; None leaves the leak meter and the lamps' escape unmeasured.
+    a house's triangles; None leaves leaks and the lamps' light output ratio unmeasured.
     """
     if house.is_repaired:
         return house, RepairReport(house_id=house.id, was_repaired=True)
 
-    # What does not belong, and what is unsound.
-    house, removed = clean.without_living(house, fields)
-    house, faces = clean.with_sound_faces(house)
-    house, n_white = clean.with_white_walls(house, fields.default_wall_rgb)
+    # Remove what does not belong, and what is unsound.
+    house, removed = without_persons_and_plants(house, fields)
+    house, faces = with_sound_faces(house)
+    house, n_white = with_white_walls(house, fields.default_wall_rgb)
 
-    # The shell.
+    # Make walls, floors and ceilings watertight, with the openings cut.
     structure = repaired_structure(house, fields.wall_thickness_m)
     house, swallowed = with_structure(house, structure)
 
-    # The lights.
+    # Give every lamp a bulb, every dark room a light, every dim lamp a translucent shade.
     house, sources = with_bulbs(house, fields)
-    house, given = with_lit_rooms(house, fallback=fields.fallback_light)
+    house, given = with_room_lighting(house, fallback=fields.fallback_light)
     if occluder_from is not None:
         house, sources = with_shades(house, sources, fields, occluder_from)
 
-    # What is closed, and whether it is tight.
+    # Say which rooms are closed, and let rays look for leaks in them.
     house = replace(house, rooms=_with_enclosure(house.rooms, structure.spaces), is_repaired=True)
     leaks = None
     if occluder_from is not None:
         plugs = [s for plug in structure.plugs.values() for s in plug]
-        leaks = leaks_of_house(house, structure.spaces, structure.airs, plugs, occluder_from)
+        leaks = leaks_of_house(house, structure.spaces, structure.interiors, plugs, occluder_from)
     report = RepairReport(
         house_id=house.id,
         removed=(*removed, *swallowed),
@@ -74,7 +74,7 @@ def _with_enclosure(rooms: Sequence[Room], spaces: Sequence[Space]) -> tuple[Roo
     found = {}
     for space in spaces:
         for room_id in space.rooms:
-            found[room_id] = (Enclosure.CLOSED, "") if space.is_closed else (Enclosure.OPEN, space.why(room_id))  # fmt: skip
+            found[room_id] = (Enclosure.CLOSED, "") if space.is_closed else (Enclosure.OPEN, space.explain(room_id))  # fmt: skip
     return tuple(
         replace(r, enclosure=found[r.id][0], enclosure_reason=found[r.id][1]) for r in rooms
     )

@@ -56,7 +56,7 @@ class FacesReport(_Record):
 
 
 class SourceRepair(_Record):
-    """One light source of a lamp. radii and moved_m in metres; escape: share of 0..1 or None."""
+    """One light source of a lamp. radii and moved_m in metres; escape: light output ratio or None."""
 
     item_id: str
     source: int
@@ -70,7 +70,7 @@ class SourceRepair(_Record):
 
 
 class RoomAudit(_Record):
-    """A room: what lights it, how large, whether closed. space: rooms it shares its air with."""
+    """A room: what lights it, how large, whether closed. space: rooms it opens into."""
 
     room_id: str
     name: str
@@ -89,7 +89,7 @@ class Leak(_Record):
 
 
 class SpaceLeaks(_Record):
-    """Leak meter of one closed space (rooms that share their air). leaks: the first 50.
+    """Leak meter of one closed space (rooms that open into each other). leaks: the first 50.
 
     n_blind: rays that saw the back of a face first, so started inside a solid: they prove nothing.
     """

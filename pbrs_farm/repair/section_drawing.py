@@ -15,7 +15,7 @@ _GAP_M = 1.0
 _TEXT_M = 0.25
 
 
-def cut_picture(
+def section_svg(
     before: House, after: House, level_id: str, *, height_m: float = 1.2, width_px: int = 1600
 ) -> str:
     """Side by side: every wall of before with its outline, and the solid walls of after.
@@ -25,8 +25,8 @@ def cut_picture(
     x right and z down, one unit a metre.
     """
     y = before.level(level_id).elevation + height_m
-    parts = [cut_of_items([i], y) for i in before.items if i.kind is ItemKind.WALL]
-    solid = cut_of_items([i for i in after.items if i.kind.is_structure], y)
+    parts = [section_of_items([i], y) for i in before.items if i.kind is ItemKind.WALL]
+    solid = section_of_items([i for i in after.items if i.kind.is_structure], y)
     everything = np.concatenate([np.zeros((0, 2, 2)), *parts, solid]).reshape(-1, 2)
     if not len(everything):
         everything = np.array([[0.0, 0.0], [1.0, 1.0]])
@@ -66,7 +66,7 @@ def _xy(point: Sequence[float] | F64) -> str:
     return f"{point[0]:.4f} {point[1]:.4f}"
 
 
-def cut_of_items(items: Sequence[Item], y: float) -> F64:
+def section_of_items(items: Sequence[Item], y: float) -> F64:
     """(N, 2, 2) plan segments in which the items' triangles meet the height y."""
     triangles = [s.positions.astype(np.float64)[s.faces] for i in items for s in i.surfaces]
     corners = np.concatenate([np.zeros((0, 3, 3)), *triangles])

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pbrs_farm.repair.report import RepairReport
 
 
-def plain_words(report: RepairReport) -> str:
+def summary_of_report(report: RepairReport) -> str:
     """What was wrong with a house and what was done about it, a sentence per line."""
     if report.was_repaired:
         return f"{report.house_id} was repaired before; nothing was changed."

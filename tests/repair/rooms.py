@@ -41,7 +41,7 @@ def room(room_id: str, rect: Rect, *, floor_y: float = 0.0, ceiling_y: float = H
     return Room(room_id, room_id, room_id.split("_")[0], _outline(rect), floor_y, ceiling_y)
 
 
-def lids(of: Room, *, floor: bool = True, ceiling: bool = True) -> list[Item]:
+def covers(of: Room, *, floor: bool = True, ceiling: bool = True) -> list[Item]:
     """The planar floor and ceiling of a room."""
     items = []
     for kind, y, material, wanted in (

@@ -15,7 +15,7 @@ from pbrs_farm.core.mesh import distances_to_triangles, face_areas, triangle_cor
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of, with_bulbs
-from pbrs_farm.repair.lamps.room_lighting import with_lit_rooms
+from pbrs_farm.repair.lamps.room_lighting import with_room_lighting
 from pbrs_farm.repair.lamps.shades import with_shades
 from tests.repair.embree import EmbreeOccluder
 
@@ -118,7 +118,7 @@ def test_only_the_part_that_encloses_becomes_a_shade() -> None:
 def test_a_room_that_nothing_lights_gets_a_ceiling_light() -> None:
     home = builtin_home()
     dark = replace(home, openings=(), items=tuple(i for i in home.items if not i.lights))
-    house, given_to = with_lit_rooms(dark, fallback=True)
+    house, given_to = with_room_lighting(dark, fallback=True)
     assert given_to == ["0_0", "0_1"]
     assert {r.lit_by for r in house.rooms} == {("fallback",)}
     lamp = house.items[-1]
@@ -132,6 +132,6 @@ def test_a_room_that_nothing_lights_gets_a_ceiling_light() -> None:
 def test_the_fallback_light_can_be_switched_off() -> None:
     home = builtin_home()
     dark = replace(home, openings=(), items=tuple(i for i in home.items if not i.lights))
-    house, given_to = with_lit_rooms(dark, fallback=False)
+    house, given_to = with_room_lighting(dark, fallback=False)
     assert given_to == []
     assert {r.lit_by for r in house.rooms} == {()}

@@ -14,7 +14,7 @@ from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.leaks import LeakMeter, leaks_of_house
-from pbrs_farm.repair.measure.room_edges import RoomAir
+from pbrs_farm.repair.measure.room_edges import RoomInterior
 from pbrs_farm.repair.structure import watertight as structure
 from pbrs_farm.repair.structure.prisms import level_plane
 from tests.repair.embree import EmbreeOccluder
@@ -74,7 +74,9 @@ def test_the_meter_counts_the_open_share_of_a_box() -> None:
     faces = np.where((centre * normal).sum(1, keepdims=True) > 0, faces[:, [0, 2, 1]], faces)
     surface = replace(wall.surfaces[0], positions=corners, faces=faces, uvs=None)
     house = home.with_items([replace(wall, surfaces=(surface,))])
-    air = RoomAir(cube.buffer(-0.49), cube.buffer(-0.49), 0.0, level_plane(0.49), level_plane(0.51))
+    air = RoomInterior(
+        cube.buffer(-0.49), cube.buffer(-0.49), 0.0, level_plane(0.49), level_plane(0.51)
+    )
     meter = LeakMeter(step_m=1.0, per_start=4_000, n_inside=0, n_bounces=0)
     report = leaks_of_house(house, [Space(("0_0",), ())], {"0_0": [air]}, (), EmbreeOccluder, meter)
     share = report.n_sky / report.n_rays

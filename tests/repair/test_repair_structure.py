@@ -14,7 +14,7 @@ from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.mesh.primitives import box
 from pbrs_farm.repair import RepairReport, repair
 from tests.repair.embree import EmbreeOccluder
-from tests.repair.rooms import house, lids, planar_walls, room, turned, wall, walls_around
+from tests.repair.rooms import covers, house, planar_walls, room, turned, wall, walls_around
 from tests.repair.shells import (
     coinciding_share,
     leaning_area,
@@ -42,7 +42,7 @@ def _sky(report: RepairReport) -> int:
 
 def test_planar_walls_become_solids_of_ten_centimetres_away_from_the_room() -> None:
     r = room("0_0", RECT)
-    after, report = _repaired(house([*planar_walls(RECT), *lids(r)], [r]))
+    after, report = _repaired(house([*planar_walls(RECT), *covers(r)], [r]))
     assert report.structure.n_walls_thickened == 4
     assert len(unpaired_edges(after)) == 0
     assert _sky(report) == 0
@@ -60,7 +60,7 @@ def test_a_wall_that_is_no_closed_solid_is_left_as_it_is_and_told() -> None:
     r = room("0_0", RECT)
     first, *others = walls_around(RECT)
     gap = replace(first, surfaces=first.surfaces[:-1])
-    after, report = _repaired(house([gap, *others, *lids(r)], [r]))
+    after, report = _repaired(house([gap, *others, *covers(r)], [r]))
     assert [(x.what, x.id) for x in report.structure.left_as_is] == [("wall", "w0")]
     assert after.items[0].surfaces == gap.surfaces
 
@@ -68,7 +68,7 @@ def test_a_wall_that_is_no_closed_solid_is_left_as_it_is_and_told() -> None:
 def test_walls_drawn_twice_leave_one_face() -> None:
     r = room("0_0", RECT)
     twice = [*walls_around(RECT), *walls_around(RECT, "again")]
-    after, report = _repaired(house([*twice, *lids(r)], [r]))
+    after, report = _repaired(house([*twice, *covers(r)], [r]))
     assert len(unpaired_edges(after)) == 0
     assert coinciding_share(after, MIDDLE) < 1e-3
     assert _sky(report) == 0
@@ -80,7 +80,7 @@ def test_neighbouring_slabs_show_each_room_its_own_floor() -> None:
         *walls_around((0.0, 0.0, 8.0, 3.0)),
         wall("between", (4.05, 0.0), (4.05, 3.0), thickness=0.1),
     ]
-    after, report = _repaired(house([*walls, *lids(a), *lids(b)], [a, b]))
+    after, report = _repaired(house([*walls, *covers(a), *covers(b)], [a, b]))
     assert len(unpaired_edges(after)) == 0
     assert _sky(report) == 0
     for origin, own in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
@@ -98,7 +98,7 @@ def test_a_floor_goes_on_through_a_doorway() -> None:
     cutter = box("cutter", np.array([4.15, 1.0, 1.5]), np.array([0.2, 1.0, 0.45]), 0)
     quad = np.array([[4.15, 0, 1.05], [4.15, 0, 1.95], [4.15, 2, 1.95], [4.15, 2, 1.05]])
     door = Opening("door", "0", None, False, cutter, quad, np.array([1.0, 0, 0]))
-    source = replace(house([*walls, *lids(a), *lids(b)], [a, b]), openings=(door,))
+    source = replace(house([*walls, *covers(a), *covers(b)], [a, b]), openings=(door,))
     after, report = _repaired(source)
     # Straight down anywhere in the doorway: one of the two floors, at floor height.
     shell = structure_of(after)
@@ -119,7 +119,7 @@ def test_a_slab_never_sticks_into_a_neighbour_at_another_height() -> None:
         *walls_around((0.0, 0.0, 8.0, 3.0), bottom=-0.04),
         wall("between", (4.025, 0.0), (4.025, 3.0), thickness=0.05, bottom=-0.04),
     ]
-    after, report = _repaired(house([*walls, *lids(a), *lids(b)], [a, b]))
+    after, report = _repaired(house([*walls, *covers(a), *covers(b)], [a, b]))
     assert _sky(report) == 0
     for origin, own in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
         lids_seen = {i for i, _ in seen_from(after, origin) if not i.startswith(("w", "between"))}
@@ -130,7 +130,7 @@ def test_a_slab_of_an_upper_room_leaves_the_room_below_its_height() -> None:
     # The floors are 3 cm apart: a slab of 10 cm would come through the ceiling.
     a, b = room("0_0", RECT), room("1_0", RECT, floor_y=2.53, ceiling_y=5.0)
     walls = [*walls_around(RECT), *walls_around(RECT, "up", bottom=2.5, top=5.0)]
-    after, report = _repaired(house([*walls, *lids(a), *lids(b)], [a, b]))
+    after, report = _repaired(house([*walls, *covers(a), *covers(b)], [a, b]))
     assert len(unpaired_edges(after)) == 0
     assert _sky(report) == 0
     assert ("ceiling_0_0", "ceiling") in seen_from(after, MIDDLE)
@@ -144,12 +144,12 @@ def test_a_stairwell_that_no_room_covers_gets_the_lid_it_lacks() -> None:
     b = room("1_0", (0.0, 0.0, 3.0, 3.0), floor_y=2.6, ceiling_y=5.1)
     walls = [*walls_around(RECT), *walls_around(RECT, "up", bottom=2.5, top=5.1)]
     below = replace(a, polygon=np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]))
-    ceiling = lids(below, floor=False)
+    ceiling = covers(below, floor=False)
     stairs = Item(
         "stairs", "stairs", ItemKind.STAIRS, "0",
         (box("steps", np.array([3.5, 1.3, 1.5]), np.array([0.4, 1.3, 1.0]), 0),),
     )  # fmt: skip
-    items = [*walls, *lids(a, ceiling=False), *ceiling, *lids(b), stairs]
+    items = [*walls, *covers(a, ceiling=False), *ceiling, *covers(b), stairs]
     after, report = _repaired(house(items, [a, b]))
     assert report.structure.n_stairwells_closed == 1
     assert {x.space for x in report.rooms} == {("0_0", "1_0")}
@@ -160,7 +160,7 @@ def test_a_stairwell_that_no_room_covers_gets_the_lid_it_lacks() -> None:
 def test_uv_of_a_source_is_carried_to_the_new_solid() -> None:
     # A plank pattern turned by 30 degrees and scaled by 3: an affine map of the plan.
     r = room("0_0", RECT)
-    floor, ceiling = lids(r)
+    floor, ceiling = covers(r)
     c, s = 3 * np.cos(np.pi / 6), 3 * np.sin(np.pi / 6)
     plan = floor.surfaces[0].positions[:, [0, 2]]
     uvs = (plan @ np.array([[c, s], [-s, c]]) + [0.3, 0.7]).astype(np.float32)
@@ -193,7 +193,7 @@ def test_badly_drawn_rooms_are_tight_after_repair(
     walls = walls_around(rect, thickness=thickness, bottom=lifts[0], top=2.5 - lifts[1])
     shorter = [_shortened(w, slack) for w in walls]
     r = room("0_0", RECT)
-    after, report = _repaired(turned(house([*shorter, *lids(r)], [r]), angle))
+    after, report = _repaired(turned(house([*shorter, *covers(r)], [r]), angle))
     assert after.rooms[0].enclosure is Enclosure.CLOSED
     assert _sky(report) == 0
     assert len(unpaired_edges(after)) == 0

@@ -11,10 +11,10 @@ import shapely
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.mesh.primitives import box
-from pbrs_farm.repair import RepairReport, cut_picture, plain_words, repair
+from pbrs_farm.repair import RepairReport, repair, section_svg, summary_of_report
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
-from pbrs_farm.repair.section_drawing import cut_of_items, solid_polygons
-from tests.repair.rooms import house, lids, room, walls_around
+from pbrs_farm.repair.section_drawing import section_of_items, solid_polygons
+from tests.repair.rooms import covers, house, room, walls_around
 
 RECT = (0.0, 0.0, 4.0, 3.0)
 
@@ -26,7 +26,7 @@ def _piece(item_id: str, centre: tuple[float, float, float], half: float = 0.25)
 
 def _furnished(*pieces: Item) -> House:
     r = room("0_0", RECT)
-    return house([*walls_around(RECT), *lids(r), *pieces], [r])
+    return house([*walls_around(RECT), *covers(r), *pieces], [r])
 
 
 def test_overlapping_pieces_are_told_with_their_volume() -> None:
@@ -55,7 +55,7 @@ def test_a_piece_that_stands_twice_is_a_duplicate() -> None:
 
 
 def test_the_words_say_what_was_wrong(repaired: tuple[House, RepairReport]) -> None:
-    text = plain_words(repaired[1])
+    text = summary_of_report(repaired[1])
     assert "1 person or plant taken out." in text
     assert "2 floors and 2 ceilings had no thickness" in text
     assert "1 lamp had no part that shines and got a bulb." in text
@@ -63,25 +63,25 @@ def test_the_words_say_what_was_wrong(repaired: tuple[House, RepairReport]) -> N
     leaks = repaired[1].leaks
     assert leaks is not None
     leaking = repaired[1].model_copy(update={"leaks": leaks.model_copy(update={"n_sky": 7})})
-    assert "LIGHT LEAKS IN: 7 of" in plain_words(leaking)
+    assert "LIGHT LEAKS IN: 7 of" in summary_of_report(leaking)
 
 
 def test_the_cut_shows_the_walls_with_their_openings(home: House) -> None:
     after, _ = repair(home, RepairFields())
-    segments = cut_of_items([i for i in after.items if i.kind.is_structure], 1.2)
+    segments = section_of_items([i for i in after.items if i.kind.is_structure], 1.2)
     polygons = solid_polygons(segments)
     # Outer walls 9.4 x 4.4 m around 9 x 4 m, one wall of 0.1 m between; holes at 1.2 m height.
     walls = 9.4 * 4.4 - 9.0 * 4.0 + 0.1 * 4.0
     holes = 0.2 * 1.8 + 0.2 * 1.2 + 0.2 * 0.95 + 0.1 * 0.9
     assert shapely.union_all(polygons).area == pytest.approx(walls - holes, abs=2e-3)
-    svg = cut_picture(home, after, "0")
+    svg = section_svg(home, after, "0")
     assert svg.startswith("<svg")
     assert svg.count("<path") == 5 + 1
-    assert svg == cut_picture(home, after, "0")
+    assert svg == section_svg(home, after, "0")
 
 
 def test_a_planar_wall_is_drawn_as_a_line() -> None:
     source = _furnished()
     flat = replace(source.items[0], surfaces=source.items[0].surfaces[:1])
-    svg = cut_picture(source.with_items([flat]), source, "0")
+    svg = section_svg(source.with_items([flat]), source, "0")
     assert 'fill="none" stroke="#c02020"' in svg

@@ -30,7 +30,7 @@ Part = tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LampBench:
+class LampScene:
     """Every lamp of a house laid out for measuring.
 
     part_of_face: (F,) int64 index into parts, of each face of the scene.
@@ -47,14 +47,14 @@ class LampBench:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Escape:
+class LightOutput:
     """share: of the light that leaves the lamp. blocked: (n_parts,) share each part stops."""
 
     share: float
     blocked: F64
 
 
-def bench_of_lamps(house: House, occluder_from: Callable[[House], Occluder]) -> LampBench:
+def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]) -> LampScene:
     """Lay out the house's lamps, glass and bulbs left out, and build their ray caster."""
     lamps = [k for k, item in enumerate(house.items) if item.lights]
     side = max(int(np.ceil(np.sqrt(len(lamps)))), 1)
@@ -81,46 +81,46 @@ def bench_of_lamps(house: House, occluder_from: Callable[[House], Occluder]) -> 
     scene = house.with_items(items)
     part_of_face = np.concatenate([np.zeros(0, np.int64), *numbers])
     occluder = occluder_from(scene) if len(part_of_face) else None
-    return LampBench(house, occluder, tuple(parts), part_of_face, offset_of, labels)
+    return LampScene(house, occluder, tuple(parts), part_of_face, offset_of, labels)
 
 
-def escape_of_source(
-    bench: LampBench, item: int, source: int, shades: Sequence[int], transmission: float
-) -> Escape:
-    """Escape of one source from its own lamp, by N_RAYS rays that leave its bulb diffusely.
+def light_output_of_source(
+    scene: LampScene, item: int, source: int, shades: Sequence[int], transmission: float
+) -> LightOutput:
+    """Light output of one source from its own lamp, by N_RAYS rays that leave its bulb diffusely.
 
     shades: indices of parts that let light through, each time weakened by transmission.
     """
-    lamp = bench.house.items[item]
+    lamp = scene.house.items[item]
     emitting = [lamp.surfaces[k] for k in lamp.lights[source].emitting]
     rng = np.random.default_rng([item, source])
     origins, directions = diffuse_rays(emitting, N_RAYS, rng)
-    origins += bench.offset_of[item]
-    blocked = np.zeros(len(bench.parts))
-    is_shade = np.zeros(len(bench.parts), np.bool_)
+    origins += scene.offset_of[item]
+    blocked = np.zeros(len(scene.parts))
+    is_shade = np.zeros(len(scene.parts), np.bool_)
     is_shade[list(shades)] = True
 
     # Through the shades, layer by layer, until a ray is stopped or out.
     weight = np.full(len(origins), 1.0 / max(len(origins), 1))
     share = 0.0
     for _ in range(_MAX_LAYERS):
-        if bench.occluder is None or not len(origins):
+        if scene.occluder is None or not len(origins):
             break
-        distance, face = bench.occluder.first_hit(
+        distance, face = scene.occluder.first_hit(
             origins.astype(np.float32), directions.astype(np.float32), _REACH_M
         )
         out = face < 0
         share += float(weight[out].sum())
-        part = bench.part_of_face[face[~out]]
+        part = scene.part_of_face[face[~out]]
         through = is_shade[part]
         np.add.at(blocked, part[~through], weight[~out][~through])
         origins = (origins + directions * np.where(out, 0.0, distance)[:, None])[~out][through]
         directions = directions[~out][through]
         origins = origins + 1e-4 * directions
         weight = weight[~out][through] * transmission
-    if bench.occluder is None:
+    if scene.occluder is None:
         share = 1.0
-    return Escape(share, blocked)
+    return LightOutput(share, blocked)
 
 
 def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) -> tuple[F64, F64]:

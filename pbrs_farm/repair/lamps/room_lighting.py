@@ -33,7 +33,7 @@ _POWER = 0.5
 _BY_THE_ROOM_M = 0.6
 
 
-def with_lit_rooms(house: House, *, fallback: bool) -> tuple[House, list[str]]:
+def with_room_lighting(house: House, *, fallback: bool) -> tuple[House, list[str]]:
     """Room.lit_by of every room; and a light in each that has a floor, a ceiling and no light.
 
     Second: ids of the rooms that got one. fallback False: none does.

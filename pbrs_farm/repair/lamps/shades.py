@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.lamps.light_output_ratio import (
-    Escape,
-    LampBench,
-    bench_of_lamps,
-    escape_of_source,
+    LampScene,
+    LightOutput,
+    lamp_scene_of_house,
+    light_output_of_source,
 )
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.report import SourceRepair
@@ -32,28 +32,28 @@ def with_shades(
     fields: RepairFields,
     occluder_from: Callable[[House], Occluder],
 ) -> tuple[House, list[SourceRepair]]:
-    """LightPart.escape of every source; shades where less than fields.min_escape gets out."""
-    bench = bench_of_lamps(house, occluder_from)
+    """The light output ratio of every source; shades where it is below fields.min_escape."""
+    scene = lamp_scene_of_house(house, occluder_from)
     shades: list[int] = []
-    measured: dict[tuple[int, int], tuple[Escape, Escape]] = {}
+    measured: dict[tuple[int, int], tuple[LightOutput, LightOutput]] = {}
     for k, item in enumerate(house.items):
         for source in range(len(item.lights)):
-            before = escape_of_source(bench, k, source, (), fields.shade_transmission)
-            after = _opened(bench, k, source, shades, fields)
+            before = light_output_of_source(scene, k, source, (), fields.shade_transmission)
+            after = _opened(scene, k, source, shades, fields)
             measured[k, source] = (before, after)
     if shades:
         measured = {
-            key: (before, escape_of_source(bench, *key, shades, fields.shade_transmission))
+            key: (before, light_output_of_source(scene, *key, shades, fields.shade_transmission))
             for key, (before, _) in measured.items()
         }
     materials = list(house.materials)
     items: list[Item] = []
     names: dict[str, tuple[str, ...]] = {}
     for k, item in enumerate(house.items):
-        mine = [bench.parts[p] for p in shades if bench.parts[p][0] == k]
+        mine = [scene.parts[p] for p in shades if scene.parts[p][0] == k]
         for j in sorted({part[1] for part in mine}):
             wanted = [part[2] for part in mine if part[1] == j]
-            is_shade = np.isin(bench.labels[k, j], wanted)
+            is_shade = np.isin(scene.labels[k, j], wanted)
             item = _split_off(item, j, is_shade, _shade_of(item.surfaces[j].material, materials))
             names[item.id] = (*names.get(item.id, ()), house.items[k].surfaces[j].name)
         lights = tuple(
@@ -76,13 +76,13 @@ def with_shades(
 
 
 def _opened(
-    bench: LampBench, item: int, source: int, shades: list[int], fields: RepairFields
-) -> Escape:
+    scene: LampScene, item: int, source: int, shades: list[int], fields: RepairFields
+) -> LightOutput:
     """Add to shades the parts that stop most of this source's light, until enough gets out."""
     while True:
-        found = escape_of_source(bench, item, source, shades, fields.shade_transmission)
+        found = light_output_of_source(scene, item, source, shades, fields.shade_transmission)
         worst = int(np.argmax(found.blocked)) if len(found.blocked) else -1
-        mine = sum(bench.parts[p][0] == item for p in shades)
+        mine = sum(scene.parts[p][0] == item for p in shades)
         if found.share >= fields.min_escape or mine >= _MOST_SHADES:
             return found
         if worst < 0 or found.blocked[worst] < _LEAST_BLOCKED:

@@ -1,4 +1,4 @@
-"""Which rooms are closed, which share their air, and why the others are open; no effects.
+"""Which rooms are closed, which open into each other, and why the others are open; no effects.
 
 A room is closed when full-height walls, or rooms it opens into, bound its polygon, and it has a
 floor and a ceiling of its own or those of the space it opens into (stairwell, hall).
@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64
-from pbrs_farm.repair.structure.planar_surfaces import Lid
+from pbrs_farm.repair.structure.planar_surfaces import Cover
 from pbrs_farm.repair.structure.prisms import polygons_of
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
@@ -33,7 +33,7 @@ _PROBES_M = (0.02, 0.12, 0.24)
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """Rooms (ids) that share their air. reasons: (room id, why it is open), empty if closed.
+    """Rooms (ids) that open into each other. reasons: (room id, why it is open), empty if closed.
 
     wells: stairwells without a room (ids) that belong to it.
     """
@@ -47,7 +47,7 @@ class Space:
         """All its rooms are bounded."""
         return not self.reasons
 
-    def why(self, room_id: str) -> str:
+    def explain(self, room_id: str) -> str:
         """Why that room is open: its own reason, or the room it opens into."""
         own = dict(self.reasons).get(room_id)
         if own is not None or not self.reasons:
@@ -57,9 +57,9 @@ class Space:
 
 
 def spaces_of_rooms(
-    real: Sequence[Room], wells: Sequence[Room], walls: Sequence[Wall], lids: Sequence[Lid]
+    real: Sequence[Room], wells: Sequence[Room], walls: Sequence[Wall], covers: Sequence[Cover]
 ) -> tuple[Space, ...]:
-    """Rooms grouped by the air they share, in the order of their first room.
+    """Rooms that open into each other grouped, in the order of their first room.
 
     wells: stairwells that no room covers; a space of wells alone is left out.
     """
@@ -69,9 +69,9 @@ def spaces_of_rooms(
     reasons: dict[int, str] = {}
     for i in range(len(rooms)):
         found = [
-            _edge(i, rooms, areas, walls, lids),
-            _cover(i, rooms, areas, lids, above=False),
-            _cover(i, rooms, areas, lids, above=True),
+            _edge(i, rooms, areas, walls, covers),
+            _cover(i, rooms, areas, covers, above=False),
+            _cover(i, rooms, areas, covers, above=True),
         ]
         links += [(i, j) for linked, _ in found for j in linked]
         why = [reason for _, reason in found if reason]
@@ -97,13 +97,13 @@ def _edge(
     rooms: Sequence[Room],
     areas: Sequence[plan.Shape],
     walls: Sequence[Wall],
-    lids: Sequence[Lid],
+    covers: Sequence[Cover],
 ) -> tuple[list[int], str]:
     """Rooms that room i opens into through its edge, and why the edge is open, or ""."""
     room = rooms[i]
     points, outward = edge_samples(areas[i])
     floor = np.full(len(points), room.floor_y)
-    ceiling = _ceiling_at(points, room, lids)
+    ceiling = _ceiling_at(points, room, covers)
     bare = ~_walled(points + 0.01 * outward, floor, ceiling, walls)
     linked = []
     for j, other in enumerate(rooms):
@@ -142,15 +142,15 @@ def edge_samples(area: plan.Shape) -> tuple[F64, F64]:
     return np.concatenate(points), np.concatenate(outward)
 
 
-def _ceiling_at(points: F64, room: Room, lids: Sequence[Lid]) -> F64:
+def _ceiling_at(points: F64, room: Room, covers: Sequence[Cover]) -> F64:
     # The lowest ceiling above each point that belongs to this room's height.
     y = np.full(len(points), room.ceiling_y)
     own = plan.polygon_of_room(room.polygon)
-    for lid in lids:
-        if not lid.is_ceiling or not shapely.intersects(lid.area, own):
+    for cover in covers:
+        if not cover.is_ceiling or not shapely.intersects(cover.area, own):
             continue
-        heights = lid.plane.at(points)
-        inside = shapely.contains_xy(plan.grown(lid.area, 0.01), points[:, 0], points[:, 1])
+        heights = cover.plane.at(points)
+        inside = shapely.contains_xy(plan.grown(cover.area, 0.01), points[:, 0], points[:, 1])
         y = np.where(inside & (heights < y) & (heights > room.floor_y + 0.1), heights, y)
     return y
 
@@ -170,10 +170,15 @@ def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> NDArray[
 
 
 def _cover(
-    i: int, rooms: Sequence[Room], areas: Sequence[plan.Shape], lids: Sequence[Lid], *, above: bool
+    i: int,
+    rooms: Sequence[Room],
+    areas: Sequence[plan.Shape],
+    covers: Sequence[Cover],
+    *,
+    above: bool,
 ) -> tuple[list[int], str]:
-    """Rooms that room i opens into upwards (or downwards), and why it has no lid there, or ""."""
-    near = _lids_of(rooms[i], lids, above=above)
+    """Rooms that room i opens into upwards (or downwards), and why it has no cover there, or ""."""
+    near = _covers_of(rooms[i], covers, above=above)
     bare = plan.without(areas[i], *(plan.grown(a, GAP_M) for a in near))
     linked = []
     for j in _storey_next(rooms[i], rooms, above=above):
@@ -187,15 +192,17 @@ def _cover(
     return linked, f"{exact.area:.1f} m2 of it have no {what}"
 
 
-def bare_area(room: Room, rooms: Sequence[Room], lids: Sequence[Lid], *, above: bool) -> plan.Shape:
-    """Plan area of room with neither a lid above (or below) it nor a room of the next storey."""
-    bare = plan.without(plan.polygon_of_room(room.polygon), *_lids_of(room, lids, above=above))
+def bare_area(
+    room: Room, rooms: Sequence[Room], covers: Sequence[Cover], *, above: bool
+) -> plan.Shape:
+    """Plan area of room with neither a cover above (or below) it nor a room of the next storey."""
+    bare = plan.without(plan.polygon_of_room(room.polygon), *_covers_of(room, covers, above=above))
     beyond = [rooms[j].polygon for j in _storey_next(room, rooms, above=above)]
     return plan.without(bare, *(plan.grown(plan.polygon_of_room(p), GAP_M) for p in beyond))
 
 
-def _lids_of(room: Room, lids: Sequence[Lid], *, above: bool) -> list[plan.Shape]:
-    return [lid.area for lid in lids if _covers(room, lid, above=above)]
+def _covers_of(room: Room, covers: Sequence[Cover], *, above: bool) -> list[plan.Shape]:
+    return [cover.area for cover in covers if _covers(room, cover, above=above)]
 
 
 def _storey_next(room: Room, rooms: Sequence[Room], *, above: bool) -> list[int]:
@@ -209,16 +216,16 @@ def _storey_next(room: Room, rooms: Sequence[Room], *, above: bool) -> list[int]
     ]
 
 
-def _covers(room: Room, lid: Lid, *, above: bool) -> bool:
+def _covers(room: Room, cover: Cover, *, above: bool) -> bool:
     # A ceiling, or the floor of the storey above, closes a room upwards; and the other way round.
-    corners = shapely.get_coordinates(lid.area)
+    corners = shapely.get_coordinates(cover.area)
     if not len(corners):
         return False
-    heights = lid.plane.at(corners)
+    heights = cover.plane.at(corners)
     if above:
-        if lid.is_ceiling:
+        if cover.is_ceiling:
             return bool(heights.min() > room.floor_y + 0.1 and heights.min() < room.ceiling_y + _STOREY_GAP_M)  # fmt: skip
         return bool(-GAP_M <= heights.min() - room.ceiling_y <= _STOREY_GAP_M)
-    if lid.is_ceiling:
+    if cover.is_ceiling:
         return bool(-GAP_M <= room.floor_y - heights.max() <= _STOREY_GAP_M)
     return bool(abs(heights.max() - room.floor_y) < 2 * GAP_M)

@@ -1,4 +1,4 @@
-"""Furniture that shares volume, hangs in the air, or stands twice in one place; no effects."""
+"""Furniture that shares volume, touches nothing, or stands twice in one place; no effects."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manifold3d import Manifold
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.repair.report import Floating, FurnitureAudit, Overlap
 from pbrs_farm.repair.structure.booleans import F64, TagTable, common, united
-from pbrs_farm.repair.structure.closed_shells import closed_bodies
+from pbrs_farm.repair.structure.closed_shells import closed_shells
 
 _TOUCH_M = 0.02
 _SAME_M = 0.001
@@ -22,7 +22,7 @@ _MAX_FACES = 60_000
 def furniture_audit(house: House) -> FurnitureAudit:
     """What is doubtful about where the furniture stands; nothing is changed.
 
-    Overlaps are exact for the closed bodies of each piece; open meshes have no volume and do not
+    Overlaps are exact for the closed shells of each piece; open meshes have no volume and do not
     count, nor do pieces of more than 60,000 triangles. Floating: its bounding box, grown by 2 cm,
     meets no other item's.
     """
@@ -71,8 +71,8 @@ def _overlaps(pieces: Sequence[Item], boxes: F64) -> Iterator[Overlap]:
 def _solid(item: Item) -> Manifold | None:
     if item.n_faces > _MAX_FACES:
         return None
-    bodies = closed_bodies(item, TagTable())
-    return united(bodies) if bodies else None
+    shells = closed_shells(item, TagTable())
+    return united(shells) if shells else None
 
 
 def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floating]:

@@ -16,7 +16,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, Surface, geometry_from_h
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.occluder import Occluder
-from pbrs_farm.repair.measure.room_edges import RoomAir
+from pbrs_farm.repair.measure.room_edges import RoomInterior
 from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64
@@ -45,14 +45,14 @@ class LeakMeter:
 def leaks_of_house(
     house: House,
     spaces: Sequence[Space],
-    airs: Mapping[str, Sequence[RoomAir]],
+    interiors: Mapping[str, Sequence[RoomInterior]],
     plugs: Sequence[Surface],
     occluder_from: Callable[[House], Occluder],
     meter: LeakMeter | None = None,
 ) -> LeakReport:
     """Count, for each closed space, the rays that reach the sky. The house is a repaired one.
 
-    airs: by room id. plugs: fill its openings. Only structure and plugs stop rays: furniture hides no leak.
+    interiors: by room id. plugs: fill its openings. Only structure and plugs stop rays: furniture hides no leak.
     """
     meter = LeakMeter() if meter is None else meter
     shell = plugged_shell(house, plugs)
@@ -63,7 +63,7 @@ def leaks_of_house(
     rng = np.random.default_rng(0)
     found = []
     for space in closed:
-        inside = [a for r in (*space.rooms, *space.wells) for a in airs[r]]
+        inside = [a for r in (*space.rooms, *space.wells) for a in interiors[r]]
         origins, directions = _rays(inside, meter, rng)
         assert occluder is not None
         found.append(_measured(space, origins, directions, normals, occluder, meter, rng))
@@ -85,30 +85,36 @@ def plugged_shell(house: House, plugs: Sequence[Surface]) -> House:
     return replace(house, items=(*items, plug))
 
 
-def _rays(airs: Sequence[RoomAir], meter: LeakMeter, rng: np.random.Generator) -> tuple[F64, F64]:
-    if not airs:
+def _rays(
+    interiors: Sequence[RoomInterior], meter: LeakMeter, rng: np.random.Generator
+) -> tuple[F64, F64]:
+    if not interiors:
         return np.zeros((0, 3)), np.zeros((0, 3))
-    edges = np.concatenate([_edge_starts(a, meter.step_m, rng) for a in airs])
-    areas = np.array([a.area.area for a in airs])
+    edges = np.concatenate([_edge_starts(a, meter.step_m, rng) for a in interiors])
+    areas = np.array([a.area.area for a in interiors])
     shares = rng.multinomial(meter.n_inside, areas / areas.sum())
-    inside = np.concatenate([_inside(a, int(n), rng) for a, n in zip(airs, shares, strict=True)])
+    inside = np.concatenate(
+        [_inside(a, int(n), rng) for a, n in zip(interiors, shares, strict=True)]
+    )
     origins = np.concatenate(
         [np.repeat(edges, meter.per_start, 0), np.repeat(inside, meter.per_inside, 0)]
     )
     return origins, _unit(rng.normal(size=origins.shape))
 
 
-def _edge_starts(air: RoomAir, step_m: float, rng: np.random.Generator) -> F64:
-    """Points within 5 mm of the edges where walls, floor and ceiling meet, in the air."""
+def _edge_starts(interior: RoomInterior, step_m: float, rng: np.random.Generator) -> F64:
+    """Points within 5 mm of the edges where walls, floor and ceiling meet, in the interior."""
     inset = 0.5 * WITHIN_M
-    knee = air.low.raised(air.foot_m + inset)
+    knee = interior.low.raised(interior.foot_m + inset)
     found = [
-        *_along(air.foot, air.low.raised(inset), step_m, rng),
-        *_along(air.area, air.high.raised(-inset), step_m, rng),
-        *_upright(air.area, knee, air.high.raised(-inset), step_m, rng),
+        *_along(interior.foot, interior.low.raised(inset), step_m, rng),
+        *_along(interior.area, interior.high.raised(-inset), step_m, rng),
+        *_upright(interior.area, knee, interior.high.raised(-inset), step_m, rng),
     ]
-    if air.foot_m > 0:
-        found += _upright(air.foot, air.low.raised(inset), knee.raised(-2 * inset), step_m, rng)
+    if interior.foot_m > 0:
+        found += _upright(
+            interior.foot, interior.low.raised(inset), knee.raised(-2 * inset), step_m, rng
+        )
     points = np.concatenate([np.zeros((0, 3)), *found])
     return np.asarray(points + rng.uniform(-0.4, 0.4, points.shape) * WITHIN_M)
 
@@ -145,8 +151,8 @@ def _lifted(plan_points: F64, y: F64) -> F64:
     return np.stack([plan_points[:, 0], y, plan_points[:, 1]], 1)
 
 
-def _inside(air: RoomAir, n: int, rng: np.random.Generator) -> F64:
-    area = shapely.buffer(air.foot, -0.02)
+def _inside(interior: RoomInterior, n: int, rng: np.random.Generator) -> F64:
+    area = shapely.buffer(interior.foot, -0.02)
     if n == 0 or shapely.is_empty(area):
         return np.zeros((0, 3))
     x0, z0, x1, z1 = area.bounds
@@ -155,7 +161,7 @@ def _inside(air: RoomAir, n: int, rng: np.random.Generator) -> F64:
         points = rng.uniform((x0, z0), (x1, z1), (4 * n, 2))
         found = np.concatenate([found, points[shapely.contains_xy(area, *points.T)]])
     found = found[:n]
-    low, high = air.low.at(found) + 0.02, air.high.at(found) - 0.02
+    low, high = interior.low.at(found) + 0.02, interior.high.at(found) - 0.02
     return _lifted(found, low + rng.random(n) * (high - low))
 
 
@@ -180,12 +186,12 @@ def _measured(
             for a, b in zip(p[gone][: _MAX_LEAKS - len(leaks)], d[gone], strict=False)
         ]
         # From the front of a face light goes on; behind one it is inside a solid, absorbed.
-        lit = ~gone
-        lit[lit] = (d[lit] * normals[face[lit]]).sum(1) < 0
+        front = ~gone
+        front[front] = (d[front] * normals[face[front]]).sum(1) < 0
         if flight == 0:
-            n_blind = int((~gone & ~lit).sum())
-        reached = p[lit] + d[lit] * distance[lit, None].astype(np.float64)
-        n = normals[face[lit]]
+            n_blind = int((~gone & ~front).sum())
+        reached = p[front] + d[front] * distance[front, None].astype(np.float64)
+        n = normals[face[front]]
         d = _unit(_unit(rng.normal(size=n.shape)) + n)
         p = reached + 1e-4 * n
     return SpaceLeaks(

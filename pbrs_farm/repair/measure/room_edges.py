@@ -1,4 +1,4 @@
-"""The air of each room as the leak meter sees it: where its edges are; no effects."""
+"""Room interiors for the leak meter: between walls, floor and ceiling; no effects."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import shapely
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.plan_geometry import Shape
-from pbrs_farm.repair.structure.planar_surfaces import Sheet
+from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of
 from pbrs_farm.repair.structure.walls import Wall
 
@@ -18,7 +18,7 @@ _SLIVER_M = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RoomAir:
+class RoomInterior:
     """A part of a room between its floor and one plane of its ceiling.
 
     area: plan, walls left out. foot: the same with baseboards left out too, up to foot_m.
@@ -37,7 +37,9 @@ class RoomAir:
         return float((self.high.at(corners) - self.low.at(corners)).max())
 
 
-def room_airs(room: Room, uprights: Sequence[Wall], sheets: Sequence[Sheet]) -> list[RoomAir]:
+def interiors_of_room(
+    room: Room, uprights: Sequence[Wall], surfaces: Sequence[PlanarSurface]
+) -> list[RoomInterior]:
     """Between the walls, above the floor, a part below each plane of the ceiling."""
     near = [
         w for w in uprights if w.bottom_y < room.ceiling_y - 0.1 and w.high_y > room.floor_y + 0.01
@@ -49,12 +51,12 @@ def room_airs(room: Room, uprights: Sequence[Wall], sheets: Sequence[Sheet]) -> 
     foot_m = max(
         (w.high_y - room.floor_y for w in boards if w.footprint.distance(area) < 0.05), default=0.0
     )
-    ceilings = [s for s in sheets if s.is_ceiling and s.room_id == room.id]
+    ceilings = [s for s in surfaces if s.is_ceiling and s.room_id == room.id]
     parts = [(plan.common(area, s.area), s.plane) for s in ceilings]
     parts.append((plan.without(area, *(s.area for s in ceilings)), level_plane(room.ceiling_y)))
     floor = level_plane(room.floor_y)
     return [
-        RoomAir(p, plan.opened(plan.without(p, foot), _SLIVER_M), foot_m, floor, plane)
+        RoomInterior(p, plan.opened(plan.without(p, foot), _SLIVER_M), foot_m, floor, plane)
         for shape, plane in parts
         for p in polygons_of(plan.opened(shape, _SLIVER_M), min_area_m2=1e-3)
     ]

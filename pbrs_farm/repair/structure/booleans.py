@@ -16,7 +16,7 @@ from manifold3d import Manifold
 from numpy.typing import NDArray
 
 from pbrs_farm.core.mesh import signed_volume
-from pbrs_farm.repair.structure.sliver_removal import sealed
+from pbrs_farm.repair.structure.sliver_removal import without_slivers
 
 F64 = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
         vertices = np.concatenate([vertices, pad], 1)
     triangles = np.asarray(mesh.tri_verts, np.int64)
     tags, tag_of_face = _tags_of_faces(mesh, table)
-    vertices, triangles, tag_of_face = sealed(vertices, triangles, tag_of_face)
+    vertices, triangles, tag_of_face = without_slivers(vertices, triangles, tag_of_face)
     found = [
         _compact(tag, vertices, triangles[tag_of_face == k])
         for k, tag in enumerate(tags)

@@ -1,4 +1,4 @@
-"""The closed bodies a structure item is made of; or that it is flat; or neither. No effects."""
+"""The closed shells a structure item is made of; or that it is flat; or neither. No effects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pbrs_farm.repair.structure.patches import patch_from_surface
 _FLAT_M = 1e-3
 _WELD_M = 1e-5
 
-Body = tuple[Manifold, list[Patch]]
+ClosedShell = tuple[Manifold, list[Patch]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,21 +30,21 @@ class FlatPatch:
     normal: F64
 
 
-def bodies_from_item(item: Item, index: int, table: TagTable) -> list[Body] | None:
-    """The item as closed solids, one per connected body; None if any part of it is not closed."""
+def shells_from_item(item: Item, index: int, table: TagTable) -> list[ClosedShell] | None:
+    """The item as closed solids, one per connected shell; None if any part of it is not closed."""
     patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
     if not patches:
         return None
-    bodies = []
+    shells = []
     for part in _split(patches, components(patches)):
         solid = solid_from_patches(part, table)
         if solid is None:
             return None
-        bodies.append((solid, part))
-    return bodies
+        shells.append((solid, part))
+    return shells
 
 
-def closed_bodies(item: Item, table: TagTable) -> list[Manifold]:
+def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
     """Those connected parts of the item that are closed solids."""
     patches = [patch_from_surface(s, 0) for s in item.surfaces if len(s.faces)]
     if not patches:
@@ -54,7 +54,7 @@ def closed_bodies(item: Item, table: TagTable) -> list[Manifold]:
 
 
 def components(patches: Sequence[Patch]) -> list[NDArray[np.int64]]:
-    """For each patch the body (F,) of each face; bodies are faces joined at their corners."""
+    """For each patch the shell (F,) of each face; shells are faces joined at their corners."""
     positions = np.concatenate([p.positions for p in patches])
     keys = np.round(positions / _WELD_M)
     _, inverse = np.unique(keys, axis=0, return_inverse=True)
@@ -75,11 +75,11 @@ def _split(patches: Sequence[Patch], labels: Sequence[NDArray[np.int64]]) -> lis
         return [list(patches)]
     return [
         [
-            Patch(p.tag, p.positions, p.faces[part == body], p.uvs, p.normals)
+            Patch(p.tag, p.positions, p.faces[part == shell], p.uvs, p.normals)
             for p, part in zip(patches, labels, strict=True)
-            if (part == body).any()
+            if (part == shell).any()
         ]
-        for body in every
+        for shell in every
     ]
 
 

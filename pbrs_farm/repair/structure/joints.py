@@ -14,7 +14,7 @@ from manifold3d import Manifold
 
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable, solid_from_patches
-from pbrs_farm.repair.structure.planar_surfaces import Sheet
+from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import level_plane, polygons_of, prism
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
@@ -103,9 +103,9 @@ def _run_on(wall: Wall) -> plan.Shape:
     return plan.on_grid(shapely.Polygon(corners + outward * along * thickness))
 
 
-def joints_with_sheet(
-    sheet: Sheet,
-    ground: plan.Shape,
+def joints_with_surface(
+    surface: PlanarSurface,
+    footprint: plan.Shape,
     walls: Sequence[Wall],
     doors: plan.Shape,
     thickness_m: float,
@@ -113,26 +113,26 @@ def joints_with_sheet(
 ) -> list[tuple[Wall, Manifold]]:
     """Wall parts that reach half a slab into the floor below or the ceiling above, hidden in it.
 
-    Made where a wall ends within GAP_M of the sheet's plane, so that a gap there is filled too.
+    Made where a wall ends within GAP_M of the surface's plane, so that a gap there is filled too.
     doors: plan area of openings down to the floor, where a wall has no foot.
     """
     depth_m = 0.5 * thickness_m
-    away = 1.0 if sheet.is_ceiling else -1.0
+    away = 1.0 if surface.is_ceiling else -1.0
     found = []
     for wall in walls:
-        if wall.footprint.distance(ground) > 0:
+        if wall.footprint.distance(footprint) > 0:
             continue
-        area = plan.common(plan.grown(wall.footprint, -_RECESS_M), ground)
-        if not sheet.is_ceiling:
+        area = plan.common(plan.grown(wall.footprint, -_RECESS_M), footprint)
+        if not surface.is_ceiling:
             area = plan.without(area, doors)
         for polygon in polygons_of(area):
             corners = shapely.get_coordinates(polygon)
-            end = wall.top if sheet.is_ceiling else level_plane(wall.bottom_y)
-            gap = away * (sheet.plane.at(corners) - end.at(corners))
+            end = wall.top if surface.is_ceiling else level_plane(wall.bottom_y)
+            gap = away * (surface.plane.at(corners) - end.at(corners))
             if gap.max() > GAP_M or gap.max() < -depth_m:
                 continue
-            near, far = end.raised(-away * _OVERLAP_M), sheet.plane.raised(away * depth_m)
-            low, high = (near, far) if sheet.is_ceiling else (far, near)
+            near, far = end.raised(-away * _OVERLAP_M), surface.plane.raised(away * depth_m)
+            low, high = (near, far) if surface.is_ceiling else (far, near)
             if (high.at(corners) - low.at(corners)).min() < _RECESS_M:
                 continue
             patches = prism(polygon, low, high, (wall.tag("joint"),) * 3)

@@ -14,14 +14,14 @@ from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64, Patch, Tag, TagTable, bounds
-from pbrs_farm.repair.structure.closed_shells import bodies_from_item
+from pbrs_farm.repair.structure.closed_shells import shells_from_item
 from pbrs_farm.repair.structure.prisms import Plane, UvMap, level_plane, plane_of_points
 
 _SAME_FACING = 1.0 - 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sheet:
+class PlanarSurface:
     """One plane's worth of one planar floor or ceiling. area: its plan polygon."""
 
     item: int
@@ -31,7 +31,7 @@ class Sheet:
     plane: Plane
     uv: UvMap | None
     material: int
-    surface: str
+    name: str
 
     def tag(self, surface: str) -> Tag:
         """The tag of a surface that repair adds to this floor or ceiling."""
@@ -39,7 +39,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lid:
+class Cover:
     """A floor or a ceiling as rooms feel it: plan area and plane of the face they see."""
 
     is_ceiling: bool
@@ -48,33 +48,33 @@ class Lid:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sheets:
+class FloorsAndCeilings:
     """All floors and ceilings: planar ones, those that came as solids, and those left as they are.
 
-    lids: plan area and plane of the solid ones' inner faces.
+    covers: plan area and plane of the solid ones' inner faces.
     """
 
-    planar: list[Sheet]
+    planar: list[PlanarSurface]
     solid: dict[int, list[Manifold]]
     left: dict[int, str]
-    lids: list[Lid]
+    covers: list[Cover]
 
 
-def sheets_from_house(house: House, table: TagTable) -> Sheets:
+def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCeilings:
     """Sort every floor, ceiling and ground item into planar, solid, or neither."""
-    found = Sheets([], {}, {}, [])
+    found = FloorsAndCeilings([], {}, {}, [])
     for index, item in enumerate(house.items):
         if item.kind not in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND):
             continue
-        bodies = bodies_from_item(item, index, table)
-        if bodies is not None:
-            found.solid[index] = [solid for solid, _ in bodies]
+        shells = shells_from_item(item, index, table)
+        if shells is not None:
+            found.solid[index] = [solid for solid, _ in shells]
             if item.kind is not ItemKind.GROUND:
-                found.lids.extend(_lid(item, solid, patches) for solid, patches in bodies)
+                found.covers.extend(_lid(item, solid, patches) for solid, patches in shells)
         elif item.kind is ItemKind.GROUND:
             continue
         else:
-            planar = list(_sheets(item, index))
+            planar = list(_planar_surfaces(item, index))
             if planar:
                 found.planar.extend(planar)
             elif item.surfaces:
@@ -82,14 +82,14 @@ def sheets_from_house(house: House, table: TagTable) -> Sheets:
     return found
 
 
-def _lid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> Lid:
+def _lid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> Cover:
     low, high = bounds(solid)
     is_ceiling = item.kind is ItemKind.CEILING
     area = plan.union(plan.polygon_of_triangles(p.positions, p.faces) for p in patches)
-    return Lid(is_ceiling, area, level_plane(float(low[1] if is_ceiling else high[1])))
+    return Cover(is_ceiling, area, level_plane(float(low[1] if is_ceiling else high[1])))
 
 
-def _sheets(item: Item, index: int) -> Iterator[Sheet]:
+def _planar_surfaces(item: Item, index: int) -> Iterator[PlanarSurface]:
     for surface in item.surfaces:
         positions = surface.positions.astype(np.float64)
         for faces in _facets(positions, surface.faces):
@@ -98,7 +98,7 @@ def _sheets(item: Item, index: int) -> Iterator[Sheet]:
             area = plan.polygon_of_triangles(positions, faces)
             if plane is None or shapely.is_empty(area):
                 continue
-            yield Sheet(
+            yield PlanarSurface(
                 item=index,
                 room_id=item.room_id,
                 is_ceiling=item.kind is ItemKind.CEILING,
@@ -106,7 +106,7 @@ def _sheets(item: Item, index: int) -> Iterator[Sheet]:
                 plane=plane,
                 uv=_uv_map(surface, faces),
                 material=surface.material,
-                surface=surface.name,
+                name=surface.name,
             )
 
 
@@ -127,7 +127,7 @@ def _facets(positions: F64, faces: NDArray[np.int32]) -> list[NDArray[np.int32]]
 
 
 def _uv_map(surface: Surface, faces: NDArray[np.int32]) -> UvMap | None:
-    # The texture as an affine map of the plan, so that it carries on where the sheet grows.
+    # The texture as an affine map of the plan, so that it carries on where the slab grows.
     if surface.uvs is None:
         return None
     used = np.unique(faces)

@@ -1,4 +1,4 @@
-"""The air of rooms as solids, so that no slab or joint sticks into another room; no effects."""
+"""Room volumes as solids, so that no slab or joint sticks into another room; no effects."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pbrs_farm.repair.structure.booleans import (
     reduced,
     solid_from_patches,
 )
-from pbrs_farm.repair.structure.planar_surfaces import Sheet
+from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, prism
 from pbrs_farm.repair.structure.slabs import GAP_M, SAME_HEIGHT_M
 from pbrs_farm.repair.structure.walls import Wall
@@ -31,8 +31,8 @@ _COINCIDE_M = 0.001
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Air:
-    """A part of a room's air: plan area between two planes.
+class RoomVolume:
+    """A part of a room's volume: a plan area between two planes.
 
     items: the floors and ceilings that bound it, whichever room they are listed under.
     """
@@ -44,33 +44,33 @@ class Air:
     bounds: F64
 
 
-def airs_of_rooms(rooms: Sequence[Room], sheets: Sequence[Sheet]) -> list[Air]:
-    """The air of every room, below each plane of its ceiling, and a little of what bounds it.
+def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -> list[RoomVolume]:
+    """The volumes of every room, a part below each plane of its ceiling, a little too large.
 
-    What is cut by it then ends inside walls, floor and ceiling, flush with none of them.
+    What they cut ends inside walls, floor and ceiling, flush with none of them.
     """
     margin = _margin(rooms)
     found = []
     for room in rooms:
         area = plan.polygon_of_room(room.polygon)
-        own = frozenset(s.item for s in sheets if _bounds_room(s, room))
-        ceilings = [s for s in sheets if s.is_ceiling and s.room_id == room.id]
+        own = frozenset(s.item for s in surfaces if _bounds_room(s, room))
+        ceilings = [s for s in surfaces if s.is_ceiling and s.room_id == room.id]
         floor = level_plane(room.floor_y - margin)
         parts = [(s.area, s.plane.raised(margin)) for s in ceilings]
         bare = plan.without(area, *(s.area for s in ceilings))
         parts.append((bare, level_plane(room.ceiling_y + margin)))
         for shape, high in parts:
             wide = plan.grown(shape, margin)
-            found += [_air(p, floor, high, own) for p in polygons_of(wide, min_area_m2=1e-3)]
+            found += [_volume(p, floor, high, own) for p in polygons_of(wide, min_area_m2=1e-3)]
     return found
 
 
-def _bounds_room(sheet: Sheet, room: Room) -> bool:
-    # At the room's own height whatever it shows is settled in plan (slabs.own_areas).
-    if sheet.room_id == room.id:
+def _bounds_room(surface: PlanarSurface, room: Room) -> bool:
+    # At the room's own height whatever it shows is settled in plan (slabs.visible_areas).
+    if surface.room_id == room.id:
         return True
-    nominal = room.ceiling_y if sheet.is_ceiling else room.floor_y
-    heights = sheet.plane.at(shapely.get_coordinates(sheet.area))
+    nominal = room.ceiling_y if surface.is_ceiling else room.floor_y
+    heights = surface.plane.at(shapely.get_coordinates(surface.area))
     return bool(np.abs(heights - nominal).max() < SAME_HEIGHT_M)
 
 
@@ -85,31 +85,36 @@ def _margin(rooms: Sequence[Room]) -> float:
     return min([_MARGIN_M, *(gap / 3 for gap in gaps)])
 
 
-def _air(area: shapely.Polygon, low: Plane, high: Plane, items: frozenset[int]) -> Air:
+def _volume(area: shapely.Polygon, low: Plane, high: Plane, items: frozenset[int]) -> RoomVolume:
     corners = shapely.get_coordinates(area)
     x0, z0, x1, z1 = area.bounds
     box = np.array([[x0, low.at(corners).min(), z0], [x1, high.at(corners).max(), z1]])
-    return Air(area, low, high, items, box)
+    return RoomVolume(area, low, high, items, box)
 
 
-def without_air(
-    solid: Manifold, tag: Tag, item: int | None, airs: Sequence[Air], table: TagTable
+def without_volumes(
+    solid: Manifold, tag: Tag, item: int | None, volumes: Sequence[RoomVolume], table: TagTable
 ) -> Manifold:
-    """solid less the air of rooms, but not of the room item (a floor or ceiling) belongs to.
+    """solid less the volumes of rooms, save of the room that item (a floor or ceiling) bounds.
 
     New faces get tag.
     """
     cutters = []
-    for air in airs:
-        if item in air.items or (overlap_of_bounds(bounds(solid), air.bounds) < _TOUCH_M).any():
+    for volume in volumes:
+        if (
+            item in volume.items
+            or (overlap_of_bounds(bounds(solid), volume.bounds) < _TOUCH_M).any()
+        ):
             continue
-        cutter = solid_from_patches(prism(air.area, air.low, air.high, (tag,) * 3), table)
+        cutter = solid_from_patches(prism(volume.area, volume.low, volume.high, (tag,) * 3), table)
         if cutter is not None:
             cutters.append(cutter)
     return reduced(solid, cutters)
 
 
-def own_sides_first(walls: Sequence[Wall], rooms: Sequence[Room], table: TagTable) -> list[Wall]:
+def with_own_sides_visible(
+    walls: Sequence[Wall], rooms: Sequence[Room], table: TagTable
+) -> list[Wall]:
     """The walls, those of other rooms drawn back behind each room's own where the two coincide.
 
     Where every room brings walls of its own (SUNCG), two rooms' walls lie in one plane: each room

@@ -14,7 +14,7 @@ from manifold3d import Manifold
 
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable, solid_from_patches
-from pbrs_farm.repair.structure.planar_surfaces import Sheet
+from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, polygons_of, prism
 from pbrs_farm.repair.structure.walls import Wall
 
@@ -28,29 +28,32 @@ _FACE_M = 0.02
 _BASE_BEHIND_M = 0.01
 
 
-def ground_of_sheets(
-    sheets: Sequence[Sheet], walls: Sequence[Wall], thresholds: plan.Shape, thickness_m: float
+def footprints_of_surfaces(
+    surfaces: Sequence[PlanarSurface],
+    walls: Sequence[Wall],
+    thresholds: plan.Shape,
+    thickness_m: float,
 ) -> list[plan.Shape]:
-    """For each sheet the plan area of its slab: its own area, grown under or over the walls.
+    """For each surface the plan area of its slab: its own area, grown under or over the walls.
 
     It grows thickness_m into walls, across gaps up to GAP_M, and through thresholds (plan area of
     openings that reach the floor); never past a free edge.
     """
-    grounds = []
-    for sheet in sheets:
-        mates = [s.area for s in sheets if _beside(sheet, s)]
-        feet = [w.footprint for w in walls if _meets(sheet, w)]
+    footprints = []
+    for surface in surfaces:
+        mates = [s.area for s in surfaces if _beside(surface, s)]
+        feet = [w.footprint for w in walls if _meets(surface, w)]
         whole = plan.closed(plan.union([*mates, *feet]), 2 * GAP_M)
-        reach = plan.grown(sheet.area, thickness_m)
-        if not sheet.is_ceiling:
-            doors = plan.common(thresholds, plan.grown(sheet.area, 1.0))
-            near = [d for d in polygons_of(doors) if d.distance(sheet.area) < GAP_M]
+        reach = plan.grown(surface.area, thickness_m)
+        if not surface.is_ceiling:
+            doors = plan.common(thresholds, plan.grown(surface.area, 1.0))
+            near = [d for d in polygons_of(doors) if d.distance(surface.area) < GAP_M]
             reach = plan.union([reach, *near])
-        grounds.append(plan.union([sheet.area, plan.common(reach, whole)]))
-    return grounds
+        footprints.append(plan.union([surface.area, plan.common(reach, whole)]))
+    return footprints
 
 
-def _beside(a: Sheet, b: Sheet) -> bool:
+def _beside(a: PlanarSurface, b: PlanarSurface) -> bool:
     near = a.is_ceiling == b.is_ceiling and a.area.distance(b.area) < 1.0
     if not near:
         return False
@@ -58,31 +61,33 @@ def _beside(a: Sheet, b: Sheet) -> bool:
     return bool(abs(a.plane.at(middle)[0] - b.plane.at(middle)[0]) < 0.5)
 
 
-def _meets(sheet: Sheet, wall: Wall) -> bool:
-    # The wall's body comes within GAP_M of the sheet's plane where they are next to each other.
-    if wall.footprint.distance(sheet.area) > 1.0:
+def _meets(surface: PlanarSurface, wall: Wall) -> bool:
+    # Ask whether the wall comes within GAP_M of the surface's plane where both are near in plan.
+    if wall.footprint.distance(surface.area) > 1.0:
         return False
     corners = shapely.get_coordinates(wall.footprint)
-    heights = sheet.plane.at(corners)
+    heights = surface.plane.at(corners)
     return bool((wall.bottom_y - GAP_M <= heights).any() and (heights <= wall.top.at(corners) + GAP_M).any())  # fmt: skip
 
 
-def own_areas(sheets: Sequence[Sheet], grounds: Sequence[plan.Shape]) -> list[plan.Shape]:
-    """For each sheet the part of its ground it shows: where sheets overlap, the later one.
+def visible_areas(
+    surfaces: Sequence[PlanarSurface], footprints: Sequence[plan.Shape]
+) -> list[plan.Shape]:
+    """For each surface the part of its footprint it shows: where surfaces overlap, the later one.
 
-    Under walls, where two grounds meet, the earlier one. Sheets at other heights do not count.
+    Under walls, where two footprints meet, the earlier one. FloorsAndCeilings at other heights do not count.
     """
     own = []
-    for i, sheet in enumerate(sheets):
-        same = [j for j, s in enumerate(sheets) if j != i and _same_height(sheet, s)]
-        mine = plan.without(sheet.area, *(sheets[j].area for j in same if j > i))
-        ring = plan.without(grounds[i], sheet.area, *(sheets[j].area for j in same))
-        ring = plan.without(ring, *(grounds[j] for j in same if j < i))
+    for i, surface in enumerate(surfaces):
+        same = [j for j, s in enumerate(surfaces) if j != i and _same_height(surface, s)]
+        mine = plan.without(surface.area, *(surfaces[j].area for j in same if j > i))
+        ring = plan.without(footprints[i], surface.area, *(surfaces[j].area for j in same))
+        ring = plan.without(ring, *(footprints[j] for j in same if j < i))
         own.append(plan.union([mine, ring]))
     return own
 
 
-def _same_height(a: Sheet, b: Sheet) -> bool:
+def _same_height(a: PlanarSurface, b: PlanarSurface) -> bool:
     if a.is_ceiling != b.is_ceiling or a.area.distance(b.area) > 1.0:
         return False
     corners = shapely.get_coordinates(b.area)
@@ -90,41 +95,47 @@ def _same_height(a: Sheet, b: Sheet) -> bool:
 
 
 def slab(
-    sheet: Sheet, ground: plan.Shape, own: plan.Shape, thickness_m: float, table: TagTable
+    surface: PlanarSurface,
+    footprint: plan.Shape,
+    own: plan.Shape,
+    thickness_m: float,
+    table: TagTable,
 ) -> list[Manifold]:
-    """The sheet's slab as solids that overlap: the layer with its face, and the base behind it."""
-    away = 1.0 if sheet.is_ceiling else -1.0
-    hidden, face = sheet.tag("hidden"), sheet.tag(sheet.surface)
+    """The surface's slab as solids that overlap: the layer with its face, and the base behind it."""
+    away = 1.0 if surface.is_ceiling else -1.0
+    hidden, face = surface.tag("hidden"), surface.tag(surface.name)
     solids = []
     for area, near_m, far_m, tag in (
         (own, 0.0, _FACE_M, face),
-        (ground, _BASE_BEHIND_M, thickness_m, hidden),
+        (footprint, _BASE_BEHIND_M, thickness_m, hidden),
     ):
-        near, far = sheet.plane.raised(away * near_m), sheet.plane.raised(away * far_m)
-        low, high = (near, far) if sheet.is_ceiling else (far, near)
-        tags = (tag, hidden, hidden) if sheet.is_ceiling else (hidden, tag, hidden)
+        near, far = surface.plane.raised(away * near_m), surface.plane.raised(away * far_m)
+        low, high = (near, far) if surface.is_ceiling else (far, near)
+        tags = (tag, hidden, hidden) if surface.is_ceiling else (hidden, tag, hidden)
         for polygon in polygons_of(area):
-            solid = solid_from_patches(prism(polygon, low, high, tags, sheet.uv), table)
+            solid = solid_from_patches(prism(polygon, low, high, tags, surface.uv), table)
             if solid is not None:
                 solids.append(solid)
     return solids
 
 
-def bridged(sheets: Sequence[Sheet], thickness_m: float, table: TagTable) -> list[Manifold]:
+def bridged(
+    surfaces: Sequence[PlanarSurface], thickness_m: float, table: TagTable
+) -> list[Manifold]:
     """Solids that join the planes of one ceiling behind its creases, where slabs only abut."""
     solids = []
-    for k, sheet in enumerate(sheets):
-        others = [s.area for j, s in enumerate(sheets) if j != k and s.item == sheet.item]
+    for k, surface in enumerate(surfaces):
+        others = [s.area for j, s in enumerate(surfaces) if j != k and s.item == surface.item]
         if not others:
             continue
-        whole = plan.union([sheet.area, *others])
-        area = plan.common(plan.grown(sheet.area, 0.2 * thickness_m), whole)
-        away = 1.0 if sheet.is_ceiling else -1.0
-        a: Plane = sheet.plane.raised(away * 0.5 * thickness_m)
-        b: Plane = sheet.plane.raised(away * thickness_m)
-        hidden = sheet.tag("hidden")
+        whole = plan.union([surface.area, *others])
+        area = plan.common(plan.grown(surface.area, 0.2 * thickness_m), whole)
+        away = 1.0 if surface.is_ceiling else -1.0
+        a: Plane = surface.plane.raised(away * 0.5 * thickness_m)
+        b: Plane = surface.plane.raised(away * thickness_m)
+        hidden = surface.tag("hidden")
         for polygon in polygons_of(area):
-            low, high = (a, b) if sheet.is_ceiling else (b, a)
+            low, high = (a, b) if surface.is_ceiling else (b, a)
             solid = solid_from_patches(prism(polygon, low, high, (hidden,) * 3), table)
             if solid is not None:
                 solids.append(solid)

@@ -1,7 +1,7 @@
 """Closed in double precision, closed in single precision: slivers dissolved; no effects.
 
 Rounded to float32, thin triangles of a boolean result lose their area. Left out, they would leave
-a vertex in the middle of another triangle's edge, and rays may slip through such a seam. Here
+a vertex in the middle of another triangle's edge, and rays may slip through there. Here
 each is dissolved instead: the triangle across its longest edge is split at that vertex.
 """
 
@@ -23,7 +23,7 @@ _MERGE_M = 4e-6
 _MAX_ROUNDS = 8
 
 
-def sealed(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Faces, Faces]:
+def without_slivers(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Faces, Faces]:
     """The mesh with float32 positions and no face without area, its edges still in pairs.
 
     Points nearer than a few micrometres, which differ by noise, become one.

@@ -1,4 +1,4 @@
-"""Stairwells that no room covers: their air, and the floor or ceiling they lack; no effects.
+"""Stairwells that no room covers, and the floor or ceiling they lack; no effects.
 
 People draw rooms around a stairwell. Where stairs stand between rooms and walls without a room
 of their own, the sky would look in from below the stairs or from above them.
@@ -14,7 +14,7 @@ import shapely
 from pbrs_farm.core.house import House, ItemKind, Room
 from pbrs_farm.repair.measure.enclosure import bare_area
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.planar_surfaces import Lid, Sheet
+from pbrs_farm.repair.structure.planar_surfaces import Cover, PlanarSurface
 from pbrs_farm.repair.structure.prisms import polygons_of
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
@@ -25,14 +25,14 @@ _NEIGHBOUR_M = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stairwells:
-    """wells: stairwells as rooms (ids "well_<level>_<k>"). sheets: the lids they lacked."""
+    """Stairwells as rooms, and the floors and ceilings that were missing there."""
 
-    wells: tuple[Room, ...]
-    sheets: tuple[Sheet, ...]
+    wells: tuple[Room, ...]  # ids "well_<level>_<k>"
+    surfaces: tuple[PlanarSurface, ...]
 
 
 def stairwells_of_house(
-    house: House, walls: Sequence[Wall], sheets: Sequence[Sheet], lids: Sequence[Lid]
+    house: House, walls: Sequence[Wall], surfaces: Sequence[PlanarSurface], covers: Sequence[Cover]
 ) -> Stairwells:
     """Every hole among a level's rooms and walls in which stairs stand or arrive.
 
@@ -55,9 +55,9 @@ def stairwells_of_house(
     added = []
     for well in wells:
         for above in (False, True):
-            bare = bare_area(well, rooms, lids, above=above)
+            bare = bare_area(well, rooms, covers, above=above)
             if bare.area > _MIN_AREA_M2:
-                added += _continued(bare, well, sheets, is_ceiling=above)
+                added += _continued(bare, well, surfaces, is_ceiling=above)
     return Stairwells(tuple(wells), tuple(added))
 
 
@@ -83,11 +83,11 @@ def _holes(
 
 
 def _continued(
-    area: plan.Shape, well: Room, sheets: Sequence[Sheet], *, is_ceiling: bool
-) -> list[Sheet]:
+    area: plan.Shape, well: Room, surfaces: Sequence[PlanarSurface], *, is_ceiling: bool
+) -> list[PlanarSurface]:
     near = [
         s
-        for s in sheets
+        for s in surfaces
         if s.is_ceiling == is_ceiling
         and s.area.distance(area) < _NEIGHBOUR_M
         and well.floor_y - GAP_M < s.plane.at(shapely.get_coordinates(s.area)).mean()

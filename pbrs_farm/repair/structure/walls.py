@@ -20,7 +20,7 @@ from pbrs_farm.repair.structure.booleans import (
     bounds,
     solid_from_patches,
 )
-from pbrs_farm.repair.structure.closed_shells import bodies_from_item, flat_patch
+from pbrs_farm.repair.structure.closed_shells import flat_patch, shells_from_item
 from pbrs_farm.repair.structure.prisms import (
     Plane,
     level_plane,
@@ -61,7 +61,7 @@ class Wall:
 def walls_from_house(
     house: House, table: TagTable, rooms: plan.Shape, thickness_m: float
 ) -> tuple[list[Wall], dict[int, str]]:
-    """A Wall for every closed body of every wall item, and item index -> why it is left as it is.
+    """A Wall for every closed shell of every wall item, and item index -> why it is left as it is.
 
     rooms: plan area of all rooms; planar walls are thickened away from it.
     """
@@ -70,9 +70,9 @@ def walls_from_house(
     for index, item in enumerate(house.items):
         if item.kind is not ItemKind.WALL or not item.surfaces:
             continue
-        bodies = bodies_from_item(item, index, table)
-        if bodies is not None:
-            walls += [_wall(item, index, solid, patches) for solid, patches in bodies]
+        shells = shells_from_item(item, index, table)
+        if shells is not None:
+            walls += [_wall(item, index, solid, patches) for solid, patches in shells]
             continue
         thick = _thickened(item, index, table, rooms, thickness_m)
         if thick is None:

@@ -9,113 +9,134 @@ from manifold3d import Manifold
 
 from pbrs_farm.core.house import House, Item, Surface
 from pbrs_farm.repair.measure.enclosure import Space, spaces_of_rooms
-from pbrs_farm.repair.measure.room_edges import RoomAir, room_airs
+from pbrs_farm.repair.measure.room_edges import RoomInterior, interiors_of_room
 from pbrs_farm.repair.report import LeftAsIs, Removed, StructureReport
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable, patches_from_solid, united
 from pbrs_farm.repair.structure.cut_openings import WallPart, cut_openings, thresholds
-from pbrs_farm.repair.structure.joints import joints_between_walls, joints_with_sheet
+from pbrs_farm.repair.structure.joints import joints_between_walls, joints_with_surface
 from pbrs_farm.repair.structure.patches import surface_from_patch
-from pbrs_farm.repair.structure.planar_surfaces import Lid, Sheets, sheets_from_house
+from pbrs_farm.repair.structure.planar_surfaces import (
+    Cover,
+    FloorsAndCeilings,
+    PlanarSurface,
+    floors_and_ceilings_from_house,
+)
 from pbrs_farm.repair.structure.reveals import with_metric_uv
-from pbrs_farm.repair.structure.room_volumes import Air, airs_of_rooms, own_sides_first, without_air
-from pbrs_farm.repair.structure.slabs import bridged, ground_of_sheets, own_areas, slab
+from pbrs_farm.repair.structure.room_volumes import (
+    RoomVolume,
+    volumes_of_rooms,
+    with_own_sides_visible,
+    without_volumes,
+)
+from pbrs_farm.repair.structure.slabs import bridged, footprints_of_surfaces, slab, visible_areas
 from pbrs_farm.repair.structure.stairwells import stairwells_of_house
-from pbrs_farm.repair.structure.walls import walls_from_house
+from pbrs_farm.repair.structure.walls import Wall, walls_from_house
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
-    """The repaired structure. surfaces: item index -> its new surfaces, empty if swallowed.
+    """The repaired walls, floors and ceilings of a house.
 
-    plugs: for each opening that cuts a wall, closed solids of the wall's own thickness that fill
-    it (by opening id), for the leak meter. spaces: rooms by the air they share. airs: each room's
-    air by room id, walls left out.
+    plugs: closed solids of the wall's own thickness, for each opening that cuts a wall.
     """
 
-    surfaces: dict[int, tuple[Surface, ...]]
-    plugs: dict[str, tuple[Surface, ...]]
+    surfaces: dict[int, tuple[Surface, ...]]  # item index -> new surfaces, none if swallowed
+    plugs: dict[str, tuple[Surface, ...]]  # opening id -> what fills it for the leak meter
     report: StructureReport
-    spaces: tuple[Space, ...]
-    airs: dict[str, list[RoomAir]]
+    spaces: tuple[Space, ...]  # rooms that open into each other
+    interiors: dict[str, list[RoomInterior]]  # room id -> its parts between the walls
 
 
 def repaired_structure(house: House, thickness_m: float) -> Structure:
     """Thicken what is planar, join, cut, unite. Faces keep item, surface name, material and uv."""
+    # Read walls, floors and ceilings; give stairwells without a room the covers they lack.
     table = TagTable()
     rooms = plan.union([plan.polygon_of_room(r.polygon) for r in house.rooms])
     uprights, left = walls_from_house(house, table, rooms, thickness_m)
     walls = [w for w in uprights if not w.is_board]
-    sheets = sheets_from_house(house, table)
-    found = stairwells_of_house(house, walls, sheets.planar, _lids(sheets))
-    sheets.planar.extend(found.sheets)
+    horizontal = floors_and_ceilings_from_house(house, table)
+    found = stairwells_of_house(house, walls, horizontal.planar, _covers(horizontal))
+    planar = [*horizontal.planar, *found.surfaces]
+    covers = _covers(replace(horizontal, planar=planar))
     lived = (*house.rooms, *found.wells)
     doors = thresholds(house, walls)
 
-    grounds = ground_of_sheets(sheets.planar, walls, doors, thickness_m)
-    airs = airs_of_rooms(lived, sheets.planar)
-    slabs = _slabs(sheets, grounds, airs, thickness_m, table)
-    wholes = own_sides_first(uprights, house.rooms, table)
+    # Thicken floors and ceilings, join walls to walls and to slabs, but never inside a room.
+    footprints = footprints_of_surfaces(planar, walls, doors, thickness_m)
+    volumes = volumes_of_rooms(lived, planar)
+    slabs = _slabs(planar, footprints, volumes, thickness_m, table)
+    wholes = with_own_sides_visible(uprights, house.rooms, table)
     joints, n_gaps = joints_between_walls(walls, rooms, table)
-    for sheet, ground in zip(sheets.planar, grounds, strict=True):
-        joints += joints_with_sheet(sheet, ground, walls, doors, thickness_m, table)
+    for surface, footprint in zip(planar, footprints, strict=True):
+        joints += joints_with_surface(surface, footprint, walls, doors, thickness_m, table)
     parts = [WallPart(w, w.solid, is_joint=False) for w in wholes]
     for w, solid in joints:
-        solid = without_air(solid, w.tag("joint"), None, airs, table)
+        solid = without_volumes(solid, w.tag("joint"), None, volumes, table)
         parts.append(WallPart(w, solid, is_joint=True))
 
+    # Cut the openings, unite everything, and take the faces back by item.
     cut_parts, plugs, idle = cut_openings(house.openings, parts, table)
-    bodies = [*cut_parts, *slabs, *(s for solids in sheets.solid.values() for s in solids)]
-    surfaces = _surfaces(united(bodies), table) if bodies else {}
-    touched = {w.item for w in uprights} | {s.item for s in sheets.planar} | set(sheets.solid)
-    report = StructureReport(
-        n_walls=len({w.item for w in walls}),
-        n_walls_thickened=len({w.item for w in walls if w.thickened}),
-        n_floors_thickened=len({s.item for s in sheets.planar if not s.is_ceiling}),
-        n_ceilings_thickened=len({s.item for s in sheets.planar if s.is_ceiling}),
-        n_solid_before=len({w.item for w in walls if not w.thickened} | set(sheets.solid)),
-        n_joints_closed=n_gaps,
-        n_stairwells_closed=len(found.sheets),
-        n_openings=len(house.openings),
-        n_openings_cut=len(plugs),
-        left_as_is=(
-            *_left(house, {**left, **sheets.left}),
-            *(LeftAsIs(what="opening", id=i, reason="it touches no wall") for i in idle),
-        ),
+    solids = [*cut_parts, *slabs, *(s for found in horizontal.solid.values() for s in found)]
+    surfaces = _surfaces(united(solids), table) if solids else {}
+    touched = {w.item for w in uprights} | {s.item for s in planar} | set(horizontal.solid)
+    report = _counts(walls, planar, set(horizontal.solid)).model_copy(
+        update={
+            "n_joints_closed": n_gaps,
+            "n_stairwells_closed": len(found.surfaces),
+            "n_openings": len(house.openings),
+            "n_openings_cut": len(plugs),
+            "left_as_is": _left(house, {**left, **horizontal.left}, idle),
+        }
     )
     return Structure(
         {i: surfaces.get(i, ()) for i in sorted(touched)},
         plugs,
         report,
-        spaces_of_rooms(house.rooms, found.wells, walls, _lids(sheets)),
-        {r.id: room_airs(r, uprights, sheets.planar) for r in lived},
+        spaces_of_rooms(house.rooms, found.wells, walls, covers),
+        {r.id: interiors_of_room(r, uprights, planar) for r in lived},
     )
 
 
-def _lids(sheets: Sheets) -> list[Lid]:
-    return [Lid(s.is_ceiling, s.area, s.plane) for s in sheets.planar] + sheets.lids
+def _counts(
+    walls: Sequence[Wall], planar: Sequence[PlanarSurface], solid: set[int]
+) -> StructureReport:
+    # A wall of several shells counts once.
+    return StructureReport(
+        n_walls=len({w.item for w in walls}),
+        n_walls_thickened=len({w.item for w in walls if w.thickened}),
+        n_floors_thickened=len({s.item for s in planar if not s.is_ceiling}),
+        n_ceilings_thickened=len({s.item for s in planar if s.is_ceiling}),
+        n_solid_before=len({w.item for w in walls if not w.thickened} | solid),
+    )
 
 
-def _left(house: House, left: dict[int, str]) -> list[LeftAsIs]:
-    return [
-        LeftAsIs(what=str(house.items[i].kind), id=house.items[i].id, reason=why)
-        for i, why in sorted(left.items())
+def _covers(horizontal: FloorsAndCeilings) -> list[Cover]:
+    return [Cover(s.is_ceiling, s.area, s.plane) for s in horizontal.planar] + horizontal.covers
+
+
+def _left(house: House, left: dict[int, str], idle: Sequence[str]) -> tuple[LeftAsIs, ...]:
+    items = [
+        LeftAsIs(what=str(house.items[i].kind), id=house.items[i].id, reason=reason)
+        for i, reason in sorted(left.items())
     ]
+    openings = [LeftAsIs(what="opening", id=i, reason="it touches no wall") for i in idle]
+    return (*items, *openings)
 
 
 def _slabs(
-    sheets: Sheets,
-    grounds: Sequence[plan.Shape],
-    airs: Sequence[Air],
+    planar: Sequence[PlanarSurface],
+    footprints: Sequence[plan.Shape],
+    volumes: Sequence[RoomVolume],
     thickness_m: float,
     table: TagTable,
 ) -> list[Manifold]:
     found = []
-    owns = own_areas(sheets.planar, grounds)
-    for sheet, ground, own in zip(sheets.planar, grounds, owns, strict=True):
-        for solid in slab(sheet, ground, own, thickness_m, table):
-            found.append(without_air(solid, sheet.tag("hidden"), sheet.item, airs, table))
-    return found + bridged(sheets.planar, thickness_m, table)
+    visible = visible_areas(planar, footprints)
+    for surface, footprint, own in zip(planar, footprints, visible, strict=True):
+        for solid in slab(surface, footprint, own, thickness_m, table):
+            found.append(without_volumes(solid, surface.tag("hidden"), surface.item, volumes, table))  # fmt: skip
+    return found + bridged(planar, thickness_m, table)
 
 
 def _surfaces(solid: Manifold, table: TagTable) -> dict[int, tuple[Surface, ...]]:
