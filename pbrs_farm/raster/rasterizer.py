@@ -28,8 +28,7 @@ from pbrs_farm.raster.gl_device import (
 from pbrs_farm.raster.light_choice import LIGHT_FLOATS, brightness_scale
 from pbrs_farm.raster.projection import boxes_in_view, clip_from_world, distance_to_boxes, far_plane
 from pbrs_farm.raster.shader_features import (
-    ALPHA_CUTOUT,
-    TRANSPARENT,
+    Feature,
     feature_names,
     features_of_material,
     light_features,
@@ -160,13 +159,13 @@ class Rasterizer:
             target.begin((*self._sky, 1.0))
             for number in np.unique(kind):
                 self._begin_surfaces(mode, int(number), camera, clip)
-                if number & TRANSPARENT:
+                if number & Feature.TRANSPARENT:
                     continue
                 for draw in order[kind == number]:
                     self._bind(mode, int(draw))
                     self._draw(self._program(mode, int(number))[1], int(draw))
-            if (kind & TRANSPARENT).any():
-                self._blend_transparent(mode, order[(kind & TRANSPARENT) > 0], camera)
+            if (kind & Feature.TRANSPARENT).any():
+                self._blend_transparent(mode, order[(kind & Feature.TRANSPARENT) > 0], camera)
             return srgb8_from_half(target.read("f2", 0, 3))
 
     @property
@@ -190,7 +189,10 @@ class Rasterizer:
         # Draw opaque surfaces into the depth texture and count the samples that pass.
         program, vao = self._program("depth", 0)
         _set(program, clip_from_world=clip)
-        is_solid = (self._kind[self._mesh.draw_material[draws]] & (TRANSPARENT | ALPHA_CUTOUT)) == 0
+        is_solid = (
+            self._kind[self._mesh.draw_material[draws]]
+            & (Feature.TRANSPARENT | Feature.ALPHA_CUTOUT)
+        ) == 0
         target.begin_depth_prepass()
         for draw in draws[is_solid]:
             with self._queries[draw]:

@@ -6,36 +6,37 @@ features gets the smallest program that is right for it.
 
 from __future__ import annotations
 
-from typing import Final
+from enum import IntFlag
 
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.lighting import LightForm
 
-GLOSSY: Final = 1  # a specular highlight
-ALPHA_CUTOUT: Final = 2  # the texture's alpha discards fragments
-TRANSPARENT: Final = 4  # blended: glass, panes, opacity below 1
-TEXTURED: Final = 8  # the texture multiplies the diffuse colour
+
+class Feature(IntFlag):
+    """What a surface's shader must be able to do; the names are the shader's #defines."""
+
+    GLOSSY = 1  # a specular highlight
+    ALPHA_CUTOUT = 2  # the texture's alpha discards fragments
+    TRANSPARENT = 4  # blended: glass, panes, opacity below 1
+    TEXTURED = 8  # the texture multiplies the diffuse colour
 
 
 def features_of_material(material: Material, *, is_textured: bool = True) -> int:
     """The features a material needs, as a sum of bits."""
-    kind = TEXTURED if is_textured and material.texture_id is not None else 0
+    features = Feature.TEXTURED if is_textured and material.texture_id is not None else Feature(0)
     if material.shininess > 0 and any(material.specular):
-        kind |= GLOSSY
+        features |= Feature.GLOSSY
+    # Blend what is transparent; alpha then needs no cut-out of its own.
     if material.kind in (MaterialKind.GLASS, MaterialKind.PANE) or material.opacity < 1:
-        return kind | TRANSPARENT
-    return kind | (ALPHA_CUTOUT if material.alpha_cutout and kind & TEXTURED else 0)
+        features |= Feature.TRANSPARENT
+    elif material.alpha_cutout and features & Feature.TEXTURED:
+        features |= Feature.ALPHA_CUTOUT
+    return int(features)
 
 
-def feature_names(kind: int) -> list[str]:
-    """The shader's #defines of the features in the bits kind."""
-    names = {
-        "GLOSSY": GLOSSY,
-        "ALPHA_CUTOUT": ALPHA_CUTOUT,
-        "TRANSPARENT": TRANSPARENT,
-        "TEXTURED": TEXTURED,
-    }
-    return [name for name, bit in names.items() if kind & bit]
+def feature_names(features: int) -> list[str]:
+    """The shader's #defines of a sum of bits."""
+    return [str(f.name) for f in Feature if f & features]
 
 
 def light_features(house: House) -> list[str]:

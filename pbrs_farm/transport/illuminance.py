@@ -1,4 +1,4 @@
-"""Illuminance of a room's floor by each light group; kernels, no effects."""
+"""Illuminance of a room's floor by each light group, and its record; kernels, no effects."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ from pbrs_farm.transport.kernels.path_state import (
 from pbrs_farm.transport.kernels.path_step import advance, direct
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, SobolSampler, device_array, stream_key
 
-LAMPS_LX: Final = (30.0, 1000.0)
-DAYLIGHT_LX: Final = (20.0, 5000.0)
-"""Where the mean floor illuminance of a home should land (spec/sky.md); outside = a warning."""
+LAMPS_LX: Final = (30.0, 1000.0)  # expected mean illuminance of a floor by lamps (spec/sky.md)
+DAYLIGHT_LX: Final = (20.0, 5000.0)  # and by daylight; a value outside is a warning
 
 _SPP: Final = 32
-_ABOVE_FLOOR_M: Final = 0.05
+_ABOVE_FLOOR_M: Final = 0.05  # above carpets
+_MAX_ATTEMPTS: Final = 200  # at points in a polygon that is thin in its box
+_ALL, _NONE = -1, -2  # values of an EmitterFilter
 
 
 def illuminance_record(house: House, lux: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """What illuminance.json says of a house: a row a room, with what is outside the range.
+    """The record illuminance.json: a row for each room, with a warning for what is out of range.
 
     lux: as LightScene.floor_lux gives it; rooms that it lacks are left out.
     """
@@ -53,9 +54,9 @@ def illuminance_record(house: House, lux: dict[str, dict[str, float]]) -> dict[s
 
 
 def photometric_warnings(room: Room, lux: dict[str, float]) -> list[str]:
-    """One line for each group that lights a room's floor outside the expected range.
+    """A line for each light group whose illuminance of the room's floor is out of range.
 
-    lux: of "outdoor" and "indoor". A group that lights nothing here (room.lit_by) need not.
+    lux: of "outdoor" and "indoor". A group that room.lit_by lacks has no lower bound.
     """
     lines = []
     has_lamps = "lamps" in room.lit_by or "fallback" in room.lit_by
@@ -74,14 +75,16 @@ def photometric_warnings(room: Room, lux: dict[str, float]) -> list[str]:
 
 def floor_points(room: Room, n: int, seed: int) -> NDArray[np.float64]:
     """(n, 3) points uniform over a room's floor polygon, 5 cm above it."""
+    # Draw points in the polygon's box and keep those inside, until there are enough.
     rng = np.random.default_rng(seed)
     low, high = room.polygon.min(0), room.polygon.max(0)
     kept: list[NDArray[np.float64]] = []
-    for _attempt in range(200):
+    for _attempt in range(_MAX_ATTEMPTS):
         tried = low + (high - low) * rng.random((4 * n, 2))
         kept.append(tried[_inside(tried, room.polygon)])
         if sum(len(k) for k in kept) >= n:
             break
+    # Fill up with the polygon's middle should it be too thin to hit.
     plan = np.concatenate([*kept, np.repeat(room.polygon.mean(0)[None], n, 0)])[:n]
     return np.stack([plan[:, 0], np.full(n, room.floor_y + _ABOVE_FLOOR_M), plan[:, 1]], 1)
 
@@ -89,10 +92,10 @@ def floor_points(room: Room, n: int, seed: int) -> NDArray[np.float64]:
 def illuminance_lx(
     scene: DeviceScene, emitters: Emitters, points: NDArray[np.float64], seed: int
 ) -> tuple[float, float]:
-    """(outdoor, indoor) mean illuminance of level surfaces at points (N, 3), facing up."""
+    """(outdoor, indoor) mean illuminance in lx of level surfaces at points (N, 3), facing up."""
     up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
-    sent = radiosity(scene, emitters, points, up, _SPP, seed)
-    lumens = [float((v @ LUMINANCE).mean()) * LM_PER_W * math.pi for v in sent]
+    radiance = radiosity(scene, emitters, points, up, _SPP, seed)
+    lumens = [float((v @ LUMINANCE).mean()) * LM_PER_W * math.pi for v in radiance]
     return lumens[0], lumens[1]
 
 
@@ -107,17 +110,19 @@ def radiosity(
     lamps: NDArray[np.int64] | None = None,
     max_depth: int | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(outdoor, indoor) radiance that white matte surfaces send out: irradiance / pi, (N, 3) each.
+    """(outdoor, indoor) radiance that white matte surfaces reflect: irradiance / pi, (N, 3) each.
 
     points, normals: (N, 3). lamps: (N,) the one lamp that counts for each, nothing outdoors then.
     max_depth: vertices of a path, the recipe's usual number unless given.
     """
+    # Let one lamp through for each point when lamps are given, all emitters otherwise.
     n = len(points)
-    asked = np.full(n, -1) if lamps is None else lamps
-    outdoor = np.full(n, -1 if lamps is None else -2)
+    asked = np.full(n, _ALL) if lamps is None else lamps
+    outdoor = np.full(n, _ALL if lamps is None else _NONE)
     emitter_filter = EmitterFilter(
         *(device_array(mi.Int32, v.astype(np.int32)) for v in (asked, outdoor))
     )
+    # Give each point a random stream of its own.
     key = stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     p, normal = mi.Point3f(*_columns(points)), mi.Vector3f(*_columns(normals))
     fields = device_fields(LightFields(), max_depth=max_depth)
@@ -143,13 +148,14 @@ def _radiosity(
     emitter_filter: EmitterFilter,
     spp: Any,
 ) -> tuple[Any, Any]:
-    """Sums over samples."""
+    """Sums over spp samples of (outdoor, indoor) radiance reflected by a white surface."""
     p, normal = place
     frame = mi.Frame3f(normal)
     here = white_interaction(p, normal)
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     s = mi.UInt32(0)
     while s < spp:
+        # Add direct light at the point.
         sampler = SobolSampler(key, s)
         dim = mi.UInt32(CAMERA_DIMS)
         near = emitters.nearby.at_vertex(p, normal, emitter_filter.indoor, mi.Bool(True))
@@ -158,6 +164,7 @@ def _radiosity(
             scene, emitters, here, frame, up, sampler, dim, emitter_filter, near, mi.Bool(True)
         )
         lit_out, lit_in = out.light, lamp.light
+        # Sample the hemisphere by the cosine and follow the path.
         wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(dim + 1))
         d = mi.Vector3f(frame.to_world(wo))
         path = surface_path(p, normal, d, wo.z * dr.inv_pi, near)
@@ -176,7 +183,8 @@ def _radiosity(
 
 
 def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(N,) bool by the crossing rule."""
+    """(N,) bool: the point lies inside the polygon, by the crossing rule."""
+    # Flip at each edge that a ray towards +x from the point crosses.
     inside = np.zeros(len(points), bool)
     for a, b in zip(polygon, np.roll(polygon, -1, 0), strict=True):
         crosses = (a[1] > points[:, 1]) != (b[1] > points[:, 1])

@@ -1,7 +1,7 @@
-"""Indoor light by the lamp it comes from: layers, their table, other strengths; pure numpy, no effects.
+"""Lamp layers: indoor light by the lamp that emits it, scaled and summed; pure numpy, no effects.
 
-A lamp's number is its place in the scene, counted from 1. Lamps that bring nothing to a view have
-a row in the table and no layer.
+A lamp's number is its place among the scene's area emitters, counted from 1. A lamp that lights
+nothing in a view has a row in the table and no layer.
 """
 
 from __future__ import annotations
@@ -18,24 +18,25 @@ from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter
 
-MAX_SUMS: Final = 2**32
-"""Sums of one launch (pixels x lamps x 3): the kernel counts them in 32 bits."""
+MAX_SUMS: Final = 2**32  # pixels x lamps x 3 of one launch: the kernel counts them in 32 bits
 
 
 def with_lamp_layers(
     result: LightResult, sums: NDArray[np.float32] | None, spp: int, lamps: Sequence[AreaEmitter]
 ) -> LightResult:
-    """The result with a layer for each lamp that brings light, and indoor their sum to the bit.
+    """The result with a layer for each lamp that lights the view, and indoor their sum to the bit.
 
     sums: (H * W, L, 3) over spp samples, None in a house without lamps.
     """
     shape = result.indoor.shape
+    # Divide each lamp's sums by the samples; leave out lamps without any light.
     by_lamp = [] if sums is None else [sums[:, k] for k in range(sums.shape[1])]
     layers = {
         number: np.ascontiguousarray((total / np.float32(spp)).reshape(shape))
         for number, total in enumerate(by_lamp, start=1)
         if total.any()
     }
+    # Sum indoor light from the layers, in the order in which relight sums it.
     indoor = indoor_from_lamps(layers, {}, shape)
     facts = {**result.facts, "lamps": lamp_table(lamps, layers, indoor)}
     return replace(result, indoor=indoor, lamps=layers, facts=facts)
@@ -63,9 +64,10 @@ def lamp_table(
     """A row per lamp for view.json: number, item, instance, room, lm, share, layer.
 
     item: id of the item that holds it, item/0, item/1 where that has several; instance: of the
-    item. lm: its flux. share: its part of the view's indoor light, by mean luminance. layer: its
-    name in radiance.exr, None when it brings nothing.
+    item. lm: its flux. share: of the view's indoor light, by mean luminance. layer: its name in
+    radiance.exr, None when it lights nothing.
     """
+    # Average in double precision, so that the shares sum to one.
     whole = float((indoor @ LUMINANCE).mean(dtype=np.float64))
     rows: list[dict[str, Any]] = []
     for number, lamp in enumerate(lamps, start=1):

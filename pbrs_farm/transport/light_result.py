@@ -1,4 +1,4 @@
-"""What a light render gives, and its noise; pure numpy, no effects."""
+"""The result of a light render, and the estimate of its noise; pure numpy, no effects."""
 
 from __future__ import annotations
 
@@ -18,28 +18,22 @@ from pbrs_farm.core.recipe import LightFields
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightResult:
-    """The light of one view by groups, W m-2 sr-1, raw (not denoised).
+    """The linear AOVs of one view, raw (not denoised); images are (H, W, 3) float32."""
 
-    outdoor, indoor: (H, W, 3) float32, finite, >= 0. albedo: (H, W, 3) in 0..1 and normal:
-    (H, W, 3) world, of the first surface that is neither mirror nor glass: for the denoiser.
-    noise: relative error of each group and of their sum, estimated from two half buffers.
-    spp: samples (or mutations) per pixel. n_nonfinite: contributions replaced by nothing.
-    facts: for view.json: integrator, weights of lamps, seed.
-    lamps: number -> (H, W, 3), what indoor is the sum of, when light.groups is "lamps".
-    """
-
-    outdoor: RadianceImage
+    outdoor: RadianceImage  # W m-2 sr-1, finite, >= 0
     indoor: RadianceImage
-    albedo: RadianceImage
-    normal: UnitVectors
-    noise: dict[str, float]
-    spp: int
-    n_nonfinite: int
-    facts: dict[str, Any] = field(default_factory=dict)
-    lamps: Mapping[int, RadianceImage] = field(default_factory=dict)
+    albedo: RadianceImage  # 0..1, of the first surface that is neither mirror nor glass
+    normal: UnitVectors  # of the same surface, in the world frame
+    noise: dict[str, float]  # relative error of each group and of their sum, from two half buffers
+    spp: int  # samples (or mutations) per pixel
+    n_nonfinite: int  # contributions that were not finite, left out
+    facts: dict[str, Any] = field(default_factory=dict)  # of view.json: integrator, seed, weights
+    lamps: Mapping[int, RadianceImage] = field(
+        default_factory=dict
+    )  # layers of light.groups "lamps"
 
     def group(self, group: Group) -> RadianceImage:
-        """The picture of one light group."""
+        """The radiance of one light group."""
         return self.outdoor if group is Group.OUTDOOR else self.indoor
 
     def mode(self, mode: Mode) -> RadianceImage:
@@ -56,9 +50,9 @@ class LightResult:
 def relative_noise(half_a: NDArray[np.floating], half_b: NDArray[np.floating]) -> float:
     """Relative error of the mean of two independent halves, (H, W, 3) each; 0 for black pictures.
 
-    The root mean square over pixels of |a - b| / 2 against the pixel's luminance, brought towards
-    the picture's mean by a tenth so that black pixels do not rule; the largest 0.1 % of pixels
-    are left out, as fireflies would make the estimate itself noise.
+    The root mean square over pixels of |a - b| / 2 against the pixel's luminance plus a tenth of
+    the picture's mean, so that dark pixels do not dominate; the largest 0.1 % of the squares are
+    left out, as fireflies would make the estimate itself noise.
     """
     a, b = half_a @ LUMINANCE, half_b @ LUMINANCE
     mean = 0.5 * (a + b)
@@ -66,12 +60,12 @@ def relative_noise(half_a: NDArray[np.floating], half_b: NDArray[np.floating]) -
     if level <= 0:
         return 0.0
     error = np.sort(((0.5 * (a - b)) / (mean + 0.1 * level)).ravel() ** 2)
-    kept = error[: max(int(len(error) * 0.999), 1)]
-    return float(np.sqrt(kept.mean()))
+    without_fireflies = error[: max(int(len(error) * 0.999), 1)]
+    return float(np.sqrt(without_fireflies.mean()))
 
 
 class GroupSums(Protocol):
-    """Sums over n samples of each pixel, row by row, (N, 3); *_even: of every second sample."""
+    """Sums over the samples of each pixel, row by row, (N, 3); *_even: of every second sample."""
 
     outdoor: NDArray[np.float32]
     indoor: NDArray[np.float32]
@@ -79,13 +73,13 @@ class GroupSums(Protocol):
     indoor_even: NDArray[np.float32]
     albedo: NDArray[np.float32]
     normal: NDArray[np.float32]
-    n_bad: int
+    n_bad: int  # paths that were not finite
 
 
 def result_from_sums(
     sums: GroupSums, camera: Camera, spp: int, facts: dict[str, Any]
 ) -> LightResult:
-    """Means of spp samples per pixel, with the noise that even and odd samples tell."""
+    """Means of spp samples per pixel, with the noise estimated from even and odd samples."""
     shape = (camera.intrinsics.height_px, camera.intrinsics.width_px, 3)
     n_even = max((spp + 1) // 2, 1)
     n_odd = max(spp - n_even, 1)
@@ -93,11 +87,13 @@ def result_from_sums(
     def picture(values: NDArray[np.float32], n: int) -> NDArray[np.float32]:
         return np.ascontiguousarray((values / np.float32(n)).reshape(shape))
 
+    # Divide each half buffer by its own number of samples.
     even = picture(sums.outdoor_even, n_even), picture(sums.indoor_even, n_even)
     odd = (
         picture(sums.outdoor - sums.outdoor_even, n_odd),
         picture(sums.indoor - sums.indoor_even, n_odd),
     )
+    # Normalise the mean normal; it is zero where no sample met a surface.
     normal = picture(sums.normal, spp)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     return LightResult(
@@ -120,11 +116,12 @@ def joined_result(
     facts: dict[str, Any],
     fields: LightFields,
 ) -> LightResult:
-    """Two half buffers of each group, plus direct light when it is separate.
+    """The mean of two half buffers of each group, plus direct light when it is separate.
 
-    guides: whose albedo and normal are kept. The noise is that of the halves; direct light's own
-    is left out (it has many more samples).
+    guides: whose albedo and normal are kept. The noise is that of the half buffers; direct light's
+    own is left out (it has many more samples).
     """
+    # Add direct light to both half buffers, then average them.
     base = {
         Group.OUTDOOR: direct.outdoor if direct else np.float32(0),
         Group.INDOOR: direct.indoor if direct else np.float32(0),

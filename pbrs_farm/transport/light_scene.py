@@ -1,4 +1,4 @@
-"""LightScene: a house loaded once for all its views and light groups.
+"""The way into light transport: a house loaded once for all its views and light groups.
 
 Effects: holds Mitsuba scenes and device buffers of the process's variant.
 """
@@ -19,6 +19,7 @@ from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.lamp_layers import MAX_SUMS, with_lamp_layers
 from pbrs_farm.transport.light_result import LightResult, joined_result, result_from_sums
+from pbrs_farm.transport.scene_tables.portals import nearest_portals, portals_of_house
 from pbrs_farm.transport.scene_tables.scene_tables import (
     SceneTables,
     bounding_spheres,
@@ -27,14 +28,16 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
 from pbrs_farm.transport.scene_tables.sky import Sky
 from pbrs_farm.transport.time_budget import TimeBudget
 
-_SAMPLES_PER_LAUNCH: Final = 1 << 26
+_SAMPLES_PER_LAUNCH: Final = 1 << 26  # bounds how long one kernel runs
+_FLOOR_POINTS: Final = 256  # a room, for its mean illuminance
+_PILOT_SEED: Final = 0x5EED  # parts the pilot's random stream from the picture's
 
 
 class LightScene:
-    """The light of one house under one sky.
+    """The scene of one house under one sky.
 
-    tables: geometry, materials and lamps as numbers. notes: what had to be changed or left out.
-    device_scene: the same on the device; None for scalar variants.
+    tables: geometry, materials and area emitters as arrays, with notes on what had to be changed
+    or left out. device_scene: the same on the device; None for scalar variants.
     """
 
     def __init__(
@@ -47,7 +50,7 @@ class LightScene:
         self._portals = portals
         mitsuba(variant)
         self.device_scene: Any = None
-        self._emitters: Any = None
+        self._emitters: Any = None  # built at the first view, then given each view's weights
         if not variant.startswith("scalar"):
             from pbrs_farm.transport.kernels.device_scene import DeviceScene
 
@@ -62,32 +65,30 @@ class LightScene:
         *,
         variant: str | None = None,
     ) -> LightScene:
-        """The scene of a repaired house; window panes carry no light and are left out.
+        """The scene of a repaired house, without its window panes, which would only cost rays.
 
         textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 at the top. Raises BadHouse when there
-        is nothing to see and MachineFailed when Mitsuba does not work here.
+        is no surface and MachineFailed when Mitsuba does not work here.
         """
         name = choose_variant() if variant is None else variant
         mitsuba(name)
-        from pbrs_farm.transport.scene_tables.portals import portals_of_house
-
         tables = tables_from_house(house, textures, recipe)
         return LightScene(tables, sky, portals_of_house(house), name)
 
     @property
     def n_lamps(self) -> int:
-        """Light sources."""
+        """The number of area emitters."""
         return len(self.tables.lamps)
 
     def render(self, camera: Camera, room_id: str, fields: LightFields, seed: int) -> LightResult:
-        """Both light groups as a camera sees them, by the integrator that fields name.
+        """The radiance of both light groups in a camera's view, by the integrator of fields.
 
-        `path`: fields.spp samples per pixel, again and again until fields.noise is reached when
-        it is given, or as many as fit into fields.time_budget_s. `metropolis`: direct light by
-        fields.direct_spp samples, the rest by mutations. With fields.groups "lamps" `path` sums the
-        light of each lamp by itself, too. room_id names the view in errors. Equal
-        arguments give equal bits on one machine (Metropolis: equal to 1e-5, it splats in
-        parallel); with a time budget similar pictures.
+        `path`: fields.spp samples per pixel, in passes until fields.noise is reached when it is
+        given, or as many as fit into fields.time_budget_s. `metropolis`: direct light by
+        fields.direct_spp samples, the rest by mutations. With fields.groups "lamps" `path` also
+        sums the light of each lamp by itself. room_id names the view in errors. Equal arguments
+        give equal bits on one machine (Metropolis: equal to 1e-5, it splats in parallel); with a
+        time budget similar pictures.
         """
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
@@ -100,13 +101,14 @@ class LightScene:
         if fields.groups == "two":
             sums, spp = self._path_sums(camera, fields, seed, emitters)
             return result_from_sums(sums, camera, spp, facts)
+        # Sum each lamp by itself, too, and split indoor light into layers.
         n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
         sums, spp = self._path_sums(camera, fields, seed, emitters, n_lamps=n_lamps)
         result = result_from_sums(sums, camera, spp, facts)
         return with_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
 
     def _n_lamps_that_fit(self, camera: Camera, room_id: str, seed: int) -> int:
-        """The number of lamps; RenderFailed when a sum of each is more than the kernel can count."""
+        """The number of lamps; RenderFailed when the kernel cannot count a sum for each of them."""
         i = camera.intrinsics
         if i.width_px * i.height_px * self.n_lamps * 3 >= MAX_SUMS:
             raise RenderFailed(
@@ -130,24 +132,26 @@ class LightScene:
     ) -> tuple[Any, int]:
         """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached.
 
-        With a time budget: in launches as long as what is left of it, and no fewer than one.
-        n_lamps: 0, or the number of all lamps, to sum the light of each by itself.
+        With a time budget: launches that fit into what is left of it, one at least. n_lamps: 0,
+        or the number of all lamps, to sum the light of each by itself.
         """
         from pbrs_farm.transport.path_tracer import Lanes, trace
 
+        # Size the launches: by memory, by the pace so far, and one pass each when noise decides.
         i = camera.intrinsics
         per_launch = max(_SAMPLES_PER_LAUNCH // (i.width_px * i.height_px), 1)
-        watch = TimeBudget(fields.time_budget_s)
-        is_open = watch.runs or fields.noise > 0
+        budget = TimeBudget(fields.time_budget_s)
+        is_open = budget.is_limited or fields.noise > 0
         goal = max(fields.spp, fields.max_spp) if is_open else fields.spp
         if fields.noise > 0:
             per_launch = min(per_launch, fields.spp)
+        # Launch until samples, budget or noise say that it is enough.
         total: Any = None
         spp = 0
-        while spp < goal and (n := watch.fitting(min(per_launch, goal - spp))) > 0:
+        while spp < goal and (n := budget.n_that_fit(min(per_launch, goal - spp))) > 0:
             lanes = Lanes(i.width_px, i.height_px, spp, n, seed, n_lamps=n_lamps)
             sums = trace(self.device_scene, emitters, camera, lanes, fields, max_depth=max_depth)
-            watch.did(n)
+            budget.record(n)
             total = sums if total is None else total + sums
             spp += n
             if fields.noise > 0 and spp >= fields.spp:
@@ -168,84 +172,81 @@ class LightScene:
         """Direct light by `path` with two segments, the rest by Metropolis, group by group."""
         from pbrs_farm.transport.metropolis.integrator import metropolis
 
+        # Trace direct light by path; without it one sample still gives the denoiser's guides.
         began = time.monotonic()
-        is_separate = fields.direct_spp > 0
-        plain = fields.model_copy(update={"spp": max(fields.direct_spp, 1), "time_budget_s": 0.0})
+        has_direct = fields.direct_spp > 0
+        direct_fields = fields.model_copy(
+            update={"spp": max(fields.direct_spp, 1), "time_budget_s": 0.0}
+        )
         sums, spp = self._path_sums(
-            camera, plain, seed, emitters, max_depth=2 if is_separate else 1
+            camera, direct_fields, seed, emitters, max_depth=2 if has_direct else 1
         )
         direct = result_from_sums(sums, camera, spp, {})
-        halves: dict[Group, tuple[Any, Any]] = {}
-        n_bad = direct.n_nonfinite
-        budget = max(fields.time_budget_s - (time.monotonic() - began), 0.0)
+
+        # Run the chains of each group for half of the time that is left.
+        left_s = max(fields.time_budget_s - (time.monotonic() - began), 0.0)
+        estimates = {}
         for k, group in enumerate(Group):
-            deadline = time.monotonic() + budget / 2 if fields.time_budget_s > 0 else None
-            rest = metropolis(
-                self.device_scene,
-                emitters,
-                camera,
-                group,
-                fields,
-                seed + k,
-                min_segments=3 if is_separate else 1,
-                deadline=deadline,
-            )
-            halves[group] = rest.halves
-            n_bad += rest.n_bad
-            facts[group.value] = {
-                "mean_luminance": rest.mean_luminance,
-                "acceptance": round(rest.acceptance, 4),
-                "mutations": rest.n_mutations,
-            }
-        if not self._is_lit(direct, halves):
-            raise RenderFailed(
-                f"no light found in room {room_id}: {self._what_emits()}",
-                view=room_id,
-                mode="light",
-                seed=seed,
-            )
-        facts |= {
-            "integrator": "pssmlt-camera",
-            "large_step": fields.large_step,
-            "tail_pixels": fields.tail_pixels,
-        }
-        return joined_result(direct if is_separate else None, direct, halves, n_bad, facts, fields)
+            deadline = time.monotonic() + left_s / 2 if fields.time_budget_s > 0 else None
+            first = 3 if has_direct else 1
+            estimates[group] = metropolis(
+                self.device_scene, emitters, camera, group, fields, seed + k,
+                min_segments=first, deadline=deadline,
+            )  # fmt: skip
+        halves = {group: e.halves for group, e in estimates.items()}
+        self._check_lit(direct, halves, room_id, seed)
+        for group, e in estimates.items():
+            numbers = {"mean_luminance": e.mean_luminance, "acceptance": round(e.acceptance, 4)}
+            facts[group.value] = numbers | {"mutations": e.n_mutations}
+        facts |= {"integrator": "pssmlt-camera", "large_step": fields.large_step}
+        facts["tail_pixels"] = fields.tail_pixels
+        n_bad = direct.n_nonfinite + sum(e.n_bad for e in estimates.values())
+        return joined_result(direct if has_direct else None, direct, halves, n_bad, facts, fields)
 
     def floor_lux(self, house: House, *, seed: int = 0) -> dict[str, dict[str, float]]:
         """Room id -> mean illuminance of its floor in lx by "outdoor" and "indoor" light.
 
-        256 points 5 cm above the floor, 32 paths each, furniture and all. {} for scalar variants.
+        256 points 5 cm above the floor, 32 paths each, with the furniture in place. {} for scalar
+        variants.
         """
         if self.variant.startswith("scalar"):
             return {}
         mitsuba(self.variant)
         from pbrs_farm.transport.guiding.pilot import weights_by_distance
         from pbrs_farm.transport.illuminance import floor_points, illuminance_lx
-        from pbrs_farm.transport.scene_tables.portals import nearest_portals
 
-        balls = bounding_spheres(self.tables)
+        # Weight the lamps by their distance: there is no view that a pilot could render.
+        spheres = bounding_spheres(self.tables)
         lux: dict[str, dict[str, float]] = {}
         for room in house.rooms:
-            points = floor_points(room, 256, seed)
+            points = floor_points(room, _FLOOR_POINTS, seed)
             portals = nearest_portals(self._portals, points.mean(0))
-            weights = weights_by_distance(balls, points.mean(0), len(portals))
+            weights = weights_by_distance(spheres, points.mean(0), len(portals))
             emitters = self._emitters_of_view(portals, weights)
             outdoor, indoor = illuminance_lx(self.device_scene, emitters, points, seed)
             lux[room.id] = {"outdoor": round(outdoor, 2), "indoor": round(indoor, 2)}
         return lux
 
-    def _is_lit(self, direct: LightResult, halves: dict[Group, tuple[Any, Any]]) -> bool:
-        if direct.outdoor.any() or direct.indoor.any():
-            return True
-        return any(half.any() for pair in halves.values() for half in pair)
-
-    def _what_emits(self) -> str:
+    def _check_lit(
+        self, direct: LightResult, halves: dict[Group, tuple[Any, Any]], room_id: str, seed: int
+    ) -> None:
+        """Raise RenderFailed when the view is black, and say which emitters there are."""
+        images = [
+            direct.outdoor,
+            direct.indoor,
+            *(half for pair in halves.values() for half in pair),
+        ]
+        if any(image.any() for image in images):
+            return
         n = self.n_lamps
         sky = "a sky" if self.sky.dome.any() or self.sky.sun_irradiance.any() else "no sky"
-        return f"{sky} and {n} lamp{'s' * (n != 1)} in the house, none reaches this view"
+        text = f"{sky} and {n} lamp{'s' * (n != 1)} in the house, none reaches this view"
+        raise RenderFailed(
+            f"no light found in room {room_id}: {text}", view=room_id, mode="light", seed=seed
+        )
 
     def _render_scalar(self, camera: Camera, fields: LightFields, seed: int) -> LightResult:
-        """By Mitsuba's own plugins: scalar variants have no arrays for our kernels."""
+        """Both groups by Mitsuba's own plugins: scalar variants have no arrays for our kernels."""
         from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
 
         if fields.groups == "lamps":
@@ -253,39 +254,34 @@ class LightScene:
                 f"light by lamp needs LLVM or CUDA, this is {self.variant}",
                 hint="sudo apt-get install -y libllvm19, or --groups two",
             )
+        # Render two half buffers of each group, with seeds of their own, for the noise estimate.
         scene = ReferenceScene(self.tables, self.sky, self.variant)
         half = fields.model_copy(update={"spp": max(fields.spp // 2, 1)})
         halves = {
             g: tuple(scene.render(camera, g, half, seed + 2 * k + j) for j in range(2))
             for k, g in enumerate(Group)
         }
-        i = camera.intrinsics
-        plain = np.zeros((i.height_px, i.width_px, 3), np.float32)
-        guides = LightResult(plain, plain, np.ones_like(plain), plain, {}, 0, 0, {})
+        # Give the denoiser a white albedo and no normals: Mitsuba renders radiance alone here.
+        black = np.zeros((camera.intrinsics.height_px, camera.intrinsics.width_px, 3), np.float32)
+        guides = LightResult(black, black, np.ones_like(black), black, {}, 0, 0, {})
         facts = {"integrator": "mitsuba path", "seed": seed}
-        return joined_result(
-            None, guides, halves, 0, facts, half.model_copy(update={"spp": 2 * half.spp})
-        )
+        whole = half.model_copy(update={"spp": 2 * half.spp})
+        return joined_result(None, guides, halves, 0, facts, whole)
 
     def emitters(
         self, camera: Camera, fields: LightFields, seed: int
     ) -> tuple[Any, dict[str, float]]:
-        """Emitters with the weights of this view, and the lamps' weights by name."""
+        """Emitters with the sampling weights of this view, and the lamps' weights by name."""
         from pbrs_farm.transport.guiding.pilot import pilot_weights, uniform_weights
-        from pbrs_farm.transport.scene_tables.portals import nearest_portals
 
+        # Start from uniform weights; a pilot measures what each emitter brings to the view.
         portals = nearest_portals(self._portals, camera.eye)
         weights = uniform_weights(self.n_lamps, len(portals))
         emitters = self._emitters_of_view(portals, weights)
         if fields.pilot_spp > 0:
+            n = self.n_lamps, len(portals)
             weights = pilot_weights(
-                self.device_scene,
-                emitters,
-                camera,
-                self.n_lamps,
-                len(portals),
-                fields,
-                seed ^ 0x5EED,
+                self.device_scene, emitters, camera, *n, fields, seed ^ _PILOT_SEED
             )
             emitters.set_weights(weights)
         names = [lamp.name for lamp in self.tables.lamps]
@@ -295,6 +291,7 @@ class LightScene:
         """The emitters, their tables built once, with the portals and weights of a view."""
         from pbrs_farm.transport.kernels.emitters import Emitters
 
+        # Measure the lampshades' exitance once, with rays that are not guided yet.
         if self._emitters is None:
             from pbrs_farm.transport.guiding.lampshade_exitance import guiding_targets, pdfs_by_face
 

@@ -1,33 +1,32 @@
-"""How many more samples fit into a time budget. Effects: reads the clock."""
+"""Time budgets: how many more samples fit. Effects: reads the clock."""
 
 from __future__ import annotations
 
 import time
 from typing import Final
 
-_FIRST: Final = 4
-"""Samples of the first launch, from which the pace is known."""
+_FIRST_SPP: Final = 4  # samples of the first launch, which measures the pace
 
 
 class TimeBudget:
-    """Counts down a budget in seconds from now; a budget of 0 is no budget at all."""
+    """A budget of seconds that counts down from now; 0 sets no limit."""
 
     def __init__(self, budget_s: float) -> None:
-        self.runs = budget_s > 0
-        self._now = time.monotonic()
-        self._end = self._now + budget_s
-        self._pace_s: float | None = None
+        self.is_limited = budget_s > 0
+        self._last = time.monotonic()
+        self._end = self._last + budget_s
+        self._s_per_sample: float | None = None  # of the last launch
 
-    def fitting(self, most: int) -> int:
-        """Samples of the next launch, at most `most`; 0 when not even one fits any more."""
-        if not self.runs:
+    def n_that_fit(self, most: int) -> int:
+        """Samples of the next launch, at most `most`; 0 when none fits any more."""
+        if not self.is_limited:
             return most
-        if self._pace_s is None:
-            return min(_FIRST, most)
-        left = self._end - time.monotonic()
-        return max(min(int(left / self._pace_s), most), 0)
+        if self._s_per_sample is None:
+            return min(_FIRST_SPP, most)
+        left_s = self._end - time.monotonic()
+        return max(min(int(left_s / self._s_per_sample), most), 0)
 
-    def did(self, n: int) -> None:
-        """A launch of n samples has ended: its pace is that of the next."""
-        began, self._now = self._now, time.monotonic()
-        self._pace_s = (self._now - began) / n
+    def record(self, n: int) -> None:
+        """Take the time since the last launch for n samples as the pace of the next."""
+        began, self._last = self._last, time.monotonic()
+        self._s_per_sample = (self._last - began) / n

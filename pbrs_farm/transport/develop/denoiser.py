@@ -1,7 +1,7 @@
-"""Open Image Denoise over a rendered view.
+"""Denoising by Open Image Denoise.
 
 Effects: the denoiser's threads, and its device and filter, which `pyoidn.denoise` keeps for the
-life of the process (since 2.5.1): the first picture pays 0.2 s for them, no other does.
+life of the process (since 2.5.1): only the first picture pays 0.2 s for them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pbrs_farm.transport.light_result import LightResult
 
 
 def denoise(result: LightResult) -> LightResult:
-    """The same view with both groups denoised, each by itself: modes stay exact sums."""
+    """The same view with each group denoised by itself, so that modes stay exact sums."""
     return replace(
         result,
         outdoor=denoise_radiance(result.outdoor, result.albedo, result.normal),
@@ -46,4 +46,5 @@ def denoise_radiance(
         hdr=True,
         clean_aux=True,
     )
+    # Remove what the network may invent: negative and non-finite values.
     return np.maximum(np.nan_to_num(np.asarray(clean, np.float32), posinf=0.0), 0.0)

@@ -1,4 +1,4 @@
-"""Stored radiance to the pictures of the light modes: groups summed, denoised, tone-mapped; no effects."""
+"""Development: linear AOVs to the light modes' pictures, denoised and tone-mapped; no effects."""
 
 from __future__ import annotations
 
@@ -18,30 +18,24 @@ from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearAovs:
-    """What a picture is developed from. outdoor, indoor: (H, W, 3) raw radiance, W m-2 sr-1.
+    """The linear AOVs (arbitrary output variables) of radiance.exr, (H, W, 3) each."""
 
-    albedo: (H, W, 3) in 0..1 and normal: (H, W, 3) unit or 0, both noise-free, for the denoiser.
-    """
-
-    outdoor: RadianceImage
+    outdoor: RadianceImage  # raw radiance of each light group, W m-2 sr-1
     indoor: RadianceImage
-    albedo: RadianceImage
-    normal: UnitVectors
+    albedo: RadianceImage  # 0..1; it and normal are free of noise: the denoiser's guides
+    normal: UnitVectors  # unit, or 0 where nothing is hit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ToneMappedImage:
-    """A developed picture: rgb_srgb8 = tone(radiance * gains * exposure).
-
-    gains: (3,) of the white balance. exposure: what radiance was multiplied by before the curve.
-    """
+    """A tone-mapped image: rgb_srgb8 = tone(radiance * gains * exposure)."""
 
     rgb_srgb8: Srgb8Image
-    gains: NDArray[np.float32]
-    exposure: float
+    gains: NDArray[np.float32]  # (3,) factors of the white balance
+    exposure: float  # factor before the tone curve
 
     def facts(self) -> dict[str, Any]:
-        """For view.json."""
+        """What view.json says of the image."""
         return {"gains": [round(float(g), 6) for g in self.gains], "exposure": self.exposure}
 
 
@@ -53,22 +47,24 @@ def develop(
     indoor: float = 1.0,
     outdoor: float = 1.0,
 ) -> dict[str, ToneMappedImage]:
-    """Mode name -> picture of every mode that is a sum of light groups.
+    """Mode name -> image of every mode that is a sum of light groups.
 
     Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors.
     """
+    # Scale and denoise the light groups.
     groups = {
         Group.OUTDOOR: aovs.outdoor * np.float32(outdoor),
         Group.INDOOR: aovs.indoor * np.float32(indoor),
     }
     if denoise:
-        # What sees nothing stays black: the denoiser would smear light over it.
+        # Keep pixels black that hit nothing: the denoiser would smear light over them.
         light = aovs.outdoor + aovs.indoor
-        seen = np.any(light > 0, -1, keepdims=True) | np.any(aovs.albedo > 0, -1, keepdims=True)
+        is_hit = np.any(light > 0, -1, keepdims=True) | np.any(aovs.albedo > 0, -1, keepdims=True)
         groups = {
-            name: denoise_radiance(radiance, aovs.albedo, aovs.normal) * seen
+            name: denoise_radiance(radiance, aovs.albedo, aovs.normal) * is_hit
             for name, radiance in groups.items()
         }
+    # Sum the groups of each mode, balance white, expose, and apply the tone curve.
     images = {}
     for mode, names in GROUPS_OF_MODE.items():
         if names:
@@ -83,18 +79,20 @@ def develop(
 def white_balance(
     radiance: RadianceImage, albedo: RadianceImage, strength: float
 ) -> NDArray[np.float32]:
-    """(3,) factors that turn the picture's light towards white, as a camera's would; mean 1.
+    """(3,) gains that turn the illuminant's colour towards white, as a camera's do; luminance 1.
 
-    The light's colour is radiance over albedo, which is known here: the median of their
-    logarithms over pixels that are neither dark nor blown. strength: 0 leaves the colour,
-    1 makes the light neutral. Ones when there is nothing to go by.
+    The illuminant is radiance over albedo, which is known here: the median of its logarithm over
+    pixels that are neither dark nor overexposed. strength: 0 leaves the colour, 1 makes it
+    neutral. Ones when fewer than 16 pixels tell it.
     """
+    # Take pixels between the 10th and the 90th percentile of luminance.
     level = radiance @ LUMINANCE
     usable = (level > 0) & np.all(albedo > 0.02, -1) & np.all(radiance > 0, -1)
     if strength == 0 or usable.sum() < 16:
         return np.ones(3, np.float32)
     low, high = np.percentile(level[usable], [10, 90])
     usable &= (level >= low) & (level <= high)
+    # Scale against the illuminant, at constant luminance.
     light = np.exp(np.median(np.log(radiance[usable] / albedo[usable]), axis=0))
     gains = (light / (light @ LUMINANCE)) ** -strength
     return np.asarray(gains / (gains @ LUMINANCE), np.float32)

@@ -1,7 +1,7 @@
-"""Radiance to 8-bit sRGB: exposure by the log-average, highlights rolled off; pure numpy.
+"""Tone mapping: radiance to 8-bit sRGB, exposed by the log-average; pure numpy, no effects.
 
-No effects. `released` is Reinhard's global operator as the published images used it
-(spec/suncg.md section 5: key 0.8, burn 0.2); `photo` is this project's default.
+`released` is Reinhard's global operator as the published images used it (spec/suncg.md section 5:
+key 0.8, burn 0.2); `photo`, the default, rolls highlights off.
 """
 
 from __future__ import annotations
@@ -15,19 +15,20 @@ from pbrs_farm.core.arrays import RadianceImage, Srgb8Image
 from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
 from pbrs_farm.core.recipe import ToneFields
 
-_MITSUBA_LUMINANCE: Final = np.array([0.212671, 0.715160, 0.072169])
-_BURN: Final = 0.2
-_SHOULDER: Final = 0.6
-_SPAN: Final = 16.0
+_MITSUBA_LUMINANCE: Final = np.array([0.212671, 0.715160, 0.072169])  # of Mitsuba's tone mapper
+_BURN: Final = 0.2  # of Reinhard's operator: how far highlights may burn out
+_LOG_FLOOR: Final = 1e-3  # added before the logarithm, as Mitsuba's tone mapper does
+_SHOULDER: Final = 0.6  # of photo: the curve is straight below
+_WHITE: Final = 16.0  # of photo: the exposed radiance that becomes 1
 
 
 def tone(
     radiance: RadianceImage, fields: ToneFields, *, exposure: float | None = None
 ) -> Srgb8Image:
-    """(H, W, 3) uint8 sRGB of a radiance picture.
+    """(H, W, 3) uint8 sRGB of a radiance image.
 
-    exposure: a factor common to several pictures (see `exposure_of`); the picture's own when
-    None. A black picture stays black. Not-finite and negative values count as 0.
+    exposure: a factor (see `exposure_of`); the image's own when None. A black image stays black.
+    Non-finite and negative values count as 0.
     """
     rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
     if fields.preset == "released":
@@ -39,48 +40,51 @@ def tone(
 
 
 def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
-    """The factor that brings a picture's log-average luminance to the key; 1 for a black one.
+    """The factor that brings an image's log-average luminance to the key; 1 for a black one.
 
-    For `photo` pixels above the 98th percentile (a window, a bulb) count as that, and the part
-    of the picture that is a thousand times darker than it counts as a thousandth.
+    For `photo` luminance is clamped to the 98th percentile (above it are windows and bulbs) and
+    to a thousandth of it.
     """
     rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
     if fields.preset == "released":
         luminance = rgb @ _MITSUBA_LUMINANCE
-        return fields.key / float(np.exp(np.mean(np.log(luminance + 1e-3))))
+        return fields.key / float(np.exp(np.mean(np.log(luminance + _LOG_FLOOR))))
     luminance = rgb @ LUMINANCE
     if luminance.max() <= 0:
         return 1.0
-    luminance = luminance[luminance > 0]  # pixels that see nothing say nothing of the light
+    luminance = luminance[luminance > 0]  # leave out pixels that hit nothing
     bright = float(np.percentile(luminance, 98))
     clipped = np.clip(luminance, bright / 1000, bright)
     return fields.key / float(np.exp(np.mean(np.log(clipped))))
 
 
 def _reinhard(rgb: NDArray[np.float64], key: float, exposure: float | None) -> NDArray[np.float64]:
+    # Scale the log-average to the key and find the luminance that becomes white.
     luminance = rgb @ _MITSUBA_LUMINANCE
-    average = float(np.exp(np.mean(np.log(luminance + 1e-3))))
+    average = float(np.exp(np.mean(np.log(luminance + _LOG_FLOOR))))
     scaled = luminance * (key / average if exposure is None else exposure)
     white = float(scaled.max()) * (1 - _BURN) ** 2
     if white <= 0:
         return rgb
+    # Compress luminance and scale all three components alike.
     mapped = scaled * (1 + scaled / white**2) / (1 + scaled)
     ratio = np.divide(mapped, luminance, out=np.zeros_like(mapped), where=luminance > 0)
     return np.asarray(rgb * ratio[..., None])
 
 
 def _rolled_off(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Straight up to the shoulder, then a logarithm that reaches 1 at _SPAN times white.
+    """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at _WHITE.
 
-    It works on the largest component and keeps the hue; what is far beyond white fades to white.
+    It maps the largest component and keeps the hue; colours far beyond white fade to white.
     """
     top = np.maximum(np.maximum(rgb[..., :1], rgb[..., 1:2]), rgb[..., 2:3])
     over = np.maximum(top - _SHOULDER, 0.0)
     room = 1 - _SHOULDER
-    rise = np.log1p(over / room) / np.log1p((_SPAN - _SHOULDER) / room)
+    rise = np.log1p(over / room) / np.log1p((_WHITE - _SHOULDER) / room)
     # Match the slope at the shoulder: a rational start that meets the logarithm's end.
-    soft = _SHOULDER + room * np.maximum(rise, over / (over + room) * (1 - 1 / _SPAN))
+    soft = _SHOULDER + room * np.maximum(rise, over / (over + room) * (1 - 1 / _WHITE))
     target = np.where(top > _SHOULDER, np.minimum(soft, 1.0), top)
+    # Scale all three components alike; fade to white over five stops, from twice white on.
     out = rgb * np.divide(target, top, out=np.ones_like(top), where=top > 0)
     fade = np.clip(np.log2(np.maximum(top, 1e-9) / 2) / 5, 0, 1)
     return np.asarray(out * (1 - fade) + target * fade)
