@@ -1,4 +1,4 @@
-"""The floor plan with every candidate, why it was refused, and the winners; no effects.
+"""The floor plan with every candidate, why it was rejected, and the winners; no effects.
 
 One panel per level, then a legend with counts and, room by room, the reason of each sector that
 has no camera.
@@ -35,7 +35,7 @@ COLOURS: Final = {
 """Colour of each verdict's dots."""
 
 _PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0
-_ROW, _LETTERS, _LETTER_WIDTH, _WORDS_PX = 16.0, 12.0, 0.56, 200.0
+_ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = 16.0, 12.0, 0.56, 200.0
 _ROOM, _FURNITURE, _WALL, _INK = "#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222"
 
 
@@ -61,15 +61,15 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
         x0, z0, x1, z1 = shapely.total_bounds(shapes)
         scale = min(_PX_PER_M, _MAX_PX / max(x1 - x0, z1 - z0, 1e-6))
         panel = _Panel(left - scale * x0, 2 * _MARGIN - scale * z0, scale)
-        marks.append(_words(left, _MARGIN, level.name or f"Level {level.id}", 14.0))
+        marks.append(_text(left, _MARGIN, level.name or f"Level {level.id}", 14.0))
         marks += _level_marks(house, sampling, level.id, panel)
         left += scale * (x1 - x0) + 2 * _MARGIN
         bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
     notes = _notes(sampling)
     marks += [_shifted(mark, left) for mark in notes]
     height = max(bottom, *(mark.points[0][1] for mark in notes)) + _MARGIN
-    letters = max(len(mark.words) for mark in notes)
-    width = left + max(_WORDS_PX, _LETTER_WIDTH * _LETTERS * letters) + _MARGIN
+    letters = max(len(mark.text) for mark in notes)
+    width = left + max(_TEXT_PX, _LETTER_WIDTH * _LETTERS * letters) + _MARGIN
     return Drawing(math.ceil(width), math.ceil(height), tuple(marks))
 
 
@@ -99,9 +99,9 @@ def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel)
                 kind = Verdict(verdict)
                 if kind is not Verdict.WINNER:
                     point = panel(eye[0], eye[2])
-                    marks.append(Mark("dot", (point,), COLOURS[kind], 1.4, title=kind.word))
+                    marks.append(Mark("dot", (point,), COLOURS[kind], 1.4, title=kind.label))
     marks += [
-        _words(*panel(*_middle(room.polygon)), f"{room.id} {room.name}", _LETTERS)
+        _text(*panel(*_middle(room.polygon)), f"{room.id} {room.name}", _LETTERS)
         for room in rooms.values()
         if len(room.polygon)
     ]
@@ -146,7 +146,7 @@ def _winner(view: View, panel: _Panel) -> list[Mark]:
     return [
         Mark("line", (*wedge, wedge[0]), colour, 2.0, title=title),
         Mark("dot", (wedge[0],), colour, 4.0, title=title),
-        _words(*label, view.id.removeprefix(f"{view.room_id}_"), _LETTERS, colour),
+        _text(*label, view.id.removeprefix(f"{view.room_id}_"), _LETTERS, colour),
     ]
 
 
@@ -157,7 +157,7 @@ def _notes(sampling: Sampling) -> list[Mark]:
         counts += np.bincount(trace.verdict, minlength=len(Verdict))
     rows: list[tuple[str, str | None]] = []
     for verdict in Verdict:
-        text = f"{verdict.word.replace('_', ' ')}: {counts[verdict]}"
+        text = f"{verdict.label.replace('_', ' ')}: {counts[verdict]}"
         rows.append((text, COLOURS[verdict]))
     rows.append(("", None))
     for room in sampling.report.rooms:
@@ -168,7 +168,7 @@ def _notes(sampling: Sampling) -> list[Mark]:
         y = _MARGIN + k * _ROW
         if colour:
             marks.append(Mark("dot", ((6.0, y),), colour, 4.0))
-        marks.append(_words(16.0 if colour else 0.0, y, text, _LETTERS))
+        marks.append(_text(16.0 if colour else 0.0, y, text, _LETTERS))
     return marks
 
 
@@ -188,10 +188,10 @@ def _middle(polygon: NDArray[np.float64]) -> tuple[float, float]:
     return float(x) - 0.4, float(z)
 
 
-def _words(x: float, y: float, text: str, size: float = _LETTERS, colour: str = _INK) -> Mark:
-    return Mark("words", ((x, y),), colour, size, words=text)
+def _text(x: float, y: float, text: str, size: float = _LETTERS, colour: str = _INK) -> Mark:
+    return Mark("text", ((x, y),), colour, size, text=text)
 
 
 def _shifted(mark: Mark, dx: float) -> Mark:
     points = tuple((x + dx, y) for x, y in mark.points)
-    return Mark(mark.shape, points, mark.colour, mark.size, mark.words, mark.title)
+    return Mark(mark.shape, points, mark.colour, mark.size, mark.text, mark.title)

@@ -1,4 +1,4 @@
-"""A drawing of polygons, lines, dots and words, as SVG text or as an RGB array; no effects."""
+"""A drawing of polygons, lines, dots and text, as SVG text or as an RGB array; no effects."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-Shape = Literal["polygon", "line", "dot", "words"]
+Shape = Literal["polygon", "line", "dot", "text"]
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """One shape. points: pixels, x right, y down; one point for a dot or words (left, middle).
+    """One shape. points: pixels, x right, y down; one point for a dot or text (left, middle).
 
     colour: "#rrggbb". size: line width, dot radius or letter height, px. title: shown by a
     browser over the shape.
@@ -26,7 +26,7 @@ class Mark:
     points: tuple[tuple[float, float], ...]
     colour: str
     size: float = 1.0
-    words: str = ""
+    text: str = ""
     title: str = ""
 
 
@@ -55,14 +55,14 @@ class Drawing:
         big = Image.new("RGB", (2 * self.width, 2 * self.height), "#ffffff")
         pen = ImageDraw.Draw(big)
         for mark in self.marks:
-            if mark.shape != "words":
+            if mark.shape != "text":
                 _paint(pen, mark)
         image = big.resize((self.width, self.height), Image.Resampling.BOX)
         pen = ImageDraw.Draw(image)
         for mark in self.marks:
-            if mark.shape == "words":
+            if mark.shape == "text":
                 font = ImageFont.load_default(mark.size)
-                pen.text(mark.points[0], mark.words, fill=mark.colour, font=font, anchor="lm")
+                pen.text(mark.points[0], mark.text, fill=mark.colour, font=font, anchor="lm")
         return np.asarray(image, np.uint8)
 
 
@@ -71,9 +71,9 @@ def _svg(mark: Mark) -> str:
     x, y = mark.points[0]
     if mark.shape == "dot":
         attributes = f'circle cx="{x:.1f}" cy="{y:.1f}" r="{mark.size:.1f}" fill="{mark.colour}"'
-    elif mark.shape == "words":
+    elif mark.shape == "text":
         size = f'font-size="{mark.size:.0f}" dominant-baseline="middle" fill="{mark.colour}"'
-        return f'<text x="{x:.1f}" y="{y:.1f}" {size}>{escape(mark.words)}</text>'
+        return f'<text x="{x:.1f}" y="{y:.1f}" {size}>{escape(mark.text)}</text>'
     elif mark.shape == "polygon":
         attributes = f'polygon points="{_path(mark.points)}" fill="{mark.colour}"'
     else:

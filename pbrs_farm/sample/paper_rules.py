@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
-from pbrs_farm.sample import eye_probes as probes
 from pbrs_farm.sample.candidates import Candidates, Grid
 from pbrs_farm.sample.clearance import near_any_triangle
-from pbrs_farm.sample.eye_probes import Counter
+from pbrs_farm.sample.eye_probes import Counter, enclosed, not_above_floor
 from pbrs_farm.sample.rejection import Verdict
 
 _CHUNK = 4096
@@ -32,7 +31,7 @@ def room_shape(room: Room) -> shapely.Geometry:
     return shapely.make_valid(shapely.Polygon(room.polygon))
 
 
-def refusals(
+def rejections(
     house: House,
     room: Room,
     fields: CameraFields,
@@ -40,7 +39,7 @@ def refusals(
     geometry: Geometry,
     counter: Counter,
 ) -> NDArray[np.uint8]:
-    """(N,) verdict of each candidate: the first rule of place that refuses it, or LOWER_SCORE.
+    """(N,) verdict of each candidate: the first rule of place that rejects it, or LOWER_SCORE.
 
     In order: inside the room's polygon, farther than the clearance from every triangle, a floor
     or furniture below rather than a wall or ceiling, not enclosed by one item. Memory is bounded.
@@ -52,14 +51,14 @@ def refusals(
 
     rules: tuple[tuple[Verdict, Callable[[NDArray[np.float64]], NDArray[np.bool_]]], ...] = (
         (Verdict.NEAR_OBSTACLE, lambda p: near_any_triangle(p, geometry, fields.clearance_m)),
-        (Verdict.NOT_ABOVE_FLOOR, lambda p: probes.not_above_floor(house, p, counter)),
-        (Verdict.ENCLOSED, lambda p: probes.enclosed(house, p, counter)),
+        (Verdict.NOT_ABOVE_FLOOR, lambda p: not_above_floor(house, p, counter)),
+        (Verdict.ENCLOSED, lambda p: enclosed(house, p, counter)),
     )
     places = np.flatnonzero(inside)
     for start in range(0, len(places), _CHUNK):
         left = places[start : start + _CHUNK]
-        for rule, refused in rules:
-            bad = refused(eye[left])
-            verdict[left[bad]] = rule
-            left = left[~bad]
+        for rule, breaks in rules:
+            rejected = breaks(eye[left])
+            verdict[left[rejected]] = rule
+            left = left[~rejected]
     return verdict

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Verdict(IntEnum):
-    """The first rule that refused a candidate, in the order the rules are tried, or its success."""
+    """The first rule that rejected a candidate, in the order the rules are tried, or its success."""
 
     OUTSIDE_ROOM = 0  # not inside the room's polygon
     NEAR_OBSTACLE = 1  # closer to a triangle than the clearance
@@ -18,9 +18,9 @@ class Verdict(IntEnum):
     WINNER = 7
 
     @property
-    def word(self) -> str:
+    def label(self) -> str:
         """The name in reports: "near_obstacle"."""
         return self.name.lower()
 
 
-REFUSALS = tuple(v for v in Verdict if v < Verdict.LOWER_SCORE)
+REJECTIONS = tuple(v for v in Verdict if v < Verdict.LOWER_SCORE)

@@ -28,7 +28,7 @@ def room_grid(house: House, room: Room) -> Grid:
     return Grid(float(low[0]), float(low[2]), float(high[0]), float(high[2]), float(low[1]))
 
 
-def refusals(
+def rejections(
     house: House,
     room: Room,
     fields: CameraFields,

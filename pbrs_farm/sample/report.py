@@ -1,18 +1,18 @@
-"""cameras.json: how many candidates each rule refused, per room and sector; no effects."""
+"""cameras.json: how many candidates each rule rejected, per room and sector; no effects."""
 
 from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict
 
 
-class _Fact(BaseModel):
+class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class SectorReport(_Fact):
+class SectorReport(_Record):
     """One sector of a room. n_candidates = the sum of refused, + those kept by every rule.
 
-    refused: rule -> candidates it was the first to refuse. n_kept: candidates that kept every
+    refused: rule -> candidates it was the first to reject. n_kept: candidates that kept every
     rule, the winners included. n_rescored: how many of them were scored at full size.
     Scores are in pixels at full size (preset released: a sum of logarithms); None = no camera.
     """
@@ -28,7 +28,7 @@ class SectorReport(_Fact):
     reason: str = ""
 
 
-class RoomReport(_Fact):
+class RoomReport(_Record):
     """One room. reason: why it was not sampled at all, or ""."""
 
     room_id: str
@@ -37,7 +37,7 @@ class RoomReport(_Fact):
     sectors: tuple[SectorReport, ...] = ()
 
 
-class CameraReport(_Fact):
+class CameraReport(_Record):
     """What the sampler did with a house; notes: what is not about one sector."""
 
     preset: str
@@ -49,8 +49,8 @@ class CameraReport(_Fact):
     notes: tuple[str, ...] = ()
 
 
-def total_refused(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
-    """Rule -> refused candidates over all sectors of all rooms."""
+def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
+    """Rule -> rejected candidates over all sectors of all rooms."""
     total: dict[str, int] = {}
     for room in rooms:
         for sector in room.sectors:

@@ -1,4 +1,4 @@
-"""One room's views: candidates, the rules that refuse them, the best of each sector.
+"""One room's views: candidates, the rules that reject them, the best of each sector.
 
 No effects of its own: pictures come from the counter it is given.
 """
@@ -16,13 +16,19 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Intrinsics, View
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
-from pbrs_farm.sample import paper_rules as paper
-from pbrs_farm.sample import released_rules as released
-from pbrs_farm.sample import sector_choice as choose
+from pbrs_farm.sample import paper_rules, released_rules
 from pbrs_farm.sample.candidates import Candidates, Grid, grid_candidates, n_cells
 from pbrs_farm.sample.eye_probes import Counter, counted
-from pbrs_farm.sample.rejection import REFUSALS, Verdict
+from pbrs_farm.sample.rejection import REJECTIONS, Verdict
 from pbrs_farm.sample.report import RoomReport, SectorReport
+from pbrs_farm.sample.sector_choice import (
+    COARSE_MARGIN_PX,
+    COARSE_SLACK,
+    Coarse,
+    FullScores,
+    best_first,
+    next_diverse,
+)
 from pbrs_farm.sample.view_score import (
     Scored,
     object_columns,
@@ -33,7 +39,7 @@ from pbrs_farm.sample.view_score import (
 )
 
 MAX_CELLS = 400_000
-"""A room of more cells (25,000 square metres at 0.25 m) is refused, so that memory is bounded."""
+"""A room of more cells (25,000 square metres at 0.25 m) is rejected, so that memory is bounded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,12 +62,12 @@ class RoomSampler:
     counter: Counter
     geometry: Geometry
 
-    def why_not(self) -> str:
+    def explain_rejection(self) -> str:
         """Why this room is not sampled at all, or ""."""
         room = self.room
         if self.house.is_repaired and not room.lit_by:
             return "nothing lights it: neither lamp nor window nor fallback light"
-        if shapely.area(paper.room_shape(room)) <= 0:
+        if shapely.area(paper_rules.room_shape(room)) <= 0:
             return "its polygon has no area"
         if self.fields.preset == "released" and not (room.has_floor and room.has_ceiling):
             return "the released sampler needs a floor and a ceiling"
@@ -74,14 +80,18 @@ class RoomSampler:
         """The room's views, its report and all its candidates."""
         names = (self.seed, self.house.id, self.room.id)
         candidates = grid_candidates(self._grid(), self.fields, names)
-        rules = released.refusals if self.fields.preset == "released" else paper.refusals
+        rules = (
+            released_rules.rejections
+            if self.fields.preset == "released"
+            else paper_rules.rejections
+        )
         verdict = rules(self.house, self.room, self.fields, candidates, self.geometry, self.counter)
         views: list[View] = []
         sectors: list[SectorReport] = []
         for sector in range(self.fields.n_sectors):
-            found, facts = self._sector(sector, candidates, verdict)
+            found, sector_report = self._sector(sector, candidates, verdict)
             views += found
-            sectors.append(facts)
+            sectors.append(sector_report)
         report = RoomReport(room_id=self.room.id, name=self.room.name, sectors=tuple(sectors))
         return views, report, RoomTrace(self.room.id, candidates, verdict)
 
@@ -91,28 +101,26 @@ class RoomSampler:
         """Choose among a sector's candidates; writes their verdicts."""
         of_sector = np.flatnonzero(candidates.sector == sector)
         eligible = of_sector[verdict[of_sector] == Verdict.LOWER_SCORE]
-        full = choose.FullScores(lambda which: self._full(candidates, eligible[which]))
-        coarse, share, judged = self._coarse(candidates, eligible)
+        full = FullScores(lambda which: self._full(candidates, eligible[which]))
+        coarse, share, image_verdicts = self._coarse(candidates, eligible)
         chosen = self._chosen(coarse, share, full)
 
-        # What was seen at full size is judged by that, the others by their coarse picture.
+        # What was seen at full size is image_verdicts by that, the others by their coarse picture.
         for k, rows in full.counts.items():
-            judged[k] = self._judged(rows[None])[0]
-        judged[chosen] = Verdict.WINNER
-        verdict[eligible] = judged
+            image_verdicts[k] = self._image_verdicts(rows[None])[0]
+        image_verdicts[chosen] = Verdict.WINNER
+        verdict[eligible] = image_verdicts
         views = [
             self._view(sector, k, candidates, int(eligible[c]), full.counts[c], full.score[c])
             for k, c in enumerate(chosen)
         ]
         return views, self._report(sector, verdict[of_sector], full, views)
 
-    def _chosen(
-        self, coarse: choose.Coarse, share: NDArray[np.float32], full: choose.FullScores
-    ) -> list[int]:
-        best = choose.best_first(coarse, full, margin=None if self._exact else self._margin)
+    def _chosen(self, coarse: Coarse, share: NDArray[np.float32], full: FullScores) -> list[int]:
+        best = best_first(coarse, full, margin=None if self._exact else self._margin)
         chosen = [] if best is None else [best]
         while chosen and len(chosen) < self.fields.per_sector:
-            more = choose.next_diverse(coarse, share, chosen, full, self.fields.min_object_fraction)
+            more = next_diverse(coarse, share, chosen, full, self.fields.min_object_fraction)
             if more is None:
                 break
             chosen.append(more)
@@ -120,26 +128,26 @@ class RoomSampler:
 
     def _coarse(
         self, candidates: Candidates, which: NDArray[np.intp]
-    ) -> tuple[choose.Coarse, NDArray[np.float32], NDArray[np.uint8]]:
+    ) -> tuple[Coarse, NDArray[np.float32], NDArray[np.uint8]]:
         """Coarse scores, each object's share of the picture when several views are wanted, and
         the verdicts that the coarse pictures give."""
         columns, fraction = self._columns(), self.fields.min_object_fraction
         keep = self.fields.per_sector > 1
         n = len(which)
-        coarse = choose.Coarse(np.zeros(n, np.bool_), np.zeros(n))
+        coarse = Coarse(np.zeros(n, np.bool_), np.zeros(n))
         share = np.zeros((n, len(columns) if keep else 0), np.float32)
-        judged = np.zeros(n, np.uint8)
+        image_verdicts = np.zeros(n, np.uint8)
         cameras = candidates.cameras(which, self._intrinsics(coarse=True))
         for part, rows in counted(self.counter, cameras, len(self.house.items)):
-            lenient = paper_score(rows, columns, fraction * choose.COARSE_SLACK)
+            lenient = paper_score(rows, columns, fraction * COARSE_SLACK)
             enough = lenient.n_objects >= self.fields.min_objects
             over = overfill(rows, columns, self.fields)
             coarse.possible[part] = enough & (over <= self._margin)
             coarse.score[part] = self._scored(rows).score
-            judged[part] = self._judged(rows)
+            image_verdicts[part] = self._image_verdicts(rows)
             if keep:
                 share[part] = rows[:, columns] / rows.sum(1, keepdims=True)
-        return coarse, share, judged
+        return coarse, share, image_verdicts
 
     def _full(
         self, candidates: Candidates, which: NDArray[np.intp]
@@ -147,22 +155,22 @@ class RoomSampler:
         cameras = candidates.cameras(which, self._intrinsics(coarse=False))
         parts = [rows for _part, rows in counted(self.counter, cameras, len(self.house.items))]
         rows = np.concatenate(parts)
-        return self._judged(rows) == Verdict.LOWER_SCORE, self._scored(rows).score, rows
+        return self._image_verdicts(rows) == Verdict.LOWER_SCORE, self._scored(rows).score, rows
 
-    def _judged(self, rows: NDArray[np.uint32]) -> NDArray[np.uint8]:
+    def _image_verdicts(self, rows: NDArray[np.uint32]) -> NDArray[np.uint8]:
         """(N,) the verdict of the rules about the picture, before any comparison of scores."""
         scored = self._scored(rows)
-        judged = np.full(len(rows), Verdict.LOWER_SCORE, np.uint8)
-        judged[(scored.n_objects < self.fields.min_objects) | (scored.score <= 0)] = (
+        image_verdicts = np.full(len(rows), Verdict.LOWER_SCORE, np.uint8)
+        image_verdicts[(scored.n_objects < self.fields.min_objects) | (scored.score <= 0)] = (
             Verdict.FEW_OBJECTS
         )
-        judged[overfill(rows, self._columns(), self.fields) > 0] = Verdict.FILLED_BY_ONE
-        return judged
+        image_verdicts[overfill(rows, self._columns(), self.fields) > 0] = Verdict.FILLED_BY_ONE
+        return image_verdicts
 
     @property
     def _margin(self) -> float:
         """By how much a share of the picture may differ between the sizes."""
-        return choose.COARSE_MARGIN_PX / self.fields.coarse_width_px
+        return COARSE_MARGIN_PX / self.fields.coarse_width_px
 
     def _scored(self, rows: NDArray[np.uint32]) -> Scored:
         if self.fields.preset == "released":
@@ -176,8 +184,8 @@ class RoomSampler:
 
     def _grid(self) -> Grid:
         if self.fields.preset == "released":
-            return released.room_grid(self.house, self.room)
-        return paper.room_grid(self.room)
+            return released_rules.room_grid(self.house, self.room)
+        return paper_rules.room_grid(self.room)
 
     @property
     def _exact(self) -> bool:
@@ -220,24 +228,24 @@ class RoomSampler:
         return float(round(score * f.score_width_px * f.score_height_px))
 
     def _report(
-        self, sector: int, verdict: NDArray[np.uint8], full: choose.FullScores, views: list[View]
+        self, sector: int, verdict: NDArray[np.uint8], full: FullScores, views: list[View]
     ) -> SectorReport:
         tally = Tally(verdict.tolist())
         ranking = full.ranking
-        refused = {rule.word: tally[rule] for rule in REFUSALS if tally[rule]}
+        rejected = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
         return SectorReport(
             sector=sector,
             n_candidates=len(verdict),
-            refused=refused,
+            refused=rejected,
             n_kept=tally[Verdict.LOWER_SCORE] + tally[Verdict.WINNER],
             n_rescored=len(full.score),
             views=tuple(view.id for view in views),
             winner_score=views[0].score if views else None,
             runner_up_score=self._reported(full.score[ranking[1]]) if len(ranking) > 1 else None,
-            reason="" if views else f"every candidate was refused: {_words(refused)}",
+            reason="" if views else f"every candidate was refused: {_label_counts(rejected)}",
         )
 
 
-def _words(refused: dict[str, int]) -> str:
-    most = sorted(refused.items(), key=lambda pair: -pair[1])
+def _label_counts(rejected: dict[str, int]) -> str:
+    most = sorted(rejected.items(), key=lambda pair: -pair[1])
     return ", ".join(f"{n} {rule.replace('_', ' ')}" for rule, n in most)

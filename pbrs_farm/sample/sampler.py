@@ -11,7 +11,7 @@ from pbrs_farm.core.camera import View
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.eye_probes import Counter
-from pbrs_farm.sample.report import CameraReport, RoomReport, total_refused
+from pbrs_farm.sample.report import CameraReport, RoomReport, total_rejected
 from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
 from pbrs_farm.sample.stored_cameras import stored_views
 
@@ -28,7 +28,7 @@ class Sampling:
 def cameras(
     house: House, fields: CameraFields, seed: int, counter: Counter
 ) -> tuple[tuple[View, ...], CameraReport]:
-    """The views of a house and why every other candidate was refused; see sample_cameras."""
+    """The views of a house and why every other candidate was rejected; see sample_cameras."""
     sampling = sample_cameras(house, fields, seed, counter)
     return sampling.views, sampling.report
 
@@ -48,12 +48,12 @@ def sample_cameras(house: House, fields: CameraFields, seed: int, counter: Count
     rooms: list[RoomReport] = []
     traces: list[RoomTrace] = []
     for room in house.rooms:
-        job = RoomSampler(house, room, fields, seed, counter, geometry)
-        reason = job.why_not()
+        sampler = RoomSampler(house, room, fields, seed, counter, geometry)
+        reason = sampler.explain_rejection()
         if reason:
             rooms.append(RoomReport(room_id=room.id, name=room.name, reason=reason))
             continue
-        found, report, trace = job.run()
+        found, report, trace = sampler.run()
         views += found
         rooms.append(report)
         traces.append(trace)
@@ -78,7 +78,7 @@ def _report(
         source=fields.source,
         n_views=len(views),
         n_candidates=sum(s.n_candidates for room in rooms for s in room.sectors),
-        refused=total_refused(rooms),
+        refused=total_rejected(rooms),
         rooms=rooms,
         notes=notes,
     )

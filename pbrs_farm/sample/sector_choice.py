@@ -52,7 +52,7 @@ class FullScores:
     score: dict[int, float] = field(default_factory=dict)
     counts: dict[int, NDArray[np.uint32]] = field(default_factory=dict)
 
-    def ask(self, candidates: NDArray[np.intp]) -> None:
+    def rescore_new(self, candidates: NDArray[np.intp]) -> None:
         """Score these candidates at full size, unless that was done."""
         new = np.array([c for c in candidates.tolist() if c not in self.score], np.intp)
         if not len(new):
@@ -81,7 +81,7 @@ def best_first(coarse: Coarse, full: FullScores, *, margin: float | None) -> int
     """
     order = np.argsort(-coarse.score, kind="stable")
     if margin is None:
-        full.ask(order)
+        full.rescore_new(order)
     else:
         order = order[coarse.possible[order]]
         for start in range(0, len(order), _BATCH):
@@ -92,7 +92,7 @@ def best_first(coarse: Coarse, full: FullScores, *, margin: float | None) -> int
                 batch = batch[reach >= full.score[ranking[0]]]
                 if not len(batch):
                     break
-            full.ask(batch)
+            full.rescore_new(batch)
     ranking = full.ranking
     return ranking[0] if ranking else None
 
@@ -116,7 +116,7 @@ def next_diverse(
     for candidate in order.tolist():
         if candidate in chosen or not coarse.possible[candidate]:
             continue
-        full.ask(np.array([candidate]))
+        full.rescore_new(np.array([candidate]))
         if full.keeps(candidate):
             return int(candidate)
     return None

@@ -60,7 +60,7 @@ def paper_score(
 def overfill(
     counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: CameraFields
 ) -> NDArray[np.float64]:
-    """(N,) by how much of the picture one item covers more than it may; above 0 is a refusal.
+    """(N,) by how much of the picture one item covers more than it may; above 0 rejects the view.
 
     An object may cover max_item_fraction, a wall (floor, ceiling) max_wall_fraction. counts:
     (N, n_items + 1) pixels. Beyond the paper; 1 switches a rule off.
