@@ -17,7 +17,7 @@ import bpy  # type: ignore[import-not-found]
 import numpy as np
 from mathutils import Matrix, Vector  # type: ignore[import-not-found]
 
-SURFACE, MIRROR, GLASS, HOLE = 0, 1, 2, 3
+SURFACE, MIRROR, GLASS, NULL = 0, 1, 2, 3
 
 BLENDER_FROM_WORLD = Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
 """The exported world has +y up, Blender's +z."""
@@ -164,7 +164,7 @@ def material_of(folder: Path, part):  # type: ignore[no-untyped-def]
     elif part["kind"] == GLASS:
         clear = colour(nodes.new("ShaderNodeBsdfTransparent"), part["tau"])
         shader = _mixed(nodes, links, _pane_fresnel(nodes, links), clear, _glossy(nodes, [1, 1, 1]))
-    elif part["kind"] == HOLE:
+    elif part["kind"] == NULL:
         shader = nodes.new("ShaderNodeBsdfTransparent")
     else:
         shader = colour(nodes.new("ShaderNodeBsdfDiffuse"), part["kd"])

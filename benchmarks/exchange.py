@@ -18,9 +18,26 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
-from pbrs_farm.transport.scene_tables.material_rows import MIRROR, SURFACE
+from pbrs_farm.transport.scene_tables.material_rows import (
+    ALPHA,
+    F0,
+    IS_CUTOUT,
+    KD,
+    KIND,
+    MIRROR,
+    SURFACE,
+    TAU,
+)
 from pbrs_farm.transport.scene_tables.portals import portals_of_house
-from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables, tables_from_house
+from pbrs_farm.transport.scene_tables.scene_tables import (
+    DUV1,
+    DUV2,
+    NO_LAMP,
+    NORMALS,
+    UV0,
+    SceneTables,
+    tables_from_house,
+)
 from pbrs_farm.transport.scene_tables.sky import Sky, sky_for_house
 
 
@@ -41,9 +58,10 @@ def home_without_coats(name: str) -> tuple[House, LightScene, dict[str, NDArray[
 def without_coats(tables: SceneTables) -> SceneTables:
     """The tables with every coat taken off; a metal's reflectance becomes diffuse."""
     rows = tables.material_rows.copy()
-    is_metal = (rows[:, 11] == SURFACE) & (rows[:, 4:7].max(1) > 0.081)
-    rows[is_metal, 0:3] += rows[is_metal, 4:7]
-    rows[rows[:, 11] == SURFACE, 4:8] = 0
+    is_metal = (rows[:, KIND] == SURFACE) & (rows[:, F0].max(1) > 0.081)
+    rows[is_metal, KD] += rows[is_metal, F0]
+    rows[rows[:, KIND] == SURFACE, F0] = 0
+    rows[rows[:, KIND] == SURFACE, ALPHA] = 0
     return replace(tables, material_rows=rows)
 
 
@@ -60,16 +78,15 @@ def write_scene(
     """
     folder.mkdir(parents=True, exist_ok=True)
     rows = tables.face_rows
-    first = np.stack([rows[:, 3], rows[:, 7]], 1)
-    step = rows[:, [11, 12]], rows[:, [13, 14]]
+    first = rows[:, UV0]
     tags, part = np.unique(tables.face_tags, return_inverse=True)
     np.savez(
         folder / "scene.npz",
         positions=tables.positions,
         faces=tables.faces,
         face_part=part.astype(np.int32),
-        uvs=np.stack([first, first + step[0], first + step[1]], 1),
-        normals=np.stack([rows[:, 16 + 4 * k : 19 + 4 * k] for k in range(3)], 1),
+        uvs=np.stack([first, first + rows[:, DUV1], first + rows[:, DUV2]], 1),
+        normals=np.stack([rows[:, columns] for columns in NORMALS], 1),
     )
     described = {
         "parts": [_part(int(tag), tables, house, set(textures)) for tag in tags],
@@ -88,11 +105,11 @@ def _part(tag: int, tables: SceneTables, house: House, textures: set[str]) -> di
     texture = material.texture_id if material.texture_id in textures else None
     return {
         "name": f"{index} {material.name}"[:60],
-        "kind": int(row[11]),
-        "kd": row[0:3].tolist(),
-        "f0": row[4:7].tolist(),
-        "tau": row[8:11].tolist(),
-        "texture": texture if int(row[11]) != MIRROR else None,
-        "cutout": bool(row[15] > 0),
+        "kind": int(row[KIND]),
+        "kd": row[KD].tolist(),
+        "f0": row[F0].tolist(),
+        "tau": row[TAU].tolist(),
+        "texture": texture if int(row[KIND]) != MIRROR else None,
+        "cutout": bool(row[IS_CUTOUT] > 0),
         "radiance": [0.0] * 3 if lamp == NO_LAMP else tables.lamp_rows[lamp, :3].tolist(),
     }

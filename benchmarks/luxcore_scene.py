@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import pyluxcore  # type: ignore[import-not-found]
 
-SURFACE, MIRROR, GLASS, HOLE = 0, 1, 2, 3
+SURFACE, MIRROR, GLASS, NULL = 0, 1, 2, 3
 
 PANE_REFLECTANCE = 2 * 0.04 / 1.04
 """What a thin pane of index 1.5 reflects at right angles."""
@@ -142,7 +142,7 @@ def material(name, part):  # type: ignore[no-untyped-def]
             f"{here}.material2": shine,
             f"{here}.amount": PANE_REFLECTANCE,
         }
-    elif part["kind"] == HOLE:
+    elif part["kind"] == NULL:
         out[f"{here}.type"] = "null"
     elif max(part["tau"]) > 0:
         if part["texture"]:

@@ -13,7 +13,7 @@ import mitsuba as mi
 from pbrs_farm.raycast.tracer import scene_from_mesh
 from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance
 from pbrs_farm.transport.kernels.sampler import device_array
-from pbrs_farm.transport.scene_tables.material_rows import GLASS, HOLE, MIRROR
+from pbrs_farm.transport.scene_tables.material_rows import GLASS, MIRROR, NULL
 from pbrs_farm.transport.scene_tables.scene_tables import FACE_FLOATS, SceneTables
 
 _RAY_OFFSET = 2e-5  # of a point's largest coordinate plus 1 m
@@ -47,7 +47,7 @@ class DeviceScene:
 
     def __init__(self, tables: SceneTables) -> None:
         self._all = scene_from_mesh(mi, tables.positions, tables.faces)
-        transparent = tables.see_through
+        transparent = tables.transparent
         self.has_transparent = bool(transparent.any())
         self._opaque = self._all
         self._transparent: Any = None
@@ -176,7 +176,7 @@ class DeviceScene:
         )
         is_cut: Any = rows[3][3] > 0
         cut = has_texture & is_cut & ~is_solid
-        return bsdf, active & (cut | (kind == HOLE))
+        return bsdf, active & (cut | (kind == NULL))
 
     def _texture(
         self, first: Any, width: Any, height: Any, uv: Any, active: Any

@@ -1,4 +1,4 @@
-"""The colour of a black body: linear sRGB of luminance 1 from a temperature; no effects."""
+"""Blackbody colour: linear sRGB of luminance 1 from a temperature; no effects."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ _HC_OVER_K = 1.438777e7  # nm K
 
 def rgb_from_kelvin(kelvin: float) -> NDArray[np.float64]:
     """(3,) linear sRGB, luminance 1, none negative, of Planck's radiator at 1000 to 20000 K."""
+    # Weight Planck's law by the matching functions, every 5 nm of the visible spectrum.
     wavelength = np.arange(380.0, 781.0, 5.0)
     power = wavelength**-5 / np.expm1(_HC_OVER_K / (wavelength * kelvin))
     xyz = (_matching(wavelength) * power).sum(1)
+    # Clip colours outside the gamut of sRGB and scale to luminance 1.
     rgb = np.maximum(_RGB_FROM_XYZ @ (xyz / xyz[1]), 0.0)
     return np.asarray(rgb / (rgb @ LUMINANCE))
 

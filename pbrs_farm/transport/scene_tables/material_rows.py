@@ -1,8 +1,4 @@
-"""Materials and textures as rows of numbers for the kernels; pure numpy, no effects.
-
-A row of 16 floats: kd r g b | f0 r g b, alpha | tau r g b, kind | first texel, width, height, cut.
-The first texel is an unsigned integer in the float's bits (a float holds 24 bits only).
-"""
+"""Materials as rows of floats for the kernels, textures as one atlas; pure numpy, no effects."""
 
 from __future__ import annotations
 
@@ -17,34 +13,33 @@ from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.recipe import Recipe
 
-MATERIAL_FLOATS: Final = 16
-KD, F0, ALPHA, TAU, KIND = slice(0, 3), slice(4, 7), 7, slice(8, 11), 11
-FIRST_TEXEL, TEXTURE_SIZE, IS_CUT = 12, slice(13, 15), 15
+MATERIAL_FLOATS: Final = 16  # columns of a material's row: four packets of four
+KD, TAU = slice(0, 3), slice(8, 11)  # diffuse reflectance; transmittance, diffuse or of thin glass
+F0, ALPHA = slice(4, 7), 7  # specular reflectance at right angles, GGX roughness
+KIND = 11  # of the next four
+FIRST_TEXEL = 12  # in the atlas, 0 = none: an unsigned integer in the float's bits
+TEXTURE_SIZE, IS_CUTOUT = slice(13, 15), 15  # width and height in texels; alpha cuts out
 
-SURFACE, MIRROR, GLASS, HOLE = 0, 1, 2, 3
-"""Kinds of the kernels: diffuse, specular and translucent; delta mirror; thin glass; nothing."""
+SURFACE, MIRROR, GLASS = 0, 1, 2  # rough and diffuse, delta mirror, thin glass
+NULL = 3  # Mitsuba's null BSDF: rays pass as if there were nothing
 
-_MIRROR_REFLECTANCE: Final = 0.9
-_MIN_ALPHA: Final = 0.05
-MAX_ALBEDO: Final = 0.9
-"""Of any diffuse surface in the preset `physical`: the whitest paints reach it, 1 never ends."""
-
+MAX_ALBEDO: Final = 0.9  # in the preset `physical`: the whitest paints; paths in 1 would never end
+_MIRROR_REFLECTANCE: Final = 0.9  # of a mirror whose source tells no colour
+_MIN_ALPHA: Final = 0.05  # below it a highlight is as narrow as a mirror's
 _MAX_TEXTURE_PX: Final = 2048
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TextureAtlas:
-    """All textures in one list of texels; slots: texture id -> (first texel, width, height).
+    """All textures in one list of texels."""
 
-    A texel holds 10 bits for the square root of each linear component and 2 bits of alpha.
-    """
-
-    texels: NDArray[np.uint32]
-    slots: dict[str, tuple[int, int, int]]
+    texels: NDArray[np.uint32]  # 10 bits for the square root of each linear component, 2 of alpha
+    slots: dict[str, tuple[int, int, int]]  # texture id -> first texel, width, height
 
 
 def texture_atlas(house: House, textures: dict[str, NDArray[np.uint8]]) -> TextureAtlas:
-    """Pack the textures that materials use. Textures that were not decoded are left out."""
+    """The atlas of the textures that materials use, without those that could not be decoded."""
+    # Leave texel 0 out: a first texel of 0 means that there is no texture.
     parts: list[NDArray[np.uint32]] = [np.zeros(1, np.uint32)]
     slots: dict[str, tuple[int, int, int]] = {}
     first = 1
@@ -72,42 +67,45 @@ def material_rows(
             row, was_scaled = _physical(material, recipe)
             if was_scaled:
                 scaled.append(material.name)
+        # Add the place of the texture in the atlas.
         slot = packed.slots.get(material.texture_id or "")
         if slot is not None:
             row[FIRST_TEXEL] = np.array([slot[0]], np.uint32).view(np.float32)[0]
             row[TEXTURE_SIZE] = slot[1:]
-            row[IS_CUT] = float(material.alpha_cutout)
+            row[IS_CUTOUT] = float(material.alpha_cutout)
         rows[index] = row
     notes = [f"material {n!r}: Kd + Ks above 1, scaled to conserve energy" for n in scaled]
     return rows, notes
 
 
 def _physical(material: Material, recipe: Recipe) -> tuple[NDArray[np.float32], bool]:
-    """The preset `physical`.
+    """(row, whether Kd + Ks had to be scaled) in the preset `physical`.
 
     Ks is read as the strength of a clear coat, F0 = 0.08 Ks (0.04 = glass of index 1.5 at Ks
-    0.5), unless Ks outshines Kd four times: then it is a metal of reflectance Ks. Kd is dimmed
-    by what the coat reflects (bsdf.py), metals are scaled to Kd + Ks <= 1.
+    0.5), unless Ks is four times brighter than Kd: then the surface is a metal of reflectance Ks.
+    What the coat reflects is taken off Kd (bsdf.py); metals are scaled to Kd + Ks <= 1.
     """
+    # Decode colours to linear light.
     row = np.zeros(MATERIAL_FLOATS, np.float32)
     kd = linear_from_srgb(np.clip(np.nan_to_num(material.diffuse), 0, 1))
     kd = np.minimum(kd, MAX_ALBEDO)
     ks_encoded = np.clip(np.nan_to_num(material.specular), 0, 1)
     ks = linear_from_srgb(ks_encoded)
     row[KIND] = SURFACE
+    # Describe mirrors, thin glass and lampshades, which have no coat.
     if material.kind is MaterialKind.MIRROR:
         tint = ks if ks @ LUMINANCE > 0.3 else np.full(3, _MIRROR_REFLECTANCE)
         row[F0], row[KIND] = np.minimum(tint, 0.98), MIRROR
         return row, False
     if material.kind is MaterialKind.GLASS:
-        # Opacity is how much of the glass's own colour the light takes on.
+        # Tint by the glass's own colour as much as it is opaque.
         row[TAU], row[KIND] = 1 - material.opacity * (1 - kd), GLASS
         return row, False
     if material.kind is MaterialKind.SHADE:
-        transmitted = recipe.repair.shade_transmission * kd
-        row[TAU] = transmitted
+        row[TAU] = recipe.repair.shade_transmission * kd
         row[KD] = np.minimum(0.9 * kd, 1 - recipe.repair.shade_transmission) * 0.9
         return row, False
+    # Tell metals from coated surfaces.
     too_much = bool(np.any(kd + ks > 1 + 1e-6))
     has_coat = material.shininess > 1 and float(ks.max()) > 0
     if (
@@ -120,6 +118,7 @@ def _physical(material: Material, recipe: Recipe) -> tuple[NDArray[np.float32], 
         kd, f0 = kd * scale, ks * scale
     else:
         f0 = 0.08 * ks_encoded
+    # Turn the Phong exponent into GGX roughness.
     row[KD] = kd
     if has_coat:
         row[F0] = f0
@@ -128,10 +127,10 @@ def _physical(material: Material, recipe: Recipe) -> tuple[NDArray[np.float32], 
 
 
 def _released(material: Material) -> NDArray[np.float32]:
-    """The preset `released`: diffuse, Kd taken as linear, a texture replaces it, glass is nothing."""
+    """The preset `released`: diffuse with a linear Kd or its texture; glass is a null BSDF."""
     row = np.zeros(MATERIAL_FLOATS, np.float32)
     transparent = material.opacity < 1 or material.kind in (MaterialKind.GLASS, MaterialKind.PANE)
-    row[KIND] = HOLE if transparent else SURFACE
+    row[KIND] = NULL if transparent else SURFACE
     row[KD] = 1.0 if material.texture_id else np.clip(np.nan_to_num(material.diffuse), 0, 1)
     return row
 
@@ -142,9 +141,12 @@ def _shrunk(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _packed(picture: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """(H, W) uint32 texels, as TextureAtlas packs them."""
+    # Take grey pictures as three equal components.
     if picture.ndim == 2:
         picture = picture[..., None]
     rgb = picture[..., :3] if picture.shape[-1] >= 3 else np.repeat(picture[..., :1], 3, -1)
+    # Encode by the square root of linear light; cut alpha at one half.
     table = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 1023).astype(np.uint32)
     bits = table[rgb]
     alpha = picture[..., 3] if picture.shape[-1] == 4 else np.full(picture.shape[:2], 255, np.uint8)

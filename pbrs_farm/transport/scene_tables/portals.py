@@ -1,4 +1,4 @@
-"""The openings through which daylight enters, as rectangles to sample; pure numpy, no effects."""
+"""Portals: the openings that daylight enters by, as rectangles to sample; pure numpy, no effects."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from pbrs_farm.core.house import House, MaterialKind
 from pbrs_farm.core.mesh import face_areas
 
-MAX_PORTALS: Final = 6
+MAX_PORTALS: Final = 6  # sampled for one view
 
 
 def portals_of_house(house: House) -> NDArray[np.float64]:
     """(K, 4, 3) rectangles through which daylight enters: windows, and doors with panes."""
+    # Count a door as a portal when one of its surfaces is a pane.
     glazed = {
         item.id
         for item in house.items
@@ -29,7 +30,7 @@ def portals_of_house(house: House) -> NDArray[np.float64]:
 
 
 def nearest_portals(portals: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
-    """At most MAX_PORTALS of them, those that subtend most at eye (3,)."""
+    """At most MAX_PORTALS of them, those of the largest solid angle from eye (3,), roughly."""
     if len(portals) <= MAX_PORTALS:
         return portals
     area = 2 * face_areas(portals[:, [0, 1, 3]])
@@ -39,6 +40,7 @@ def nearest_portals(portals: NDArray[np.float64], eye: NDArray[np.float64]) -> N
 
 
 def _is_rectangle(quad: NDArray[np.floating]) -> bool:
+    # Ask for an area, a right angle, and a fourth corner that closes a parallelogram.
     if quad.shape != (4, 3) or not np.isfinite(quad).all():
         return False
     a, b = quad[1] - quad[0], quad[3] - quad[0]

@@ -1,7 +1,7 @@
-"""A house as the flat tables that the light kernels gather from; pure numpy, no effects.
+"""Scene tables: a house as the flat arrays that the kernels gather from; pure numpy, no effects.
 
-Everything is one mesh and a few arrays, so that the kernels are the same for every house: nothing
-is compiled again for another home, camera or sky.
+A scene is one mesh and a few arrays, so that the kernels are the same for every house, camera and
+sky, and none is compiled again.
 """
 
 from __future__ import annotations
@@ -19,77 +19,70 @@ from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter, area_emitters_of_house
 from pbrs_farm.transport.scene_tables.material_rows import (
     MATERIAL_FLOATS,
-    TextureAtlas,
     material_rows,
     texture_atlas,
 )
 
-FACE_FLOATS: Final = 28
-NO_LAMP: Final = 0xFFFF
+FACE_FLOATS: Final = 28  # columns of a face's row: seven packets of four, gathered together
+ORIGIN, EDGE1, EDGE2 = slice(0, 3), slice(4, 7), slice(8, 11)  # first corner, edges to the others
+UV0, DUV1, DUV2 = [3, 7], [11, 12], [13, 14]  # uv of the first corner, steps to the others
+NORMALS = slice(16, 19), slice(20, 23), slice(24, 27)  # of the corners; 15, 19, 23, 27 are free
+NO_LAMP: Final = 0xFFFF  # upper half of a face's tag that does not emit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneTables:
-    """What the kernels gather from.
+    """The arrays that the kernels gather from."""
 
-    positions (V, 3) float32, faces (F, 3) int32: the mesh for Mitsuba, degenerate faces removed.
-    face_rows: (F, 28) float32 v0 u0 | e1 v0 | e2 du1 | dv1 du2 dv2 0 | n0 a | n1 b | n2 c; a, b, c
-    are kept free for DeviceScene.set_guiding_targets.
-    face_tags: (F,) uint32, material + 65536 * lamp (65535 = no lamp).
-    see_through: (F,) bool, thin glass and cut-outs: shadow rays may pass.
-    material_rows: (M, 16) float32. texels: the packed texture atlas.
-    lamps: the emitters, in order. lamp_rows: (L, 4) float32 r g b area. lamp_first: (L + 1,)
-    first triangle of each lamp; lamp_faces: (T,) face; lamp_areas: (T,) running sum of areas
-    inside each lamp, divided by the lamp's area.
-    """
-
-    positions: NDArray[np.float32]
-    faces: NDArray[np.int32]
-    face_rows: NDArray[np.float32]
-    face_tags: NDArray[np.uint32]
-    see_through: NDArray[np.bool_]
-    material_rows: NDArray[np.float32]
-    texels: NDArray[np.uint32]
-    lamps: tuple[AreaEmitter, ...]
-    lamp_rows: NDArray[np.float32]
-    lamp_first: NDArray[np.uint32]
-    lamp_faces: NDArray[np.uint32]
-    lamp_areas: NDArray[np.float32]
-    notes: tuple[str, ...]
+    positions: NDArray[np.float32]  # (V, 3) vertices of Mitsuba's mesh
+    faces: NDArray[np.int32]  # (F, 3), without degenerate ones
+    face_rows: NDArray[np.float32]  # (F, 28), columns as above
+    face_tags: NDArray[np.uint32]  # (F,) material + 65536 * lamp
+    transparent: NDArray[np.bool_]  # (F,) thin glass and alpha cut-outs: shadow rays may pass
+    material_rows: NDArray[np.float32]  # (M, 16), columns as in material_rows.py
+    texels: NDArray[np.uint32]  # the texture atlas
+    lamps: tuple[AreaEmitter, ...]  # L of them
+    lamp_rows: NDArray[np.float32]  # (L, 4) radiance r g b, area in m2
+    lamp_first: NDArray[np.uint32]  # (L + 1,) first of each lamp's triangles in the next two
+    lamp_faces: NDArray[np.uint32]  # (T,) face
+    lamp_areas: NDArray[np.float32]  # (T,) running sum of areas over the lamp's area
+    notes: tuple[str, ...]  # what had to be changed or left out
 
 
 def tables_from_house(
     house: House, textures: dict[str, NDArray[np.uint8]], recipe: Recipe
 ) -> SceneTables:
-    """The tables of a house without its panes. Raises BadHouse when nothing is left to hit."""
+    """The tables of a house without its panes. Raises BadHouse when it has no surface."""
+    # Leave out panes, which would only cost rays, and faces without a plane.
     geometry = geometry_from_house(house, with_panes=False)
     keep = _solid_faces(geometry)
     if not keep.any():
         raise BadHouse(house.source.file, house.id, "no surface that light could meet")
-    notes = (
-        [f"{int((~keep).sum())} degenerate faces left out of the light"] if (~keep).any() else []
-    )
+    n_left_out = int((~keep).sum())
+    notes = [f"{n_left_out} degenerate faces left out of the light"] * (n_left_out > 0)
 
-    packed: TextureAtlas = texture_atlas(house, textures)
+    # Tag each face with its material and its lamp.
+    packed = texture_atlas(house, textures)
     rows, material_notes = material_rows(house, packed, recipe)
     lamps = area_emitters_of_house(house, geometry, keep, recipe)
     faces = geometry.faces[keep]
     face_lamp = np.full(len(geometry.faces), NO_LAMP, np.uint32)
     for index, lamp in enumerate(lamps):
         face_lamp[lamp.faces] = index
-    new_number = np.cumsum(keep) - 1
     material = geometry.face_material[keep].astype(np.uint32)
-    first, lamp_faces, lamp_areas = _lamp_triangles(lamps, new_number)
-    kinds = np.array([m.kind is MaterialKind.GLASS or m.alpha_cutout for m in house.materials])
-    if recipe.materials.preset == "released":
-        kinds = np.array([m.opacity < 1 or m.kind is MaterialKind.GLASS or m.alpha_cutout
-                          for m in house.materials])  # fmt: skip
+    first, lamp_faces, lamp_areas = _lamp_triangles(lamps, np.cumsum(keep) - 1)
+    # Tell which materials let a shadow ray pass; in `released` opacity below 1 does, too.
+    released = recipe.materials.preset == "released"
+    transparent = np.array([
+        m.kind is MaterialKind.GLASS or m.alpha_cutout or (released and m.opacity < 1)
+        for m in house.materials
+    ])  # fmt: skip
     return SceneTables(
         positions=geometry.positions,
         faces=faces,
         face_rows=_face_rows(geometry, faces),
         face_tags=material + (face_lamp[keep] << np.uint32(16)),
-        see_through=kinds[material],
+        transparent=transparent[material],
         material_rows=rows.reshape(-1, MATERIAL_FLOATS),
         texels=packed.texels,
         lamps=lamps,
@@ -102,7 +95,7 @@ def tables_from_house(
 
 
 def _solid_faces(geometry: Geometry) -> NDArray[np.bool_]:
-    """(F,) bool: finite, and wide enough that the plane of the face is known."""
+    """(F,) bool: finite corners and an area that defines the face's plane."""
     return faces_with_area(triangle_corners(geometry.positions, geometry.faces), 0.5e-10)
 
 
@@ -111,35 +104,34 @@ def _face_rows(geometry: Geometry, faces: NDArray[np.int32]) -> NDArray[np.float
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     flat = unit_normals(corners)
 
-    # Take the face's own normal where a vertex has none or one that is no unit vector.
+    # Take the face's own normal where a vertex has none or one that is not of unit length.
     normals = geometry.normals[faces].astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         length = np.linalg.norm(normals, axis=2, keepdims=True)
         normals = np.where((length > 0.5) & (length < 2), normals / length, flat[:, None])
-    # Keep one side for all three: a vertex normal that leans to the back is turned round.
+    # Turn all three to the front; replace one that leans to the back by the face's own.
     side = np.sign((normals.sum(1) * flat).sum(1))
     normals = np.where(((normals.sum(1) * flat).sum(1) < 0)[:, None, None], -normals, normals)
     lean = (normals * flat[:, None]).sum(2, keepdims=True)
     normals = np.where((lean > 0.05) & (side != 0)[:, None, None], normals, flat[:, None])
 
-    # Repeat makes whole texture turns free: start near 0 so that float32 keeps the fraction.
+    # Shift repeating textures by whole turns to start near 0: float32 keeps the fraction.
     uvs = np.nan_to_num(geometry.uvs[faces].astype(np.float64), posinf=0, neginf=0)
     uvs -= np.floor(uvs.min(1, keepdims=True))
     duv = uvs[:, 1:] - uvs[:, :1]
 
     rows = np.zeros((len(faces), FACE_FLOATS), np.float32)
-    rows[:, 0:3], rows[:, 3] = corners[:, 0], uvs[:, 0, 0]
-    rows[:, 4:7], rows[:, 7] = e1, uvs[:, 0, 1]
-    rows[:, 8:11], rows[:, 11] = e2, duv[:, 0, 0]
-    rows[:, 12], rows[:, 13], rows[:, 14] = duv[:, 0, 1], duv[:, 1, 0], duv[:, 1, 1]
-    for k in range(3):
-        rows[:, 16 + 4 * k : 19 + 4 * k] = normals[:, k]
+    rows[:, ORIGIN], rows[:, EDGE1], rows[:, EDGE2] = corners[:, 0], e1, e2
+    rows[:, UV0], rows[:, DUV1], rows[:, DUV2] = uvs[:, 0], duv[:, 0], duv[:, 1]
+    for k, columns in enumerate(NORMALS):
+        rows[:, columns] = normals[:, k]
     return rows
 
 
 def _lamp_triangles(
     lamps: tuple[AreaEmitter, ...], new_number: NDArray[np.int64]
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]:
+    """(first, faces, areas) as in SceneTables; new_number: of each face of the geometry."""
     first = np.cumsum([0, *(len(lamp.faces) for lamp in lamps)]).astype(np.uint32)
     faces = [new_number[lamp.faces] for lamp in lamps]
     areas = [np.cumsum(lamp.face_areas) / np.sum(lamp.face_areas) for lamp in lamps]
@@ -151,11 +143,11 @@ def _lamp_triangles(
 
 
 def bounding_spheres(tables: SceneTables) -> NDArray[np.float64]:
-    """(L, 4) centre and radius in m of the box around each lamp's shining faces."""
-    balls = np.zeros((len(tables.lamps), 4))
+    """(L, 4) centre and radius in m of the sphere around the bounding box of each lamp's faces."""
+    spheres = np.zeros((len(tables.lamps), 4))
     for k in range(len(tables.lamps)):
-        shining = tables.lamp_faces[tables.lamp_first[k] : tables.lamp_first[k + 1]]
-        corners = tables.positions[tables.faces[shining]].reshape(-1, 3)
+        emitting = tables.lamp_faces[tables.lamp_first[k] : tables.lamp_first[k + 1]]
+        corners = tables.positions[tables.faces[emitting]].reshape(-1, 3)
         low, high = corners.min(0), corners.max(0)
-        balls[k, :3], balls[k, 3] = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-    return balls
+        spheres[k, :3], spheres[k, 3] = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    return spheres

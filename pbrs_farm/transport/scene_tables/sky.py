@@ -1,8 +1,8 @@
-"""Outdoor light as one latitude-longitude picture of the dome and one sun; no effects.
+"""Sky: outdoor light as one latitude-longitude image of the dome and one sun; no effects.
 
-Both kinds of sky, analytic and panorama, end here on one photometric scale (spec/sky.md): the
-dome without its sun gives `sky_lx` on open level ground, the sun at most `sun_lx` more. Rows run
-from the zenith (+y, row 0) to the nadir, columns with the azimuth atan2(x, -z).
+Analytic skies and panorama have one photometric scale (spec/sky.md): the dome without its sun
+gives `sky_lx` on open level ground, the sun at most `sun_lx` more. Rows run from the zenith (+y,
+row 0) to the nadir, columns with the azimuth atan2(x, -z).
 """
 
 from __future__ import annotations
@@ -20,32 +20,29 @@ from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 
-DOME_SHAPE: Final = (256, 512)
+DOME_SHAPE: Final = (256, 512)  # texels of an analytic sky
 SUN_HALF_ANGLE_RAD: Final = math.radians(0.5358 / 2)
-GROUND_ALBEDO: Final = 0.2
-NO_SKIES: Final = ("interior", "studio", "courtyard", "night")
-"""Panoramas of Debian's blender-data that show no daylight sky."""
+GROUND_ALBEDO: Final = 0.2  # grey
+NO_SKIES: Final = ("interior", "studio", "courtyard", "night")  # panoramas without a daylight sky
 
-_SUN_ELEVATION_DEG: Final = (15.0, 60.0)
+_SUN_ELEVATION_DEG: Final = (15.0, 60.0)  # range from which a house's sun is drawn
+_OPTICAL_DEPTH: Final = 0.21  # of clear air at the zenith, for the sun's light
+_SUN_RAD: Final = math.radians(4)  # around a panorama's brightest texel, where its sun is sought
+_RING_RAD: Final = math.radians(6)  # outer edge of the ring that tells the sky around the sun
+_SUN_FACTOR: Final = 20  # the sun is brighter than that ring by this
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sky:
-    """Light from outside, in the world frame.
+    """Light from outside, in the world frame."""
 
-    name: what it is, for view.json. dome: (H, W, 3) float32 radiance in W m-2 sr-1, sun removed.
-    sun_direction: (3,) unit, towards the sun. sun_irradiance: (3,) W m-2 on a surface that faces
-    the sun, linear RGB; zeros = no sun. sun_half_angle_rad: of its disc. rotation_rad: how far
-    the source was turned about +y. scale: what its radiance was multiplied by.
-    """
-
-    name: str
-    dome: NDArray[np.float32]
-    sun_direction: NDArray[np.float64]
-    sun_irradiance: NDArray[np.float64]
-    sun_half_angle_rad: float = SUN_HALF_ANGLE_RAD
-    rotation_rad: float = 0.0
-    scale: float = 1.0
+    name: str  # of view.json
+    dome: NDArray[np.float32]  # (H, W, 3) radiance in W m-2 sr-1, sun removed
+    sun_direction: NDArray[np.float64]  # (3,) unit, towards the sun
+    sun_irradiance: NDArray[np.float64]  # (3,) W m-2 facing the sun, linear RGB; zeros = no sun
+    sun_half_angle_rad: float = SUN_HALF_ANGLE_RAD  # of its disc
+    rotation_rad: float = 0.0  # of the source about +y
+    scale: float = 1.0  # of the source's radiance
 
     @property
     def sky_lx(self) -> float:
@@ -84,7 +81,7 @@ def uniform_sky(radiance: tuple[float, float, float]) -> Sky:
 
 
 def choose_panorama(names: list[str], house_id: str, seed: int) -> str:
-    """The panorama of a house, the same at every run; known non-skies are passed over.
+    """The panorama of a house, the same at every run, without known interiors and nights.
 
     Raises BadRecipe when no name is left.
     """
@@ -112,6 +109,7 @@ def sky_for_house(
             )
         rotation = _uniform(house_id, recipe.seed, "rotation") * 2 * math.pi
         return sky_from_panorama(panorama[0], panorama[1], recipe, rotation_rad=rotation)
+    # Draw the sun's place by seeds of the house.
     low, high = _SUN_ELEVATION_DEG
     elevation = math.radians(low + (high - low) * _uniform(house_id, recipe.seed, "elevation"))
     azimuth = _uniform(house_id, recipe.seed, "azimuth") * 2 * math.pi
@@ -120,6 +118,7 @@ def sky_for_house(
 
 def sunsky(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
     """Hosek and Wilkie's clear sky (Mitsuba's `sunsky`) with the sun at that place."""
+    # Evaluate the model and scale its upper half to sky_lx.
     sun = np.array(
         [
             math.cos(elevation_rad) * math.sin(azimuth_rad),
@@ -132,9 +131,9 @@ def sunsky(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
     scale = recipe.emission.sky_lx / (LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE))
     dome *= scale
 
-    # The sun at the zenith gives sun_lx; lower, more air lies before it (optical depth 0.21).
+    # Dim the sun by the air before it, more the lower it stands; at the zenith it gives sun_lx.
     air_mass = 1.0 / max(sun[1], 0.05)
-    lux = recipe.emission.sun_lx * math.exp(-0.21 * (air_mass - 1.0))
+    lux = recipe.emission.sun_lx * math.exp(-_OPTICAL_DEPTH * (air_mass - 1.0))
     irradiance = sun_rgb / (sun_rgb @ LUMINANCE) * lux / LM_PER_W
     return _with_ground(Sky("sunsky", dome, sun, irradiance, scale=scale))
 
@@ -142,41 +141,32 @@ def sunsky(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
 def sky_from_panorama(
     name: str, rgb: NDArray[np.floating], recipe: Recipe, *, rotation_rad: float
 ) -> Sky:
-    """A panorama with its sun taken out, both on the photometric scale; the ground stays as it is.
+    """A panorama with its sun taken out, both on the photometric scale; its ground stays.
 
-    In the preset `released` the picture is used whole, times `released_sky`, unturned.
+    The preset `released` scales the whole image by `released_sky` and does not turn it.
     """
     if rgb.ndim != 3 or rgb.shape[1] != 2 * rgb.shape[0] or rgb.shape[2] < 3:
         raise BadRecipe(f"panorama {name}: expected (H, 2 H, 3), got {rgb.shape}")
     picture = np.maximum(np.nan_to_num(np.asarray(rgb[..., :3], np.float64)), 0.0)
     if recipe.emission.preset == "released":
-        scale = recipe.emission.released_sky
-        return Sky(
-            name,
-            (picture * scale).astype(np.float32),
-            np.array([0.0, 1.0, 0.0]),
-            np.zeros(3),
-            scale=scale,
-        )
+        scale, up = recipe.emission.released_sky, np.array([0.0, 1.0, 0.0])
+        return Sky(name, (picture * scale).astype(np.float32), up, np.zeros(3), scale=scale)
+    # Turn the image about the vertical by whole texels and take its sun out.
     shift = round(rotation_rad / (2 * math.pi) * picture.shape[1])
     picture = np.roll(picture, shift, axis=1)
     dome, sun, irradiance = _without_sun(picture)
-    level = LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE)
-    if level <= 0:
+    # Scale the dome to sky_lx and the sun alike, but to sun_lx at most.
+    dome_lx = LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE)
+    if dome_lx <= 0:
         raise BadRecipe(f"panorama {name}: its upper half is black")
-    scale = recipe.emission.sky_lx / level
+    scale = recipe.emission.sky_lx / dome_lx
     irradiance = irradiance * scale
-    level_sun = LM_PER_W * float(irradiance @ LUMINANCE) * max(sun[1], 0.0)
-    if level_sun > recipe.emission.sun_lx:
-        irradiance = irradiance * (recipe.emission.sun_lx / level_sun)
-    return Sky(
-        name,
-        (dome * scale).astype(np.float32),
-        sun,
-        irradiance,
-        rotation_rad=shift / picture.shape[1] * 2 * math.pi,
-        scale=scale,
-    )
+    sun_lx = LM_PER_W * float(irradiance @ LUMINANCE) * max(sun[1], 0.0)
+    if sun_lx > recipe.emission.sun_lx:
+        irradiance = irradiance * (recipe.emission.sun_lx / sun_lx)
+    turned_rad = shift / picture.shape[1] * 2 * math.pi
+    scaled = (dome * scale).astype(np.float32)
+    return Sky(name, scaled, sun, irradiance, rotation_rad=turned_rad, scale=scale)
 
 
 def directions(height: int, width: int) -> NDArray[np.float64]:
@@ -184,14 +174,8 @@ def directions(height: int, width: int) -> NDArray[np.float64]:
     theta = (np.arange(height) + 0.5) / height * math.pi
     phi = (np.arange(width) + 0.5) / width * 2 * math.pi
     s = np.sin(theta)[:, None]
-    return np.stack(
-        [
-            s * np.sin(phi),
-            np.broadcast_to(np.cos(theta)[:, None], (height, width)),
-            -s * np.cos(phi),
-        ],
-        -1,
-    )
+    y = np.broadcast_to(np.cos(theta)[:, None], (height, width))
+    return np.stack([s * np.sin(phi), y, -s * np.cos(phi)], -1)
 
 
 def solid_angles(height: int, width: int) -> NDArray[np.float64]:
@@ -201,7 +185,7 @@ def solid_angles(height: int, width: int) -> NDArray[np.float64]:
 
 
 def horizontal_irradiance(dome: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(3,) irradiance of level open ground by the upper half of a latitude-longitude picture."""
+    """(3,) irradiance of level open ground by the upper half of a latitude-longitude image."""
     height, width = dome.shape[:2]
     up = np.maximum(directions(height, width)[..., 1], 0.0)
     weight = up * solid_angles(height, width)[:, None]
@@ -209,7 +193,7 @@ def horizontal_irradiance(dome: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def _with_ground(sky: Sky) -> Sky:
-    # Below the horizon lies grey ground, lit by the whole sky.
+    # Fill the lower half with grey ground, lit by the whole sky.
     ground = horizontal_irradiance(sky.dome) + sky.sun_irradiance * max(sky.sun_direction[1], 0.0)
     dome = sky.dome.copy()
     dome[dome.shape[0] // 2 :] = (GROUND_ALBEDO * ground / math.pi).astype(np.float32)
@@ -222,62 +206,67 @@ def _hosek(sun: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.fl
     """(dome (256, 512, 3) unscaled, colour of the sun (3,)) for a sun direction, world frame."""
     variant = choose_variant()
     mi = mitsuba(variant)
-    way = directions(*DOME_SHAPE).reshape(-1, 3)
+    towards = directions(*DOME_SHAPE).reshape(-1, 3)
 
-    # Mitsuba's sky has +z up: world (x, y, z) is its (x, -z, y).
+    # Turn into Mitsuba's frame, +z up: world (x, y, z) is its (x, -z, y).
     def turned(v: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.stack([v[..., 0], -v[..., 2], v[..., 1]], -1)
 
+    # Load sky and sun as two emitters, so that each can be evaluated alone.
     fields = {"type": "sunsky", "sun_direction": [float(v) for v in turned(sun)]}
     sky = mi.load_dict({**fields, "sun_scale": 0.0})
     disc = mi.load_dict({**fields, "sky_scale": 0.0})
-    dome = _evaluated(mi, variant, sky, turned(way)).reshape(*DOME_SHAPE, 3)
+    dome = _evaluated(mi, variant, sky, turned(towards)).reshape(*DOME_SHAPE, 3)
     return dome, _evaluated(mi, variant, disc, turned(sun)[None])[0].astype(np.float64)
 
 
 def _evaluated(
-    mi: Any, variant: str, emitter: Any, ways: NDArray[np.float64]
+    mi: Any, variant: str, emitter: Any, towards: NDArray[np.float64]
 ) -> NDArray[np.float32]:
+    """(N, 3) radiance of an emitter at infinity from directions (N, 3)."""
     if variant.startswith("scalar"):
         rows = []
-        for way in ways:
+        for direction in towards:
             si = mi.SurfaceInteraction3f()
-            si.wi = mi.Vector3f(*(-way))
+            si.wi = mi.Vector3f(*(-direction))
             rows.append(np.asarray(emitter.eval(si), np.float32))
         return np.stack(rows)
     import drjit as dr
 
-    si = dr.zeros(mi.SurfaceInteraction3f, len(ways))
-    si.wi = mi.Vector3f(*(np.ascontiguousarray(-ways[:, k], np.float32) for k in range(3)))
+    si = dr.zeros(mi.SurfaceInteraction3f, len(towards))
+    si.wi = mi.Vector3f(*(np.ascontiguousarray(-towards[:, k], np.float32) for k in range(3)))
     return np.asarray(emitter.eval(si).numpy().T, np.float32)
 
 
 def _without_sun(
     picture: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """(picture without its sun, unit direction, irradiance facing it) of a panorama.
+    """(image without its sun, unit direction of it, irradiance facing it) of a panorama.
 
-    The sun is what lies within 4 degrees of the brightest texel and is above 20 times the sky's
-    mean luminance there; it is replaced by the mean of the ring of 4 to 6 degrees around it.
+    The sun's texels lie within 4 degrees of the brightest one and are brighter than 20 times the
+    mean of the ring of 4 to 6 degrees around it, which replaces them.
     """
+    # Find the brightest texel above the horizon and measure the ring around it.
     height, width = picture.shape[:2]
     luminance = picture @ LUMINANCE
     upper = luminance[: height // 2]
-    way = directions(height, width)
+    towards = directions(height, width)
     row, column = np.unravel_index(int(np.argmax(upper)), upper.shape)
-    peak = way[row, column]
-    near = way @ peak
-    ring = (near < math.cos(math.radians(4))) & (near > math.cos(math.radians(6)))
+    peak = towards[row, column]
+    cosine = towards @ peak
+    ring = (cosine < math.cos(_SUN_RAD)) & (cosine > math.cos(_RING_RAD))
     level = float(np.mean(luminance[ring])) if ring.any() else float(np.mean(upper))
-    disc = (near >= math.cos(math.radians(4))) & (luminance > 20 * max(level, 1e-9))
+    disc = (cosine >= math.cos(_SUN_RAD)) & (luminance > _SUN_FACTOR * max(level, 1e-9))
     if not disc.any():
         return picture, peak, np.zeros(3)
+    # Integrate what the disc has above its surroundings: irradiance, and its centre.
     filling = picture[ring].mean(0) if ring.any() else np.full(3, level)
     weight = np.broadcast_to(solid_angles(height, width)[:, None], disc.shape)[disc]
     excess = np.maximum(picture[disc] - filling, 0.0)
     irradiance = np.asarray((excess * weight[:, None]).sum(0))
     strength = excess @ LUMINANCE * weight
-    sun = (way[disc] * strength[:, None]).sum(0)
+    sun = (towards[disc] * strength[:, None]).sum(0)
+    # Fill the disc with the mean of the ring.
     out = picture.copy()
     out[disc] = filling
     return out, sun / np.linalg.norm(sun), irradiance

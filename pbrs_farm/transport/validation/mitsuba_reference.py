@@ -1,9 +1,8 @@
-"""The same light by Mitsuba's own plugins and path integrator: fallback and cross-check.
+"""Mitsuba's own plugins and path integrator on the same tables: fallback and reference.
 
-Effects: holds Mitsuba scenes. `scalar_rgb` has no Dr.Jit arrays, so our kernels cannot run there;
-this renders instead, slowly. In tests it is the independent second opinion: Mitsuba's shapes,
-emitters, materials and integrator, built from the same tables. Coats become `roughplastic`, which
-is like our model but not equal to it; diffuse scenes agree exactly.
+Effects: holds Mitsuba scenes. `scalar_rgb` has no Dr.Jit arrays for our kernels, so this renders
+there, slowly. In tests it is an independent second opinion. Coats become `roughplastic`, which is
+like our BSDF but not equal to it; diffuse scenes agree exactly.
 """
 
 from __future__ import annotations
@@ -18,7 +17,18 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.raycast.variant import mitsuba
-from pbrs_farm.transport.scene_tables.material_rows import GLASS, HOLE, MIRROR
+from pbrs_farm.transport.scene_tables.material_rows import (
+    ALPHA,
+    F0,
+    FIRST_TEXEL,
+    GLASS,
+    KD,
+    KIND,
+    MIRROR,
+    NULL,
+    TAU,
+    TEXTURE_SIZE,
+)
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky
 
@@ -57,10 +67,11 @@ class ReferenceScene:
     def _shapes(self, mi: Any, group: Group) -> dict[str, Any]:
         t = self._tables
         shapes: dict[str, Any] = {}
+        # Make a mesh of the faces that share a material and a lamp.
         for tag in np.unique(t.face_tags):
             faces = t.faces[t.face_tags == tag]
             row = _untextured(t.material_rows[int(tag & 0xFFFF)], t.texels)
-            if int(row[11]) == HOLE:
+            if int(row[KIND]) == NULL:
                 continue
             fields: dict[str, Any] = {"bsdf": _bsdf(row)}
             if group is Group.INDOOR and tag >> 16 != NO_LAMP:
@@ -72,20 +83,22 @@ class ReferenceScene:
 
 def _untextured(row: NDArray[np.float32], texels: NDArray[np.uint32]) -> NDArray[np.float32]:
     """The material with its texture's mean colour in place of the texture."""
-    first = int(row[12:13].view(np.uint32)[0])
-    if first == 0 or int(row[11]) == MIRROR:
+    first = int(row[FIRST_TEXEL : FIRST_TEXEL + 1].view(np.uint32)[0])
+    if first == 0 or int(row[KIND]) == MIRROR:
         return row
-    bits = texels[first : first + int(row[13]) * int(row[14])]
+    # Unpack the texels: squares of ten bits for each component.
+    bits = texels[first : first + int(np.prod(row[TEXTURE_SIZE].astype(np.int64)))]
     mean = [np.mean(((bits >> shift & 1023) / 1023) ** 2) for shift in (0, 10, 20)]
-    plain = row.copy()
-    plain[0:3] *= mean
-    plain[8:11] *= mean
-    return plain
+    untextured = row.copy()
+    untextured[KD] *= mean
+    untextured[TAU] *= mean
+    return untextured
 
 
 def _mesh(
     mi: Any, positions: NDArray[np.float32], faces: NDArray[np.int32], fields: dict[str, Any]
 ) -> Any:
+    # Keep the vertices in use; a mesh takes its BSDF and emitter when it is made.
     used, renumbered = np.unique(faces, return_inverse=True)
     properties = mi.Properties()
     for name, plugin in fields.items():
@@ -102,31 +115,32 @@ def _bsdf(row: NDArray[np.float32]) -> dict[str, Any]:
     def rgb(values: NDArray[np.float32]) -> dict[str, Any]:
         return {"type": "rgb", "value": [float(v) for v in values]}
 
-    if int(row[11]) == MIRROR:
+    # Choose the plugin by the kind of BSDF.
+    if int(row[KIND]) == MIRROR:
         return {
             "type": "twosided",
-            "nested": {"type": "conductor", "material": "none", "specular_reflectance": rgb(row[4:7])},
+            "nested": {"type": "conductor", "material": "none", "specular_reflectance": rgb(row[F0])},
         }  # fmt: skip
-    if int(row[11]) == GLASS:
+    if int(row[KIND]) == GLASS:
         return {
             "type": "thindielectric",
             "int_ior": 1.5,
             "ext_ior": 1.0,
-            "specular_transmittance": rgb(row[8:11]),
+            "specular_transmittance": rgb(row[TAU]),
         }
-    if row[7] > 0:
+    if row[ALPHA] > 0:
         nested = {
             "type": "roughplastic",
-            "diffuse_reflectance": rgb(row[0:3]),
-            "alpha": float(row[7]),
+            "diffuse_reflectance": rgb(row[KD]),
+            "alpha": float(row[ALPHA]),
             "nonlinear": False,
         }
         return {"type": "twosided", "nested": nested}
-    return {"type": "twosided", "nested": {"type": "diffuse", "reflectance": rgb(row[0:3])}}
+    return {"type": "twosided", "nested": {"type": "diffuse", "reflectance": rgb(row[KD])}}
 
 
 def _outdoor(mi: Any, sky: Sky) -> dict[str, Any]:
-    # Mitsuba's envmap has our axes: azimuth atan2(x, -z), row 0 up.
+    # Pass the dome as it is: Mitsuba's envmap has our axes, azimuth atan2(x, -z), row 0 up.
     emitters: dict[str, Any] = {
         "dome": {"type": "envmap", "bitmap": mi.Bitmap(np.asarray(sky.dome, np.float32))}
     }
