@@ -247,14 +247,22 @@ class Recipe(_Group):
     selection: SelectionFields = SelectionFields()
 
     def digest(self, *groups: str) -> str:
-        """Digest of the seed and the named groups; of all fields but the name when none is named."""
+        """Digest of the seed and the named groups; of all fields but the name when none is named.
+
+        light.groups came later: at its default it is left out, so that what was stored before
+        the field existed keeps its digest.
+        """
+        return self._digest(groups, with_light_groups=self.light.groups != "two")
+
+    def picture_digest(self, *groups: str) -> str:
+        """As digest, without light.groups: it adds layers and changes no picture, so no seed."""
+        return self._digest(groups, with_light_groups=False)
+
+    def _digest(self, groups: tuple[str, ...], *, with_light_groups: bool) -> str:
         fields = self.model_dump(mode="json", exclude={"name"})
-        if self.light.groups == "two":
-            # The field came later: what was stored without it keeps its digest.
+        if not with_light_groups:
             del fields["light"]["groups"]
-        if groups:
-            fields = {g: fields[g] for g in ("seed", *groups)}
-        return keys.digest(fields)
+        return keys.digest({g: fields[g] for g in ("seed", *groups)} if groups else fields)
 
 
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {

@@ -224,11 +224,8 @@ def _light(work: Work) -> Made:
 
     loaded = _loaded(work)
     view, camera = _view_at_size(work, loaded)
-    groups = ("image", "light", "sky", "emission", "materials")
-    # A layer for each lamp changes no random number: the pictures stay what they are without.
-    fields = work.recipe.light.model_copy(update={"groups": "two"})
-    same = work.recipe.model_copy(update={"light": fields})
-    seed = keys.seed(work.house_id, view.id, "light", same.digest(*groups))
+    digest = work.recipe.picture_digest(*plan.STEPS["light"].groups)
+    seed = keys.seed(work.house_id, view.id, "light", digest)
     result = loaded.light_scene.render(camera, view.room_id, work.recipe.light, seed)
     images = {
         "outdoor": result.outdoor,

@@ -42,6 +42,12 @@ def test_the_name_of_a_recipe_is_no_part_of_its_digest() -> None:
     assert differences(by_name, by_fields) == []
 
 
+def test_layers_of_lamps_are_stored_anew_and_change_no_picture() -> None:
+    two, lamps = (recipe_from_name("fast", {"light.groups": word}) for word in ("two", "lamps"))
+    assert lamps.picture_digest("light") == two.picture_digest("light") == two.digest("light")
+    assert lamps.digest("light") != two.digest("light")
+
+
 def test_either_light_mode_asks_for_light() -> None:
     want = plan.wanted(["mlt_ol"], [])
     assert plan.view_steps(want) == ("truth", "light", "develop", "view")
