@@ -33,7 +33,7 @@ def main() -> None:
         one = Work(store, recipe, source.house_id, work.house_cache, source=source, view_id=view)
         labels = _seconds(lambda w=one: run_step("truth", w))
         gl = _seconds(lambda w=one: (run_step("opengl_dl", w), run_step("opengl_il", w)))
-        light = _seconds(lambda w=one: run_step("light", w))
+        light = _seconds(lambda w=one: (run_step("illuminance", work), run_step("light", w)))
         develop = _seconds(lambda w=one: run_step("develop", w))
         noise = run_step("light", one).marker.facts["noise"]["sum"]
         rows.append((light + develop, labels))

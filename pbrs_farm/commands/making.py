@@ -6,6 +6,7 @@ import argparse
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -182,7 +183,7 @@ def _demo(args: argparse.Namespace) -> int:
 def _step(args: argparse.Namespace) -> int:
     from pbrs_farm.read.source import resolve
     from pbrs_farm.run.house_cache import HouseCache
-    from pbrs_farm.run.plan import STEPS
+    from pbrs_farm.run.plan import STEPS, needed_of_house
     from pbrs_farm.run.step_cache import Work
     from pbrs_farm.run.steps import run_step
     from pbrs_farm.settings import settings_from_environment
@@ -197,6 +198,8 @@ def _step(args: argparse.Namespace) -> int:
         store=store, recipe=recipe, house_id=source.house_id, house_cache=HouseCache(), source=source,
         view_id=args.view, layers=tuple(args.layers),
     )  # fmt: skip
+    for name in needed_of_house(args.step, source.house_id):
+        run_step(name, replace(work, view_id=None))
     outcome = run_step(args.step, work)
     verdict = "already done" if outcome.was_done else f"done in {outcome.marker.seconds} s"
     echo(f"{args.step}: {verdict}")

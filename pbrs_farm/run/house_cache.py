@@ -35,7 +35,7 @@ class CachedHouse:
         self.store = store
         self.recipe = recipe
         self.house_id = house_id
-        self.digest = digest
+        self._views: tuple[str, dict[str, View]] | None = None  # cameras digest, views by id
 
     @cached_property
     def house(self) -> House:
@@ -88,16 +88,16 @@ class CachedHouse:
         panorama = panorama_for_house(self.recipe, self.house_id)
         return sky_for_house(self.recipe, self.house_id, panorama=panorama)
 
-    def views(self) -> dict[str, View]:
-        """View id -> view, as cameras.json holds them now."""
-        key = keys.house_key(self.house_id, "cameras.json")
-        return views_from_json(self.store.get(key), key)
+    def view(self, view_id: str, cameras_digest: str) -> View:
+        """The view of that id; BadInput if the house has none.
 
-    def view(self, view_id: str) -> View:
-        """The view of that id; BadInput if the house has none."""
-        views = self.views()
+        cameras_digest: of the cameras step's marker; cameras.json is read again when it changes.
+        """
+        key = keys.house_key(self.house_id, "cameras.json")
+        if self._views is None or self._views[0] != cameras_digest:
+            self._views = (cameras_digest, views_from_json(self.store.get(key), key))
+        views = self._views[1]
         if view_id not in views:
-            key = keys.house_key(self.house_id, "cameras.json")
             raise BadInput(key, view_id, "no such view", hint=f"of {', '.join(views) or 'none'}")
         return views[view_id]
 

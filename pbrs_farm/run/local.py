@@ -9,7 +9,8 @@ import os
 import shlex
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import PbrsError
@@ -95,7 +96,7 @@ def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
 
 
 class _Schedule:
-    """Which task next: houses in order, each followed by its cameras and then its views."""
+    """Which task next: houses in order, each followed by its views."""
 
     def __init__(
         self, run: Run, sources: list[SourceRef], summary: Summary, observe: Observer
@@ -104,7 +105,11 @@ class _Schedule:
         self._summary = summary
         self._observe = observe
         self._sources = {s.house_id: s for s in sources}
-        self._waiting = deque(Task(s.house_id, ("house", "cameras"), s) for s in sources)
+        self._waiting = deque(
+            Task(s.house_id, plan.house_steps(run.want, s.house_id), s) for s in sources
+        )
+        self._cameras: dict[str, dict[str, Any]] = {}  # house -> facts of its cameras step
+        self._unlit: set[str] = set()  # houses whose illuminance failed: no light in their views
 
     def drive(self, pool: Pool) -> None:
         """Until nothing waits and nobody works."""
@@ -137,24 +142,27 @@ class _Schedule:
             if event.step == "house":
                 summary.houses.append(event.house_id)
             if event.step == "cameras":
-                self._add_views(event)
+                self._cameras[event.house_id] = event.facts
         elif event.kind == "failed":
             what = "/".join(x for x in (event.house_id, event.view_id, event.step) if x)
             summary.failures.append((what, event.message, self._command(event)))
+            if event.step == "illuminance":
+                self._unlit.add(event.house_id)
+        elif event.view_id is None and event.kind == "end" and event.house_id in self._cameras:
+            self._add_views(event.house_id, self._cameras.pop(event.house_id))
         self._observe(event)
 
-    def _add_views(self, event: Event) -> None:
-        rows = [(str(v), str(room), float(score)) for v, room, score in event.facts["views"]]
-        views = plan.spread(rows, self._run.want.n_views)
+    def _add_views(self, house: str, facts: dict[str, Any]) -> None:
+        want, source = self._run.want, self._sources[house]
+        rows = [(str(v), str(room), float(score)) for v, room, score in facts["views"]]
+        views = plan.spread(rows, want.n_views)
         self._summary.n_views += len(views)
         if not views:
-            why = str(event.facts.get("why_none", ""))
-            self._summary.without_views.append((event.house_id, why))
-        source = self._sources[event.house_id]
-        tasks = [
-            Task(event.house_id, plan.view_steps(self._run.want), source, v, self._run.want.layers)
-            for v in views
-        ]
+            self._summary.without_views.append((house, str(facts.get("why_none", ""))))
+        # What needs illuminance would fail for the reason that illuminance has told already.
+        modes = tuple(m for m in want.modes if not (m.groups and house in self._unlit))
+        steps = plan.view_steps(replace(want, modes=modes))
+        tasks = [Task(house, steps, source, view, want.layers) for view in views]
         self._waiting.extendleft(reversed(tasks))
 
     def _command(self, event: Event) -> str:

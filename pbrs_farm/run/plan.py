@@ -1,8 +1,7 @@
 """Which steps a house's work consists of, what each depends on, and their digests; pure.
 
-    house -> cameras -> per view: truth, opengl_dl, opengl_il, light -> develop -> view -> finish
+    house -> cameras, illuminance -> per view: truth, opengl_dl, opengl_il, light -> develop -> view
 
-and illuminance, once a house, which the first light step that is done calls for.
 A step's digest covers its version, its ids, the recipe groups it uses and the digests of the
 steps it reads. So a changed recipe field runs again exactly the steps that use it and those after.
 """
@@ -22,13 +21,14 @@ from pbrs_farm.core.recipe import Recipe
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One function of the story. groups: recipe groups it uses; after: steps whose files it reads."""
+    """One function of run/steps.py: what it depends on."""
 
     name: str
-    version: int
-    groups: tuple[str, ...]
-    after: tuple[str, ...] = ()
+    version: int  # raised when its output changes
+    groups: tuple[str, ...]  # recipe groups it uses
+    after: tuple[str, ...] = ()  # steps whose files it reads where they are: part of its digest
     per_view: bool = True
+    needs: tuple[str, ...] = ()  # steps without which it cannot run
 
 
 _VIEW_READS: Final = ("cameras", "truth", "opengl_dl", "opengl_il", "light", "develop")
@@ -42,11 +42,15 @@ STEPS: Final = {
         Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
         Step("illuminance", 2, ("sky", "emission", "materials"), ("house",), per_view=False),
-        Step("light", 5, ("image", "light", "sky", "emission", "materials"), ("house", "cameras")),
-        Step("develop", 4, ("tone", "light"), ("light",)),
-        Step("view", 1, ("histogram",), _VIEW_READS),
+        # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
+        Step(
+            "light", 5, ("image", "light", "sky", "emission", "materials"), ("house", "cameras"),
+            needs=("illuminance",),
+        ),
+        Step("develop", 4, ("tone", "light"), ("light",), needs=("light",)),
+        Step("view", 1, ("histogram",), _VIEW_READS, needs=("truth",)),
     )
-}
+}  # fmt: skip
 
 
 PICTURE_GROUPS: Final = tuple(sorted({g for step in STEPS.values() for g in step.groups}))
@@ -74,6 +78,19 @@ def wanted(modes: Iterable[str], layers: Iterable[str], n_views: int = 0) -> Wan
             raise BadInput("--layers", layer, "no such layer", hint=f"of {', '.join(optional)}")
     chosen = tuple(m for m in ALL_MODES if m.value in set(modes)) or ALL_MODES
     return Wanted(chosen, tuple(x for x in optional if x in set(layers)), n_views)
+
+
+def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:
+    """Steps of a house in the order they run, all before the steps of its views."""
+    needed = [n for step in view_steps(want) for n in needed_of_house(step, house_id)]
+    return ("house", "cameras", *needed)
+
+
+def needed_of_house(step: str, house_id: str) -> tuple[str, ...]:
+    """Steps of the house that a step of its view needs and does not read: none of an object."""
+    if keys.is_object(house_id):
+        return ()
+    return tuple(name for name in STEPS[step].needs if not STEPS[name].per_view)
 
 
 def view_steps(want: Wanted) -> tuple[str, ...]:

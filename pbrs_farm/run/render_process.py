@@ -103,6 +103,7 @@ def limit_threads(step: str, n_threads: int) -> None:
         "house",
         "cameras",
         "truth",
+        "illuminance",
         "light",
         "develop",
     ):

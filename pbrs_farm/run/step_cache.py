@@ -10,10 +10,10 @@ import os
 import platform
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, PbrsError
@@ -36,6 +36,7 @@ class Work:
     source: SourceRef | None = None
     view_id: str | None = None
     layers: tuple[str, ...] = ()
+    inputs: Mapping[str, str] = field(default_factory=dict)  # step it reads -> digest of its marker
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ def run_marked(
         work.store.delete(key)
 
     started = time.perf_counter()
-    made = function(work)
+    made = function(replace(work, inputs=inputs))
     files = tuple(_put(work, name, file, made.files[file]) for file in sorted(made.files))
     marker = Marker(
         step=name,
@@ -99,12 +100,9 @@ def _inputs(step: plan.Step, work: Work) -> dict[str, str]:
         marker = read_marker(work.store, key)
         if marker is not None:
             digests[before] = marker.digest
-        elif not per_view or before in _NEEDED.get(step.name, ()):
+        elif not per_view or before in step.needs:
             raise BadInput(key, "", f"{step.name} needs the step {before} first")
     return digests
-
-
-_NEEDED: Final = {"develop": ("light",), "view": ("truth",)}
 
 
 def _extra(name: str, work: Work) -> object:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,10 +21,10 @@ from pbrs_farm.core.house import House, Room, geometry_from_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.recipe import CameraFields, Recipe
-from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
+from pbrs_farm.formats.cameras_json import cameras_json
 from pbrs_farm.formats.illuminance_json import illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
-from pbrs_farm.formats.marker import read_marker
+from pbrs_farm.formats.marker import Marker, read_marker
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_exr, radiance_from_exr
 from pbrs_farm.formats.serialise import json_bytes
@@ -50,14 +49,19 @@ if TYPE_CHECKING:
 
 
 def _loaded(work: Work) -> CachedHouse:
-    marker = read_marker(work.store, keys.marker_key(work.house_id, "house"))
+    digest = work.inputs.get("house") or _marker_of_house(work, "house").digest
+    return work.house_cache.get(work.store, work.recipe, work.house_id, digest)
+
+
+def _marker_of_house(work: Work, step: str) -> Marker:
+    marker = read_marker(work.store, keys.marker_key(work.house_id, step))
     if marker is None:
-        raise BadInput(work.house_id, "", "the house has not been read yet")
-    return work.house_cache.get(work.store, work.recipe, work.house_id, marker.digest)
+        raise BadInput(work.house_id, step, "has not been done yet", hint="pbrs-farm step")
+    return marker
 
 
 def _view_at_size(work: Work, loaded: CachedHouse) -> tuple[View, Camera]:
-    view = loaded.view(work.view_id or "")
+    view = loaded.view(work.view_id or "", work.inputs["cameras"])
     image = work.recipe.image
     return view, view.camera.with_size(image.width_px, image.height_px)
 
@@ -251,8 +255,7 @@ def _light(work: Work) -> Made:
         facts["lamps"] = named
     room = room_of(loaded.house, view)
     if room is not None:
-        # Measured once a house, by whichever view's light comes first.
-        lit = run_step("illuminance", replace(work, view_id=None)).marker.facts
+        lit = _marker_of_house(work, "illuminance").facts
         facts["floor_lux"] = lit["floor_lux"].get(room.id)
         facts["warnings"] = lit["warnings"].get(room.id, [])
     if loaded.light_scene.n_lamps == 0:
@@ -296,8 +299,8 @@ def _develop(work: Work) -> Made:
 
 
 def _view(work: Work) -> Made:
-    loaded_views = keys.house_key(work.house_id, "cameras.json")
-    view = views_from_json(work.store.get(loaded_views), loaded_views)[work.view_id or ""]
+    loaded = _loaded(work)
+    view = loaded.view(work.view_id or "", work.inputs["cameras"])
     facts = _facts_of_view(work)
     description = view_description(
         view,
@@ -309,7 +312,7 @@ def _view(work: Work) -> Made:
     files = {"view.json": view_json(description)}
     rendered = [m for m in ALL_MODES if m.value in facts or (m.groups and "develop" in facts)]
     if rendered:
-        house = _loaded(work).house
+        house = loaded.house
         room = room_of(house, view)
         place = {
             "house": work.house_id,

@@ -291,14 +291,16 @@ class LightScene:
         """The emitters, their tables built once, with the portals and weights of a view."""
         from pbrs_farm.transport.kernels.emitters import Emitters
 
-        # Measure the lampshades' exitance once, with rays that are not guided yet.
+        # Measure the lampshades' exitance once, with rays that are not guided yet and every lamp
+        # alike: whichever view or room is first changes no picture.
         if self._emitters is None:
             from pbrs_farm.transport.guiding.lampshade_exitance import guiding_targets, pdfs_by_face
+            from pbrs_farm.transport.guiding.pilot import uniform_weights
 
-            self._emitters = Emitters(self.tables, self.sky, portals, weights)
+            uniform = uniform_weights(self.n_lamps, len(portals))
+            self._emitters = Emitters(self.tables, self.sky, portals, uniform)
             targets = guiding_targets(self.device_scene, self._emitters, self.tables, 0)
             self.device_scene.set_guiding_targets(*pdfs_by_face(targets))
             self._emitters.set_targets(targets)
-        else:
-            self._emitters.set_view(portals, weights)
+        self._emitters.set_view(portals, weights)
         return self._emitters

@@ -12,10 +12,11 @@ from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run import local
 from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.task import Setting
 
 FAKE = "tests.run.fakes:run_step"
-N_STEPS = 2 + 2 * 6
+N_STEPS = 3 + 2 * 6
 
 
 @pytest.fixture(autouse=True)
@@ -65,6 +66,24 @@ def test_a_failed_step_leaves_out_only_what_reads_it(tmp_path: Path) -> None:
     missing = {"light.0_0_1", "develop.0_0_1"}
     assert not missing & markers(tmp_path)
     assert summary.n_done == N_STEPS - len(missing)
+
+
+def test_illuminance_that_fails_is_told_once_and_costs_the_light_of_every_view(
+    tmp_path: Path,
+) -> None:
+    summary = run(tmp_path, "refuse:illuminance")
+    assert [what.split("/")[1] for what, _m, _c in summary.failures] == ["illuminance"]
+    done = {"house", "cameras"}
+    for view in ("0_0_0", "0_0_1"):
+        done |= {f"{step}.{view}" for step in ("truth", "opengl_dl", "opengl_il", "view")}
+    assert markers(tmp_path) == done
+
+
+def test_illuminance_is_done_where_light_is_wanted(tmp_path: Path) -> None:
+    run(tmp_path, want=wanted(["opengl_dl"], []))
+    assert "illuminance" not in markers(tmp_path)
+    run(tmp_path, want=wanted(["mlt_ol"], []))
+    assert "illuminance" in markers(tmp_path)
 
 
 def test_a_bug_is_told_by_its_type_and_the_run_goes_on(tmp_path: Path) -> None:

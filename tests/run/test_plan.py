@@ -17,7 +17,20 @@ def digest_of(step: str, **overrides: str) -> str:
 
 def test_a_step_reads_only_steps_that_exist() -> None:
     for step in plan.STEPS.values():
-        assert set(step.after) <= set(plan.STEPS)
+        assert {*step.after, *step.needs} <= set(plan.STEPS)
+
+
+def test_what_changes_illuminance_changes_light_too() -> None:
+    illuminance, light = plan.STEPS["illuminance"], plan.STEPS["light"]
+    assert set(illuminance.groups) <= set(light.groups)
+    assert set(illuminance.after) <= set(light.after)
+
+
+def test_illuminance_is_measured_once_a_house_before_its_views_and_never_of_an_object() -> None:
+    want = plan.wanted(["mlt_ol"], [])
+    assert plan.house_steps(want, "home-1") == ("house", "cameras", "illuminance")
+    assert plan.house_steps(plan.wanted(["opengl_dl"], []), "home-1") == ("house", "cameras")
+    assert plan.house_steps(want, "object_chair") == ("house", "cameras")
 
 
 def test_changing_the_tone_runs_develop_again_and_nothing_before_it() -> None:

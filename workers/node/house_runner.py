@@ -59,6 +59,9 @@ class HouseRunner:
         if request.stage == GEOMETRY:
             return self._geometry(request, spec, tell)
         if request.stage in (GL, LIGHT):
+            if request.stage == LIGHT:
+                for step in plan.needed_of_house("light", request.house):
+                    self._step(request, spec, tell, step)
             for view in request.views:
                 for step in steps_of_stage(spec, request.stage):
                     self._step(request, spec, tell, step, view=view)
