@@ -13,7 +13,7 @@ from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.report import FacesReport, Removed
 from pbrs_farm.repair.structure.walls import BASEBOARD
 
-_MIN_AREA_M2 = 1e-12
+_MIN_AREA_M2 = 1e-12  # as booleans.py drops: float32 holds no smaller face
 
 
 def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
@@ -34,7 +34,7 @@ def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[Hous
 def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[House, int]:
     """Walls whose source names no colour painted rgb (sRGB); and how many, baseboards aside."""
     materials = list(house.materials)
-    white: dict[int, int] = {}
+    white: dict[int, int] = {}  # material as read -> its white copy
     items: list[Item] = []
     n = 0
     for item in house.items:
@@ -43,6 +43,7 @@ def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[Hou
             continue
         surfaces = []
         for s in item.surfaces:
+            # Keep a colour that the source gives; baseboards and walls share one white material.
             material = materials[s.material]
             if not material.is_default or material.diffuse == rgb:
                 surfaces.append(s)
@@ -51,6 +52,7 @@ def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[Hou
                 white[s.material] = len(materials)
                 materials.append(replace(material, name=f"{material.name}_wall", diffuse=rgb, texture_id=None))  # fmt: skip
             surfaces.append(replace(s, material=white[s.material]))
+        # Count walls, not surfaces; a baseboard is part of its wall.
         is_board = BASEBOARD in item.tags
         n += not is_board and any(house.materials[s.material].is_default for s in item.surfaces)
         items.append(replace(item, surfaces=tuple(surfaces)))
@@ -78,12 +80,14 @@ def with_sound_faces(house: House) -> tuple[House, FacesReport]:
 
 def _sound(surface: Surface) -> tuple[Surface, int, int]:
     faces = surface.faces
+    # Drop faces without area before their normals are asked for.
     keep = faces_with_area(triangle_corners(surface.positions, faces), _MIN_AREA_M2)
     faces = faces[keep]
     against = _against_normals(surface, faces)
     n_dropped, n_turned = int((~keep).sum()), int(against.sum())
     if n_dropped + n_turned == 0:
-        return surface, 0, 0
+        return surface, 0, 0  # the same object, so that sound meshes stay as read
+    # Swap two corners: the face turns round, its first corner stays.
     faces = np.where(against[:, None], faces[:, [0, 2, 1]], faces)
     return replace(surface, faces=np.ascontiguousarray(faces, np.int32)), n_dropped, n_turned
 
@@ -91,6 +95,7 @@ def _sound(surface: Surface) -> tuple[Surface, int, int]:
 def _against_normals(surface: Surface, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
     if surface.normals is None or not len(faces):
         return np.zeros(len(faces), np.bool_)
+    # Compare with the mean of the corner normals; its length does not matter.
     mean = surface.normals[faces].astype(np.float64).sum(1)
     own = unit_normals(triangle_corners(surface.positions, faces))
     return np.asarray((mean * own).sum(1) < -1e-6)

@@ -51,8 +51,9 @@ def repair(
 
     # Say which rooms are closed, and let rays look for leaks in them.
     house = replace(house, rooms=_with_enclosure(house.rooms, structure.spaces), is_repaired=True)
-    leaks = None
+    leaks = None  # None = not measured
     if occluder_from is not None:
+        # Fill the openings: a window is no leak.
         plugs = [s for plug in structure.plugs.values() for s in plug]
         leaks = leaks_of_house(house, structure.spaces, structure.interiors, plugs, occluder_from)
     report = RepairReport(
@@ -71,6 +72,7 @@ def repair(
 
 
 def _with_enclosure(rooms: Sequence[Room], spaces: Sequence[Space]) -> tuple[Room, ...]:
+    # Give every room of a space the verdict of the space.
     found = {}
     for space in spaces:
         for room_id in space.rooms:

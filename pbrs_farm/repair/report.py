@@ -13,38 +13,34 @@ Point = tuple[float, float, float]
 
 
 class Removed(_Record):
-    """An item that was taken out. reason: "person", "plant", or "nothing left of it": the
-    item lay wholly inside other walls and openings.
-    """
+    """An item that was taken out."""
 
     item_id: str
     name: str
-    reason: str
+    reason: str  # "person", "plant", or "nothing left of it": inside other walls and openings
 
 
 class LeftAsIs(_Record):
-    """Something repair could not do its work on. what: "wall", "floor", "ceiling", "opening"."""
+    """Something repair could not do its work on."""
 
-    what: str
+    what: str  # "wall", "floor", "ceiling", "opening"
     id: str
     reason: str
 
 
 class StructureReport(_Record):
-    """The geometry work. n_joints_closed: places where a wall was bridged to its neighbour.
-    n_stairwells_closed: floors and ceilings carried on over stairwells that no room covers.
-    """
+    """What was done to walls, floors, ceilings and openings."""
 
     n_walls: int = 0
-    n_walls_thickened: int = 0
-    n_walls_made_white: int = 0
+    n_walls_thickened: int = 0  # planar as read
+    n_walls_made_white: int = 0  # the source names no colour
     n_floors_thickened: int = 0
     n_ceilings_thickened: int = 0
-    n_solid_before: int = 0
-    n_joints_closed: int = 0
-    n_stairwells_closed: int = 0
+    n_solid_before: int = 0  # walls, floors and ceilings that came as closed shells
+    n_joints_closed: int = 0  # places where a wall was bridged to its neighbour
+    n_stairwells_closed: int = 0  # floors and ceilings over stairwells that no room covers
     n_openings: int = 0
-    n_openings_cut: int = 0
+    n_openings_cut: int = 0  # the others touch no wall
     left_as_is: tuple[LeftAsIs, ...] = ()
 
 
@@ -56,29 +52,29 @@ class FacesReport(_Record):
 
 
 class SourceRepair(_Record):
-    """One light source of a lamp. radii and moved_m in metres; escape: light output ratio or None."""
+    """One light source of a lamp."""
 
     item_id: str
-    source: int
+    source: int  # index into Item.lights
     bulb_added: bool
-    radius_given_m: float
-    radius_m: float
-    moved_m: float
-    escape_before: float | None = None
-    escape: float | None = None
-    shades: tuple[str, ...] = ()
+    radius_given_m: float  # of the source, or the recipe
+    radius_m: float  # smaller where the lamp leaves no room
+    moved_m: float  # of the bulb, out of the lamp's own mesh
+    escape_before: float | None = None  # light output ratio without shades; None = not measured
+    escape: float | None = None  # light output ratio, 0..1
+    shades: tuple[str, ...] = ()  # names of the surfaces that became shades
 
 
 class RoomAudit(_Record):
-    """A room: what lights it, how large, whether closed. space: rooms it opens into."""
+    """A room: what lights it, how large, whether closed."""
 
     room_id: str
     name: str
     floor_area_m2: float
-    lit_by: tuple[str, ...]
+    lit_by: tuple[str, ...]  # "lamps", "windows", "fallback"
     enclosure: str
     reason: str
-    space: tuple[str, ...]
+    space: tuple[str, ...]  # ids of the rooms it opens into, its own included
 
 
 class Leak(_Record):
@@ -89,66 +85,60 @@ class Leak(_Record):
 
 
 class SpaceLeaks(_Record):
-    """Leak meter of one closed space (rooms that open into each other). leaks: the first 50.
-
-    n_blind: rays that saw the back of a face first, so started inside a solid: they prove nothing.
-    """
+    """Leak meter of one closed space: rooms that open into each other."""
 
     rooms: tuple[str, ...]
     n_rays: int
-    n_blind: int
-    n_sky: int
-    leaks: tuple[Leak, ...] = ()
+    n_blind: int  # met a back side first, so began inside a solid: they prove nothing
+    n_sky: int  # reached the sky
+    leaks: tuple[Leak, ...] = ()  # the first 50
 
 
 class LeakReport(_Record):
-    """Leak meter of the house; closed_share: floor area in closed rooms / all floor area."""
+    """Leak meter of the house."""
 
     spaces: tuple[SpaceLeaks, ...] = ()
     n_rays: int = 0
     n_blind: int = 0
     n_sky: int = 0
-    closed_share: float = 0.0
+    closed_share: float = 0.0  # floor area in closed rooms / all floor area
 
 
 class Overlap(_Record):
-    """Two pieces that share volume. share: of the smaller piece."""
+    """Two pieces that share volume."""
 
     a: str
     b: str
     volume_m3: float
-    share: float
+    share: float  # of the smaller piece, 0..1
 
 
 class Floating(_Record):
-    """A piece that nothing carries. gap_m: down to what is below it."""
+    """A piece that nothing carries."""
 
     item_id: str
-    gap_m: float
+    gap_m: float  # down to what is below it; -1 = nothing is
 
 
 class FurnitureAudit(_Record):
     """Furniture that shares volume, floats, or stands twice in the same place."""
 
     overlaps: tuple[Overlap, ...] = ()
-    floating: tuple[Floating, ...] = ()
-    duplicates: tuple[tuple[str, str], ...] = ()
+    floating: tuple[Floating, ...] = ()  # touch no other item
+    duplicates: tuple[tuple[str, str], ...] = ()  # same mesh, same place
 
 
 class RepairReport(_Record):
-    """Everything that was changed in a house and what was measured in it afterwards.
-
-    was_repaired: it came in repaired, so nothing was changed. is_leaking: None = not measured.
-    """
+    """Everything that was changed in a house and what was measured in it afterwards."""
 
     house_id: str
-    was_repaired: bool = False
+    was_repaired: bool = False  # it came in repaired: nothing was changed
     removed: tuple[Removed, ...] = ()
     faces: FacesReport = FacesReport()
     structure: StructureReport = StructureReport()
     sources: tuple[SourceRepair, ...] = ()
-    fallback_lights: tuple[str, ...] = ()
+    fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one
     rooms: tuple[RoomAudit, ...] = ()
-    is_leaking: bool | None = None
+    is_leaking: bool | None = None  # None = not measured
     leaks: LeakReport | None = None
     furniture: FurnitureAudit = FurnitureAudit()

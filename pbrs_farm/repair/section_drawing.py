@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.repair.structure.booleans import F64
 
-_GAP_M = 1.0
-_TEXT_M = 0.25
+_GAP_M = 1.0  # between the two panels
+_TEXT_M = 0.25  # height of letters
 
 
 def section_svg(
@@ -24,12 +24,14 @@ def section_svg(
     wrong shows before: walls that overlap, miss each other or have no thickness. SVG, plan with
     x right and z down, one unit a metre.
     """
+    # Cut wall by wall before repair, all of the structure at once after it.
     y = before.level(level_id).elevation + height_m
     parts = [section_of_items([i], y) for i in before.items if i.kind is ItemKind.WALL]
     solid = section_of_items([i for i in after.items if i.kind.is_structure], y)
     everything = np.concatenate([np.zeros((0, 2, 2)), *parts, solid]).reshape(-1, 2)
     if not len(everything):
         everything = np.array([[0.0, 0.0], [1.0, 1.0]])
+    # Frame both panels alike, half a metre around.
     low, high = everything.min(0) - 0.5, everything.max(0) + 0.5
     size = high - low
     panels = [
@@ -51,7 +53,7 @@ def _panel(title: str, low: F64, body: str) -> str:
 
 
 def _walls(segments: F64, fill: str, opacity: str, stroke: str) -> str:
-    # A closed cut is filled; an open one (a planar wall) is a line.
+    # Fill a closed cut; draw an open one, of a planar wall, as a red line.
     polygons = solid_polygons(segments)
     style = f'fill="{fill}" fill-opacity="{opacity}" stroke="{stroke}" stroke-width="0.012"'
     if not polygons:
@@ -70,6 +72,7 @@ def section_of_items(items: Sequence[Item], y: float) -> F64:
     """(N, 2, 2) plan segments in which the items' triangles meet the height y."""
     triangles = [s.positions.astype(np.float64)[s.faces] for i in items for s in i.surfaces]
     corners = np.concatenate([np.zeros((0, 3, 3)), *triangles])
+    # Keep the triangles with corners on both sides of the cut.
     above = corners[:, :, 1] > y
     crossing = above.any(1) & ~above.all(1)
     corners, above = corners[crossing], above[crossing]
@@ -78,6 +81,7 @@ def section_of_items(items: Sequence[Item], y: float) -> F64:
     alone = np.where(above.sum(1, keepdims=True) == 1, above, ~above).argmax(1)
     order = (alone[:, None] + np.arange(3)) % 3
     a, b, c = np.moveaxis(np.take_along_axis(corners, order[:, :, None], 1), 1, 0)
+    # Intersect the two edges that leave that corner.
     ends = [_meet(a, b, y), _meet(a, c, y)]
     return np.stack(ends, 1)[:, :, [0, 2]]
 
@@ -91,8 +95,10 @@ def solid_polygons(segments: F64) -> list[shapely.Polygon]:
     """The regions a closed cut bounds that are solid: an odd number of edges lies to their right."""
     if not len(segments):
         return []
+    # Snap to 10 micrometres, so that segments of neighbours share their ends.
     snapped = np.round(segments, 5)
     lines = shapely.linestrings(snapped[(snapped[:, 0] != snapped[:, 1]).any(1)])
+    # Split the lines where they cross and collect the cells between them.
     noded = shapely.union_all(lines, grid_size=1e-5)
     cells = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     return [c for c in cells.tolist() if _is_odd(_inner_point(c), snapped)]
@@ -105,6 +111,7 @@ def _inner_point(cell: shapely.Polygon) -> F64:
 
 def _is_odd(point: F64, segments: F64) -> bool:
     a, b = segments[:, 0] - point, segments[:, 1] - point
+    # Count the segments that a ray towards +x crosses.
     crosses: NDArray[np.bool_] = (a[:, 1] > 0) != (b[:, 1] > 0)
     a, b = a[crosses], b[crosses]
     x = a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])

@@ -22,17 +22,20 @@ def summary_of_report(report: RepairReport) -> str:
 
 
 def _structure(report: RepairReport) -> Iterator[str]:
+    # Say what was taken out.
     living = [r for r in report.removed if r.reason in ("person", "plant")]
     if living:
         yield f"{_n(len(living), 'person or plant', 'persons and plants')} taken out."
     gone = [r.item_id for r in report.removed if r.reason not in ("person", "plant")]
     if gone:
         yield f"{_n(len(gone), 'wall')} lay wholly inside others or in an opening: {_some(gone)}."
+    # Say what was wrong with single faces.
     faces = report.faces
     if faces.n_degenerate_dropped:
         yield f"{_n(faces.n_degenerate_dropped, 'face')} without area dropped."
     if faces.n_turned:
         yield f"{_n(faces.n_turned, 'face')} looked against their own normals and were turned."
+    # Say what was done to walls, floors, ceilings and openings.
     s = report.structure
     if s.n_walls_thickened:
         yield f"{_n(s.n_walls_thickened, 'wall')} had no thickness and got one."
@@ -56,6 +59,7 @@ def _structure(report: RepairReport) -> Iterator[str]:
 def _lamps(report: RepairReport) -> Iterator[str]:
     added = [s for s in report.sources if s.bulb_added]
     if added:
+        # A radius that only rounding changed is not smaller.
         smaller = sum(s.radius_m < 0.999 * s.radius_given_m for s in added)
         moved = sum(s.moved_m > 0 for s in added)
         more = f", {smaller} of them smaller than given to fit" if smaller else ""
@@ -88,6 +92,7 @@ def _leaks(report: RepairReport) -> Iterator[str]:
     yield f"LIGHT LEAKS IN: {leaks.n_sky} of {leaks.n_rays} rays reached the sky; {share}."
     for space in leaks.spaces:
         if space.n_sky:
+            # Name one place per space where light leaks in.
             x, y, z = space.leaks[0].origin
             yield f"{space.n_sky} of them from {_some(space.rooms)}, one near ({x:.2f}, {y:.2f}, {z:.2f})."  # fmt: skip
 
@@ -95,6 +100,7 @@ def _leaks(report: RepairReport) -> Iterator[str]:
 def _furniture(report: RepairReport) -> Iterator[str]:
     f = report.furniture
     if f.overlaps:
+        # Name the pair that shares most.
         worst = max(f.overlaps, key=lambda o: o.volume_m3)
         yield (
             f"{_n(len(f.overlaps), 'pair')} of pieces share volume, most of all {worst.a} and "

@@ -19,9 +19,9 @@ from pbrs_farm.repair.structure.booleans import F64
 
 Faces = NDArray[np.int64]
 
-_CLEARANCE = 0.97
-_LEAST_RADIUS_M = 0.004
-_N_MOVES = 400
+_CLEARANCE = 0.97  # of the free distance that a bulb fills
+_LEAST_RADIUS_M = 0.004  # a smaller bulb is moved instead
+_N_MOVES = 400  # random places tried
 
 
 def with_bulbs(house: House, fields: RepairFields) -> tuple[House, list[SourceRepair]]:
@@ -42,8 +42,8 @@ class _Palette:
 
     def __init__(self, materials: tuple[Material, ...]) -> None:
         self.materials = list(materials)
-        self._bulbs: dict[tuple[float, float, float], int] = {}
-        self._emitting: dict[int, int] = {}
+        self._bulbs: dict[tuple[float, float, float], int] = {}  # colour -> material
+        self._emitting: dict[int, int] = {}  # material as read -> its bulb
 
     def bulb(self, rgb_linear: tuple[float, float, float]) -> int:
         """Index of a bulb material for light of that colour."""
@@ -75,9 +75,11 @@ def _with_bulbs(
         emitting = tuple(k for k in light.emitting if len(surfaces[k].faces))
         radius, moved = given, 0.0
         if emitting:
+            # Let the surfaces that the source names shine.
             for k in emitting:
                 surfaces[k] = replace(surfaces[k], material=palette.emitting(surfaces[k].material))
         else:
+            # Set a sphere where none shines; later bulbs must not touch it.
             centre, radius = _fitting_sphere(np.array(light.position), given, corners)
             moved = float(np.linalg.norm(centre - np.array(light.position)))
             emitting = (len(surfaces),)
@@ -96,6 +98,7 @@ def _with_bulbs(
             )
         )
         lights.append(replace(light, emitting=emitting))
+    # Call a piece with a light a lamp, whatever the source calls it.
     kind = ItemKind.LAMP if not item.kind.is_structure else item.kind
     return replace(item, kind=kind, surfaces=tuple(surfaces), lights=tuple(lights)), done
 
@@ -105,9 +108,9 @@ def _fitting_sphere(position: F64, radius: float, corners: F64) -> tuple[F64, fl
     free = _free(position, corners)
     if free >= _LEAST_RADIUS_M / _CLEARANCE:
         return position, min(radius, _CLEARANCE * free)
-    # A mesh passes through the light's centre: the roomiest place within the bulb takes it.
+    # Move the bulb to the roomiest place within its radius: a mesh passes through its centre.
     near = corners[distances_to_triangles(position, corners) < 4 * radius]
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(0)  # fixed: repair is a function of the house
     steps = rng.normal(size=(_N_MOVES, 3))
     steps *= (radius * rng.random((_N_MOVES, 1)) ** (1 / 3)) / np.linalg.norm(steps, axis=1, keepdims=True)  # fmt: skip
     room = [_free(position + step, near) for step in steps]
@@ -129,12 +132,13 @@ def icosphere(
     name: str, centre: F64, radius: float, material: int, *, n_splits: int = 2
 ) -> Surface:
     """A closed sphere of 20 * 4^n_splits triangles whose corners lie on it, smooth normals."""
+    # Place the 12 vertices of an icosahedron by the golden ratio.
     g = (1 + 5**0.5) / 2
     points = [(s, t * g, 0.0) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
     points += [(0.0, x, y) for x, y, _ in points[:4]]
     points += [(y, 0.0, x) for x, y, _ in points[:4]]
     unit = np.array(points) / np.linalg.norm(points, axis=1, keepdims=True)
-    near = np.linalg.norm(unit[:, None] - unit[None], axis=2) < 1.2
+    near = np.linalg.norm(unit[:, None] - unit[None], axis=2) < 1.2  # an edge is 1.05 long
     faces = np.array(
         [
             (i, j, k)
@@ -144,6 +148,7 @@ def icosphere(
             if near[i, j] and near[j, k] and near[i, k]
         ]
     )
+    # Halve the edges, then turn inward faces round.
     for _ in range(n_splits):
         unit, faces = _split(unit, faces)
     inward = (area_vectors(unit[faces]) * unit[faces[:, 0]]).sum(1) < 0
@@ -159,11 +164,13 @@ def icosphere(
 
 
 def _split(unit: F64, faces: Faces) -> tuple[F64, Faces]:
+    # Make one middle vertex for the two faces of an edge, on the sphere.
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     pairs, inverse = np.unique(edges, axis=0, return_inverse=True)
     middle = unit[pairs].mean(1)
     middle /= np.linalg.norm(middle, axis=1, keepdims=True)
     ab, bc, ca = np.ravel(inverse).reshape(3, -1) + len(unit)
+    # Put four faces in the place of each.
     a, b, c = faces.T
     parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     return np.concatenate([unit, middle]), np.concatenate([np.stack(p, 1) for p in parts])

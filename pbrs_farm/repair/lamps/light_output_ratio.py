@@ -19,39 +19,33 @@ from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.closed_shells import components
 from pbrs_farm.repair.structure.patches import patch_from_surface
 
-N_RAYS = 4000
+N_RAYS = 4000  # standard error below 0.8 % of the ratio
 _SEE_THROUGH = frozenset({MaterialKind.GLASS, MaterialKind.PANE, MaterialKind.BULB})
-_SPACING_M = 30.0
-_REACH_M = 14.0
-_MAX_LAYERS = 12
+_SPACING_M = 30.0  # between lamps, so that none meets another's rays
+_REACH_M = 14.0  # a ray that gets this far has left its lamp
+_MAX_LAYERS = 12  # of shade that one ray passes
 
-Part = tuple[int, int, int]
-"""A connected part of a lamp: index of the item, of its surface, number of the part in it."""
+Part = tuple[int, int, int]  # a connected part of a lamp: item, surface, number of the part
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LampScene:
-    """Every lamp of a house laid out for measuring.
-
-    part_of_face: (F,) int64 index into parts, of each face of the scene.
-    offset_of: item index -> (3,) translation of that lamp. labels: (item, surface) -> (F,) number
-    of the part each face belongs to.
-    """
+    """Every lamp of a house laid out for measuring."""
 
     house: House
-    occluder: Occluder | None
+    occluder: Occluder | None  # None where no lamp has a face that stops light
     parts: tuple[Part, ...]
-    part_of_face: NDArray[np.int64]
-    offset_of: dict[int, F64]
-    labels: dict[tuple[int, int], NDArray[np.int64]]
+    part_of_face: NDArray[np.int64]  # (F,) index into parts, of each face of the scene
+    offset_of: dict[int, F64]  # item -> (3,) translation of that lamp
+    labels: dict[tuple[int, int], NDArray[np.int64]]  # (item, surface) -> (F,) part of each face
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightOutput:
-    """share: of the light that leaves the lamp. blocked: (n_parts,) share each part stops."""
+    """How much of a source's light leaves its lamp."""
 
-    share: float
-    blocked: F64
+    ratio: float  # light output ratio, 0..1
+    blocked: F64  # (n_parts,) share of the light that each part stops
 
 
 def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]) -> LampScene:
@@ -65,6 +59,7 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
     labels: dict[tuple[int, int], NDArray[np.int64]] = {}
     for n, k in enumerate(lamps):
         item = house.items[k]
+        # Stand the lamp in its cell of a square grid, the first bulb in the middle.
         row, column = divmod(n, side)
         cell = np.array([column - side / 2, 0.0, row - side / 2]) * _SPACING_M
         offset_of[k] = cell - np.array(item.lights[0].position)
@@ -72,6 +67,7 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
         for j, s in enumerate(item.surfaces):
             if house.materials[s.material].kind in _SEE_THROUGH or not len(s.faces):
                 continue
+            # Split the surface into connected parts, the units that may become shades.
             labels[k, j] = np.unique(components([patch_from_surface(s, k)])[0], return_inverse=True)[1]  # fmt: skip
             numbers.append(labels[k, j] + len(parts))
             parts += [(k, j, part) for part in range(int(labels[k, j].max()) + 1)]
@@ -94,15 +90,16 @@ def light_output_of_source(
     lamp = scene.house.items[item]
     emitting = [lamp.surfaces[k] for k in lamp.lights[source].emitting]
     rng = np.random.default_rng([item, source])
+    # Send the rays from the bulb where it stands in the scene.
     origins, directions = diffuse_rays(emitting, N_RAYS, rng)
     origins += scene.offset_of[item]
     blocked = np.zeros(len(scene.parts))
     is_shade = np.zeros(len(scene.parts), np.bool_)
     is_shade[list(shades)] = True
 
-    # Through the shades, layer by layer, until a ray is stopped or out.
+    # Follow the rays through the shades, layer by layer, until each is stopped or out.
     weight = np.full(len(origins), 1.0 / max(len(origins), 1))
-    share = 0.0
+    ratio = 0.0
     for _ in range(_MAX_LAYERS):
         if scene.occluder is None or not len(origins):
             break
@@ -110,17 +107,18 @@ def light_output_of_source(
             origins.astype(np.float32), directions.astype(np.float32), _REACH_M
         )
         out = face < 0
-        share += float(weight[out].sum())
+        ratio += float(weight[out].sum())
+        # Charge a stopped ray to its part; let the others through, weakened.
         part = scene.part_of_face[face[~out]]
         through = is_shade[part]
         np.add.at(blocked, part[~through], weight[~out][~through])
         origins = (origins + directions * np.where(out, 0.0, distance)[:, None])[~out][through]
         directions = directions[~out][through]
-        origins = origins + 1e-4 * directions
+        origins = origins + 1e-4 * directions  # off the face just passed
         weight = weight[~out][through] * transmission
     if scene.occluder is None:
-        share = 1.0
-    return LightOutput(share, blocked)
+        ratio = 1.0
+    return LightOutput(ratio, blocked)
 
 
 def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) -> tuple[F64, F64]:
@@ -128,13 +126,15 @@ def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) 
     sound = [s for s in surfaces if len(s.faces)]
     corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in sound])
     areas, normals = face_areas(corners), unit_normals(corners)
+    # Choose faces by area, points uniformly on them.
     chosen = rng.choice(len(areas), n, p=areas / areas.sum())
     u, v = np.sqrt(rng.random(n)), rng.random(n)
     weights = np.stack([1 - u, u * (1 - v), u * v], 1)
     points = np.einsum("nk,nki->ni", weights, corners[chosen])
+    # Choose directions by the cosine: a point on a unit sphere that touches the face.
     sphere = rng.normal(size=(n, 3))
     sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
     directions = sphere + normals[chosen]
     directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
-    step = min(1e-4, 0.01 * float(np.sqrt(areas.sum())))
+    step = min(1e-4, 0.01 * float(np.sqrt(areas.sum())))  # off the bulb
     return points + step * normals[chosen], directions

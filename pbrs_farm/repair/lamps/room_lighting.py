@@ -25,12 +25,12 @@ from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.prisms import polygons_of
 
-LAMP_NYU40 = 35
+LAMP_NYU40 = 35  # class "lamp" of NYU40
 FALLBACK = "fallback"
-_BELOW_CEILING_M = 0.2
+_BELOW_CEILING_M = 0.2  # centre of the fallback light
 _RADIUS_M = 0.1
-_POWER = 0.5
-_BY_THE_ROOM_M = 0.6
+_POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
+_BY_THE_ROOM_M = 0.6  # an opening nearer than this is in a wall of the room
 
 
 def with_room_lighting(house: House, *, fallback: bool) -> tuple[House, list[str]]:
@@ -48,6 +48,7 @@ def with_room_lighting(house: House, *, fallback: bool) -> tuple[House, list[str
             lit_by.append("lamps")
         if any(_opens_on(o, room, area, glazed) for o in house.openings):
             lit_by.append("windows")
+        # Hang a light where neither lamp nor daylight reaches.
         if not lit_by and fallback and room.has_floor and room.has_ceiling:
             lit_by.append(FALLBACK)
             lights.append(_fallback_light(house, room, area, len(house.materials)))
@@ -74,7 +75,7 @@ def _lights(lamp: Item, room: Room, area: plan.Shape) -> bool:
 
 
 def _opens_on(opening: Opening, room: Room, area: plan.Shape, glazed: set[str]) -> bool:
-    # A window, or a door with glass, in a wall of this room.
+    # Accept a window, or a door with glass, in a wall of this room.
     if not opening.is_window and opening.item_id not in glazed:
         return False
     middle = opening.quad.mean(0)
@@ -85,12 +86,14 @@ def _opens_on(opening: Opening, room: Room, area: plan.Shape, glazed: set[str]) 
 
 def _fallback_light(house: House, room: Room, area: plan.Shape, material: int) -> Item:
     """A ball below the ceiling, as near the middle of the room as nothing stands in its way."""
+    # Hang it in the middle of the largest circle in the plan.
     largest = max(polygons_of(area), key=lambda p: p.area)
     circle = shapely.get_coordinates(shapely.maximum_inscribed_circle(largest, 0.05))
     x, z = circle[0]
     centre = np.array([x, room.ceiling_y - _BELOW_CEILING_M, z])
     radius = _RADIUS_M
     near = [i for i in house.items if _within(i, centre, 2 * radius)]
+    # Shrink it until it touches nothing.
     for item in near:
         free = distances_to_triangles(centre, triangles_of(item)).min()
         radius = max(min(radius, 0.9 * float(free)), 0.01)

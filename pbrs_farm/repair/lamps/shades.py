@@ -22,8 +22,8 @@ from pbrs_farm.repair.lamps.light_output_ratio import (
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.report import SourceRepair
 
-_MOST_SHADES = 16
-_LEAST_BLOCKED = 0.02
+_MOST_SHADES = 16  # of one lamp
+_LEAST_BLOCKED = 0.02  # share of the light that makes a part worth opening
 
 
 def with_shades(
@@ -34,22 +34,12 @@ def with_shades(
 ) -> tuple[House, list[SourceRepair]]:
     """The light output ratio of every source; shades where it is below fields.min_escape."""
     scene = lamp_scene_of_house(house, occluder_from)
-    shades: list[int] = []
-    measured: dict[tuple[int, int], tuple[LightOutput, LightOutput]] = {}
-    for k, item in enumerate(house.items):
-        for source in range(len(item.lights)):
-            before = light_output_of_source(scene, k, source, (), fields.shade_transmission)
-            after = _opened(scene, k, source, shades, fields)
-            measured[k, source] = (before, after)
-    if shades:
-        measured = {
-            key: (before, light_output_of_source(scene, *key, shades, fields.shade_transmission))
-            for key, (before, _) in measured.items()
-        }
+    shades, measured = _measured(scene, fields)
     materials = list(house.materials)
     items: list[Item] = []
-    names: dict[str, tuple[str, ...]] = {}
+    names: dict[str, tuple[str, ...]] = {}  # item id -> surfaces that became shades
     for k, item in enumerate(house.items):
+        # Split the shades of this lamp off its surfaces.
         mine = [scene.parts[p] for p in shades if scene.parts[p][0] == k]
         for j in sorted({part[1] for part in mine}):
             wanted = [part[2] for part in mine if part[1] == j]
@@ -57,33 +47,50 @@ def with_shades(
             item = _split_off(item, j, is_shade, _shade_of(item.surfaces[j].material, materials))
             names[item.id] = (*names.get(item.id, ()), house.items[k].surfaces[j].name)
         lights = tuple(
-            replace(light, escape=_rounded(measured[k, n][1].share))
+            replace(light, escape=_rounded(measured[k, n][1].ratio))
             for n, light in enumerate(item.lights)
         )
         items.append(replace(item, lights=lights))
+
+    # Add the ratios and the shades to the report of each source.
     index = {item.id: k for k, item in enumerate(house.items)}
-    done = [
-        s.model_copy(
-            update={
-                "escape_before": _rounded(measured[index[s.item_id], s.source][0].share),
-                "escape": _rounded(measured[index[s.item_id], s.source][1].share),
-                "shades": names.get(s.item_id, ()),
-            }
-        )
-        for s in sources
-    ]
+    done = []
+    for s in sources:
+        before, after = (_rounded(x.ratio) for x in measured[index[s.item_id], s.source])
+        shaded = {"escape_before": before, "escape": after, "shades": names.get(s.item_id, ())}
+        done.append(s.model_copy(update=shaded))
     return replace(house, items=tuple(items), materials=tuple(materials)), done
 
 
-def _opened(
+def _measured(
+    scene: LampScene, fields: RepairFields
+) -> tuple[list[int], dict[tuple[int, int], tuple[LightOutput, LightOutput]]]:
+    """Parts that become shades; (item, source) -> its light output without and with them."""
+    shades: list[int] = []
+    measured: dict[tuple[int, int], tuple[LightOutput, LightOutput]] = {}
+    for k, item in enumerate(scene.house.items):
+        for source in range(len(item.lights)):
+            before = light_output_of_source(scene, k, source, (), fields.shade_transmission)
+            measured[k, source] = (before, _with_more_shades(scene, k, source, shades, fields))
+    if shades:
+        # Measure every source again: a shade may serve several of one lamp.
+        measured = {
+            key: (before, light_output_of_source(scene, *key, shades, fields.shade_transmission))
+            for key, (before, _) in measured.items()
+        }
+    return shades, measured
+
+
+def _with_more_shades(
     scene: LampScene, item: int, source: int, shades: list[int], fields: RepairFields
 ) -> LightOutput:
     """Add to shades the parts that stop most of this source's light, until enough gets out."""
     while True:
         found = light_output_of_source(scene, item, source, shades, fields.shade_transmission)
+        # Stop when enough gets out, or no part stops much of what is left.
         worst = int(np.argmax(found.blocked)) if len(found.blocked) else -1
         mine = sum(scene.parts[p][0] == item for p in shades)
-        if found.share >= fields.min_escape or mine >= _MOST_SHADES:
+        if found.ratio >= fields.min_escape or mine >= _MOST_SHADES:
             return found
         if worst < 0 or found.blocked[worst] < _LEAST_BLOCKED:
             return found

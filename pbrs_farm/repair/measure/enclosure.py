@@ -24,23 +24,20 @@ from pbrs_farm.repair.structure.prisms import polygons_of
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
 
-_STEP_M = 0.05
-_OPEN_EDGE_M = 0.075
-_OPEN_AREA_M2 = 0.02
-_STOREY_GAP_M = 0.8
-_PROBES_M = (0.02, 0.12, 0.24)
+_STEP_M = 0.05  # between samples of a room's edge
+_OPEN_EDGE_M = 0.075  # a shorter open edge is a fault of the drawing
+_OPEN_AREA_M2 = 0.02  # so is a smaller hole in a floor or ceiling
+_STOREY_GAP_M = 0.8  # thickest floor between two storeys
+_PROBES_M = (0.02, 0.12, 0.24)  # out of an edge, to meet the next room behind a thin wall
 
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """Rooms (ids) that open into each other. reasons: (room id, why it is open), empty if closed.
+    """Rooms that open into each other."""
 
-    wells: stairwells without a room (ids) that belong to it.
-    """
-
-    rooms: tuple[str, ...]
-    reasons: tuple[tuple[str, str], ...]
-    wells: tuple[str, ...] = ()
+    rooms: tuple[str, ...]  # ids
+    reasons: tuple[tuple[str, str], ...]  # (room id, why it is open), empty if closed
+    wells: tuple[str, ...] = ()  # ids of the stairwells without a room that belong to it
 
     @property
     def is_closed(self) -> bool:
@@ -65,18 +62,20 @@ def spaces_of_rooms(
     """
     rooms = (*real, *wells)
     areas = [plan.polygon_of_room(r.polygon) for r in rooms]
-    links: list[tuple[int, int]] = []
+    links: list[tuple[int, int]] = []  # rooms that open into each other, by index
     reasons: dict[int, str] = {}
     for i in range(len(rooms)):
         found = [
-            _edge(i, rooms, areas, walls, covers),
-            _cover(i, rooms, areas, covers, above=False),
-            _cover(i, rooms, areas, covers, above=True),
+            # Look sideways, down and up.
+            _open_sides(i, rooms, areas, walls, covers),
+            _open_above_or_below(i, rooms, areas, covers, above=False),
+            _open_above_or_below(i, rooms, areas, covers, above=True),
         ]
         links += [(i, j) for linked, _ in found for j in linked]
         why = [reason for _, reason in found if reason]
         if why:
             reasons[i] = "; ".join(why)
+    # Connect the rooms by their links; one link of a room to itself keeps the array 2-d.
     rows, columns = np.array([*links, (0, 0)]).T if rooms else (np.zeros(0, int),) * 2
     graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(len(rooms),) * 2)
     labels = connected_components(graph, directed=False)[1] if rooms else np.zeros(0, int)
@@ -92,7 +91,7 @@ def spaces_of_rooms(
     )
 
 
-def _edge(
+def _open_sides(
     i: int,
     rooms: Sequence[Room],
     areas: Sequence[plan.Shape],
@@ -101,6 +100,7 @@ def _edge(
 ) -> tuple[list[int], str]:
     """Rooms that room i opens into through its edge, and why the edge is open, or ""."""
     room = rooms[i]
+    # Find the samples of the edge behind which no wall of full height stands.
     points, outward = edge_samples(areas[i])
     floor = np.full(len(points), room.floor_y)
     ceiling = _ceiling_at(points, room, covers)
@@ -113,6 +113,7 @@ def _edge(
             or other.ceiling_y < room.floor_y + GAP_M
         ):
             continue
+        # Step out of the bare samples until another room of this height is met.
         near = plan.grown(areas[j], GAP_M)
         reached = np.zeros(len(points), np.bool_)
         for step in _PROBES_M:
@@ -120,6 +121,7 @@ def _edge(
         if reached.any():
             linked.append(j)
             bare &= ~reached
+    # Measure what opens into nothing.
     open_m = float(bare.sum() * _STEP_M)
     reason = f"{open_m:.1f} m of its edge have no full-height wall" if open_m > _OPEN_EDGE_M else ""
     return linked, reason
@@ -132,6 +134,7 @@ def edge_samples(area: plan.Shape) -> tuple[F64, F64]:
         oriented = shapely.orient_polygons(polygon)
         for ring in (oriented.exterior, *oriented.interiors):
             corners = np.asarray(ring.coords)
+            # Sample each side in the middle of equal steps; outside lies to the right.
             for a, b in pairwise(corners):
                 length = float(np.linalg.norm(b - a))
                 n = max(round(length / _STEP_M), 1)
@@ -143,7 +146,7 @@ def edge_samples(area: plan.Shape) -> tuple[F64, F64]:
 
 
 def _ceiling_at(points: F64, room: Room, covers: Sequence[Cover]) -> F64:
-    # The lowest ceiling above each point that belongs to this room's height.
+    # Take the lowest ceiling above each point that belongs to this room's height.
     y = np.full(len(points), room.ceiling_y)
     own = plan.polygon_of_room(room.polygon)
     for cover in covers:
@@ -157,19 +160,20 @@ def _ceiling_at(points: F64, room: Room, covers: Sequence[Cover]) -> F64:
 
 def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> NDArray[np.bool_]:
     """Whether walls stand at each point from low to high, gaps up to GAP_M aside."""
-    reached = low + 2 * GAP_M
+    reached = low + 2 * GAP_M  # a wall may begin a little above the floor
     spans = []
     for wall in walls:
         inside = shapely.contains_xy(plan.grown(wall.footprint, GAP_M), points[:, 0], points[:, 1])
         if inside.any():
             spans.append((inside, wall.bottom_y, wall.top.at(points)))
+    # Stack walls from the lowest up, as over a window in three parts.
     for inside, bottom, top in sorted(spans, key=lambda s: s[1]):
         grows = inside & (bottom <= reached + GAP_M)
         reached = np.where(grows, np.maximum(reached, top), reached)
-    return np.asarray(reached >= high - GAP_M)  # fmt: skip
+    return np.asarray(reached >= high - GAP_M)
 
 
-def _cover(
+def _open_above_or_below(
     i: int,
     rooms: Sequence[Room],
     areas: Sequence[plan.Shape],
@@ -178,6 +182,7 @@ def _cover(
     above: bool,
 ) -> tuple[list[int], str]:
     """Rooms that room i opens into upwards (or downwards), and why it has no cover there, or ""."""
+    # Take away what covers the room, then what opens into the next storey.
     near = _covers_of(rooms[i], covers, above=above)
     bare = plan.without(areas[i], *(plan.grown(a, GAP_M) for a in near))
     linked = []
@@ -188,6 +193,7 @@ def _cover(
     what = "ceiling" if above else "floor"
     if bare.area <= _OPEN_AREA_M2:
         return linked, ""
+    # Report the area that no cover reaches, without the slack of GAP_M.
     exact = plan.common(plan.without(areas[i], *near), plan.grown(bare, 2 * GAP_M))
     return linked, f"{exact.area:.1f} m2 of it have no {what}"
 
@@ -202,11 +208,11 @@ def bare_area(
 
 
 def _covers_of(room: Room, covers: Sequence[Cover], *, above: bool) -> list[plan.Shape]:
-    return [cover.area for cover in covers if _covers(room, cover, above=above)]
+    return [cover.area for cover in covers if _closes(room, cover, above=above)]
 
 
 def _storey_next(room: Room, rooms: Sequence[Room], *, above: bool) -> list[int]:
-    # Indices of the rooms one storey up (or down), wherever they lie in plan.
+    # List the rooms one storey up (or down), wherever they lie in plan.
     gaps = [
         other.floor_y - room.ceiling_y if above else room.floor_y - other.ceiling_y
         for other in rooms
@@ -216,8 +222,8 @@ def _storey_next(room: Room, rooms: Sequence[Room], *, above: bool) -> list[int]
     ]
 
 
-def _covers(room: Room, cover: Cover, *, above: bool) -> bool:
-    # A ceiling, or the floor of the storey above, closes a room upwards; and the other way round.
+def _closes(room: Room, cover: Cover, *, above: bool) -> bool:
+    # Count a ceiling, or the floor of the storey above, upwards; and the other way round.
     corners = shapely.get_coordinates(cover.area)
     if not len(corners):
         return False

@@ -12,11 +12,11 @@ from pbrs_farm.repair.report import Floating, FurnitureAudit, Overlap
 from pbrs_farm.repair.structure.booleans import F64, TagTable, common, united
 from pbrs_farm.repair.structure.closed_shells import closed_shells
 
-_TOUCH_M = 0.02
-_SAME_M = 0.001
-_MIN_VOLUME_M3 = 1e-4
-_MIN_SHARE = 0.01
-_MAX_FACES = 60_000
+_TOUCH_M = 0.02  # boxes nearer than this touch
+_SAME_M = 0.001  # boxes that differ by less stand in one place
+_MIN_VOLUME_M3 = 1e-4  # a decilitre
+_MIN_SHARE = 0.01  # of the smaller piece
+_MAX_FACES = 60_000  # beyond it the boolean takes too long
 
 
 def furniture_audit(house: House) -> FurnitureAudit:
@@ -51,12 +51,14 @@ def _pairs(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
 def _overlaps(pieces: Sequence[Item], boxes: F64) -> Iterator[Overlap]:
     solids: dict[int, Manifold | None] = {}
     for i, j in _pairs(boxes, -_SAME_M):
+        # Build the solid of a piece when its box first meets another.
         for k in (i, j):
             if k not in solids:
                 solids[k] = _solid(pieces[k])
         a, b = solids[i], solids[j]
         if a is None or b is None:
             continue
+        # Intersect the solids exactly.
         volume = float(common(a, b).volume())
         share = volume / max(min(float(a.volume()), float(b.volume())), 1e-12)
         if volume > _MIN_VOLUME_M3 and share > _MIN_SHARE:
@@ -80,10 +82,12 @@ def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floa
     around = np.concatenate([boxes, np.array([i.bounds for i in others]).reshape(-1, 2, 3)])
     for k, piece in enumerate(pieces):
         apart = (around[:, 0] > boxes[k, 1] + _TOUCH_M) | (around[:, 1] < boxes[k, 0] - _TOUCH_M)
+        # Pass over what touches another item, and our own ceiling lights.
         touched = ~apart.any(1)
         touched[k] = False
         if touched.any() or (piece.lights and "fallback" in piece.tags):
             continue
+        # Measure down to the highest item below.
         below = ~apart[:, [0, 2]].any(1) & (around[:, 1, 1] <= boxes[k, 0, 1])
         below[k] = False
         gap = boxes[k, 0, 1] - around[below, 1, 1].max() if below.any() else np.inf
@@ -93,6 +97,7 @@ def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floa
 def _duplicates(pieces: Sequence[Item], boxes: F64) -> Iterator[tuple[str, str]]:
     for i, j in _pairs(boxes, 0.0):
         a, b = pieces[i], pieces[j]
+        # Compare class and mesh size before places.
         same = (a.source_class, a.n_faces) == (b.source_class, b.n_faces)
         if same and np.abs(boxes[i] - boxes[j]).max() < _SAME_M:
             yield a.id, b.id

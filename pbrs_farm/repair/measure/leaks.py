@@ -23,23 +23,19 @@ from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.plan_geometry import Shape
 from pbrs_farm.repair.structure.prisms import Plane, polygons_of
 
-WITHIN_M = 0.005
-_MAX_LEAKS = 50
+WITHIN_M = 0.005  # how near to an edge rays start
+_MAX_LEAKS = 50  # of a space, kept with their rays
 
 
 @dataclass(frozen=True, slots=True)
 class LeakMeter:
-    """How closely the meter looks.
+    """How closely the meter looks."""
 
-    step_m: distance of starts along every edge where walls, floor and ceiling meet; per_start:
-    rays from each; n_inside: random points per space; n_bounces: after the first flight.
-    """
-
-    step_m: float = 0.025
-    per_start: int = 48
-    n_inside: int = 1000
-    per_inside: int = 48
-    n_bounces: int = 2
+    step_m: float = 0.025  # between starts, along edges where walls, floor and ceiling meet
+    per_start: int = 48  # rays from each
+    n_inside: int = 1000  # random points per space
+    per_inside: int = 48  # rays from each
+    n_bounces: int = 2  # after the first flight
 
 
 def leaks_of_house(
@@ -55,12 +51,13 @@ def leaks_of_house(
     interiors: by room id. plugs: fill its openings. Only structure and plugs stop rays: furniture hides no leak.
     """
     meter = LeakMeter() if meter is None else meter
+    # Trace rays against the structure alone, its openings filled.
     shell = plugged_shell(house, plugs)
     geometry = geometry_from_house(shell)
     normals = unit_normals(triangle_corners(geometry.positions, geometry.faces))
     closed = [s for s in spaces if s.is_closed]
     occluder = occluder_from(shell) if closed else None
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(0)  # fixed: the report is a function of the house
     found = []
     for space in closed:
         inside = [a for r in (*space.rooms, *space.wells) for a in interiors[r]]
@@ -90,6 +87,7 @@ def _rays(
 ) -> tuple[F64, F64]:
     if not interiors:
         return np.zeros((0, 3)), np.zeros((0, 3))
+    # Start densely along edges, where leaks are, and by area inside.
     edges = np.concatenate([_edge_starts(a, meter.step_m, rng) for a in interiors])
     areas = np.array([a.area.area for a in interiors])
     shares = rng.multinomial(meter.n_inside, areas / areas.sum())
@@ -105,7 +103,7 @@ def _rays(
 def _edge_starts(interior: RoomInterior, step_m: float, rng: np.random.Generator) -> F64:
     """Points within 5 mm of the edges where walls, floor and ceiling meet, in the interior."""
     inset = 0.5 * WITHIN_M
-    knee = interior.low.raised(interior.foot_m + inset)
+    knee = interior.low.raised(interior.foot_m + inset)  # top of the baseboards
     found = [
         *_along(interior.foot, interior.low.raised(inset), step_m, rng),
         *_along(interior.area, interior.high.raised(-inset), step_m, rng),
@@ -115,11 +113,13 @@ def _edge_starts(interior: RoomInterior, step_m: float, rng: np.random.Generator
         found += _upright(
             interior.foot, interior.low.raised(inset), knee.raised(-2 * inset), step_m, rng
         )
+    # Scatter the starts, but less than their distance from the edge.
     points = np.concatenate([np.zeros((0, 3)), *found])
     return np.asarray(points + rng.uniform(-0.4, 0.4, points.shape) * WITHIN_M)
 
 
 def _rings(area: Shape) -> list[shapely.LinearRing]:
+    # Draw the outline back from the walls by half that distance.
     inner = shapely.buffer(area, -0.5 * WITHIN_M, join_style="mitre", mitre_limit=2.0)
     return [r for p in polygons_of(inner) for r in (p.exterior, *p.interiors)]
 
@@ -128,7 +128,7 @@ def _along(area: Shape, plane: Plane, step_m: float, rng: np.random.Generator) -
     found = []
     for ring in _rings(area):
         n = max(int(ring.length / step_m), 8)
-        steps = ring.length * (np.arange(n) + rng.random()) / n
+        steps = ring.length * (np.arange(n) + rng.random()) / n  # stratified, one random shift
         points = shapely.get_coordinates(shapely.line_interpolate_point(ring, steps))
         found.append(_lifted(points, plane.at(points)))
     return found
@@ -157,6 +157,7 @@ def _inside(interior: RoomInterior, n: int, rng: np.random.Generator) -> F64:
         return np.zeros((0, 3))
     x0, z0, x1, z1 = area.bounds
     found = np.zeros((0, 2))
+    # Reject points of the box outside the room.
     while len(found) < n:
         points = rng.uniform((x0, z0), (x1, z1), (4 * n, 2))
         found = np.concatenate([found, points[shapely.contains_xy(area, *points.T)]])
@@ -179,19 +180,21 @@ def _measured(
     p, d = origins, directions
     for flight in range(meter.n_bounces + 1):
         distance, face = occluder.first_hit(p.astype(np.float32), d.astype(np.float32))
+        # Count the rays that meet nothing and keep the first of them.
         gone = ~np.isfinite(distance)
         n_sky += int(gone.sum())
         leaks += [
             Leak(origin=_triple(a), direction=_triple(b))
             for a, b in zip(p[gone][: _MAX_LEAKS - len(leaks)], d[gone], strict=False)
         ]
-        # From the front of a face light goes on; behind one it is inside a solid, absorbed.
+        # Go on from the front of faces; absorb rays that see a back, inside a solid.
         front = ~gone
         front[front] = (d[front] * normals[face[front]]).sum(1) < 0
         if flight == 0:
             n_blind = int((~gone & ~front).sum())
         reached = p[front] + d[front] * distance[front, None].astype(np.float64)
         n = normals[face[front]]
+        # Bounce diffusely: a point on a unit sphere that touches the face.
         d = _unit(_unit(rng.normal(size=n.shape)) + n)
         p = reached + 1e-4 * n
     return SpaceLeaks(

@@ -14,21 +14,18 @@ from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of
 from pbrs_farm.repair.structure.walls import Wall
 
-_SLIVER_M = 0.02
+_SLIVER_M = 0.02  # narrower parts of a room hold no starts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomInterior:
-    """A part of a room between its floor and one plane of its ceiling.
+    """A part of a room between its floor and one plane of its ceiling."""
 
-    area: plan, walls left out. foot: the same with baseboards left out too, up to foot_m.
-    """
-
-    area: Shape
-    foot: Shape
-    foot_m: float
-    low: Plane
-    high: Plane
+    area: Shape  # plan, walls left out
+    foot: Shape  # plan, baseboards left out too
+    foot_m: float  # height of the baseboards
+    low: Plane  # floor
+    high: Plane  # ceiling
 
     @property
     def height(self) -> float:
@@ -42,7 +39,10 @@ def interiors_of_room(
 ) -> list[RoomInterior]:
     """Between the walls, above the floor, a part below each plane of the ceiling."""
     near = [
-        w for w in uprights if w.bottom_y < room.ceiling_y - 0.1 and w.high_y > room.floor_y + 0.01
+        # Take the walls that stand at the height of this room.
+        w
+        for w in uprights
+        if w.bottom_y < room.ceiling_y - 0.1 and w.high_y > room.floor_y + 0.01
     ]
     walls = plan.union(w.footprint for w in near if not w.is_board)
     boards = [w for w in near if w.is_board]
@@ -51,6 +51,7 @@ def interiors_of_room(
     foot_m = max(
         (w.high_y - room.floor_y for w in boards if w.footprint.distance(area) < 0.05), default=0.0
     )
+    # Part the room below the planes of its ceiling, the rest below its nominal height.
     ceilings = [s for s in surfaces if s.is_ceiling and s.room_id == room.id]
     parts = [(plan.common(area, s.area), s.plane) for s in ceilings]
     parts.append((plan.without(area, *(s.area for s in ceilings)), level_plane(room.ceiling_y)))

@@ -20,28 +20,28 @@ from pbrs_farm.repair.structure.sliver_removal import without_slivers
 
 F64 = NDArray[np.float64]
 
-_WELD_M = 1e-5
-_NUMBER_OF_PROPERTIES = 8
+_WELD_M = 1e-5  # corners nearer than this become one where exact ones do not close
+_NUMBER_OF_PROPERTIES = 8  # x y z, u v, nx ny nz
 
 
 @dataclass(frozen=True, slots=True)
 class Tag:
-    """What a face is: index of its item in House.items, name of its surface, its material."""
+    """What a face is part of."""
 
-    item: int
-    surface: str
-    material: int
+    item: int  # index into House.items
+    surface: str  # name, one of its item's
+    material: int  # index into House.materials
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
-    """Triangles of one tag. positions (V, 3), faces (F, 3) outward, uvs (V, 2), normals or zeros."""
+    """Triangles of one tag."""
 
     tag: Tag
-    positions: F64
-    faces: NDArray[np.int64]
-    uvs: F64
-    normals: F64
+    positions: F64  # (V, 3) metres
+    faces: NDArray[np.int64]  # (F, 3) anticlockwise seen from outside
+    uvs: F64  # (V, 2)
+    normals: F64  # (V, 3) unit, or zeros where faces are flat
 
 
 class TagTable:
@@ -66,6 +66,7 @@ def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | 
     patches = [p for p in patches if len(p.faces)]
     if not patches:
         return None
+    # Weld equal corners alone first: a larger weld may close a gap that is meant.
     for weld_m in (0.0, _WELD_M):
         solid = _solid(patches, table, weld_m)
         if solid is not None:
@@ -75,9 +76,11 @@ def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | 
 
 def _solid(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold | None:
     vertices, faces, merge_from, merge_to = _welded(patches, weld_m)
+    # Turn an inward mesh round, its normals with it.
     if signed_volume(vertices[faces, :3], vertices[:, :3].mean(0)) < 0:
         faces = faces[:, [0, 2, 1]]
-        vertices = vertices * np.array([1.0] * 5 + [-1.0] * 3)
+        vertices = vertices * np.array([1.0] * 5 + [-1.0] * 3)  # x y z u v kept, normals turned
+    # Hand each patch over as a run of its own, with a new original id.
     mesh = manifold3d.Mesh64(
         np.ascontiguousarray(vertices),
         np.ascontiguousarray(faces, np.uint64),
@@ -87,6 +90,7 @@ def _solid(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold
         run_original_id=table.reserve([p.tag for p in patches]),
     )
     solid = Manifold(mesh)
+    # Take only what is closed and has a volume.
     if solid.status() != manifold3d.Error.NoError or solid.is_empty() or solid.volume() <= 0:
         return None
     return solid
@@ -95,15 +99,17 @@ def _solid(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold
 def _welded(
     patches: Sequence[Patch], weld_m: float
 ) -> tuple[F64, NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint64]]:
-    # One vertex list; equal positions of different patches are declared to be one vertex.
+    # Join the vertex lists; declare equal positions of different patches to be one vertex.
     positions = np.concatenate([p.positions for p in patches])
-    keys = np.round(positions / weld_m) if weld_m else positions + 0.0
+    keys = np.round(positions / weld_m) if weld_m else positions + 0.0  # + 0.0 makes -0 and 0 equal
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    canonical = first[np.ravel(inverse)]
+    canonical = first[np.ravel(inverse)]  # each vertex -> the first at its place
     if weld_m:
         positions = positions[canonical]
+    # Number corners through all patches.
     starts = np.cumsum([0, *(len(p.positions) for p in patches)])
     faces = np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
+    # List the vertices to merge with an earlier one.
     twins = np.flatnonzero(canonical != np.arange(len(canonical)))
     uvs = np.concatenate([p.uvs for p in patches])
     normals = np.concatenate([p.normals for p in patches])
@@ -142,6 +148,7 @@ def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
     """The solid's surface by tag, in order of item and surface; positions are float32 values."""
     mesh = solid.to_mesh64()
     vertices = np.asarray(mesh.vert_properties, np.float64)
+    # Pad a result without properties, as of an empty solid.
     if vertices.shape[1] < _NUMBER_OF_PROPERTIES:
         pad = np.zeros((len(vertices), _NUMBER_OF_PROPERTIES - vertices.shape[1]))
         vertices = np.concatenate([vertices, pad], 1)
@@ -149,6 +156,7 @@ def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
     tags, tag_of_face = _tags_of_faces(mesh, table)
     vertices, triangles, tag_of_face = without_slivers(vertices, triangles, tag_of_face)
     found = [
+        # Collect the faces of each tag with the vertices they use.
         _compact(tag, vertices, triangles[tag_of_face == k])
         for k, tag in enumerate(tags)
         if (tag_of_face == k).any()
@@ -157,7 +165,7 @@ def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
 
 
 def _tags_of_faces(mesh: manifold3d.Mesh64, table: TagTable) -> tuple[list[Tag], NDArray[np.int64]]:
-    # Several runs may have one tag: a wall cut by two openings has two runs of reveals.
+    # Number the tags; several runs may have one: a wall cut by two openings has two of reveals.
     run_index = np.asarray(mesh.run_index, np.int64) // 3
     tags: dict[Tag, int] = {}
     of_run = [tags.setdefault(table[int(i)], len(tags)) for i in mesh.run_original_id]

@@ -16,18 +16,18 @@ from pbrs_farm.core.mesh import face_areas, unit_normals
 from pbrs_farm.repair.structure.booleans import F64, Patch, TagTable, solid_from_patches
 from pbrs_farm.repair.structure.patches import patch_from_surface
 
-_FLAT_M = 1e-3
-_WELD_M = 1e-5
+_FLAT_M = 1e-3  # how far corners may lie off the plane of a planar wall
+_WELD_M = 1e-5  # as booleans.py welds
 
-ClosedShell = tuple[Manifold, list[Patch]]
+ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was made of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlatPatch:
-    """All of an item's triangles, which lie in one plane. normal: (3,) unit, area-weighted."""
+    """All of an item's triangles, which lie in one plane."""
 
     patch: Patch
-    normal: F64
+    normal: F64  # (3,) unit, mean of the faces' by area
 
 
 def shells_from_item(item: Item, index: int, table: TagTable) -> list[ClosedShell] | None:
@@ -38,6 +38,7 @@ def shells_from_item(item: Item, index: int, table: TagTable) -> list[ClosedShel
     shells = []
     for part in _split(patches, components(patches)):
         solid = solid_from_patches(part, table)
+        # Give the whole item up for one open part: it would not be watertight.
         if solid is None:
             return None
         shells.append((solid, part))
@@ -56,21 +57,25 @@ def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
 def components(patches: Sequence[Patch]) -> list[NDArray[np.int64]]:
     """For each patch the shell (F,) of each face; shells are faces joined at their corners."""
     positions = np.concatenate([p.positions for p in patches])
+    # Number the places of corners through all patches.
     keys = np.round(positions / _WELD_M)
     _, inverse = np.unique(keys, axis=0, return_inverse=True)
     node = np.ravel(inverse)
     starts = np.cumsum([0, *(len(p.positions) for p in patches)])
     faces = np.concatenate([node[p.faces + s] for p, s in zip(patches, starts[:-1], strict=True)])
+    # Connect the corners of each face, then label connected places.
     rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
     n = int(node.max()) + 1
     graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
     label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    # Hand the labels of faces back to their patches.
     ends = np.cumsum([len(p.faces) for p in patches])
     return [np.asarray(part, np.int64) for part in np.split(label, ends[:-1])]
 
 
 def _split(patches: Sequence[Patch], labels: Sequence[NDArray[np.int64]]) -> list[list[Patch]]:
     every = np.unique(np.concatenate(labels))
+    # Keep the patches of a single shell as they are.
     if len(every) == 1:
         return [list(patches)]
     return [
@@ -92,11 +97,13 @@ def flat_patch(item: Item, index: int) -> FlatPatch | None:
     positions = np.concatenate([p.positions for p in patches])
     faces = np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
     corners = positions[faces]
+    # Average the normals by area; two faces back to back leave no normal.
     normal = (unit_normals(corners) * face_areas(corners)[:, None]).sum(0)
     length = np.linalg.norm(normal)
     if length < 1e-9:
         return None
     normal = normal / length
+    # Measure how far the used corners lie off the plane.
     off = (positions - positions[faces[0, 0]]) @ normal
     if np.abs(off[np.unique(faces)]).max() > _FLAT_M:
         return None

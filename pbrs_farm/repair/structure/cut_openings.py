@@ -28,16 +28,16 @@ from pbrs_farm.repair.structure.reveals import REVEAL
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
 
-_MIN_VOLUME_M3 = 1e-9
+_MIN_VOLUME_M3 = 1e-9  # of what an opening cuts; less is a touch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WallPart:
-    """A wall's own solid, or a joint that was added to it."""
+    """A solid of a wall."""
 
     wall: Wall
     solid: Manifold
-    is_joint: bool
+    is_joint: bool  # added by repair, else the wall's own
 
 
 def thresholds(house: House, walls: Sequence[Wall]) -> plan.Shape:
@@ -47,6 +47,7 @@ def thresholds(house: House, walls: Sequence[Wall]) -> plan.Shape:
         cutter = opening.cutter
         area = plan.polygon_of_triangles(cutter.positions.astype(float), cutter.faces)
         low = float(cutter.positions[:, 1].min())
+        # Keep what lies over walls whose foot is as low as the opening.
         feet = [w.footprint for w in walls if abs(w.bottom_y - low) < GAP_M]
         areas.append(plan.common(area, plan.union(feet)))
     return plan.union(areas)
@@ -64,15 +65,18 @@ def cut_openings(
     plugs: dict[str, tuple[Surface, ...]] = {}
     for opening in openings:
         fills = []
+        # Pass over parts whose box the opening does not meet.
         reach = np.stack([opening.cutter.positions.min(0), opening.cutter.positions.max(0)])
         for k, part in enumerate(parts):
             if (overlap_of_bounds(bounds(part.solid), reach) <= 0).any():
                 continue
+            # Leave walls alone that the source has cut itself.
             if opening.is_cut and not part.is_joint:
                 continue
             cutter = _cutter(opening, part.wall, table)
             if cutter is None:
                 continue
+            # Remember what the cut takes away: together it is the plug.
             fill = common(part.solid, cutter)
             if fill.volume() > _MIN_VOLUME_M3:
                 cutters_of[k].append(cutter)
@@ -82,6 +86,7 @@ def cut_openings(
         elif fills:
             plug = patches_from_solid(united(fills), table)
             plugs[opening.id] = tuple(s for p in plug if (s := surface_from_patch(p)) is not None)
+    # Cut all openings of a part at once.
     idle = [o.id for o in openings if o.id not in plugs]
     cut = [reduced(p.solid, c) for p, c in zip(parts, cutters_of, strict=True)]
     return cut, plugs, idle

@@ -19,9 +19,9 @@ from pbrs_farm.repair.structure.prisms import level_plane, polygons_of, prism
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
 
-_RECESS_M = 0.001
-_OVERLAP_M = 0.01
-_GAP_SEEN_M = 1e-4
+_RECESS_M = 0.001  # joints stay this far behind the faces of their walls
+_OVERLAP_M = 0.01  # least height of a joint, and how far it reaches into its wall
+_GAP_SEEN_M = 1e-4  # walls farther apart than this miss each other visibly
 
 
 def joints_between_walls(
@@ -38,6 +38,7 @@ def joints_between_walls(
     tree = shapely.STRtree([w.footprint for w in walls])
     for i, a in enumerate(walls):
         for j in sorted(tree.query(a.footprint, "dwithin", GAP_M).tolist()):
+            # Visit each pair once; shells of one item belong together already.
             if j <= i or walls[j].item == a.item:
                 continue
             solids = _joint(a, walls[j], rooms, table)
@@ -47,19 +48,22 @@ def joints_between_walls(
 
 
 def _joint(a: Wall, b: Wall, rooms: plan.Shape, table: TagTable) -> list[Manifold]:
+    # Fill what lies near both walls, drawn back behind their faces.
     both = plan.union([a.footprint, b.footprint])
     near = plan.common(plan.grown(a.footprint, GAP_M), plan.grown(b.footprint, GAP_M))
     if a.thickened and b.thickened:
         both, near = _outer_corner(a, b, rooms)
     inner = plan.grown(plan.closed(both, GAP_M), -_RECESS_M)
     areas = polygons_of(plan.common(near, inner))
+    # Bridge walls that both end short of their corner.
     if not any(_touches(p, a) and _touches(p, b) for p in areas):
         areas += polygons_of(_bridge(a, b, rooms))
-    # Across a gap a joint runs on into the slabs below and above.
+    # Run on into the slabs below and above where the joint crosses a gap.
     beyond = GAP_M if a.footprint.distance(b.footprint) > _GAP_SEEN_M else -_RECESS_M
     solids = []
     for polygon in areas:
         corners = shapely.get_coordinates(polygon)
+        # Stand as high as both walls do.
         low = max(a.bottom_y, b.bottom_y) - beyond
         high = min(float(a.top.at(corners).min()), float(b.top.at(corners).min())) + beyond
         if high - low < _OVERLAP_M:
@@ -76,7 +80,7 @@ def _touches(area: shapely.Polygon, wall: Wall) -> bool:
 
 
 def _bridge(a: Wall, b: Wall, rooms: plan.Shape) -> plan.Shape:
-    # Two walls that both end short of their corner: a block from end to end, outside the rooms.
+    # Span the ends of both walls by their convex hull, outside the rooms.
     ends = [
         plan.common(x.footprint, plan.grown(y.footprint, 1.5 * GAP_M)) for x, y in ((a, b), (b, a))
     ]
@@ -84,7 +88,7 @@ def _bridge(a: Wall, b: Wall, rooms: plan.Shape) -> plan.Shape:
 
 
 def _outer_corner(a: Wall, b: Wall, rooms: plan.Shape) -> tuple[plan.Shape, plan.Shape]:
-    # Walls thickened outward touch at an outer corner's edge only: both run on to fill the corner.
+    # Run both walls on to fill an outer corner: thickened outward, they touch at its edge only.
     strips = [_run_on(w) for w in (a, b)]
     corner = plan.without(plan.common(*strips), rooms)
     whole = plan.union([a.footprint, b.footprint, corner])
@@ -92,11 +96,11 @@ def _outer_corner(a: Wall, b: Wall, rooms: plan.Shape) -> tuple[plan.Shape, plan
 
 
 def _run_on(wall: Wall) -> plan.Shape:
-    # The wall's footprint made longer at both ends by its own thickness.
+    # Lengthen the wall's footprint at both ends by its own thickness.
     box = shapely.minimum_rotated_rectangle(wall.footprint)
     corners = shapely.get_coordinates(box)[:4]
     sides = np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1)
-    thickness, k = float(sides.min()), int(sides.argmax())
+    thickness, k = float(sides.min()), int(sides.argmax())  # k: the first of its two long sides
     along = (corners[(k + 1) % 4] - corners[k]) / max(float(sides.max()), 1e-9)
     middle = corners.mean(0)
     outward = np.sign((corners - middle) @ along)[:, None]
@@ -117,7 +121,7 @@ def joints_with_surface(
     doors: plan area of openings down to the floor, where a wall has no foot.
     """
     depth_m = 0.5 * thickness_m
-    away = 1.0 if surface.is_ceiling else -1.0
+    away = 1.0 if surface.is_ceiling else -1.0  # out of the room
     found = []
     for wall in walls:
         if wall.footprint.distance(footprint) > 0:
@@ -127,10 +131,12 @@ def joints_with_surface(
             area = plan.without(area, doors)
         for polygon in polygons_of(area):
             corners = shapely.get_coordinates(polygon)
+            # Compare the end of the wall with the plane of the floor or ceiling.
             end = wall.top if surface.is_ceiling else level_plane(wall.bottom_y)
             gap = away * (surface.plane.at(corners) - end.at(corners))
             if gap.max() > GAP_M or gap.max() < -depth_m:
                 continue
+            # Reach from inside the wall to the middle of the slab.
             near, far = end.raised(-away * _OVERLAP_M), surface.plane.raised(away * depth_m)
             low, high = (near, far) if surface.is_ceiling else (far, near)
             if (high.at(corners) - low.at(corners)).min() < _RECESS_M:

@@ -8,7 +8,7 @@ from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners
 from pbrs_farm.repair.structure.booleans import Patch, Tag
 
-_MIN_AREA_M2 = 1e-12
+_MIN_AREA_M2 = 1e-12  # float32 holds no smaller face
 
 
 def patch_from_surface(surface: Surface, item: int, *, name: str | None = None) -> Patch:
@@ -30,7 +30,9 @@ def surface_from_patch(patch: Patch) -> Surface | None:
     keep = faces_with_area(triangle_corners(positions, patch.faces), _MIN_AREA_M2)
     if not keep.any():
         return None
+    # Keep the vertices that the remaining faces use.
     used, inverse = np.unique(patch.faces[keep], return_inverse=True)
+    # Store normals only where every vertex has one.
     length = np.linalg.norm(patch.normals[used], axis=1, keepdims=True)
     normals = None
     if bool((length > 0.1).all()):

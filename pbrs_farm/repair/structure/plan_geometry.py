@@ -24,6 +24,7 @@ GRID_M = 1e-6
 
 def polygon_of_triangles(positions: F64, faces: NDArray[np.integer]) -> Shape:
     """The plan area (a polygon, several or none) that triangles cover, seen from above."""
+    # Leave out triangles that stand upright: they cover no plan.
     corners = positions[:, [0, 2]][faces]
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     turned = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) > 1e-9
@@ -41,7 +42,7 @@ def on_grid(shape: Shape) -> Shape:
 
 
 def _areal(shape: Shape) -> Shape:
-    # Overlays leave lines and points where areas only touch; GEOS refuses them as input.
+    # Drop the lines and points that overlays leave where areas touch: GEOS rejects them as input.
     if shape.geom_type in ("Polygon", "MultiPolygon"):
         return shape
     parts = shapely.get_parts(shapely.get_parts(shape))

@@ -17,21 +17,21 @@ from pbrs_farm.repair.structure.booleans import F64, Patch, Tag, TagTable, bound
 from pbrs_farm.repair.structure.closed_shells import shells_from_item
 from pbrs_farm.repair.structure.prisms import Plane, UvMap, level_plane, plane_of_points
 
-_SAME_FACING = 1.0 - 1e-6
+_SAME_FACING = 1.0 - 1e-6  # cosine between normals of one plane
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanarSurface:
-    """One plane's worth of one planar floor or ceiling. area: its plan polygon."""
+    """The faces of a planar floor or ceiling that lie in one plane."""
 
-    item: int
+    item: int  # index into House.items
     room_id: str | None
     is_ceiling: bool
-    area: plan.Shape
+    area: plan.Shape  # what it covers, seen from above
     plane: Plane
-    uv: UvMap | None
+    uv: UvMap | None  # None: metres in plan
     material: int
-    name: str
+    name: str  # of the surface it comes from
 
     def tag(self, surface: str) -> Tag:
         """The tag of a surface that repair adds to this floor or ceiling."""
@@ -40,7 +40,7 @@ class PlanarSurface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cover:
-    """A floor or a ceiling as rooms feel it: plan area and plane of the face they see."""
+    """The face of a floor or ceiling that closes rooms: plan area and plane."""
 
     is_ceiling: bool
     area: plan.Shape
@@ -49,15 +49,12 @@ class Cover:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorsAndCeilings:
-    """All floors and ceilings: planar ones, those that came as solids, and those left as they are.
-
-    covers: plan area and plane of the solid ones' inner faces.
-    """
+    """All floors and ceilings of a house, sorted by what they are made of."""
 
     planar: list[PlanarSurface]
-    solid: dict[int, list[Manifold]]
-    left: dict[int, str]
-    covers: list[Cover]
+    solid: dict[int, list[Manifold]]  # item -> its closed shells
+    left: dict[int, str]  # item -> why it is left as it is
+    covers: list[Cover]  # inner faces of the solid ones
 
 
 def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCeilings:
@@ -71,6 +68,7 @@ def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCe
             found.solid[index] = [solid for solid, _ in shells]
             if item.kind is not ItemKind.GROUND:
                 found.covers.extend(_lid(item, solid, patches) for solid, patches in shells)
+        # Leave the ground around the house alone, unless it is solid.
         elif item.kind is ItemKind.GROUND:
             continue
         else:
@@ -83,6 +81,7 @@ def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCe
 
 
 def _lid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> Cover:
+    # Take the side that looks into the room: a ceiling's lowest, a floor's highest.
     low, high = bounds(solid)
     is_ceiling = item.kind is ItemKind.CEILING
     area = plan.union(plan.polygon_of_triangles(p.positions, p.faces) for p in patches)
@@ -111,11 +110,11 @@ def _planar_surfaces(item: Item, index: int) -> Iterator[PlanarSurface]:
 
 
 def _facets(positions: F64, faces: NDArray[np.int32]) -> list[NDArray[np.int32]]:
-    # Faces grouped by their plane, in order of first face; upright faces are no floor.
+    # Group faces by their plane, in order of first face; leave out upright ones.
     normals = unit_normals(positions[faces])
     normals = normals * np.where(normals[:, 1:2] < 0, -1.0, 1.0)
     offsets = (normals * positions[faces[:, 0]]).sum(1)
-    groups: list[tuple[F64, float, list[int]]] = []
+    groups: list[tuple[F64, float, list[int]]] = []  # normal, offset along it, faces
     for k in np.flatnonzero(normals[:, 1] > 0.05):
         for normal, offset, members in groups:
             if normals[k] @ normal > _SAME_FACING and abs(offsets[k] - offset) < 1e-3:
@@ -127,7 +126,7 @@ def _facets(positions: F64, faces: NDArray[np.int32]) -> list[NDArray[np.int32]]
 
 
 def _uv_map(surface: Surface, faces: NDArray[np.int32]) -> UvMap | None:
-    # The texture as an affine map of the plan, so that it carries on where the slab grows.
+    # Fit the texture by an affine map of the plan, so that it carries on where the slab grows.
     if surface.uvs is None:
         return None
     used = np.unique(faces)
@@ -135,6 +134,7 @@ def _uv_map(surface: Surface, faces: NDArray[np.int32]) -> UvMap | None:
     uvs = surface.uvs[used].astype(np.float64)
     columns = np.stack([points[:, 0], points[:, 2], np.ones(len(points))], 1)
     affine = np.linalg.lstsq(columns, uvs, rcond=None)[0]
+    # Give up where the texture is no affine map, within a thousandth of its width.
     if np.abs(columns @ affine - uvs).max() > 1e-3:
         return None
 

@@ -41,9 +41,11 @@ def level_plane(y: float) -> Plane:
 
 def plane_of_points(points: F64, *, tolerance_m: float = 1e-3) -> Plane | None:
     """The plane through points (N, 3), exactly level where they are; None if they are on none."""
+    # Answer exactly for a level surface: least squares would tilt it.
     low, high = float(points[:, 1].min()), float(points[:, 1].max())
     if high - low <= 1e-6:
         return level_plane(high)
+    # Fit y = a x + b z + c and see how far off the points lie.
     columns = np.stack([points[:, 0], points[:, 2], np.ones(len(points))], 1)
     (a, b, c), _, rank, _ = np.linalg.lstsq(columns, points[:, 1], rcond=None)
     plane = Plane(float(a), float(b), float(c))
@@ -72,6 +74,7 @@ def prism(
 
     uv: of bottom and top; metres in plan when None. Sides have metres along and up.
     """
+    # Triangulate the outline with its holes, corners shared by bottom, top and sides.
     polygon = shapely.orient_polygons(polygon)
     rings = [np.asarray(r.coords)[:-1] for r in (polygon.exterior, *polygon.interiors)]
     plan = np.concatenate(rings)
@@ -79,6 +82,7 @@ def prism(
     lows, highs = _lifted(plan, low.at(plan)), _lifted(plan, high.at(plan))
     bottom_tag, top_tag, side_tag = tags
     return [
+        # Turn the top round: both triangulations look down.
         _patch(bottom_tag, lows, triangles, lows[:, [0, 2]] if uv is None else uv(lows)),
         _patch(top_tag, highs, triangles[:, [0, 2, 1]], highs[:, [0, 2]] if uv is None else uv(highs)),
         _sides(side_tag, rings, lows, highs),
@@ -92,6 +96,7 @@ def _lifted(plan: F64, y: F64) -> F64:
 def _sides(tag: Tag, rings: list[F64], lows: F64, highs: F64) -> Patch:
     quads, uvs, first = [], [], 0
     for ring in rings:
+        # Raise a quad over every edge, u running along the ring.
         i = np.arange(len(ring)) + first
         j = np.roll(i, -1)
         quads.append(np.stack([lows[i], highs[i], highs[j], lows[j]], 1))

@@ -21,6 +21,7 @@ def with_metric_uv(patch: Patch) -> Patch:
     """
     if patch.tag.surface not in ADDED:
         return patch
+    # Span each face's plane by u across and v up (or along z where it lies flat).
     corners = patch.positions[patch.faces]
     normals = unit_normals(corners)
     up = np.where(np.abs(normals[:, 1:2]) < 0.7, [[0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0]])
@@ -28,6 +29,7 @@ def with_metric_uv(patch: Patch) -> Patch:
     u = u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-12)
     v = np.cross(normals, u)
     uvs = np.stack([np.einsum("fki,fi->fk", corners, axis) for axis in (u, v)], -1)
+    # Give each face vertices of its own: neighbours have other axes.
     n = len(patch.faces)
     return replace(
         patch,

@@ -25,23 +25,20 @@ from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, p
 from pbrs_farm.repair.structure.slabs import GAP_M, SAME_HEIGHT_M
 from pbrs_farm.repair.structure.walls import Wall
 
-_MARGIN_M = 0.005
-_TOUCH_M = 0.002
-_COINCIDE_M = 0.001
+_MARGIN_M = 0.005  # volumes reach this far into what bounds them
+_TOUCH_M = 0.002  # solids that overlap less are left uncut
+_COINCIDE_M = 0.001  # walls nearer than this to a room lie in one plane with its own
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomVolume:
-    """A part of a room's volume: a plan area between two planes.
-
-    items: the floors and ceilings that bound it, whichever room they are listed under.
-    """
+    """A part of a room's volume: a plan area between two planes."""
 
     area: shapely.Polygon
     low: Plane
     high: Plane
-    items: frozenset[int]
-    bounds: F64
+    items: frozenset[int]  # floors and ceilings that bound it, of any room
+    bounds: F64  # (2, 3) lowest and highest corner
 
 
 def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -> list[RoomVolume]:
@@ -54,6 +51,7 @@ def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -
     for room in rooms:
         area = plan.polygon_of_room(room.polygon)
         own = frozenset(s.item for s in surfaces if _bounds_room(s, room))
+        # Stand a part below each plane of the ceiling, one below the nominal height elsewhere.
         ceilings = [s for s in surfaces if s.is_ceiling and s.room_id == room.id]
         floor = level_plane(room.floor_y - margin)
         parts = [(s.area, s.plane.raised(margin)) for s in ceilings]
@@ -66,7 +64,7 @@ def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -
 
 
 def _bounds_room(surface: PlanarSurface, room: Room) -> bool:
-    # At the room's own height whatever it shows is settled in plan (slabs.visible_areas).
+    # Count what lies at the room's own height: slabs.visible_areas settles it in plan.
     if surface.room_id == room.id:
         return True
     nominal = room.ceiling_y if surface.is_ceiling else room.floor_y
@@ -75,7 +73,7 @@ def _bounds_room(surface: PlanarSurface, room: Room) -> bool:
 
 
 def _margin(rooms: Sequence[Room]) -> float:
-    # Thin floors (a roof 1 mm above a ceiling) leave no room for a margin of 5 mm.
+    # Shrink the margin for thin floors: a roof may lie 1 mm above a ceiling.
     gaps = [
         upper.floor_y - lower.ceiling_y
         for lower in rooms
@@ -106,6 +104,7 @@ def without_volumes(
             or (overlap_of_bounds(bounds(solid), volume.bounds) < _TOUCH_M).any()
         ):
             continue
+        # Cut with the volume, its faces tagged as the solid's own.
         cutter = solid_from_patches(prism(volume.area, volume.low, volume.high, (tag,) * 3), table)
         if cutter is not None:
             cutters.append(cutter)
@@ -120,6 +119,7 @@ def with_own_sides_visible(
     Where every room brings walls of its own (SUNCG), two rooms' walls lie in one plane: each room
     then sees its own side. Walls that belong to no room stay as they are.
     """
+    # Do nothing where walls belong to no room.
     if all(w.room_id is None for w in walls):
         return list(walls)
     areas = [(r, plan.polygon_of_room(r.polygon)) for r in rooms]
@@ -134,6 +134,7 @@ def with_own_sides_visible(
                 or wall.footprint.distance(area) > _COINCIDE_M
             ):
                 continue
+            # Draw the wall back from the whole height of the other room.
             low, high = level_plane(room.floor_y - GAP_M), level_plane(room.ceiling_y + GAP_M)
             for polygon in polygons_of(plan.grown(area, _COINCIDE_M)):
                 patches = prism(polygon, low, high, (wall.tag("hidden"),) * 3)

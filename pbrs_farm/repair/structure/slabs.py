@@ -24,8 +24,8 @@ GAP_M = 0.05
 SAME_HEIGHT_M = 0.01
 """Floors (or ceilings) nearer in height than this are one level, told apart in plan."""
 
-_FACE_M = 0.02
-_BASE_BEHIND_M = 0.01
+_FACE_M = 0.02  # thickness of the layer with the visible face
+_BASE_BEHIND_M = 0.01  # the base begins this far behind the face, inside that layer
 
 
 def footprints_of_surfaces(
@@ -41,9 +41,11 @@ def footprints_of_surfaces(
     """
     footprints = []
     for surface in surfaces:
+        # Close the gaps between neighbours at this height and the walls between them.
         mates = [s.area for s in surfaces if _beside(surface, s)]
         feet = [w.footprint for w in walls if _meets(surface, w)]
         whole = plan.closed(plan.union([*mates, *feet]), 2 * GAP_M)
+        # Grow into walls, and for a floor through the thresholds of its doors.
         reach = plan.grown(surface.area, thickness_m)
         if not surface.is_ceiling:
             doors = plan.common(thresholds, plan.grown(surface.area, 1.0))
@@ -57,6 +59,7 @@ def _beside(a: PlanarSurface, b: PlanarSurface) -> bool:
     near = a.is_ceiling == b.is_ceiling and a.area.distance(b.area) < 1.0
     if not near:
         return False
+    # Compare heights in the middle of the other one.
     middle = shapely.get_coordinates(b.area).mean(0)[None]
     return bool(abs(a.plane.at(middle)[0] - b.plane.at(middle)[0]) < 0.5)
 
@@ -80,7 +83,9 @@ def visible_areas(
     own = []
     for i, surface in enumerate(surfaces):
         same = [j for j, s in enumerate(surfaces) if j != i and _same_height(surface, s)]
+        # Show the own area, save where a later surface lies.
         mine = plan.without(surface.area, *(surfaces[j].area for j in same if j > i))
+        # Show the ring under the walls, save where an earlier footprint lies.
         ring = plan.without(footprints[i], surface.area, *(surfaces[j].area for j in same))
         ring = plan.without(ring, *(footprints[j] for j in same if j < i))
         own.append(plan.union([mine, ring]))
@@ -105,6 +110,7 @@ def slab(
     away = 1.0 if surface.is_ceiling else -1.0
     hidden, face = surface.tag("hidden"), surface.tag(surface.name)
     solids = []
+    # Stack the two layers from the face outwards.
     for area, near_m, far_m, tag in (
         (own, 0.0, _FACE_M, face),
         (footprint, _BASE_BEHIND_M, thickness_m, hidden),
@@ -129,6 +135,7 @@ def bridged(
         if not others:
             continue
         whole = plan.union([surface.area, *others])
+        # Reach a little past the crease, behind the visible layers.
         area = plan.common(plan.grown(surface.area, 0.2 * thickness_m), whole)
         away = 1.0 if surface.is_ceiling else -1.0
         a: Plane = surface.plane.raised(away * 0.5 * thickness_m)

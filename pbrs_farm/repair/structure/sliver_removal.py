@@ -18,9 +18,9 @@ from pbrs_farm.core.mesh import face_areas
 F64 = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
-MIN_AREA_M2 = 1e-12
-_MERGE_M = 4e-6
-_MAX_ROUNDS = 8
+MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver
+_MERGE_M = 4e-6  # a few steps of float32 ten metres from the origin
+_MAX_ROUNDS = 8  # splitting may leave new slivers
 
 
 def without_slivers(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Faces, Faces]:
@@ -31,9 +31,11 @@ def without_slivers(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Fa
     vertices: (V, P) positions and properties, those of one position possibly several times.
     faces: (F, 3); labels: (F,), kept with each face. New vertices get properties in between.
     """
+    # Round positions to float32, one for each cluster of close points.
     vertices = vertices.copy()
     vertices[:, :3] = vertices[_representatives(vertices[:, :3]), :3].astype(np.float32)
     _, place = np.unique(vertices[:, :3], axis=0, return_inverse=True)
+    # Dissolve until no sliver is left.
     mesh = _Mesh(vertices, np.ravel(place), faces, labels)
     for _ in range(_MAX_ROUNDS):
         if not mesh.dissolve():
@@ -42,7 +44,7 @@ def without_slivers(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Fa
 
 
 def _representatives(positions: F64) -> NDArray[np.int64]:
-    # For each point the first of those that are linked to it by steps below _MERGE_M.
+    # Take for each point the first of those linked to it by steps below _MERGE_M.
     n = len(positions)
     pairs = KDTree(positions).query_pairs(_MERGE_M, output_type="ndarray").reshape(-1, 2)
     graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
@@ -54,12 +56,12 @@ class _Mesh:
     """Faces that can be replaced, with the faces at each directed edge between positions."""
 
     def __init__(self, vertices: F64, place: Faces, faces: Faces, labels: Faces) -> None:
-        self._vertices = list(vertices)
-        self._place = place.tolist()
+        self._vertices = list(vertices)  # (P,) position and properties each
+        self._place = place.tolist()  # vertex -> number of its position
         self._faces: list[tuple[int, int, int]] = [(a, b, c) for a, b, c in faces.tolist()]
         self._labels = labels.tolist()
-        self._alive = [True] * len(self._faces)
-        self._at_edge: dict[tuple[int, int], list[int]] = {}
+        self._alive = [True] * len(self._faces)  # a dissolved face keeps its number
+        self._at_edge: dict[tuple[int, int], list[int]] = {}  # directed edge of places -> its faces
         for f in range(len(self._faces)):
             self._enter(f)
 
@@ -84,23 +86,27 @@ class _Mesh:
 
     def _dissolve_one(self, f: int) -> None:
         places = [self._place[v] for v in self._faces[f]]
+        # Drop a face that collapsed to a line or a point.
         if len(set(places)) < 3:
             self._leave(f)
             return
         corners = np.array([self._vertices[v][:3] for v in self._faces[f]])
+        # Find the longest edge c a and the vertex b that lies on it.
         longest = int(np.linalg.norm(corners - np.roll(corners, -1, 0), axis=1).argmax())
         a, c, b = (self._faces[f][(longest + k) % 3] for k in range(3))
+        # Split the face on the other side of that edge at b.
         across = self._at_edge.get((self._place[c], self._place[a]))
         if across:
             self._leave(f)
             self._split(across[0], self._place[c], self._place[a], b)
 
     def _split(self, f: int, c: int, a: int, b: int) -> None:
-        # Face f has the edge from place c to place a: put the position of vertex b into it.
+        # Put the position of vertex b into the edge of face f from place c to place a.
         face = self._faces[f]
         k = next(k for k in range(3) if self._place[face[k]] == c and self._place[face[(k + 1) % 3]] == a)  # fmt: skip
         first, second, third = (face[(k + j) % 3] for j in range(3))
         start, end, at = self._vertices[first], self._vertices[second], self._vertices[b]
+        # Interpolate properties there, but keep b's exact position.
         along = end[:3] - start[:3]
         t = float(np.clip((at[:3] - start[:3]) @ along / max(along @ along, 1e-300), 0.0, 1.0))
         middle = start + t * (end - start)
@@ -109,6 +115,7 @@ class _Mesh:
         self._vertices.append(middle)
         self._place.append(self._place[b])
         self._leave(f)
+        # Replace the face by its two halves.
         for part in ((first, new, third), (new, second, third)):
             self._faces.append(part)
             self._labels.append(self._labels[f])

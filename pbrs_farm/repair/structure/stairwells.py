@@ -19,8 +19,8 @@ from pbrs_farm.repair.structure.prisms import polygons_of
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
 
-_MIN_AREA_M2 = 0.05
-_NEIGHBOUR_M = 0.6
+_MIN_AREA_M2 = 0.05  # a smaller hole is a gap in the drawing
+_NEIGHBOUR_M = 0.6  # a floor farther away is not carried on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +55,7 @@ def stairwells_of_house(
     added = []
     for well in wells:
         for above in (False, True):
+            # Carry on the nearest floor or ceiling where the stairwell has none.
             bare = bare_area(well, rooms, covers, above=above)
             if bare.area > _MIN_AREA_M2:
                 added += _continued(bare, well, surfaces, is_ceiling=above)
@@ -67,14 +68,17 @@ def _holes(
     rooms = [r for r in house.rooms if r.level_id == level_id]
     floor_y = min(r.floor_y for r in rooms)
     ceiling_y = max(r.ceiling_y for r in rooms)
+    # Unite rooms and walls that stand at this level.
     feet = [w.footprint for w in walls if w.bottom_y < ceiling_y - 0.1 and w.high_y > floor_y + 0.1]
     areas = [plan.polygon_of_room(r.polygon) for r in rooms]
     whole = plan.closed(plan.union([*areas, *feet]), 2 * GAP_M)
     stairs = [
+        # Take the boxes of stairs that stand or arrive here.
         shapely.box(low[0], low[2], high[0], high[2])
         for low, high in (i.bounds for i in house.items if i.kind is ItemKind.STAIRS)
         if low[1] < ceiling_y and high[1] > floor_y - 0.2
     ]
+    # Keep the holes with stairs in them.
     for polygon in polygons_of(whole):
         for ring in polygon.interiors:
             hole = shapely.Polygon(ring)

@@ -35,23 +35,18 @@ BASEBOARD = "baseboard"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wall:
-    """A wall's solid, uncut. footprint: plan area; bottom_y, high_y: its lowest and
-    highest point; top: its upper plane.
+    """A wall's solid, uncut."""
 
-    material: of parts repair adds to it. thickened: it was planar. is_board: a baseboard, which
-    bounds no room and is joined to nothing. room_id: the one room it belongs to, if it does.
-    """
-
-    item: int
+    item: int  # index into House.items
     solid: Manifold
     footprint: plan.Shape
-    bottom_y: float
-    high_y: float
-    top: Plane
-    material: int
-    thickened: bool = False
-    is_board: bool = False
-    room_id: str | None = None
+    bottom_y: float  # lowest point
+    high_y: float  # highest point
+    top: Plane  # its upper edge, sloped under a roof
+    material: int  # of parts that repair adds
+    thickened: bool = False  # it was planar
+    is_board: bool = False  # a baseboard: bounds no room, is joined to nothing
+    room_id: str | None = None  # the one room it belongs to, if it does
 
     def tag(self, surface: str) -> Tag:
         """The tag of a surface that repair adds to this wall."""
@@ -74,6 +69,7 @@ def walls_from_house(
         if shells is not None:
             walls += [_wall(item, index, solid, patches) for solid, patches in shells]
             continue
+        # Thicken what is planar, and leave the rest.
         thick = _thickened(item, index, table, rooms, thickness_m)
         if thick is None:
             left[index] = "its surfaces bound no closed solid and lie in no one plane"
@@ -85,7 +81,9 @@ def walls_from_house(
 def _wall(
     item: Item, index: int, solid: Manifold, patches: Sequence[Patch], *, thickened: bool = False
 ) -> Wall:
-    named = {s.name: s.material for s in reversed(item.surfaces)}
+    named = {
+        s.name: s.material for s in reversed(item.surfaces)
+    }  # the first surface of a name counts
     low, high = bounds(solid)
     footprint, top = _footprint_and_top(patches, float(high[1]))
     return Wall(
@@ -114,6 +112,7 @@ def _footprint_and_top(patches: Sequence[Patch], high_y: float) -> tuple[plan.Sh
         footprint.append(plan.polygon_of_triangles(p.positions, faces))
         level_top.append(plan.polygon_of_triangles(p.positions, faces[at_top]))
         points.append(p.positions[faces].reshape(-1, 3))
+    # Trust a level top that covers half the plan, else fit the sloped edge.
     whole, upward = plan.union(footprint), np.concatenate(points)
     if plan.union(level_top).area > 0.5 * whole.area or not len(upward):
         return whole, level_plane(high_y)
@@ -128,6 +127,7 @@ def _thickened(
     flat = flat_patch(item, index)
     if flat is None or abs(flat.normal[1]) > 0.2:
         return None
+    # Look which side of the wall is in a room, 5 cm off its middle.
     normal = flat.normal / np.linalg.norm(flat.normal)
     middle = flat.patch.positions.mean(0)[[0, 2]]
     side = normal[[0, 2]] * 0.05
@@ -147,6 +147,7 @@ def extruded(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | Non
 
     normal: (3,) unit, out of the face that is kept. uv is carried on by its affine map.
     """
+    # Span a frame: along the wall, out of its face, up.
     along = np.cross([0.0, 1.0, 0.0], normal)
     if np.linalg.norm(along) < 1e-6:
         along = np.array([1.0, 0.0, 0.0])
@@ -154,6 +155,7 @@ def extruded(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | Non
     axes = np.stack([along, normal, np.cross(along, normal)])
     origin = patch.positions[0]
     local = (patch.positions - origin) @ axes.T
+    # Carry the texture on by the affine map that fits it.
     columns = np.concatenate([local, np.ones((len(local), 1))], 1)[:, [0, 2, 3]]
     affine = np.linalg.lstsq(columns, patch.uvs, rcond=None)[0]
 
@@ -161,6 +163,7 @@ def extruded(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | Non
         flat = np.stack([positions[:, 0], positions[:, 2], np.ones(len(positions))], 1)
         return np.asarray(flat @ affine)
 
+    # Raise a prism behind the face, in that frame, and turn it back.
     polygons = polygons_of(plan.polygon_of_triangles(local, patch.faces))
     if not polygons:
         return None

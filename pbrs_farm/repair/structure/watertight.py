@@ -121,6 +121,7 @@ def _left(house: House, left: dict[int, str], idle: Sequence[str]) -> tuple[Left
         for i, reason in sorted(left.items())
     ]
     openings = [LeftAsIs(what="opening", id=i, reason="it touches no wall") for i in idle]
+    # Name walls, floors and ceilings first, then openings.
     return (*items, *openings)
 
 
@@ -134,6 +135,7 @@ def _slabs(
     found = []
     visible = visible_areas(planar, footprints)
     for surface, footprint, own in zip(planar, footprints, visible, strict=True):
+        # Keep slabs out of every room but their own.
         for solid in slab(surface, footprint, own, thickness_m, table):
             found.append(without_volumes(solid, surface.tag("hidden"), surface.item, volumes, table))  # fmt: skip
     return found + bridged(planar, thickness_m, table)
@@ -154,6 +156,7 @@ def with_structure(house: House, structure: Structure) -> tuple[House, list[Remo
     removed = []
     for index, item in enumerate(house.items):
         surfaces = structure.surfaces.get(index, item.surfaces)
+        # Take a wall out that lies wholly inside others.
         if index in structure.surfaces and not surfaces:
             removed.append(Removed(item_id=item.id, name=item.name, reason="nothing left of it"))
         else:
