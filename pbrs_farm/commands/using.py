@@ -58,7 +58,8 @@ def _sheet(args: argparse.Namespace) -> int:
 
 def write_sheets(folder: Path, max_views: int) -> None:
     """Write sheet.png and index.html into an output folder and say where they are."""
-    from pbrs_farm.gallery.contact_sheet import contact_sheet, gallery
+    from pbrs_farm.gallery.contact_sheet import contact_sheet
+    from pbrs_farm.gallery.gallery_page import gallery
     from pbrs_farm.store.folder import FolderStore
 
     store = FolderStore(folder)

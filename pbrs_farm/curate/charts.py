@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-Rgb = tuple[int, int, int]
+Rgb = tuple[int, int, int]  # 0..255
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 46, 14, 14, 40  # pixels around the plot area
 _TENTHS: Final = ("0", "0.2", "0.4", "0.6", "0.8", "1")
@@ -27,6 +27,7 @@ class Drawing:
 
     def add(self, tag: str, content: str = "", **attributes: object) -> None:
         """Draw an element above what is there; css= is its class, "_" stands for "-"."""
+        # Translate Python's names into SVG's, leaving out what is empty.
         names = {name: "class" if name == "css" else name.replace("_", "-") for name in attributes}
         written = {names[name]: str(value) for name, value in attributes.items() if value != ""}
         ET.SubElement(self._svg, tag, written).text = content
@@ -88,6 +89,7 @@ def distribution(
     scores: NDArray[np.float64], kept: NDArray[np.bool_], threshold: float, title: str
 ) -> Markup:
     """Scores 0..1 in 50 bars, the kept part of each apart, and the threshold."""
+    # Count all views and the kept ones by the same bars.
     edges = np.linspace(0, 1, 51)
     whole, _ = np.histogram(scores, edges)
     good, _ = np.histogram(scores[kept], edges)
@@ -95,6 +97,7 @@ def distribution(
     frame = Frame(460, 260, f"Distribution of the {title} of all scored views")
     frame.axes(title, _TENTHS, [f"{top * k // 4:,}" for k in range(5)])
     for k in range(50):
+        # Stack the rejected part on the kept part, with a gap between bars.
         x0, x1 = edges[k] + 0.002, edges[k + 1] - 0.002
         frame.box((x0, 0, x1, good[k] / top), "kept")
         frame.box((x0, good[k] / top, x1, whole[k] / top), "rejected")
@@ -111,9 +114,10 @@ def joint(
     frame = Frame(460, 400, "Colour score against depth score")
     frame.axes("colour score", _TENTHS, _TENTHS)
     top = np.log1p(cells.max(initial=0)) or 1.0
-    frame.box((limits[0], limits[1], 1, 1), "zone")
+    frame.box((limits[0], limits[1], 1, 1), "zone")  # where views are kept
     for i, j in zip(*np.nonzero(cells), strict=True):
         inside = (i + 0.5) / n > limits[0] and (j + 0.5) / n > limits[1]
+        # Darken by the logarithm: most cells hold few views.
         opacity = 0.15 + 0.85 * np.log1p(cells[i, j]) / top
         at = (i / n, j / n, (i + 1) / n, (j + 1) / n)
         frame.box(at, "kept" if inside else "rejected", f"opacity:{opacity:.2f}")
@@ -161,11 +165,12 @@ def mirrored(
     width, half = 260, 44  # pixels; the axis lies at half
     drawing = Drawing(width, 2 * half, label)
     top = max(float(above.max(initial=0)), float(below.max(initial=0)), 1e-9)
-    step = width / max(len(above), 1)
+    step = width / max(len(above), 1)  # pixels from bar to bar
     bar = f"{max(step - 0.6, 0.6):.1f}"
     for k, (a, b) in enumerate(zip(above, below, strict=True)):
         fill = "" if colours is None else "fill:rgb({},{},{})".format(*colours[k])
         for value, css, up in ((a, "view", True), (b, "other", False)):
+            # Leave out bars that would not be seen.
             height = float(value) / top * (half - 2)
             if height > 0.05:
                 x, y = f"{k * step:.1f}", f"{half - height if up else half + 1:.1f}"

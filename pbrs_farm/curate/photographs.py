@@ -1,12 +1,6 @@
 """Reads photographs with depth: a folder of pairs, or NYUv2's labelled .mat. Effects: reads files.
 
-A folder is searched at any depth for pairs, in two layouts:
-
-    .../rgb/NAME.jpg with .../depth/NAME.png     rgb may be called color, colour, image or images;
-                                                 depth may be called depth_bfx (preferred) too;
-                                                 where each folder holds one file, the names may
-                                                 differ (SUN RGB-D)
-    .../NAME_rgb.jpg with .../NAME_depth.png     _rgb may be _color, _colour or _image
+docs/selection.md shows the layouts in which pairs are found, at any depth of a folder.
 """
 
 from __future__ import annotations
@@ -22,24 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm import images
+from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.selection.depth_photographs import depth_mm_from_units, sun_rgbd_depth
 
-_RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")
-_DEPTH_NAMES: Final = ("depth_bfx", "depth")
+_RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")  # of folders
+_DEPTH_NAMES: Final = ("depth_bfx", "depth")  # the preferred first
 _RGB_FILES: Final = (".jpg", ".jpeg", ".png", ".bmp")
 _DEPTH_FILES: Final = (".png", ".npy", ".exr")
-_SUFFIX: Final = re.compile(r"(.+)_(rgb|color|colour|image|depth)", re.IGNORECASE)
+_SUFFIX: Final = re.compile(r"(.+)_(rgb|color|colour|image|depth)", re.IGNORECASE)  # of files
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Photo:
-    """A photograph. rgb: (H, W, 3) uint8 sRGB. depth_mm: (H, W) uint16, 0 = unknown."""
+    """A photograph with depth."""
 
     id: str
-    rgb: Srgb8Image
-    depth_mm: NDArray[np.uint16]
+    rgb: Srgb8Image  # (H, W, 3)
+    depth_mm: NDArray[np.uint16]  # (H, W), 0 = unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,34 +55,35 @@ def pairs_in(folder: Path) -> tuple[Pair, ...]:
         raise BadInput(folder, "", "no such folder")
     pairs: list[Pair] = []
     for inner in sorted({folder, *(p for p in folder.rglob("*") if p.is_dir())}):
+        # Look for a folder of pictures beside one of depth.
         names = {p.name.lower(): p for p in inner.iterdir() if p.is_dir()}
         rgb = next((names[n] for n in _RGB_NAMES if n in names), None)
         depth = next((names[n] for n in _DEPTH_NAMES if n in names), None)
         if rgb is not None and depth is not None:
             pairs += _pairs_of_folders(folder, inner, rgb, depth)
+        # Look for pairs by suffix anywhere else.
         if inner.name.lower() not in (*_RGB_NAMES, *_DEPTH_NAMES):
             pairs += _pairs_by_suffix(folder, inner)
     if not pairs:
-        raise BadInput(
-            folder, "", "holds no RGB-D pairs", hint="rgb/NAME.jpg with depth/NAME.png; see docs"
-        )
+        hint = "rgb/NAME.jpg with depth/NAME.png; see docs"
+        raise BadInput(folder, "", "holds no RGB-D pairs", hint=hint)
     return tuple(sorted(pairs, key=lambda pair: pair.id))
 
 
 def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[Pair]:
     pictures, depths = _files(rgb, _RGB_FILES), _files(depth, _DEPTH_FILES)
+    # Pair the only files of two folders whatever they are called (SUN RGB-D).
     if len(pictures) == len(depths) == 1 and pictures.keys() != depths.keys():
         (one,), (other,) = pictures.values(), depths.values()
         return [Pair(inner.relative_to(root).as_posix(), one, other)]
+    # Name the first file whose other half is missing.
     for name, path in (pictures | depths).items():
         if name not in pictures or name not in depths:
             lacks = "depth" if name in pictures else "colour"
             where = depth if name in pictures else rgb
             raise BadInput(path, "", f"only one half of a pair: {where} has no {lacks} {name}")
-    return [
-        Pair((inner.relative_to(root) / name).as_posix(), pictures[name], depths[name])
-        for name in pictures
-    ]
+    place = inner.relative_to(root)
+    return [Pair((place / n).as_posix(), pictures[n], depths[n]) for n in pictures]
 
 
 def _files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
@@ -101,7 +97,8 @@ def _files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
 
 
 def _pairs_by_suffix(root: Path, inner: Path) -> list[Pair]:
-    halves: dict[str, dict[str, Path]] = {}
+    # Gather the halves of each name.
+    halves: dict[str, dict[str, Path]] = {}  # name -> "rgb", "depth" -> file
     for path in sorted(p for p in inner.iterdir() if p.is_file()):
         match = _SUFFIX.fullmatch(path.stem)
         if match is None:
@@ -113,12 +110,10 @@ def _pairs_by_suffix(root: Path, inner: Path) -> list[Pair]:
     for name, found in halves.items():
         if len(found) != 2:
             (kind, path), *_ = found.items()
-            raise BadInput(
-                path, "", f"only one half of a pair: no {'rgb' if kind == 'depth' else 'depth'}"
-            )
-        pairs.append(
-            Pair((inner.relative_to(root) / name).as_posix(), found["rgb"], found["depth"])
-        )
+            lacks = "rgb" if kind == "depth" else "depth"
+            raise BadInput(path, "", f"only one half of a pair: no {lacks}")
+        place = (inner.relative_to(root) / name).as_posix()
+        pairs.append(Pair(place, found["rgb"], found["depth"]))
     return pairs
 
 
@@ -134,6 +129,7 @@ def photo_from_pair(pair: Pair, *, depth_scale: float | None, sun_rgbd: bool) ->
     if stored.shape != rgb.shape[:2]:
         sizes = f"{stored.shape[1]}x{stored.shape[0]}, the picture {rgb.shape[1]}x{rgb.shape[0]}"
         raise BadInput(pair.depth, "", f"sizes differ: depth is {sizes}")
+    # Bring depth to whole millimetres.
     if sun_rgbd:
         if stored.dtype != np.uint16:
             raise BadInput(pair.depth, "", "SUN RGB-D's depth has 16 bits; this file has not")
@@ -196,6 +192,7 @@ class NyuMat:
     def _open_fault(self, text: str) -> str:
         if not self.path.is_file():
             return "no such file"
+        # Tell the usual mistakes apart by the first bytes.
         with self.path.open("rb") as file:
             start = file.read(10)
         if start.startswith(b"MATLAB 5.0"):
@@ -232,6 +229,7 @@ class NyuMat:
         for k in range(len(self)):
             place = f"image {k + 1}"
             try:
+                # Turn MATLAB's (channel, column, row) round.
                 rgb = np.ascontiguousarray(np.asarray(self._images[k]).transpose(2, 1, 0))
                 depth = np.asarray(self._depths[k]).T
             except (OSError, RuntimeError):
@@ -248,6 +246,4 @@ def sha256_of_files(paths: list[Path]) -> str:
                 digests.append(hashlib.file_digest(file, "sha256").hexdigest())
         except OSError as error:
             raise BadInput(path, "", f"cannot be read: {error.strerror}") from None
-    return (
-        digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
-    )
+    return digests[0] if len(digests) == 1 else keys.sha256("".join(digests).encode())

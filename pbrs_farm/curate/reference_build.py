@@ -27,20 +27,16 @@ from pbrs_farm.selection.reference_set import (
     reference_from_histograms,
 )
 
-Progress = Callable[[int, int], None]
-"""Called with (photographs done, photographs in all)."""
+Progress = Callable[[int, int], None]  # (photographs done, photographs in all)
 
 
 @dataclass(frozen=True, slots=True)
 class PhotoOptions:
-    """How photographs are read. depth_scale: depth units per metre, None = by the file's kind.
+    """How photographs are read."""
 
-    sun_rgbd: undo SUN RGB-D's rotation of bits. crop: peel off the registration border.
-    """
-
-    depth_scale: float | None = None
-    sun_rgbd: bool = False
-    crop: bool = True
+    depth_scale: float | None = None  # depth units per metre, None = by the file's kind
+    sun_rgbd: bool = False  # undo SUN RGB-D's rotation of depth bits
+    crop: bool = True  # peel off the registration border
 
 
 def build_reference(
@@ -52,13 +48,14 @@ def build_reference(
 ) -> Reference:
     """The reference of a folder of RGB-D pairs, or of NYUv2's labelled .mat.
 
-    Raises BadInput naming the file that is wrong; see photos.py for the layouts.
+    Raises BadInput naming the file that is wrong; docs/selection.md shows the layouts.
     """
     options = options or PhotoOptions()
     if options.depth_scale is not None and not options.depth_scale > 0:
         raise BadInput("--depth-scale", "", f"{options.depth_scale} is not above 0")
     if not source.exists():
         raise BadInput(source, "", "no such file or folder")
+    # Count the photographs of a .mat or of a folder of pairs, one at a time.
     if source.is_file():
         with NyuMat(source) as mat:
             counted = _counted(mat.photos(), len(mat), settings, options, progress)
@@ -86,6 +83,7 @@ def _counted(
 ) -> dict[str, Histogram]:
     counted: dict[str, Histogram] = {}
     for photo in photos:
+        # Count what is left without the border; the picture itself is not kept.
         rows, columns = registration_border(photo.rgb) if options.crop else (slice(None),) * 2
         rgb, depth = photo.rgb[rows, columns], photo.depth_mm[rows, columns]
         counted[photo.id] = histogram(rgb, depth, settings)

@@ -37,8 +37,8 @@ from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normal
 from pbrs_farm.selection.reference_set import Reference
 from pbrs_farm.store.interface import Store
 
-MAX_ROWS: Final = 40
-_SHOWN_COLOURS: Final = 26
+MAX_ROWS: Final = 40  # of a table of houses or room types
+_SHOWN_COLOURS: Final = 26  # fullest colour bins of a histogram
 
 
 def selection_report(
@@ -55,6 +55,7 @@ def selection_report(
     """
     table = verdict_table(store, run)
     summary = summary_of(table, run, fields, reference)
+    # Draw scored views only; count all of them.
     scored = table.filter(table["colour_score"].is_valid())
     shown = {"kept": _spread(scored, n_examples), "rejected": _rejected(scored, n_examples)}
     examples = _Examples(store, reference, fields)
@@ -122,6 +123,7 @@ def _credits(store: Store, *shown: Any) -> list[str]:
     lines: dict[str, None] = {}
     for house in dict.fromkeys(h for table in shown for h in table["house"].to_pylist()):
         try:
+            # A house without a bundle, or with a damaged one, has no line.
             facts = json.loads(store.get(keys.house_key(house, "house.json")))
             line = (facts.get("source") or {}).get("attribution")
         except (ObjectMissing, ValueError, AttributeError):
@@ -143,6 +145,7 @@ def _is_kept(scored: Any) -> NDArray[np.bool_]:
 def _spread(scored: Any, n: int) -> Any:
     """n kept rows from the best to the worst, at equal steps of rank."""
     table = scored.filter(scored["kept"])
+    # Rank by the smaller of the two scores.
     order = np.argsort(-_worst(table), kind="stable")
     picked = np.unique(np.linspace(0, max(len(order) - 1, 0), min(n, len(order))).round())
     return table.take(pa.array(order[picked.astype(np.intp)]))
@@ -167,6 +170,7 @@ class _Examples:
     def __init__(self, store: Store, reference: Reference, fields: SelectionFields) -> None:
         self._store = store
         self._mode = Mode(fields.score_mode)
+        # Look up photographs by their ids.
         self._binning = reference.facts.binning
         self._places = {name: k for k, name in enumerate(reference.facts.ids)}
         self._colour, self._depth = reference.colour_shares(), reference.depth_shares()
@@ -212,8 +216,10 @@ class _Examples:
 
 def bin_colours(bins: Iterable[int], space: str) -> NDArray[np.uint8]:
     """(a * b * c, 3) sRGB of the middle of each colour bin, in the order of the counts."""
+    # Enumerate the middles, the first channel slowest.
     axes = [(np.arange(n) + 0.5) * 256 / n for n in bins]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    # Bring the middle of a YCbCr bin back to RGB (BT.601, full range).
     if space == "ycbcr":
         y, cb, cr = grid[:, 0], grid[:, 1] - 128, grid[:, 2] - 128
         grid = np.stack([y + 1.402 * cr, y - 0.344136 * cb - 0.714136 * cr, y + 1.772 * cb], -1)

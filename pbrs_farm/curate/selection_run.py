@@ -35,10 +35,9 @@ from pbrs_farm.selection.scores import SCORES, Scorer, merged
 from pbrs_farm.selection.verdicts import verdicts
 from pbrs_farm.store.interface import Store
 
-_METADATA: Final = b"pbrs_farm"
+_METADATA: Final = b"pbrs_farm"  # of the Parquet file: reference and mode of its scores
 
-Progress = Callable[[int, int], None]
-"""Called with (houses done, houses in all)."""
+Progress = Callable[[int, int], None]  # (houses done, houses in all)
 
 
 def select(
@@ -59,6 +58,7 @@ def select(
     houses = _houses(store)
     sources = {h: _source(store, h, views, score_mode) for h, views in houses.items()}
     facts = {"reference": reference.digest, "score_mode": str(score_mode)}
+    # Keep the scores that still hold; score the houses that have none.
     old = _kept_rows(store, run, facts, sources)
     known = set(old["house"].unique().to_pylist())
     todo = [h for h in sources if h not in known and houses[h]]
@@ -83,16 +83,11 @@ def judge_again(
 
     Raises BadInput when there is no such run, or when it has scores of another reference or mode.
     """
-    table = _stored_run(store, run)
-    if table is None:
-        raise BadInput(
-            keys.selection_key(run, "parquet"), "", "no such run", hint="`pbrs-farm select` first"
-        )
+    table = verdict_table(store, run)
     facts = {"reference": reference.digest, "score_mode": fields.score_mode}
     if _facts(table) != facts:
-        raise BadInput(
-            keys.selection_key(run, "parquet"), "", "scored with another reference or --score-mode"
-        )
+        what = "scored with another reference or --score-mode"
+        raise BadInput(keys.selection_key(run, "parquet"), "", what)
     scores = table.select(SCORES.names).cast(SCORES)
     return _write(store, run, scores, fields, facts, reference, n_scored_houses=0)
 
@@ -101,9 +96,8 @@ def verdict_table(store: Store, run: str = "default") -> Any:
     """The stored table of a run (scores.SCORES and the columns of verdicts); BadInput if none."""
     table = _stored_run(store, run)
     if table is None:
-        raise BadInput(
-            keys.selection_key(run, "parquet"), "", "no such run", hint="`pbrs-farm select` first"
-        )
+        hint = "`pbrs-farm select` first"
+        raise BadInput(keys.selection_key(run, "parquet"), "", "no such run", hint=hint)
     return table
 
 
@@ -126,15 +120,16 @@ def _houses(store: Store, below: str = f"{keys.FOLDERS[0]}/") -> dict[str, dict[
 
 def _source(store: Store, house: str, views: Mapping[str, bool], score_mode: Mode) -> str:
     """Digest of what the house's scores depend on: from its manifest, else from the files."""
+    # The manifest holds the hash of every file: without one, read the files.
     try:
         hashes = sha256_by_key(store.get(keys.house_key(house, keys.MANIFEST)))
     except (ObjectMissing, ValueError, KeyError, TypeError):
         hashes = {}
-    told = {}
+    digests = {}
     for view, has in views.items():
         key = keys.view_key(house, view, "histogram.json")
-        told[view] = "" if not has else hashes.get(key) or keys.sha256(store.get(key))
-    return keys.digest(house, told, str(score_mode))
+        digests[view] = "" if not has else hashes.get(key) or keys.sha256(store.get(key))
+    return keys.digest(house, digests, str(score_mode))
 
 
 def _pack(
@@ -146,7 +141,8 @@ def _pack(
         if pack_source(data) == source:
             return pack_from_bytes(data, key)
     except (ObjectMissing, BadInput):
-        pass  # made again
+        pass  # missing or damaged: made again
+    # Pack the records of one setting, the others marked as failed.
     records, failed = _records(store, house, views)
     settings = records[0].settings if records else HistogramFields()
     for record in records:
@@ -198,6 +194,7 @@ def _kept_rows(store: Store, run: str, facts: dict[str, str], sources: Mapping[s
     if table is None or _facts(table) != facts or set(SCORES.names) - set(table.column_names):
         return SCORES.empty_table()
     table = table.select(SCORES.names).cast(SCORES)
+    # Keep the rows of houses whose histograms have the digest they were scored with.
     houses, rows = table["house"].to_numpy(), table["source"].to_numpy()
     holds = np.fromiter(
         (sources.get(h) == s for h, s in zip(houses, rows, strict=True)), bool, len(houses)
@@ -215,6 +212,7 @@ def _write(
     *,
     n_scored_houses: int,
 ) -> SelectionSummary:
+    # Write the table with its verdicts, the same as lines of JSON, and the summary.
     judged = verdicts(scores, fields)
     file = io.BytesIO()
     metadata = {_METADATA: keys.canonical_json(facts).encode()}
@@ -232,6 +230,7 @@ def json_lines(table: Any) -> bytes:
     opened = [("{" if k == 0 else ",") + json.dumps(name) + ":" for k, name in enumerate(names)]
     file = io.BytesIO()  # getvalue does not copy: at the paper's scale this is 300 MB
     for batch in table.to_batches(max_chunksize=16384):
+        # Join the columns' texts to a line a row.
         pieces: list[Any] = []
         for head, name in zip(opened, names, strict=True):
             pieces += [head, _json_values(batch.column(name))]
@@ -243,9 +242,10 @@ def json_lines(table: Any) -> bytes:
 def _json_values(column: Any) -> Any:
     """The column's values as the text that JSON has for them."""
     if pa.types.is_string(column.type):
-        words = column.dictionary_encode()
-        texts = pa.array([json.dumps(w) for w in words.dictionary.to_pylist()], pa.string())
-        values = texts.take(words.indices)
+        # Quote each text once: a column has few different ones.
+        encoded = column.dictionary_encode()
+        texts = pa.array([json.dumps(t) for t in encoded.dictionary.to_pylist()], pa.string())
+        values = texts.take(encoded.indices)
     elif pa.types.is_floating(column.type):
         values = pc.round(column, ndigits=6).cast(pa.string())
     else:

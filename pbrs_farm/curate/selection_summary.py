@@ -1,4 +1,4 @@
-"""What a selection came to, as numbers: yield, reasons, per house and room type; no effects."""
+"""The summary of a selection: yield, reasons, tallies per house and room type; no effects."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from pbrs_farm.selection.verdicts import REASONS
 
 THRESHOLDS: Final = tuple(round(0.01 * k, 2) for k in range(101))
 
+# What the paper kept of its own pictures at 0.70 (section 3.3): 73.0 %.
 PAPER_VIEWS: Final = 779_342
 PAPER_KEPT: Final = 568_793
-"""What the paper kept of its own pictures at 0.70 (section 3.3): 73.0 %."""
 
 
 class Tally(BaseModel):
@@ -42,12 +42,7 @@ class ReferenceSummary(BaseModel):
 
 
 class SelectionSummary(BaseModel):
-    """selection.json. reasons: rejected views by their first reason.
-
-    modes: scored views by the lighting mode they were scored on. yield_both: share of the scored
-    views whose two scores are above each of THRESHOLDS, whatever their image quality.
-    n_scored_houses: houses scored in this very run, the others had scores; not stored.
-    """
+    """selection.json: the counts of a run, and what they were made with."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     run: str
@@ -56,20 +51,21 @@ class SelectionSummary(BaseModel):
     views: int
     scored: int
     kept: int
-    reasons: dict[str, int]
-    modes: dict[str, int]
-    colour_quartiles: tuple[float, ...]
+    reasons: dict[str, int]  # rejected views by their first reason
+    modes: dict[str, int]  # scored views by the lighting mode they were scored on
+    colour_quartiles: tuple[float, ...]  # with minimum and maximum; empty without scores
     depth_quartiles: tuple[float, ...]
-    yield_both: tuple[float, ...]
+    yield_both: tuple[float, ...]  # share with both scores above each of THRESHOLDS
     houses: tuple[Tally, ...]
     room_types: tuple[Tally, ...]
-    n_scored_houses: int = 0
+    n_scored_houses: int = 0  # houses scored in this very run; not stored
 
 
 def summary_of(
     judged: Any, run: str, fields: SelectionFields, reference: Reference
 ) -> SelectionSummary:
     """The summary of a table of verdicts."""
+    # Views without a score are null there and count in no statistics of scores.
     colour, depth = (judged[k].drop_null().to_numpy() for k in ("colour_score", "depth_score"))
     counts = {r["values"]: r["counts"] for r in pc.value_counts(judged["reason"]).to_pylist()}
     modes = pc.value_counts(judged["mode"].filter(judged["colour_score"].is_valid())).to_pylist()
@@ -102,6 +98,7 @@ def yield_curve(scores: np.ndarray[Any, np.dtype[np.float64]]) -> list[float]:
     """Share of scores above each of THRESHOLDS; zeros where there are no scores."""
     if not len(scores):
         return [0.0] * len(THRESHOLDS)
+    # Count by sorting once: the scores above each threshold.
     above = len(scores) - np.searchsorted(np.sort(scores), THRESHOLDS, side="right")
     return [round(float(n) / len(scores), 6) for n in above]
 

@@ -15,28 +15,24 @@ from pbrs_farm.images import array_from_png
 
 
 class ClassRow(BaseModel):
-    """One NYU40 class. pixel_share: of all pixels. n_images: that see it. n_instances: seen in all."""
+    """How often one NYU40 class is seen."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     nyu40: int
     name: str
-    pixel_share: float
-    n_images: int
-    n_instances: int
+    pixel_share: float  # of the pixels of all images
+    n_images: int  # that see the class
+    n_instances: int  # in all images
 
 
 class ClassStatistics(BaseModel):
-    """Classes by pixel share, largest first; id 0 is what has no class or is nothing.
-
-    classes_per_image: mean number of classes, 0 not counted. unmapped: "house: source class (how
-    many items)" of every item whose source's class has no place in the table; it is otherprop.
-    """
+    """Classes by pixel share, largest first; id 0 is what has no class or is nothing."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     n_views: int
-    classes_per_image: float
+    classes_per_image: float  # mean, id 0 not counted
     rows: tuple[ClassRow, ...]
-    unmapped: tuple[str, ...]
+    unmapped: tuple[str, ...]  # "house: source class (items)" that became otherprop
 
     def text(self) -> str:
         """The statistics as a Markdown table and a list."""
@@ -64,6 +60,7 @@ def class_statistics(folder: Path) -> ClassStatistics:
     views = [v for v in views_of(folder) if v.file("semantic.png") and "instances" in v.facts]
     if not views:
         raise BadInput(folder, "", "no finished view with labels")
+    # Sum over all views, indexed by class id.
     pixels, images, instances = (np.zeros(256, np.int64) for _ in range(3))
     for view in views:
         counts = _pixels_of_classes(view)

@@ -1,7 +1,4 @@
-"""`pbrs-farm sheet`: a contact sheet (PNG) of a finished output folder. Effects: reads files.
-
-The HTML gallery of the same folder is `gallery`, in gallery.py.
-"""
+"""`pbrs-farm sheet`: a contact sheet (PNG) of a finished output folder. Effects: reads files."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import io
 import unicodedata
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -18,21 +14,20 @@ from PIL import Image, ImageDraw, ImageFont
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
-from pbrs_farm.gallery.gallery_page import attributions, gallery
+from pbrs_farm.gallery.gallery_page import attributions
 from pbrs_farm.gallery.label_colours import NYU40_COLOURS
 from pbrs_farm.gallery.tiles import TILES, Tile, tiles_of
-
-__all__ = ["contact_sheet", "gallery", "spread_views"]
 
 _TILE_PX: Final = 224
 _GAP_PX: Final = 6
 _MARGIN_PX: Final = 28
-_PAPER: Final = (16, 18, 23)
-_INK: Final = (236, 238, 242)
-_FAINT: Final = (142, 149, 163)
-_EMPTY: Final = (29, 32, 40)
+PAPER: Final = (16, 18, 23)  # background, sRGB
+INK: Final = (236, 238, 242)  # text
+_FAINT: Final = (142, 149, 163)  # text of less weight
+_EMPTY: Final = (29, 32, 40)  # a tile that is missing
 
 _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+_Chip = tuple[int, int]  # of the legend: left edge in px, NYU40 id
 
 
 def contact_sheet(folder: Path, *, max_views: int = 12) -> bytes:
@@ -54,7 +49,7 @@ def contact_sheet(folder: Path, *, max_views: int = 12) -> bytes:
     width = 2 * _MARGIN_PX + len(TILES) * _TILE_PX + (len(TILES) - 1) * _GAP_PX
     legend = _legend_rows(classes, width - 2 * _MARGIN_PX)
     header, foot = 112, 48 + 28 * len(legend) + 22 * len(credits)
-    sheet = Image.new("RGB", (width, header + sum(heights) + foot), _PAPER)
+    sheet = Image.new("RGB", (width, header + sum(heights) + foot), PAPER)
     draw = ImageDraw.Draw(sheet)
     _draw_header(draw, everything, len(views))
     y = header
@@ -73,16 +68,19 @@ def contact_sheet(folder: Path, *, max_views: int = 12) -> bytes:
 
 def spread_views(views: Sequence[ViewEntry], max_views: int) -> list[ViewEntry]:
     """At most max_views of views, taken in turn from each house and there from each room."""
+    # Group by house and room.
     rooms: dict[str, dict[str, list[ViewEntry]]] = defaultdict(lambda: defaultdict(list))
     for view in views:
         rooms[view.house.id][view.room_id].append(view)
     turns = {house: _in_turn(of_room.values()) for house, of_room in rooms.items()}
+    # Take in turn, then go back to the order of the folder.
     chosen = _in_turn(turns.values())[: max(max_views, 0)]
     places = {id(view): i for i, view in enumerate(views)}
     return sorted(chosen, key=lambda view: places[id(view)])
 
 
 def _in_turn(lists: Iterable[Sequence[ViewEntry]]) -> list[ViewEntry]:
+    """The first of each list, then the second of each, and so on."""
     columns = [list(x) for x in lists]
     longest = max((len(x) for x in columns), default=0)
     return [x[i] for i in range(longest) for x in columns if i < len(x)]
@@ -90,7 +88,7 @@ def _in_turn(lists: Iterable[Sequence[ViewEntry]]) -> list[ViewEntry]:
 
 def _row_height(tiles: Sequence[Tile]) -> int:
     shown = [t.pixels.shape[0] for t in tiles if t.pixels is not None]
-    return 34 + (max(shown) if shown else _TILE_PX * 3 // 4) + 12
+    return 34 + max(shown, default=_TILE_PX * 3 // 4) + 12  # title above, gap below
 
 
 def _classes(rows: Sequence[Sequence[Tile]]) -> list[int]:
@@ -124,7 +122,7 @@ def _drawable(text: str) -> str:
 
 def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown: int) -> None:
     n_houses = len({view.house.id for view in views})
-    draw.text((_MARGIN_PX, 22), "pbrs_farm", _INK, _font(30))
+    draw.text((_MARGIN_PX, 22), "pbrs_farm", INK, _font(30))
     shown = "" if n_shown == len(views) else f"{n_shown} of "
     text = (
         f"{shown}{len(views)} view{'s'[: len(views) != 1]}, "
@@ -132,7 +130,7 @@ def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown:
     )
     draw.text((_MARGIN_PX + 172, 34), text, _FAINT, _font(16))
     for i, kind in enumerate(TILES):
-        draw.text((_MARGIN_PX + i * (_TILE_PX + _GAP_PX), 80), kind.title, _INK, _font(15))
+        draw.text((_MARGIN_PX + i * (_TILE_PX + _GAP_PX), 80), kind.title, INK, _font(15))
 
 
 def _draw_row(
@@ -140,7 +138,7 @@ def _draw_row(
 ) -> None:
     draw.line([(_MARGIN_PX, y + 2), (sheet.width - _MARGIN_PX, y + 2)], fill=(38, 42, 52), width=1)
     title = _drawable(view.room_name)
-    draw.text((_MARGIN_PX, y + 9), title, _INK, _font(16))
+    draw.text((_MARGIN_PX, y + 9), title, INK, _font(16))
     after = _MARGIN_PX + draw.textlength(title, _font(16)) + 14
     draw.text((after, y + 11), _drawable(f"{view.house.name}, view {view.id}"), _FAINT, _font(14))
     for i, tile in enumerate(tiles):
@@ -151,44 +149,41 @@ def _draw_row(
 def _draw_tile(
     sheet: Image.Image, draw: ImageDraw.ImageDraw, at: tuple[int, int], tile: Tile
 ) -> None:
+    # Say in an empty frame why a tile is missing.
     if tile.pixels is None:
         size = (_TILE_PX, _TILE_PX * 3 // 4)
         draw.rectangle([at, (at[0] + size[0] - 1, at[1] + size[1] - 1)], _EMPTY)
         middle = (at[0] + size[0] // 2, at[1] + size[1] // 2)
         draw.text(middle, tile.missing, _FAINT, _font(15), anchor="mm")
         return
+    # Lay the note over the picture's corner, on a dark ground.
     sheet.paste(Image.fromarray(tile.pixels), at)
     if tile.note:
         box = draw.textbbox((at[0] + 6, at[1] + 5), tile.note, _font(12))
-        draw.rectangle([box[0] - 4, box[1] - 3, box[2] + 4, box[3] + 3], (16, 18, 23))
-        draw.text((at[0] + 6, at[1] + 5), tile.note, _INK, _font(12))
-
-
-@dataclass(frozen=True, slots=True)
-class _Chip:
-    x: int
-    nyu40: int
+        draw.rectangle([box[0] - 4, box[1] - 3, box[2] + 4, box[3] + 3], PAPER)
+        draw.text((at[0] + 6, at[1] + 5), tile.note, INK, _font(12))
 
 
 def _legend_rows(classes: Sequence[int], width: int) -> list[list[_Chip]]:
+    """The legend's rows, each as wide as width allows."""
     rows: list[list[_Chip]] = []
-    x = width
+    x = width  # where the next chip would begin
     for nyu40 in classes:
         length = 22 + round(_font(14).getlength(NYU40_NAMES[nyu40])) + 22
         if not rows or x + length > width:
             rows.append([])
             x = 0
-        rows[-1].append(_Chip(x, nyu40))
+        rows[-1].append((x, nyu40))
         x += length
     return rows
 
 
 def _draw_legend(draw: ImageDraw.ImageDraw, y: int, rows: Sequence[Sequence[_Chip]]) -> int:
     for row in rows:
-        for chip in row:
-            x = _MARGIN_PX + chip.x
-            colour = tuple(int(c) for c in NYU40_COLOURS[chip.nyu40])
+        for left, nyu40 in row:
+            x = _MARGIN_PX + left
+            colour = tuple(NYU40_COLOURS[nyu40].tolist())
             draw.rounded_rectangle([x, y + 2, x + 14, y + 16], 3, colour, (70, 76, 90))
-            draw.text((x + 22, y), NYU40_NAMES[chip.nyu40], _INK, _font(14))
+            draw.text((x + 22, y), NYU40_NAMES[nyu40], INK, _font(14))
         y += 28
     return y

@@ -23,9 +23,9 @@ from pbrs_farm.gallery.label_colours import NYU40_COLOURS
 from pbrs_farm.gallery.templates import page
 from pbrs_farm.gallery.tiles import TILES, Tile, tiles_of
 
-THUMBNAIL_PX: Final = 320
+THUMBNAIL_PX: Final = 320  # longer edge
+# Of a thumbnail: 200 views of 9 tiles stay under 30 MB with base64's third on top.
 MAX_TILE_BYTES: Final = 11_000
-"""Of a thumbnail: 200 views of 9 tiles stay under 30 MB with base64's third on top."""
 
 
 def gallery(folder: Path) -> str:
@@ -37,6 +37,7 @@ def gallery(folder: Path) -> str:
     cards: list[dict[str, Any]] = []
     aspect = "4 / 3"
     for view in views:
+        # Give every tile the shape of the first picture there is.
         tiles = tiles_of(view, THUMBNAIL_PX)
         shape = next((t.pixels.shape for t in tiles if t.pixels is not None), None)
         if not cards and shape is not None:
@@ -92,6 +93,7 @@ def _card(root: Path, view: ViewEntry, tiles: Sequence[Tile], reason: str | None
 def _tile_url(tile: Tile) -> str:
     if tile.pixels is None:
         return ""
+    # Flat colours stay exact as a PNG with a palette, where that is small enough.
     if tile.kind.is_flat:
         data = _palette_png(tile.pixels)
         if len(data) <= MAX_TILE_BYTES:
@@ -110,8 +112,9 @@ def small_jpeg(pixels: Srgb8Image, max_bytes: int) -> bytes:
         data = images.jpeg_from_array(pixels, quality)
         if len(data) <= max_bytes:
             return data
-    half = images.thumbnail(pixels, max_edge_px=max(16, max(pixels.shape[:2]) * 3 // 4))
-    return small_jpeg(half, max_bytes) if half.shape != pixels.shape else data
+    # Three quarters of the size, until it fits or cannot be made smaller.
+    smaller = images.thumbnail(pixels, max_edge_px=max(16, max(pixels.shape[:2]) * 3 // 4))
+    return small_jpeg(smaller, max_bytes) if smaller.shape != pixels.shape else data
 
 
 def _palette_png(pixels: Srgb8Image) -> bytes:

@@ -1,4 +1,4 @@
-"""How layers of numbers look on a sheet: depth, normals, classes, instances as colours; no effects."""
+"""Label layers as colours: depth, normals, classes, instances, boundaries; no effects."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ is the colour farthest in Oklab from those before it, so any two differ by 0.085
 _NEAR_TO_FAR: Final = np.array(
     [[253, 246, 214], [164, 216, 172], [64, 172, 172], [34, 112, 162], [42, 54, 122], [18, 14, 42]],
     np.float64,
-)
+)  # sRGB of depths at equal steps
 
 
 def depth_range_m(depth_mm: NDArray[np.integer]) -> tuple[float, float]:
@@ -44,6 +44,7 @@ def depth_colours(
 
     near_m, far_m: the ends of the scale; depth_range_m of the picture when None.
     """
+    # Scale to 0..1, then look up a ramp of 256 colours.
     low, high = depth_range_m(depth_mm)
     low = low if near_m is None else near_m
     high = high if far_m is None else far_m
@@ -54,7 +55,7 @@ def depth_colours(
     )
     picked = np.rint(table[np.rint(share * 255).astype(np.intp)])
     colours = np.asarray(picked, np.uint8)
-    colours[depth_mm == 0] = (58, 58, 62)
+    colours[depth_mm == 0] = (58, 58, 62)  # nothing: a grey the ramp has not
     return colours
 
 
@@ -66,9 +67,11 @@ def semantic_colours(nyu40: NDArray[np.integer]) -> Srgb8Image:
 def instance_colours(instance: NDArray[np.integer]) -> Srgb8Image:
     """(H, W, 3) a colour per instance id, the same in every view; neighbouring ids lie far apart."""
     ids = np.arange(int(instance.max(initial=0)) + 1)
+    # Step hues by the golden ratio, and vary value and saturation, so neighbours differ.
     hue = (ids * 0.61803398875) % 1.0
     value = np.array([0.96, 0.74, 0.56])[ids // 2 % 3]
     saturation = np.array([0.72, 0.50, 0.85])[ids // 5 % 3]
+    # HSV to RGB.
     ring = np.clip(np.abs((hue[:, None] * 6 + [0, 4, 2]) % 6 - 3) - 1, 0, 1)
     table = 255 * value[:, None] * (1 - saturation[:, None] * (1 - ring))
     table[0] = NYU40_COLOURS[0]

@@ -16,13 +16,13 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.coco import PICTURES
 from pbrs_farm.formats.output_folder import ViewEntry
+from pbrs_farm.gallery.contact_sheet import INK, PAPER
 from pbrs_farm.gallery.label_colours import NYU40_COLOURS, semantic_colours
 from pbrs_farm.images import array_from_png
 
-_ZOOM: Final = 8
-_PAPER: Final = (16, 18, 23)
-_INK: Final = (236, 238, 242)
-_ROW_PX: Final = 24
+_ZOOM: Final = 8  # of the magnified edge
+_ROW_PX: Final = 24  # height of a row of the legend
+_CHIP_PX: Final = 190  # width of an entry of the legend
 
 
 def label_sheet(view: ViewEntry) -> Srgb8Image:
@@ -36,6 +36,7 @@ def label_sheet(view: ViewEntry) -> Srgb8Image:
     over = _overlaid(picture, semantic, boundary)
     window = _busiest(boundary)
     near = [_magnified(image[window]) for image in (picture, over)]
+    # Stack: whole pictures, magnified edges, legend.
     top = np.concatenate([picture, over], axis=1)
     bottom = np.concatenate([_padded(image, picture.shape) for image in near], axis=1)
     return np.concatenate([top, bottom, legend(semantic, top.shape[1])], axis=0)
@@ -43,18 +44,19 @@ def label_sheet(view: ViewEntry) -> Srgb8Image:
 
 def legend(semantic: NDArray[Any], width_px: int) -> Srgb8Image:
     """(H', width_px, 3) a row of chips per class in semantic, largest share first."""
+    # List the classes that are seen, largest first.
     counts = np.bincount(semantic.reshape(-1), minlength=1)
     classes = [int(i) for i in np.argsort(-counts, kind="stable") if counts[i]]
-    columns = max(1, width_px // 190)
+    columns = max(1, width_px // _CHIP_PX)
     n_rows = -(-len(classes) // columns)
-    sheet = Image.new("RGB", (width_px, _ROW_PX * n_rows + 8), _PAPER)
+    sheet = Image.new("RGB", (width_px, _ROW_PX * n_rows + 8), PAPER)
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(14)
     for k, nyu40 in enumerate(classes):
-        x, y = 8 + k % columns * 190, 6 + k // columns * _ROW_PX
-        colour = tuple(int(c) for c in NYU40_COLOURS[nyu40])
+        x, y = 8 + k % columns * _CHIP_PX, 6 + k // columns * _ROW_PX
+        colour = tuple(NYU40_COLOURS[nyu40].tolist())
         draw.rectangle([x, y, x + 14, y + 14], colour, (90, 96, 110))
         share = 100 * counts[nyu40] / semantic.size
-        draw.text((x + 22, y - 1), f"{NYU40_NAMES[nyu40]} {share:.1f} %", _INK, font)
+        draw.text((x + 22, y - 1), f"{NYU40_NAMES[nyu40]} {share:.1f} %", INK, font)
     return np.asarray(sheet, np.uint8)
 
 
@@ -83,6 +85,7 @@ def _overlaid(
 def _busiest(boundary: NDArray[Any]) -> tuple[slice, slice]:
     """The window, an eighth of the picture each way, with the most boundary pixels in it."""
     height, width = (max(1, n // _ZOOM) for n in boundary.shape)
+    # Sum over every window at once, from a summed-area table.
     edges = np.pad((boundary > 0).astype(np.int64), ((1, 0), (1, 0))).cumsum(0).cumsum(1)
     inside = edges[height:, width:] - edges[:-height, width:] - edges[height:, :-width]
     inside += edges[:-height, :-width]
@@ -95,7 +98,6 @@ def _magnified(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _padded(image: NDArray[np.uint8], shape: tuple[int, ...]) -> NDArray[np.uint8]:
-    canvas = np.zeros(shape, np.uint8)
-    canvas[...] = _PAPER
+    canvas = np.broadcast_to(np.array(PAPER, np.uint8), shape).copy()
     canvas[: image.shape[0], : image.shape[1]] = image[: shape[0], : shape[1]]
     return canvas

@@ -1,4 +1,4 @@
-"""One view -> the nine tiles a sheet shows of it, as small pictures. Effects: reads picture files."""
+"""The nine tiles that sheets show of a view, as small pictures. Effects: reads picture files."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from pbrs_farm.gallery import label_colours as colours
 
 @dataclass(frozen=True, slots=True)
 class TileKind:
-    """A column of the sheet. is_photo: a picture as it is; else numbers shown as colours."""
+    """A column of the sheet."""
 
     layer: str
     title: str
-    is_photo: bool = False
+    is_photo: bool = False  # a picture as it is; else numbers shown as colours
     is_flat: bool = False  # areas of one value, shown unblurred
 
     @property
@@ -55,17 +55,13 @@ _COLOURS: Final[dict[str, Callable[[NDArray[Any]], Srgb8Image]]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tile:
-    """A tile of a view. pixels: (H, W, 3) sRGB, or None with the reason in missing.
-
-    note: what a reader needs with it ("0.8 to 5.4 m"). classes: (NYU40 id, share of the picture),
-    largest first, for the layer semantic only.
-    """
+    """A tile of a view."""
 
     kind: TileKind
-    pixels: Srgb8Image | None
-    missing: str = ""
-    note: str = ""
-    classes: tuple[tuple[int, float], ...] = ()
+    pixels: Srgb8Image | None  # (H, W, 3), None where the layer is missing
+    missing: str = ""  # why it is
+    note: str = ""  # what a reader needs with it ("0.8 to 5.4 m")
+    classes: tuple[tuple[int, float], ...] = ()  # of semantic: (NYU40 id, share), largest first
 
 
 def tiles_of(view: ViewEntry, max_edge_px: int = 320) -> tuple[Tile, ...]:

@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 from pbrs_farm.core.classes import NYU40_NAMES
 
 N_CLASSES: Final = len(NYU40_NAMES)
-_FLOOR: Final = 0.01
-"""Of a picture: keeps the first view of a class from being worth infinitely much."""
+_FLOOR: Final = 0.01  # of a picture: bounds the gain of the first view of a class
 
 
 def class_shares(texts: Sequence[str]) -> NDArray[np.float32]:
     """(n, 41) share of the picture of each NYU40 class, from "1:0.53 2:0.21" texts."""
     shares = np.zeros((len(texts), N_CLASSES), np.float32)
     for row, text in enumerate(texts):
-        for word in text.split():
-            nyu40, _, share = word.partition(":")
+        for pair in text.split():
+            nyu40, _, share = pair.partition(":")
             shares[row, int(nyu40)] = float(share)
     return shares
 
@@ -34,13 +33,17 @@ def balanced(shares: NDArray[np.float32], n_views: int) -> NDArray[np.bool_]:
     submodular, so greedy comes within 1 - 1/e of the best, and a gain that was computed earlier
     bounds the present one (Minoux 1978). Ties go to the earlier row.
     """
+    # Start from the gain of each view alone, the largest on top of the heap.
     taken = np.zeros(len(shares), bool)
-    total = np.full(shares.shape[1], _FLOOR, np.float64)
+    total = np.full(shares.shape[1], _FLOOR, np.float64)  # share gathered of each class
     gains = np.log1p(shares / _FLOOR).sum(axis=1, dtype=np.float64)
+    # (-gain, row): an upper bound, since gains only fall as classes fill up.
     heap = [(-float(gain), row) for row, gain in enumerate(gains)]
     heapq.heapify(heap)
+    # Keep of each view the classes it has, and their shares.
     held = [(np.nonzero(s)[0], s[s != 0].astype(np.float64)) for s in shares]
     for _ in range(min(n_views, len(shares))):
+        # Compute the top view's gain anew; take it if no other bound is above.
         while True:
             _bound, row = heapq.heappop(heap)
             classes, share = held[row]

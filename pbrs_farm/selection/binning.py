@@ -16,15 +16,14 @@ from pydantic import BaseModel, ConfigDict
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.similarity import best_match
 
-MIN_PASSING: Final = 0.95
-"""Share of the reference's own images that must pass at the binning that is chosen (issue 8)."""
+MIN_PASSING: Final = 0.95  # share of the reference's own images that pass at the chosen binning
 
 
 class Binning(BaseModel):
     """Bins that are compared: colour per channel, jointly, and depth over the range of settings."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    colour: tuple[int, int, int]
+    colour: tuple[int, int, int]  # bins of each channel
     depth: int
 
     @property
@@ -43,15 +42,12 @@ BINNINGS: Final = tuple(
 
 
 class BinningRow(BaseModel):
-    """How a reference's own images score at one binning, each left out in turn.
-
-    *_passing: share above the threshold; *_median: median best intersection.
-    """
+    """How a reference's own images score at one binning, each left out in turn."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     binning: Binning
-    colour_passing: float
-    colour_median: float
+    colour_passing: float  # share of the images above the threshold
+    colour_median: float  # median best intersection
     depth_passing: float
     depth_median: float
 
@@ -67,10 +63,12 @@ def binning_table(
         raise ValueError("a reference needs two images at least: each is compared with the others")
     rows = []
     for binning in BINNINGS:
+        # Leave out binnings that are finer than what was counted.
         if max(binning.colour) ** 3 > colour.shape[1] or binning.depth > depth.shape[1]:
             continue
         c = normalised(coarser_colour(colour, binning.colour))
         d = normalised(coarser_depth(depth, binning.depth))
+        # Match every image with all the others.
         c_best, _ = best_match(c, c, leave_out_self=True)
         d_best, _ = best_match(d, d, leave_out_self=True)
         rows.append(
@@ -90,6 +88,7 @@ def finest_passing(rows: Sequence[BinningRow], min_passing: float = MIN_PASSING)
 
     Where not even the coarsest passes, the coarsest.
     """
+    # Rows run from coarse to fine, so the last that passes is the finest.
     colour = [r.binning.colour for r in rows if r.colour_passing >= min_passing]
     depth = [r.binning.depth for r in rows if r.depth_passing >= min_passing]
     coarsest = rows[0].binning
@@ -111,6 +110,7 @@ def table_text(rows: Sequence[BinningRow], chosen: Binning) -> str:
             f"{r.colour_median:>6.3f}  {d} {r.binning.depth:>8} {100 * r.depth_passing:>5.1f} % "
             f"{r.depth_median:>6.3f}"
         )
+    # Say where not even the coarsest binning lets enough images pass.
     coarsest = rows[0]
     for name, passing in (("colour", coarsest.colour_passing), ("depth", coarsest.depth_passing)):
         if passing < MIN_PASSING:

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import Srgb8Image
 
+# A pixel of the registration border has all channels at least WHITE, or at most BLACK.
 WHITE: Final = 245
 BLACK: Final = 10
-"""A pixel of the registration border has all channels at least WHITE, or at most BLACK."""
 
-_BORDER_SHARE: Final = 0.97
-_MAX_BORDER: Final = 1 / 8
+_BORDER_SHARE: Final = 0.97  # of a row or column that is border
+_MAX_BORDER: Final = 1 / 8  # of the picture, at each side
 
 
 def sun_rgbd_depth(stored: NDArray[np.uint16]) -> NDArray[np.uint16]:
@@ -39,11 +39,13 @@ def registration_border(rgb_srgb8: Srgb8Image) -> tuple[slice, slice]:
     Warping colour onto the depth camera leaves edges that are white (NYUv2) or black. A row or
     column goes while 97 % of it is such; at most an eighth of the picture at each side.
     """
+    # Mark the pixels that may be border.
     light, dark = (rgb_srgb8 >= WHITE).all(axis=2), (rgb_srgb8 <= BLACK).all(axis=2)
     plain = np.asarray(light | dark)
     height, width = plain.shape
-    top, bottom, left, right = 0, height, 0, width
+    top, bottom, left, right = 0, height, 0, width  # what is left, half-open
     most_rows, most_columns = int(height * _MAX_BORDER), int(width * _MAX_BORDER)
+    # Peel one row or column a side and turn until nothing changes.
     changed = True
     while changed:
         before = (top, bottom, left, right)

@@ -21,37 +21,30 @@ from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.formats.histogram_json import SCORED_MODE, ViewRecord
 
 _FORMAT: Final = "pbrs_farm pack 2"
-_TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes")
+_TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes")  # columns
 
-QUALITIES: Final = (
-    "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
-)  # fmt: skip
-"""Columns of HistogramPack.quality."""
+_OF_PICTURE: Final = ("brightness", "blown")
+_OF_SCENE: Final = ("surface", "near", "n_objects", "noise", "missing_textures")
+QUALITIES: Final = (*_OF_PICTURE, *_OF_SCENE)
+"""Columns of HistogramPack.quality: attributes of PictureQuality and SceneQuality."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HistogramPack:
-    """The views of one house as arrays.
-
-    source: digest of what the pack was made from. views, rooms, room_types, modes, faults,
-    classes: (n,) text; modes "" and the fault's text where a view cannot be scored; classes
-    "1:0.53 2:0.21", the share of the picture of each NYU40 class. colour: (n, colour bins) and
-    depth: (n, depth bins) uint32 counts, zero where there are none. quality: (n, len(QUALITIES))
-    float32, NaN where not known.
-    """
+    """The n views of one house as columns."""
 
     house: str
-    source: str
+    source: str  # digest of what the pack was made from
     settings: HistogramFields
     views: tuple[str, ...]
     rooms: tuple[str, ...]
     room_types: tuple[str, ...]
-    modes: tuple[str, ...]
-    faults: tuple[str, ...]
-    classes: tuple[str, ...]
-    colour: NDArray[np.uint32]
-    depth: NDArray[np.uint32]
-    quality: NDArray[np.float32]
+    modes: tuple[str, ...]  # lighting mode that is scored, "" = none
+    faults: tuple[str, ...]  # why the view cannot be scored, "" = it can
+    classes: tuple[str, ...]  # "1:0.53 2:0.21": share of the picture of each NYU40 class
+    colour: NDArray[np.uint32]  # (n, colour bins) counts, zero where there are none
+    depth: NDArray[np.uint32]  # (n, depth bins) the same
+    quality: NDArray[np.float32]  # (n, len(QUALITIES)), NaN where not known
 
 
 def pack_house(
@@ -73,6 +66,7 @@ def pack_house(
     if any(r.settings != settings for r in rows):
         raise ValueError("records of different settings cannot be packed together")
     lost = sorted((failed or {}).items())
+    # Fill the columns of numbers; those of lost views stay zero and NaN.
     n = len(rows) + len(lost)
     colour = np.zeros((n, settings.colour_bins**3), np.uint32)
     depth = np.zeros((n, settings.depth_bins), np.uint32)
@@ -80,23 +74,23 @@ def pack_house(
     modes = [_mode(r, score_mode) for r in rows]
     for i, (record, mode) in enumerate(zip(rows, modes, strict=True)):
         depth[i] = record.depth.dense()
-        scene = record.scene
-        quality[i, 2:5] = scene.surface, scene.near, scene.n_objects
-        quality[i, 5] = np.nan if scene.noise is None else scene.noise
-        quality[i, 6] = scene.missing_textures
+        values = [getattr(record.scene, name) for name in _OF_SCENE]
+        quality[i, len(_OF_PICTURE) :] = [np.nan if v is None else v for v in values]
         if mode is not None:
             colour[i] = record.colour[mode].dense()
-            quality[i, :2] = record.picture[mode].brightness, record.picture[mode].blown
+            picture = record.picture[mode]
+            quality[i, : len(_OF_PICTURE)] = [getattr(picture, name) for name in _OF_PICTURE]
+    blank = ("",) * len(lost)
     return HistogramPack(
         house,
         source,
         settings,
-        views=(*(r.view for r in rows), *(view for view, _why in lost)),
-        rooms=(*(r.room for r in rows), *("" for _ in lost)),
-        room_types=(*(r.room_type for r in rows), *("" for _ in lost)),
-        modes=(*(str(m or "") for m in modes), *("" for _ in lost)),
-        faults=(*("" if m else "unscored" for m in modes), *(why for _view, why in lost)),
-        classes=(*(_classes(r) for r in rows), *("" for _ in lost)),
+        views=(*(r.view for r in rows), *(view for view, _fault in lost)),
+        rooms=(*(r.room for r in rows), *blank),
+        room_types=(*(r.room_type for r in rows), *blank),
+        modes=(*(str(m or "") for m in modes), *blank),
+        faults=(*("" if m else "unscored" for m in modes), *(fault for _view, fault in lost)),
+        classes=(*(_classes(r) for r in rows), *blank),
         colour=colour,
         depth=depth,
         quality=quality,
@@ -108,26 +102,13 @@ def _classes(record: ViewRecord) -> str:
 
 
 def _mode(record: ViewRecord, score_mode: Mode) -> Mode | None:
-    for mode in (SCORED_MODE, score_mode):
-        if mode in record.colour:
-            return mode
-    return None
+    return next((mode for mode in (SCORED_MODE, score_mode) if mode in record.colour), None)
 
 
 def bytes_from_pack(pack: HistogramPack) -> bytes:
     """The pack as one object; equal packs give equal bytes."""
-    head: dict[str, Any] = {
-        "format": _FORMAT,
-        "house": pack.house,
-        "source": pack.source,
-        "settings": pack.settings.model_dump(mode="json"),
-        "views": pack.views,
-        "rooms": pack.rooms,
-        "room_types": pack.room_types,
-        "modes": pack.modes,
-        "faults": pack.faults,
-        "classes": pack.classes,
-    }
+    head: dict[str, Any] = {"format": _FORMAT, "settings": pack.settings.model_dump(mode="json")}
+    head |= {name: getattr(pack, name) for name in ("house", "source", *_TEXTS)}
     body = b"".join(
         np.ascontiguousarray(a, kind).tobytes()
         for a, kind in ((pack.colour, "<u4"), (pack.depth, "<u4"), (pack.quality, "<f4"))
@@ -143,6 +124,7 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
         head = json.loads(line)
         if head.pop("format") != _FORMAT:
             raise ValueError("another format")
+        # Check that texts and numbers are of as many views as the line says.
         settings = HistogramFields.model_validate(head.pop("settings"))
         body = zlib.decompress(rest)
         text = {k: tuple(head[k]) for k in _TEXTS}
@@ -150,6 +132,7 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
         widths = settings.colour_bins**3, settings.depth_bins, len(QUALITIES)
         if len(body) != 4 * n * sum(widths) or any(len(t) != n for t in text.values()):
             raise ValueError("lengths differ")
+        # Cut the bytes into the three tables of numbers.
         ends = np.cumsum([4 * n * w for w in widths])
         return HistogramPack(
             head["house"],

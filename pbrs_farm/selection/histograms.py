@@ -14,19 +14,15 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.recipe import HistogramFields
 
-Counts = NDArray[np.uint32]
-"""(bins,) uint32: pixels in each bin."""
+Counts = NDArray[np.uint32]  # (bins,) pixels in each bin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Histogram:
-    """Pixel counts of one picture. colour: (colour_bins ** 3,), first channel slowest.
+    """Pixel counts of one picture."""
 
-    depth: (depth_bins,), pixels of unknown depth left out, so its sum may be smaller.
-    """
-
-    colour: Counts
-    depth: Counts
+    colour: Counts  # (colour_bins ** 3,), first channel slowest
+    depth: Counts  # (depth_bins,), of pixels of known depth only
 
 
 def histogram(
@@ -44,6 +40,7 @@ def colour_counts(rgb_srgb8: Srgb8Image, settings: HistogramFields) -> Counts:
     if rgb_srgb8.ndim != 3 or rgb_srgb8.shape[2] != 3 or rgb_srgb8.dtype != np.uint8:
         raise ValueError(f"a picture is (H, W, 3) uint8, got {rgb_srgb8.shape} {rgb_srgb8.dtype}")
     pixels = _ycbcr(rgb_srgb8) if settings.colour_space == "ycbcr" else rgb_srgb8
+    # Join the leading bits of the three channels to the number of a bin.
     bits = settings.colour_bins.bit_length() - 1
     index = (pixels[..., 0] >> (8 - bits)).astype(np.uint16)
     for channel in (1, 2):
@@ -58,7 +55,8 @@ def depth_counts(depth_mm: NDArray[np.integer], settings: HistogramFields) -> Co
         raise ValueError(f"depth is (H, W) whole millimetres, got {depth_mm.dtype}")
     # Count each millimetre first: a table of 65536 bins is quicker than a division per pixel.
     per_mm = np.bincount(np.clip(depth_mm, 0, 65535).reshape(-1).astype(np.intp), minlength=65536)
-    per_mm[0] = 0
+    per_mm[0] = 0  # unknown
+    # Sum the millimetres of each bin.
     low, high = settings.depth_min_m * 1000.0, settings.depth_max_m * 1000.0
     place = np.floor((np.arange(65536) - low) * (settings.depth_bins / (high - low)))
     bins = np.clip(place, 0, settings.depth_bins - 1).astype(np.intp)
@@ -68,7 +66,7 @@ def depth_counts(depth_mm: NDArray[np.integer], settings: HistogramFields) -> Co
 def _ycbcr(rgb: Srgb8Image) -> Srgb8Image:
     """(H, W, 3) uint8 luma and chroma of full range (BT.601), in 16-bit fixed point, rounded."""
     r, g, b = (rgb[..., k].astype(np.int32) for k in range(3))
-    half = 1 << 15
+    half = 1 << 15  # of a unit in fixed point: rounds
     y = (19595 * r + 38470 * g + 7471 * b + half) >> 16
     cb = (-11059 * r - 21709 * g + 32768 * b + half) // 65536 + 128
     cr = (32768 * r - 27439 * g - 5329 * b + half) // 65536 + 128
@@ -86,6 +84,7 @@ def coarser_colour(counts: NDArray[np.generic], shape: tuple[int, int, int]) -> 
     if shape == (n, n, n):
         return counts
     a, b, c = shape
+    # Part each axis into (coarse bin, fine bin within it) and sum the latter.
     cube = counts.reshape(*counts.shape[:-1], a, n // a, b, n // b, c, n // c)
     return np.asarray(cube.sum(axis=(-5, -3, -1))).reshape(*counts.shape[:-1], a * b * c)
 
@@ -103,5 +102,5 @@ def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generi
 def normalised(counts: NDArray[np.generic]) -> NDArray[np.float32]:
     """(..., bins) float32 shares that sum to 1; all zero where nothing was counted."""
     total = counts.sum(axis=-1, keepdims=True, dtype=np.float64)
-    total[total == 0] = 1.0
+    total[total == 0] = 1.0  # nothing counted: shares of 0
     return np.asarray(np.divide(counts, total, dtype=np.float32, casting="same_kind"))

@@ -1,4 +1,4 @@
-"""Numbers that tell a picture nobody can use, whatever it resembles; no effects."""
+"""Quality numbers of a picture and its scene, by which useless views are rejected; no effects."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.formats.histogram_json import PictureQuality, SceneQuality
 
-_SATURATED: Final = 254
+_SATURATED: Final = 254  # of 255: a channel from here on is blown
 
 
 def picture_quality(rgb_srgb8: Srgb8Image) -> PictureQuality:
     """Brightness and saturation of (H, W, 3) uint8."""
     # Every second pixel is plenty for a median, and quick.
     r, g, b = (rgb_srgb8[::2, ::2, k].astype(np.uint32) for k in range(3))
+    # Find the median by counting, with BT.709 weights in 1/256.
     luma = np.bincount(((54 * r + 183 * g + 19 * b) >> 8).reshape(-1), minlength=256)
     median = int(np.searchsorted(np.cumsum(luma), (luma.sum() + 1) // 2))
     brightest = np.maximum(np.maximum(rgb_srgb8[..., 0], rgb_srgb8[..., 1]), rgb_srgb8[..., 2])
@@ -40,8 +41,9 @@ def scene_quality(
 
     Of a row "kind" (house.ItemKind), "fraction" and, if there, "nyu40" are read.
     """
+    # Sum the shares of each class; keep those of each item by its kind.
     classes: dict[int, float] = {}
-    rows = []
+    rows = []  # (kind, share of the picture)
     for row in instances:
         share, nyu40 = float(row["fraction"]), int(row.get("nyu40", 0))
         rows.append((str(row["kind"]), share))

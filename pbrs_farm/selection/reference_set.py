@@ -29,32 +29,29 @@ from pbrs_farm.selection.histograms import (
 )
 from pbrs_farm.selection.similarity import Shares
 
-_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # the earliest a ZIP can say: equal content, equal bytes
 
 
 class ReferenceFacts(BaseModel):
-    """What a reference file says of itself. source: name of what it was built from.
-
-    binning: the bins that are compared. table: how it was chosen.
-    """
+    """What a reference file says of itself."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     format: Literal["pbrs_farm reference 1"] = "pbrs_farm reference 1"
-    source: str
+    source: str  # name of what it was built from
     source_sha256: str
     settings: HistogramFields
-    binning: Binning
-    table: tuple[BinningRow, ...]
-    ids: tuple[str, ...]
+    binning: Binning  # the bins that are compared
+    table: tuple[BinningRow, ...]  # how the binning was chosen
+    ids: tuple[str, ...]  # of the photographs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """Histograms of photographs. colour: (n, colour bins), depth: (n, depth bins), uint32 counts."""
+    """Histograms of n photographs."""
 
     facts: ReferenceFacts
-    colour: NDArray[np.uint32]
-    depth: NDArray[np.uint32]
+    colour: NDArray[np.uint32]  # (n, colour bins) counts
+    depth: NDArray[np.uint32]  # (n, depth bins) counts
 
     @property
     def digest(self) -> str:
@@ -89,9 +86,11 @@ def reference_from_histograms(
         raise BadInput(source[0], "", f"{what}; a reference needs two at least")
     colour = np.stack([h.colour for h in histograms]).astype(np.uint32)
     depth = np.stack([h.depth for h in histograms]).astype(np.uint32)
+    # Reject a photograph without depth: it would resemble nothing.
     blind = np.nonzero(depth.sum(axis=1) == 0)[0]
     if len(blind):
         raise BadInput(source[0], ids[int(blind[0])], "no pixel has a known depth")
+    # Choose the finest binning at which the photographs pass themselves.
     table = binning_table(
         colour, depth, min_colour=selection.min_colour, min_depth=selection.min_depth
     )
@@ -137,6 +136,7 @@ def reference_from_bytes(data: bytes, name: str) -> Reference:
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError):
         hint = "`pbrs-farm reference build` makes one"
         raise BadInput(name, "", "not a reference file, or damaged", hint=hint) from None
+    # Check that the tables have a row a photograph and the bins of the settings.
     n = len(facts.ids)
     wanted = (n, facts.settings.colour_bins**3), (n, facts.settings.depth_bins)
     if n == 0 or (colour.shape, depth.shape) != wanted:
@@ -157,6 +157,7 @@ def check_comparable(reference: Reference, settings: HistogramFields, name: str)
     Colour space and depth range must be equal; the bins may be finer than the reference compares.
     """
     facts = reference.facts
+    # Collect what differs, to name it all at once.
     differing = [
         f"{field}: {getattr(facts.settings, field)} there, {getattr(settings, field)} here"
         for field in ("colour_space", "depth_min_m", "depth_max_m")

@@ -21,29 +21,21 @@ from pbrs_farm.selection.similarity import best_match
 
 SCORES: Final[Any] = pa.schema(
     [
-        ("house", pa.string()),
-        ("view", pa.string()),
-        ("room", pa.string()),
-        ("room_type", pa.string()),
-        ("mode", pa.string()),
-        ("colour_score", pa.float64()),
+        *((name, pa.string()) for name in ("house", "view", "room", "room_type")),
+        ("mode", pa.string()),  # the lighting mode that was scored
+        ("colour_score", pa.float64()),  # best intersection, null where not scored
         ("depth_score", pa.float64()),
-        ("colour_reference", pa.string()),
+        ("colour_reference", pa.string()),  # id of the photograph that is most alike
         ("depth_reference", pa.string()),
         *((name, pa.float32()) for name in QUALITIES),
-        ("classes", pa.string()),
-        ("fault", pa.string()),
-        ("source", pa.string()),
+        ("classes", pa.string()),  # as HistogramPack.classes
+        ("fault", pa.string()),  # "", "unscored", or why the view cannot be read
+        ("source", pa.string()),  # digest of the house's histograms
     ]
 )
-"""colour_score, depth_score: best intersection, null where the view is not scored.
+"""Columns of a score table."""
 
-*_reference: id of the photograph that is most alike. mode: the lighting mode that was scored.
-fault: "", "unscored", or why the view cannot be read. source: digest of the house's histograms.
-"""
-
-BATCH_VIEWS: Final = 8192
-"""Views scored at once: bounds memory, and keeps the search efficient."""
+BATCH_VIEWS: Final = 8192  # scored at once: bounds memory, and keeps the search efficient
 
 
 class Scorer:
@@ -68,6 +60,7 @@ class Scorer:
             return SCORES.empty_table()
         for settings in {p.settings for p in packs if any(p.modes)}:
             check_comparable(self._reference, settings, self._reference.facts.source)
+        # Search among the photographs; packs without a scored view have no shape to compare.
         with_views = [p for p in packs if any(p.modes)]
         c_score, c_best = self._best(
             [coarser_colour(p.colour, self._binning.colour) for p in with_views],
@@ -77,6 +70,7 @@ class Scorer:
         d_score, d_best = self._best(
             [coarser_depth(p.depth, self._binning.depth) for p in with_views], self._depth, packs
         )
+        # Lay out a row per view.
         quality = np.concatenate([p.quality for p in packs])
         columns: dict[str, Any] = {
             "house": [p.house for p in packs for _ in p.views],
@@ -99,8 +93,9 @@ class Scorer:
         self, packs: Iterable[HistogramPack], batch_views: int = BATCH_VIEWS
     ) -> Iterator[Any]:
         """Score tables of a stream of packs, about batch_views rows each."""
+        # Gather packs until they fill a batch.
         held: list[HistogramPack] = []
-        n = 0
+        n = 0  # their views
         for pack in packs:
             held.append(pack)
             n += len(pack.views)
@@ -120,6 +115,7 @@ class Scorer:
 
         counts: of the packs that have a scored view; n counts the views of all packs.
         """
+        # Search for scored views only, of the packs that counts holds.
         scored = np.array([bool(m) for p in packs for m in p.modes])
         score = np.full(len(scored), np.nan)
         best = np.full(len(scored), None, object)
@@ -142,15 +138,17 @@ def merged(*tables: Any) -> Any:
     """One score table of several, sorted by house and view; a row in two of them is kept once.
 
     Associative, commutative, and merging a table with itself gives that table. Raises ValueError
-    when two tables tell different things of one view.
+    when two tables say different things of one view.
     """
     joined = pa.concat_tables([SCORES.empty_table(), *(t.select(SCORES.names) for t in tables)])
     joined = joined.sort_by([("house", "ascending"), ("view", "ascending")]).combine_chunks()
     if joined.num_rows < 2:
         return joined
+    # Rows of one view stand together now: all but the first are repeats.
     again = _same_as_before(joined, "house") & _same_as_before(joined, "view")
     if not again.any():
         return joined
+    # Refuse to merge repeats that differ.
     for name in SCORES.names:
         same = _same_as_before(joined, name)
         if not same[again].all():

@@ -13,11 +13,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-Shares = NDArray[np.float32]
-"""(n, bins) float32, each row sums to 1, or to 0 where nothing was counted."""
+Shares = NDArray[np.float32]  # (n, bins), rows sum to 1, or to 0 where nothing was counted
 
-_BLOCK: Final = 32
-_CACHE_BYTES: Final = 512 * 1024
+_BLOCK: Final = 32  # queries of numpy's search at once
+_CACHE_BYTES: Final = 512 * 1024  # references that are searched at once
 
 
 def intersection(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -36,6 +35,7 @@ def best_match(
     """
     if len(references) <= leave_out_self or queries.shape[1] != references.shape[1]:
         raise ValueError(f"cannot match {queries.shape} against {references.shape}")
+    # Find the nearest by single precision.
     library = library or ("faiss" if importlib.util.find_spec("faiss") else "numpy")
     q, r = _on_support(queries, references)
     search = _faiss_nearest if library == "faiss" else _numpy_nearest
@@ -84,6 +84,7 @@ def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int
 def _numpy_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int64]:
     nearest = np.empty(len(q), np.int64)
     for start in range(0, len(q), _BLOCK):
+        # Intersect a block of queries with all references at once.
         block = q[start : start + _BLOCK]
         score = np.minimum(block[:, None], r[None]).sum(axis=2)
         if leave_out_self:

@@ -32,14 +32,17 @@ def verdicts(scores: Any, fields: SelectionFields) -> Any:
     A view is kept when its colour and its depth score are both above their thresholds (paper
     section 3.3) and no quality number is beyond its own. A number that is not known rejects nothing.
     """
-    rejected = _rejections(scores, fields)
-    table = np.stack(list(rejected.values()), axis=1)
+    # Judge each view by itself: a column per reason.
+    rejections = _rejections(scores, fields)
+    table = np.stack(list(rejections.values()), axis=1)
     kept = np.asarray(~table.any(axis=1), np.bool_)
+    # Judge those that are left against each other.
     beyond = _beyond_cap(scores, kept, fields.per_room_cap)
     kept &= ~beyond
     surplus = _surplus(scores, kept, fields)
     kept &= ~surplus
     table = np.column_stack([table, beyond, surplus])
+    # Name the first reason and all of them.
     first = np.where(kept, len(REASONS), table.argmax(axis=1))
     names = np.array([*REASONS, ""], object)
     added = {"kept": pa.array(kept), "reason": pa.array(names[first], pa.string())}
@@ -54,7 +57,7 @@ def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, NDArray[np
     faults = scores["fault"].to_numpy()
     unscored = np.asarray(faults == "unscored", bool)
     failed = np.asarray(faults != "", bool) & ~unscored
-    told = ~(failed | unscored)
+    has_scores = ~(failed | unscored)
     with np.errstate(invalid="ignore"):  # NaN: not known
         return {
             "failed": failed,
@@ -66,8 +69,8 @@ def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, NDArray[np
             "too-few-objects": number["n_objects"] < fields.min_objects,
             "too-noisy": number["noise"] > fields.max_noise,
             "missing-textures": number["missing_textures"] > fields.max_missing_textures,
-            "unlike-colour": told & ~(number["colour_score"] > fields.min_colour),
-            "unlike-depth": told & ~(number["depth_score"] > fields.min_depth),
+            "unlike-colour": has_scores & ~(number["colour_score"] > fields.min_colour),
+            "unlike-depth": has_scores & ~(number["depth_score"] > fields.min_depth),
         }
 
 
@@ -93,10 +96,12 @@ def _beyond_cap(scores: Any, kept: NDArray[np.bool_], cap: int) -> NDArray[np.bo
     beyond = np.zeros(len(kept), bool)
     if cap <= 0 or not kept.any():
         return beyond
+    # Sort by house and room, in each room the best first.
     rows = np.nonzero(kept)[0]
     worse_score = np.minimum(_floats(scores, "colour_score"), _floats(scores, "depth_score"))[rows]
     house, room, view = (_ranks(scores[name])[rows] for name in ("house", "room", "view"))
     order = np.lexsort((view, -worse_score, room, house))
+    # A view's rank in its room: its place less that of the room's first view.
     starts = np.ones(len(order), bool)
     starts[1:] = (np.diff(house[order]) != 0) | (np.diff(room[order]) != 0)
     first_of_room = np.maximum.accumulate(np.where(starts, np.arange(len(order)), 0))
@@ -110,6 +115,7 @@ def _surplus(scores: Any, kept: NDArray[np.bool_], fields: SelectionFields) -> N
     if fields.balance == "none" or not kept.any():
         return surplus
     rows = np.nonzero(kept)[0]
+    # Go by the order of ids, so that ties do not depend on the order of rows.
     order = rows[np.lexsort((_ranks(scores["view"])[rows], _ranks(scores["house"])[rows]))]
     shares = class_shares(scores["classes"].take(pa.array(order)).to_pylist())
     taken = balanced(shares, round(fields.balance_share * len(order)))
@@ -124,6 +130,7 @@ def _ranks(column: Any) -> NDArray[np.int64]:
 
 def _joined(table: NDArray[np.bool_]) -> list[str]:
     """(n,) the names of the reasons that hold, with commas."""
+    # Number each combination of reasons, and write each number's text once.
     weights = 1 << np.arange(len(REASONS))
     codes = table @ weights
     text = {
