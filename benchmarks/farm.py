@@ -24,10 +24,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.noop_runner import N_HOUSES, groups_of
+from benchmarks.noop_runner import N_HOUSES, batches_of
 from benchmarks.report import write_report
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.run.processes.child_process import die_with_parent
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.secret import Secret
 from workers.client.farm_client import Farm, completed, new_spec
@@ -35,7 +36,6 @@ from workers.config import FarmConfig
 from workers.ids import job_key
 from workers.job import HouseEntry, lines_from_houses
 from workers.ledger.interface import HouseState
-from workers.node.renderer import die_with_parent
 
 FULL = os.environ.get("FULL") == "1"
 N_TASKS = 410_000 if FULL else 100_000
@@ -170,9 +170,9 @@ def throughput() -> dict[str, Any]:
 
 
 def _opened(index: int) -> HouseState:
-    groups = groups_of(f"h{index}")
-    units = {str(n): ("gl", "l") for n in range(len(groups))}
-    return HouseState(index, f"h{index:05d}", False, groups, {**units, "-": ("geometry", "d")})
+    batches = batches_of(f"h{index}")
+    units = {str(n): ("gl", "l") for n in range(len(batches))}
+    return HouseState(index, f"h{index:05d}", False, batches, {**units, "-": ("geometry", "d")})
 
 
 class Watch:
@@ -253,7 +253,7 @@ def recover_s(farm: Farm, job: str) -> float:
         if n_done >= 100_000:
             break
         house = f"h{index:05d}"
-        steps = [f"{n}_{s}" for n in range(len(groups_of(house))) for s in ("gl", "light")]
+        steps = [f"{n}_{s}" for n in range(len(batches_of(house))) for s in ("gl", "light")]
         for step in ("house", "cameras", *steps, "reduce"):
             farm.store.put_if_absent(keys.marker_key(house, step), b"{}")
         n_done += len(steps) + 1

@@ -10,7 +10,7 @@ from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig
 from workers.ids import GEOMETRY
 from workers.job import JobSpec
-from workers.runner import Request, Result, Survey, Tell
+from workers.runner import OnText, Request, Result, Survey
 
 # 45,622 houses of 17 or 18 views are the paper's 779,342.
 N_HOUSES = 45_622
@@ -23,13 +23,13 @@ def views_of(index: int) -> int:
     return (index + 1) * N_VIEWS // N_HOUSES - index * N_VIEWS // N_HOUSES
 
 
-def groups_of(house: str) -> tuple[tuple[str, ...], ...]:
-    """The groups of a house "h<index>"."""
+def batches_of(house: str) -> tuple[tuple[str, ...], ...]:
+    """The batches of a house "h<index>"."""
     views = [f"r{k // 6}_{k % 6}" for k in range(views_of(int(house[1:])))]
     return tuple(tuple(views[k : k + PER_GROUP]) for k in range(0, len(views), PER_GROUP))
 
 
-def runner(config: FarmConfig, _storage_waits: Tell) -> NoopRunner:
+def runner(config: FarmConfig, _on_waiting: OnText) -> NoopRunner:
     return NoopRunner(store_from_url(config.store_url, config.store))
 
 
@@ -40,14 +40,14 @@ class NoopRunner:
         self._store = store
         self._sleep_s = float(os.environ.get("PBRS_BENCH_SLEEP", "0"))
 
-    def run(self, request: Request, _tell: Tell) -> Result:
+    def run(self, request: Request, _on_step: OnText) -> Result:
         time.sleep(self._sleep_s)
         name = f"{request.unit}_{request.stage}" if request.unit != "-" else request.stage
         if request.house != "-":
             self._store.put(keys.house_key(request.house, f"views/{name}.png"), b"." * 100)
             self._store.put_if_absent(keys.marker_key(request.house, name), b"{}")
-        groups = groups_of(request.house) if request.stage == GEOMETRY else ()
-        return Result(groups=groups, n_views=len(request.views))
+        batches = batches_of(request.house) if request.stage == GEOMETRY else ()
+        return Result(batches=batches, n_views=len(request.views))
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
         """As the real one: a look at the cameras' marker, then names."""
@@ -55,7 +55,7 @@ class NoopRunner:
             return Survey()  # the benchmark enters houses whose geometry was never run
         self._store.get(keys.marker_key(house, "cameras"))
         missing = {}
-        for number in range(len(groups_of(house))):
-            left = [s for s in spec.group_stages if f"{number}_{s}" not in done]
+        for number in range(len(batches_of(house))):
+            left = [s for s in spec.batch_stages if f"{number}_{s}" not in done]
             missing[str(number)] = left[0] if left else ""
-        return Survey(groups_of(house), missing, "reduce" in done)
+        return Survey(batches_of(house), missing, "reduce" in done)

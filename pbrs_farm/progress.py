@@ -20,7 +20,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from pbrs_farm.run.task import Event
+from pbrs_farm.run.processes.task import Event
 
 
 class ProgressReporter(ABC):

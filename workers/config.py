@@ -15,10 +15,11 @@ from typing import Any, Final
 from urllib.parse import quote, urlsplit, urlunsplit
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings
-from workers.ids import QUEUES
+from workers.ids import GEOMETRY, GL, LIGHT, QUEUES
 from workers.liveness import alive_file
 
 _PREFIX: Final = "PBRS_FARM_"
@@ -53,8 +54,18 @@ class Limits:
 
     def deadline_s(self, stage: str) -> float:
         """Seconds a task of the stage may take."""
-        return {"geometry": self.geometry_s, "gl": self.gl_s, "light": self.light_s}.get(
+        return {GEOMETRY: self.geometry_s, GL: self.gl_s, LIGHT: self.light_s}.get(
             stage, self.reduce_s
+        )
+
+    def of_process(self, n_slots: int) -> ProcessLimits:
+        """The limits of the render process of one of n slots."""
+        memory_mb = self.memory_mb or memory_share_mb(n_slots)
+        return ProcessLimits(
+            silence_s=self.silence_s,
+            memory_mb=memory_mb,
+            recycle_mb=memory_mb / 2,
+            recycle_tasks=self.tasks_per_renderer,
         )
 
 
@@ -64,7 +75,7 @@ class FarmConfig:
 
     redis_ca: file of the CA for rediss://, "" = the system's. sticky_s: a task this long takes
     another of its house with it. breaker_s: claims stop this long after a storage failure.
-    forgive_s: a worker suspected of being sick rests this long. grace_s: from TERM to having handed
+    cooldown_s: an unhealthy worker claims nothing for this long. grace_s: from TERM to having handed
     everything back. min_free_mb: scratch space a worker wants before it starts. window_min: tasks in
     flight per stage, at least. metrics_port: of the coordinator's Prometheus endpoint, 0 = off.
     """
@@ -80,12 +91,12 @@ class FarmConfig:
     scratch: Path = Path("/tmp")
     runner: str = "workers.node.house_runner:runner"
     lease_s: float = _above(120.0)
-    beat_s: float = _above(20.0)
+    heartbeat_s: float = _above(20.0)
     sticky_s: float = 2.0
     retry_delay_s: float = 10.0
     storage_patience_s: float = 600.0
     breaker_s: int = _least(30, 1)
-    forgive_s: float = 600.0
+    cooldown_s: float = 600.0
     grace_s: float = _above(600.0)
     min_free_mb: int = _least(500, 0)
     window_per_slot: int = _least(4, 1)
@@ -104,9 +115,9 @@ class FarmConfig:
             )
 
     @property
-    def handback_file(self) -> Path:
+    def preemption_file(self) -> Path:
         """While this file exists the worker's tasks are given back to the ledger at once."""
-        return self.scratch / f"pbrs-{self.worker}.handback"
+        return self.scratch / f"pbrs-{self.worker}.preempted"
 
     @property
     def heartbeat_file(self) -> Path:
@@ -143,6 +154,7 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     "Path": Path,
     "tuple[str, ...]": lambda text: tuple(x for x in text.split(",") if x),
 }
+_FORMER_NAMES: Final = {"beat_s": "heartbeat_s", "forgive_s": "cooldown_s"}
 _ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits"}
 
 
@@ -151,11 +163,13 @@ def _read(cls: type[FarmConfig | Limits], words: Mapping[str, str], prefix: str)
     kinds = {f.name: str(f.type) for f in fields(cls) if f.name not in _ELSEWHERE}
     values = {}
     for name, text in words.items():
-        kind = kinds.get(name.removeprefix(prefix).lower())
+        setting = name.removeprefix(prefix).lower()
+        setting = _FORMER_NAMES.get(setting, setting)
+        kind = kinds.get(setting)
         if kind is None:
             raise BadInput("environment", name, "no such setting", hint="docs/farm.md lists them")
         try:
-            values[name.removeprefix(prefix).lower()] = _READERS[kind](text)
+            values[setting] = _READERS[kind](text)
         except ValueError:
             raise BadInput("environment", name, f"{text!r} is not of type {kind}") from None
     return values

@@ -1,9 +1,9 @@
 """Names of the farm's tasks, stages, queues and of what a job stores; no effects.
 
-A task is `<house>/<unit>/<stage>`. Unit "-" is the house as a whole, "0", "1", ... its groups of
+A task is `<house>/<unit>/<stage>`. Unit "-" is the house as a whole, "0", "1", ... its batches of
 views. House "-" is the job: `-/s3/shard` merges shard 3, `-/-/job` ends the job.
 
-    geometry -> each group: gl -> light -> reduce -> (all of a shard) shard -> (all shards) job
+    geometry -> each batch: gl -> light -> reduce -> (all of a shard) shard -> (all shards) job
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ REDUCE: Final = "reduce"
 SHARD: Final = "shard"
 JOB: Final = "job"
 STAGES: Final = (GEOMETRY, GL, LIGHT, REDUCE, SHARD, JOB)
-QUEUES: Final = (GEOMETRY, GL, LIGHT, "light.gpu", REDUCE)
-LEASES: Final = (*STAGES, "light.gpu")
+LIGHT_GPU: Final = "light.gpu"  # the queue of light on a GPU, and its leases
+QUEUES: Final = (GEOMETRY, GL, LIGHT, LIGHT_GPU, REDUCE)
+LEASES: Final = (*STAGES, LIGHT_GPU)
 WHOLE: Final = "-"
 
 _JOB_ID: Final = re.compile(r"[0-9a-f]{12}")
@@ -60,7 +61,7 @@ def queue_of(stage: str, *, gpu: bool) -> str:
     """The queue a stage's tasks go to: by kind of worker, not by job."""
     if stage in (REDUCE, SHARD, JOB):
         return REDUCE
-    return "light.gpu" if gpu and stage == LIGHT else stage
+    return LIGHT_GPU if gpu and stage == LIGHT else stage
 
 
 def stages_of_queue(queue: str) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ class JobRules(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     max_attempts: int = Field(3, ge=1)
-    failed_share: float = Field(0.5, description="of a house's groups; more quarantines the house")
+    failed_share: float = Field(0.5, description="of a house's batches; more quarantines the house")
     max_quarantined: int = Field(20, ge=1, description="houses; fewer never pause a job")
     quarantined_share: float = Field(0.2, description="of closed houses; more pauses the job")
     max_same_failure: int = Field(50, ge=1, description="alike for good; as many pause the job")
@@ -36,9 +36,14 @@ class JobRules(BaseModel):
 
 
 class JobSpec(BaseModel):
-    """Everything a job is made with except its houses; stored as jobs/<id>/job.json."""
+    """Everything a job is made with except its houses; stored as jobs/<id>/job.json.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    A batch is some views of a house that one task makes; job.json calls it a group.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_by_name=True, serialize_by_alias=True
+    )
     job_id: str
     version: str
     recipe: Recipe
@@ -47,23 +52,25 @@ class JobSpec(BaseModel):
     n_views: int = 0
     gpu: bool = False
     priority: int = Field(5, ge=0, le=9, description="0 goes first")
-    group_stages: tuple[str, ...] = (GL, LIGHT)
-    seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the groups")
-    min_groups: int = Field(1, ge=1, description="of a house, about; by slots at submission")
+    batch_stages: tuple[str, ...] = Field((GL, LIGHT), alias="group_stages")
+    seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the batches")
+    min_batches: int = Field(
+        1, ge=1, alias="min_groups", description="of a house, about; by slots at submission"
+    )
     reference: str = Field("", description="key of the reference selection scores against, or none")
     rules: JobRules = JobRules()
     n_houses: int = 0
 
 
 # What is decided when a job is entered and changes nothing of what it makes.
-_NOT_WORK = {"job_id", "priority", "rules", "n_houses", "min_groups", "seconds_per_view"}
+_NOT_WORK = {"job_id", "priority", "rules", "n_houses", "min_batches", "seconds_per_view"}
 
 
 def job_id(spec: JobSpec, houses: Iterable[HouseEntry]) -> str:
     """The id of a job: equal for equal work, so that submitting twice is submitting once."""
-    plain = spec.model_dump(mode="json", exclude=_NOT_WORK)
-    plain["recipe"] = spec.recipe.digest()
-    return keys.digest(plain, [[h.house_id, h.sha256] for h in houses])[:12]
+    work = spec.model_dump(mode="json", exclude=_NOT_WORK)
+    work["recipe"] = spec.recipe.digest()
+    return keys.digest(work, [[h.house_id, h.sha256] for h in houses])[:12]
 
 
 def lines_from_houses(houses: Iterable[HouseEntry]) -> bytes:

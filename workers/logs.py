@@ -11,14 +11,14 @@ _SECRETS: Final = re.compile(r"(rediss?://[^:/@\s]*:)[^@\s]+@")
 
 
 class NoSecrets(logging.Formatter):
-    """Formats a record with the passwords of Redis URLs blotted out."""
+    """Formats a record with the passwords of Redis URLs replaced by ***."""
 
     def format(self, record: logging.LogRecord) -> str:
         return _SECRETS.sub(r"\1***@", super().format(record))
 
 
-def log_plainly(level: int | str = "INFO") -> None:
-    """Log to stderr with time, process and level; passwords in URLs are blotted out."""
+def log_to_stderr(level: int | str = "INFO") -> None:
+    """Log to stderr with time, process and level; passwords in URLs are replaced by ***."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(NoSecrets("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
     root = logging.getLogger()

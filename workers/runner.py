@@ -10,20 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Literal, Protocol
+from typing import Protocol
 
 from pydantic import BaseModel, ConfigDict
 
 from pbrs_farm.core.errors import BadInput
 from workers.config import FarmConfig
 from workers.job import JobSpec
-from workers.ledger.interface import FaultClass
 
-Tell = Callable[[str], None]
+OnText = Callable[[str], None]
 
 
 class Request(BaseModel):
-    """A task for the runner. views: of its group. source: of the house, for geometry only."""
+    """A task for the runner. views: of its batch. source: of the house, for geometry only."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     job_id: str
@@ -36,32 +35,21 @@ class Request(BaseModel):
 
 
 class Result(BaseModel):
-    """What came of it. groups: of views to be made, only after geometry."""
+    """What came of it. batches: of views to be made, only after geometry."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    groups: tuple[tuple[str, ...], ...] = ()
+    batches: tuple[tuple[str, ...], ...] = ()
     n_views: int = 0
-
-
-class Reply(BaseModel):
-    """A line from the renderer: a sign of life, trouble with storage, or the end of the task."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    kind: Literal["ready", "step", "storage", "done", "fault"]
-    text: str = ""
-    result: Result | None = None
-    fault: FaultClass | None = None
-    fingerprint: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Survey:
     """What storage says of a house. missing: unit -> first stage not done, "" when all are.
 
-    groups is None while the house's geometry is not done. reduced: the house is finished.
+    batches is None while the house's geometry is not done. reduced: the house is finished.
     """
 
-    groups: tuple[tuple[str, ...], ...] | None = None
+    batches: tuple[tuple[str, ...], ...] | None = None
     missing: Mapping[str, str] = field(default_factory=dict)
     reduced: bool = False
 
@@ -69,8 +57,8 @@ class Survey:
 class StepRunner(Protocol):
     """Runs the steps of a task; raises the errors of pbrs_farm.core.errors."""
 
-    def run(self, request: Request, tell: Tell) -> Result:
-        """Do what the markers say is missing. tell: called with the name of each step begun."""
+    def run(self, request: Request, on_step: OnText) -> Result:
+        """Do what the markers say is missing. on_step: called with the name of each step begun."""
         ...
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
@@ -78,7 +66,7 @@ class StepRunner(Protocol):
         ...
 
 
-RunnerMaker = Callable[[FarmConfig, Tell], StepRunner]
+RunnerMaker = Callable[[FarmConfig, OnText], StepRunner]
 
 
 def runner_maker(name: str) -> RunnerMaker:

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.commands.arguments import Handler, Verb, add_farm, echo, echo_json, farm_of
-from workers.client.text import failures_text, status_text, why_text, workers_text
+from workers.client.text import explanation_text, failures_text, status_text, workers_text
 
 if TYPE_CHECKING:
     from workers.client.farm_client import Farm
@@ -109,8 +109,8 @@ def _status(args: argparse.Namespace) -> int:
 
 def _why(args: argparse.Namespace) -> int:
     farm, job = _farm_and_job(args)
-    rows = farm.why(job, args.task)
-    _show(args, rows, lambda: why_text(rows))
+    rows = farm.explain(job, args.task)
+    _show(args, rows, lambda: explanation_text(rows))
     return 0
 
 
@@ -123,8 +123,8 @@ def _logs(args: argparse.Namespace) -> int:
 
 def _failures(args: argparse.Namespace) -> int:
     farm, job = _farm_and_job(args)
-    groups = farm.failures(job)
-    _show(args, groups, lambda: failures_text(groups))
+    kinds = farm.failures(job)
+    _show(args, kinds, lambda: failures_text(kinds))
     return 0
 
 

@@ -86,7 +86,7 @@ def _spec(args: argparse.Namespace) -> JobSpec:
     from pbrs_farm.run.plan import wanted
     from workers.client.estimate import seconds_per_view
     from workers.client.farm_client import new_spec
-    from workers.node.house_runner import group_stages
+    from workers.node.house_runner import batch_stages
 
     at_least("--views", args.views, 0)
     at_least("--slots", args.slots, 1)
@@ -99,6 +99,6 @@ def _spec(args: argparse.Namespace) -> JobSpec:
         n_views=want.n_views,
         gpu=args.gpu,
         priority=args.priority,
-        group_stages=group_stages(want),
+        batch_stages=batch_stages(want),
         seconds_per_view=seconds_per_view(recipe),
     )

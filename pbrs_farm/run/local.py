@@ -20,8 +20,9 @@ from pbrs_farm.read.source import SourceRef, resolve
 from pbrs_farm.run import plan
 from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
 from pbrs_farm.run.plan import Wanted
-from pbrs_farm.run.process_pool import Pool
-from pbrs_farm.run.task import Event, Setting, Task
+from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
+from pbrs_farm.run.processes.pool import Pool
+from pbrs_farm.run.processes.task import Event, Setting, Task
 from pbrs_farm.store import StoreSettings, store_from_url
 
 Observer = Callable[[Event], None]
@@ -29,7 +30,11 @@ Observer = Callable[[Event], None]
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What is asked of a local run. homes: words as sources.resolve takes them, sources: resolved."""
+    """What is asked of a local run. homes: words as sources.resolve takes them, sources: resolved.
+
+    A process is killed when a step takes step_timeout_s, when it neither begins a step nor writes to
+    its log for silence_s (0 = step_timeout_s), or when it holds memory_mb (0 = share of the machine).
+    """
 
     homes: Sequence[str]
     store_url: str
@@ -38,6 +43,8 @@ class Run:
     n_jobs: int = 1
     update: bool = False
     step_timeout_s: float = 3600.0
+    silence_s: float = 0.0
+    memory_mb: float = 0.0
     debug: bool = False
     store: StoreSettings = field(default_factory=StoreSettings)
     sources: Sequence[SourceRef] = ()
@@ -73,13 +80,21 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     n_jobs = max(1, run.n_jobs)
     n_threads = max(1, (os.cpu_count() or 1) // n_jobs)
     setting = Setting(run.store_url, run.recipe, n_threads, run.debug, run.store)
-    with Pool(n_jobs, setting, step_timeout_s=run.step_timeout_s) as pool:
+    with Pool(n_jobs, setting, _limits(run, n_jobs)) as pool:
         _Schedule(run, sources, summary, observe).drive(pool)
     for house_id in summary.houses:
         finish_house(store, house_id)
     below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
     merge_manifests(store, [at.house for at in below if at and at.file == keys.MANIFEST])
     return summary
+
+
+def _limits(run: Run, n_jobs: int) -> ProcessLimits:
+    return ProcessLimits(
+        step_s=run.step_timeout_s,
+        silence_s=run.silence_s or run.step_timeout_s,
+        memory_mb=run.memory_mb or memory_share_mb(n_jobs),
+    )
 
 
 def _resolved(run: Run, summary: Summary) -> list[SourceRef]:

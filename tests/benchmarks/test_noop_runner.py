@@ -15,4 +15,4 @@ def test_a_house_whose_geometry_was_never_run_is_not_begun() -> None:
     survey = NoopRunner(store).survey(
         new_spec(recipe_from_name("fast")), "h00001", frozenset({"0_gl"})
     )
-    assert survey.groups is None
+    assert survey.batches is None

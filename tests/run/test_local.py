@@ -13,7 +13,7 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run import local
 from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.plan import wanted
-from pbrs_farm.run.task import Setting
+from pbrs_farm.run.processes.task import Setting
 
 FAKE = "tests.run.fakes:run_step"
 N_STEPS = 3 + 2 * 6
@@ -96,6 +96,17 @@ def test_a_step_that_hangs_is_killed(tmp_path: Path) -> None:
     summary = run(tmp_path, "hang:opengl_dl.0_0_0", step_timeout_s=3.0)
     assert "killed" in summary.failures[0][1]
     assert summary.n_done == N_STEPS - 1
+
+
+def test_a_step_that_is_silent_is_killed(tmp_path: Path) -> None:
+    summary = run(tmp_path, "hang:opengl_dl.0_0_0", silence_s=2.0)
+    assert "silent for 2 s; killed" in summary.failures[0][1]
+    assert summary.n_done == N_STEPS - 1
+
+
+def test_a_process_over_its_memory_is_killed(tmp_path: Path) -> None:
+    summary = run(tmp_path, "hang:cameras", memory_mb=1.0)
+    assert "MB resident, 1 allowed; killed" in summary.failures[-1][1]
 
 
 def test_a_home_that_is_missing_does_not_stop_the_others(tmp_path: Path) -> None:

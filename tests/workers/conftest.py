@@ -33,7 +33,7 @@ def config(redis_server: RedisServer, tmp_path: Path) -> FarmConfig:
         worker="w1",
         scratch=tmp_path,
         lease_s=0.3,
-        beat_s=0.05,
+        heartbeat_s=0.05,
         retry_delay_s=0.0,
         window_min=100,
     )

@@ -13,7 +13,7 @@ from workers.ledger.interface import Claim, Fault, FaultClass, Finished
 from workers.ledger.redis_ledger import RedisLedger
 
 ROOM = dict.fromkeys(STAGES, 100)
-GROUPS = (("a", "b"), ("c",))
+BATCHES = (("a", "b"), ("c",))
 
 
 @dataclass
@@ -25,9 +25,9 @@ class Drive:
     leader: str = "leader"
     ran: Counter[str] = field(default_factory=Counter)
 
-    def feed(self) -> list[str]:
+    def dispatch(self) -> list[str]:
         assert self.ledger.lead(self.leader)
-        tasks = self.ledger.feed(self.job.job_id, self.leader, max_open=100, room=ROOM)
+        tasks = self.ledger.dispatch(self.job.job_id, self.leader, max_open=100, room=ROOM)
         assert tasks is not None
         return tasks
 
@@ -39,16 +39,18 @@ class Drive:
             recipe=self.job.recipe.digest(), direct=direct,
         )  # fmt: skip
 
-    def run(self, task: str, groups: tuple[tuple[str, ...], ...] = GROUPS) -> None:
+    def run(self, task: str, batches: tuple[tuple[str, ...], ...] = BATCHES) -> None:
         """Claim, and finish well."""
         claim = self.claim(task)
         assert claim.verdict == "run", (task, claim)
         self.ran[task] += 1
-        self.finish(task, claim, groups)
+        self.finish(task, claim, batches)
 
-    def finish(self, task: str, claim: Claim, groups: tuple[tuple[str, ...], ...] = GROUPS) -> None:
+    def finish(
+        self, task: str, claim: Claim, batches: tuple[tuple[str, ...], ...] = BATCHES
+    ) -> None:
         stage = task.rpartition("/")[2]
-        end = Finished(1.0, groups if stage == "geometry" else (), 1)
+        end = Finished(1.0, batches if stage == "geometry" else (), 1)
         self.ledger.finish(self.job.job_id, task, claim.token, end, sticky=False)
 
     def fail(self, task: str, claim: Claim, kind: FaultClass = "crash", worker: str = "w1") -> str:
@@ -58,8 +60,8 @@ class Drive:
         return other.fail(self.job.job_id, task, claim.token, fault, delay_s=0.0)
 
     def run_all(self) -> None:
-        """Feed and run until nothing comes any more."""
-        while tasks := self.feed():
+        """Dispatch and run until nothing comes any more."""
+        while tasks := self.dispatch():
             for task in tasks:
                 self.run(task)
 

@@ -19,21 +19,19 @@ from pbrs_farm.store import Head, Store, store_from_url
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
 from workers.job import JobSpec
-from workers.runner import Request, Result, Survey, Tell
+from workers.runner import OnText, Request, Result, Survey
 
 
 def control_folder() -> Path:
     return Path(os.environ["PBRS_TEST_CONTROL"])
 
 
-def runner(config: FarmConfig, storage_waits: Tell) -> FakeRunner:
-    store = SickStore(store_from_url(config.store_url, config.store), control_folder())
-    return FakeRunner(
-        RetryingStore(store, config.storage_patience_s, storage_waits), control_folder()
-    )
+def runner(config: FarmConfig, on_waiting: OnText) -> FakeRunner:
+    store = UnhealthyStore(store_from_url(config.store_url, config.store), control_folder())
+    return FakeRunner(RetryingStore(store, config.storage_patience_s, on_waiting), control_folder())
 
 
-class SickStore:
+class UnhealthyStore:
     """The store, unless a control file says it is away or full."""
 
     def __init__(self, store: Store, control: Path) -> None:
@@ -75,8 +73,8 @@ class SickStore:
             raise StoreUnavailable(key, f"is full: {os.strerror(errno.ENOSPC)}")
 
 
-def groups_of(house: str) -> tuple[tuple[str, ...], ...]:
-    """Two or three groups of two views, by the house's name."""
+def batches_of(house: str) -> tuple[tuple[str, ...], ...]:
+    """Two or three batches of two views, by the house's name."""
     return tuple((f"r{g}_0", f"r{g}_1") for g in range(2 + len(house) % 2))
 
 
@@ -87,18 +85,18 @@ class FakeRunner:
         self._store = store
         self._control = control
 
-    def run(self, request: Request, tell: Tell) -> Result:
+    def run(self, request: Request, on_step: OnText) -> Result:
         with (self._control / "starts").open("a") as file:
             file.write(f"{request.house}/{request.unit}/{request.stage}\n")
         self._misbehave(request)
         if request.stage == "geometry":
             for step in ("house", "cameras"):
-                self._step(request.house, step, None, tell)
-            return Result(groups=groups_of(request.house))
+                self._step(request.house, step, None, on_step)
+            return Result(batches=batches_of(request.house))
         if request.stage in ("gl", "light"):
             for view in request.views:
                 step = {"gl": "truth", "light": "light"}[request.stage]
-                self._step(request.house, step, view, tell)
+                self._step(request.house, step, view, on_step)
         elif request.stage == "reduce":
             listed = sorted(self._store.list(keys.house_key(request.house, "views/")))
             self._store.put(keys.house_key(request.house, "manifest.jsonl"), repr(listed).encode())
@@ -111,19 +109,19 @@ class FakeRunner:
         if not done.issuperset({"house", "cameras"}):
             return Survey()
         missing = {}
-        for number, views in enumerate(groups_of(house)):
+        for number, views in enumerate(batches_of(house)):
             stages = {"gl": "truth", "light": "light"}
             left = [
-                s for s in spec.group_stages if any(f"{stages[s]}.{v}" not in done for v in views)
+                s for s in spec.batch_stages if any(f"{stages[s]}.{v}" not in done for v in views)
             ]
             missing[str(number)] = left[0] if left else ""
         reduced = not any(missing.values()) and (
             self._store.head(keys.house_key(house, "manifest.jsonl")) is not None
         )
-        return Survey(groups_of(house), missing, reduced)
+        return Survey(batches_of(house), missing, reduced)
 
-    def _step(self, house: str, step: str, view: str | None, tell: Tell) -> None:
-        tell(f"{step} {view}")
+    def _step(self, house: str, step: str, view: str | None, on_step: OnText) -> None:
+        on_step(f"{step} {view}")
         marker = keys.marker_key(house, step, view)
         if self._store.head(marker) is not None:
             return

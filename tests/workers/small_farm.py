@@ -13,16 +13,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.run.processes.child_process import die_with_parent
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store import Store, StoreSettings
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.secret import Secret
-from tests.workers.fake_runner import FakeRunner, groups_of
+from tests.workers.fake_runner import FakeRunner, batches_of
 from tests.workers.redis_server import RedisServer
 from workers.client.farm_client import Farm, new_spec
 from workers.config import FarmConfig
 from workers.job import HouseEntry
-from workers.node.renderer import die_with_parent
 from workers.runner import Request
 
 REPO = Path(__file__).parents[2]
@@ -40,7 +40,7 @@ class SmallFarm:
         self.control.mkdir(parents=True)
         self.store: Store = s3 or FolderStore(folder / "store")
         self._settings = {
-            "lease_s": 3, "beat_s": 0.5, "retry_delay_s": 0.1, "resend_s": 3, "breaker_s": 12,
+            "lease_s": 3, "heartbeat_s": 0.5, "retry_delay_s": 0.1, "resend_s": 3, "breaker_s": 12,
             "grace_s": 30, "storage_patience_s": 60, "min_free_mb": 1, **settings,
         }  # fmt: skip
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -167,7 +167,7 @@ class SmallFarm:
             if house in without:
                 continue
             run(house, "-", "geometry")
-            for number, views in enumerate(groups_of(house)):
+            for number, views in enumerate(batches_of(house)):
                 run(house, str(number), "gl", views)
                 run(house, str(number), "light", views)
             run(house, "-", "reduce")
@@ -178,11 +178,11 @@ class SmallFarm:
         """Nothing lost, nothing else there, at most n_repeats starts beyond the first; how many."""
         assert self.objects() == self.expected()
         view = self.farm.view(self.job)
-        n_groups = sum(len(groups_of(h)) for h in self.houses)
+        n_batches = sum(len(batches_of(h)) for h in self.houses)
         n_markers = Counter(
             key.rpartition("/")[2].partition(".")[0] for key in self.objects() if "/done/" in key
         )
-        assert view.counts["done:gl"] == view.counts["done:light"] == n_groups
+        assert view.counts["done:gl"] == view.counts["done:light"] == n_batches
         assert view.counts["done:geometry"] == n_markers["house"] == len(self.houses)
         assert 2 * view.counts["done:light"] == n_markers["light"]
         starts = self.starts()

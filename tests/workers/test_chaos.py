@@ -175,7 +175,9 @@ def test_every_message_delivered_twice(farm: SmallFarm) -> None:
         send(copies)
 
     farm.submit(6)
-    coordinator = Coordinator(farm.farm.config, farm.farm.ledger, send_twice)
+    coordinator = Coordinator(
+        farm.farm.config, farm.farm.ledger, send_twice, registry=farm.farm.registry
+    )
 
     def turn() -> bool:
         coordinator.turn()
@@ -200,14 +202,14 @@ def test_a_house_that_fails_each_time(farm: SmallFarm, fault: str) -> None:
     view = farm.farm.view(farm.job)
     assert view.counts["houses:quarantined"] == 1
     assert view.counts["houses:done"] == 5
-    (group,) = farm.farm.failures(farm.job)
-    assert group["n"] == 2
+    (kind,) = farm.farm.failures(farm.job)
+    assert kind["n"] == 2
     if fault == "crash":
         assert "about to crash" in farm.farm.logs(farm.job, "h002/0/gl", attempt=3)
     (farm.control / f"{fault}.h002").unlink()
     assert len(farm.farm.retry(farm.job)) == 2
     farm.wait_done(60)
-    farm.check_complete(n_repeats=8)  # three more attempts of two groups, shard, job
+    farm.check_complete(n_repeats=8)  # three more attempts of two batches, shard, job
     note(f"a house whose renderer fails each time ({fault}), then retry", farm, 4, seconds)
 
 

@@ -57,51 +57,51 @@ def test_another_recipe_in_the_same_store_is_refused_with_what_differs(farm: Far
 
 def test_status_counts_what_runs_and_why_says_what_waits(farm: Farm) -> None:
     d = submit(farm)
-    tasks = d.feed()
+    tasks = d.dispatch()
     d.run(tasks[0])
     d.claim(tasks[1])
     status = farm.status(d.job.job_id)
     geometry = status["stages"][0]
     assert (geometry["done"], geometry["running"], geometry["queued"]) == (1, 1, 1)
     json.dumps(status)
-    (row,) = farm.why(d.job.job_id, tasks[1])
+    (row,) = farm.explain(d.job.job_id, tasks[1])
     assert row["state"] == "running"
     assert row["worker"] == "w1"
-    assert farm.why(d.job.job_id, "h0/a")[0]["views"] == ["a", "b"]
+    assert farm.explain(d.job.job_id, "h0/a")[0]["views"] == ["a", "b"]
     with pytest.raises(BadInput, match="no such house"):
-        farm.why(d.job.job_id, "nobody")
+        farm.explain(d.job.job_id, "nobody")
     with pytest.raises(BadInput, match="no such task or view"):
-        farm.why(d.job.job_id, "h0/zzz")
+        farm.explain(d.job.job_id, "h0/zzz")
 
 
 def test_why_says_what_keeps_a_task_from_running(farm: Farm) -> None:
     d = submit(farm)
     job = d.job.job_id
-    d.feed()
+    d.dispatch()
 
     def because() -> str:
-        (row,) = farm.why(job, "h0")
+        (row,) = farm.explain(job, "h0")
         return str(row.get("because", ""))
 
     assert because() == "no worker takes geometry"
-    farm.registry.beat()
+    farm.registry.heartbeat()
     assert because() == ""
     assert farm.registry.drain("w1")
     assert because() == "every worker that takes geometry is leaving"
-    farm.registry.storage_sick("disk full")
-    assert because() == "storage is sick: disk full"
+    farm.registry.open_breaker("disk full")
+    assert because() == "storage is unhealthy: disk full"
     farm.pause(job)
     assert because() == "the job is paused: by hand"
 
 
 def test_failures_alike_stand_together(farm: Farm) -> None:
     d = submit(farm)
-    for number, task in enumerate(d.feed()):
+    for number, task in enumerate(d.dispatch()):
         fault = Fault(fault="data", fingerprint="data: wall w#", message=f"wall w{number}")
         farm.ledger.fail(d.job.job_id, task, d.claim(task).token, fault, delay_s=0)
-    (group,) = farm.failures(d.job.job_id)
-    assert group["n"] == 3
-    assert group["tasks"] == ["h0/-/geometry", "h1/-/geometry", "h2/-/geometry"]
+    (kind,) = farm.failures(d.job.job_id)
+    assert kind["n"] == 3
+    assert kind["tasks"] == ["h0/-/geometry", "h1/-/geometry", "h2/-/geometry"]
     assert len(farm.retry(d.job.job_id)) == 3
     assert farm.failures(d.job.job_id) == []
 
@@ -121,7 +121,7 @@ def test_what_is_not_there_is_one_line(farm: Farm) -> None:
 
 def test_recover_takes_up_a_cancelled_job(farm: Farm) -> None:
     d = submit(farm)
-    d.feed()
+    d.dispatch()
     farm.cancel(d.job.job_id)
     farm.submit(HOUSES, new_spec(recipe_from_name("preview")))
     assert d.state == "running"
@@ -131,7 +131,7 @@ def test_recover_takes_up_a_cancelled_job(farm: Farm) -> None:
 
 def test_the_metrics_endpoint_counts_without_naming_houses(farm: Farm) -> None:
     d = submit(farm)
-    d.run(d.feed()[0])
+    d.run(d.dispatch()[0])
     port = free_port()
     server, thread = serve_metrics(replace(farm.config, metrics_port=port), farm.ledger)
     try:

@@ -92,7 +92,7 @@ def renderers(farm: SmallFarm, worker: str) -> list[int]:
     found = []
     for pid in descendants(farm.processes[worker].pid):
         words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-        if b"workers.node.renderer" in words:
+        if b"workers.node.renderer:make_handler" in words:
             found.append(pid)
     return found
 

@@ -1,4 +1,4 @@
-"""The parts of the farm that only compute: groups, rates, faults, limits, texts."""
+"""The parts of the farm that only compute: batches, rates, faults, limits, texts."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from pbrs_farm.core.errors import (
     StoreUnavailable,
 )
 from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.run.processes.limits import machine_mb, memory_share_mb
 from pbrs_farm.store import MemoryStore
 from tests.workers.conftest import spec
 from workers.client.estimate import estimate, seconds_per_view
@@ -32,8 +33,7 @@ from workers.job import HouseEntry
 from workers.ledger.interface import JobView
 from workers.node.faults import class_of, fingerprint, without_numbers
 from workers.node.house_runner import HouseRunner, steps_of_stage
-from workers.node.memory import machine_mb, memory_limit_mb
-from workers.node.view_groups import groups_from_views
+from workers.node.view_batches import batches_from_views
 from workers.runner import Request
 
 
@@ -41,26 +41,26 @@ from workers.runner import Request
     st.lists(st.tuples(st.integers(0, 4), st.integers(0, 99)), unique=True, max_size=40),
     st.floats(0.5, 1000),
 )
-def test_groups_hold_every_view_once_and_no_group_is_too_long(
+def test_batches_hold_every_view_once_and_no_batch_is_too_long(
     pairs: list[tuple[int, int]], seconds: float
 ) -> None:
     views = [(f"r{room}_{k}", f"r{room}") for room, k in pairs]
-    groups = groups_from_views(views, seconds)
-    assert sorted(v for g in groups for v in g) == sorted(v for v, _room in views)
-    assert all(len(g) == 1 or len(g) * seconds <= 300 + 1e-6 for g in groups)
+    batches = batches_from_views(views, seconds)
+    assert sorted(v for g in batches for v in g) == sorted(v for v, _room in views)
+    assert all(len(g) == 1 or len(g) * seconds <= 300 + 1e-6 for g in batches)
 
 
 def test_a_rooms_views_stay_together() -> None:
     views = [(f"a{k}", "a") for k in range(6)] + [(f"b{k}", "b") for k in range(6)]
-    assert [len(g) for g in groups_from_views(views, 30.0)] == [6, 6]
+    assert [len(g) for g in batches_from_views(views, 30.0)] == [6, 6]
 
 
-def test_a_small_job_is_cut_into_enough_groups_for_the_slots() -> None:
+def test_a_small_job_is_cut_into_enough_batches_for_the_slots() -> None:
     views = [(f"a{k}", "a") for k in range(10)]
-    assert [len(g) for g in groups_from_views(views, 1.5)] == [10]
-    assert [len(g) for g in groups_from_views(views, 1.5, 8)] == [2] * 5
-    assert [len(g) for g in groups_from_views(views, 1.5, 100)] == [1] * 10
-    assert groups_from_views([], 1.5, 8) == ()
+    assert [len(g) for g in batches_from_views(views, 1.5)] == [10]
+    assert [len(g) for g in batches_from_views(views, 1.5, 8)] == [2] * 5
+    assert [len(g) for g in batches_from_views(views, 1.5, 100)] == [1] * 10
+    assert batches_from_views([], 1.5, 8) == ()
 
 
 @pytest.mark.parametrize(
@@ -85,11 +85,11 @@ def test_every_stage_has_a_queue_and_back() -> None:
     assert queue_of("light", gpu=True) == "light.gpu"
 
 
-def test_the_last_stage_of_a_group_writes_the_view() -> None:
+def test_the_last_stage_of_a_batch_writes_the_view() -> None:
     both = spec(1)
     assert steps_of_stage(both, "gl") == ("truth", "opengl_dl", "opengl_il")
     assert steps_of_stage(both, "light")[-1] == "view"
-    only_gl = both.model_copy(update={"modes": ("opengl_dl",), "group_stages": ("gl",)})
+    only_gl = both.model_copy(update={"modes": ("opengl_dl",), "batch_stages": ("gl",)})
     assert steps_of_stage(only_gl, "gl") == ("truth", "opengl_dl", "view")
 
 
@@ -121,7 +121,7 @@ def test_rates_and_time_left_follow_the_counts() -> None:
     fields = {"n_houses": "10", "stages": "gl,light", "shard_size": "500"}
 
     def view(done: int, rates: dict[str, float]) -> JobView:
-        counts = {"done:geometry": 4.0, "groups": 8.0, "done:gl": float(done), "took:gl:3": 5.0}
+        counts = {"done:geometry": 4.0, "batches": 8.0, "done:gl": float(done), "took:gl:3": 5.0}
         return JobView("j", fields, counts, rates, 0)
 
     rates = Rates()
@@ -129,7 +129,7 @@ def test_rates_and_time_left_follow_the_counts() -> None:
     now = rates.update(view(20, {}), 10.0)
     assert now["gl"] == pytest.approx(2.0)
     gl = next(s for s in stage_views(view(4, now), {"gl": 2}) if s.stage == "gl")
-    assert gl.total == 20  # 8 groups of 4 houses, 2 a house for the 6 to come
+    assert gl.total == 20  # 8 batches of 4 houses, 2 a house for the 6 to come
     assert gl.eta_s == pytest.approx(16 / 2.0)
     assert gl.p50_s == 8.0
 
@@ -138,7 +138,7 @@ def test_houses_given_up_and_stages_unknown_expect_nothing() -> None:
     fields = {"n_houses": "2", "stages": "gl,light", "shard_size": "500", "state": "running"}
     start = {s.stage: s for s in stage_views(JobView("j", fields, {}, {}, 0), {})}
     assert (start["gl"].total, start["gl"].eta_s) == (0, None)
-    counts = {"done:geometry": 1.0, "geometry:f": 1.0, "groups": 3.0, "done:gl": 3.0, "done:light": 3.0,
+    counts = {"done:geometry": 1.0, "geometry:f": 1.0, "batches": 3.0, "done:gl": 3.0, "done:light": 3.0,
               "houses:quarantined": 1.0, "done:reduce": 1.0}  # fmt: skip
     end = {s.stage: s for s in stage_views(JobView("j", fields, counts, {}, 0), {})}
     assert [end[s].total for s in ("geometry", "gl", "light", "reduce")] == [2, 3, 3, 1]
@@ -157,7 +157,7 @@ def test_memory_is_the_containers_when_it_has_a_limit(tmp_path: Path) -> None:
     assert machine_mb((limit,)) == 1024
     limit.write_text("max\n")
     assert machine_mb((limit,)) == machine_mb(())
-    assert memory_limit_mb(2) == pytest.approx(memory_limit_mb(1) / 2)
+    assert memory_share_mb(2) == pytest.approx(memory_share_mb(1) / 2)
 
 
 def test_an_estimate_grows_with_the_job() -> None:

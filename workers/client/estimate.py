@@ -11,7 +11,7 @@ from typing import Final
 
 from pbrs_farm.core.recipe import Recipe
 from workers.job import JobSpec
-from workers.node.view_groups import TARGET_S
+from workers.node.view_batches import TARGET_S
 
 # 779,342 views of 45,622 houses, the paper's own count.
 VIEWS_PER_HOUSE: Final = 17.1
@@ -33,10 +33,10 @@ def estimate(spec: JobSpec, n_slots: int) -> dict[str, float | int | str]:
     """Expected houses, views, tasks, hours and storage of a job."""
     per_house = min(spec.n_views, VIEWS_PER_HOUSE) if spec.n_views else VIEWS_PER_HOUSE
     n_views = round(spec.n_houses * per_house)
-    per_group = max(1.0, TARGET_S / spec.seconds_per_view)
-    n_groups = spec.n_houses * math.ceil(per_house / per_group)
-    n_tasks = 2 * spec.n_houses + n_groups * len(spec.group_stages)
-    has_light = "light" in spec.group_stages
+    per_batch = max(1.0, TARGET_S / spec.seconds_per_view)
+    n_batches = spec.n_houses * math.ceil(per_house / per_batch)
+    n_tasks = 2 * spec.n_houses + n_batches * len(spec.batch_stages)
+    has_light = "light" in spec.batch_stages
     seconds = spec.n_houses * _HOUSE_S + n_views * (
         _LABELS_S + (spec.seconds_per_view if has_light else 0.0)
     )

@@ -7,39 +7,41 @@ from typing import Any
 
 from pbrs_farm.core.errors import BadInput
 from workers.ids import WHOLE, TaskId, queue_of, task_from_text
-from workers.ledger.interface import JobView
+from workers.ledger.interface import ALIVE_S, STATES, JobView
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.worker_registry import ALIVE_S, Registry
+from workers.ledger.worker_registry import Registry
 
-_LETTERS = {
-    "l": "loaded, its house not admitted yet", "w": "ready", "q": "queued", "r": "running",
-    "d": "done", "f": "failed for good", "x": "cancelled",
-}  # fmt: skip
-_WAITING = {_LETTERS[letter] for letter in "lwq"}
+_TEXTS = {letter: name.lower() for name, letter in STATES.items()} | {
+    STATES["LOADED"]: "loaded, its house not admitted yet",
+    STATES["FAILED"]: "failed for good",
+}
+_WAITING = {_TEXTS[STATES[name]] for name in ("LOADED", "READY", "QUEUED")}
 
 
-def why(ledger: RedisLedger, registry: Registry, view: JobView, text: str) -> list[dict[str, Any]]:
+def explain(
+    ledger: RedisLedger, registry: Registry, view: JobView, text: str
+) -> list[dict[str, Any]]:
     """A row per task that text names: a task, a house, or a view (HOUSE/VIEW).
 
     Empty when the house is not in the ledger yet. Raises BadInput for a task or view there is not.
     """
     house, _, rest = text.partition("/")
     states = ledger.unit_states(view.job_id, house)
-    groups = ledger.groups(view.job_id, house)
+    batches = ledger.batches(view.job_id, house)
     units = {u: at for u, at in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
     units = {u: at for u, at in units.items() if ":" in at}
     wanted = rest.partition("/")[0]
     if states and wanted and wanted not in units:
-        holding = [str(k) for k, views in enumerate(groups) if wanted in views]
+        holding = [str(k) for k, views in enumerate(batches) if wanted in views]
         if not holding:
             raise BadInput(text, "", "the job has no such task or view")
         units = {holding[0]: units[holding[0]]}
     elif wanted:
         units = {u: at for u, at in units.items() if u == wanted}
-    rows = [_row(ledger, view.job_id, house, u, at, groups) for u, at in sorted(units.items())]
+    rows = [_row(ledger, view.job_id, house, u, at, batches) for u, at in sorted(units.items())]
     for row in rows:
-        if row["state"] in _WAITING and (hindered := _hindrance(registry, view, row["task"])):
-            row["because"] = hindered
+        if row["state"] in _WAITING and (obstacle := _obstacle(registry, view, row["task"])):
+            row["because"] = obstacle
     return rows
 
 
@@ -49,15 +51,15 @@ def _row(
     house: str,
     unit: str,
     at: str,
-    groups: tuple[tuple[str, ...], ...],
+    batches: tuple[tuple[str, ...], ...],
 ) -> dict[str, Any]:
     stage, _, letter = at.partition(":")
     task = str(TaskId(house, unit, stage))
     facts = ledger.task_facts(job, task)
-    row: dict[str, Any] = {"task": task, "state": _LETTERS.get(letter, letter)}
+    row: dict[str, Any] = {"task": task, "state": _TEXTS.get(letter, letter)}
     if unit.isdigit():
-        row["views"] = list(groups[int(unit)])
-    if letter == "w" and "not_before" in facts:
+        row["views"] = list(batches[int(unit)])
+    if letter == STATES["READY"] and "not_before" in facts:
         row["state"] = "waits before it is tried again"
     if "claim" in facts:
         _token, row["worker"], since = facts["claim"].split("|")
@@ -68,17 +70,17 @@ def _row(
     return row
 
 
-def _hindrance(registry: Registry, view: JobView, task: str) -> str:
+def _obstacle(registry: Registry, view: JobView, task: str) -> str:
     """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
     if view.state != "running":
         return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
-    if sick := registry.breaker():
-        return f"storage is sick: {sick}"
+    if reason := registry.breaker():
+        return f"storage is unhealthy: {reason}"
     queue = queue_of(task_from_text(task).stage, gpu=view.fields.get("gpu") == "1")
     takers = [
         w
         for w in registry.workers()
-        if w.age_s < ALIVE_S and queue in w.fields.get("queues", "").split(",")
+        if w.age_s <= ALIVE_S and queue in w.fields.get("queues", "").split(",")
     ]
     if not takers:
         return f"no worker takes {queue}"

@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, Any
 import pbrs_farm
 from pbrs_farm.core.errors import BadInput, MachineFailed, ObjectMissing
 from pbrs_farm.store import Store, store_from_url
-from workers.client.explain import why
+from workers.client.explain import explain
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
 from workers.ids import check_job_id, failed_key, job_key, log_key, task_from_text
-from workers.ledger.interface import JobView
+from workers.ledger.interface import ALIVE_S, JobView
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.worker_registry import ALIVE_S, Registry
+from workers.ledger.worker_registry import Registry
 
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe import Recipe
@@ -63,7 +63,7 @@ class Farm:
         spec: JobSpec,
         *,
         update: bool = False,
-        tell: Callable[[str], None] = lambda _line: None,
+        progress: Callable[[str], None] = lambda _line: None,
     ) -> Submitted:
         """Put a job on the farm; a job that is there already is left alone.
 
@@ -81,20 +81,20 @@ class Farm:
             return Submitted(spec.job_id, len(houses), view.state)
         n_slots = max(self.registry.slots().values(), default=_SLOTS_UNKNOWN)
         spec = spec.model_copy(
-            update={"min_groups": math.ceil(_GROUPS_PER_SLOT * n_slots / len(houses))}
+            update={"min_batches": math.ceil(_BATCHES_PER_SLOT * n_slots / len(houses))}
         )
         claim_root(self.store, spec.recipe, update=update)
         self.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
         self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
-        return Submitted(spec.job_id, len(houses), self._load(spec, list(houses), tell))
+        return Submitted(spec.job_id, len(houses), self._load(spec, list(houses), progress))
 
-    def recover(self, job: str, tell: Callable[[str], None] = lambda _line: None) -> JobView:
+    def recover(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
         """Rebuild the ledger of a job from storage, whatever Redis held of it."""
         from workers.job import houses_from_lines
 
         spec = self.spec(job)
         houses = [*houses_from_lines(self.store.get(job_key(job, "houses.jsonl")))]
-        self._load(spec, houses, tell)
+        self._load(spec, houses, progress)
         view = self.ledger.view(job)
         assert view is not None
         return view
@@ -148,22 +148,22 @@ class Farm:
             "eta_s": max((s.eta_s for s in stages if s.eta_s is not None), default=None),
             "failures": _with_prefix(view.counts, "failures:"),
             "handed_back": _with_prefix(view.counts, "handed_back:"),
-            "workers": len([w for w in workers if w.age_s < ALIVE_S]),
+            "workers": len([w for w in workers if w.age_s <= ALIVE_S]),
             "refusing": [
                 {"worker": w.name, "why": w.fields["refuses"]}
                 for w in workers
-                if w.age_s < ALIVE_S and job in w.fields.get("refuses", "")
+                if w.age_s <= ALIVE_S and job in w.fields.get("refuses", "")
             ],
             "storage": self.registry.breaker() or "ok",
         }
 
-    def why(self, job: str, text: str) -> list[dict[str, Any]]:
+    def explain(self, job: str, text: str) -> list[dict[str, Any]]:
         """What is known of a task, of all tasks of a house, or of one view (HOUSE/VIEW).
 
         Says in words what each waits for. Raises BadInput when the job has no such house.
         """
-        rows = why(self.ledger, self.registry, self.view(job), text)
-        return rows or self._why_not_admitted(job, text.partition("/")[0])
+        rows = explain(self.ledger, self.registry, self.view(job), text)
+        return rows or self._explain_not_admitted(job, text.partition("/")[0])
 
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
         """The stored log of a task's attempt (the last one by default); BadInput when none."""
@@ -182,17 +182,17 @@ class Farm:
         return self.store.get(found[chosen]).decode("utf-8", "replace")
 
     def failures(self, job: str) -> list[dict[str, Any]]:
-        """Tasks that failed for good, grouped by what is alike, most frequent first."""
-        groups: dict[str, dict[str, Any]] = {}
+        """Tasks that failed for good, alike ones together, most frequent first."""
+        kinds: dict[str, dict[str, Any]] = {}
         for task, fault in self.ledger.faults(job):
-            group = groups.setdefault(
+            kind = kinds.setdefault(
                 fault.fingerprint,
                 {"fingerprint": fault.fingerprint, "class": fault.fault, "n": 0,
                  "example": fault.message, "log": fault.log, "tasks": []},
             )  # fmt: skip
-            group["n"] += 1
-            group["tasks"] = sorted([*group["tasks"], task])[:20]
-        return sorted(groups.values(), key=lambda g: (-g["n"], g["fingerprint"]))
+            kind["n"] += 1
+            kind["tasks"] = sorted([*kind["tasks"], task])[:20]
+        return sorted(kinds.values(), key=lambda k: (-k["n"], k["fingerprint"]))
 
     def retry(self, job: str, tasks: Sequence[str] = ()) -> list[str]:
         """Fresh attempts for these tasks, or for all that failed; those that were put back."""
@@ -230,7 +230,9 @@ class Farm:
             for w in self.registry.workers()
         ]
 
-    def _load(self, spec: JobSpec, houses: list[HouseEntry], tell: Callable[[str], None]) -> str:
+    def _load(
+        self, spec: JobSpec, houses: list[HouseEntry], progress: Callable[[str], None]
+    ) -> str:
         """Enter the job into the ledger, as far along as storage says it is."""
         from workers.coordinator.recover import rebuild
         from workers.runner import runner_maker
@@ -245,7 +247,7 @@ class Farm:
         if self.ledger.create(spec) != "":
             raise BadInput(spec.job_id, "", "is being submitted by somebody else", hint=_WAIT)
         runner = runner_maker(self.config.runner)(self.config, lambda _reason: None)
-        rebuild(self.ledger, self.store, runner, spec, houses, tell)
+        rebuild(self.ledger, self.store, runner, spec, houses, progress)
         self.ledger.open(spec.job_id, spec.priority)
         return was
 
@@ -255,7 +257,7 @@ class Farm:
             raise BadInput(job, "", "not in the ledger", hint="`recover` rebuilds it from storage")
         return state
 
-    def _why_not_admitted(self, job: str, house: str) -> list[dict[str, Any]]:
+    def _explain_not_admitted(self, job: str, house: str) -> list[dict[str, Any]]:
         from workers.job import houses_from_lines
 
         data = self.store.get(job_key(check_job_id(job), "houses.jsonl"))
@@ -266,8 +268,8 @@ class Farm:
 
 # A submission that takes longer has died; the next one starts afresh.
 _LOADING_S = 900.0
-# A small job is cut finer, so that its last group does not leave the other slots idle.
-_GROUPS_PER_SLOT = 4
+# A small job is cut finer, so that its last batch does not leave the other slots idle.
+_BATCHES_PER_SLOT = 4
 _SLOTS_UNKNOWN = 2
 _WAIT = "wait for it; after 15 minutes it counts as dead"
 _HOUSE_STATES = ("open", "done", "quarantined")

@@ -36,7 +36,7 @@ def status_text(status: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def why_text(rows: Sequence[Mapping[str, Any]]) -> str:
+def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
     """A task a line, and below it what is known."""
     lines = []
     for row in rows:
@@ -56,16 +56,16 @@ def why_text(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def failures_text(groups: Sequence[Mapping[str, Any]]) -> str:
-    """A group a paragraph, the most frequent first."""
-    if not groups:
+def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
+    """A kind of failure a paragraph, the most frequent first."""
+    if not kinds:
         return "nothing failed for good"
     parts = []
-    for group in groups:
-        more = f" and {group['n'] - 5} more" if group["n"] > 5 else ""
+    for kind in kinds:
+        more = f" and {kind['n'] - 5} more" if kind["n"] > 5 else ""
         parts.append(
-            f"{group['n']} x {group['fingerprint']}\n    {group['example']}\n"
-            f"    {' '.join(group['tasks'][:5])}{more}"
+            f"{kind['n']} x {kind['fingerprint']}\n    {kind['example']}\n"
+            f"    {' '.join(kind['tasks'][:5])}{more}"
         )
     return "\n".join(parts)
 

@@ -21,11 +21,11 @@ from pbrs_farm.core.errors import PbrsError
 from workers.config import FarmConfig, config_from_environment
 from workers.coordinator.progress_rates import Rates
 from workers.ids import STAGES, queue_of, task_from_text
-from workers.ledger.interface import JobView, LedgerUnavailable
+from workers.ledger.interface import JobView, Ledger, LedgerUnavailable, WorkerRegistry
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
-from workers.logs import log_plainly
+from workers.logs import log_to_stderr
 
 _log = logging.getLogger("pbrs.coordinator")
 _BUSY_PAUSE_S: Final = 0.05
@@ -36,19 +36,30 @@ _RESEND_EVERY_S: Final = 15.0
 _RATES_EVERY_S: Final = 10.0
 
 
+Send = Callable[[Iterable[tuple[str, str, str, str]]], None]
+
+
 class Coordinator:
-    """send: puts one message on a queue: send(queue, job, task, recipe digest)."""
+    """Leads the farm, or stands by until the leader is gone.
+
+    send: puts messages on queues, each (queue, job, task, recipe digest). clock: seconds that only
+    grow.
+    """
 
     def __init__(
         self,
         config: FarmConfig,
-        ledger: RedisLedger,
-        send: Callable[[Iterable[tuple[str, str, str, str]]], None],
+        ledger: Ledger,
+        send: Send,
+        *,
+        registry: WorkerRegistry,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._config = config
         self._ledger = ledger
-        self._registry = Registry(ledger)
+        self._registry = registry
         self._send = send
+        self._clock = clock
         self._token = f"{platform.node()}:{os.getpid()}:{secrets.token_hex(4)}"
         self._due: dict[str, float] = {}
         self._slots: dict[str, int] = {}
@@ -62,7 +73,7 @@ class Coordinator:
                 if self.turn():
                     stop.wait(_BUSY_PAUSE_S)
                 elif self.leading:
-                    self._ledger.rest(_IDLE_PAUSE_S)
+                    self._ledger.wait(_IDLE_PAUSE_S)
                 else:
                     stop.wait(_STANDBY_PAUSE_S)
             except LedgerUnavailable as error:
@@ -90,19 +101,19 @@ class Coordinator:
         views = [v for j in self._ledger.active_jobs() if (v := self._ledger.view(j)) is not None]
         if self._is_due("rates", _RATES_EVERY_S):
             for view in views:
-                self._ledger.set_rates(view.job_id, self._rates.update(view, time.monotonic()))
+                self._ledger.set_rates(view.job_id, self._rates.update(view, self._clock()))
         if self._registry.breaker():
             return 0
-        n_sent = self._feed(views)
+        n_sent = self._dispatch(views)
         if self._is_due("resend", _RESEND_EVERY_S):
             n_sent += self._resend(views)
         return n_sent
 
-    def _feed(self, views: list[JobView]) -> int:
+    def _dispatch(self, views: list[JobView]) -> int:
         room = self._room(views)
         n_sent = 0
         for view in views:
-            tasks = self._ledger.feed(
+            tasks = self._ledger.dispatch(
                 view.job_id, self._token, max_open=self._max_open(), room=room
             )
             if tasks is None:
@@ -152,18 +163,18 @@ class Coordinator:
         )
 
     def _is_due(self, what: str, every_s: float) -> bool:
-        now = time.monotonic()
+        now = self._clock()
         if now < self._due.get(what, 0.0):
             return False
         self._due[what] = now + every_s
         return True
 
 
-# Nothing to be declared (a message goes to a queue by its name), and no repr of its words.
-_PLAIN: Final[dict[str, Any]] = {"declare": (), "argsrepr": "", "kwargsrepr": ""}
+# Nothing to be declared (a message goes to a queue by its name), and no repr of its arguments.
+_MESSAGE_OPTIONS: Final[dict[str, Any]] = {"declare": (), "argsrepr": "", "kwargsrepr": ""}
 
 
-def celery_sender(app: Any) -> Callable[[Iterable[tuple[str, str, str, str]]], None]:
+def celery_sender(app: Any) -> Send:
     """send for a Coordinator, through a Celery application."""
     from kombu.exceptions import OperationalError
 
@@ -174,7 +185,7 @@ def celery_sender(app: Any) -> Callable[[Iterable[tuple[str, str, str, str]]], N
                 for queue, job, task, recipe in messages:
                     app.send_task(
                         "pbrs.run", args=(job, task, recipe), queue=queue, producer=producer,
-                        **_PLAIN,
+                        **_MESSAGE_OPTIONS,
                     )  # fmt: skip
         except (OperationalError, OSError) as error:
             # What was not sent stays "q" in the ledger, and is sent again when it is old.
@@ -187,7 +198,7 @@ def main() -> int:
     """`python -m workers.coordinator.leader`: lead, or stand by, until told to leave."""
     from workers.queue.celery_app import make_app
 
-    log_plainly()
+    log_to_stderr()
     try:
         config = config_from_environment()
         ledger = RedisLedger(config)
@@ -202,7 +213,8 @@ def main() -> int:
         from workers.coordinator.metrics import serve_metrics
 
         serve_metrics(config, ledger)
-    Coordinator(config, ledger, celery_sender(make_app(config))).run(stop)
+    send = celery_sender(make_app(config))
+    Coordinator(config, ledger, send, registry=Registry(ledger)).run(stop)
     return 0
 
 

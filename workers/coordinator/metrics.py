@@ -18,7 +18,7 @@ from prometheus_client.core import (
 
 from workers.config import FarmConfig
 from workers.ids import QUEUES, STAGES
-from workers.ledger.interface import JobView, LedgerUnavailable
+from workers.ledger.interface import ALIVE_S, STATES, JobView, LedgerUnavailable
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.worker_registry import Registry
 
@@ -49,10 +49,10 @@ class FarmCollector:
         for stage, n in self._registry.slots().items():
             slots.add_metric([stage], n)
         yield slots
-        alive = sum(w.age_s < 45 for w in self._registry.workers())
-        yield GaugeMetricFamily("pbrs_workers", "workers seen in the last 45 s", value=alive)
-        sick = bool(self._registry.breaker())
-        yield GaugeMetricFamily("pbrs_storage_sick", "1 while the breaker is open", value=sick)
+        alive = sum(w.age_s <= ALIVE_S for w in self._registry.workers())
+        yield GaugeMetricFamily("pbrs_workers", f"workers seen in {ALIVE_S:.0f} s", value=alive)
+        is_open = bool(self._registry.breaker())
+        yield GaugeMetricFamily("pbrs_breaker_open", "1 while storage is unhealthy", value=is_open)
         used = self._ledger.client.info("memory")["used_memory"]
         yield GaugeMetricFamily("pbrs_redis_bytes", "memory Redis uses", value=used)
 
@@ -69,7 +69,7 @@ def _tasks(views: list[JobView]) -> Metric:
     metric = GaugeMetricFamily(
         "pbrs_tasks", "tasks now in a state", labels=["job", "stage", "state"]
     )
-    names = {"w": "ready", "q": "queued", "r": "running", "f": "failed"}
+    names = {STATES[name.upper()]: name for name in ("ready", "queued", "running", "failed")}
     for view in views:
         for stage in STAGES:
             for letter, name in names.items():

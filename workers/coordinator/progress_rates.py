@@ -91,7 +91,7 @@ def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
 
 
 def expected_total(view: JobView, stage: str) -> int:
-    """Tasks of a stage in the whole job; groups of houses not yet opened at the mean so far.
+    """Tasks of a stage in the whole job; batches of houses not yet opened at the mean so far.
 
     0 while nothing is known. Houses that were given up have none that are still to come.
     """
@@ -106,9 +106,9 @@ def expected_total(view: JobView, stage: str) -> int:
     if stage == "reduce":
         return n_houses - n_given_up
     opened = view.counts.get("done:geometry", 0)
-    groups = view.counts.get("groups", 0)
+    batches = view.counts.get("batches", 0)
     unread = view.counts.get("geometry:f", 0) + view.counts.get("geometry:x", 0)
-    return int(groups + (n_houses - opened - unread) * (groups / opened if opened else 0))
+    return int(batches + (n_houses - opened - unread) * (batches / opened if opened else 0))
 
 
 def _took(view: JobView, stage: str) -> dict[int, float]:

@@ -30,11 +30,11 @@ def rebuild(
     runner: StepRunner,
     spec: JobSpec,
     houses: list[HouseEntry],
-    tell: Callable[[str], None] = lambda _line: None,
+    progress: Callable[[str], None] = lambda _line: None,
 ) -> None:
     """Enter every house of the job as its markers tell it. The job must have just been created."""
     done = done_steps(store) if houses else {}
-    tell(f"{sum(map(len, done.values()))} markers of {len(done)} houses")
+    progress(f"{sum(map(len, done.values()))} markers of {len(done)} houses")
     numbered = iter(enumerate(houses))
     with ThreadPoolExecutor(_THREADS) as pool:
         while chunk := list(islice(numbered, _CHUNK)):
@@ -62,18 +62,18 @@ def _state(
     index, house = numbered
     names = done.get(house.house_id)
     survey = runner.survey(spec, house.house_id, names) if names else None
-    if survey is None or survey.groups is None:
+    if survey is None or survey.batches is None:
         return None
     units: dict[str, tuple[str, str]] = {}
     for unit, stage in survey.missing.items():
-        units[unit] = (stage, "l") if stage else (spec.group_stages[-1], "d")
+        units[unit] = (stage, "l") if stage else (spec.batch_stages[-1], "d")
     if survey.reduced:
         units["-"] = (REDUCE, "d")
     elif all(letter == "d" for _stage, letter in units.values()):
         units["-"] = (REDUCE, "l")
     else:
         units["-"] = (GEOMETRY, "d")
-    return HouseState(index, house.house_id, survey.reduced, survey.groups, units)
+    return HouseState(index, house.house_id, survey.reduced, survey.batches, units)
 
 
 def _enter(

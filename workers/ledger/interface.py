@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 from pbrs_farm.core.errors import PbrsError, Transient
 
@@ -24,6 +24,23 @@ FaultClass = Literal[
     "data", "bug", "crash", "resource", "machine", "timeout", "silent", "lost",
     "storage", "preempted", "drained", "version", "cancelled",
 ]  # fmt: skip
+
+ALIVE_S: Final = 45.0
+"""A worker whose last heartbeat is no older than this is there."""
+UNCOUNTED: Final = ("preempted", "storage", "version", "drained")
+"""Classes of fault that are nobody's: the attempt is given back."""
+SUSPECT: Final = ("crash", "resource", "machine", "timeout", "silent")
+"""Classes of fault that speak against the worker: three in a row and it cools down."""
+STATES: Final = {
+    "LOADED": "l",  # entered, its house not admitted
+    "READY": "w",  # in the outbox, or waiting for its time
+    "QUEUED": "q",  # its message is sent
+    "RUNNING": "r",  # leased
+    "DONE": "d",
+    "FAILED": "f",  # for good
+    "CANCELLED": "x",
+}
+"""A unit's state: name -> the letter it has in the ledger; Lua knows the names as constants."""
 
 
 class LedgerUnavailable(PbrsError, Transient):
@@ -65,10 +82,10 @@ def fault_from_json(text: str) -> Fault:
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """How a task ended well. groups: of views, only after geometry."""
+    """How a task ended well. batches: of views, only after geometry."""
 
     seconds: float
-    groups: tuple[tuple[str, ...], ...] = ()
+    batches: tuple[tuple[str, ...], ...] = ()
     n_views: int = 0
 
 
@@ -79,7 +96,7 @@ class HouseState:
     index: int
     house_id: str
     done: bool
-    groups: tuple[tuple[str, ...], ...] = ()
+    batches: tuple[tuple[str, ...], ...] = ()
     units: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
 
@@ -120,20 +137,42 @@ class Ledger(Protocol):
     def claim(
         self, job: str, task: str, *, token: str, recipe: str, direct: bool = False
     ) -> Claim: ...
-    def beat(self, job: str, task: str, token: str) -> str: ...
+    def heartbeat(self, job: str, task: str, token: str) -> str: ...
     def finish(self, job: str, task: str, token: str, end: Finished, *, sticky: bool) -> str: ...
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str: ...
 
     def lead(self, token: str) -> bool: ...
+    def resign(self, token: str) -> None: ...
     def reap(self, token: str) -> int: ...
-    def feed(
+    def dispatch(
         self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
     ) -> list[str] | None: ...
-    def rest(self, seconds: float) -> None: ...
+    def wait(self, seconds: float) -> None: ...
     def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None: ...
 
     def steer(self, job: str, what: str, reason: str = "") -> str: ...
     def retry(self, job: str, task: str) -> bool: ...
     def view(self, job: str) -> JobView | None: ...
+    def set_rates(self, job: str, rates: Mapping[str, float]) -> None: ...
+    def queue_length(self, queue: str) -> int: ...
     def active_jobs(self) -> list[str]: ...
     def known_jobs(self) -> list[str]: ...
+
+
+class WorkerRegistry(Protocol):
+    """Who works on the farm, as slots and the coordinator see it."""
+
+    def slots(self) -> dict[str, int]: ...
+    def refused(self, reason: str) -> None: ...
+    def open_breaker(self, reason: str) -> None: ...
+    def breaker(self) -> str: ...
+
+
+def batches_from_text(text: str) -> tuple[tuple[str, ...], ...]:
+    """ "a,b;c" -> (("a", "b"), ("c",))."""
+    return tuple(tuple(batch.split(",")) for batch in text.split(";") if batch)
+
+
+def text_from_batches(batches: Sequence[Sequence[str]]) -> str:
+    """(("a", "b"), ("c",)) -> "a,b;c"."""
+    return ";".join(",".join(batch) for batch in batches)

@@ -17,27 +17,32 @@ from redis.retry import Retry
 
 import pbrs_farm
 from workers.config import FarmConfig, shown_url
-from workers.ids import LEASES
+from workers.ids import LEASES, LIGHT_GPU, STAGES
 from workers.ledger.interface import (
+    ALIVE_S,
+    STATES,
+    SUSPECT,
+    UNCOUNTED,
     Claim,
     Fault,
     Finished,
     HouseState,
     JobView,
     LedgerUnavailable,
+    batches_from_text,
     fault_from_json,
+    text_from_batches,
 )
 
 if TYPE_CHECKING:
     from workers.job import HouseEntry, JobSpec
 
 _SCRIPTS: Final = (
-    "claim", "beat", "finish", "fail", "reap", "feed", "resend", "create", "load", "retry",
-    "steer", "lead",
+    "claim", "heartbeat", "finish", "fail", "reap", "dispatch", "resend", "create", "load",
+    "retry", "steer", "lead",
 )  # fmt: skip
 _CHUNK: Final = 1000
 _LEAD_S: Final = 15
-_AGAINST_WORKER: Final = {"crash", "resource", "machine", "timeout", "silent"}
 
 
 def redis_client(config: FarmConfig) -> Any:
@@ -65,8 +70,23 @@ def redis_client(config: FarmConfig) -> Any:
     )
 
 
+def lua_constants() -> str:
+    """What Lua and Python must agree on, as Lua: told by Python, so that it stands once."""
+    lines = [f"local {name} = '{letter}'" for name, letter in STATES.items()]
+    lines += [f"local {name.upper()}_STAGE = '{name}'" for name in STAGES]
+    lines += [f"local STAGES = {{ {', '.join(f'{s!r}' for s in STAGES)} }}"]
+    for name, classes in (("UNCOUNTED", UNCOUNTED), ("SUSPECT", SUSPECT)):
+        lines += [f"local {name} = {{ {', '.join(f'{c} = true' for c in classes)} }}"]
+    return "\n".join(
+        [*lines, f"local ALIVE_S = {ALIVE_S:g}", f"local GPU_LEASE = '{LIGHT_GPU}'", ""]
+    )
+
+
 class RedisLedger:
-    """Implements workers.ledger.interface.Ledger; one per process, safe after a fork."""
+    """Implements workers.ledger.interface.Ledger; one per process, safe after a fork.
+
+    client: a redis-py client that decodes its answers; made from the configuration by default.
+    """
 
     def __init__(self, config: FarmConfig, client: Any = None) -> None:
         self.config = config
@@ -74,7 +94,7 @@ class RedisLedger:
         self._g = config.prefix
         self._where = shown_url(config.redis_url.reveal())
         folder = Path(__file__).with_name("lua")
-        common = (folder / "common.lua").read_text()
+        common = lua_constants() + (folder / "common.lua").read_text()
         self._scripts: dict[str, Any] = {
             name: self.client.register_script(common + (folder / f"{name}.lua").read_text())
             for name in _SCRIPTS
@@ -89,7 +109,7 @@ class RedisLedger:
             "version": spec.version,
             "recipe": spec.recipe.digest(),
             "recipe_name": spec.recipe.name,
-            "stages": ",".join(spec.group_stages),
+            "stages": ",".join(spec.batch_stages),
             "priority": spec.priority,
             "gpu": int(spec.gpu),
             "max_attempts": rules.max_attempts,
@@ -126,20 +146,20 @@ class RedisLedger:
                 for house in chunk:
                     units = [x for u, at in house.units.items() for x in (u, *at)]
                     what = "done" if house.done else "loaded"
-                    groups = _text_from_groups(house.groups)
-                    args = [house.index, house.house_id, what, groups, *units]
+                    batches = text_from_batches(house.batches)
+                    args = [house.index, house.house_id, what, batches, *units]
                     script(keys=keys, args=args, client=pipe)
                 n_new += sum(pipe.execute())
         return n_new
 
     def open(self, job: str, priority: int) -> None:
-        """The job is loaded; the coordinator may feed it."""
+        """The job is loaded; the coordinator may dispatch it."""
         with self.errors():
             pipe = self.client.pipeline(transaction=True)
             pipe.hset(f"{self._p(job)}job", "state", "running")
             pipe.zadd(f"{self._g}jobs", {job: priority})
             pipe.zadd(f"{self._g}known", {job: self.now()})
-            pipe.lpush(f"{self._g}wake", "1")
+            pipe.lpush(f"{self._g}notify", "1")
             pipe.execute()
 
     def forget(self, job: str) -> None:
@@ -180,23 +200,21 @@ class RedisLedger:
         )
         return Claim(verdict, detail, inputs, token)
 
-    def beat(self, job: str, task: str, token: str) -> str:
+    def heartbeat(self, job: str, task: str, token: str) -> str:
         """Keep the lease: ok, lost (somebody else's by now) or cancelled."""
-        return str(self._run("beat", job, task, token, self.config.lease_s))
+        return str(self._run("heartbeat", job, task, token, self.config.lease_s))
 
     def finish(self, job: str, task: str, token: str, end: Finished, *, sticky: bool) -> str:
         """Done: what follows becomes ready. Another task of the house to go on with, or ""."""
-        groups = _text_from_groups(end.groups)
-        args = (f"{end.seconds:.3f}", groups, end.n_views, self.config.worker, int(sticky))
+        batches = text_from_batches(end.batches)
+        args = (f"{end.seconds:.3f}", batches, end.n_views, self.config.worker, int(sticky))
         _verdict, more = self._run("finish", job, task, token, *args)
         return str(more)
 
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str:
         """Ended badly: stale, handed back, retry, failed (for good) or cancelled."""
-        blocking = int(fault.fault in _AGAINST_WORKER)
         args = (fault.fault, fault.fingerprint, fault.json(), self.config.worker)
-        rest = (delay_s, blocking, self.config.forgive_s)
-        return str(self._run("fail", job, task, token, *args, *rest))
+        return str(self._run("fail", job, task, token, *args, delay_s, self.config.cooldown_s))
 
     # The coordinator
 
@@ -214,12 +232,12 @@ class RedisLedger:
         """End leases that ran out; how many, -1 when not leading."""
         return int(self._run("reap", "", token, 200, *LEASES))
 
-    def feed(
+    def dispatch(
         self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
     ) -> list[str] | None:
         """Admit houses and take ready tasks to be sent, at most room[stage]; None: not leading."""
         pairs = [x for pair in room.items() for x in pair]
-        return _tasks(self._run("feed", job, token, max_open, *pairs))
+        return _tasks(self._run("dispatch", job, token, max_open, *pairs))
 
     def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None:
         """Tasks whose message was sent age_s ago and never claimed; None: not leading."""
@@ -231,10 +249,10 @@ class RedisLedger:
             with self.errors():
                 self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
 
-    def rest(self, seconds: float) -> None:
+    def wait(self, seconds: float) -> None:
         """Wait so long at most, less when a task becomes ready meanwhile."""
         with self.errors():
-            self.client.blpop([f"{self._g}wake"], timeout=seconds)
+            self.client.blpop([f"{self._g}notify"], timeout=seconds)
 
     def queue_length(self, queue: str) -> int:
         """Messages waiting on a queue of the broker."""
@@ -275,10 +293,10 @@ class RedisLedger:
         with self.errors():
             return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
 
-    def groups(self, job: str, house: str) -> tuple[tuple[str, ...], ...]:
-        """The house's groups of views, () before they are known."""
+    def batches(self, job: str, house: str) -> tuple[tuple[str, ...], ...]:
+        """The house's batches of views, () before they are known."""
         with self.errors():
-            return groups_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
+            return batches_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
 
     def task_facts(self, job: str, task: str) -> dict[str, str]:
         """What is known of one task beside its state: claim, attempts, tried, not before, fault."""
@@ -335,15 +353,6 @@ class RedisLedger:
             raise LedgerUnavailable(
                 f"{self._where} is out of memory: {error}", hint="raise maxmemory"
             ) from error
-
-
-def groups_from_text(text: str) -> tuple[tuple[str, ...], ...]:
-    """ "a,b;c" -> (("a", "b"), ("c",))."""
-    return tuple(tuple(group.split(",")) for group in text.split(";") if group)
-
-
-def _text_from_groups(groups: Sequence[Sequence[str]]) -> str:
-    return ";".join(",".join(group) for group in groups)
 
 
 def _tasks(answer: object) -> list[str] | None:

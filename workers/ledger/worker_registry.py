@@ -1,4 +1,4 @@
-"""Who works on the farm: registration, signs of life, draining, and the storage breaker.
+"""Who works on the farm: registration, heartbeats, draining, and the storage breaker.
 
 Effects: Redis. The ledger's scripts read what stands here (drain, blocked_until, breaker).
 """
@@ -10,22 +10,20 @@ from collections.abc import Mapping
 
 import pbrs_farm
 from workers.ids import QUEUES, stages_of_queue
-from workers.ledger.interface import WorkerView
+from workers.ledger.interface import ALIVE_S, WorkerView
 from workers.ledger.redis_ledger import RedisLedger
 
 _GONE_S = 3600.0
-ALIVE_S = 45.0
-"""A worker seen no longer ago than this is there."""
 
 
 class Registry:
-    """The farm's workers, as a view on the ledger's Redis."""
+    """Implements workers.ledger.interface.WorkerRegistry on the ledger's Redis."""
 
     def __init__(self, ledger: RedisLedger) -> None:
         self._ledger = ledger
         self._g = ledger.config.prefix
 
-    def beat(self) -> bool:
+    def heartbeat(self) -> bool:
         """This worker is alive; True when it is asked to leave."""
         config, client = self._ledger.config, self._ledger.client
         key = f"{self._g}worker:{config.worker}"
@@ -76,13 +74,13 @@ class Registry:
             client.zremrangebyscore(f"{self._g}workers", "-inf", now - _GONE_S)
             seen = client.zrange(f"{self._g}workers", 0, -1, withscores=True)
             pipe = client.pipeline(transaction=False)
-            for name, _beat in seen:
+            for name, _seen_at in seen:
                 pipe.hgetall(f"{self._g}worker:{name}")
             fields = pipe.execute()
         return sorted(
             (
-                WorkerView(name, now - beat, row)
-                for (name, beat), row in zip(seen, fields, strict=True)
+                WorkerView(name, now - seen_at, row)
+                for (name, seen_at), row in zip(seen, fields, strict=True)
             ),
             key=lambda worker: worker.name,
         )
@@ -97,14 +95,14 @@ class Registry:
                         slots[stage] = slots.get(stage, 0) + int(worker.fields.get("slots", 1))
         return slots
 
-    def storage_sick(self, reason: str) -> None:
-        """Open the breaker: no claims and no feeding until it runs out by itself."""
+    def open_breaker(self, reason: str) -> None:
+        """Storage is unhealthy: no claims and no messages until the breaker closes by itself."""
         with self._ledger.errors():
             self._ledger.client.set(
                 f"{self._g}breaker", reason[:300], ex=self._ledger.config.breaker_s
             )
 
     def breaker(self) -> str:
-        """Why the farm holds its breath, "" when storage is well."""
+        """Why nothing is claimed, "" while storage is healthy."""
         with self._ledger.errors():
             return str(self._ledger.client.get(f"{self._g}breaker") or "")

@@ -1,4 +1,4 @@
-"""Signs of life of a worker's main loop, and leaving when drained. Effects: Redis, a file."""
+"""The heartbeat of a worker's main loop, and leaving when drained. Effects: Redis, a file."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _log = logging.getLogger("pbrs.worker")
 _EVERY_S: Final = 10.0
 
 
-class SignsOfLife(bootsteps.StartStopStep):  # type: ignore[misc]
-    """Celery boot step: beats for the whole worker, and shuts it down warmly when drained."""
+class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
+    """Celery boot step: a heartbeat for the whole worker, and shuts it down warmly when drained."""
 
     requires = {"celery.worker.components:Timer"}  # noqa: RUF012 - Celery's own interface
 
@@ -31,8 +31,8 @@ class SignsOfLife(bootsteps.StartStopStep):  # type: ignore[misc]
         self._timer: Any = None
 
     def start(self, parent: Any) -> None:
-        self._beat()
-        self._timer = parent.timer.call_repeatedly(_EVERY_S, self._beat)
+        self._heartbeat()
+        self._timer = parent.timer.call_repeatedly(_EVERY_S, self._heartbeat)
 
     def stop(self, _parent: Any) -> None:
         if self._timer is not None:
@@ -43,10 +43,10 @@ class SignsOfLife(bootsteps.StartStopStep):  # type: ignore[misc]
             _log.warning("%s", error)
         self._config.heartbeat_file.unlink(missing_ok=True)
 
-    def _beat(self) -> None:
+    def _heartbeat(self) -> None:
         touch(self._config.heartbeat_file)
         try:
-            if self._registry.beat():
+            if self._registry.heartbeat():
                 _log.info("drained: finishing what runs, then leaving")
                 state.should_stop = os.EX_OK
         except LedgerUnavailable as error:

@@ -20,7 +20,7 @@ from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
 from pbrs_farm.run.plan import Wanted, view_steps, wanted
-from pbrs_farm.run.render_process import limit_threads
+from pbrs_farm.run.run_task import limit_threads
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import Store, store_from_url
@@ -30,17 +30,17 @@ from workers.house_files import FOLDER, fill_cache, is_left_in_place
 from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
 from workers.job import JobSpec
 from workers.node.merge_manifests import merge_job, merge_shard
-from workers.node.view_groups import groups_from_views
-from workers.runner import Request, Result, Survey, Tell
+from workers.node.view_batches import batches_from_views
+from workers.runner import OnText, Request, Result, Survey
 
 _HOUSE_STEPS: Final = ("house", "cameras")
 _LIGHT_STEPS: Final = ("light", "develop")
 
 
-def runner(config: FarmConfig, storage_waits: Tell) -> HouseRunner:
+def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
     """The runner of a worker or of `recover`."""
     store = store_from_url(config.store_url, config.store)
-    patient = RetryingStore(store, config.storage_patience_s, storage_waits)
+    patient = RetryingStore(store, config.storage_patience_s, on_waiting)
     return HouseRunner(patient, n_threads=max(1, (os.cpu_count() or 1) // config.slots))
 
 
@@ -53,60 +53,60 @@ class HouseRunner:
         self._house_cache = HouseCache()
         self._spec: Callable[[str], JobSpec] = lru_cache(maxsize=4)(self._read_spec)
 
-    def run(self, request: Request, tell: Tell) -> Result:
+    def run(self, request: Request, on_step: OnText) -> Result:
         """One task; raises what its steps raise."""
         spec = self._spec(request.job_id)
         if request.stage == GEOMETRY:
-            return self._geometry(request, spec, tell)
+            return self._geometry(request, spec, on_step)
         if request.stage in (GL, LIGHT):
             if request.stage == LIGHT:
                 for step in plan.needed_of_house("light", request.house):
-                    self._step(request, spec, tell, step)
+                    self._step(request, spec, on_step, step)
             for view in request.views:
                 for step in steps_of_stage(spec, request.stage):
-                    self._step(request, spec, tell, step, view=view)
+                    self._step(request, spec, on_step, step, view=view)
         elif request.stage == REDUCE:
-            tell("finish")
+            on_step("finish")
             finish_house(self._store, request.house)
             if spec.reference:
-                self._pack_histograms(request.house, spec, tell)
+                self._pack_histograms(request.house, spec, on_step)
         elif request.stage == SHARD:
-            merge_shard(self._store, spec, int(request.unit.removeprefix("s")), tell)
+            merge_shard(self._store, spec, int(request.unit.removeprefix("s")), on_step)
         elif request.stage == JOB:
             if spec.reference:
-                self._select(spec, tell)
-            merge_job(self._store, spec, tell)
+                self._select(spec, on_step)
+            merge_job(self._store, spec, on_step)
         return Result(n_views=len(request.views))
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
         """What the markers' names say of a house: see workers.runner.Survey."""
         if not done.issuperset(_HOUSE_STEPS):
             return Survey()
-        groups = self._groups(spec, house)
+        batches = self._batches(spec, house)
         units: dict[str, str] = {}
-        for number, views in enumerate(groups):
+        for number, views in enumerate(batches):
             units[str(number)] = _first_stage_missing(spec, views, done)
         finished = all(stage == "" for stage in units.values())
         has_manifest = self._store.head(keys.house_key(house, keys.MANIFEST)) is not None
-        return Survey(groups=groups, missing=units, reduced=finished and has_manifest)
+        return Survey(batches=batches, missing=units, reduced=finished and has_manifest)
 
-    def _geometry(self, request: Request, spec: JobSpec, tell: Tell) -> Result:
+    def _geometry(self, request: Request, spec: JobSpec, on_step: OnText) -> Result:
         fill_cache(self._store)
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
             for step in _HOUSE_STEPS:
-                self._step(request, spec, tell, step, source=source)
-        return Result(groups=self._groups(spec, request.house))
+                self._step(request, spec, on_step, step, source=source)
+        return Result(batches=self._batches(spec, request.house))
 
-    def _pack_histograms(self, house: str, spec: JobSpec, tell: Tell) -> None:
+    def _pack_histograms(self, house: str, spec: JobSpec, on_step: OnText) -> None:
         """The house's histograms in one object, so that the job's selection reads one a house."""
         from pbrs_farm.core.lighting import Mode
         from pbrs_farm.curate.selection_run import house_pack
 
-        tell("histograms")
+        on_step("histograms")
         house_pack(self._store, house, Mode(spec.recipe.selection.score_mode))
 
-    def _select(self, spec: JobSpec, tell: Tell) -> None:
+    def _select(self, spec: JobSpec, on_step: OnText) -> None:
         """Selection over the views there are; a run of the job's name, so that it adds up."""
         from pbrs_farm.curate.selection_run import select
         from pbrs_farm.selection.reference_set import reference_from_bytes
@@ -118,10 +118,10 @@ class HouseRunner:
             spec.recipe.selection,
             reference_name=spec.reference,
             run=spec.job_id,
-            progress=lambda done, n: tell(f"select {done} of {n}"),
+            progress=lambda done, n: on_step(f"select {done} of {n}"),
         )
 
-    def _groups(self, spec: JobSpec, house: str) -> tuple[tuple[str, ...], ...]:
+    def _batches(self, spec: JobSpec, house: str) -> tuple[tuple[str, ...], ...]:
         marker = read_marker(self._store, keys.marker_key(house, "cameras"))
         if marker is None:
             return ()
@@ -129,19 +129,19 @@ class HouseRunner:
         rooms = {view: room for view, room, _score in rows}
         chosen = plan.spread(rows, spec.n_views)
         placed = [(v, rooms[v]) for v in chosen]
-        return groups_from_views(placed, spec.seconds_per_view, spec.min_groups)
+        return batches_from_views(placed, spec.seconds_per_view, spec.min_batches)
 
     def _step(
         self,
         request: Request,
         spec: JobSpec,
-        tell: Tell,
+        on_step: OnText,
         step: str,
         *,
         view: str | None = None,
         source: SourceRef | None = None,
     ) -> None:
-        tell(step if view is None else f"{step} {view}")
+        on_step(step if view is None else f"{step} {view}")
         limit_threads(step, self._n_threads)
         work = Work(
             store=self._store,
@@ -186,22 +186,22 @@ def want_of(spec: JobSpec) -> Wanted:
     return wanted(spec.modes, spec.layers, spec.n_views)
 
 
-def group_stages(want: Wanted) -> tuple[str, ...]:
-    """The stages a group of views goes through: light only when a mode needs it."""
+def batch_stages(want: Wanted) -> tuple[str, ...]:
+    """The stages a batch of views goes through: light only when a mode needs it."""
     return (GL, LIGHT) if "light" in view_steps(want) else (GL,)
 
 
 def steps_of_stage(spec: JobSpec, stage: str) -> tuple[str, ...]:
     """The steps of a view that one stage does; the last stage also writes view.json."""
     steps = view_steps(want_of(spec))
-    last = stage == spec.group_stages[-1]
+    last = stage == spec.batch_stages[-1]
     return tuple(
         s for s in steps if (last if s == "view" else (s in _LIGHT_STEPS) == (stage == LIGHT))
     )
 
 
 def _first_stage_missing(spec: JobSpec, views: tuple[str, ...], done: frozenset[str]) -> str:
-    for stage in spec.group_stages:
+    for stage in spec.batch_stages:
         if any(
             keys.marker_name(s, v) not in done for v in views for s in steps_of_stage(spec, stage)
         ):

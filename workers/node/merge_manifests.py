@@ -18,7 +18,7 @@ from pbrs_farm.formats.manifest import lines_by_house
 from pbrs_farm.store.interface import Store
 from workers.ids import job_key
 from workers.job import JobSpec, houses_from_lines
-from workers.runner import Tell
+from workers.runner import OnText
 
 
 def shard_key(job: str, shard: int) -> str:
@@ -32,17 +32,17 @@ def house_ids(store: Store, spec: JobSpec) -> list[str]:
     return [house.house_id for house in houses_from_lines(data)]
 
 
-def merge_shard(store: Store, spec: JobSpec, shard: int, tell: Tell) -> None:
+def merge_shard(store: Store, spec: JobSpec, shard: int, on_step: OnText) -> None:
     """Write the manifests of a shard's houses as one; houses without one are left out."""
     size = spec.rules.shard_size
     parts = []
     for house in house_ids(store, spec)[shard * size : (shard + 1) * size]:
-        tell(f"merge {house}")
+        on_step(f"merge {house}")
         parts.append(_manifest(store, house) or b"")
     store.put(shard_key(spec.job_id, shard), b"".join(parts))
 
 
-def merge_job(store: Store, spec: JobSpec, tell: Tell) -> None:
+def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
     """Write the root's manifest.jsonl and the job's report.json, which says what is missing.
 
     Rows of other jobs' houses in the same root are kept. Over a job that still runs, houses that
@@ -54,7 +54,7 @@ def merge_job(store: Store, spec: JobSpec, tell: Tell) -> None:
     missing: list[str] = []
     n_objects = 0
     with TemporaryFile() as file:
-        for house, part in _merged(store, own, _new_rows(store, spec, houses, tell)):
+        for house, part in _merged(store, own, _new_rows(store, spec, houses, on_step)):
             if part is None:
                 missing.append(house)
             else:
@@ -90,12 +90,12 @@ def _put_file(store: Store, key: str, file: IO[bytes]) -> None:
 
 
 def _new_rows(
-    store: Store, spec: JobSpec, houses: list[str], tell: Tell
+    store: Store, spec: JobSpec, houses: list[str], on_step: OnText
 ) -> Iterator[tuple[str, bytes | None]]:
     """House -> its manifest, through its shard's where that is there; None when it has none."""
     size = spec.rules.shard_size
     for first in range(0, len(houses), size):
-        tell(f"merge shard {first // size}")
+        on_step(f"merge shard {first // size}")
         members = houses[first : first + size]
         merged = _get(store, shard_key(spec.job_id, first // size))
         found = dict(lines_by_house(merged)) if merged is not None else {}

@@ -1,7 +1,7 @@
-"""One slot of a worker: claims a task, has it run by its renderer, and tells the ledger.
+"""One slot of a worker: claims a task, has it run by its render process, and reports to the ledger.
 
-Effects: Redis, a renderer process, log objects in storage. The attempt was counted by the claim,
-before any work; the lease is kept by beats; the token fences off whoever lost it.
+Effects: Redis, a render process, log objects in storage. The attempt was counted by the claim,
+before any work; the lease is kept by heartbeats; the token fences off whoever lost it.
 """
 
 from __future__ import annotations
@@ -14,123 +14,203 @@ import random
 import secrets
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final, TypeVar
 
 from pbrs_farm.core.errors import PbrsError, StoreFailed
+from pbrs_farm.run.processes.child_process import ChildProcess
+from pbrs_farm.run.processes.render_process import REPORTED, Ended, RenderProcess
 from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig
-from workers.ids import WHOLE, TaskId, failed_key, log_key, task_from_text
-from workers.ledger.interface import Claim, Fault, FaultClass, Finished, LedgerUnavailable
-from workers.ledger.redis_ledger import RedisLedger, groups_from_text
-from workers.ledger.worker_registry import Registry
+from workers.ids import GEOMETRY, WHOLE, TaskId, failed_key, log_key, task_from_text
+from workers.ledger.interface import (
+    UNCOUNTED,
+    Claim,
+    Fault,
+    FaultClass,
+    Finished,
+    Ledger,
+    LedgerUnavailable,
+    WorkerRegistry,
+    batches_from_text,
+)
 from workers.node.faults import without_numbers
-from workers.node.renderer_process import Attendant, Ended, Watch
 from workers.runner import Request, Result
 
 T = TypeVar("T")
 _log = logging.getLogger("pbrs.slot")
-_FREE: Final = {"preempted", "drained", "cancelled", "lost", "storage"}
+# Ends that say nothing of the task: no log of them is stored.
+_NO_LOG: Final = {*UNCOUNTED, "cancelled", "lost"}
 _WAIT_AFTER_REFUSAL: Final = {"version", "recipe", "draining", "blocked", "elsewhere"}
+_POLL_S: Final = 1.0
 _LOG_EVERY_S: Final = 60.0
+_RETRY_S: Final = 600.0
+_TAIL_IN_FAULT: Final = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class _Claimed:
+    """A task this slot holds the lease of."""
+
+    job: str
+    task: TaskId
+    claim: Claim
+
+    @property
+    def attempt(self) -> int:
+        return int(self.claim.detail)
+
+    @property
+    def log_key(self) -> str:
+        return log_key(self.job, str(self.task), self.attempt)
+
+
+def make_slot(config: FarmConfig) -> Slot:
+    """The slot of this pool process, with its ledger in Redis and a render process of its own."""
+    from workers.ledger.redis_ledger import RedisLedger
+    from workers.ledger.worker_registry import Registry
+    from workers.node.renderer import HANDLER
+
+    folder = config.scratch / f"pbrs-{config.worker}-{os.getpid()}"
+    folder.mkdir(parents=True, exist_ok=True)
+    start = partial(ChildProcess, HANDLER, folder / "log.txt")
+    process = RenderProcess(start, config.limits.of_process(config.slots))
+    ledger = RedisLedger(config)
+    return Slot(config, ledger, Registry(ledger), process)
 
 
 class Slot:
-    """What one pool process of a worker holds: ledger, renderer and, for logs, the store."""
+    """What one pool process of a worker holds: ledger, render process and, for logs, the store.
 
-    def __init__(self, config: FarmConfig) -> None:
+    clock: seconds that only grow. sleep: waits for so many seconds.
+    """
+
+    def __init__(
+        self,
+        config: FarmConfig,
+        ledger: Ledger,
+        registry: WorkerRegistry,
+        process: RenderProcess,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         self._config = config
-        self._ledger = RedisLedger(config)
-        self._registry = Registry(self._ledger)
-        self._attendant = Attendant(config)
+        self._ledger = ledger
+        self._registry = registry
+        self._process = process
+        self._clock = clock
+        self._sleep = sleep
         self._store: Store | None = None
         self._numbers = itertools.count()
+        self._heartbeat_at = 0.0  # next heartbeat of the lease
+        self._upload_at = 0.0  # next upload of the running task's log
 
-    def perform(self, job: str, task: TaskId, recipe: str) -> None:
+    def run_task(self, job: str, task: TaskId, recipe: str) -> None:
         """Run the task if the ledger allows it, then others of its house while that pays."""
         direct = False
         following: TaskId | None = task
         while following is not None:
-            token = (
-                f"{self._config.worker}:{os.getpid()}:{next(self._numbers)}:{secrets.token_hex(4)}"
-            )
+            random_part = secrets.token_hex(4)
+            token = f"{self._config.worker}:{os.getpid()}:{next(self._numbers)}:{random_part}"
             ask = partial(
                 self._ledger.claim, job, str(following), token=token, recipe=recipe, direct=direct
             )
-            claim = self._insist(ask)
+            claim = self._retry(ask)
             if claim.verdict != "run":
                 self._refused(job, following, claim)
                 return
-            following = self._run(job, following, claim)
+            following = self._run_claimed(_Claimed(job, following, claim))
             direct = True
 
-    def _run(self, job: str, task: TaskId, claim: Claim) -> TaskId | None:
-        request = _request(job, task, claim)
-        ended = self._attendant.run(request, self._watch(job, task, claim))
-        if ended.result is None:
-            self._failed(job, task, claim, ended)
+    def _run_claimed(self, held: _Claimed) -> TaskId | None:
+        """Run a task to its end; another task of its house to go on with."""
+        request = _request(held)
+        ended = self._render(held, request)
+        if ended.cause:
+            self._failed(held, ended)
             return None
-        sticky = ended.seconds >= self._config.sticky_s and not self._config.handback_file.exists()
-        end = Finished(ended.seconds, ended.result.groups, _n_views(request, ended.result))
-        more = self._insist(
-            lambda: self._ledger.finish(job, str(task), claim.token, end, sticky=sticky)
+        result = Result.model_validate(ended.body)
+        sticky = ended.seconds >= self._config.sticky_s and not self._is_preempted()
+        end = Finished(ended.seconds, result.batches, result.n_views or len(request.views))
+        more = self._retry(
+            lambda: self._ledger.finish(
+                held.job, str(held.task), held.claim.token, end, sticky=sticky
+            )
         )
         return task_from_text(more) if more else None
 
-    def _watch(self, job: str, task: TaskId, claim: Claim) -> Watch:
-        last_beat = last_upload = time.monotonic()
+    def _render(self, held: _Claimed, request: Request) -> Ended:
+        """Have the task run, and keep its lease meanwhile."""
+        now = self._clock()
+        self._heartbeat_at, self._upload_at = now + self._config.heartbeat_s, now + _LOG_EVERY_S
+        deadline_s = self._config.limits.deadline_s(held.task.stage)
+        self._process.begin(request.model_dump_json().encode(), task_s=deadline_s)
+        while True:
+            heard = self._process.poll(_POLL_S)
+            if isinstance(heard, Ended):
+                return heard
+            if heard is not None and heard.kind == "waiting":
+                self._open_breaker(heard.text)
+            stop = self._why_stop(held)
+            if stop is not None:
+                return self._process.kill(stop, f"stopped: {stop}")
+            if self._clock() >= self._upload_at:
+                self._upload_at = self._clock() + _LOG_EVERY_S
+                self._put(held.log_key, self._process.log_tail())
 
-        def wanted() -> FaultClass | None:
-            nonlocal last_beat
-            if self._config.handback_file.exists():
-                return "preempted"
-            if time.monotonic() - last_beat < self._config.beat_s:
-                return None
-            last_beat = time.monotonic()
-            try:
-                answer = self._ledger.beat(job, str(task), claim.token)
-            except LedgerUnavailable as error:
-                # Go on: the token fences us off if the lease has run out meanwhile.
-                _log.warning("no beat: %s", error)
-                return None
-            return None if answer == "ok" else "lost" if answer == "lost" else "cancelled"
+    def _why_stop(self, held: _Claimed) -> FaultClass | None:
+        """None, or why the running task must end now; sends the heartbeat when it is due."""
+        if self._is_preempted():
+            return "preempted"
+        if self._clock() < self._heartbeat_at:
+            return None
+        self._heartbeat_at = self._clock() + self._config.heartbeat_s
+        try:
+            answer = self._ledger.heartbeat(held.job, str(held.task), held.claim.token)
+        except LedgerUnavailable as error:
+            # Go on: the token fences us off if the lease has run out meanwhile.
+            _log.warning("no heartbeat: %s", error)
+            return None
+        return None if answer == "ok" else "lost" if answer == "lost" else "cancelled"
 
-        def on_log() -> None:
-            nonlocal last_upload
-            if time.monotonic() - last_upload >= _LOG_EVERY_S:
-                last_upload = time.monotonic()
-                self._put(log_key(job, str(task), int(claim.detail)), self._attendant.tail())
+    def _is_preempted(self) -> bool:
+        return self._config.preemption_file.exists()
 
-        return Watch(wanted, self._storage_sick, on_log)
-
-    def _failed(self, job: str, task: TaskId, claim: Claim, ended: Ended) -> None:
-        fault_class = ended.fault or "bug"
-        attempt = int(claim.detail)
-        key = log_key(job, str(task), attempt)
-        fault = Fault(
-            fault=fault_class,
-            fingerprint=f"{fault_class}: {without_numbers(ended.fingerprint)}",
-            message=ended.message,
-            worker=self._config.worker,
-            attempt=attempt,
-            log="" if fault_class in _FREE else key,
-            tail=self._attendant.tail()[-2000:],
-        )
-        if fault_class not in _FREE:
-            self._put(key, self._attendant.tail())
-        if fault_class == "storage":
-            self._storage_sick(ended.message)
-        delay_s = 0.0 if fault_class == "preempted" else self._config.retry_delay_s * attempt
-        delay_s *= random.uniform(0.7, 1.3)
-        verdict = self._insist(
-            lambda: self._ledger.fail(job, str(task), claim.token, fault, delay_s=delay_s)
+    def _failed(self, held: _Claimed, ended: Ended) -> None:
+        fault = self._fault(held, ended)
+        if fault.log:
+            self._put(fault.log, self._process.log_tail())
+        if fault.fault == "storage":
+            self._open_breaker(ended.text)
+        delay_s = 0.0
+        if fault.fault != "preempted":
+            delay_s = self._config.retry_delay_s * held.attempt * random.uniform(0.7, 1.3)
+        task, token = str(held.task), held.claim.token
+        verdict = self._retry(
+            lambda: self._ledger.fail(held.job, task, token, fault, delay_s=delay_s)
         )
         _log.warning(
-            "%s attempt %d: %s (%s): %s", task, attempt, fault_class, verdict, fault.message
+            "%s attempt %d: %s (%s): %s", task, held.attempt, fault.fault, verdict, fault.message
         )
         if verdict == "failed":
-            self._put(failed_key(job, str(task)), fault.json())
+            self._put(failed_key(held.job, task), fault.json())
+
+    def _fault(self, held: _Claimed, ended: Ended) -> Fault:
+        """What the ledger keeps of a task that ended badly."""
+        kind, text = ended.cause, ended.text
+        if kind == REPORTED:
+            kind, text = str(ended.body["fault"]), str(ended.body["fingerprint"])
+        return Fault(
+            fault=kind,  # type: ignore[arg-type]  # causes are fault classes
+            fingerprint=f"{kind}: {without_numbers(text)}",
+            message=ended.text,
+            worker=self._config.worker,
+            attempt=held.attempt,
+            log="" if kind in _NO_LOG else held.log_key,
+            tail=self._process.log_tail(_TAIL_IN_FAULT),
+        )
 
     def _refused(self, job: str, task: TaskId, claim: Claim) -> None:
         _log.log(
@@ -144,26 +224,27 @@ class Slot:
             with contextlib.suppress(LedgerUnavailable):
                 self._registry.refused(reason)
         if claim.verdict in _WAIT_AFTER_REFUSAL:
-            time.sleep(1.0)
+            self._sleep(1.0)
 
     def _release_dead_sibling(self, job: str, task: TaskId, holder: str) -> None:
         """A pool process of this very worker died holding the lease: no need to wait for it."""
+        # holder: "<token>|worker|since"; a token is "worker:pid:number:random".
         token = holder.partition("|")[0]
-        worker, _, rest = token.rpartition(":")[0].rpartition(":")[0].rpartition(":")
-        if worker != self._config.worker or not rest.isdigit() or _is_alive(int(rest)):
+        worker, _, pid = token.rpartition(":")[0].rpartition(":")[0].rpartition(":")
+        if worker != self._config.worker or not pid.isdigit() or _is_alive(int(pid)):
             return
         fault = Fault(
             fault="lost",
             fingerprint="lost: a pool process died",
-            message=f"pool process {rest} of {worker} died",
+            message=f"pool process {pid} of {worker} died",
             worker=worker,
         )
-        self._insist(lambda: self._ledger.fail(job, str(task), token, fault, delay_s=0.0))
+        self._retry(lambda: self._ledger.fail(job, str(task), token, fault, delay_s=0.0))
 
-    def _storage_sick(self, reason: str) -> None:
+    def _open_breaker(self, reason: str) -> None:
         _log.warning("storage: %s", reason)
         with contextlib.suppress(LedgerUnavailable):
-            self._registry.storage_sick(reason)
+            self._registry.open_breaker(reason)
 
     def _put(self, key: str, text: str) -> None:
         """Store a log or a record of failure; the work does not depend on it."""
@@ -176,36 +257,31 @@ class Slot:
         except (StoreFailed, PbrsError) as error:
             _log.warning("not stored: %s", error)
 
-    def _insist(self, act: Callable[[], T]) -> T:
-        """act(), again and again while Redis is away: up to ten minutes."""
-        give_up = time.monotonic() + 600.0
+    def _retry(self, ask: Callable[[], T]) -> T:
+        """ask(), again and again while Redis is away: up to ten minutes."""
+        give_up = self._clock() + _RETRY_S
         while True:
             try:
-                return act()
+                return ask()
             except LedgerUnavailable as error:
-                if time.monotonic() > give_up or self._config.handback_file.exists():
+                if self._clock() > give_up or self._is_preempted():
                     raise
                 _log.warning("%s; trying again", error)
-                time.sleep(random.uniform(1.0, 3.0))
+                self._sleep(random.uniform(1.0, 3.0))
 
 
-def _request(job: str, task: TaskId, claim: Claim) -> Request:
-    views: tuple[str, ...] = ()
-    if task.unit.isdigit():
-        views = groups_from_text(claim.inputs)[int(task.unit)]
+def _request(held: _Claimed) -> Request:
+    task, inputs = held.task, held.claim.inputs
+    is_geometry = task.unit == WHOLE and task.stage == GEOMETRY
     return Request(
-        job_id=job,
+        job_id=held.job,
         house=task.house,
         unit=task.unit,
         stage=task.stage,
-        views=views,
-        source=claim.inputs if task.unit == WHOLE and task.stage == "geometry" else "",
-        attempt=int(claim.detail),
+        views=batches_from_text(inputs)[int(task.unit)] if task.unit.isdigit() else (),
+        source=inputs if is_geometry else "",
+        attempt=held.attempt,
     )
-
-
-def _n_views(request: Request, result: Result) -> int:
-    return result.n_views or len(request.views)
 
 
 def _is_alive(pid: int) -> bool:

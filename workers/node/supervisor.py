@@ -22,17 +22,17 @@ from types import FrameType
 from typing import Final
 
 from pbrs_farm.core.errors import MachineFailed, PbrsError
+from pbrs_farm.run.processes.child_process import die_with_parent
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES
 from workers.ledger.redis_ledger import RedisLedger
 from workers.liveness import touch
-from workers.logs import log_plainly
-from workers.node.renderer import die_with_parent
+from workers.logs import log_to_stderr
 
 _log = logging.getLogger("pbrs.supervisor")
-_HANDBACK_S: Final = 20.0
+_PREEMPT_S: Final = 20.0
 # On scratch when a signal made the worker leave: deploy/slurm/worker.sbatch asks for it.
-PREEMPTED: Final = "preempted"
+PREEMPTED_NOTE: Final = "preempted"
 
 
 @dataclass(slots=True)
@@ -75,7 +75,7 @@ def check_machine(config: FarmConfig) -> None:
 
 def sweep(config: FarmConfig) -> None:
     """Remove what an earlier life of this worker left on scratch."""
-    config.handback_file.unlink(missing_ok=True)
+    config.preemption_file.unlink(missing_ok=True)
     config.heartbeat_file.unlink(missing_ok=True)
     for folder in config.scratch.glob(f"pbrs-{config.worker}-*"):
         pid = folder.name.rpartition("-")[2]
@@ -101,7 +101,7 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
         if until_s is not None and time.monotonic() - began > until_s - config.grace_s:
             orders.leave_at = orders.leave_at or time.monotonic()
         if orders.was_told:
-            touch(config.scratch / PREEMPTED)
+            touch(config.scratch / PREEMPTED_NOTE)
         if orders.leave_at is not None:
             _leave(config, celery, orders, time.monotonic() - orders.leave_at)
         time.sleep(0.2)
@@ -115,10 +115,10 @@ def _leave(
         ("finish what runs", 0.0, lambda: celery.send_signal(signal.SIGTERM)),
         (
             "hand back what runs",
-            0.0 if orders.at_once else max(0.0, config.grace_s - _HANDBACK_S),
-            lambda: touch(config.handback_file),
+            0.0 if orders.at_once else max(0.0, config.grace_s - _PREEMPT_S),
+            lambda: touch(config.preemption_file),
         ),
-        ("kill", config.grace_s if not orders.at_once else _HANDBACK_S, celery.kill),
+        ("kill", config.grace_s if not orders.at_once else _PREEMPT_S, celery.kill),
     ]
     for name, after_s, act in steps:
         if since_s >= after_s and name not in orders.told:
@@ -146,7 +146,7 @@ def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="workers.node.supervisor", description=main.__doc__)
     parser.add_argument("--until", type=float, default=None, metavar="SECONDS")
     args = parser.parse_args(words)
-    log_plainly()
+    log_to_stderr()
     try:
         config = config_from_environment()
         sweep(config)

@@ -17,10 +17,10 @@ from celery.signals import setup_logging, worker_init, worker_process_init
 from kombu import Exchange, Queue
 from kombu.serialization import register
 
+from pbrs_farm.run.processes.child_process import die_with_parent
 from pbrs_farm.store.s3 import forbid_in_this_process
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES
-from workers.node.renderer import die_with_parent
 
 MAX_MESSAGE: Final = 2048
 _VISIBILITY_S: Final = 6 * 3600
@@ -60,7 +60,7 @@ def make_app(config: FarmConfig) -> Celery:
         task_acks_on_failure=True,
         task_acks_on_timeout=True,
         worker_prefetch_multiplier=1,
-        # The last resort only: the attendant of the renderer has its own, shorter deadlines.
+        # The last resort only: the slot gives each task a shorter deadline.
         task_time_limit=_TASK_LIMIT_S,
         worker_send_task_events=False,
         worker_enable_remote_control=False,
@@ -88,9 +88,9 @@ def make_app(config: FarmConfig) -> Celery:
         app.conf.broker_use_ssl = tls | (
             {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
         )
-    from workers.node.heartbeat import SignsOfLife
+    from workers.node.heartbeat import Heartbeat
 
-    app.steps["worker"].add(SignsOfLife)
+    app.steps["worker"].add(Heartbeat)
     return app
 
 
@@ -108,10 +108,10 @@ def _leave_signals_to_the_parent(**_: object) -> None:
 
 
 @setup_logging.connect  # type: ignore[untyped-decorator]
-def _log_plainly(loglevel: int | str = "INFO", **_: object) -> None:
-    from workers.logs import log_plainly
+def _log_to_stderr(loglevel: int | str = "INFO", **_: object) -> None:
+    from workers.logs import log_to_stderr
 
-    log_plainly(loglevel)
+    log_to_stderr(loglevel)
 
 
 app = make_app(config_from_environment())

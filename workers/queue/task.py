@@ -6,7 +6,7 @@ from functools import cache
 
 from workers.config import config_from_environment
 from workers.ids import check_job_id, task_from_text
-from workers.node.slot import Slot
+from workers.node.slot import Slot, make_slot
 from workers.queue.celery_app import app
 
 RUN = "pbrs.run"
@@ -15,10 +15,10 @@ RUN = "pbrs.run"
 @cache
 def _slot() -> Slot:
     """This pool process's slot; made at its first task, never in Celery's parent."""
-    return Slot(config_from_environment())
+    return make_slot(config_from_environment())
 
 
 @app.task(name=RUN)  # type: ignore[untyped-decorator]
 def run(job: str, task: str, recipe: str) -> None:
-    """Claim the task, run it in the renderer, tell the ledger."""
-    _slot().perform(check_job_id(job), task_from_text(task), recipe)
+    """Claim the task, run it in the render process, report to the ledger."""
+    _slot().run_task(check_job_id(job), task_from_text(task), recipe)

@@ -1,38 +1,41 @@
--- One house as storage tells it. ARGV: index, house, what, groups, then unit, stage, letter each
+-- One house as storage tells it. ARGV: index, house, what, batches, then unit, stage, letter each
 -- what: "done" or "loaded"; letters: l (to be run), d (done)
-local i, house, what, groups = ARGV[1], ARGV[2], ARGV[3], ARGV[4]
+local i, house, what, batches = ARGV[1], ARGV[2], ARGV[3], ARGV[4]
 local key = house_key(house)
 if redis.call('EXISTS', key) == 1 then return 0 end
 local n, left, views, n_views = 0, 0, 0, {}
-for group in string.gmatch(groups, '[^;]+') do
-  n_views[n] = select(2, string.gsub(group, '[^,]+', ''))
+-- Views of each batch, to count those that are done.
+for batch in string.gmatch(batches, '[^;]+') do
+  n_views[n] = select(2, string.gsub(batch, '[^,]+', ''))
   n = n + 1
 end
 redis.call('HSET', key, 'i', i, 's', what)
-if groups ~= '' then redis.call('HSET', P .. 'views', house, groups) end
-local names = group_stages()
+if batches ~= '' then redis.call('HSET', P .. 'views', house, batches) end
+local names = batch_stages()
 local opened = false
+-- Enter each unit, and the stages before its own as done.
 for j = 5, #ARGV, 3 do
   local unit, stage, letter = ARGV[j], ARGV[j + 1], ARGV[j + 2]
   set_unit(house, unit, stage, letter)
   if unit ~= '-' then
     opened = true
-    if letter ~= 'd' then left = left + 1 else views = views + n_views[tonumber(unit)] end
+    if letter ~= DONE then left = left + 1 else views = views + n_views[tonumber(unit)] end
     for _, name in ipairs(names) do
-      if name == stage and letter ~= 'd' then break end
+      if name == stage and letter ~= DONE then break end
       bump('done:' .. name, 1)
     end
-  elseif stage == 'reduce' then
+  elseif stage == REDUCE_STAGE then
     opened = true
-    if letter == 'd' then bump('done:reduce', 1) end
+    if letter == DONE then bump('done:' .. REDUCE_STAGE, 1) end
   end
 end
 if views > 0 then bump('views', views) end
 if opened then
-  bump('done:geometry', 1)
+  bump('done:' .. GEOMETRY_STAGE, 1)
   redis.call('HSET', key, 'n', n, 'left', left, 'nf', 0)
-  bump('groups', n)
+  bump('batches', n)
 end
+-- A finished house is closed at once, any other waits to be admitted.
 if what == 'done' then
   bump('houses:open', 1)
   close_house(house, 'done')

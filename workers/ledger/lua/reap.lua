@@ -7,6 +7,7 @@ for i = 3, #ARGV do
   for _, member in ipairs(expired) do
     local job, task = string.match(member, '^(.-)|(.*)$')
     P = G .. '{' .. job .. '}:'
+    -- The script was called without a job: work on the keys of the lease's own.
     local claim = redis.call('HGET', P .. 'claims', task)
     if claim then
       local worker = string.match(claim, '^[^|]*|([^|]*)|')

@@ -5,7 +5,7 @@ local t, again = now(), {}
 for _, task in ipairs(redis.call('ZRANGEBYSCORE', P .. 'queued', '-inf', t - tonumber(ARGV[3]), 'LIMIT', 0, tonumber(ARGV[4]))) do
   local house, unit, stage = split(task)
   local at_stage, letter = unit_at(house, unit)
-  if at_stage ~= stage or letter ~= 'q' then
+  if at_stage ~= stage or letter ~= QUEUED then
     redis.call('ZREM', P .. 'queued', task)
   elseif stage == ARGV[2] then
     redis.call('ZADD', P .. 'queued', t, task)

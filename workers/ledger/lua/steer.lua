@@ -6,17 +6,19 @@ if ARGV[1] == 'pause' then
 elseif ARGV[1] == 'resume' and state == 'paused' then
   redis.call('HSET', P .. 'job', 'state', 'running', 'reason', '')
 elseif ARGV[1] == 'cancel' and state ~= 'done' then
+  -- What runs learns it at its next heartbeat; what is queued, when it is claimed.
   redis.call('HSET', P .. 'job', 'state', 'cancelled', 'reason', ARGV[2], 'ended', now())
   redis.call('ZREM', G .. 'jobs', job_of(P))
   redis.call('DEL', P .. 'order', P .. 'later')
-  for _, stage in ipairs({ 'geometry', 'gl', 'light', 'reduce', 'shard', 'job' }) do
+  for _, stage in ipairs(STAGES) do
     redis.call('DEL', P .. 'out:' .. stage)
   end
 elseif ARGV[1] == 'reduce' and state ~= 'cancelled' then
+  -- Merge what is there now, unless a merge is on its way.
   local _, letter = unit_at('-', '-')
-  if letter ~= 'w' and letter ~= 'q' and letter ~= 'r' then
-    if letter == 'd' then bump('done:job', -1) end
-    ready('-', '-', 'job', 'LPUSH')
+  if letter ~= READY and letter ~= QUEUED and letter ~= RUNNING then
+    if letter == DONE then bump('done:' .. JOB_STAGE, -1) end
+    ready('-', '-', JOB_STAGE, 'LPUSH')
     if state == 'done' then redis.call('HSET', P .. 'job', 'state', 'running') end
     redis.call('ZADD', G .. 'jobs', redis.call('HGET', P .. 'job', 'priority'), job_of(P))
   end

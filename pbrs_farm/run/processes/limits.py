@@ -1,8 +1,10 @@
-"""How much memory there is and how much a process holds. Effects: reads /proc and /sys."""
+"""What a render process may use, and what the machine has. Effects: reads /proc and /sys."""
 
 from __future__ import annotations
 
+import math
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +13,25 @@ _CGROUP_LIMITS: Final = (
     Path("/sys/fs/cgroup/memory.max"),
     Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"),
 )
+# cgroup v1 writes "no limit" as a number near 2^63.
 _NO_LIMIT: Final = 1 << 50
+_SHARE_OF_MACHINE: Final = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessLimits:
+    """When a render process is killed, and when it is replaced between two tasks.
+
+    start_s: until it is ready. step_s: for one step. silence_s: without a message and without a
+    line in its log. Time in which storage does not answer counts for neither.
+    """
+
+    start_s: float = 300.0
+    step_s: float = math.inf
+    silence_s: float = 1800.0
+    memory_mb: float = math.inf  # resident, MiB
+    recycle_mb: float = math.inf  # resident between two tasks, MiB
+    recycle_tasks: int = 2000
 
 
 def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
@@ -27,9 +47,9 @@ def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
     return total / 2**20
 
 
-def memory_limit_mb(n_slots: int) -> float:
-    """What one renderer may hold: its share of nine tenths of the machine, in MiB."""
-    return 0.9 * machine_mb() / max(1, n_slots)
+def memory_share_mb(n_processes: int) -> float:
+    """What one of n render processes may hold: its share of nine tenths of the machine, in MiB."""
+    return _SHARE_OF_MACHINE * machine_mb() / max(1, n_processes)
 
 
 def resident_mb(pid: int) -> float:

@@ -2,11 +2,12 @@
 -- stage and how many of it may be sent -> {tasks to send...}, or "not leading"
 if not leads(ARGV[1]) then return 'not leading' end
 local t = now()
+-- What waited for its time is ready now.
 for _, task in ipairs(redis.call('ZRANGEBYSCORE', P .. 'later', '-inf', t, 'LIMIT', 0, 500)) do
   local house, unit, stage = split(task)
   redis.call('ZREM', P .. 'later', task)
   local at_stage, letter = unit_at(house, unit)
-  if at_stage == stage and letter == 'w' then redis.call('LPUSH', P .. 'out:' .. stage, task) end
+  if at_stage == stage and letter == READY then redis.call('LPUSH', P .. 'out:' .. stage, task) end
 end
 local running = redis.call('HGET', P .. 'job', 'state') == 'running'
 
@@ -20,16 +21,18 @@ while running and open < tonumber(ARGV[2]) and admitted < 200 do
   local key = house_key(house)
   local known = redis.call('HGET', key, 's')
   if not known then
+    -- A fresh house begins with its geometry.
     redis.call('HSET', key, 'i', i, 's', 'open')
-    ready(house, '-', 'geometry', 'RPUSH')
+    ready(house, '-', GEOMETRY_STAGE, 'RPUSH')
     open = open + 1
     bump('houses:open', 1)
   elseif known == 'loaded' then
+    -- A house storage knows goes on where it was.
     redis.call('HSET', key, 's', 'open')
     local fields = redis.call('HGETALL', key)
     for j = 1, #fields, 2 do
-      local stage = string.match(fields[j + 1], '^(%l+):l$')
-      if stage then ready(house, fields[j], stage, 'RPUSH') end
+      local stage, letter = string.match(fields[j + 1], '^(%l+):(%l)$')
+      if letter == LOADED then ready(house, fields[j], stage, 'RPUSH') end
     end
     open = open + 1
     bump('houses:open', 1)
@@ -37,18 +40,19 @@ while running and open < tonumber(ARGV[2]) and admitted < 200 do
   admitted = admitted + 1
 end
 
+-- Take from the outbox what there is room for on the queues.
 local sent = {}
 for i = 3, #ARGV, 2 do
   local stage, room = ARGV[i], tonumber(ARGV[i + 1])
-  while room > 0 and (running or stage == 'job') do
+  while room > 0 and (running or stage == JOB_STAGE) do
     local batch = redis.call('LPOP', P .. 'out:' .. stage, room)
     if not batch then break end
     for _, task in ipairs(batch) do
       local house, unit = split(task)
       local at_stage, letter = unit_at(house, unit)
       -- Anything else was cancelled, or taken without a message.
-      if at_stage == stage and letter == 'w' then
-        set_unit(house, unit, stage, 'q')
+      if at_stage == stage and letter == READY then
+        set_unit(house, unit, stage, QUEUED)
         redis.call('ZADD', P .. 'queued', t, task)
         sent[#sent + 1] = task
         room = room - 1

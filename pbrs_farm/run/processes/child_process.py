@@ -1,0 +1,138 @@
+"""The operating system's side of a render process: its start, pipes, log and end.
+
+Effects: a process in a session of its own, and its log file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final, Protocol
+
+from pbrs_farm.run.processes.limits import resident_mb
+
+_PR_SET_PDEATHSIG: Final = 1
+_CLOSE_S: Final = 10.0
+# The child sees the modules its parent sees, wherever it was started.
+_BOOT: Final = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from pbrs_farm.run.processes.task_loop import main; sys.exit(main(sys.argv[2]))"
+)
+
+
+class Child(Protocol):
+    """A process as RenderProcess needs it; tests put their own."""
+
+    def send(self, line: bytes) -> None: ...
+    def receive(self, timeout_s: float) -> bytes | None: ...
+    def exit_code(self) -> int | None: ...
+    def kill(self) -> None: ...
+    def close(self) -> None: ...
+    def fileno(self) -> int: ...
+    def resident_mb(self) -> float: ...
+    def log_size(self) -> int: ...
+    def log_tail(self, n_bytes: int) -> str: ...
+    def clear_log(self) -> None: ...
+
+
+class ChildProcess:
+    """A Python process that serves the tasks of `target` (see task_loop.main)."""
+
+    def __init__(self, target: str, log: Path) -> None:
+        self._log = log
+        self._buffer = b""
+        words = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
+        with log.open("ab") as file:
+            self._process = subprocess.Popen(
+                words,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=file,
+                start_new_session=True,
+            )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._requests, self._replies = self._process.stdin, self._process.stdout
+
+    def send(self, line: bytes) -> None:
+        """Put a line into its pipe; nothing when it is dead, which exit_code tells."""
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            self._requests.write(line + b"\n")
+            self._requests.flush()
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """Its next line, None when none came in time or the pipe is closed."""
+        if b"\n" not in self._buffer:
+            readable, _, _ = select.select([self._replies], [], [], timeout_s)
+            if not readable:
+                return None
+            chunk = os.read(self._replies.fileno(), 65536)
+            if not chunk:  # it is ending; exit_code tells how as soon as it has
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self._process.wait(timeout=1.0)
+            self._buffer += chunk
+            if b"\n" not in self._buffer:
+                return None
+        line, _, self._buffer = self._buffer.partition(b"\n")
+        return line
+
+    def exit_code(self) -> int | None:
+        """Its exit code, minus the signal that killed it; None while it lives."""
+        return self._process.poll()
+
+    def kill(self) -> None:
+        """Kill it and whatever it started; it is gone afterwards."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        for pipe in (self._requests, self._replies):
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
+
+    def close(self) -> None:
+        """Let it end by itself, which frees what its libraries hold; kill it when it does not."""
+        with contextlib.suppress(BrokenPipeError):
+            self._requests.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=_CLOSE_S)
+        self.kill()
+
+    def fileno(self) -> int:
+        """The descriptor that becomes readable when it says something."""
+        return self._replies.fileno()
+
+    def resident_mb(self) -> float:
+        """Memory it holds, MiB."""
+        return resident_mb(self._process.pid)
+
+    def log_size(self) -> int:
+        """Bytes in its log."""
+        return self._log.stat().st_size
+
+    def log_tail(self, n_bytes: int) -> str:
+        """The end of its log, "" when there is none."""
+        try:
+            with self._log.open("rb") as file:
+                file.seek(max(0, file.seek(0, os.SEEK_END) - n_bytes))
+                return file.read().decode("utf-8", "replace")
+        except OSError:
+            return ""
+
+    def clear_log(self) -> None:
+        """Empty its log: the next task's begins."""
+        os.truncate(self._log, 0)
+
+
+def die_with_parent(sign: int = signal.SIGKILL) -> None:
+    """Ask Linux to send us the signal when the thread that started us ends."""
+    parent = os.getppid()
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(sign), 0, 0, 0)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), sign)

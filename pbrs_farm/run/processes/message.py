@@ -1,0 +1,35 @@
+"""What a render process says to the process that started it; frozen values, no effects."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+# ready: it may be given a task. step: a step begins. waiting: storage does not answer.
+# event: something else its parent wants to know. done, fault: the end of the task.
+Kind = Literal["ready", "step", "waiting", "event", "done", "fault"]
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One line from a render process. body: JSON values whose meaning its parent knows."""
+
+    kind: Kind
+    text: str = ""
+    body: dict[str, Any] = field(default_factory=dict)
+
+    def line(self) -> bytes:
+        """The message as message_from_line reads it."""
+        return json.dumps(asdict(self), separators=(",", ":")).encode() + b"\n"
+
+
+def message_from_line(line: bytes) -> Message:
+    """The message a line holds."""
+    return Message(**json.loads(line))
+
+
+Send = Callable[[Message], None]
+Handler = Callable[[bytes], Message]
+"""Runs the task a request line names; its last message, done or fault."""

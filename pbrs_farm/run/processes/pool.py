@@ -1,0 +1,131 @@
+"""The render processes of a local run: one task each at a time, restarted when they die.
+
+Effects: starts and kills processes, writes their logs to a temporary folder.
+"""
+
+from __future__ import annotations
+
+import select
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Final
+
+from pbrs_farm.run.processes.child_process import ChildProcess
+from pbrs_farm.run.processes.limits import ProcessLimits
+from pbrs_farm.run.processes.message import Message
+from pbrs_farm.run.processes.render_process import CHECK_EVERY_S, Ended, RenderProcess
+from pbrs_farm.run.processes.task import Event, Setting, Task, line_from_task
+
+_HANDLER: Final = "pbrs_farm.run.run_task:make_handler"
+
+
+@dataclass(slots=True)
+class _Worker:
+    process: RenderProcess
+    task: Task | None = None
+    step: str = ""  # the step being done
+    held_house: str = ""  # the house it keeps in memory
+    done: list[str] = field(default_factory=list)  # steps of the task that ended, well or not
+
+
+class Pool:
+    """n render processes that run tasks. A process that dies costs the step it was in."""
+
+    def __init__(self, n: int, setting: Setting, limits: ProcessLimits) -> None:
+        self._n = n
+        self._setting = setting
+        self._limits = limits
+        self._folder = tempfile.TemporaryDirectory(prefix="pbrs-farm-")
+        self._workers: list[_Worker] = []
+
+    def __enter__(self) -> Pool:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        tb: TracebackType | None,
+    ) -> None:
+        for worker in self._workers:
+            worker.process.close()
+        self._folder.cleanup()
+
+    @property
+    def n_busy(self) -> int:
+        """Processes with a task."""
+        return sum(w.task is not None for w in self._workers)
+
+    def idle_houses(self) -> list[str]:
+        """The house each idle process holds in memory ("" for none): a place per idle process."""
+        idle = [w.held_house for w in self._workers if w.task is None]
+        return idle + [""] * (self._n - len(self._workers))
+
+    def busy_houses(self) -> set[str]:
+        """Houses being worked on."""
+        return {w.task.house_id for w in self._workers if w.task is not None}
+
+    def give(self, task: Task) -> None:
+        """Hand a task to an idle process, one that holds its house if there is one."""
+        idle = [w for w in self._workers if w.task is None]
+        idle.sort(key=lambda w: w.held_house != task.house_id)
+        holds = bool(idle) and idle[0].held_house == task.house_id
+        if not holds and len(self._workers) < self._n:
+            log = Path(self._folder.name) / f"process-{len(self._workers)}.log"
+            start = partial(ChildProcess, _HANDLER, log)
+            idle = [_Worker(RenderProcess(start, self._limits))]
+            self._workers += idle
+        self._begin(idle[0], task)
+
+    def events(self) -> Iterator[Event]:
+        """What happens next, at least once a second; nothing when no process has a task."""
+        busy = [w for w in self._workers if w.task is not None]
+        if busy:
+            select.select([w.process for w in busy], [], [], CHECK_EVERY_S)
+        for worker in busy:
+            # Read until it has nothing more to say: its buffer does not wake select.
+            while worker.task is not None and (heard := worker.process.poll(0.0)) is not None:
+                if isinstance(heard, Ended):
+                    yield from self._ended(worker, worker.task, heard)
+                else:
+                    yield from _told(worker, worker.task, heard)
+
+    def _begin(self, worker: _Worker, task: Task) -> None:
+        worker.task, worker.step, worker.done = task, task.steps[0], []
+        worker.held_house = task.house_id
+        worker.process.begin(line_from_task(self._setting, task))
+
+    def _ended(self, worker: _Worker, task: Task, ended: Ended) -> Iterator[Event]:
+        """The end of a task; when its process died, the step fails and the rest begins anew."""
+        worker.task = None
+        if not ended.cause:
+            yield Event(**ended.body)
+            return
+        lines = last_lines(worker.process.log_tail())
+        reason = f"{ended.text}: {lines}" if lines else ended.text
+        yield Event("failed", task.house_id, task.view_id, worker.step, message=reason)
+        left = tuple(s for s in task.steps if s != worker.step and s not in worker.done)
+        if left:
+            self._begin(worker, Task(task.house_id, left, task.source, task.view_id, task.layers))
+        else:
+            yield Event("end", task.house_id, task.view_id, "")
+
+
+def _told(worker: _Worker, task: Task, message: Message) -> Iterator[Event]:
+    """The event that a message of a running task tells of; none when it is only ready."""
+    if message.kind == "step":
+        worker.step = message.text
+        yield Event("begin", task.house_id, task.view_id, message.text)
+    elif message.kind == "event":
+        event = Event(**message.body)
+        worker.done.append(event.step)
+        yield event
+
+
+def last_lines(log: str, n: int = 3) -> str:
+    """The last lines a process' libraries printed, on one line."""
+    return " | ".join([line.strip() for line in log.splitlines() if line.strip()][-n:])

@@ -1,0 +1,192 @@
+"""The one supervisor of render processes: starts one, feeds it tasks, watches it, kills it.
+
+Effects: those of the Child it starts. A local run holds one for each of its jobs, a worker of the
+farm one for each slot; the limits and what counts as a sign of life are the same in both.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from pbrs_farm.run.processes.child_process import Child
+from pbrs_farm.run.processes.limits import ProcessLimits
+from pbrs_farm.run.processes.message import Message, message_from_line
+
+CHECK_EVERY_S: Final = 1.0
+REPORTED: Final = "reported"
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a task ended. body: of the process's own last message.
+
+    cause: "" when it was done; "reported" when the process itself says what went wrong; "crash" when
+    it died; "resource" when it held too much memory or was killed from outside; "machine" when it did
+    not start; "timeout", "silent" for a limit of time; else what kill() was told.
+    """
+
+    seconds: float
+    cause: str = ""
+    text: str = ""
+    body: dict[str, Any] = field(default_factory=dict)
+
+
+class RenderProcess:
+    """One render process at a time: a dead, worn or swollen one is replaced by the next.
+
+    start: makes the process. clock: seconds that only grow.
+    """
+
+    def __init__(
+        self,
+        start: Callable[[], Child],
+        limits: ProcessLimits,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._start = start
+        self._limits = limits
+        self._clock = clock
+        self._child: Child | None = None
+        self._is_ready = False
+        self._is_busy = False
+        self._n_tasks = 0  # since the process was started
+        self._task_s = math.inf  # what the running task may take
+        self._begun_at = 0.0  # when the task was given
+        # Begin of what a limit counts; moved on by the time that storage did not answer.
+        self._task_at = 0.0
+        self._step_at = 0.0
+        self._sign_at = 0.0  # last sign of life
+        self._check_at = 0.0  # when the limits are looked at next
+        self._log_size = 0
+
+    @property
+    def is_busy(self) -> bool:
+        """It has a task that has not ended."""
+        return self._is_busy
+
+    def fileno(self) -> int:
+        """What becomes readable when the process says something; only while it is busy."""
+        assert self._child is not None
+        return self._child.fileno()
+
+    def begin(self, request: bytes, *, task_s: float = math.inf) -> None:
+        """Give it a task of at most task_s seconds; the process is started when there is none."""
+        assert not self._is_busy, "one task at a time"
+        child = self._child
+        if child is None or child.exit_code() is not None:
+            self.stop()
+            child = self._child = self._start()
+            self._is_ready, self._n_tasks = False, 0
+        child.clear_log()
+        now = self._clock()
+        self._begun_at = self._task_at = self._step_at = self._sign_at = now
+        self._check_at, self._task_s, self._log_size = now + CHECK_EVERY_S, task_s, 0
+        self._is_busy = True
+        child.send(request)
+
+    def poll(self, timeout_s: float) -> Message | Ended | None:
+        """What it says next, or how its task ended; None when nothing happens in timeout_s."""
+        child = self._child
+        assert child is not None
+        assert self._is_busy, "no task to wait for"
+        if self._clock() >= self._check_at:
+            self._check_at = self._clock() + CHECK_EVERY_S
+            exceeded = self._exceeded(child)
+            if exceeded is not None:
+                return self.kill(*exceeded)
+        line = child.receive(timeout_s)
+        if line is None and child.exit_code() is not None:
+            line = child.receive(0.0)  # what it said last
+            if line is None:
+                return self._died(child)
+        return None if line is None else self._heard(message_from_line(line))
+
+    def kill(self, cause: str, text: str) -> Ended:
+        """End the running task and its process."""
+        self.stop()
+        return Ended(self._clock() - self._begun_at, cause, text)
+
+    def stop(self) -> None:
+        """Kill the process and whatever it started; its log can still be read."""
+        self._is_busy = False
+        if self._child is not None:
+            self._child.kill()
+
+    def close(self) -> None:
+        """End an idle process in good order, kill one that has a task."""
+        if self._child is not None and not self._is_busy and self._child.exit_code() is None:
+            self._child.close()
+        else:
+            self.stop()
+
+    def log_tail(self, n_bytes: int = 6000) -> str:
+        """The end of the running or last task's log."""
+        return "" if self._child is None else self._child.log_tail(n_bytes)
+
+    def _heard(self, message: Message) -> Message | Ended:
+        now = self._clock()
+        if message.kind == "waiting":
+            # Storage is nobody's fault: the time since the last sign counts for no limit.
+            self._task_at += now - self._sign_at
+            self._step_at += now - self._sign_at
+        self._sign_at = now
+        if message.kind == "ready":
+            self._is_ready, self._task_at = True, now
+        if message.kind in ("ready", "step"):
+            self._step_at = now
+        if message.kind == "fault" and not self._is_ready:
+            return self.kill("machine", message.text)
+        if message.kind not in ("done", "fault"):
+            return message
+        self._is_busy = False
+        self._n_tasks += 1
+        self._recycle()
+        cause = REPORTED if message.kind == "fault" else ""
+        return Ended(now - self._begun_at, cause, message.text, message.body)
+
+    def _recycle(self) -> None:
+        """Between two tasks: end a process that has run many, or that holds much."""
+        child, limits = self._child, self._limits
+        if child is not None and (
+            self._n_tasks >= limits.recycle_tasks or child.resident_mb() > limits.recycle_mb
+        ):
+            self.stop()
+
+    def _exceeded(self, child: Child) -> tuple[str, str] | None:
+        """The limit the process is over, and what to say of it."""
+        limits, now = self._limits, self._clock()
+        # A line in the log is a sign of life too.
+        size = child.log_size()
+        if size != self._log_size:
+            self._log_size, self._sign_at = size, now
+        used_mb = child.resident_mb()
+        if used_mb > limits.memory_mb:
+            return "resource", f"{used_mb:.0f} MB resident, {limits.memory_mb:.0f} allowed; killed"
+        if not self._is_ready:
+            if now - self._begun_at > limits.start_s:
+                return "machine", f"the process did not start within {limits.start_s:.0f} s"
+            return None
+        if now - self._task_at > self._task_s:
+            return "timeout", f"longer than {self._task_s:.0f} s; killed"
+        if now - self._step_at > limits.step_s:
+            return "timeout", f"the step took longer than {limits.step_s:.0f} s; killed"
+        if now - self._sign_at > limits.silence_s:
+            return "silent", f"silent for {limits.silence_s:.0f} s; killed"
+        return None
+
+    def _died(self, child: Child) -> Ended:
+        """The process ended by itself: a crash, or the kernel's out-of-memory killer."""
+        code = child.exit_code() or 0
+        self.stop()
+        seconds = self._clock() - self._begun_at
+        if code == -signal.SIGKILL:
+            text = "its process was killed by SIGKILL from outside (out of memory?)"
+            return Ended(seconds, "resource", text)
+        name = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
+        return Ended(seconds, "crash", f"its process {name}")

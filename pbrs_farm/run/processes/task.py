@@ -1,0 +1,89 @@
+"""What a render process of a local run is asked to do and what it answers; values, no effects."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from typing import Any, Literal
+
+from pydantic import TypeAdapter
+
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.read.source import SourceRef
+from pbrs_farm.store.s3 import S3Settings
+from pbrs_farm.store.secret import Secret
+from pbrs_farm.store.url import StoreSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Steps of one house or one view, done in order by one process."""
+
+    house_id: str
+    steps: tuple[str, ...]
+    source: SourceRef
+    view_id: str | None = None
+    layers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What the tasks of one run have in common. debug: tracebacks travel with failures.
+
+    runner: "module:function" that does a step as steps.run_step does (tests put their own).
+    """
+
+    store_url: str
+    recipe: Recipe
+    n_threads: int
+    debug: bool = False
+    store: StoreSettings = field(default_factory=StoreSettings)
+    runner: str = "pbrs_farm.run.steps:run_step"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened to a step.
+
+    kind: "begin", "done" (made now), "kept" (was there already), "failed", or "end" of a task.
+    facts: of the step's marker. peak_mb: largest resident memory of the process so far.
+    """
+
+    kind: Literal["begin", "done", "kept", "failed", "end"]
+    house_id: str
+    view_id: str | None
+    step: str
+    seconds: float = 0.0
+    message: str = ""
+    facts: dict[str, Any] = field(default_factory=dict)
+    peak_mb: float = 0.0
+
+
+_TASK = TypeAdapter(Task)
+_SECRETS = ("secret_key", "session_token")
+
+
+def line_from_task(setting: Setting, task: Task) -> bytes:
+    """A task and its setting as task_from_line reads them. It holds the store's secret keys."""
+    fields = {
+        name: getattr(setting, name) for name in ("store_url", "n_threads", "debug", "runner")
+    }
+    row = fields | {"recipe": setting.recipe.model_dump_json(), "store": asdict(setting.store)}
+    text = json.dumps(row, default=Secret.reveal)
+    return json.dumps([text, _TASK.dump_json(task).decode()]).encode()
+
+
+def task_from_line(line: bytes) -> tuple[Setting, Task]:
+    """The setting and the task of a line of line_from_task."""
+    setting, task = json.loads(line)
+    return _setting_from_text(setting), _TASK.validate_json(task)
+
+
+@lru_cache(maxsize=1)
+def _setting_from_text(text: str) -> Setting:
+    row = json.loads(text)
+    store = row.pop("store")
+    s3 = store["s3"] | {name: Secret(store["s3"][name]) for name in _SECRETS}
+    recipe = Recipe.model_validate_json(row.pop("recipe"))
+    return Setting(**row, recipe=recipe, store=StoreSettings(store["fsync"], S3Settings(**s3)))

@@ -1,0 +1,56 @@
+"""The body of a render process: tasks come in one after another, messages leave.
+
+Effects: those of the tasks; ends when its parent does. It is started afresh (never forked), so that
+S3 and Mitsuba are safe in it, and may be killed at any moment. Requests are lines on what was stdin,
+messages leave on what was stdout; whatever libraries print goes to stderr, which is the task's log.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+from importlib import import_module
+from typing import BinaryIO
+
+from pbrs_farm.run.processes.child_process import die_with_parent
+from pbrs_farm.run.processes.message import Message
+
+
+def main(target: str) -> int:
+    """Serve the tasks of `module:function`, which makes a Handler from what sends a message."""
+    die_with_parent()
+    # The parent decides what Ctrl-C and TERM mean; Slurm signals every process of a step.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    requests, replies = _own_pipes()
+
+    def send(message: Message) -> None:
+        replies.write(message.line())
+
+    module, _, function = target.partition(":")
+    try:
+        handle = getattr(import_module(module), function)(send)
+    except Exception as error:  # noqa: BLE001 - the parent is told why
+        traceback.print_exc()
+        send(Message("fault", f"{type(error).__name__}: {error}"))
+        return 1
+    send(Message("ready"))
+    for line in requests:
+        send(handle(line))
+    return 0
+
+
+def _own_pipes() -> tuple[BinaryIO, BinaryIO]:
+    """Keep stdin and stdout for ourselves; everybody else reads nothing and prints to stderr."""
+    requests = os.fdopen(os.dup(0), "rb")
+    replies = os.fdopen(os.dup(1), "wb", buffering=0)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.dup2(2, 1)
+    return requests, replies
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

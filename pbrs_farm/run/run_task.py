@@ -1,0 +1,101 @@
+"""What a render process of a local run does with a task: its steps, an event for each.
+
+Effects: the store's, and those of the libraries the steps use; a crash here costs one step.
+"""
+
+from __future__ import annotations
+
+import atexit
+import importlib
+import os
+import resource
+import sys
+import time
+import traceback
+from dataclasses import asdict
+from typing import Literal
+
+from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.run import plan
+from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.processes.message import Handler, Message, Send
+from pbrs_farm.run.processes.task import Event, Setting, Task, task_from_line
+from pbrs_farm.run.step_cache import Work
+from pbrs_farm.store import store_from_url
+
+_DRJIT_STEPS = ("house", "cameras", "truth", "illuminance", "light", "develop")
+
+
+def make_handler(send: Send) -> Handler:
+    """The handler of a render process: it keeps the house it worked on last loaded."""
+    house_cache = HouseCache()
+    atexit.register(house_cache.clear)
+
+    def handle(line: bytes) -> Message:
+        setting, task = task_from_line(line)
+        # Mesa reads it when the first GL context is made.
+        os.environ.setdefault("LP_NUM_THREADS", str(setting.n_threads))
+        run_task(send, setting, house_cache, task)
+        end = Event("end", task.house_id, task.view_id, "", peak_mb=peak_mb())
+        return Message("done", body=asdict(end))
+
+    return handle
+
+
+def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Task) -> None:
+    """Run the steps of one task; a failed one leaves out those that read what it makes."""
+    work = Work(
+        store=store_from_url(setting.store_url, setting.store),
+        recipe=setting.recipe,
+        house_id=task.house_id,
+        house_cache=house_cache,
+        source=task.source,
+        view_id=task.view_id,
+        layers=task.layers,
+    )
+    failed: set[str] = set()
+    for name in task.steps:
+        is_blocked = name != "view" and bool(failed.intersection(plan.STEPS[name].after))
+        if is_blocked or not _run_step(send, setting, name, work):
+            failed.add(name)
+
+
+def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
+    module, _, function = setting.runner.partition(":")
+    run_step = getattr(importlib.import_module(module), function)
+    limit_threads(name, setting.n_threads)
+    send(Message("step", name))
+    started = time.perf_counter()
+    try:
+        outcome = run_step(name, work)
+    except PbrsError as error:
+        message = str(error)
+    except Exception as error:  # noqa: BLE001  any other fault costs this step, not the run
+        message = f"{type(error).__name__}: {error}"
+        traceback.print_exc()
+        sys.stderr.flush()
+    else:
+        kind: Literal["kept", "done"] = "kept" if outcome.was_done else "done"
+        seconds = time.perf_counter() - started
+        facts = outcome.marker.facts if name in ("house", "cameras") else {}
+        event = Event(kind, work.house_id, work.view_id, name, seconds, "", facts, peak_mb())
+        send(Message("event", body=asdict(event)))
+        return True
+    if setting.debug:
+        message += "\n" + traceback.format_exc()
+    failed = Event("failed", work.house_id, work.view_id, name, message=message)
+    send(Message("event", body=asdict(failed)))
+    return False
+
+
+def limit_threads(step: str, n_threads: int) -> None:
+    """Give Dr.Jit its share of the cores before a step first uses it."""
+    if n_threads < (os.cpu_count() or 1) and step in _DRJIT_STEPS:
+        from pbrs_farm.raycast.variant import set_threads
+
+        set_threads(n_threads)
+
+
+def peak_mb() -> float:
+    """Largest resident memory of this process so far, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000

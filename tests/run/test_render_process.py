@@ -1,0 +1,261 @@
+"""The supervisor of render processes, on a fake clock and with a fake process: who is killed, when."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.run.processes.child_process import ChildProcess
+from pbrs_farm.run.processes.limits import ProcessLimits
+from pbrs_farm.run.processes.message import Handler, Message, Send
+from pbrs_farm.run.processes.render_process import Ended, RenderProcess
+from tests.run.fake_child import FakeChild, FakeClock
+
+LIMITS = ProcessLimits(
+    start_s=60, step_s=100, silence_s=30, memory_mb=500, recycle_mb=300, recycle_tasks=3
+)
+
+
+class Bench:
+    """A RenderProcess and the fake processes it has started; `next` is the one it starts next."""
+
+    def __init__(self, limits: ProcessLimits = LIMITS) -> None:
+        self.clock = FakeClock()
+        self.started: list[FakeChild] = []
+        self.next = FakeChild(self.clock)
+        self.process = RenderProcess(self._start, limits, clock=self.clock)
+
+    def _start(self) -> FakeChild:
+        self.started.append(self.next)
+        self.next = FakeChild(self.clock)
+        return self.started[-1]
+
+    def run(self, *, task_s: float = math.inf) -> tuple[list[Message], Ended]:
+        """Give it a task and wait for its end; what it said meanwhile."""
+        self.process.begin(b"task", task_s=task_s)
+        heard = []
+        while True:
+            what = self.process.poll(1.0)
+            if isinstance(what, Ended):
+                assert not self.process.is_busy
+                return heard, what
+            heard += [what] if what is not None else []
+
+
+def test_a_task_ends_with_what_the_process_says_of_it() -> None:
+    bench = Bench()
+    for at, kind in ((2.0, "ready"), (3.0, "step"), (9.0, "done")):
+        bench.next.at(at, kind, kind, n=7)  # type: ignore[arg-type]
+    heard, ended = bench.run()
+    assert [m.kind for m in heard] == ["ready", "step"]
+    assert ended == Ended(9.0, "", "done", {"n": 7})
+    assert bench.started[0].requests == [b"task"]
+    assert not bench.started[0].was_killed
+
+
+def test_a_process_serves_one_task_after_another() -> None:
+    bench = Bench()
+    child = bench.next
+    child.at(0, "ready")
+    child.at(1, "done")
+    bench.run()
+    child.at(2, "fault", "odd", fault="bug")
+    _heard, ended = bench.run()
+    assert (ended.cause, ended.text, ended.body) == ("reported", "odd", {"fault": "bug"})
+    assert len(bench.started) == 1
+
+
+def test_a_silent_process_is_killed_and_the_next_task_gets_another() -> None:
+    bench = Bench()
+    bench.next.at(0, "ready")
+    _heard, ended = bench.run()
+    assert ended.cause == "silent"
+    assert 30 < ended.seconds <= 32
+    assert bench.started[0].was_killed
+    bench.next.at(40, "ready")
+    bench.next.at(41, "done")
+    assert bench.run()[1].cause == ""
+    assert len(bench.started) == 2
+
+
+def test_a_line_in_the_log_is_a_sign_of_life() -> None:
+    bench = Bench()
+    child = bench.next
+
+    def speak() -> None:
+        child.log += "line\n"
+
+    child.at(0, "ready")
+    for at in (20, 40, 60):
+        child.at(at, speak)
+    child.at(80, "done")
+    assert bench.run()[1].cause == ""
+
+
+def test_a_step_over_its_time_is_killed_though_it_writes_to_its_log() -> None:
+    bench = Bench()
+    child = bench.next
+
+    def speak() -> None:
+        child.log += "line\n"
+
+    child.at(0, "ready")
+    child.at(10, "step", "light")
+    for at in range(20, 200, 10):
+        child.at(at, speak)
+    _heard, ended = bench.run()
+    assert ended.cause == "timeout"
+    assert "100 s; killed" in ended.text
+    assert 110 < bench.clock.now <= 112
+
+
+def test_each_step_has_its_own_time_but_the_task_has_one_too() -> None:
+    bench = Bench()
+    bench.next.at(0, "ready")
+    for at in range(0, 300, 20):
+        bench.next.at(at, "step")
+    _heard, ended = bench.run(task_s=200)
+    assert ended.cause == "timeout"
+    assert 200 < ended.seconds <= 202
+
+
+def test_time_without_storage_counts_for_no_limit() -> None:
+    bench = Bench()
+    bench.next.at(0, "ready")
+    for at in range(20, 400, 20):
+        bench.next.at(at, "waiting")
+    bench.next.at(395, "done")
+    assert bench.run(task_s=50)[1].cause == ""
+
+
+def test_the_start_is_not_part_of_the_tasks_time() -> None:
+    bench = Bench()
+    bench.next.at(50, "ready")
+    bench.next.at(75, "done")
+    assert bench.run(task_s=26)[1].cause == ""
+
+
+def test_a_process_that_does_not_start_is_the_machines_fault() -> None:
+    _heard, ended = Bench().run()
+    assert ended.cause == "machine"
+    assert 60 < ended.seconds <= 62
+    bench = Bench()
+    bench.next.at(1, "fault", "MachineFailed: no EGL")
+    _heard, ended = bench.run()
+    assert (ended.cause, ended.text) == ("machine", "MachineFailed: no EGL")
+    assert bench.started[0].was_killed
+
+
+def test_a_process_over_its_memory_is_killed_even_while_it_talks() -> None:
+    bench = Bench()
+    child = bench.next
+    child.at(0, "ready")
+    for k in range(20):
+        child.at(k / 4, "event")
+    child.at(5, lambda: setattr(child, "used_mb", 501.0))
+    for k in range(20, 100):
+        child.at(k / 4, "event")
+    _heard, ended = bench.run()
+    assert ended.cause == "resource"
+    assert "501 MB resident, 500 allowed" in ended.text
+    assert 5 <= ended.seconds <= 7
+
+
+@pytest.mark.parametrize(
+    ("code", "cause", "text"),
+    [
+        (-signal.SIGSEGV, "crash", "its process was killed by SIGSEGV"),
+        (3, "crash", "its process ended with 3"),
+        (-signal.SIGKILL, "resource", "out of memory?"),
+    ],
+)
+def test_a_death_is_told_by_its_cause(code: int, cause: str, text: str) -> None:
+    bench = Bench()
+    child = bench.next
+    child.at(0, "ready")
+    child.at(2, lambda: child.dies(code))
+    _heard, ended = bench.run()
+    assert ended.cause == cause
+    assert text in ended.text
+
+
+def test_a_process_that_died_idle_costs_no_task() -> None:
+    bench = Bench()
+    bench.next.at(0, "ready")
+    bench.next.at(1, "done")
+    bench.run()
+    bench.started[0].dies(-signal.SIGKILL)
+    bench.next.at(2, "ready")
+    bench.next.at(3, "done")
+    assert bench.run()[1].cause == ""
+
+
+def test_worn_and_swollen_processes_are_replaced_between_tasks() -> None:
+    bench = Bench()
+    for k in range(5):
+        bench.next.at(0, "ready")
+        child = (
+            bench.started[-1] if bench.started and not bench.started[-1].was_killed else bench.next
+        )
+        child.at(k, "done")
+        assert bench.run()[1].cause == ""
+    assert len(bench.started) == 2  # three tasks each
+    bench.started[-1].used_mb = 301
+    bench.started[-1].at(9, "done")
+    bench.run()
+    assert bench.started[-1].was_killed
+
+
+def test_closing_lets_an_idle_process_end_and_kills_a_busy_one() -> None:
+    bench = Bench()
+    bench.next.at(0, "ready")
+    bench.next.at(1, "done")
+    bench.run()
+    bench.process.close()
+    assert bench.started[0].was_closed
+    bench.process.begin(b"task")
+    bench.process.close()
+    assert bench.started[1].was_killed
+
+
+def make_handler(send: Send) -> Handler:
+    """A real process for the test below: it does what the request's word says."""
+
+    def handle(line: bytes) -> Message:
+        word = line.decode().strip()
+        os.write(1, f"{word}\n".encode())  # native libraries print too
+        if word == "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if word == "hang":
+            time.sleep(60)
+        send(Message("event", word, {"pid": os.getpid()}))
+        return Message("done", word)
+
+    return handle
+
+
+def test_real_processes_live_and_die_as_the_fake_ones(tmp_path: Path) -> None:
+    start = partial(ChildProcess, "tests.run.test_render_process:make_handler", tmp_path / "log")
+    process = RenderProcess(start, ProcessLimits(silence_s=2.0))
+
+    def run(word: str) -> tuple[str, str]:
+        process.begin(word.encode())
+        while not isinstance(what := process.poll(0.2), Ended):
+            pass
+        return what.cause, what.text
+
+    try:
+        assert run("fine") == ("", "fine")
+        assert process.log_tail() == "fine\n"
+        assert run("crash") == ("crash", "its process was killed by SIGSEGV")
+        assert run("fine") == ("", "fine")
+        assert run("hang")[0] == "silent"
+        assert run("fine") == ("", "fine")
+    finally:
+        process.close()

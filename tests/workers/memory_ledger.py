@@ -1,0 +1,158 @@
+"""A ledger and a registry of workers in memory: what a slot and a coordinator see of a farm."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from workers.job import HouseEntry, JobSpec
+from workers.ledger.interface import Claim, Fault, Finished, HouseState, JobView, LedgerUnavailable
+
+
+@dataclass
+class MemoryLedger:
+    """Implements workers.ledger.interface.Ledger for tasks a test puts into it."""
+
+    ready: list[str] = field(default_factory=list)
+    queued: list[str] = field(default_factory=list)
+    inputs: dict[str, str] = field(default_factory=dict)
+    leases: dict[str, str] = field(default_factory=dict)  # task -> token
+    attempts: Counter[str] = field(default_factory=Counter)
+    finished: dict[str, Finished] = field(default_factory=dict)
+    faults: dict[str, list[Fault]] = field(default_factory=lambda: defaultdict(list))
+    affine: dict[str, str] = field(default_factory=dict)  # task -> the next of its house
+    refusal: Claim | None = None  # what every claim is answered with
+    heartbeats: list[str] = field(default_factory=list)  # answers to come; then "ok"
+    n_heartbeats: int = 0
+    n_away: int = 0  # calls that fail before Redis answers again
+    leader: str = ""
+    reaped: int = 0
+    fields: dict[str, str] = field(default_factory=lambda: {"recipe": "r", "state": "running"})
+    lengths: Counter[str] = field(default_factory=Counter)  # of the queues
+
+    def _answer(self) -> None:
+        if self.n_away > 0:
+            self.n_away -= 1
+            raise LedgerUnavailable("no Redis")
+
+    def create(self, spec: JobSpec) -> str:
+        raise NotImplementedError
+
+    def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None:
+        raise NotImplementedError
+
+    def load_houses(self, job: str, houses: Iterable[HouseState]) -> int:
+        raise NotImplementedError
+
+    def open(self, job: str, priority: int) -> None:
+        raise NotImplementedError
+
+    def forget(self, job: str) -> None:
+        raise NotImplementedError
+
+    def steer(self, job: str, what: str, reason: str = "") -> str:
+        raise NotImplementedError
+
+    def retry(self, job: str, task: str) -> bool:
+        raise NotImplementedError
+
+    def claim(self, job: str, task: str, *, token: str, recipe: str, direct: bool = False) -> Claim:
+        self._answer()
+        if self.refusal is not None:
+            return self.refusal
+        if task in self.finished:
+            return Claim("done")
+        if task in self.leases:
+            return Claim("leased", f"{self.leases[task]}|w1|0")
+        self.leases[task] = token
+        self.attempts[task] += 1
+        return Claim("run", str(self.attempts[task]), self.inputs.get(task, ""), token)
+
+    def heartbeat(self, job: str, task: str, token: str) -> str:
+        self._answer()
+        self.n_heartbeats += 1
+        return self.heartbeats.pop(0) if self.heartbeats else "ok"
+
+    def finish(self, job: str, task: str, token: str, end: Finished, *, sticky: bool) -> str:
+        self._answer()
+        assert self.leases.pop(task) == token
+        self.finished[task] = end
+        return self.affine.get(task, "") if sticky else ""
+
+    def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str:
+        self._answer()
+        assert self.leases.pop(task) == token
+        self.faults[task].append(fault)
+        return "failed" if fault.fault == "data" else "retry"
+
+    def lead(self, token: str) -> bool:
+        self._answer()
+        self.leader = self.leader or token
+        return self.leader == token
+
+    def resign(self, token: str) -> None:
+        self.leader = "" if self.leader == token else self.leader
+
+    def reap(self, token: str) -> int:
+        self.reaped += 1
+        return 0
+
+    def dispatch(
+        self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
+    ) -> list[str] | None:
+        if self.leader != token:
+            return None
+        sent = []
+        left = dict(room)
+        for task in list(self.ready):
+            stage = task.rpartition("/")[2]
+            if left[stage] > 0:
+                left[stage] -= 1
+                self.ready.remove(task)
+                self.queued.append(task)
+                sent.append(task)
+        return sent
+
+    def wait(self, seconds: float) -> None:
+        self._answer()
+
+    def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None:
+        return [t for t in self.queued if t.endswith(f"/{stage}")]
+
+    def view(self, job: str) -> JobView | None:
+        counts = Counter(f"{task.rpartition('/')[2]}:q" for task in self.queued)
+        return JobView(job, self.fields, counts, {}, 0)
+
+    def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
+        self.fields["rates"] = ",".join(rates)
+
+    def queue_length(self, queue: str) -> int:
+        return self.lengths[queue]
+
+    def active_jobs(self) -> list[str]:
+        return ["0" * 12]
+
+    def known_jobs(self) -> list[str]:
+        return ["0" * 12]
+
+
+@dataclass
+class MemoryRegistry:
+    """Implements workers.ledger.interface.WorkerRegistry."""
+
+    n_slots: dict[str, int] = field(default_factory=dict)
+    refusals: list[str] = field(default_factory=list)
+    reason: str = ""
+
+    def slots(self) -> dict[str, int]:
+        return self.n_slots
+
+    def refused(self, reason: str) -> None:
+        self.refusals.append(reason)
+
+    def open_breaker(self, reason: str) -> None:
+        self.reason = reason
+
+    def breaker(self) -> str:
+        return self.reason

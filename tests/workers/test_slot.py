@@ -1,0 +1,191 @@
+"""A slot with a ledger in memory, a fake render process and a fake clock."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.run.processes.limits import ProcessLimits
+from pbrs_farm.run.processes.render_process import RenderProcess
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.secret import Secret
+from tests.run.fake_child import FakeChild, FakeClock
+from tests.workers.memory_ledger import MemoryLedger, MemoryRegistry
+from workers.config import FarmConfig, Limits
+from workers.ids import failed_key, log_key, task_from_text
+from workers.ledger.interface import Claim, LedgerUnavailable
+from workers.node.slot import Slot
+
+JOB = "0" * 12
+TASK = "h0/0/gl"
+
+
+class Bench:
+    """One slot; `next` is the process that it starts next."""
+
+    def __init__(self, folder: Path) -> None:
+        self.clock = FakeClock()
+        self.started: list[FakeChild] = []
+        self.next = FakeChild(self.clock)
+        self.ledger = MemoryLedger(inputs={TASK: "a,b;c", "h0/1/gl": "a,b;c"})
+        self.registry = MemoryRegistry()
+        self.config = FarmConfig(
+            redis_url=Secret("redis://127.0.0.1:1/0"), store_url=(folder / "store").as_uri(),
+            worker="w1", scratch=folder, limits=Limits(silence_s=100.0, gl_s=1000.0),
+        )  # fmt: skip
+        self.store = FolderStore(folder / "store")
+        process = RenderProcess(self._start, ProcessLimits(silence_s=100.0), clock=self.clock)
+        self.slot = Slot(
+            self.config, self.ledger, self.registry, process, clock=self.clock, sleep=self._sleep
+        )
+
+    def _start(self) -> FakeChild:
+        self.started.append(self.next)
+        self.next = FakeChild(self.clock)
+        return self.started[-1]
+
+    def _sleep(self, seconds: float) -> None:
+        self.clock.now += seconds
+
+    def run(self, task: str = TASK) -> None:
+        self.slot.run_task(JOB, task_from_text(task), "r")
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
+
+
+def test_a_task_is_claimed_run_and_finished(bench: Bench) -> None:
+    bench.next.at(1, "ready")
+    bench.next.at(5, "done", batches=[], n_views=0)
+    bench.run()
+    request = json.loads(bench.started[0].requests[0])
+    assert (request["house"], request["stage"], request["views"]) == ("h0", "gl", ["a", "b"])
+    end = bench.ledger.finished[TASK]
+    assert (end.seconds, end.n_views) == (5.0, 2)
+
+
+def test_the_lease_is_kept_while_the_process_talks_and_while_it_is_silent(bench: Bench) -> None:
+    bench.next.at(0, "ready")
+    for k in range(1, 200):
+        bench.next.at(k / 2, "step")  # twice a second, so that no poll is ever idle
+    bench.next.at(190, "done", batches=[], n_views=0)
+    bench.run()
+    assert bench.ledger.n_heartbeats == 9  # every 20 s
+    assert TASK in bench.ledger.finished
+
+
+@pytest.mark.parametrize("answer", ["lost", "cancelled"])
+def test_a_lost_or_cancelled_task_is_killed(bench: Bench, answer: str) -> None:
+    bench.ledger.heartbeats = ["ok", answer]
+    bench.next.at(0, "ready")
+    bench.run()
+    assert bench.started[0].was_killed
+    assert [f.fault for f in bench.ledger.faults[TASK]] == [answer]
+    assert 40 <= bench.clock.now < 43
+
+
+def test_preemption_hands_the_task_back_at_once_and_without_a_log(bench: Bench) -> None:
+    bench.next.at(0, "ready")
+    bench.next.at(7, lambda: bench.config.preemption_file.touch())
+    bench.run()
+    (fault,) = bench.ledger.faults[TASK]
+    assert (fault.fault, fault.log) == ("preempted", "")
+    assert bench.clock.now < 10
+
+
+@pytest.mark.parametrize(("code", "kind"), [(-11, "crash"), (-9, "resource")])
+def test_a_death_costs_one_attempt_and_leaves_its_log(bench: Bench, code: int, kind: str) -> None:
+    child = bench.next
+    child.at(0, "ready")
+
+    def die() -> None:
+        child.log = "about to crash\n"
+        child.dies(code)
+
+    child.at(3, die)
+    bench.run()
+    (fault,) = bench.ledger.faults[TASK]
+    assert (fault.fault, fault.attempt) == (kind, 1)
+    assert bench.store.get(log_key(JOB, TASK, 1)) == b"about to crash\n"
+    bench.next.at(10, "ready")
+    bench.next.at(11, "done", batches=[], n_views=0)
+    bench.run()
+    assert bench.ledger.attempts[TASK] == 2
+    assert TASK in bench.ledger.finished
+
+
+def test_silence_and_deadline_end_a_task(bench: Bench) -> None:
+    bench.next.at(0, "ready")
+    bench.run()
+    bench.next.at(bench.clock.now, "ready")
+    for k in range(0, 2000, 50):
+        bench.next.at(bench.clock.now + k, "step")
+    bench.run()
+    assert [f.fault for f in bench.ledger.faults[TASK]] == ["silent", "timeout"]
+    assert "longer than 1000 s" in bench.ledger.faults[TASK][1].message
+
+
+def test_a_fault_the_process_reports_keeps_its_class(bench: Bench) -> None:
+    bench.next.at(0, "ready")
+    bench.next.at(1, "fault", "h0: two walls", fault="data", fingerprint="BadHouse: two walls 3")
+    bench.run()
+    (fault,) = bench.ledger.faults[TASK]
+    assert (fault.fault, fault.message) == ("data", "h0: two walls")
+    assert fault.fingerprint == "data: BadHouse: two walls #"
+    assert json.loads(bench.store.get(failed_key(JOB, TASK)))["fault"] == "data"
+    assert not bench.started[0].was_killed
+
+
+def test_storage_that_does_not_answer_opens_the_breaker(bench: Bench) -> None:
+    bench.next.at(0, "ready")
+    bench.next.at(5, "waiting", "bucket away")
+    bench.next.at(9, "done", batches=[], n_views=0)
+    bench.run()
+    assert bench.registry.reason == "bucket away"
+    assert TASK in bench.ledger.finished
+
+
+def test_a_long_task_takes_another_of_its_house_with_it(bench: Bench) -> None:
+    bench.ledger.affine[TASK] = "h0/1/gl"
+    child = bench.next
+    child.at(0, "ready")
+    child.at(5, "done", batches=[], n_views=0)
+    child.at(9, "done", batches=[], n_views=0)
+    bench.run()
+    assert set(bench.ledger.finished) == {TASK, "h0/1/gl"}
+    assert len(bench.started) == 1
+
+
+def test_redis_away_is_waited_for_but_not_for_ever(bench: Bench) -> None:
+    bench.ledger.n_away = 3
+    bench.next.at(0, "ready")
+    bench.next.at(1, "done", batches=[], n_views=0)
+    bench.run()
+    assert TASK in bench.ledger.finished
+    bench.ledger.n_away = 10_000
+    with pytest.raises(LedgerUnavailable):
+        bench.run("h0/1/gl")
+    assert 600 < bench.clock.now < 640
+
+
+def test_a_refused_task_starts_no_process(bench: Bench) -> None:
+    bench.ledger.refusal = Claim("version", "9.9")
+    bench.run()
+    assert bench.started == []
+    assert bench.registry.refusals == [f"job {JOB} wants version 9.9"]
+    assert bench.clock.now == 1.0  # it waits, so that others may take the task
+
+
+def test_the_lease_of_a_dead_sibling_is_ended(bench: Bench) -> None:
+    gone = 2**22 - 1  # above any process id in use
+    bench.ledger.leases[TASK] = f"w1:{gone}:0:abcd"
+    bench.run()
+    assert [f.fault for f in bench.ledger.faults[TASK]] == ["lost"]
+    bench.ledger.leases["h0/1/gl"] = f"w1:{os.getpid()}:0:abcd"
+    bench.run("h0/1/gl")
+    assert "h0/1/gl" in bench.ledger.leases
