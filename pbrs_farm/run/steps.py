@@ -244,7 +244,7 @@ def _light(work: Work) -> Made:
     facts = {
         **result.facts,
         "noise": result.noise,
-        "spp": result.spp,
+        **({"spp": result.spp} if result.spp else {}),
         "n_nonfinite": result.n_nonfinite,
         "variant": loaded.light_scene.variant,
         "sky": loaded.sky.facts(),

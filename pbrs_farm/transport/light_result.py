@@ -13,7 +13,6 @@ from pbrs_farm.core.arrays import RadianceImage, UnitVectors
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
-from pbrs_farm.core.recipe import LightFields
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,7 +24,7 @@ class LightResult:
     albedo: RadianceImage  # 0..1, of the first surface that is neither mirror nor glass
     normal: UnitVectors  # of the same surface, in the world frame
     noise: dict[str, float]  # relative error of each group and of their sum, from two half buffers
-    spp: int  # samples (or mutations) per pixel
+    spp: int  # samples per pixel of `path`; 0 of Metropolis, whose facts have its own numbers
     n_nonfinite: int  # contributions that were not finite, left out
     facts: dict[str, Any] = field(default_factory=dict)  # of view.json: integrator, seed, weights
     lamps: Mapping[int, RadianceImage] = field(
@@ -114,7 +113,8 @@ def joined_result(
     halves: Mapping[Group, tuple[RadianceImage, ...]],
     n_bad: int,
     facts: dict[str, Any],
-    fields: LightFields,
+    *,
+    spp: int = 0,
 ) -> LightResult:
     """The mean of two half buffers of each group, plus direct light when it is separate.
 
@@ -129,7 +129,6 @@ def joined_result(
     a = [np.asarray(base[g] + halves[g][0], np.float32) for g in Group]
     b = [np.asarray(base[g] + halves[g][1], np.float32) for g in Group]
     outdoor, indoor = (np.float32(0.5) * (x + y) for x, y in zip(a, b, strict=True))
-    spp = fields.mutations_per_pixel if fields.integrator == "metropolis" else fields.spp
     return LightResult(
         outdoor,
         indoor,

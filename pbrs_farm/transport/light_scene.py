@@ -121,14 +121,7 @@ class LightScene:
         return self.n_lamps
 
     def _path_sums(
-        self,
-        camera: Camera,
-        fields: LightFields,
-        seed: int,
-        emitters: Any,
-        *,
-        max_depth: int | None = None,
-        n_lamps: int = 0,
+        self, camera: Camera, fields: LightFields, seed: int, emitters: Any, *, n_lamps: int = 0
     ) -> tuple[Any, int]:
         """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached.
 
@@ -139,7 +132,7 @@ class LightScene:
 
         # Size the launches: by memory, by the pace so far, and one pass each when noise decides.
         i = camera.intrinsics
-        per_launch = max(_SAMPLES_PER_LAUNCH // (i.width_px * i.height_px), 1)
+        per_launch = _samples_per_launch(camera)
         budget = TimeBudget(fields.time_budget_s)
         is_open = budget.is_limited or fields.noise > 0
         goal = max(fields.spp, fields.max_spp) if is_open else fields.spp
@@ -150,7 +143,7 @@ class LightScene:
         spp = 0
         while spp < goal and (n := budget.n_that_fit(min(per_launch, goal - spp))) > 0:
             lanes = Lanes(i.width_px, i.height_px, spp, n, seed, n_lamps=n_lamps)
-            sums = trace(self.device_scene, emitters, camera, lanes, fields, max_depth=max_depth)
+            sums = trace(self.device_scene, emitters, camera, lanes, fields)
             budget.record(n)
             total = sums if total is None else total + sums
             spp += n
@@ -159,6 +152,24 @@ class LightScene:
                 if noise <= fields.noise:
                     break
         return total, spp
+
+    def _direct_sums(self, camera: Camera, fields: LightFields, seed: int, emitters: Any) -> Any:
+        """Sums over fields.direct_spp samples of light that meets one surface.
+
+        Without any such samples: over one sample of no light, for the denoiser's guides.
+        """
+        from pbrs_farm.transport.path_tracer import Lanes, trace
+
+        i = camera.intrinsics
+        n_samples, max_depth = (fields.direct_spp, 2) if fields.direct_spp > 0 else (1, 1)
+        per_launch = _samples_per_launch(camera)
+        total: Any = None
+        for first in range(0, n_samples, per_launch):
+            n = min(per_launch, n_samples - first)
+            lanes = Lanes(i.width_px, i.height_px, first, n, seed)
+            sums = trace(self.device_scene, emitters, camera, lanes, fields, max_depth=max_depth)
+            total = sums if total is None else total + sums
+        return total
 
     def _render_metropolis(
         self,
@@ -172,16 +183,11 @@ class LightScene:
         """Direct light by `path` with two segments, the rest by Metropolis, group by group."""
         from pbrs_farm.transport.metropolis.integrator import metropolis
 
-        # Trace direct light by path; without it one sample still gives the denoiser's guides.
+        # Trace direct light by path.
         began = time.monotonic()
         has_direct = fields.direct_spp > 0
-        direct_fields = fields.model_copy(
-            update={"spp": max(fields.direct_spp, 1), "time_budget_s": 0.0}
-        )
-        sums, spp = self._path_sums(
-            camera, direct_fields, seed, emitters, max_depth=2 if has_direct else 1
-        )
-        direct = result_from_sums(sums, camera, spp, {})
+        sums = self._direct_sums(camera, fields, seed, emitters)
+        direct = result_from_sums(sums, camera, max(fields.direct_spp, 1), {})
 
         # Run the chains of each group for half of the time that is left.
         left_s = max(fields.time_budget_s - (time.monotonic() - began), 0.0)
@@ -199,9 +205,9 @@ class LightScene:
             numbers = {"mean_luminance": e.mean_luminance, "acceptance": round(e.acceptance, 4)}
             facts[group.value] = numbers | {"mutations": e.n_mutations}
         facts |= {"integrator": "pssmlt-camera", "large_step": fields.large_step}
-        facts["tail_pixels"] = fields.tail_pixels
+        facts |= {"tail_pixels": fields.tail_pixels, "direct_spp": fields.direct_spp}
         n_bad = direct.n_nonfinite + sum(e.n_bad for e in estimates.values())
-        return joined_result(direct if has_direct else None, direct, halves, n_bad, facts, fields)
+        return joined_result(direct if has_direct else None, direct, halves, n_bad, facts)
 
     def floor_lux(self, house: House, *, seed: int = 0) -> dict[str, dict[str, float]]:
         """Room id -> mean illuminance of its floor in lx by "outdoor" and "indoor" light.
@@ -265,8 +271,7 @@ class LightScene:
         black = np.zeros((camera.intrinsics.height_px, camera.intrinsics.width_px, 3), np.float32)
         guides = LightResult(black, black, np.ones_like(black), black, {}, 0, 0, {})
         facts = {"integrator": "mitsuba path", "seed": seed}
-        whole = half.model_copy(update={"spp": 2 * half.spp})
-        return joined_result(None, guides, halves, 0, facts, whole)
+        return joined_result(None, guides, halves, 0, facts, spp=2 * half.spp)
 
     def emitters(
         self, camera: Camera, fields: LightFields, seed: int
@@ -304,3 +309,8 @@ class LightScene:
             self._emitters.set_targets(targets)
         self._emitters.set_view(portals, weights)
         return self._emitters
+
+
+def _samples_per_launch(camera: Camera) -> int:
+    """Samples of every pixel that fit into the memory of one launch."""
+    return max(_SAMPLES_PER_LAUNCH // (camera.intrinsics.width_px * camera.intrinsics.height_px), 1)

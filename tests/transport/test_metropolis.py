@@ -93,3 +93,13 @@ def test_a_time_budget_ends_the_mutations() -> None:
     wanted = 100_000 * 32 * 24
     assert 0 < result.facts["indoor"]["mutations"] < wanted
     assert result.indoor.mean() > 0
+
+
+def test_direct_samples_and_mutations_never_pose_as_samples_of_path() -> None:
+    house, camera = rooms.window_room(lumen=800)
+    fields = {**METROPOLIS.model_dump(), "direct_spp": 3, "mutations_per_pixel": 8}
+    result = rendered(house, camera, dark_sky(), **fields)
+    assert result.spp == 0
+    assert "spp" not in result.facts
+    assert result.facts["direct_spp"] == 3
+    assert result.facts["indoor"]["mutations"] > 0

@@ -24,8 +24,9 @@ _BYTES_PER_PIXEL: Final = {"light": 22.0, "labels": 4.0}
 def seconds_per_view(recipe: Recipe) -> float:
     """Expected seconds of light for a view on one slot of two cores."""
     light = recipe.light
-    spp = light.spp if light.integrator == "path" else light.direct_spp + light.mutations_per_pixel
-    megasamples = 2 * spp * recipe.image.width_px * recipe.image.height_px / 1e6
+    is_path = light.integrator == "path"
+    per_pixel = light.spp if is_path else light.direct_spp + light.mutations_per_pixel
+    megasamples = 2 * per_pixel * recipe.image.width_px * recipe.image.height_px / 1e6
     return max(1.0, _SECONDS_PER_MEGASAMPLE * megasamples)
 
 
