@@ -191,6 +191,21 @@ def test_a_path_that_never_ends_stops_at_a_limit() -> None:
         polygons_from_path("M0,0 " + "l1,1 " * 50_000)
     with pytest.raises(ValueError, match="points"):
         polygons_from_path("M0,0 " + "a1e5,1e5 0 1,1 1,0 " * 4000)
+    with pytest.raises(ValueError, match="closes"):
+        polygons_from_path("M0,0" + "z" * 90_000)
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["M0 0" + "." * 90_000, "M0 0" + "e" * 90_000,
+     "M0 0A1e-300 1 0 0 1 1 0", "M0 0L1e999 0 1 1z", "M0 0A1e308 1e308 0 0 1 1 1z",
+     "M0 0L2000000 0 1 1z", "M0 0 nan 1 1z", "M0 0 A1 1 0 2 1 1 1z"],
+)  # fmt: skip
+def test_a_hostile_path_gives_no_shape(path: str) -> None:
+    try:
+        assert polygons_from_path(path) == ()
+    except ValueError as error:
+        assert str(error)
 
 
 def test_the_same_bytes_give_the_same_house() -> None:

@@ -26,6 +26,17 @@ def area(path: str) -> float:
         ("M0,0 h1 v1 h-1 z m2,0 h1 v1 h-1 z", 2.0),
         ("M0,0 q.5,1 1,0 z", 1 / 3),
         ("M0,0 c0,1 1,1 1,0 z", 0.6),
+        ("M0 0 0 1 1 1 1 0z L0 -1 1 -1 1 0 z", 2.0),
+        ("M0,0H1.V1.H0z", 1.0),
+        # Flags of an arc need no separator, and a repeated arc needs no letter.
+        ("M0 .5a.5.5 0 111 0 .5.5 0 11-1 0z", math.pi / 4),
+        # S and T reflect the control point before them; after a curve of another kind they do not.
+        ("M0,0 c0,.5 .5,.5 .5,0 s.5,-.5 .5,0 l0,1 -1,0 z", 1.0),
+        ("M0,0 q.25,.5 .5,0 t.5,0 l0,1 -1,0 z", 1.0),
+        ("M0,0 c0,1 .5,1 .5,0 t.5,0 l0,-1 -1,0 z", 1.3),
+        ("M0,0 q.25,1 .5,0 s.5,.5 .5,0 l0,-1 -1,0 z", 1 + 1 / 6 + 0.075),
+        # An arc without radius is a line, one that ends where it starts is nothing.
+        ("M0,0 a0,0 0 0 1 1,0 a0,0 0 0 1 0,0 v1 h-1 z", 1.0),
     ],
 )
 def test_a_path_encloses_its_area(path: str, expected: float) -> None:
