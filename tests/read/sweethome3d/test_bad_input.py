@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import struct
@@ -202,10 +203,10 @@ def test_a_path_that_never_ends_stops_at_a_limit() -> None:
      "M0 0L2000000 0 1 1z", "M0 0 nan 1 1z", "M0 0 A1 1 0 2 1 1 1z"],
 )  # fmt: skip
 def test_a_hostile_path_gives_no_shape(path: str) -> None:
-    try:
-        assert polygons_from_path(path) == ()
-    except ValueError as error:
-        assert str(error)
+    polygons: tuple[object, ...] = ()
+    with contextlib.suppress(ValueError):
+        polygons = polygons_from_path(path)
+    assert polygons == ()
 
 
 def test_the_same_bytes_give_the_same_house() -> None:
