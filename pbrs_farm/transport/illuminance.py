@@ -16,13 +16,16 @@ from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
+    ALL_EMITTERS,
+    NO_EMITTERS,
     EmitterFilter,
+    PathContext,
     device_fields,
     surface_path,
-    white_interaction,
+    white_vertex,
 )
-from pbrs_farm.transport.kernels.path_step import advance, direct
-from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, SobolSampler, device_array, stream_key
+from pbrs_farm.transport.kernels.path_step import Strategy, advance, sample_direct_light
+from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
 
 LAMPS_LX: Final = (30.0, 1000.0)  # expected mean illuminance of a floor by lamps (spec/sky.md)
 DAYLIGHT_LX: Final = (20.0, 5000.0)  # and by daylight; a value outside is a warning
@@ -30,7 +33,6 @@ DAYLIGHT_LX: Final = (20.0, 5000.0)  # and by daylight; a value outside is a war
 _SPP: Final = 32
 _ABOVE_FLOOR_M: Final = 0.05  # above carpets
 _MAX_ATTEMPTS: Final = 200  # at points in a polygon that is thin in its box
-_ALL, _NONE = -1, -2  # values of an EmitterFilter
 
 
 def illuminance_record(house: House, lux: dict[str, dict[str, float]]) -> dict[str, Any]:
@@ -117,18 +119,14 @@ def radiosity(
     """
     # Let one lamp through for each point when lamps are given, all emitters otherwise.
     n = len(points)
-    asked = np.full(n, _ALL) if lamps is None else lamps
-    outdoor = np.full(n, _ALL if lamps is None else _NONE)
-    emitter_filter = EmitterFilter(
-        *(device_array(mi.Int32, v.astype(np.int32)) for v in (asked, outdoor))
-    )
+    indoor = np.full(n, ALL_EMITTERS) if lamps is None else lamps
+    outdoor = np.full(n, ALL_EMITTERS if lamps is None else NO_EMITTERS)
+    asked = EmitterFilter(*(device_array(mi.Int32, v.astype(np.int32)) for v in (indoor, outdoor)))
+    context = PathContext(scene, emitters, device_fields(LightFields(), max_depth=max_depth), asked)
     # Give each point a random stream of its own.
     key = stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     p, normal = mi.Point3f(*_columns(points)), mi.Vector3f(*_columns(normals))
-    fields = device_fields(LightFields(), max_depth=max_depth)
-    sums = _radiosity(
-        scene, emitters, fields, (p, normal), key, emitter_filter, dr.opaque(mi.UInt32, spp)
-    )
+    sums = _radiosity(context, p, normal, key, dr.opaque(mi.UInt32, spp))
     dr.eval(*sums)
     outdoor_sum, indoor_sum = (v.numpy().T.astype(np.float64) / spp for v in sums)
     return outdoor_sum, indoor_sum
@@ -139,45 +137,29 @@ def _columns(rows: NDArray[np.float64]) -> list[Any]:
 
 
 @dr.syntax
-def _radiosity(
-    scene: DeviceScene,
-    emitters: Emitters,
-    fields: Any,
-    place: tuple[Any, Any],
-    key: Any,
-    emitter_filter: EmitterFilter,
-    spp: Any,
-) -> tuple[Any, Any]:
+def _radiosity(context: PathContext, p: Any, normal: Any, key: Any, spp: Any) -> tuple[Any, Any]:
     """Sums over spp samples of (outdoor, indoor) radiance reflected by a white surface."""
-    p, normal = place
-    frame = mi.Frame3f(normal)
-    here = white_interaction(p, normal)
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     s = mi.UInt32(0)
     while s < spp:
         # Add direct light at the point.
         sampler = SobolSampler(key, s)
-        dim = mi.UInt32(CAMERA_DIMS)
-        near = emitters.nearby.at_vertex(p, normal, emitter_filter.indoor, mi.Bool(True))
-        up = mi.Vector3f(0, 0, 1)
-        out, lamp = direct(
-            scene, emitters, here, frame, up, sampler, dim, emitter_filter, near, mi.Bool(True)
-        )
-        lit_out, lit_in = out.light, lamp.light
+        only = context.emitter_filter.indoor
+        near = context.emitters.nearby.at_vertex(p, normal, only, mi.Bool(True))
+        vertex = white_vertex(p, normal, near)
+        sky, lamp = sample_direct_light(context, sampler, vertex, Strategy(), mi.Bool(True))
+        l_out, l_in = sky.light, lamp.light
         # Sample the hemisphere by the cosine and follow the path.
-        wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(dim + 1))
-        d = mi.Vector3f(frame.to_world(wo))
-        path = surface_path(p, normal, d, wo.z * dr.inv_pi, near)
+        wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(vertex.dim + 1))
+        path = surface_path(vertex, mi.Vector3f(vertex.frame.to_world(wo)), wo.z * dr.inv_pi)
         active = mi.Bool(True)
         while active:
-            path, result, alive = advance(
-                scene, emitters, fields, sampler, path, emitter_filter, active
-            )
-            lit_out += dr.select(active, result.emitted_outdoor + result.direct_outdoor, 0)
-            lit_in += dr.select(active, result.emitted_indoor + result.direct_indoor, 0)
+            path, result, alive = advance(context, sampler, path, active)
+            l_out += dr.select(active, result.emitted_outdoor + result.direct_outdoor, 0)
+            l_in += dr.select(active, result.emitted_indoor + result.direct_indoor, 0)
             active = active & alive
-        outdoor += lit_out
-        indoor += lit_in
+        outdoor += l_out
+        indoor += l_in
         s += 1
     return outdoor, indoor
 

@@ -20,9 +20,11 @@ from pbrs_farm.transport.kernels.bsdf import luminance
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
+    ALL_EMITTERS,
+    NO_EMITTERS,
     DeviceCamera,
-    DeviceFields,
     EmitterFilter,
+    PathContext,
     StepResult,
     camera_path,
     device_camera,
@@ -34,25 +36,20 @@ from pbrs_farm.transport.kernels.sampler import SobolSampler, stream_key
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sums:
-    """Sums over the samples of each lane, numpy, (N, 3) float32.
+class SampleSums:
+    """Sums over the samples of each lane, numpy, (N, 3) float32."""
 
-    outdoor, indoor: radiance; *_even: of every second sample; albedo, normal: of the first
-    surface that is neither mirror nor glass; n_bad: paths that were not finite, left out.
-    lamps: (N, L, 3), indoor light by the lamp it comes from, when Lanes asks for it.
-    """
-
-    outdoor: NDArray[np.float32]
+    outdoor: NDArray[np.float32]  # radiance
     indoor: NDArray[np.float32]
-    outdoor_even: NDArray[np.float32]
+    outdoor_even: NDArray[np.float32]  # of every second sample
     indoor_even: NDArray[np.float32]
-    albedo: NDArray[np.float32]
-    normal: NDArray[np.float32]
-    n_bad: int
-    lamps: NDArray[np.float32] | None = None
+    albedo: NDArray[np.float32]  # of the first surface that is neither mirror nor glass
+    normal: NDArray[np.float32]  # the same surface's
+    n_bad: int  # paths that were not finite, left out
+    lamps: NDArray[np.float32] | None = None  # (N, L, 3) indoor light by lamp, if asked for
 
-    def __add__(self, other: Sums) -> Sums:
-        return Sums(
+    def __add__(self, other: SampleSums) -> SampleSums:
+        return SampleSums(
             self.outdoor + other.outdoor,
             self.indoor + other.indoor,
             self.outdoor_even + other.outdoor_even,
@@ -68,23 +65,21 @@ class Sums:
 class Lanes:
     """Which pixels to trace and how often.
 
-    width, height: of the picture. first_sample, n_samples: of each pixel. n_only_*: 0, or the
-    number of emitters that the pilot asks one by one: lane = pixel * n_only + emitter. n_lamps:
-    0, or the number of all lamps, to sum the light of each by itself.
+    With n_only_* a lane is a pixel's light of one emitter: lane = pixel * n_only + emitter.
     """
 
-    width: int
+    width: int  # of the picture
     height: int
     first_sample: int
-    n_samples: int
+    n_samples: int  # of each pixel
     seed: int
-    n_only_lamps: int = 0
-    n_only_outdoor: int = 0
-    n_lamps: int = 0
+    n_only_lamps: int = 0  # 0, or the lamps that the pilot asks for one by one
+    n_only_outdoor: int = 0  # the same, outdoor techniques
+    n_lamps: int = 0  # 0, or the number of all lamps, to sum the light of each by itself
 
     @property
     def n_only(self) -> int:
-        """Emitters asked one by one."""
+        """Emitters asked for one by one."""
         return self.n_only_lamps + self.n_only_outdoor
 
     @property
@@ -93,11 +88,40 @@ class Lanes:
         return self.width * self.height * max(self.n_only, 1)
 
 
-class ByLamp(NamedTuple):
-    """Where a lane adds what each lamp brings: sums (lanes * lamps * 3,); first: its place there."""
+class _LampSums(NamedTuple):
+    """Where a lane adds what each lamp brings."""
 
-    sums: Any
-    first: Any
+    sums: Any  # (lanes * lamps * 3,)
+    first: Any  # the lane's first place there
+
+
+@dataclass
+class _LaneSums:
+    """Sums over the samples of a lane, as SampleSums."""
+
+    outdoor: mi.Color3f
+    indoor: mi.Color3f
+    outdoor_even: mi.Color3f
+    indoor_even: mi.Color3f
+    albedo: mi.Color3f
+    normal: mi.Vector3f
+    n_bad: mi.UInt32
+
+    def add_guides(self, result: StepResult, seen: Any, first_rough: Any) -> None:
+        """Add albedo and normal of the first rough surface, for the denoiser."""
+        self.albedo += dr.select(first_rough, result.albedo, 0)
+        self.albedo += dr.select(result.missed & ~seen, mi.Color3f(1), 0)
+        self.normal += dr.select(first_rough, result.si.n, 0)
+
+    def add_sample(self, l_out: Any, l_in: Any, sample: Any, done: Any) -> None:
+        """Add the radiance of a path where it is done; count those that are not finite."""
+        good = dr.isfinite(luminance(l_out)) & dr.isfinite(luminance(l_in))
+        self.n_bad += dr.select(done & ~good, mi.UInt32(1), 0)
+        even = done & good & ((sample & 1) == 0)
+        self.outdoor += dr.select(done & good, l_out, 0)
+        self.indoor += dr.select(done & good, l_in, 0)
+        self.outdoor_even += dr.select(even, l_out, 0)
+        self.indoor_even += dr.select(even, l_in, 0)
 
 
 def trace(
@@ -108,119 +132,115 @@ def trace(
     fields: LightFields,
     *,
     max_depth: int | None = None,
-) -> Sums:
+) -> SampleSums:
     """Trace n_samples paths for every lane; max_depth replaces the fields' own."""
+    # Give every lane its pixel and, for the pilot, its emitter.
     lane = dr.arange(mi.UInt32, lanes.n_lanes)
     per_pixel = dr.opaque(mi.UInt32, max(lanes.n_only, 1))
-    pixel, which = lane // per_pixel, mi.Int32(lane % per_pixel)
+    pixel, number = lane // per_pixel, mi.Int32(lane % per_pixel)
     n_lamps = dr.opaque(mi.Int32, lanes.n_only_lamps)
-    asked = dr.opaque(mi.Bool, lanes.n_only > 0)
-    is_lamp = which < n_lamps
+    is_single, is_lamp = dr.opaque(mi.Bool, lanes.n_only > 0), number < n_lamps
+    indoor = dr.select(is_lamp, number, NO_EMITTERS)
+    outdoor = dr.select(is_lamp, NO_EMITTERS, number - n_lamps)
     emitter_filter = EmitterFilter(
-        indoor=dr.select(asked, dr.select(is_lamp, which, -2), -1),
-        outdoor=dr.select(asked, dr.select(is_lamp, -2, which - n_lamps), -1),
+        indoor=dr.select(is_single, indoor, ALL_EMITTERS),
+        outdoor=dr.select(is_single, outdoor, ALL_EMITTERS),
     )
-    by_lamp = None
+    lamp_sums = None
     if lanes.n_lamps > 0:
         sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
-        by_lamp = ByLamp(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
-    out = _trace(
-        scene,
-        emitters,
+        lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
+    context = PathContext(
+        scene, emitters, device_fields(fields, max_depth=max_depth), emitter_filter
+    )
+    total = _trace(
+        context,
         device_camera(camera),
-        device_fields(fields, max_depth=max_depth),
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
         stream_key(lane, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF)),
-        emitter_filter,
-        by_lamp,
+        lamp_sums,
     )
-    dr.eval(*out)
-    arrays = [np.ascontiguousarray(v.numpy().T, np.float32) for v in out[:6]]
-    n_bad = int(np.sum(out[6].numpy(), dtype=np.int64))
+    dr.eval(total)
+
+    def rows(values: Any) -> NDArray[np.float32]:
+        return np.ascontiguousarray(values.numpy().T, np.float32)
+
     lamps = None
-    if by_lamp is not None:
-        lamps = by_lamp.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
-    return Sums(arrays[0], arrays[1], arrays[2], arrays[3], arrays[4], arrays[5], n_bad, lamps)
+    if lamp_sums is not None:
+        lamps = lamp_sums.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
+    return SampleSums(
+        rows(total.outdoor),
+        rows(total.indoor),
+        rows(total.outdoor_even),
+        rows(total.indoor_even),
+        rows(total.albedo),
+        rows(total.normal),
+        int(np.sum(total.n_bad.numpy(), dtype=np.int64)),
+        lamps,
+    )
 
 
 @dr.syntax
 def _trace(
-    scene: DeviceScene,
-    emitters: Emitters,
+    context: PathContext,
     camera: DeviceCamera,
-    fields: DeviceFields,
     pixel_width: tuple[Any, Any],
     first: Any,
     last: Any,
     key: Any,
-    emitter_filter: EmitterFilter,
-    by_lamp: ByLamp | None,
-) -> tuple[Any, ...]:
-    # Sums over samples, and the light of the path that is under way.
-    outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
-    outdoor_even, indoor_even = mi.Color3f(0), mi.Color3f(0)
-    albedo, normal = mi.Color3f(0), mi.Vector3f(0)
-    n_bad = mi.UInt32(0)
-    l_out, l_in = mi.Color3f(0), mi.Color3f(0)
-    s = mi.UInt32(first)
-    seen = mi.Bool(False)
+    lamp_sums: _LampSums | None,
+) -> _LaneSums:
+    sums = _LaneSums(
+        mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Vector3f(0),
+        mi.UInt32(0),
+    )  # fmt: skip
+    l_out, l_in = mi.Color3f(0), mi.Color3f(0)  # light of the path under way
+    s = mi.UInt32(first)  # its sample
+    seen = mi.Bool(False)  # whether it has met a rough surface
+    fresh = mi.Bool(True)  # whether it has yet to start
     active = s < last
     x0, y0 = mi.Float(pixel_width[0] % pixel_width[1]), mi.Float(pixel_width[0] // pixel_width[1])
     path = camera_path(camera, x0, y0)
-    fresh = mi.Bool(True)
 
     while active:
         # Start the next sample where the last path has ended.
         sampler = SobolSampler(key, s)
-        at = film_position(sampler.get_2d(mi.UInt32(0)), fields.is_tent)
+        at = film_position(sampler.get_2d(mi.UInt32(0)), context.fields.is_tent)
         path = dr.select(fresh, camera_path(camera, x0 + at.x, y0 + at.y), path)
         l_out, l_in = dr.select(fresh, mi.Color3f(0), l_out), dr.select(fresh, mi.Color3f(0), l_in)
         seen = seen & ~fresh
 
-        path, result, alive = advance(
-            scene, emitters, fields, sampler, path, emitter_filter, active
-        )
+        # Go on by a vertex, and add what that brings.
+        path, result, alive = advance(context, sampler, path, active)
         l_out += result.emitted_outdoor + result.direct_outdoor
         l_in += result.emitted_indoor + result.direct_indoor
-        _add_by_lamp(by_lamp, result, active)
-
-        # What the denoiser is told of the first surface that is not a mirror or glass.
+        _add_by_lamp(lamp_sums, result, active)
         first_rough = result.is_rough & ~seen
-        albedo += dr.select(first_rough, result.albedo, 0)
-        albedo += dr.select(result.missed & ~seen, mi.Color3f(1), 0)
-        normal += dr.select(first_rough, result.normal, 0)
+        sums.add_guides(result, seen, first_rough)
         seen = seen | first_rough
 
         # Close the sample where the path ends.
         done = active & ~alive
-        good = dr.isfinite(luminance(l_out)) & dr.isfinite(luminance(l_in))
-        n_bad += dr.select(done & ~good, mi.UInt32(1), 0)
-        even = done & good & ((s & 1) == 0)
-        outdoor += dr.select(done & good, l_out, 0)
-        indoor += dr.select(done & good, l_in, 0)
-        outdoor_even += dr.select(even, l_out, 0)
-        indoor_even += dr.select(even, l_in, 0)
+        sums.add_sample(l_out, l_in, s, done)
         s = s + dr.select(done, mi.UInt32(1), 0)
         fresh = mi.Bool(done)
         active = s < last
 
-    return outdoor, indoor, outdoor_even, indoor_even, albedo, normal, n_bad
+    return sums
 
 
-def _add_by_lamp(by_lamp: ByLamp | None, result: StepResult, active: Any) -> None:
-    """Add what a step found to the lamps it came from; what is not finite is left out."""
-    if by_lamp is None:
+def _add_by_lamp(lamp_sums: _LampSums | None, result: StepResult, active: Any) -> None:
+    """Add what a step brought to the lamps it came from; what is not finite is left out."""
+    if lamp_sums is None:
         return
-    met, lit = (
-        (result.emitted_indoor, result.si.emitter),
-        (result.direct_indoor, result.indoor_sample.emitter),
-    )
-    for light, lamp in (met, lit):
-        level = luminance(light)
-        brings = active & (level > 0) & dr.isfinite(level)
+    emitted = result.emitted_indoor, result.si.emitter
+    direct = result.direct_indoor, result.indoor_sample.emitter
+    for light, lamp in (emitted, direct):
+        y = luminance(light)
+        is_lit = active & (y > 0) & dr.isfinite(y)
         for c in range(3):
             # A lane's place is its own: no copy of the sums for each thread.
-            at = by_lamp.first + lamp * 3 + c
-            dr.scatter_add(by_lamp.sums, light[c], at, brings, mode=dr.ReduceMode.NoConflicts)
+            place = lamp_sums.first + lamp * 3 + c
+            dr.scatter_add(lamp_sums.sums, light[c], place, is_lit, mode=dr.ReduceMode.NoConflicts)

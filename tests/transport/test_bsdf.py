@@ -44,11 +44,11 @@ ANGLES = [0.0, 0.7, 1.2, 1.5]
 @pytest.mark.parametrize("theta", ANGLES)
 def test_no_more_light_leaves_than_arrives(model: tuple[float, ...], theta: float) -> None:
     mi = mitsuba()
-    from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, sample
+    from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, sample_bsdf
 
     m, wi = bsdf(*model), direction(theta)
     lobes = mi.Float(np.random.default_rng(1).random(N, np.float32))
-    value, pdf = evaluate_bsdf(m, wi, sample(m, wi, lobes, uniform_pairs(N, 2)))
+    value, pdf = evaluate_bsdf(m, wi, sample_bsdf(m, wi, lobes, uniform_pairs(N, 2)))
     weight = (value[0] / pdf).numpy()
     weight = np.where(np.isfinite(weight), weight, 0)
     # 1.01: the diffuse and the specular part of a coat are matched at every angle to 1 %.
@@ -62,11 +62,11 @@ def test_no_more_light_leaves_than_arrives(model: tuple[float, ...], theta: floa
 def test_samples_follow_the_pdf_they_name(model: tuple[float, ...], theta: float) -> None:
     # The integral of g over the sphere by the sampler equals that by uniform directions.
     mi = mitsuba()
-    from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, sample
+    from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, sample_bsdf
 
     m, wi = bsdf(*model), direction(theta)
     lobes = mi.Float(np.random.default_rng(3).random(N, np.float32))
-    drawn = sample(m, wi, lobes, uniform_pairs(N, 4))
+    drawn = sample_bsdf(m, wi, lobes, uniform_pairs(N, 4))
     uniform = mi.warp.square_to_uniform_sphere(uniform_pairs(8 * N, 5))
     _value, pdf = evaluate_bsdf(m, wi, uniform)
     weight = pdf.numpy().astype(np.float64) * 4 * np.pi

@@ -155,6 +155,7 @@ def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
 
     from pbrs_farm.transport.kernels.path_state import (
         EmitterFilter,
+        PathContext,
         camera_path,
         device_camera,
         device_fields,
@@ -179,19 +180,12 @@ def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
             asked[-1].update({int(mi.UInt32(dim).numpy()[0]), int(mi.UInt32(dim).numpy()[0]) + 1})
             return mi.Point2f(0.3, 0.6)
 
-    emitter_filter = EmitterFilter(mi.Int32(-1), mi.Int32(-1))
+    every = EmitterFilter(mi.Int32(-1), mi.Int32(-1))
+    context = PathContext(scene.device_scene, emitters, device_fields(FIELDS), every)
     path = camera_path(device_camera(camera), mi.Float(16), mi.Float(12))
     for _step in range(3):
         asked.append(set())
-        path, result, _alive = advance(
-            scene.device_scene,
-            emitters,
-            device_fields(FIELDS),
-            Recorded(),
-            path,
-            emitter_filter,
-            mi.Bool(True),
-        )
+        path, result, _alive = advance(context, Recorded(), path, mi.Bool(True))
         assert result.si.valid.numpy()[0]
     assert not asked[0] & asked[1]
     assert not asked[1] & asked[2]

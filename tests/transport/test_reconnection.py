@@ -27,9 +27,9 @@ pytestmark = pytest.mark.skipif(
 def test_every_pixel_is_dealt_once_and_groups_are_no_larger_than_asked(
     height: int, width: int, n: int
 ) -> None:
-    from pbrs_farm.transport.metropolis.reconnection import deal
+    from pbrs_farm.transport.metropolis.reconnection import stratified_groups
 
-    groups = deal(height, width, n, seed=3)
+    groups = stratified_groups(height, width, n, seed=3)
     slots, pixels = groups.slots.numpy(), groups.pixels.numpy()
     assert groups.n <= max(n, 1)
     assert len(pixels) % groups.n == 0
@@ -38,21 +38,21 @@ def test_every_pixel_is_dealt_once_and_groups_are_no_larger_than_asked(
 
 
 def test_groups_are_spread_and_neighbours_are_apart() -> None:
-    from pbrs_farm.transport.metropolis.reconnection import deal
+    from pbrs_farm.transport.metropolis.reconnection import stratified_groups
 
-    groups = deal(64, 64, 256, seed=1)
+    groups = stratified_groups(64, 64, 256, seed=1)
     group = (groups.slots.numpy() // groups.n).reshape(64, 64)
     cells = group.reshape(16, 4, 16, 4).swapaxes(1, 2).reshape(256, 16)
     assert np.array_equal(np.sort(cells, 1), np.tile(np.arange(16), (256, 1)))
 
 
 def test_importance_is_high_where_it_is_dark_and_bounded() -> None:
-    from pbrs_farm.transport.metropolis.integrator import importance_of
+    from pbrs_farm.transport.metropolis.integrator import pixel_importance
 
     rng = np.random.default_rng(0)
     pixels = rng.integers(0, 48 * 64, 30_000).astype(np.uint32)
     levels = np.where(pixels % 64 < 32, 1.0, 0.01).astype(np.float32)
-    importance = importance_of((48, 64), pixels, levels)
+    importance = pixel_importance((48, 64), pixels, levels)
     assert importance.shape == (48, 64)
     assert importance[:, :16].mean() < 0.1 * importance[:, 48:].mean()
     assert importance.min() > 0
@@ -60,9 +60,9 @@ def test_importance_is_high_where_it_is_dark_and_bounded() -> None:
 
 
 def test_a_black_picture_has_even_importance() -> None:
-    from pbrs_farm.transport.metropolis.integrator import importance_of
+    from pbrs_farm.transport.metropolis.integrator import pixel_importance
 
-    importance = importance_of((3, 4), np.zeros(10, np.uint32), np.zeros(10, np.float32))
+    importance = pixel_importance((3, 4), np.zeros(10, np.uint32), np.zeros(10, np.float32))
     assert np.array_equal(importance, np.ones((3, 4), np.float32))
 
 

@@ -1,4 +1,4 @@
-"""How a surface scatters light: evaluate, pdf, sample; kernels on Dr.Jit, no effects.
+"""The reflectance model: evaluate, pdf, sample; kernels, no effects.
 
 One reflectance model for every material (two-sided, wi.z > 0 in the local frame):
 
@@ -22,7 +22,7 @@ import mitsuba as mi
 
 from pbrs_farm.core.frames import LUMINANCE
 
-_SMOOTH_ALPHA = 0.1
+_MIN_RECONNECT_ALPHA = 0.1
 
 
 class Bsdf(NamedTuple):
@@ -40,58 +40,59 @@ def luminance(rgb: Any) -> Any:
     return rgb[0] * LUMINANCE[0] + rgb[1] * LUMINANCE[1] + rgb[2] * LUMINANCE[2]
 
 
-def evaluate_bsdf(m: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
-    """(f |cos wo|, pdf of sample() per solid angle); local directions, wi.z > 0."""
+def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
+    """(f |cos wo|, pdf of sample_bsdf() per solid angle); local directions, wi.z > 0."""
     above = wo.z > 0
     cos_o = dr.abs(wo.z)
-    has_coat = m.alpha > 0
+    has_coat = bsdf.alpha > 0
 
-    # Diffuse below the coat, and through the sheet.
-    coupled = 28 / 23 * (1 - m.f0) * _ashikhmin(wi.z) * _ashikhmin(cos_o)
-    diffuse = m.kd * dr.select(has_coat, coupled, 1.0)
-    value = dr.select(above, diffuse, m.tau) * (cos_o * dr.inv_pi)
+    # Diffuse reflection, below the coat, and diffuse transmission.
+    coupled = 28 / 23 * (1 - bsdf.f0) * _ashikhmin(wi.z) * _ashikhmin(cos_o)
+    diffuse = bsdf.kd * dr.select(has_coat, coupled, 1.0)
+    value = dr.select(above, diffuse, bsdf.tau) * (cos_o * dr.inv_pi)
 
-    # The coat.
+    # Reflection by the coat.
     h = dr.normalize(wi + wo)
-    d = _ggx_d(h, m.alpha)
-    masking_i, masking_o = _lambda(wi, m.alpha), _lambda(wo, m.alpha)
-    fresnel = _schlick(m.f0, dr.maximum(dr.dot(wi, h), 0))
+    d = _ggx_d(h, bsdf.alpha)
+    lambda_i, lambda_o = _lambda(wi, bsdf.alpha), _lambda(wo, bsdf.alpha)
+    fresnel = _schlick(bsdf.f0, dr.maximum(dr.dot(wi, h), 0))
     use_coat = has_coat & above
-    value += dr.select(use_coat, fresnel * (d / (4 * wi.z * (1 + masking_i + masking_o))), 0)
+    value += dr.select(use_coat, fresnel * (d / (4 * wi.z * (1 + lambda_i + lambda_o))), 0)
 
-    p_diffuse, p_coat = _lobes(m, wi)
-    p_sheet = 1 - p_diffuse - p_coat
-    pdf = dr.select(above, p_diffuse, p_sheet) * (cos_o * dr.inv_pi)
-    pdf += dr.select(use_coat, p_coat * d / (4 * wi.z * (1 + masking_i)), 0)
+    # The pdf of all three lobes.
+    p_diffuse, p_coat = _lobe_probabilities(bsdf, wi)
+    p_transmitted = 1 - p_diffuse - p_coat
+    pdf = dr.select(above, p_diffuse, p_transmitted) * (cos_o * dr.inv_pi)
+    pdf += dr.select(use_coat, p_coat * d / (4 * wi.z * (1 + lambda_i)), 0)
     return value, pdf
 
 
-def sample(m: Bsdf, wi: Any, lobe: Any, u: Any) -> Any:
-    """A direction wo drawn with the pdf of evaluate()."""
-    p_diffuse, p_coat = _lobes(m, wi)
-    cosine = mi.warp.square_to_cosine_hemisphere(u)
-    wo = dr.select(lobe < p_diffuse, cosine, mi.Vector3f(cosine.x, cosine.y, -cosine.z))
-    use_coat = (lobe >= p_diffuse) & (lobe < p_diffuse + p_coat)
-    h = _visible_normal(wi, dr.maximum(m.alpha, 1e-4), u)
+def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any) -> Any:
+    """A direction wo drawn with the pdf of evaluate_bsdf()."""
+    p_diffuse, p_coat = _lobe_probabilities(bsdf, wi)
+    cosine = mi.warp.square_to_cosine_hemisphere(uv)
+    wo = dr.select(u_lobe < p_diffuse, cosine, mi.Vector3f(cosine.x, cosine.y, -cosine.z))
+    use_coat = (u_lobe >= p_diffuse) & (u_lobe < p_diffuse + p_coat)
+    h = _visible_normal(wi, dr.maximum(bsdf.alpha, 1e-4), uv)
     return dr.select(use_coat, 2 * dr.dot(wi, h) * h - wi, wo)
 
 
-def is_reconnectable(m: Bsdf) -> Any:
-    """Whether what is seen of a surface changes slowly with the direction it is seen from."""
-    return (m.alpha <= 0) | (m.alpha >= _SMOOTH_ALPHA)
+def is_reconnectable(bsdf: Bsdf) -> Any:
+    """Whether the surface is rough enough that a path through it may be seen from elsewhere."""
+    return (bsdf.alpha <= 0) | (bsdf.alpha >= _MIN_RECONNECT_ALPHA)
 
 
-def view_independent_pdf(m: Bsdf, ng: Any, w: Any) -> Any:
-    """A pdf per solid angle like sample()'s that does not depend on wi; world directions.
+def view_independent_pdf(bsdf: Bsdf, ng: Any, w: Any) -> Any:
+    """A pdf per solid angle like sample_bsdf()'s that does not depend on wi; world directions.
 
-    Positive wherever sample() may go from wi on the side of ng: a weight of the balance heuristic
-    that stays the same when wi moves.
+    Positive wherever sample_bsdf() may go from wi on the side of ng: a weight of the balance
+    heuristic that stays the same when wi moves.
     """
-    through = dr.max(m.tau) > 0
-    diffuse, sheet = luminance(m.kd), luminance(m.tau)
-    above = dr.clip(diffuse / dr.maximum(diffuse + sheet, 1e-9), 0.05, 0.95)
+    is_thin = dr.max(bsdf.tau) > 0
+    reflected, transmitted = luminance(bsdf.kd), luminance(bsdf.tau)
+    p_above = dr.clip(reflected / dr.maximum(reflected + transmitted, 1e-9), 0.05, 0.95)
     cos = dr.dot(ng, w)
-    share = dr.select(through, dr.select(cos > 0, above, 1 - above), dr.select(cos > 0, 1, 0))
+    share = dr.select(is_thin, dr.select(cos > 0, p_above, 1 - p_above), dr.select(cos > 0, 1, 0))
     return share * (dr.abs(cos) * dr.inv_pi)
 
 
@@ -102,14 +103,14 @@ def thin_glass_reflectance(cos_i: Any) -> Any:
     return 2 * r / (1 + r)
 
 
-def _lobes(m: Bsdf, wi: Any) -> tuple[Any, Any]:
-    """(probability of the diffuse lobe, of the coat); the rest goes through the sheet."""
-    coat = dr.select(m.alpha > 0, dr.maximum(luminance(_schlick(m.f0, wi.z)), 0.05), 0)
-    diffuse, sheet = luminance(m.kd), luminance(m.tau)
-    total = diffuse + sheet + coat
-    empty = total <= 0
-    scale = dr.rcp(dr.select(empty, 1, total))
-    return dr.select(empty, 1, diffuse * scale), coat * scale
+def _lobe_probabilities(bsdf: Bsdf, wi: Any) -> tuple[Any, Any]:
+    """(probability of diffuse reflection, of the coat); the rest is transmitted."""
+    coat = dr.select(bsdf.alpha > 0, dr.maximum(luminance(_schlick(bsdf.f0, wi.z)), 0.05), 0)
+    reflected, transmitted = luminance(bsdf.kd), luminance(bsdf.tau)
+    total = reflected + transmitted + coat
+    is_black = total <= 0
+    scale = dr.rcp(dr.select(is_black, 1, total))
+    return dr.select(is_black, 1, reflected * scale), coat * scale
 
 
 def _ashikhmin(cos: Any) -> Any:
@@ -135,6 +136,7 @@ def _lambda(w: Any, alpha: Any) -> Any:
 
 def _visible_normal(wi: Any, alpha: Any, u: Any) -> Any:
     """A GGX normal as wi sees them (Heitz 2018)."""
+    # Stretch wi to the hemisphere of roughness 1, with an orthonormal basis around it.
     v = dr.normalize(mi.Vector3f(alpha * wi.x, alpha * wi.y, wi.z))
     length2 = dr.square(v.x) + dr.square(v.y)
     t1 = dr.select(
@@ -143,6 +145,7 @@ def _visible_normal(wi: Any, alpha: Any, u: Any) -> Any:
         mi.Vector3f(1, 0, 0),
     )
     t2 = dr.cross(v, t1)
+    # Draw a point of the projected hemisphere.
     r = dr.sqrt(u.x)
     sin_phi, cos_phi = dr.sincos(2 * math.pi * u.y)
     x = r * cos_phi

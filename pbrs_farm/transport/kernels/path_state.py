@@ -1,4 +1,4 @@
-"""What a path through the scene is made of: the nouns of `path` and `metropolis`; no effects."""
+"""The types of a path and of its context, shared by `path` and `metropolis`; kernels, no effects."""
 
 from __future__ import annotations
 
@@ -20,106 +20,104 @@ from pbrs_farm.transport.kernels.device_scene import (
     offset_ray_origin,
 )
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.sampler import opaque3
+from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, opaque3
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
+
+ALL_EMITTERS, NO_EMITTERS = -1, -2
 
 
 class DeviceCamera(NamedTuple):
     """A camera as opaque device values: another camera is no new kernel."""
 
-    eye: Any
-    d0: Any
-    du: Any
-    dv: Any
+    eye: Any  # Point3f
+    d0: Any  # Vector3f, direction at pixel coordinates (0, 0)
+    du: Any  # what a pixel to the right adds
+    dv: Any  # what a pixel down adds
 
 
 class DeviceFields(NamedTuple):
     """The recipe's numbers as opaque device values."""
 
-    max_depth: Any
-    rr_depth: Any
-    is_tent: Any
+    max_depth: Any  # vertices of a path
+    rr_depth: Any  # first vertex with Russian roulette
+    is_tent: Any  # Bool: tent filter, else box
 
 
 class EmitterFilter(NamedTuple):
-    """Which emitters count: -1 all of the group, -2 none, else that lamp or technique alone.
+    """Which emitters count, lane by lane: ALL_EMITTERS of the group, NO_EMITTERS, or a number.
 
-    None instead of a device value: none ever, the kernel is built without that group.
+    None instead of a device value: the kernel is built without that group.
     """
 
-    indoor: Any
-    outdoor: Any
+    indoor: Any  # Int32, lamp
+    outdoor: Any  # Int32, outdoor technique (emitters.py)
+
+
+class PathContext(NamedTuple):
+    """What all paths of a launch share."""
+
+    scene: DeviceScene
+    emitters: Emitters
+    fields: DeviceFields
+    emitter_filter: EmitterFilter
 
 
 @dataclass
 class PathState:
-    """A path under way.
-
-    o, d: its ray. beta: throughput. depth: vertices so far, glass passed and holes not counted;
-    n_nulls: those. last, last_pdf: where and with which pdf of the surface's own the
-    direction was drawn, 0 = behind the camera, a mirror or glass. aimed, target: what guide.kept
-    asks for: chance of having aimed at a face over the pdf of all else, and that face.
-    """
+    """A path under way: its ray, and how that was drawn."""
 
     o: mi.Point3f
     d: mi.Vector3f
-    beta: mi.Color3f
-    depth: mi.UInt32
-    n_nulls: mi.UInt32
-    reference: ReferencePoint
-    bsdf_pdf: mi.Float
-    guiding_odds: mi.Float
-    target_face: mi.UInt32
+    beta: mi.Color3f  # throughput
+    depth: mi.UInt32  # vertices so far, glass passed and cut-outs not counted
+    n_nulls: mi.UInt32  # glass and cut-outs so far
+    reference: ReferencePoint  # the last rough vertex, where d was drawn
+    bsdf_pdf: mi.Float  # of d by the surface there; 0 = by the camera, a mirror or glass
+    guiding_odds: mi.Float  # share of rays aimed at targets, over the pdf of all other techniques
+    target_face: mi.UInt32  # the face that the ray was aimed at, NO_FACE = none
 
 
-class StepResult(NamedTuple):
-    """What one step brought, throughput included.
+class Vertex(NamedTuple):
+    """A surface interaction as the vertex of a path."""
 
-    met_*: from an emitter the ray met, by `segments` = the walk's depth before + 1 segments;
-    lit_*: from shadow rays at the new vertex, one segment more than its depth.
-    is_rough: the vertex is neither mirror nor glass; albedo, normal: of it. missed: no surface.
-    si: the vertex; ahead, pdf: the direction scattered to, 0 = nowhere; to_outdoor, to_indoor:
-    where the shadow rays went; steady: the vertex was weighted by steady_pdf (tails.py).
-    """
-
-    emitted_outdoor: Any
-    emitted_indoor: Any
-    direct_outdoor: Any
-    direct_indoor: Any
-    is_rough: Any
-    missed: Any
-    albedo: Any
-    normal: Any
-    si: Any
-    scattered_d: Any
-    pdf: Any
-    outdoor_sample: Any
-    indoor_sample: Any
-    is_view_independent: Any
-
-
-class PathContext(NamedTuple):
-    """What is asked of every path: the scene, the emitters that count, from how many segments."""
-
-    scene: DeviceScene
-    emitters: Emitters
-    camera: DeviceCamera
-    fields: DeviceFields
-    emitter_filter: EmitterFilter
-    segments: Any
+    si: SurfaceInteraction
+    frame: Any  # shading frame
+    wi: Any  # direction back along the ray, in that frame
+    is_glass: Any
+    is_mirror: Any
+    is_rough: Any  # neither glass nor mirror nor cut-out
+    depth: Any  # vertices of the path, this one counted
+    dim: Any  # its first random dimension
+    near: NearbyLamps | None  # None: lamps do not count
 
 
 class DirectLightSample(NamedTuple):
-    """What one shadow ray brought: light scattered along the path, before throughput.
+    """What one shadow ray brings to a vertex."""
 
-    d: towards the emitter; strength: its radiance times visibility and weight, over the pdf.
-    lamp: the emitter's number, None for the sky.
-    """
+    light: Any  # Color3f scattered back along the path, before its throughput
+    d: Any  # unit direction to the emitter
+    incident: Any  # radiance times visibility and MIS weight, over the pdf
+    emitter: Any = None  # number of the lamp, None for the sky
 
-    light: Any
-    d: Any
-    strength: Any
-    emitter: Any = None
+
+class StepResult(NamedTuple):
+    """What one step of a path brings, throughput included."""
+
+    # From an emitter that the ray meets, by one segment more than the depth before the step.
+    emitted_outdoor: Any
+    emitted_indoor: Any
+    # From shadow rays at the new vertex, by one segment more than the depth after the step.
+    direct_outdoor: Any
+    direct_indoor: Any
+    is_rough: Any  # Bool: the vertex is neither mirror nor glass
+    missed: Any  # Bool: the ray met no surface
+    albedo: Any
+    si: SurfaceInteraction
+    scattered_d: Any  # direction drawn at the vertex
+    pdf: Any  # of the surface drawing it, 0 = it does not go on
+    outdoor_sample: DirectLightSample
+    indoor_sample: DirectLightSample
+    is_view_independent: Any  # Bool: weighted by view_independent_pdf (bsdf.py)
 
 
 def device_camera(camera: Camera) -> DeviceCamera:
@@ -150,43 +148,44 @@ def film_position(u: Any, is_tent: Any) -> Any:
 
 
 def camera_path(camera: DeviceCamera, x: Any, y: Any) -> PathState:
-    """The walk that leaves the camera through film position (x, y), in pixels."""
+    """The path that leaves the camera through film position (x, y), in pixels."""
     d = dr.normalize(camera.d0 + x * camera.du + y * camera.dv)
     return PathState(
-        mi.Point3f(camera.eye),
-        mi.Vector3f(d),
-        mi.Color3f(1),
-        mi.UInt32(0),
-        mi.UInt32(0),
-        no_reference(camera.eye),
-        mi.Float(0),
-        mi.Float(0),
-        mi.UInt32(NO_FACE),
+        o=mi.Point3f(camera.eye),
+        d=mi.Vector3f(d),
+        beta=mi.Color3f(1),
+        depth=mi.UInt32(0),
+        n_nulls=mi.UInt32(0),
+        reference=no_reference(camera.eye),
+        bsdf_pdf=mi.Float(0),
+        guiding_odds=mi.Float(0),
+        target_face=mi.UInt32(NO_FACE),
     )
 
 
-def surface_path(p: Any, n: Any, d: Any, pdf: Any, near: NearbyLamps) -> PathState:
-    """The walk that leaves a matte surface at p in direction d, drawn with a pdf."""
+def surface_path(vertex: Vertex, d: Any, pdf: Any) -> PathState:
+    """The path that leaves a white_vertex in direction d, drawn with a pdf."""
+    assert vertex.near is not None
     return PathState(
-        o=offset_ray_origin(p, n),
+        o=offset_ray_origin(vertex.si.p, vertex.si.ng),
         d=d,
         beta=mi.Color3f(1),
         depth=mi.UInt32(1),
         n_nulls=mi.UInt32(0),
-        reference=near.reference,
+        reference=vertex.near.reference,
         bsdf_pdf=mi.Float(pdf),
         guiding_odds=mi.Float(0),
         target_face=mi.UInt32(NO_FACE),
     )
 
 
-def white_interaction(p: Any, n: Any) -> SurfaceInteraction:
-    """A white matte surface at p."""
+def white_vertex(p: Any, n: Any, near: NearbyLamps) -> Vertex:
+    """A vertex on a white matte surface at p, seen from above."""
     white = Bsdf(mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.UInt32(0))
-    no, none = mi.Bool(False), mi.UInt32(NO_LAMP)
-    return SurfaceInteraction(
-        mi.Bool(True), p, n, n, n, none, white, no, mi.UInt32(0), mi.Float(0), none
-    )
+    no, yes, none = mi.Bool(False), mi.Bool(True), mi.UInt32(NO_LAMP)
+    si = SurfaceInteraction(yes, p, n, n, n, none, white, no, mi.UInt32(0), mi.Float(0), none)
+    up, dim = mi.Vector3f(0, 0, 1), mi.UInt32(CAMERA_DIMS)
+    return Vertex(si, mi.Frame3f(n), up, no, no, yes, mi.UInt32(1), dim, near)
 
 
 def _tent(u: Any) -> Any:

@@ -1,17 +1,20 @@
 """One step of a path through the scene, shared by `path` and `metropolis`; kernels, no effects.
 
-At each vertex one shadow ray goes to the sky and one to a lamp, weighted against the scattered
-ray by the balance heuristic; an emitter that is met counts to its own group.
+Next-event estimation: at each vertex one shadow ray goes to the sky and one to a lamp, weighted
+against the scattered ray by the balance heuristic (Veach 1997, section 9.2). An emitter that the
+scattered ray meets counts to its own group.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 
 from pbrs_farm.transport.guiding.guided_rays import (
+    Guiding,
     cone_technique_pdf,
     guiding_at,
     mis_weight,
@@ -23,10 +26,9 @@ from pbrs_farm.transport.guiding.guided_rays import (
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
 from pbrs_farm.transport.guiding.nearby_lamps import NearbyLamps, no_reference
 from pbrs_farm.transport.kernels.bsdf import (
-    Bsdf,
     evaluate_bsdf,
     is_reconnectable,
-    sample,
+    sample_bsdf,
     thin_glass_reflectance,
     view_independent_pdf,
 )
@@ -35,293 +37,353 @@ from pbrs_farm.transport.kernels.device_scene import (
     SurfaceInteraction,
     offset_ray_origin,
 )
-from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, DirectionSample, Emitters
+from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, DirectionSample
 from pbrs_farm.transport.kernels.path_state import (
-    DeviceFields,
+    ALL_EMITTERS,
+    NO_EMITTERS,
     DirectLightSample,
-    EmitterFilter,
+    PathContext,
     PathState,
     StepResult,
+    Vertex,
 )
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, VERTEX_DIMS, Sampler
 from pbrs_farm.transport.scene_tables.material_rows import GLASS, MIRROR
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 MAX_NULLS = 32
+_MAX_COUNT = 64  # vertices with random dimensions of their own
+_MAX_SURVIVAL = 0.95
+
+# Random dimensions of a vertex: one or two numbers each, VERTEX_DIMS in all.
 _LOBE, _SCATTER, _ROULETTE, _LAMP, _LAMP_UV, _OUT, _OUT_UV = 0, 1, 3, 4, 5, 7, 8
 
 
+class Strategy(NamedTuple):
+    """How the rays of a vertex are sampled and weighted."""
+
+    near: NearbyLamps | None = None  # the lamps that guide its rays, None = unguided
+    guiding: Guiding | None = None
+    bsdf_share: Any = 1.0  # of the scattered rays, those that the surface draws itself
+    is_view_independent: Any = False  # Bool: the MIS weights do not depend on wi
+
+
+class _Glass(NamedTuple):
+    """The choice between reflection and transmission."""
+
+    reflectance: Any
+    probability: Any  # of choosing reflection
+    reflected: Any  # Bool, at mirrors too
+
+
+class _Scattered(NamedTuple):
+    """Where a path goes on from a vertex: at most one of bounced, mirrored and passed."""
+
+    d: Any  # direction drawn at a rough surface
+    value: Any  # f |cos| of it
+    pdf: Any  # of the surface drawing it
+    is_guided: Any
+    target_face: Any
+    bounced: Any  # Bool: goes on in direction d
+    mirrored: Any  # Bool: goes on in direction mirror_d
+    mirror_d: Any
+    passed: Any  # Bool: goes straight on, through glass or a cut-out
+
+
 def advance(
-    scene: DeviceScene,
-    emitters: Emitters,
-    fields: DeviceFields,
-    sampler: Sampler,
-    path: PathState,
-    emitter_filter: EmitterFilter,
-    active: Any,
-    may_reconnect: Any = False,
+    context: PathContext, sampler: Sampler, path: PathState, active: Any, may_reconnect: Any = False
 ) -> tuple[PathState, StepResult, Any]:
-    """(the walk one vertex on, what that brought, whether it goes on).
+    """(the path one vertex on, what that brought, whether it goes on).
 
-    may_be_steady: vertices whose share between scattered and shadow ray must not depend on where
-    the path came from, where their material allows it.
+    may_reconnect: Bool, the path's suffix from this vertex on may be reconnected to other prefixes
+    (reconnection.py), so the MIS weights here must not depend on where the path came from. False:
+    no path's; only then are rays guided.
     """
-    si = scene.intersect(path.o, path.d, active)
+    vertex = _next_vertex(context, path, active)
+    si, bsdf, depth = vertex.si, vertex.si.bsdf, vertex.depth
     missed = active & ~si.valid
+    near = vertex.near if may_reconnect is False else None
+    u_lobe = sampler.get_1d(vertex.dim + _LOBE)
+    glass = _choose_reflection(vertex, path, near, u_lobe)
 
-    # Kinds of surface.
-    m = si.bsdf
-    solid = si.valid & ~si.is_cutout
-    glass, mirror = solid & (m.kind == GLASS), solid & (m.kind == MIRROR)
-    rough = solid & ~glass & ~mirror
-    depth = path.depth + dr.select(solid & ~glass, mi.UInt32(1), 0)
-    # Vertices, glass and holes each have numbers of their own. (What is counted must depend on the
-    # surface: Dr.Jit 1.5 reads local memory at the wrong place by an index that began as a literal.)
-    count = depth + path.n_nulls + dr.select(solid & ~glass, mi.UInt32(0), 1)
-    dim = CAMERA_DIMS + VERTEX_DIMS * dr.minimum(count - 1, 64)
-    frame = mi.Frame3f(si.n)
-    wi = frame.to_local(-path.d)
-    wi.z = dr.maximum(wi.z, 1e-4)
-    near = None
-    if emitter_filter.indoor is not None:
-        is_sheet = dr.max(m.tau) > 0
-        near = emitters.nearby.at_vertex(
-            si.p, dr.select(is_sheet, 0, si.ng), emitter_filter.indoor, solid
-        )
-    guiding = near if may_reconnect is False else None
+    # Weigh what a guided ray has met; add the light of an emitter there.
+    if near is not None:
+        only, ends = context.emitter_filter.indoor, missed | glass.reflected
+        weight = mis_weight(context.emitters, path, si, only, ends, vertex.is_rough)
+        path = replace(path, beta=path.beta * weight)
+    emitted_outdoor, emitted_indoor = _emitted_light(context, path, si, missed)
 
-    # Glass: near lamps more rays are reflected, and weigh less.
-    lobe = sampler.get_1d(dim + _LOBE)
-    mirroring = thin_glass_reflectance(wi.z)
-    p_mirroring = mirroring
-    if guiding is not None:
-        often = reflection_probability(mirroring, survival_boost(guiding))
-        p_mirroring = dr.select(path.bsdf_pdf > 0, often, mirroring)
-    reflected = mirror | (glass & (lobe < p_mirroring))
+    # Decide how the rays that leave the vertex are sampled.
+    goes_on = vertex.is_rough & (depth < context.fields.max_depth)
+    strategy = Strategy(near)
+    if near is not None:
+        may_aim = goes_on & (depth + 1 < context.fields.max_depth)
+        guiding = guiding_at(near, bsdf, path.beta, may_aim)
+        strategy = Strategy(near, guiding, 1 - guiding.share)
+    if may_reconnect is not False:
+        is_independent = may_reconnect & vertex.is_rough & is_reconnectable(bsdf)
+        strategy = Strategy(is_view_independent=is_independent)
 
-    # Light that comes straight from an emitter.
-    if guiding is not None:
-        path.beta *= mis_weight(
-            emitters, path, si, emitter_filter.indoor, missed | reflected, rough
-        )
-    emitted_outdoor, emitted_indoor = _met(emitters, path, si, emitter_filter, missed)
-    go_on = rough & (depth < fields.max_depth)
-    is_view_independent = (
-        False if may_reconnect is False else may_reconnect & rough & is_reconnectable(m)
-    )
-    guide = None
-    if guiding is not None:
-        may_aim = go_on & (depth + 1 < fields.max_depth)
-        guide = guiding_at(guiding, m, path.beta, may_aim)
-    bsdf_share = 1.0 if guide is None else 1 - guide.share
-    out, lamp = direct(
-        scene,
-        emitters,
-        si,
-        frame,
-        wi,
-        sampler,
-        dim,
-        emitter_filter,
-        near,
-        go_on,
-        bsdf_share,
-        is_view_independent,
-    )
-
-    # Scatter. Glass and mirrors keep one direction; what passes glass straight is no vertex.
-    uv = sampler.get_2d(dim + _SCATTER)
-    is_guided, target = mi.Bool(False), mi.UInt32(NO_FACE)
-    if guide is None:
-        ahead = mi.Vector3f(frame.to_world(sample(m, wi, lobe, uv)))
-    else:
-        to = sample_guided(guide, scene, emitters, si, lobe, uv)
-        is_guided, target = to.is_guided, to.target_face
-        by_surface = mi.Vector3f(frame.to_world(sample(m, wi, to.u_bsdf, uv)))
-        ahead = dr.select(is_guided, to.d, by_surface)
-        go_on &= to.valid
-    wo = frame.to_local(ahead)
-    value, pdf = evaluate_bsdf(m, wi, wo)
-    bounced = go_on & (dr.dot(si.ng, ahead) * wo.z > 0) & (pdf > 0)
-    back = path.d - 2 * dr.dot(si.n, path.d) * si.n
-    may_pass = path.n_nulls < MAX_NULLS
-    mirrored = reflected & may_pass & (depth < fields.max_depth) & (dr.dot(back, si.ng) > 0)
-    passed = ((glass & ~reflected) | (si.valid & si.is_cutout)) & may_pass
-    beta = path.beta * _factor(m, value, pdf, rough, mirror, glass & passed)
-    if guiding is not None:
-        share = dr.select(reflected, mirroring / p_mirroring, (1 - mirroring) / (1 - p_mirroring))
-        beta = dr.select(glass, beta * share, beta)
-
-    # Roulette, of what the surface draws; then the throughput is over all that could draw it.
-    q = dr.max(beta) / bsdf_share
-    if guiding is not None:
-        q *= survival_boost(guiding)
-    q = dr.minimum(q, 0.95)
-    tested = bounced & (depth >= fields.rr_depth)
-    survives = ~tested | is_guided | (sampler.get_1d(dim + _ROULETTE) < q)
-    alive = (bounced | mirrored | passed) & survives & (dr.max(beta) > 0)
-    chance = bsdf_share * dr.select(tested, dr.maximum(q, 1e-6), 1)
-    aimed = mi.Float(0)
-    if guide is not None:
-        chance += cone_technique_pdf(guide, ahead) / dr.maximum(pdf, 1e-30)
-        aimed = target_technique_share(guide) / (chance * pdf)
-    beta = dr.select(bounced, beta / chance, beta)
-
-    weighed = pdf * bsdf_share
-    if is_view_independent is not False:
-        weighed = dr.select(is_view_independent, view_independent_pdf(m, si.ng, ahead), pdf)
-    d = dr.select(bounced, ahead, dr.select(mirrored, mi.Vector3f(back), path.d))
-    outward = dr.select(dr.dot(d, si.ng) > 0, si.ng, -si.ng)
-    here = no_reference(si.p) if near is None else near.reference
-    following = PathState(
-        o=offset_ray_origin(si.p, outward),
-        d=d,
-        beta=beta,
-        depth=depth,
-        n_nulls=path.n_nulls + dr.select(passed | (glass & mirrored), mi.UInt32(1), 0),
-        reference=dr.select(bounced, here, path.reference),
-        bsdf_pdf=dr.select(bounced, weighed, dr.select(mirrored, 0, path.bsdf_pdf)),
-        guiding_odds=dr.select(bounced, aimed, dr.select(mirrored, 0, path.guiding_odds)),
-        target_face=dr.select(bounced, target, dr.select(mirrored, NO_FACE, path.target_face)),
-    )
+    outdoor, indoor = sample_direct_light(context, sampler, vertex, strategy, goes_on)
+    scattered = _scatter(context, sampler, path, vertex, strategy, glass, u_lobe, goes_on)
+    following, alive = _follow(context, sampler, path, vertex, strategy, glass, scattered)
     result = StepResult(
-        emitted_outdoor,
-        emitted_indoor,
-        path.beta * out.light,
-        path.beta * lamp.light,
-        rough,
-        missed,
-        dr.minimum(m.kd + m.f0 + m.tau, 1),
-        si.n,
-        si,
-        ahead,
-        dr.select(bounced, pdf, 0),
-        out,
-        lamp,
-        is_view_independent,
+        emitted_outdoor=emitted_outdoor,
+        emitted_indoor=emitted_indoor,
+        direct_outdoor=path.beta * outdoor.light,
+        direct_indoor=path.beta * indoor.light,
+        is_rough=vertex.is_rough,
+        missed=missed,
+        albedo=dr.minimum(bsdf.kd + bsdf.f0 + bsdf.tau, 1),
+        si=si,
+        scattered_d=scattered.d,
+        pdf=dr.select(scattered.bounced, scattered.pdf, 0),
+        outdoor_sample=outdoor,
+        indoor_sample=indoor,
+        is_view_independent=strategy.is_view_independent,
     )
     return following, result, alive
 
 
-def direct(
-    scene: DeviceScene,
-    emitters: Emitters,
-    si: SurfaceInteraction,
-    frame: Any,
-    wi: Any,
-    sampler: Sampler,
-    dim: Any,
-    emitter_filter: EmitterFilter,
-    near: NearbyLamps | None,
-    active: Any,
-    bsdf_share: Any = 1.0,
-    is_view_independent: Any = False,
-) -> tuple[DirectLightSample, DirectLightSample]:
-    """(outdoor, indoor) light scattered towards wi, one shadow ray each.
+def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
+    """What the path's ray meets."""
+    si = context.scene.intersect(path.o, path.d, active)
+    is_solid = si.valid & ~si.is_cutout
+    is_glass, is_mirror = is_solid & (si.bsdf.kind == GLASS), is_solid & (si.bsdf.kind == MIRROR)
+    depth = path.depth + dr.select(is_solid & ~is_glass, mi.UInt32(1), 0)
 
-    own: share of the scattered rays that the surface draws itself.
-    """
-    out = lamp = None
-    if emitter_filter.outdoor is not None:
-        asks = active & (emitter_filter.outdoor > -2)
-        u, uv = sampler.get_1d(dim + _OUT), sampler.get_2d(dim + _OUT_UV)
-        out = emitters.sample_outdoor(si.p, u, uv, emitter_filter.outdoor, asks)
-    if emitter_filter.indoor is not None and near is not None:
-        asks = active & (emitter_filter.indoor > -2)
-        u, uv = sampler.get_1d(dim + _LAMP), sampler.get_2d(dim + _LAMP_UV)
-        lamp = emitters.sample_lamp(scene, near, u, uv, emitter_filter.indoor, asks)
-    # The pilot draws a portal's light through the portal alone.
-    alone = False if emitter_filter.outdoor is None else emitter_filter.outdoor >= FIRST_PORTAL
-    outdoor_sample, to_lamp = (
-        _lit(scene, si, frame, wi, to, alone, bsdf_share, is_view_independent) for to in (out, lamp)
-    )
-    return outdoor_sample, to_lamp
+    # Give each vertex, pane and cut-out random dimensions of its own. (What is counted must depend
+    # on the surface: Dr.Jit 1.5 reads local memory at the wrong place by an index that began as a
+    # literal.)
+    count = depth + path.n_nulls + dr.select(is_solid & ~is_glass, mi.UInt32(0), 1)
+    dim = CAMERA_DIMS + VERTEX_DIMS * dr.minimum(count - 1, _MAX_COUNT)
+    frame = mi.Frame3f(si.n)
+    wi = frame.to_local(-path.d)
+    wi.z = dr.maximum(wi.z, 1e-4)
+
+    # Weigh the lamps; a thin surface is lit from both sides.
+    near, only = None, context.emitter_filter.indoor
+    if only is not None:
+        normal = dr.select(dr.max(si.bsdf.tau) > 0, 0, si.ng)
+        near = context.emitters.nearby.at_vertex(si.p, normal, only, is_solid)
+    is_rough = is_solid & ~is_glass & ~is_mirror
+    return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near)
 
 
-def _lit(
-    scene: DeviceScene,
-    si: SurfaceInteraction,
-    frame: Any,
-    wi: Any,
-    to: DirectionSample | None,
-    alone: Any,
-    bsdf_share: Any,
-    is_view_independent: Any,
-) -> DirectLightSample:
-    """What one shadow ray brings."""
-    if to is None:
-        return DirectLightSample(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
-    wo = frame.to_local(to.d)
-    value, pdf = evaluate_bsdf(si.bsdf, wi, wo)
-    pdf *= bsdf_share
-    # Light may not come through the face when the shading normal says it does not.
-    side = dr.dot(si.ng, to.d)
-    faces = side * wo.z > 0
-    lit = faces & (dr.max(value) > 0)
-    if is_view_independent is not False:
-        # Whatever wi is: what could be lit from some wi is asked for.
-        pdf = dr.select(is_view_independent, view_independent_pdf(si.bsdf, si.ng, to.d), pdf)
-        lit = dr.select(is_view_independent, (side > 0) | (dr.max(si.bsdf.tau) > 0), lit)
-    lit = lit & to.valid & (to.pdf > 0)
-    weight = 1 / (to.pdf + dr.select(alone, 0, pdf))
-    begin = offset_ray_origin(si.p, dr.select(side > 0, si.ng, -si.ng))
-    # Aim again from the moved start: a lamp near by must not shadow itself.
-    aim = si.p + to.d * to.distance - begin
-    reach = dr.norm(aim)
-    is_near = to.distance < dr.inf
-    way = dr.select(is_near, aim / reach, to.d)
-    far = dr.select(is_near, reach * (1 - 1e-4), dr.inf)
-    clear = scene.transmittance(begin, way, far, lit)
-    strength = dr.select(lit, to.radiance * clear * weight, 0)
-    return DirectLightSample(
-        dr.select(lit & faces, value * strength, 0), to.d, strength, to.emitter
+def _choose_reflection(vertex: Vertex, path: PathState, near: NearbyLamps | None, u: Any) -> _Glass:
+    """Reflect more of the rays at glass near lamps; _follow makes them weigh less."""
+    reflectance = thin_glass_reflectance(vertex.wi.z)
+    probability = reflectance
+    if near is not None:
+        often = reflection_probability(reflectance, survival_boost(near))
+        probability = dr.select(path.bsdf_pdf > 0, often, reflectance)
+    return _Glass(
+        reflectance, probability, vertex.is_mirror | (vertex.is_glass & (u < probability))
     )
 
 
-def _met(
-    emitters: Emitters,
-    path: PathState,
-    si: SurfaceInteraction,
-    emitter_filter: EmitterFilter,
-    missed: Any,
+def _emitted_light(
+    context: PathContext, path: PathState, si: SurfaceInteraction, missed: Any
 ) -> tuple[Any, Any]:
     """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled."""
+    emitters, only = context.emitters, context.emitter_filter
     by_scatter = path.bsdf_pdf > 0
 
-    def weight(pdf: Any) -> Any:
+    def balanced(pdf: Any) -> Any:
         return dr.select(by_scatter, path.bsdf_pdf / (path.bsdf_pdf + pdf), 1)
 
-    # What the camera sees directly needs no choice: the pilot leaves it out.
+    # Leave out what the camera sees directly where one emitter is asked for: it needs no choice.
     counts = mi.Bool(by_scatter)
-    for asked in emitter_filter:
-        counts |= False if asked is None else asked == -1
+    for asked in only:
+        counts |= False if asked is None else asked == ALL_EMITTERS
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
-    if emitter_filter.outdoor is not None:
-        sun, sun_pdf = emitters.eval_sun(path.d, emitter_filter.outdoor)
-        dome, dome_pdf = emitters.eval_dome(
-            path.reference.p, path.d, emitter_filter.outdoor, missed
-        )
-        # The pilot of a portal counts what is drawn through it only.
-        wanted = (emitter_filter.outdoor > -2) & (emitter_filter.outdoor < FIRST_PORTAL)
-        sees_sky = missed & counts & emitters.has_sky & wanted
-        sky = sun * weight(sun_pdf) + dome * weight(dome_pdf)
+    if only.outdoor is not None:
+        sun, sun_pdf = emitters.eval_sun(path.d, only.outdoor)
+        dome, dome_pdf = emitters.eval_dome(path.reference.p, path.d, only.outdoor, missed)
+        # Where a portal is asked for, count only what is drawn through it.
+        is_asked = (only.outdoor > NO_EMITTERS) & (only.outdoor < FIRST_PORTAL)
+        sees_sky = missed & counts & emitters.has_sky & is_asked
+        sky = sun * balanced(sun_pdf) + dome * balanced(dome_pdf)
         outdoor = dr.select(sees_sky, path.beta * sky, 0)
-    if emitter_filter.indoor is not None:
-        glows = si.valid & counts & (emitter_filter.indoor > -2) & (si.emitter != NO_LAMP)
-        glow, lamp_pdf = emitters.eval_lamp(
-            si.emitter,
-            path.reference,
-            dr.norm(si.p - path.reference.p),
-            dr.dot(path.d, si.ng),
-            emitter_filter.indoor,
-            glows,
+    if only.indoor is not None:
+        shines = si.valid & counts & (only.indoor > NO_EMITTERS) & (si.emitter != NO_LAMP)
+        distance, cos = dr.norm(si.p - path.reference.p), dr.dot(path.d, si.ng)
+        radiance, lamp_pdf = emitters.eval_lamp(
+            si.emitter, path.reference, distance, cos, only.indoor, shines
         )
-        indoor = dr.select(glows, path.beta * glow * weight(lamp_pdf), 0)
+        indoor = dr.select(shines, path.beta * radiance * balanced(lamp_pdf), 0)
     return outdoor, indoor
 
 
-def _factor(m: Bsdf, value: Any, pdf: Any, rough: Any, mirror: Any, passed: Any) -> Any:
-    """What the throughput is multiplied by."""
-    factor = dr.select(rough, value / pdf, mi.Color3f(1))
-    factor = dr.select(mirror, m.f0, factor)
-    return dr.select(passed, m.tau, factor)
+def sample_direct_light(
+    context: PathContext, sampler: Sampler, vertex: Vertex, strategy: Strategy, active: Any
+) -> tuple[DirectLightSample, DirectLightSample]:
+    """(outdoor, indoor) light scattered back along the path, one shadow ray each."""
+    emitters, only, dim = context.emitters, context.emitter_filter, vertex.dim
+    outdoor = indoor = None
+    if only.outdoor is not None:
+        u, uv = sampler.get_1d(dim + _OUT), sampler.get_2d(dim + _OUT_UV)
+        is_asked = active & (only.outdoor > NO_EMITTERS)
+        outdoor = emitters.sample_outdoor(vertex.si.p, u, uv, only.outdoor, is_asked)
+    if only.indoor is not None and vertex.near is not None:
+        u, uv = sampler.get_1d(dim + _LAMP), sampler.get_2d(dim + _LAMP_UV)
+        is_asked = active & (only.indoor > NO_EMITTERS)
+        indoor = emitters.sample_lamp(context.scene, vertex.near, u, uv, only.indoor, is_asked)
+    # A portal asked for alone has no light of scattered rays to be weighted against.
+    is_alone = False if only.outdoor is None else only.outdoor >= FIRST_PORTAL
+    return (
+        _direct_light(context.scene, vertex, strategy, outdoor, is_alone),
+        _direct_light(context.scene, vertex, strategy, indoor, is_alone),
+    )
+
+
+def _direct_light(
+    scene: DeviceScene,
+    vertex: Vertex,
+    strategy: Strategy,
+    sample: DirectionSample | None,
+    is_alone: Any,
+) -> DirectLightSample:
+    """What one shadow ray brings."""
+    if sample is None:
+        return DirectLightSample(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
+    si, is_independent = vertex.si, strategy.is_view_independent
+    wo = vertex.frame.to_local(sample.d)
+    value, pdf = evaluate_bsdf(si.bsdf, vertex.wi, wo)
+    pdf *= strategy.bsdf_share
+
+    # Refuse light through the face where the shading normal says that it does not pass.
+    side = dr.dot(si.ng, sample.d)
+    is_consistent = side * wo.z > 0
+    lit = is_consistent & (dr.max(value) > 0)
+    if is_independent is not False:
+        # Ask for what could be lit from some wi, whatever this wi is.
+        pdf = dr.select(is_independent, view_independent_pdf(si.bsdf, si.ng, sample.d), pdf)
+        lit = dr.select(is_independent, (side > 0) | (dr.max(si.bsdf.tau) > 0), lit)
+    lit = lit & sample.valid & (sample.pdf > 0)
+    weight = 1 / (sample.pdf + dr.select(is_alone, 0, pdf))
+
+    # Aim again from the offset origin: a lamp near by must not shadow itself.
+    begin = offset_ray_origin(si.p, dr.select(side > 0, si.ng, -si.ng))
+    to = si.p + sample.d * sample.distance - begin
+    distance = dr.norm(to)
+    is_finite = sample.distance < dr.inf
+    d = dr.select(is_finite, to / distance, sample.d)
+    reach = dr.select(is_finite, distance * (1 - 1e-4), dr.inf)
+    clear = scene.transmittance(begin, d, reach, lit)
+    incident = dr.select(lit, sample.radiance * clear * weight, 0)
+    light = dr.select(lit & is_consistent, value * incident, 0)
+    return DirectLightSample(light, sample.d, incident, sample.emitter)
+
+
+def _scatter(
+    context: PathContext,
+    sampler: Sampler,
+    path: PathState,
+    vertex: Vertex,
+    strategy: Strategy,
+    glass: _Glass,
+    u_lobe: Any,
+    goes_on: Any,
+) -> _Scattered:
+    """Draw a direction at a rough surface; mirrors and glass keep one, and glass is no vertex."""
+    si, frame, wi = vertex.si, vertex.frame, vertex.wi
+    uv = sampler.get_2d(vertex.dim + _SCATTER)
+    is_guided, target_face = mi.Bool(False), mi.UInt32(NO_FACE)
+    if strategy.guiding is None:
+        d = mi.Vector3f(frame.to_world(sample_bsdf(si.bsdf, wi, u_lobe, uv)))
+    else:
+        to = sample_guided(strategy.guiding, context.scene, context.emitters, si, u_lobe, uv)
+        is_guided, target_face = to.is_guided, to.target_face
+        by_surface = mi.Vector3f(frame.to_world(sample_bsdf(si.bsdf, wi, to.u_bsdf, uv)))
+        d = dr.select(is_guided, to.d, by_surface)
+        goes_on = goes_on & to.valid
+    wo = frame.to_local(d)
+    value, pdf = evaluate_bsdf(si.bsdf, wi, wo)
+    bounced = goes_on & (dr.dot(si.ng, d) * wo.z > 0) & (pdf > 0)
+
+    # Reflect about the shading normal, or go straight on.
+    mirror_d = path.d - 2 * dr.dot(si.n, path.d) * si.n
+    may_pass = path.n_nulls < MAX_NULLS
+    may_reflect = may_pass & (vertex.depth < context.fields.max_depth)
+    mirrored = glass.reflected & may_reflect & (dr.dot(mirror_d, si.ng) > 0)
+    passed = ((vertex.is_glass & ~glass.reflected) | (si.valid & si.is_cutout)) & may_pass
+    return _Scattered(d, value, pdf, is_guided, target_face, bounced, mirrored, mirror_d, passed)
+
+
+def _follow(
+    context: PathContext,
+    sampler: Sampler,
+    path: PathState,
+    vertex: Vertex,
+    strategy: Strategy,
+    glass: _Glass,
+    scattered: _Scattered,
+) -> tuple[PathState, Any]:
+    """(the path behind the vertex, whether it goes on)."""
+    si, bounced, mirrored, passed = (
+        vertex.si,
+        scattered.bounced,
+        scattered.mirrored,
+        scattered.passed,
+    )
+    beta = _throughput(path, vertex, strategy, glass, scattered)
+
+    # Play roulette with what the surface draws.
+    q = dr.max(beta) / strategy.bsdf_share
+    if strategy.near is not None:
+        q *= survival_boost(strategy.near)
+    q = dr.minimum(q, _MAX_SURVIVAL)
+    tested = bounced & (vertex.depth >= context.fields.rr_depth)
+    survives = ~tested | scattered.is_guided | (sampler.get_1d(vertex.dim + _ROULETTE) < q)
+    alive = (bounced | mirrored | passed) & survives & (dr.max(beta) > 0)
+
+    # Divide by the pdf of all techniques that could have drawn the direction, over the surface's.
+    ratio = strategy.bsdf_share * dr.select(tested, dr.maximum(q, 1e-6), 1)
+    odds = mi.Float(0)
+    if strategy.guiding is not None:
+        pdf = scattered.pdf
+        ratio += cone_technique_pdf(strategy.guiding, scattered.d) / dr.maximum(pdf, 1e-30)
+        odds = target_technique_share(strategy.guiding) / (ratio * pdf)
+    beta = dr.select(bounced, beta / ratio, beta)
+
+    # Keep how the direction was drawn, for the weight of what it meets.
+    pdf = scattered.pdf * strategy.bsdf_share
+    if strategy.is_view_independent is not False:
+        independent = view_independent_pdf(si.bsdf, si.ng, scattered.d)
+        pdf = dr.select(strategy.is_view_independent, independent, scattered.pdf)
+    d = dr.select(
+        bounced, scattered.d, dr.select(mirrored, mi.Vector3f(scattered.mirror_d), path.d)
+    )
+    outward = dr.select(dr.dot(d, si.ng) > 0, si.ng, -si.ng)
+    here = no_reference(si.p) if vertex.near is None else vertex.near.reference
+    is_null = passed | (vertex.is_glass & mirrored)
+    target_face = dr.select(mirrored, NO_FACE, path.target_face)
+    return PathState(
+        o=offset_ray_origin(si.p, outward),
+        d=d,
+        beta=beta,
+        depth=vertex.depth,
+        n_nulls=path.n_nulls + dr.select(is_null, mi.UInt32(1), 0),
+        reference=dr.select(bounced, here, path.reference),
+        bsdf_pdf=dr.select(bounced, pdf, dr.select(mirrored, 0, path.bsdf_pdf)),
+        guiding_odds=dr.select(bounced, odds, dr.select(mirrored, 0, path.guiding_odds)),
+        target_face=dr.select(bounced, scattered.target_face, target_face),
+    ), alive
+
+
+def _throughput(
+    path: PathState, vertex: Vertex, strategy: Strategy, glass: _Glass, scattered: _Scattered
+) -> Any:
+    """The path's throughput times f |cos| / pdf, or times the share of a mirror or glass."""
+    bsdf = vertex.si.bsdf
+    factor = dr.select(vertex.is_rough, scattered.value / scattered.pdf, mi.Color3f(1))
+    factor = dr.select(vertex.is_mirror, bsdf.f0, factor)
+    beta = path.beta * dr.select(vertex.is_glass & scattered.passed, bsdf.tau, factor)
+    if strategy.near is None:
+        return beta
+    # Make up for having chosen reflection more often than it happens.
+    r, p = glass.reflectance, glass.probability
+    return dr.select(
+        vertex.is_glass, beta * dr.select(glass.reflected, r / p, (1 - r) / (1 - p)), beta
+    )

@@ -1,4 +1,4 @@
-"""The film Metropolis splats on: positions from numbers, and splats; kernels, no effects."""
+"""The film that Metropolis splats on, and the chains' target function; kernels, no effects."""
 
 from __future__ import annotations
 
@@ -8,22 +8,28 @@ import drjit as dr
 import mitsuba as mi
 
 from pbrs_farm.transport.kernels.bsdf import luminance
-from pbrs_farm.transport.kernels.path_state import film_position
+from pbrs_farm.transport.kernels.path_state import DeviceCamera, PathContext, film_position
 
 
 class Film(NamedTuple):
-    """Size of the picture, opaque; splats: (2 * pixels * 3,) sums of the two halves.
+    """The picture that chains splat on."""
 
-    importance: (pixels,) how much a unit of luminance counts for the chains.
-    """
-
-    width: Any
+    width: Any  # px, opaque
     height: Any
-    splats: Any
-    importance: Any
+    splats: Any  # (2 * pixels * 3,) sums of the two halves, by odd and even chains
+    importance: Any  # (pixels,) how much a unit of luminance counts for the chains
 
 
-def film_point(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any]:
+class ChainContext(NamedTuple):
+    """What all chains share."""
+
+    paths: PathContext
+    camera: DeviceCamera
+    film: Film
+    min_segments: Any  # of paths whose light counts
+
+
+def sample_film(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any]:
     """(pixel index, film position in pixels spread by the filter) of two numbers."""
     x, y = u.x * mi.Float(film.width), u.y * mi.Float(film.height)
     column = dr.minimum(mi.UInt32(x), film.width - 1)
@@ -33,23 +39,19 @@ def film_point(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any]:
     return row * film.width + column, at
 
 
-def point_in_pixel(film: Film, pixel: Any, u: Any, is_tent: Any) -> Any:
+def sample_pixel(film: Film, pixel: Any, u: Any, is_tent: Any) -> Any:
     """Film position of two numbers inside a pixel, spread by the filter."""
     corner = mi.Point2f(mi.Float(pixel % film.width), mi.Float(pixel // film.width))
     return film_position(u, is_tent) + corner
 
 
-def level_of(film: Film, pixel: Any, light: Any, active: Any = True) -> Any:
-    """What the chains are drawn by: the luminance of light at a pixel times its importance."""
+def target_function(film: Film, pixel: Any, light: Any, active: Any = True) -> Any:
+    """What chains are distributed by: the luminance of light at a pixel times its importance."""
     return luminance(light) * dr.gather(mi.Float, film.importance, pixel, active)
 
 
-def splat(
-    film: Film, chain: Any, pixel: Any, light: Any, level: Any, weight: Any, active: Any
-) -> None:
-    """Add light, brought from `level` to `weight`, to a pixel of the half the chain belongs to."""
-    active = active & (level > 0) & (weight > 0)
-    value = light * (weight / dr.select(level > 0, level, 1))
-    base = ((chain & 1) * (film.width * film.height) + pixel) * 3
+def splat(film: Film, chain: Any, pixel: Any, value: Any, active: Any) -> None:
+    """Add a value to a pixel of the half that the chain belongs to."""
+    first = ((chain & 1) * (film.width * film.height) + pixel) * 3
     for c in range(3):
-        dr.scatter_add(film.splats, value[c], base + c, active)
+        dr.scatter_add(film.splats, value[c], first + c, active)

@@ -1,11 +1,11 @@
-"""Markov chains of light paths: what one is made of, and how it moves; kernels, no effects.
+"""Markov chains of light paths: their state, and the steps of a chain; kernels, no effects.
 
-The three steps of Metropolis sampling are `mutate`; the estimator they serve is metropolis.py's.
-
-A proposal is never stored: every number is mutated by a hash of (chain, step, dimension) when the
-path asks for it, and again when it is accepted. Sampler beyond STORED_DIMS are fresh in every
-proposal, which is a large step in those dimensions. A chain's numbers stay in local memory while
-a launch runs; a lane starts its next mutation as soon as its path ends.
+`mutate` makes the three steps of Metropolis sampling (propose, accept, splat); integrator.py
+describes the estimator. A proposal is never stored: every number is mutated by a hash of (chain,
+step, dimension) when the path asks for it, and again when it is accepted. Numbers beyond
+STORED_DIMS are fresh in every proposal, which is a large step in those dimensions. A chain's
+numbers stay in local memory while a launch runs; a lane starts its next mutation as soon as its
+path ends.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.transport.kernels.bsdf import luminance
-from pbrs_farm.transport.kernels.path_state import DeviceCamera, PathContext, PathState, camera_path
+from pbrs_farm.transport.kernels.path_state import DeviceCamera, PathState, camera_path
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import (
     CAMERA_DIMS,
@@ -29,18 +29,24 @@ from pbrs_farm.transport.kernels.sampler import (
     stream_key,
     unit_float,
 )
-from pbrs_farm.transport.metropolis.film import Film, film_point, level_of, splat
+from pbrs_farm.transport.metropolis.film import (
+    ChainContext,
+    Film,
+    sample_film,
+    splat,
+    target_function,
+)
 from pbrs_farm.transport.metropolis.reconnection import (
-    NEAR_M,
-    TAIL_FLOATS,
-    close_tail,
-    passing_chance,
-    write_tail,
+    MIN_DISTANCE_M,
+    SUFFIX_FLOATS,
+    finish_suffix,
+    pass_probability,
+    record_suffix,
 )
 
 STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 7
-_SMALLEST, _LARGEST = 1 / 1024, 1 / 64
-_FILM_STEP: Final = 2.0
+_MIN_STEP, _MAX_STEP = 1 / 1024, 1 / 64  # of a small mutation
+_FILM_STEP: Final = 2.0  # times as far on the film
 
 
 class MutatedSampler:
@@ -56,11 +62,11 @@ class MutatedSampler:
         stored = dim < STORED_DIMS
         old = self._chain.read(dr.minimum(dim, STORED_DIMS - 1))
 
-        # Kelemen's step: between the smallest and the largest, small ones more often.
+        # Move by Kelemen's step: between the least and the largest, small ones more often.
         up = fresh < 0.5
         v = dr.select(up, 2 * fresh, 2 * fresh - 1)
         reach = dr.select(dim < CAMERA_DIMS, _FILM_STEP, 1.0)
-        step = reach * _LARGEST * dr.exp2(v * float(np.log2(_SMALLEST / _LARGEST)))
+        step = reach * _MAX_STEP * dr.exp2(v * float(np.log2(_MIN_STEP / _MAX_STEP)))
         moved = old + dr.select(up, step, -step)
         moved = moved - dr.floor(moved)
         return dr.minimum(dr.select(self._is_large | ~stored, fresh, moved), 1 - 2**-24)
@@ -71,233 +77,250 @@ class MutatedSampler:
 
 
 class Chains(NamedTuple):
-    """Where every chain stands. numbers: (STORED_DIMS * N,), dimension by dimension.
+    """Where N chains stand."""
 
-    is_shared: whether its tail can be shown from other pixels; tails: (TAIL_FLOATS * N,),
-    number by number.
-    """
-
-    numbers: Any
-    light: Any
-    level: Any
-    pixel: Any
-    is_shared: Any
-    tails: Any
+    samples: Any  # (STORED_DIMS * N,) numbers in the unit cube, dimension by dimension
+    light: Any  # Color3f
+    target: Any  # target function of the light
+    pixel: Any  # UInt32
+    is_reconnectable: Any  # Bool: the path's suffix can be seen from other pixels
+    suffixes: Any  # (SUFFIX_FLOATS * N,), column by column (reconnection.py)
 
 
 @dataclass
-class Trial:
-    """A path under way, in two parts: up to its second vertex, and beyond.
+class SplitPath:
+    """A path under way, split at its second vertex into prefix and suffix."""
 
-    walk: beyond the second vertex with a throughput of its own. light: of the first part; head:
-    throughput up to the second vertex; tail: light from beyond, head not counted. is_straight:
-    the first vertex is rough and nothing but glass and cut-outs was met since, passed with chance
-    `passes`; is_shared: see tails.py.
-    """
+    path: PathState  # beyond the second vertex its throughput is the suffix's own
+    light: mi.Color3f  # of paths that end at the second vertex or before
+    prefix_beta: mi.Color3f  # throughput up to the second vertex
+    suffix_light: mi.Color3f  # from beyond, the prefix's throughput not counted
+    is_straight: mi.Bool  # the first vertex is rough; since, only glass and cut-outs were passed
+    passed: mi.Float  # probability of having passed those
+    is_reconnectable: mi.Bool
 
-    path: PathState
-    light: mi.Color3f
-    head: mi.Color3f
-    tail: mi.Color3f
-    is_straight: mi.Bool
-    passes: mi.Float
-    is_shared: mi.Bool
+
+@dataclass
+class _State:
+    """A path as a chain stands at it (x in the loop) or proposes it (y)."""
+
+    light: Any
+    target: Any
+    pixel: Any
+    is_reconnectable: Any
+    weight: Any  # expected number of steps spent here, to splat
+
+
+@dataclass
+class ChainSums:
+    """Sums over the steps of a chain."""
+
+    target: mi.Float  # of large steps, which are independent paths
+    n_large: mi.Float
+    n_accepted: mi.Float
+    n_bad: mi.UInt32  # paths that were not finite
+
+    def add(self, target: Any, is_large: Any, accept: Any, bad: Any) -> None:
+        """Add a step; the arguments are false for a lane whose path has not ended."""
+        self.n_bad += dr.select(bad, mi.UInt32(1), 0)
+        self.n_accepted += dr.select(accept, mi.Float(1), 0)
+        self.target += dr.select(is_large, target, 0)
+        self.n_large += dr.select(is_large, mi.Float(1), 0)
 
 
 @dr.syntax
 def mutate(
-    context: PathContext,
-    film: Film,
+    context: ChainContext,
     chains: Chains,
     steps: tuple[Any, Any],
     p_large: Any,
     seed: Any,
-    shares: Any,
-) -> tuple[Chains, tuple[Any, ...]]:
-    """Steps [first, last) of every chain, splatted where a path is its own pixel's alone.
+    reconnects: Any,
+) -> tuple[Chains, ChainSums]:
+    """Make steps [first, last) of every chain; splat the paths that are their own pixel's alone.
 
-    p_large: chance of a fresh path. shares: whether tails are shown to other pixels afterwards.
-    Returns (chains, (sum of I and number of fresh paths, accepted steps, paths not finite)), the
-    sums per chain.
+    p_large: chance of a fresh path. reconnects: whether suffixes are reconnected afterwards.
     """
-    n_chains = dr.width(chains.level)
+    film, n_chains = context.film, dr.width(chains.target)
     lane = dr.arange(mi.UInt32, n_chains)
-    numbers = dr.alloc_local(mi.Float, STORED_DIMS)
-    x_tail = dr.alloc_local(mi.Float, TAIL_FLOATS)
-    y_tail = dr.alloc_local(mi.Float, TAIL_FLOATS)
-    dim = mi.UInt32(0)
-    while dim < STORED_DIMS:
-        numbers.write(dr.gather(mi.Float, chains.numbers, dim * n_chains + lane), dim)
-        dim += 1
-    dim = mi.UInt32(0)
-    while dim < TAIL_FLOATS:
-        x_tail.write(dr.gather(mi.Float, chains.tails, dim * n_chains + lane), dim)
-        dim += 1
-
-    # x is where a chain stands, y what it proposes.
-    x_light, x_level, x_pixel = chains.light, chains.level, chains.pixel
-    x_shared = mi.Bool(chains.is_shared)
-    x_weight = mi.Float(0)
-    large_sum, large_count = mi.Float(0), mi.Float(0)
-    n_accepted, n_bad = mi.Float(0), mi.UInt32(0)
-    step = mi.UInt32(steps[0])
+    x_samples = _load(chains.samples, STORED_DIMS, n_chains)
+    x_suffix = _load(chains.suffixes, SUFFIX_FLOATS, n_chains)
+    y_suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
+    is_reconnectable = mi.Bool(chains.is_reconnectable)
+    x = _State(chains.light, chains.target, chains.pixel, is_reconnectable, mi.Float(0))
+    y = _camera_split_path(context.camera, mi.Float(0) * mi.Float(lane), mi.Float(0))
+    sums = ChainSums(mi.Float(0), mi.Float(0), mi.Float(0), mi.UInt32(0))
     chain_key = stream_key(lane, seed)
-    y = _trial(context.camera, mi.Float(0) * mi.Float(lane), mi.Float(0))
-    fresh = mi.Bool(True)
+    step = mi.UInt32(steps[0])
+    fresh = mi.Bool(True)  # whether y has yet to start
     active = step < steps[1]
 
     while active:
         # 1. Propose; the path's first ray leaves through the film position of dimensions 0 and 1.
         key = hash32(chain_key ^ hash32(step + 0x9E3779B9))
         is_large = unit_float(hash32(key ^ 0x51ED270B)) < p_large
-        proposal = MutatedSampler(numbers, key, is_large)
-        y_pixel, at = film_point(film, proposal.get_2d(mi.UInt32(0)), context.fields.is_tent)
-        y = dr.select(fresh, _trial(context.camera, at.x, at.y), y)
-        y, alive = _onward(context, proposal, y, y_tail, active)
+        proposal = MutatedSampler(x_samples, key, is_large)
+        u = proposal.get_2d(mi.UInt32(0))
+        pixel, at = sample_film(film, u, context.paths.fields.is_tent)
+        y = dr.select(fresh, _camera_split_path(context.camera, at.x, at.y), y)
+        y, alive = _extend(context, proposal, y, y_suffix, active)
         done = active & ~alive
 
         # 2. Accept or stay.
-        y_light = y.light + y.head * y.tail
-        good = dr.isfinite(luminance(y_light))
-        n_bad += dr.select(done & ~good, mi.UInt32(1), 0)
-        y_light = dr.select(good, y_light, 0)
-        y_level = level_of(film, y_pixel, y_light)
-        y_shared = y.is_shared & shares
-        a = dr.select(x_level > 0, dr.minimum(y_level / x_level, 1), 1)
+        proposed, good = _proposed_state(film, y, pixel, reconnects)
+        a = dr.select(x.target > 0, dr.minimum(proposed.target / x.target, 1), 1)
         accept = done & (unit_float(hash32(key ^ 0x2545F491)) < a)
-        n_accepted += dr.select(accept, mi.Float(1), 0)
-        large_sum += dr.select(done & is_large, y_level, 0)
-        large_count += dr.select(done & is_large, mi.Float(1), 0)
+        sums.add(proposed.target, done & is_large, accept, done & ~good)
 
-        # 3. Splat what is left behind: the old point with all it has gathered, or the refused one.
-        #    What is shared waits for the launch's end (tails.py).
-        x_weight += dr.select(done, 1 - a, 0)
-        splat(
-            film,
-            lane,
-            dr.select(accept, x_pixel, y_pixel),
-            dr.select(accept, x_light, y_light),
-            dr.select(accept, x_level, y_level),
-            dr.select(accept, x_weight, a),
-            done & ~dr.select(accept, x_shared, y_shared),
-        )
-        close_tail(y_tail, y_light, y.tail, accept & y_shared)
-        x_pixel = dr.select(accept, y_pixel, x_pixel)
-        x_light = dr.select(accept, y_light, x_light)
-        x_level = dr.select(accept, y_level, x_level)
-        x_shared = dr.select(accept, y_shared, x_shared)
-        x_weight = dr.select(accept, a, x_weight)
-        dim = mi.UInt32(0)
-        updating = mi.Bool(accept)
-        while updating:
-            numbers.write(proposal.get_1d(dim), dim)
-            dim += 1
-            updating = updating & (dim < STORED_DIMS)
-        dim = mi.UInt32(0)
-        updating = accept & y_shared
-        while updating:
-            x_tail.write(y_tail.read(dim), dim)
-            dim += 1
-            updating = updating & (dim < TAIL_FLOATS)
+        # 3. Splat what is left behind: the old path with all the weight it has gathered, or the
+        #    rejected one. What is reconnectable waits for the launch's end (reconnection.py).
+        x.weight += dr.select(done, 1 - a, 0)
+        proposed.weight = a
+        left = dr.select(accept, x, proposed)
+        _splat_state(film, lane, left, done & ~left.is_reconnectable)
+        keeps_suffix = accept & proposed.is_reconnectable
+        finish_suffix(y_suffix, proposed.light, y.suffix_light, keeps_suffix)
+        x = dr.select(accept, proposed, x)
+        x_samples = _accept_samples(x_samples, proposal, accept)
+        x_suffix = _copy(y_suffix, x_suffix, SUFFIX_FLOATS, keeps_suffix)
 
         step += dr.select(done, mi.UInt32(1), 0)
         fresh = mi.Bool(done)
         active = step < steps[1]
 
-    splat(film, lane, x_pixel, x_light, x_level, x_weight, ~x_shared)
-    kept = dr.empty(mi.Float, STORED_DIMS * n_chains)
-    dim = mi.UInt32(0)
-    while dim < STORED_DIMS:
-        dr.scatter(kept, numbers.read(dim), dim * n_chains + lane)
-        dim += 1
-    kept_tails = dr.empty(mi.Float, TAIL_FLOATS * n_chains)
-    dim = mi.UInt32(0)
-    while dim < TAIL_FLOATS:
-        dr.scatter(kept_tails, x_tail.read(dim), dim * n_chains + lane)
-        dim += 1
-    sums = large_sum, large_count, n_accepted, n_bad
-    return Chains(kept, x_light, x_level, x_pixel, x_shared, kept_tails), sums
+    _splat_state(film, lane, x, ~x.is_reconnectable)
+    samples = _store(x_samples, STORED_DIMS, n_chains)
+    suffixes = _store(x_suffix, SUFFIX_FLOATS, n_chains)
+    return Chains(samples, x.light, x.target, x.pixel, x.is_reconnectable, suffixes), sums
 
 
 @dr.syntax
-def draw_paths(context: PathContext, film: Film, numbers: HashedSampler) -> Chains:
-    """One path per lane, as where a chain stands; its numbers are not kept."""
-    pixel, at = film_point(film, numbers.get_2d(mi.UInt32(0)), context.fields.is_tent)
-    tail = dr.alloc_local(mi.Float, TAIL_FLOATS)
-    y = _trial(context.camera, at.x, at.y)
+def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
+    """n independent paths, a lane each, as chains stand at them; their numbers are not kept."""
+    film = context.film
+    pixel, at = sample_film(film, sampler.get_2d(mi.UInt32(0)), context.paths.fields.is_tent)
+    suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
+    y = _camera_split_path(context.camera, at.x, at.y)
     active = mi.Bool(True)
     while active:
-        y, alive = _onward(context, numbers, y, tail, active)
+        y, alive = _extend(context, sampler, y, suffix, active)
         active = active & alive
-    light = y.light + y.head * y.tail
-    level = level_of(film, pixel, light)
-    level = dr.select(dr.isfinite(level), level, 0)
-    close_tail(tail, light, y.tail, y.is_shared)
-    lane = dr.arange(mi.UInt32, dr.width(pixel))
-    rows = dr.empty(mi.Float, TAIL_FLOATS * dr.width(pixel))
-    dim = mi.UInt32(0)
-    while dim < TAIL_FLOATS:
-        dr.scatter(rows, tail.read(dim), dim * dr.width(pixel) + lane)
-        dim += 1
-    return Chains(mi.Float(0), light, level, pixel, y.is_shared, rows)
+    light = y.light + y.prefix_beta * y.suffix_light
+    target = target_function(film, pixel, light)
+    target = dr.select(dr.isfinite(target), target, 0)
+    finish_suffix(suffix, light, y.suffix_light, y.is_reconnectable)
+    suffixes = _store(suffix, SUFFIX_FLOATS, n)
+    return Chains(mi.Float(0), light, target, pixel, y.is_reconnectable, suffixes)
 
 
-def _trial(camera: DeviceCamera, x: Any, y: Any) -> Trial:
+def _camera_split_path(camera: DeviceCamera, x: Any, y: Any) -> SplitPath:
     """The path that leaves the camera through film position (x, y), in pixels."""
-    none, one = mi.Color3f(0), mi.Color3f(1)
-    no = mi.Bool(False)
-    return Trial(camera_path(camera, x, y), none, one, mi.Color3f(0), no, mi.Float(1), mi.Bool(no))
+    return SplitPath(
+        path=camera_path(camera, x, y),
+        light=mi.Color3f(0),
+        prefix_beta=mi.Color3f(1),
+        suffix_light=mi.Color3f(0),
+        is_straight=mi.Bool(False),
+        passed=mi.Float(1),
+        is_reconnectable=mi.Bool(False),
+    )
 
 
-def _onward(
-    context: PathContext, numbers: Sampler, trial: Trial, tail: Any, active: Any
-) -> tuple[Trial, Any]:
-    """(the path one vertex on, whether it goes on); its tail is kept in local memory."""
-    path = trial.path
+def _extend(
+    context: ChainContext, sampler: Sampler, split: SplitPath, suffix: Any, active: Any
+) -> tuple[SplitPath, Any]:
+    """(the path one vertex on, whether it goes on); its suffix is recorded in local memory."""
+    path, least = split.path, context.min_segments
     before = path.depth
-    may_reconnect = trial.is_straight & (before == 1)
-    following, result, alive = advance(
-        context.scene,
-        context.emitters,
-        context.fields,
-        numbers,
-        path,
-        context.emitter_filter,
-        active,
-        may_reconnect,
-    )
-    met = dr.select(
-        before + 1 >= context.segments, result.emitted_outdoor + result.emitted_indoor, 0
-    )
-    lit = dr.select(
-        following.depth + 1 >= context.segments, result.direct_outdoor + result.direct_indoor, 0
-    )
+    may_reconnect = split.is_straight & (before == 1)
+    following, result, alive = advance(context.paths, sampler, path, active, may_reconnect)
+
+    # Count the light of paths that are long enough.
+    emitted = result.emitted_outdoor + result.emitted_indoor
+    direct = result.direct_outdoor + result.direct_indoor
+    emitted = dr.select(before + 1 >= least, emitted, 0)
+    direct = dr.select(following.depth + 1 >= least, direct, 0)
+
+    # Split the path where it makes its second vertex.
     is_beyond = before >= 2
     is_second = active & (before < 2) & (following.depth == 2)
-    write_tail(
-        tail,
-        result,
-        path,
-        trial.passes,
-        context.emitter_filter,
-        is_second & result.is_view_independent,
-    )
-    head = dr.select(is_second, following.beta, trial.head)
+    is_independent, asked = result.is_view_independent, context.paths.emitter_filter
+    record_suffix(suffix, result, path, split.passed, asked, is_second & is_independent)
+    prefix_beta = dr.select(is_second, following.beta, split.prefix_beta)
     following.beta = dr.select(is_second, 1, following.beta)
-    is_far = dr.squared_norm(result.si.p - path.reference.p) > NEAR_M**2
-    # What reflects, glass too, forgets the pdf of the direction.
-    goes_on = trial.is_straight & (following.bsdf_pdf > 0)
-    is_straight = dr.select(before == 0, result.is_rough, goes_on)
-    can_share = result.is_view_independent & (result.pdf > 0) & is_far
-    return (
-        Trial(
-            following,
-            trial.light + dr.select(is_beyond, 0, met + lit),
-            head,
-            trial.tail + dr.select(is_beyond, met + lit, 0),
-            is_straight,
-            trial.passes * dr.select(before == 1, passing_chance(result.si, path.d), 1),
-            dr.select(is_second, can_share, trial.is_shared),
-        ),
-        alive,
-    )
+
+    # Reconnect only rough vertices apart; what reflects, glass too, forgets the direction's pdf.
+    is_far = dr.squared_norm(result.si.p - path.reference.p) > MIN_DISTANCE_M**2
+    stays_straight = split.is_straight & (following.bsdf_pdf > 0)
+    can_reconnect = is_independent & (result.pdf > 0) & is_far
+    return SplitPath(
+        path=following,
+        light=split.light + dr.select(is_beyond, 0, emitted + direct),
+        prefix_beta=prefix_beta,
+        suffix_light=split.suffix_light + dr.select(is_beyond, emitted + direct, 0),
+        is_straight=dr.select(before == 0, result.is_rough, stays_straight),
+        passed=split.passed * dr.select(before == 1, pass_probability(result.si, path.d), 1),
+        is_reconnectable=dr.select(is_second, can_reconnect, split.is_reconnectable),
+    ), alive
+
+
+def _proposed_state(film: Film, y: SplitPath, pixel: Any, reconnects: Any) -> tuple[_State, Any]:
+    """(the state of a path that has ended, whether its light is finite; black where not)."""
+    light = y.light + y.prefix_beta * y.suffix_light
+    good = dr.isfinite(luminance(light))
+    light = dr.select(good, light, 0)
+    target = target_function(film, pixel, light)
+    return _State(light, target, pixel, y.is_reconnectable & reconnects, mi.Float(0)), good
+
+
+def _splat_state(film: Film, chain: Any, state: _State, active: Any) -> None:
+    """Splat the light of a state, brought from its target function to its weight."""
+    active = active & (state.target > 0) & (state.weight > 0)
+    scale = state.weight / dr.select(state.target > 0, state.target, 1)
+    splat(film, chain, state.pixel, state.light * scale, active)
+
+
+@dr.syntax
+def _load(rows: Any, n: int, n_chains: int) -> Any:
+    """Local memory with n numbers of each chain."""
+    local, lane = dr.alloc_local(mi.Float, n), dr.arange(mi.UInt32, n_chains)
+    k = mi.UInt32(0)
+    while k < n:
+        local.write(dr.gather(mi.Float, rows, k * n_chains + lane), k)
+        k += 1
+    return local
+
+
+@dr.syntax
+def _store(local: Any, n: int, n_chains: int) -> Any:
+    """(n * N,) numbers of all chains, from local memory."""
+    rows, lane = dr.empty(mi.Float, n * n_chains), dr.arange(mi.UInt32, n_chains)
+    k = mi.UInt32(0)
+    while k < n:
+        dr.scatter(rows, local.read(k), k * n_chains + lane)
+        k += 1
+    return rows
+
+
+@dr.syntax
+def _copy(source: Any, target: Any, n: int, active: Any) -> Any:
+    """The target in local memory with n numbers of the source, where active."""
+    k = mi.UInt32(0)
+    updating = mi.Bool(active)
+    while updating:
+        target.write(source.read(k), k)
+        k += 1
+        updating = updating & (k < n)
+    return target
+
+
+@dr.syntax
+def _accept_samples(samples: Any, proposal: MutatedSampler, active: Any) -> Any:
+    """A chain's numbers in local memory, each replaced by the proposal's, where active."""
+    dim = mi.UInt32(0)
+    updating = mi.Bool(active)
+    while updating:
+        samples.write(proposal.get_1d(dim), dim)
+        dim += 1
+        updating = updating & (dim < STORED_DIMS)
+    return samples
