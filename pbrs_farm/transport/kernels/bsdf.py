@@ -32,7 +32,7 @@ class Bsdf(NamedTuple):
     f0: Any  # Color3f, the coat's reflectance at normal incidence; of a mirror its reflectance
     tau: Any  # Color3f, diffuse transmittance; of thin glass its colour
     alpha: Any  # GGX roughness of the coat, 0 = no coat
-    kind: Any  # UInt32, SURFACE, MIRROR, GLASS or HOLE
+    kind: Any  # UInt32, SURFACE, MIRROR, GLASS or NULL
 
 
 def luminance(rgb: Any) -> Any:
