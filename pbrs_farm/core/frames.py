@@ -19,7 +19,7 @@ OPENCV_FROM_OPENGL: Matrix4 = np.diag([1.0, -1.0, -1.0, 1.0])
 PUBLISHED_FROM_OPENGL: NDArray[np.float64] = np.array(
     [[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], np.float64
 )
-"""Published normal axes x right, y forward, z up  <-  OpenGL camera axes (suncg section 5)."""
+"""Published normal axes x right, y forward, z up  <-  OpenGL camera axes (docs/spec/suncg.md section 5)."""
 
 
 def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:

@@ -64,7 +64,7 @@ def flux_lm(
     lamp_lm: float = 1_600.0,
     lm_per_watt: float = 13.0,
 ) -> float:
-    """Luminous flux in lm of one light source (spec/sky.md: one photometric scale).
+    """Luminous flux in lm of one light source (docs/spec/sky.md: one photometric scale).
 
     share: the part of the lamp's power that falls to this source (1 / number of sources).
     lamp_lm: the flux of a Sweet Home 3D lamp of power 0.5; lm_per_watt: for SUNCG's watts.

@@ -135,7 +135,7 @@ class LightFields(_Group):
 
 
 class SkyFields(_Group):
-    """Outdoor light (spec/sky.md)."""
+    """Outdoor light (docs/spec/sky.md)."""
 
     kind: Literal["sunsky", "panorama"] = "sunsky"
     panoramas: str = Field(
@@ -160,7 +160,7 @@ class EmissionFields(_Group):
 
 
 class MaterialFields(_Group):
-    """Materials (paper section 3.2; presets in spec/suncg section 6)."""
+    """Materials (paper section 3.2; presets in docs/spec/suncg.md section 6)."""
 
     preset: Literal["physical", "released"] = "physical"
 
@@ -277,7 +277,7 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "cameras": {
             "preset": "released",
             "n_sectors": 4,
-            "tilt_deg": 11.309932,  # direction (cos, -0.2, sin), suncg section 3.2 c
+            "tilt_deg": 11.309932,  # direction (cos, -0.2, sin), docs/spec/suncg.md section 3.2 c
             "clearance_m": 0.0,
             "min_objects": 4,
         },

@@ -1,4 +1,4 @@
-"""The layout of the published PBRS data (suncg section 5): <kind>_v2/<house>/<6 digits>_<kind>.png.
+"""The layout of the published PBRS data (docs/spec/suncg.md section 5): <kind>_v2/<house>/<6 digits>_<kind>.png.
 
 Effects: reads views, writes files. Every label is stored in that form already, so files are copied.
 """

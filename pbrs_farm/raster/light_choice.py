@@ -1,6 +1,6 @@
 """The lamps' lights as OpenGL-IL uses them: the best ones per item, and their scale; no effects.
 
-Paper section 3.2; suncg section 4. The published code kept the worst eight lights of a node and
+Paper section 3.2; docs/spec/suncg.md section 4. The published code kept the worst eight lights of a node and
 matched none of them: this is its intent.
 """
 

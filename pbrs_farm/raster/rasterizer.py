@@ -122,7 +122,7 @@ class Rasterizer:
         return str(self._context.info["GL_RENDERER"])
 
     def render_dl(self, camera: Camera) -> Srgb8Image:
-        """(H, W, 3) OpenGL-DL: a headlight and two directional lights, no shadows (suncg section 4)."""
+        """(H, W, 3) OpenGL-DL: a headlight and two directional lights, no shadows (docs/spec/suncg.md section 4)."""
         return self._render(camera, "dl")
 
     def render_il(self, camera: Camera) -> Srgb8Image:

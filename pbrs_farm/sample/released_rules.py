@@ -1,4 +1,4 @@
-"""Where the published data's sampler let a camera be (suncg section 3.2 b, c); no effects."""
+"""Where the published data's sampler let a camera be (docs/spec/suncg.md section 3.2 b, c); no effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""room_camera.txt and its companions, the published camera files (suncg section 3.3): text only.
+"""room_camera.txt and its companions, the published camera files (docs/spec/suncg.md section 3.3): text only.
 
 No effects: text in, text out. Half-angles are in radians; yf is recomputed from xf and the
 picture's shape, and up is made perpendicular again, as every published reader does.

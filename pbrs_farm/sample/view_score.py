@@ -29,7 +29,7 @@ def object_columns(house: House) -> NDArray[np.intp]:
 
 
 def released_columns(house: House, room: Room) -> NDArray[np.intp]:
-    """Instance ids the published sampler counts in a room (suncg section 3.2 d).
+    """Instance ids the published sampler counts in a room (docs/spec/suncg.md section 3.2 d).
 
     Objects of this room alone; stairs, columns and boxes are no objects there.
     """

@@ -27,7 +27,7 @@ from pbrs_farm.transport.kernels.path_state import (
 from pbrs_farm.transport.kernels.path_step import Strategy, advance, sample_direct_light
 from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
 
-LAMPS_LX: Final = (30.0, 1000.0)  # expected mean illuminance of a floor by lamps (spec/sky.md)
+LAMPS_LX: Final = (30.0, 1000.0)  # expected mean illuminance of a floor by lamps (docs/spec/sky.md)
 DAYLIGHT_LX: Final = (20.0, 5000.0)  # and by daylight; a value outside is a warning
 
 _SPP: Final = 32

@@ -17,7 +17,7 @@ OWNER, HIDDEN = 255, 128  # the side that owns the occluding edge, the side that
 
 
 def instance_boundary(instance: NDArray[Any]) -> NDArray[np.uint8]:
-    """(H, W) uint8, 255 on boundaries: the published definition (suncg section 5).
+    """(H, W) uint8, 255 on boundaries: the published definition (docs/spec/suncg.md section 5).
 
     Pixel (r, c) is boundary when any adjacent pair inside its 2 x 2 block (r..r+1, c..c+1) has
     different ids; in the last row when it differs from its right, in the last column from its

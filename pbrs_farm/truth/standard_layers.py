@@ -15,7 +15,9 @@ from pbrs_farm.core.house import MAX_INSTANCES, House
 from pbrs_farm.truth.boundary import instance_boundary
 
 DEPTH_MAX_MM = 65535  # the largest 16-bit value
-UNIT_TOLERANCE = 0.1  # n is valid while | |n|^2 - 1 | <= this: the published rule (suncg section 5)
+UNIT_TOLERANCE = (
+    0.1  # n is valid while | |n|^2 - 1 | <= this: the published rule (docs/spec/suncg.md section 5)
+)
 
 
 def depth_mm(depth_z: DepthZ) -> NDArray[np.uint16]:
@@ -40,7 +42,7 @@ def unit_mask(normal: UnitVectors) -> Mask:
 def normal_png(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArray[np.uint16]:
     """(H, W, 3) uint16 normals in the published camera frame: round((n + 1) 65535 / 2).
 
-    x right, y forward, z up (suncg section 5). A normal that is not of unit length (nothing there,
+    x right, y forward, z up (docs/spec/suncg.md section 5). A normal that is not of unit length (nothing there,
     a triangle without area, NaN) is stored as n = 0: 32768 in all three channels.
     """
     # Turn world normals into the published camera frame.

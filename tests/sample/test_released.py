@@ -1,4 +1,4 @@
-"""The preset that does what the published data's sampler did (suncg section 3.2)."""
+"""The preset that does what the published data's sampler did (docs/spec/suncg.md section 3.2)."""
 
 import math
 from dataclasses import replace

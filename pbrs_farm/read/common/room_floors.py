@@ -1,7 +1,7 @@
 """Floor polygon and heights of a room from its meshes; no effects.
 
 The walkable polygon is the top of the floor's mesh less the walls that stand on it: SUNCG's floor
-slab reaches under the walls (suncg section 1.5).
+slab reaches under the walls (docs/spec/suncg.md section 1.5).
 """
 
 from __future__ import annotations

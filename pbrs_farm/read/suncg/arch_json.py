@@ -1,4 +1,4 @@
-"""SUNCG v2's wall/<id>/<id>.arch.json -> structure items and openings (suncg section 1.7).
+"""SUNCG v2's wall/<id>/<id>.arch.json -> structure items and openings (docs/spec/suncg.md section 1.7).
 
 No effects. Walls become solids of their own depth, outward from their points; floors and ceilings
 slabs upwards from their offset, as v1's released meshes are (the format does not say which way it

@@ -1,4 +1,4 @@
-"""SUNCG's house.json -> plain records, checked (suncg sections 1.1-1.6); no effects."""
+"""SUNCG's house.json -> plain records, checked (docs/spec/suncg.md sections 1.1-1.6); no effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SUNCG's metadata tables, read from the user's own root (suncg section 2); no effects.
+"""SUNCG's metadata tables, read from the user's own root (docs/spec/suncg.md section 2); no effects.
 
 No table is shipped: where the root lacks one, the house is read without it and a note says so.
 """

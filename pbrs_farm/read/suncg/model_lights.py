@@ -1,4 +1,4 @@
-"""Lights of a placed SUNCG model, each with the bulbs that emit it (suncg section 2); no effects."""
+"""Lights of a placed SUNCG model, each with the bulbs that emit it (docs/spec/suncg.md section 2); no effects."""
 
 from __future__ import annotations
 

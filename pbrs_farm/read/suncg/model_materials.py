@@ -1,4 +1,4 @@
-"""Materials and textures of a SUNCG house (suncg sections 1.5, 1.6); reads textures of the root."""
+"""Materials and textures of a SUNCG house (docs/spec/suncg.md sections 1.5, 1.6); reads textures of the root."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_TEXTURE_BYTES: Final = 64_000_000
 GREY: Final = (0.8, 0.8, 0.8)
 WHITE: Final = (1.0, 1.0, 1.0)
 DEFAULT_WALLS: Final = ("wallp_1_1", "wallp_1_2")
-"""Textures of walls that nobody painted; the published pictures show them white (section 6)."""
+"""Textures of walls that nobody painted; the published pictures show them white (docs/spec/suncg.md section 6)."""
 
 
 class ModelMaterials:

@@ -1,4 +1,4 @@
-"""Nodes of a SUNCG house -> items placed in the world (suncg sections 1.3-1.6).
+"""Nodes of a SUNCG house -> items placed in the world (docs/spec/suncg.md sections 1.3-1.6).
 
 Effect: reads the models and textures they name.
 """
@@ -36,7 +36,7 @@ _WALL_GROUP: Final = re.compile(r"Wall(?:Inside|Outside)#.*_(\d+)")
 BOX_FACES: Final = ((1, 1, 0), (1, -1, 1), (0, 1, 2), (0, -1, 3), (2, 1, 4), (2, -1, 5))
 """(axis, sign, material) of a Box's faces in sstk's order, which made the published pictures.
 
-GAPS exchanges the materials of -x and +x (suncg section 1.5).
+GAPS exchanges the materials of -x and +x (docs/spec/suncg.md section 1.5).
 """
 
 
@@ -99,7 +99,7 @@ def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item
 
 
 def _row(table: dict[str, _T], variant: str, model_id: str) -> _T | None:
-    """The row of a model; a variant such as 122_0 has the row of its model (section 2)."""
+    """The row of a model; a variant such as 122_0 has the row of its model (docs/spec/suncg.md section 2)."""
     for name in (variant, model_id, re.sub(r"_\d$", "", model_id)):
         if name in table:
             return table[name]

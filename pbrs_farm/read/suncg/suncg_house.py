@@ -1,4 +1,4 @@
-"""A SUNCG house (v1, or v2 by its arch.json) -> House, after spec/suncg sections 1 and 2. Effect: reads files below root."""
+"""A SUNCG house (v1, or v2 by its arch.json) -> House (docs/spec/suncg.md sections 1 and 2). Effect: reads files below root."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Holes that doors and windows have in released walls, found in the walls' meshes; no effects.
 
-Released walls are cut already (suncg section 1.5): there the quad is the hole itself and the cutter
+Released walls are cut already (docs/spec/suncg.md section 1.5): there the quad is the hole itself and the cutter
 its plug, of the wall's thickness. In a wall without a hole they are the door's or window's own size.
 """
 

@@ -1,6 +1,6 @@
 """Tone mapping: radiance to 8-bit sRGB, exposed by the log-average; pure numpy, no effects.
 
-`released` is Reinhard's global operator as the published images used it (spec/suncg.md section 5:
+`released` is Reinhard's global operator as the published images used it (docs/spec/suncg.md section 5:
 key 0.8, burn 0.2); `photo`, the default, rolls highlights off.
 """
 

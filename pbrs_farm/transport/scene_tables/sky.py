@@ -1,6 +1,6 @@
 """Sky: outdoor light as one latitude-longitude image of the dome and one sun; no effects.
 
-Analytic skies and panorama have one photometric scale (spec/sky.md): the dome without its sun
+Analytic skies and panorama have one photometric scale (docs/spec/sky.md): the dome without its sun
 gives `sky_lx` on open level ground, the sun at most `sun_lx` more. Rows run from the zenith (+y,
 row 0) to the nadir, columns with the azimuth atan2(x, -z).
 """

@@ -284,7 +284,7 @@ def write_large_root(
 ) -> str:
     """One long room with n_nodes objects of n_models models of 2 detail^2 triangles; its id.
 
-    1,400 faces a model is the mean of the 29 real models that were looked at (suncg section 1.5).
+    1,400 faces a model is the mean of the 29 real models that were looked at (docs/spec/suncg.md section 1.5).
     """
     _write_textures(root)
     _write_models(root)
