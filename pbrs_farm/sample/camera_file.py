@@ -22,20 +22,22 @@ class GivenCamera(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-    eye: Vector | None = None
+    eye: Vector | None = None  # metres
     towards: Vector | None = None
     up: Vector = (0.0, 1.0, 0.0)
     world_from_camera: tuple[Row, Row, Row, Row] | None = None
-    hfov_rad: Annotated[float, Field(gt=0, lt=3.1)] = PAPER_HFOV_RAD
+    hfov_rad: Annotated[float, Field(gt=0, lt=3.1)] = PAPER_HFOV_RAD  # of the picture's width
 
     @model_validator(mode="after")
     def _has_one_pose(self) -> GivenCamera:
+        # Ask for exactly one of the two forms.
         looks = self.eye is not None and self.towards is not None
         if looks == (self.world_from_camera is not None):
             raise ValueError("give eye and towards, or world_from_camera")
         if looks and np.linalg.norm(np.cross(self.towards, self.up)) < 1e-9:  # type: ignore[arg-type]
             raise ValueError("towards and up are parallel or zero")
         if self.world_from_camera is not None:
+            # Accept a rotation without mirroring or scale, to a ten-thousandth.
             rotation = np.array(self.world_from_camera)[:3, :3]
             proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4)
             if not proper or np.linalg.det(rotation) < 0:
@@ -60,11 +62,13 @@ def cameras_from_file_text(text: str, file: str, width_px: int, height_px: int) 
 
     Raises BadInput with the file and the place.
     """
+    # Tell the two formats apart by their first character.
     if not text.lstrip().startswith("["):
         return [line.camera for line in cameras_from_text(text, file, width_px, height_px)]
     try:
         given = _CAMERAS.validate_json(text)
     except ValidationError as error:
+        # Name the first camera and field that pydantic rejects.
         first = error.errors()[0]
         place = "camera " + ".".join(str(part) for part in first["loc"])
         raise BadInput(file, place, first["msg"]) from None

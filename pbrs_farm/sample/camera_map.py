@@ -22,6 +22,7 @@ from pbrs_farm.sample.rejection import Verdict
 from pbrs_farm.sample.report import RoomReport
 from pbrs_farm.sample.sampler import Sampling
 
+# Colour the dots by verdict.
 COLOURS: Final = {
     Verdict.OUTSIDE_ROOM: "#d9d9d9",
     Verdict.NEAR_OBSTACLE: "#e6701d",
@@ -32,11 +33,10 @@ COLOURS: Final = {
     Verdict.LOWER_SCORE: "#5aa469",
     Verdict.WINNER: "#0b5fff",
 }
-"""Colour of each verdict's dots."""
 
-_PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0
-_ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = 16.0, 12.0, 0.56, 200.0
-_ROOM, _FURNITURE, _WALL, _INK = "#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222"
+_PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0  # scale, largest width of a panel, border
+_ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = (16.0, 12.0, 0.56, 200.0)  # px of text
+_ROOM, _FURNITURE, _WALL, _INK = ("#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222")  # fills
 
 
 def camera_map_svg(house: House, sampling: Sampling) -> str:
@@ -52,6 +52,7 @@ def camera_map_rgb(house: House, sampling: Sampling) -> NDArray[np.uint8]:
 def camera_map(house: House, sampling: Sampling) -> Drawing:
     """The map of a house's sampling; x of the world to the right, z down."""
     marks: list[Mark] = []
+    # Draw the levels side by side, each at the scale that fits.
     left, bottom = _MARGIN, _MARGIN
     for level in house.levels:
         rooms = [room for room in house.rooms if room.level_id == level.id]
@@ -65,6 +66,7 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
         marks += _level_marks(house, sampling, level.id, panel)
         left += scale * (x1 - x0) + 2 * _MARGIN
         bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
+    # Write the legend and the reasons to the right of the last level.
     notes = _notes(sampling)
     marks += [_shifted(mark, left) for mark in notes]
     height = max(bottom, *(mark.points[0][1] for mark in notes)) + _MARGIN
@@ -90,6 +92,7 @@ def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel)
         for room in rooms.values()
         if len(room.polygon) >= 3
     ]
+    # Draw from the floor up: rooms, furniture and walls, candidates, names, winners.
     items = [item for item in house.items if item.level_id == level_id]
     for item in items:
         marks += _footprint(item, panel)
@@ -118,11 +121,13 @@ def _footprint(item: Item, panel: _Panel) -> list[Mark]:
     if item.kind is ItemKind.WALL:
         marks = []
         for surface in item.surfaces:
+            # Take faces nearer to level than 60 degrees.
             corners = triangle_corners(surface.positions, surface.faces)
             for triangle in corners[np.abs(unit_normals(corners)[:, 1]) > 0.5]:
                 points = tuple(panel(x, z) for x, _y, z in triangle)
                 marks.append(Mark("polygon", points, _WALL))
         return marks
+    # Draw anything else as its convex hull in plan.
     plan = np.concatenate([s.positions[:, [0, 2]] for s in item.surfaces])
     hull = shapely.convex_hull(shapely.multipoints(plan))
     if not isinstance(hull, shapely.Polygon):
@@ -134,6 +139,7 @@ def _footprint(item: Item, panel: _Panel) -> list[Mark]:
 def _winner(view: View, panel: _Panel) -> list[Mark]:
     """A wedge of the camera's field of view, half a metre long, and the view's id."""
     camera = view.camera
+    # Span the wedge by the horizontal field of view.
     half = math.atan(0.5 * camera.intrinsics.width_px / camera.intrinsics.fx)
     heading = math.atan2(camera.towards[2], camera.towards[0])
     x, _y, z = camera.eye
@@ -152,9 +158,11 @@ def _winner(view: View, panel: _Panel) -> list[Mark]:
 
 def _notes(sampling: Sampling) -> list[Mark]:
     """Legend and reasons, as marks whose x counts from 0."""
+    # Count verdicts over all rooms.
     counts = np.zeros(len(Verdict), np.int64)
     for trace in sampling.traces:
         counts += np.bincount(trace.verdict, minlength=len(Verdict))
+    # List the verdicts with their colours, then rooms, then notes.
     rows: list[tuple[str, str | None]] = []
     for verdict in Verdict:
         text = f"{verdict.label.replace('_', ' ')}: {counts[verdict]}"

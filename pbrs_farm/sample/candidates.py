@@ -18,16 +18,12 @@ from pbrs_farm.core.recipe import CameraFields
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:
-    """N viewpoints of one room, sector by sector, cells in order of z, then x.
+    """N viewpoints of one room, sector by sector, cells in order of z, then x."""
 
-    eye: (N, 3) float64, metres. towards: (N, 3) float64 unit. sector: (N,) int32.
-    cell: (N, 2) int32, column along x and row along z.
-    """
-
-    eye: NDArray[np.float64]
-    towards: NDArray[np.float64]
-    sector: NDArray[np.int32]
-    cell: NDArray[np.int32]
+    eye: NDArray[np.float64]  # (N, 3) metres
+    towards: NDArray[np.float64]  # (N, 3) unit
+    sector: NDArray[np.int32]  # (N,)
+    cell: NDArray[np.int32]  # (N, 2) column along x, row along z
 
     def __len__(self) -> int:
         return len(self.sector)
@@ -44,6 +40,7 @@ def cameras_looking(
     up: tuple[float, float, float] = (0.0, 1.0, 0.0),
 ) -> list[Camera]:
     """Camera.look for many at once: eyes, towards (N, 3), neither parallel to up."""
+    # Build OpenGL axes: x right, y up, z back.
     back = -towards / np.linalg.norm(towards, axis=1, keepdims=True)
     right = np.cross(np.array(up), back)
     right /= np.linalg.norm(right, axis=1, keepdims=True)
@@ -55,13 +52,13 @@ def cameras_looking(
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Where a room is sampled: plan bounds and the height that eye heights are above, metres."""
+    """Where a room is sampled: bounds in plan, metres."""
 
     x_min: float
     z_min: float
     x_max: float
     z_max: float
-    base_y: float
+    base_y: float  # eye heights count from here
 
 
 def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ...]) -> Candidates:
@@ -78,6 +75,7 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
     step = 2 * np.pi / fields.n_sectors
     eyes, directions = [], []
     for sector in range(fields.n_sectors):
+        # Draw six numbers per cell: x, z, azimuth, height, and two for the tilt.
         u = uniforms(int(keys.digest(*names, sector)[:16], 16), cell, 6)
         x = grid.x_min + (column + u[:, 0]) * fields.cell_m
         z = grid.z_min + (row + u[:, 1]) * fields.cell_m
@@ -85,6 +83,7 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
         azimuth = (sector + u[:, 2]) * step
         tilt = np.deg2rad(fields.tilt_deg + fields.tilt_sd_deg * _normal(u[:, 4], u[:, 5]))
         eyes.append(np.stack([x, grid.base_y + height, z], axis=1))
+        # Look along the azimuth, tilted down.
         directions.append(
             np.stack(
                 [np.cos(azimuth) * np.cos(tilt), -np.sin(tilt), np.sin(azimuth) * np.cos(tilt)],
@@ -112,10 +111,12 @@ def uniforms(key: int, cell: NDArray[np.int32], n: int) -> NDArray[np.float64]:
 
     SplitMix64's finalizer (Steele et al. 2014) over key, column, row and the number's index.
     """
+    # Mix key, column and row into one state, then a number per index.
     state = np.full(len(cell), key % 2**64, np.uint64)
     for part in (cell[:, 0], cell[:, 1]):
         state = _mixed(state ^ part.astype(np.int64).astype(np.uint64))
     numbers = [_mixed(state ^ np.uint64(k)) for k in range(n)]
+    # Keep 53 bits, as many as a float64 holds.
     return np.stack([(x >> np.uint64(11)).astype(np.float64) * 2.0**-53 for x in numbers], axis=1)
 
 
@@ -125,7 +126,7 @@ def _normal(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    x = x + np.uint64(0x9E3779B97F4A7C15)
+    x = x + np.uint64(0x9E3779B97F4A7C15)  # SplitMix64 (Steele et al. 2014)
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pbrs_farm.core.house import Geometry
 from pbrs_farm.core.mesh import distances_to_triangles
 
-_PAIRS: Final = 1 << 19
-_POINTS: Final = 1 << 12
+_PAIRS: Final = 1 << 19  # distances computed at once: bounds memory
+_POINTS: Final = 1 << 12  # points asked of the tree at once
 
 
 def near_any_triangle(
@@ -29,6 +29,7 @@ def near_any_triangle(
     corners = _corners_around(points, geometry, distance_m)
     if not len(corners):
         return near
+    # Find pairs whose boxes meet in plan by a tree, in height by comparison.
     low, high = corners.min(1) - distance_m, corners.max(1) + distance_m
     tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 2], high[:, 0], high[:, 2]))
     for start in range(0, len(points), _POINTS):
@@ -37,6 +38,7 @@ def near_any_triangle(
         y = part[point, 1]
         kept = (y >= low[triangle, 1]) & (y <= high[triangle, 1])
         point, triangle = point[kept], triangle[kept]
+        # Compute the exact distances of the pairs that are left.
         for first in range(0, len(point), _PAIRS):
             i, t = point[first : first + _PAIRS], triangle[first : first + _PAIRS]
             near[start + i[distances_to_triangles(part[i], corners[t]) <= distance_m]] = True

@@ -16,27 +16,23 @@ Shape = Literal["polygon", "line", "dot", "text"]
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """One shape. points: pixels, x right, y down; one point for a dot or text (left, middle).
-
-    colour: "#rrggbb". size: line width, dot radius or letter height, px. title: shown by a
-    browser over the shape.
-    """
+    """One shape of a drawing."""
 
     shape: Shape
-    points: tuple[tuple[float, float], ...]
-    colour: str
-    size: float = 1.0
+    points: tuple[tuple[float, float], ...]  # px, x right, y down; one for a dot or text
+    colour: str  # "#rrggbb"
+    size: float = 1.0  # px: line width, dot radius or letter height
     text: str = ""
-    title: str = ""
+    title: str = ""  # shown by a browser over the shape
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """Marks on a white sheet of width x height px, later ones on top."""
+    """Marks on a white sheet."""
 
-    width: int
+    width: int  # px
     height: int
-    marks: tuple[Mark, ...]
+    marks: tuple[Mark, ...]  # later ones on top
 
     def svg(self) -> str:
         """The drawing as a whole SVG file."""
@@ -52,11 +48,13 @@ class Drawing:
 
     def rgb(self) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 sRGB, drawn at twice the size and halved."""
+        # Paint shapes at twice the size and halve it: edges become smooth.
         big = Image.new("RGB", (2 * self.width, 2 * self.height), "#ffffff")
         pen = ImageDraw.Draw(big)
         for mark in self.marks:
             if mark.shape != "text":
                 _paint(pen, mark)
+        # Set text at the final size, where letters are sharpest.
         image = big.resize((self.width, self.height), Image.Resampling.BOX)
         pen = ImageDraw.Draw(image)
         for mark in self.marks:

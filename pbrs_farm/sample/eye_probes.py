@@ -19,18 +19,16 @@ from pbrs_farm.sample.candidates import cameras_looking
 Counter = Callable[[Sequence[Camera]], NDArray[np.uint32]]
 """Pixels of each item in each camera: (n_cameras, n_items + 1), column 0 = nothing."""
 
+# An object that covers more of all directions, and whose box holds the eye, encloses it.
 MAX_OBJECT_SHARE: Final = 0.75
-"""An object that covers more of all directions, and whose box holds the eye, encloses it."""
-
+# An object whose box is larger is no furniture but a building's shell: being inside is right.
 MAX_OBJECT_M3: Final = 12.0
-"""An object whose box is larger is no furniture but a building's shell: being inside is right."""
-
+# A wall, floor or ceiling that covers more of all directions encloses the eye.
 MAX_STRUCTURE_SHARE: Final = 0.97
-"""A wall, floor or ceiling that covers more of all directions encloses the eye."""
 
-_CUBE_PX: Final = 12
-_COUNTS_PER_CALL: Final = 1 << 22
-_CAMERAS_PER_CALL: Final = 384
+_CUBE_PX: Final = 12  # width of a face of the cube around the eye
+_COUNTS_PER_CALL: Final = 1 << 22  # numbers in a table of counts: bounds memory
+_CAMERAS_PER_CALL: Final = 384  # a multiple of the six faces of a cube
 _AXES: Final = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
 
 
@@ -41,10 +39,12 @@ def counted(
 
     group: cameras in a row that stay together. A counter may give fewer columns, not more.
     """
+    # Keep cameras of a group in one part.
     most = max(1, min(_CAMERAS_PER_CALL, _COUNTS_PER_CALL // (n_items + 1)) // group) * group
     for start in range(0, len(cameras), most):
         part = slice(start, min(start + most, len(cameras)))
         rows = counter(cameras[part])
+        # Add the columns of items that no camera saw.
         padded = np.zeros((len(rows), n_items + 1), np.uint32)
         padded[:, : rows.shape[1]] = rows
         yield part, padded
@@ -55,6 +55,7 @@ def not_above_floor(house: House, eyes: NDArray[np.float64], counter: Counter) -
 
     So it is above a low or sloped ceiling, above a wall, or inside one.
     """
+    # Look straight down with one pixel.
     pencil = Intrinsics.from_hfov(1, 1, 1e-4)
     down = np.array([0.0, -1.0, 0.0])
     cameras = cameras_looking(pencil, eyes, np.broadcast_to(down, eyes.shape), (0.0, 0.0, 1.0))
@@ -75,6 +76,7 @@ def enclosed(house: House, eyes: NDArray[np.float64], counter: Counter) -> NDArr
     bounds, most = _enclosing(house)
     inside = np.zeros(len(eyes), np.bool_)
     for part, rows in counted(counter, cameras, len(house.items), group=6):
+        # Add up the six faces, and compare with what encloses each item's kind.
         share = rows[:, 1:].reshape(-1, 6, len(house.items)).sum(1) / (6 * _CUBE_PX**2)
         which = slice(part.start // 6, part.stop // 6)
         eye = eyes[which, None, :]
@@ -85,6 +87,7 @@ def enclosed(house: House, eyes: NDArray[np.float64], counter: Counter) -> NDArr
 
 def _cube_poses(eyes: NDArray[np.float64]) -> NDArray[np.float64]:
     """(6 N, 4, 4) poses that look from each eye along the six axes, their pictures a cube."""
+    # Turn six cameras at the origin, then move copies to every eye.
     pencil, zero = Intrinsics.from_hfov(1, 1), np.zeros(3)
     poses = np.zeros((len(eyes), 6, 4, 4))
     for k, axis in enumerate(_AXES):

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 
-N_VIEWS: Final = 20
-MIN_DIAGONALS, MAX_DIAGONALS = 1.5, 4.5
-POLE_RAD: Final = np.deg2rad(1.0)
+N_VIEWS: Final = 20  # per object, paper section 4.1
+MIN_DIAGONALS, MAX_DIAGONALS = 1.5, 4.5  # from the box's middle to the eye
+POLE_RAD: Final = np.deg2rad(1.0)  # nearer to a pole the camera takes another up vector
 
 _UP, _UP_AT_POLES = (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)
 
@@ -41,9 +41,11 @@ def object_views(
     rng = np.random.default_rng(int(keys.digest(seed, *names)[:16], 16))
     views = []
     for k in range(n_views):
+        # Draw the vertex, then the distance.
         vertex = int(rng.integers(len(vertices)))
         distance = diagonal * rng.uniform(MIN_DIAGONALS, MAX_DIAGONALS)
         outwards = vertices[vertex]
+        # Keep the camera upright where that is defined.
         at_pole = np.arccos(min(1.0, abs(float(outwards[1])))) <= POLE_RAD
         up = _UP_AT_POLES if at_pole else _UP
         camera = Camera.look(intrinsics, centre + distance * outwards, -outwards, up)
@@ -58,6 +60,7 @@ def icosphere(n_subdivisions: int) -> NDArray[np.float64]:
     """
     vertices, faces = _icosahedron()
     for _ in range(n_subdivisions):
+        # Make one middle per edge, on the sphere, and four faces of each.
         edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         unique, place = np.unique(edges, axis=0, return_inverse=True)
         middles = vertices[unique].sum(1)
@@ -73,13 +76,13 @@ def icosphere(n_subdivisions: int) -> NDArray[np.float64]:
 
 def _icosahedron() -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """12 unit vertices, poles first and last, and 20 faces."""
-    height, radius = 1 / np.sqrt(5), 2 / np.sqrt(5)
+    height, radius = 1 / np.sqrt(5), 2 / np.sqrt(5)  # of the two rings of five vertices
     turn = 2 * np.pi / 5 * np.arange(5)
     upper = np.stack([radius * np.cos(turn), np.full(5, height), radius * np.sin(turn)], axis=1)
     lower = upper @ np.diag([-1.0, -1.0, -1.0])
     vertices = np.concatenate([[[0, 1, 0]], upper, lower, [[0, -1, 0]]])
 
-    # A face is three vertices at the edge's length from each other.
+    # Take as a face any three vertices at the edge's length from each other.
     gaps = np.linalg.norm(vertices[:, None] - vertices[None], axis=2)
     edge = gaps[gaps > 0].min()
     near = np.isclose(gaps, edge)

@@ -15,7 +15,7 @@ from pbrs_farm.sample.clearance import near_any_triangle
 from pbrs_farm.sample.eye_probes import Counter, enclosed, not_above_floor
 from pbrs_farm.sample.rejection import Verdict
 
-_CHUNK = 4096
+_CHUNK = 4096  # candidates judged at once: bounds memory
 
 
 def room_grid(room: Room) -> Grid:
@@ -46,6 +46,7 @@ def rejections(
     """
     verdict = np.full(len(candidates), Verdict.LOWER_SCORE, np.uint8)
     eye = candidates.eye
+    # Sort out by the polygon first, which costs least.
     inside = shapely.contains_xy(room_shape(room), eye[:, 0], eye[:, 2])
     verdict[~inside] = Verdict.OUTSIDE_ROOM
 
@@ -57,6 +58,7 @@ def rejections(
     places = np.flatnonzero(inside)
     for start in range(0, len(places), _CHUNK):
         left = places[start : start + _CHUNK]
+        # Ask each rule about the candidates that all rules before it passed.
         for rule, breaks in rules:
             rejected = breaks(eye[left])
             verdict[left[rejected]] = rule

@@ -14,8 +14,8 @@ from pbrs_farm.sample.eye_probes import Counter
 from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.rejection import Verdict
 
-_MASK_CELL_M = 0.05
-_MAX_MASK_CELL_M = 0.1
+_MASK_CELL_M = 0.05  # without a clearance
+_MAX_MASK_CELL_M = 0.1  # else half the clearance, but at most this
 
 
 def room_grid(house: House, room: Room) -> Grid:
@@ -41,6 +41,7 @@ def rejections(
     No clearance in three dimensions and no look around: the published sampler had neither.
     """
     verdict = np.full(len(candidates), Verdict.LOWER_SCORE, np.uint8)
+    # Read the masks between their nodes, as the published program did.
     top = max((i.bounds[1, 1] for i in _items_of(house, room)), default=room.ceiling_y)
     floor, allowed, cell = viewpoint_mask(house, room, fields.clearance_m)
     grid = room_grid(house, room)
@@ -63,12 +64,14 @@ def viewpoint_mask(
     clearance when it is above 0. A grid under 3 nodes a side allows nothing.
     """
     grid = room_grid(house, room)
+    # Lay the nodes over the box of the room and its objects.
     cell = min(clearance_m / 2, _MAX_MASK_CELL_M) if clearance_m > 0 else _MASK_CELL_M
     xs = np.arange(grid.x_min, grid.x_max + cell, cell)
     zs = np.arange(grid.z_min, grid.z_max + cell, cell)
     nodes = np.stack(np.meshgrid(xs, zs), axis=-1).reshape(-1, 2)
     shape = (len(zs), len(xs))
 
+    # Find the floor: where the room's own floor lies, else its polygon.
     floors = [i for i in _items_of(house, room) if i.kind is ItemKind.FLOOR]
     ceilings = [i for i in _items_of(house, room) if i.kind is ItemKind.CEILING]
     floor_top = max((i.bounds[1, 1] for i in floors), default=room.floor_y)
@@ -78,14 +81,16 @@ def viewpoint_mask(
     else:
         floor = shapely.intersects_xy(room_shape(room), nodes[:, 0], nodes[:, 1])
 
+    # Block what any triangle between floor and ceiling covers in plan.
     triangles = _triangles([i for i in house.items if _is_obstacle(i, room)])
-    eps = 1e-3
+    eps = 1e-3  # triangles that only touch floor or ceiling block nothing
     y = triangles[:, :, 1]
     plan_low, plan_high = triangles.min(1)[:, [0, 2]], triangles.max(1)[:, [0, 2]]
     met = (y.max(1) > floor_top + eps) & (y.min(1) < ceiling_bottom - eps)
     met &= (plan_low >= (xs[0], zs[0])).all(1) & (plan_high <= (xs[-1], zs[-1])).all(1)
     blocked = _near(nodes, _plan_shapes(triangles[met]), cell / 2)
 
+    # Erode by the clearance.
     allowed = (floor & ~blocked).reshape(shape)
     if min(shape) < 3:
         allowed[:] = False
@@ -116,6 +121,7 @@ def _plan_shapes(triangles: NDArray[np.float64]) -> NDArray[np.object_]:
     """Plan projections (x, z): triangles, or lines where they stand upright."""
     plan = triangles[:, :, [0, 2]]
     e, f = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
+    # Draw triangles that stand upright as lines.
     upright = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]) < 1e-9
     ring = plan[:, [0, 1, 2, 0]]
     shapes = np.empty(len(plan), np.object_)

@@ -10,35 +10,30 @@ class _Record(BaseModel):
 
 
 class SectorReport(_Record):
-    """One sector of a room. n_candidates = the sum of refused, + those kept by every rule.
-
-    refused: rule -> candidates it was the first to reject. n_kept: candidates that kept every
-    rule, the winners included. n_rescored: how many of them were scored at full size.
-    Scores are in pixels at full size (preset released: a sum of logarithms); None = no camera.
-    """
+    """One sector of a room. Scores are pixels at full size, or the released sum of logarithms."""
 
     sector: int
-    n_candidates: int
-    refused: dict[str, int]
-    n_kept: int
-    n_rescored: int
+    n_candidates: int  # the sum of refused, and n_kept
+    refused: dict[str, int]  # rule -> candidates it was the first to reject
+    n_kept: int  # candidates that no rule rejected, the winners included
+    n_rescored: int  # how many were scored at full size
     views: tuple[str, ...] = ()
-    winner_score: float | None = None
+    winner_score: float | None = None  # None = no camera
     runner_up_score: float | None = None
-    reason: str = ""
+    reason: str = ""  # why there is no camera
 
 
 class RoomReport(_Record):
-    """One room. reason: why it was not sampled at all, or ""."""
+    """One room."""
 
     room_id: str
     name: str
-    reason: str = ""
+    reason: str = ""  # why it was not sampled at all
     sectors: tuple[SectorReport, ...] = ()
 
 
 class CameraReport(_Record):
-    """What the sampler did with a house; notes: what is not about one sector."""
+    """What the sampler did with a house."""
 
     preset: str
     source: str
@@ -46,7 +41,7 @@ class CameraReport(_Record):
     n_candidates: int
     refused: dict[str, int]
     rooms: tuple[RoomReport, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what is not about one sector
 
 
 def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:

@@ -47,10 +47,12 @@ def _camera(words: list[str], file: str, line: int, width_px: int, height_px: in
         raise BadInput(file, place, f"expected 12 numbers, got {len(numbers)}")
     if not np.isfinite(numbers).all():
         raise BadInput(file, place, "a number is not finite")
+    # Read vx vy vz, tx ty tz, ux uy uz, xf, yf, value.
     eye, towards, up = (np.array(numbers[k : k + 3]) for k in (0, 3, 6))
-    half_angle, score = numbers[9], numbers[11]
+    half_angle, score = numbers[9], numbers[11]  # yf follows from xf and the shape of the picture
     if not 0 < half_angle < math.pi / 2:
         raise BadInput(file, place, f"half angle {half_angle} is not within 0..pi/2")
+    # Reject an up vector along the view.
     across = np.linalg.norm(np.cross(towards, up))
     if across <= 1e-6 * np.linalg.norm(towards) * np.linalg.norm(up):
         raise BadInput(file, place, "towards and up are parallel or zero")
@@ -64,7 +66,7 @@ def text_from_views(views: Sequence[View]) -> str:
     lines = []
     for view in views:
         i, pose = view.camera.intrinsics, view.camera.world_from_camera
-        xf = math.atan(0.5 * i.width_px / i.fx)
+        xf = math.atan(0.5 * i.width_px / i.fx)  # half the horizontal field of view, radians
         yf = math.atan(0.5 * i.height_px / i.fy)
         groups = (view.camera.eye, view.camera.towards, pose[:3, 1], (xf, yf), (view.score,))
         lines.append("  ".join(" ".join(f"{float(x):g}" for x in group) for group in groups))
@@ -80,6 +82,7 @@ def names_from_text(text: str, file: str) -> list[tuple[str, int]]:
     """(room id, sector) of each line of a room_camera_name.txt. Raises BadInput."""
     names = []
     for number, line in enumerate(text.split(), 1):
+        # Split at the last underscore: room ids contain some.
         room, _, sector = line.removeprefix("Room#").rpartition("_")
         if not line.startswith("Room#") or not room or not sector.isdigit():
             raise BadInput(file, f"line {number}", f"expected Room#<room>_<sector>, got {line!r}")

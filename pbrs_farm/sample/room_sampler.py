@@ -38,17 +38,16 @@ from pbrs_farm.sample.view_score import (
     released_score,
 )
 
-MAX_CELLS = 400_000
-"""A room of more cells (25,000 square metres at 0.25 m) is rejected, so that memory is bounded."""
+MAX_CELLS = 400_000  # 25,000 square metres at 0.25 m; a larger room is rejected to bound memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomTrace:
-    """Every candidate of a room, for the map. verdict: (N,) uint8 of Verdict."""
+    """Every candidate of a room, for the map."""
 
     room_id: str
     candidates: Candidates
-    verdict: NDArray[np.uint8]
+    verdict: NDArray[np.uint8]  # (N,) of Verdict
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,12 +79,10 @@ class RoomSampler:
         """The room's views, its report and all its candidates."""
         names = (self.seed, self.house.id, self.room.id)
         candidates = grid_candidates(self._grid(), self.fields, names)
-        rules = (
-            released_rules.rejections
-            if self.fields.preset == "released"
-            else paper_rules.rejections
+        rules = released_rules if self.fields.preset == "released" else paper_rules
+        verdict = rules.rejections(
+            self.house, self.room, self.fields, candidates, self.geometry, self.counter
         )
-        verdict = rules(self.house, self.room, self.fields, candidates, self.geometry, self.counter)
         views: list[View] = []
         sectors: list[SectorReport] = []
         for sector in range(self.fields.n_sectors):
@@ -99,13 +96,14 @@ class RoomSampler:
         self, sector: int, candidates: Candidates, verdict: NDArray[np.uint8]
     ) -> tuple[list[View], SectorReport]:
         """Choose among a sector's candidates; writes their verdicts."""
+        # Choose among the candidates that no rule of place rejected.
         of_sector = np.flatnonzero(candidates.sector == sector)
         eligible = of_sector[verdict[of_sector] == Verdict.LOWER_SCORE]
         full = FullScores(lambda which: self._full(candidates, eligible[which]))
         coarse, share, image_verdicts = self._coarse(candidates, eligible)
         chosen = self._chosen(coarse, share, full)
 
-        # What was seen at full size is image_verdicts by that, the others by their coarse picture.
+        # Judge by the full-size picture what has one, by the coarse picture what has not.
         for k, rows in full.counts.items():
             image_verdicts[k] = self._image_verdicts(rows[None])[0]
         image_verdicts[chosen] = Verdict.WINNER
@@ -119,6 +117,7 @@ class RoomSampler:
     def _chosen(self, coarse: Coarse, share: NDArray[np.float32], full: FullScores) -> list[int]:
         best = best_first(coarse, full, margin=None if self._exact else self._margin)
         chosen = [] if best is None else [best]
+        # Add views that show what the chosen ones do not.
         while chosen and len(chosen) < self.fields.per_sector:
             more = next_diverse(coarse, share, chosen, full, self.fields.min_object_fraction)
             if more is None:
@@ -132,13 +131,14 @@ class RoomSampler:
         """Coarse scores, each object's share of the picture when several views are wanted, and
         the verdicts that the coarse pictures give."""
         columns, fraction = self._columns(), self.fields.min_object_fraction
-        keep = self.fields.per_sector > 1
+        keep = self.fields.per_sector > 1  # shares are needed for diversity alone
         n = len(which)
         coarse = Coarse(np.zeros(n, np.bool_), np.zeros(n))
         share = np.zeros((n, len(columns) if keep else 0), np.float32)
         image_verdicts = np.zeros(n, np.uint8)
         cameras = candidates.cameras(which, self._intrinsics(coarse=True))
         for part, rows in counted(self.counter, cameras, len(self.house.items)):
+            # Let pass what the full-size picture might still accept.
             lenient = paper_score(rows, columns, fraction * COARSE_SLACK)
             enough = lenient.n_objects >= self.fields.min_objects
             over = overfill(rows, columns, self.fields)
@@ -159,6 +159,7 @@ class RoomSampler:
 
     def _image_verdicts(self, rows: NDArray[np.uint32]) -> NDArray[np.uint8]:
         """(N,) the verdict of the rules about the picture, before any comparison of scores."""
+        # Judge by the number of objects first, then by the largest one.
         scored = self._scored(rows)
         image_verdicts = np.full(len(rows), Verdict.LOWER_SCORE, np.uint8)
         image_verdicts[(scored.n_objects < self.fields.min_objects) | (scored.score <= 0)] = (
@@ -189,7 +190,7 @@ class RoomSampler:
 
     @property
     def _exact(self) -> bool:
-        # The released score jumps at whole multiples of its least count: coarse says too little.
+        # Skip coarse pictures for the released score: it jumps at multiples of its least count.
         return self.fields.exact or self.fields.preset == "released"
 
     def _intrinsics(self, *, coarse: bool) -> Intrinsics:
@@ -210,6 +211,7 @@ class RoomSampler:
     ) -> View:
         several = self.fields.per_sector > 1
         camera = candidates.cameras(np.array([index]), self._intrinsics(coarse=False))[0]
+        # List every object in the view, whatever the score counted.
         columns = object_columns(self.house)
         return View(
             id=keys.view_id(self.room.id, sector, k if several else None),
@@ -247,5 +249,6 @@ class RoomSampler:
 
 
 def _label_counts(rejected: dict[str, int]) -> str:
+    # Name the rule that rejected most first.
     most = sorted(rejected.items(), key=lambda pair: -pair[1])
     return ", ".join(f"{n} {rule.replace('_', ' ')}" for rule, n in most)

@@ -49,6 +49,7 @@ def sample_cameras(house: House, fields: CameraFields, seed: int, counter: Count
     traces: list[RoomTrace] = []
     for room in house.rooms:
         sampler = RoomSampler(house, room, fields, seed, counter, geometry)
+        # Report a room that cannot be sampled with its reason.
         reason = sampler.explain_rejection()
         if reason:
             rooms.append(RoomReport(room_id=room.id, name=room.name, reason=reason))
@@ -57,6 +58,7 @@ def sample_cameras(house: House, fields: CameraFields, seed: int, counter: Count
         views += found
         rooms.append(report)
         traces.append(trace)
+    # Order as published: best views of the house first.
     if fields.preset == "released":
         views.sort(key=lambda view: -view.score)
     return Sampling(tuple(views), _report(fields, views, tuple(rooms)), tuple(traces))

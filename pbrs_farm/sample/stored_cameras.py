@@ -17,8 +17,7 @@ from pbrs_farm.sample.eye_probes import Counter, counted
 from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.view_score import object_columns
 
-OUTSIDE = "out"
-"""Room id in the views of cameras that stand in no room."""
+OUTSIDE = "out"  # room id in the views of cameras that stand in no room
 
 
 def stored_views(
@@ -30,11 +29,13 @@ def stored_views(
     """
     cameras, notes = [], []
     for stored in house.cameras:
+        # Leave out poses that are no numbers, look nowhere, or see too wide.
         numbers = np.concatenate([stored.eye, stored.towards, [stored.hfov_rad]])
         usable = np.isfinite(numbers).all() and np.linalg.norm(stored.towards) > 0
         if not usable or not 0 < stored.hfov_rad < math.pi:
             notes.append(f"stored camera {stored.name!r} has no usable pose and was left out")
             continue
+        # Take another up vector for a camera that looks straight up or down.
         size = (fields.score_width_px, fields.score_height_px)
         intrinsics = Intrinsics.from_hfov(*size, stored.hfov_rad)
         towards = stored.towards / np.linalg.norm(stored.towards)
@@ -56,11 +57,13 @@ def views_from_cameras(
     columns = object_columns(house)
     views: list[View] = []
     used: dict[tuple[str, int], int] = {}
+    # Name each view by room, sector and a running number.
     for camera in cameras:
         room = room_of(house, camera)
         place = (OUTSIDE if room is None else room.id, sector_of(camera, fields.n_sectors))
         k = used[place] = used.get(place, -1) + 1
         views.append(View(keys.view_id(*place, k), *place, camera, origin))
+    # Count what each sees, as the sampler does.
     for part, rows in counted(counter, [v.camera for v in views], len(house.items)):
         score = rows[:, columns].sum(1)
         for row, number in enumerate(range(part.start, part.stop)):
@@ -72,6 +75,7 @@ def views_from_cameras(
 def room_of(house: House, camera: Camera) -> Room | None:
     """The room whose polygon holds the eye and whose floor is the nearest below it, or None."""
     x, y, z = camera.eye
+    # Allow for a floor drawn a little high and an eye just above the ceiling.
     holding = [
         room
         for room in house.rooms

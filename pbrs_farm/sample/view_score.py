@@ -16,10 +16,10 @@ from pbrs_farm.core.recipe import CameraFields
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scored:
-    """Scores of N views. n_objects: (N,) objects large enough. score: (N,) float64, 0 = none."""
+    """Scores of N views."""
 
-    n_objects: NDArray[np.int64]
-    score: NDArray[np.float64]
+    n_objects: NDArray[np.int64]  # (N,) objects large enough
+    score: NDArray[np.float64]  # (N,) 0 = no score
 
 
 def object_columns(house: House) -> NDArray[np.intp]:
@@ -65,8 +65,9 @@ def overfill(
     An object may cover max_item_fraction, a wall (floor, ceiling) max_wall_fraction. counts:
     (N, n_items + 1) pixels. Beyond the paper; 1 switches a rule off.
     """
+    # Compare the largest object and the largest wall with what each may cover.
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
-    others = np.delete(counts, np.append(columns, 0), axis=1)
+    others = np.delete(counts, np.append(columns, 0), axis=1)  # walls, floors, ceilings, the ground
     object_share = counts[:, columns].max(1, initial=0) / pixels
     wall_share = others.max(1, initial=0) / pixels
     over_object = object_share - fields.max_item_fraction
@@ -84,7 +85,8 @@ def released_score(
     pixels = int(counts[0].sum()) if len(counts) else 0
     least = max(1, int(fields.min_object_fraction * pixels))
     objects = counts[:, columns].astype(np.int64)
-    kept = objects > least
+    kept = objects > least  # strictly more
+    # Sum the logarithms of whole multiples of the least count.
     score = np.log(np.where(kept, objects // least, 1)).sum(1)
     n_objects = kept.sum(1)
     return Scored(n_objects, np.where(n_objects >= fields.min_objects, score, 0.0))
