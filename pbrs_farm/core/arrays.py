@@ -51,35 +51,17 @@ def guard(
     return array
 
 
-def frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a C-contiguous, read-only view or copy of array."""
-    contiguous = np.ascontiguousarray(array)
-    if contiguous is array and array.flags.writeable:
-        contiguous = array.view()
-    contiguous.flags.writeable = False
-    return contiguous
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class HitRecord:
-    """What the ray through each pixel's centre hits first: the one source of every label (rule 8).
+    """What the ray through each pixel's centre hits first: the one source of every label (rule 8)."""
 
-    face: (H, W) int32, index into Geometry.faces, -1 = nothing
-    item: (H, W) uint32, instance id, 0 = nothing
-    depth_z: (H, W) float32, metres along the optical axis, 0 = nothing
-    position_world: (H, W, 3) float32, metres, 0 = nothing
-    geo_normal_world, shading_normal_world: (H, W, 3) float32, unit, turned towards the camera,
-        (0, 0, 0) = nothing
-    uv: (H, W, 2) float32 texture coordinates, v up
-    """
-
-    face: NDArray[np.int32]
-    item: ItemBuffer
-    depth_z: DepthZ
-    position_world: NDArray[np.float32]
-    geo_normal_world: UnitVectors
-    shading_normal_world: UnitVectors
-    uv: NDArray[np.float32]
+    face: NDArray[np.int32]  # (H, W) index into Geometry.faces, -1 = nothing
+    item: ItemBuffer  # (H, W) instance id, 0 = nothing
+    depth_z: DepthZ  # (H, W) metres along the optical axis, 0 = nothing
+    position_world: NDArray[np.float32]  # (H, W, 3) metres, 0 = nothing
+    geo_normal_world: UnitVectors  # (H, W, 3) of the triangle, turned towards the camera
+    shading_normal_world: UnitVectors  # (H, W, 3) interpolated, turned towards the camera
+    uv: NDArray[np.float32]  # (H, W, 2) texture coordinates, v up
 
     @property
     def valid(self) -> Mask:

@@ -20,13 +20,13 @@ PAPER_HFOV_RAD = 2 * 0.5534
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """A pinhole camera without distortion. width_px, height_px; fx, fy, cx, cy in pixels."""
+    """A pinhole camera without distortion, in pixels."""
 
     width_px: int
     height_px: int
-    fx: float
+    fx: float  # focal lengths
     fy: float
-    cx: float
+    cx: float  # principal point, from the top left corner
     cy: float
 
     @staticmethod
@@ -50,10 +50,10 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """Intrinsics and pose. world_from_camera: (4, 4) float64, OpenGL axes, metres."""
+    """Intrinsics and pose."""
 
     intrinsics: Intrinsics
-    world_from_camera: Matrix4
+    world_from_camera: Matrix4  # OpenGL axes, metres
 
     @staticmethod
     def look(
@@ -63,6 +63,7 @@ class Camera:
         up: tuple[float, float, float] = (0.0, 1.0, 0.0),
     ) -> Camera:
         """A camera at eye (3,) looking along towards (3,), any length; up must not be parallel to it."""
+        # The camera looks along -z: build the right-handed frame from its back.
         back = -np.asarray(towards, np.float64)
         back = back / np.linalg.norm(back)
         right = np.cross(np.asarray(up, np.float64), back)
@@ -98,6 +99,7 @@ class Camera:
 
     def exact_rays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """As rays, in float64."""
+        # A point of each pixel on the plane z = -1 of the camera: unit length along the axis.
         i = self.intrinsics
         x = (np.arange(i.width_px) + 0.5 - i.cx) / i.fx
         y = -(np.arange(i.height_px) + 0.5 - i.cy) / i.fy
@@ -110,17 +112,12 @@ class Camera:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """A camera with its place in a house. id is `<room>_<sector>`, `_<k>` when several per sector.
+    """A camera with its place in a house."""
 
-    origin: "sampled", "stored" (placed by the home's author) or "file" (given by the user).
-    score: the sampler's score; 0 where there is none.
-    objects: instance id -> covered pixels at the size the score was taken.
-    """
-
-    id: str
+    id: str  # keys.view_id
     room_id: str
     sector: int
     camera: Camera
-    origin: str = "sampled"
-    score: float = 0.0
-    objects: dict[int, int] = field(default_factory=dict)
+    origin: str = "sampled"  # or "stored" (placed by the home's author), "file" (the user's)
+    score: float = 0.0  # the sampler's; 0 where there is none
+    objects: dict[int, int] = field(default_factory=dict)  # instance id -> pixels when scored

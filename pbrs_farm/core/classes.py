@@ -1,7 +1,7 @@
 """The label sets NYU40 and NYU13: names and the map between them; no effects.
 
 Ids start at 1; 0 is "nothing". NYU40: Gupta, Arbelaez, Malik 2013. NYU13: Couprie et al. 2013, by
-the usual 40 to 13 table (SceneNet). `TABLE_VERSION` changes when any row here does.
+the usual 40 to 13 table (SceneNet).
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-
-TABLE_VERSION: Final = 1
 
 NYU40_NAMES: Final = (
     "none", "wall", "floor", "cabinet", "bed", "chair", "sofa", "table", "door", "window",

@@ -27,11 +27,6 @@ def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
     return world_from_camera @ OPENCV_FROM_OPENGL
 
 
-def opengl_world_from_camera(world_from_camera_opencv: Matrix4) -> Matrix4:
-    """Pose of a camera with OpenGL axes from the pose with OpenCV axes."""
-    return world_from_camera_opencv @ OPENCV_FROM_OPENGL
-
-
 def published_normal_from_world(
     normal_world: NDArray[np.floating], world_from_camera: Matrix4
 ) -> NDArray[np.float64]:

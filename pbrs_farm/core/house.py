@@ -55,60 +55,52 @@ class MaterialKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Texture:
-    """An encoded picture (PNG or JPEG), never decoded here. id = first 16 hex of its sha256."""
+    """An encoded picture as its source has it, never decoded here."""
 
-    id: str
+    id: str  # first 16 hex of the data's sha256
     name: str
-    media_type: str
+    media_type: str  # "image/png"
     data: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """A surface's look as its source gives it.
+    """A surface's material as its source gives it.
 
-    diffuse, specular: sRGB-encoded Kd and Ks in 0..1; decode with frames.linear_from_srgb.
     With a texture the colour is diffuse (linear) times texture (linear): readers set diffuse to
-    white where the source means the texture alone. shininess: Phong exponent Ns (0 = none).
-    opacity: d in 0..1. texture_id: key into House.textures. alpha_cutout: texture alpha < 0.5
-    is a hole. is_default: the source names no colour (repair paints default walls white).
+    white where the source means the texture alone.
     """
 
     name: str
     kind: MaterialKind = MaterialKind.OPAQUE
-    diffuse: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    specular: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    shininess: float = 0.0
-    opacity: float = 1.0
-    texture_id: str | None = None
-    alpha_cutout: bool = False
-    is_default: bool = False
+    diffuse: tuple[float, float, float] = (1.0, 1.0, 1.0)  # Kd, sRGB-encoded, 0..1
+    specular: tuple[float, float, float] = (0.0, 0.0, 0.0)  # Ks, sRGB-encoded, 0..1
+    shininess: float = 0.0  # Phong exponent Ns, 0 = none
+    opacity: float = 1.0  # d, 0..1
+    texture_id: str | None = None  # key into House.textures
+    alpha_cutout: bool = False  # texture alpha < 0.5 is a hole
+    is_default: bool = False  # the source names no colour: repair paints such walls white
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """A triangle mesh of one material.
-
-    positions: (V, 3) float32, metres, world. faces: (F, 3) int32, counter-clockwise seen from
-    the front. uvs: (V, 2) float32, v up, repeat wrap, or None. normals: (V, 3) float32 unit
-    shading normals, or None for flat shading. material: index into House.materials.
-    """
+    """A triangle mesh of one material."""
 
     name: str
-    positions: Points
-    faces: NDArray[np.int32]
-    material: int
-    uvs: NDArray[np.float32] | None = None
-    normals: NDArray[np.float32] | None = None
+    positions: Points  # (V, 3) metres, world
+    faces: NDArray[np.int32]  # (F, 3) counter-clockwise seen from the front
+    material: int  # index into House.materials
+    uvs: NDArray[np.float32] | None = None  # (V, 2) v up, repeat wrap
+    normals: NDArray[np.float32] | None = None  # (V, 3) unit shading normals; None = flat
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
-    """An oriented box: centre (3,) and half extents (3,) in metres; columns of axes (3, 3) are unit."""
+    """An oriented box."""
 
-    centre: NDArray[np.float64]
-    half: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    centre: NDArray[np.float64]  # (3,) metres, world
+    half: NDArray[np.float64]  # (3,) half extents, metres
+    axes: NDArray[np.float64]  # (3, 3), unit columns
 
     @property
     def corners(self) -> NDArray[np.float64]:
@@ -119,52 +111,38 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class LightPart:
-    """One light source of a lamp, in the world.
+    """One light source of a lamp, in the world. Its flux: lighting.flux_lm."""
 
-    position, radius_m: the bulb as the source gives it. rgb_linear: colour, linear, largest 1.
-    power, unit, share: see lighting.flux_lm; share is this source's part of its lamp's power.
-    direction, cutoff_rad (half angle), dropoff (exponent of the cosine): spots and lines.
-    position_end: the other end of a line.
-    emitting: indices into Item.surfaces that emit this light (repair adds a sphere where none do).
-    escape: share of the light that leaves the lamp, measured by repair; None = not measured.
-    """
-
-    position: tuple[float, float, float]
+    position: tuple[float, float, float]  # of the bulb as the source gives it, metres
     radius_m: float
-    power: float
+    power: float  # of the whole lamp, in unit
     unit: PowerUnit
-    share: float = 1.0
-    rgb_linear: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    share: float = 1.0  # this source's part of its lamp's power
+    rgb_linear: tuple[float, float, float] = (1.0, 1.0, 1.0)  # largest 1
     form: LightForm = LightForm.POINT
-    direction: tuple[float, float, float] = (0.0, -1.0, 0.0)
-    cutoff_rad: float = 3.141592653589793
-    dropoff: float = 0.0
-    position_end: tuple[float, float, float] | None = None
-    emitting: tuple[int, ...] = ()
-    escape: float | None = None
+    direction: tuple[float, float, float] = (0.0, -1.0, 0.0)  # of spots and lines
+    cutoff_rad: float = 3.141592653589793  # half angle of a spot
+    dropoff: float = 0.0  # exponent of the cosine to the direction
+    position_end: tuple[float, float, float] | None = None  # other end of a line
+    emitting: tuple[int, ...] = ()  # indices into Item.surfaces; repair adds a sphere where none do
+    escape: float | None = None  # light output ratio: share that leaves the lamp; None = unmeasured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Item:
-    """A thing with one instance id and one class: a chair, a wall, a room's floor.
+    """A thing with one instance id and one class: a chair, a wall, a room's floor."""
 
-    id: unique in the house and stable. source_class: the source's own name for it (catalogue id
-    or model id). nyu40: class 0..40, 0 = none. room_id: the room it stands in, or None.
-    box: oriented bounding box, or None (then the axis-aligned one holds).
-    tags: words of the source the stages may need ("mirrored", "unmapped", "boundary_of:0_1").
-    """
-
-    id: str
+    id: str  # unique in the house and stable
     name: str
     kind: ItemKind
     level_id: str
     surfaces: tuple[Surface, ...]
-    nyu40: int = 0
-    source_class: str = ""
-    room_id: str | None = None
+    nyu40: int = 0  # class 0..40, 0 = none
+    source_class: str = ""  # the source's own name of its class: catalogue id or model id
+    room_id: str | None = None  # the room it stands in
     lights: tuple[LightPart, ...] = ()
-    box: Box | None = None
-    tags: tuple[str, ...] = ()
+    box: Box | None = None  # oriented bounding box; None = the axis-aligned one holds
+    tags: tuple[str, ...] = ()  # words of the source: "mirrored", "unmapped", "boundary_of:0_1"
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -193,22 +171,16 @@ class Item:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Opening:
-    """A hole that a door or window cuts into walls.
-
-    cutter: a closed solid in the world that repair subtracts from every wall it touches.
-    quad: (4, 3) corners of the opening's rectangle in the wall's middle plane, in order around.
-    normal: (3,) unit, across the wall, either way. item_id: the door or window, or None.
-    is_cut: the source's walls have the hole already; the cutter then is its plug.
-    """
+    """A hole that a door or window cuts into walls."""
 
     id: str
     level_id: str
-    item_id: str | None
+    item_id: str | None  # the door or window
     is_window: bool
-    cutter: Surface
-    quad: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    is_cut: bool = False
+    cutter: Surface  # closed solid that repair subtracts from every wall it touches
+    quad: NDArray[np.float64]  # (4, 3) corners in the wall's middle plane, in order around
+    normal: NDArray[np.float64]  # (3,) unit, across the wall, either way
+    is_cut: bool = False  # the source's walls have the hole already: the cutter is its plug
 
 
 class Enclosure(StrEnum):
@@ -221,87 +193,77 @@ class Enclosure(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """A room's floor polygon and heights.
+    """A room's floor polygon and heights."""
 
-    id: `<level index>_<room index>`. polygon: (N, 2) float64 plan (x, z), simple, counter-clockwise
-    seen with x right and z up. floor_y, ceiling_y: world y of the walkable surface and of the
-    nominal ceiling. lit_by (set by repair): some of "lamps", "windows", "fallback".
-    """
-
-    id: str
+    id: str  # `<level index>_<room index>`
     name: str
     level_id: str
-    polygon: Points2
-    floor_y: float
-    ceiling_y: float
+    polygon: Points2  # (N, 2) plan (x, z), simple, counter-clockwise with x right and z up
+    floor_y: float  # world y of the walkable surface
+    ceiling_y: float  # world y of the nominal ceiling
     types: tuple[str, ...] = ()
     has_floor: bool = True
     has_ceiling: bool = True
     enclosure: Enclosure = Enclosure.UNKNOWN
     enclosure_reason: str = ""
-    lit_by: tuple[str, ...] = ()
+    lit_by: tuple[str, ...] = ()  # set by repair: some of "lamps", "windows", "fallback"
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A storey. elevation: world y of its floor's top; height: floor to nominal ceiling, metres."""
+    """A storey; metres."""
 
     id: str
     name: str
-    elevation: float
-    height: float
+    elevation: float  # world y of its floor's top
+    height: float  # floor to nominal ceiling
     floor_thickness: float = 0.12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredCamera:
-    """A viewpoint kept in the source. eye, towards: (3,) world. hfov_rad: horizontal, full."""
+    """A viewpoint kept in the source."""
 
     name: str
-    eye: NDArray[np.float64]
-    towards: NDArray[np.float64]
-    hfov_rad: float
+    eye: NDArray[np.float64]  # (3,) world
+    towards: NDArray[np.float64]  # (3,) world
+    hfov_rad: float  # horizontal, full angle
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a house came from and under which terms.
+    """Where a house came from and under which terms; "" where nothing is known."""
 
-    kind: "sweethome3d", "suncg", "gltf" or "builtin". sha256: of the source's bytes.
-    package: distribution package and version it was fetched from, or "".
-    attribution: the line every product made from it must carry, or "".
-    """
-
-    kind: str
+    kind: str  # "sweethome3d", "suncg", "gltf" or "builtin"
     file: str
-    sha256: str
-    package: str = ""
+    sha256: str  # of the source's bytes
+    package: str = ""  # distribution package and version it was fetched from
     author: str = ""
     licence: str = ""
-    attribution: str = ""
+    attribution: str = ""  # the line that every product made from it must carry
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Something wrong but recoverable: kind (a slug such as "missing-texture"), place, text."""
+    """Something wrong but recoverable."""
 
-    kind: str
-    place: str
+    kind: str  # a slug such as "missing-texture"
+    place: str  # where inside the source
     text: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class House:
-    """A house as read, or as repaired (is_repaired). Instance id of items[i] is i + 1."""
+    """A house as read, or as repaired."""
 
     id: str
     name: str
     source: Source
     levels: tuple[Level, ...]
     rooms: tuple[Room, ...]
-    items: tuple[Item, ...]
+    items: tuple[Item, ...]  # the instance id of items[i] is i + 1
     materials: tuple[Material, ...]
-    textures: dict[str, Texture]
+    textures: dict[str, Texture]  # by Material.texture_id
     openings: tuple[Opening, ...] = ()
     cameras: tuple[StoredCamera, ...] = ()
     notes: tuple[Note, ...] = ()
@@ -334,20 +296,15 @@ class House:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """All triangles of a house in one list: what rays and rasters see.
+    """All triangles of a house in one list: what rays and rasters see."""
 
-    positions, normals: (V, 3) float32 (normals (0, 0, 0) = flat). uvs: (V, 2) float32.
-    faces: (F, 3) int32. face_item: (F,) uint32 instance id. face_material: (F,) int32.
-    face_surface: (F,) int32, running number of the surface in House.surfaces() order.
-    """
-
-    positions: Points
-    normals: NDArray[np.float32]
-    uvs: NDArray[np.float32]
-    faces: NDArray[np.int32]
-    face_item: NDArray[np.uint32]
-    face_material: NDArray[np.int32]
-    face_surface: NDArray[np.int32]
+    positions: Points  # (V, 3) metres, world
+    normals: NDArray[np.float32]  # (V, 3) unit, (0, 0, 0) = flat
+    uvs: NDArray[np.float32]  # (V, 2) v up
+    faces: NDArray[np.int32]  # (F, 3) indices into positions
+    face_item: NDArray[np.uint32]  # (F,) instance id
+    face_material: NDArray[np.int32]  # (F,) index into House.materials
+    face_surface: NDArray[np.int32]  # (F,) number of the surface in House.surfaces() order
 
 
 def geometry_from_house(house: House, *, with_panes: bool = True) -> Geometry:
@@ -358,10 +315,12 @@ def geometry_from_house(house: House, *, with_panes: bool = True) -> Geometry:
     for number, (instance, _item, _j, s) in enumerate(house.surfaces()):
         if not with_panes and house.materials[s.material].kind is MaterialKind.PANE:
             continue
+        # Surfaces without normals or texture coordinates have zeros there.
         v, f = len(s.positions), len(s.faces)
         positions.append(s.positions)
         normals.append(s.normals if s.normals is not None else np.zeros((v, 3), np.float32))
         uvs.append(s.uvs if s.uvs is not None else np.zeros((v, 2), np.float32))
+        # Number the vertices through, and tell of each face where it came from.
         faces.append(s.faces + n_vertices)
         face_item.append(np.full(f, instance, np.uint32))
         face_material.append(np.full(f, s.material, np.int32))
@@ -383,4 +342,5 @@ _T = TypeVar("_T", bound=np.generic)
 
 
 def _joined(parts: list[NDArray[_T]], empty: NDArray[_T]) -> NDArray[_T]:
+    # The empty array gives shape and dtype where a house has no surface.
     return np.concatenate([empty, *(p.astype(empty.dtype, copy=False) for p in parts)])

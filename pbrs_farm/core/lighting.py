@@ -10,10 +10,10 @@ from typing import Final
 class Mode(StrEnum):
     """A lighting mode of the paper (section 3.2); the value is the name of its picture."""
 
-    OPENGL_DL = "opengl_dl"
-    OPENGL_IL = "opengl_il"
-    MLT_OL = "mlt_ol"
-    MLT_IL_OL = "mlt_il_ol"
+    OPENGL_DL = "opengl_dl"  # OpenGL, a headlight and two directional lights
+    OPENGL_IL = "opengl_il"  # OpenGL, the lamps, no shadows
+    MLT_OL = "mlt_ol"  # light transport, outdoor light
+    MLT_IL_OL = "mlt_il_ol"  # light transport, indoor and outdoor light
 
     @property
     def groups(self) -> tuple[Group, ...]:
@@ -24,8 +24,8 @@ class Mode(StrEnum):
 class Group(StrEnum):
     """Light transport is linear: each group is rendered by itself and modes are sums (rule 9)."""
 
-    OUTDOOR = "outdoor"
-    INDOOR = "indoor"
+    OUTDOOR = "outdoor"  # sky and sun
+    INDOOR = "indoor"  # lamps
 
 
 GROUPS_OF_MODE: Final = MappingProxyType(
@@ -43,9 +43,9 @@ ALL_MODES: Final = tuple(Mode)
 class LightForm(StrEnum):
     """The shape of a lamp's light source as its model describes it."""
 
-    POINT = "point"
-    SPOT = "spot"
-    LINE = "line"
+    POINT = "point"  # all directions alike
+    SPOT = "spot"  # a cone about a direction
+    LINE = "line"  # a tube between two points
 
 
 class PowerUnit(StrEnum):

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.errors import BadInput, PbrsError
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.read.source import SourceRef
@@ -137,10 +137,3 @@ def _put(work: Work, step: str, file: str, data: bytes) -> StoredFile:
         key = keys.house_key(work.house_id, file)
     work.store.put(key, data)
     return StoredFile(key=key, n_bytes=len(data), sha256=keys.sha256(data))
-
-
-def describe_failure(error: BaseException) -> str:
-    """One line for a failed step; PbrsError says it itself, anything else by its type."""
-    if isinstance(error, PbrsError):
-        return str(error)
-    return f"{type(error).__name__}: {error}"
