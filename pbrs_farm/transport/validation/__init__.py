@@ -1,1 +1,1 @@
-"""Is the light right? Rooms with known answers, statistics, and the claims of `verify --light`."""
+"""Validation of light transport: rooms of known radiance, statistics, claims of `verify --light`."""

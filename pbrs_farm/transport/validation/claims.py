@@ -1,8 +1,8 @@
-"""The claims of `pbrs-farm verify --light`: each measured here and now against what is known.
+"""The claims of `pbrs-farm verify --light`: each is measured and compared with a known value.
 
-Rooms are built in code and small. Noisy claims say how many standard errors are allowed: with
-other seeds a correct renderer would miss one of all of them about once in a thousand runs. Seeds
-are fixed, so that one machine says the same at every run. Effects: renders.
+Rooms are small and built in code. Noisy claims state how many standard errors are allowed: with
+other seeds a correct renderer would fail one of them about once in a thousand runs. Seeds are
+fixed, so that one machine gives the same answer at every run. Effects: renders.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky, uniform_
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.statistics import blocks, z_scores
 
+# Standard errors allowed of one mean, its error measured by twelve runs: fails once in 2,500.
 _SIGMAS: Final = 5.0
-"""Of a single mean whose error is known from twelve runs; missed by chance once in 2,500."""
-
+# Standard errors allowed of the worst of 16 blocks, four pooled runs: fails once in 20,000.
 _BLOCK_SIGMAS: Final = 5.0
-"""Of the worst of 16 blocks, four runs each, pooled; missed by chance once in 20,000."""
-
+_MEASURING_SEEDS: Final = range(12)
+_LM_PER_W: Final = 179
 _PATH: Final = LightFields(filter="box", pilot_spp=0, denoise=False)
 _CHAINS: Final = LightFields(
     integrator="metropolis",
@@ -48,17 +48,17 @@ _SKY_OF_ONE: Final = (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One thing that must hold, what was found, and whether it does. seconds: to find out."""
+    """A statement about light, what was measured, and whether it holds."""
 
     text: str
     measured: str
     expected: str
     passed: bool
-    seconds: float = 0.0
+    seconds: float = 0.0  # that the measurement took
 
 
 def light_claims(variant: str) -> Iterator[Claim]:
-    """Every claim, one after the other, in the Mitsuba variant. Under a minute on two cores.
+    """Every claim, measured one after the other in a Mitsuba variant, in a minute on two cores.
 
     Raises MachineFailed in a scalar variant: our kernels do not run there.
     """
@@ -67,9 +67,9 @@ def light_claims(variant: str) -> Iterator[Claim]:
             "the light's kernels need LLVM or CUDA, nothing to prove in scalar_rgb",
             hint="sudo apt-get install -y libllvm19",
         )
-    for prove in _CLAIMS:
+    for measure in _CLAIMS:
         began = time.perf_counter()
-        claim = prove(variant)
+        claim = measure(variant)
         yield replace(claim, seconds=round(time.perf_counter() - began, 2))
 
 
@@ -84,25 +84,27 @@ def _spp(n: int, **more: object) -> LightFields:
     return _PATH.model_copy(update={"spp": n, **more})
 
 
-# Closed forms
+# Claims with a closed form
 
 
 def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], Claim]:
-    def prove(variant: str) -> Claim:
-        results = _rendered(variant, rooms.furnace(albedo), dark_sky(), fields, *range(12))
+    def measure(variant: str) -> Claim:
+        results = _rendered(variant, rooms.furnace(albedo), dark_sky(), fields, *_MEASURING_SEEDS)
+        # Compare with the geometric series, cut off at the longest path.
         means = [float((r.indoor @ LUMINANCE).mean()) for r in results]
         expected = sum(albedo**k for k in range(fields.max_depth))
         error = max(float(np.std(means, ddof=1)) / math.sqrt(len(means)), 5e-4 * expected)
+        is_near = (
+            abs(float(np.mean(means)) - expected) <= _SIGMAS * error < 0.01 * expected * _SIGMAS
+        )
         return Claim(
             f"furnace room, {name}: the geometric series, albedo {albedo:g}",
             f"{np.mean(means):.5f}",
             f"{expected:.5f} +- {_SIGMAS * error:.5f}",
-            abs(float(np.mean(means)) - expected) <= _SIGMAS * error
-            and error < 0.01 * expected
-            and not any(r.outdoor.any() for r in results),
+            is_near and not any(r.outdoor.any() for r in results),
         )
 
-    return prove
+    return measure
 
 
 def _floor(variant: str) -> Claim:
@@ -112,10 +114,11 @@ def _floor(variant: str) -> Claim:
     )
     camera = rooms.camera((1.5, 0.3, 0), (1, 0, 0), 8, 8, 0.01)
     (result,) = _rendered(variant, (house, camera), dark_sky(), _spp(1024), 1)
+    # Expect I cos / d^2 at 1 m beside the foot point, 1 m below: I / (4 pi) / 2^1.5.
     lux = 1000 / (4 * math.pi) / 2**1.5
     return _near(
         "a bulb of 1,000 lm lights a floor by distance and cosine",
-        float((result.indoor @ LUMINANCE).mean()) * math.pi / 0.5 * 179,
+        float((result.indoor @ LUMINANCE).mean()) * math.pi / 0.5 * _LM_PER_W,
         lux,
         0.01,
         "lx",
@@ -140,7 +143,7 @@ def _near(text: str, measured: float, expected: float, tolerance: float, unit: s
     )
 
 
-# Two estimators, one mean
+# Claims that two estimators have one mean
 
 
 def _window() -> tuple[House, Camera]:
@@ -154,16 +157,17 @@ def _sun() -> Sky:
 def _metropolis_is_path(
     name: str, room: Callable[[], tuple[House, Camera]], sky: Callable[[], Sky]
 ) -> Callable[[str], Claim]:
-    def prove(variant: str) -> Claim:
+    def measure(variant: str) -> Claim:
         path = _spp(256, pilot_spp=4)
         a = _rendered(variant, room(), sky(), _CHAINS, 50, 51, 52, 53)
         b = _rendered(variant, room(), sky(), path, 10, 11, 12, 13)
         return _one_mean(f"Metropolis has the mean of path: {name}", a, b)
 
-    return prove
+    return measure
 
 
-def _direct_and_rest(variant: str) -> Claim:
+def _direct_and_indirect(variant: str) -> Claim:
+    # Render with separate direct light, and all light by chains.
     whole = _CHAINS.model_copy(update={"direct_spp": 0, "mutations_per_pixel": 256})
     a = _rendered(variant, _window(), _sun(), _CHAINS, 20, 21, 22, 23)
     b = _rendered(variant, _window(), _sun(), whole, 30, 31, 32, 33)
@@ -171,10 +175,12 @@ def _direct_and_rest(variant: str) -> Claim:
 
 
 def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> Claim:
+    """That two lists of independent renders have one mean, block by block, in each group."""
     worst, n = 0.0, 0
     for group in Group:
         x, y = ([blocks(r.group(group)) for r in results] for results in (a, b))
         lit = (np.mean(x, 0) > 0) & (np.mean(y, 0) > 0)
+        # Fail where one is black and the other is not; z is not defined there.
         if not np.array_equal(np.mean(x, 0) > 0, np.mean(y, 0) > 0):
             worst = math.inf
         if lit.any():
@@ -185,10 +191,11 @@ def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> Claim:
     )
 
 
-# Exact facts
+# Claims that hold to the bit
 
 
 def _groups_sum(variant: str) -> Claim:
+    # Keep the bulb's geometry in the room without lamp light: the paths must be the same.
     dim = rooms.window_room(0.7, lumen=1e-30)
     lit = _window()
     (both,) = _rendered(variant, lit, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
@@ -203,7 +210,7 @@ def _groups_sum(variant: str) -> Claim:
     )
 
 
-def _twice(variant: str) -> Claim:
+def _doubled_emitters(variant: str) -> Claim:
     (one,) = _rendered(variant, _window(), uniform_sky((1, 1, 1)), _spp(16), 1)
     (two,) = _rendered(
         variant, rooms.window_room(0.7, lumen=1600), uniform_sky((2, 2, 2)), _spp(16), 1
@@ -218,7 +225,7 @@ def _twice(variant: str) -> Claim:
     )
 
 
-def _sealed(variant: str) -> Claim:
+def _sealed_room(variant: str) -> Claim:
     room = rooms.house(rooms.shell((4, 2.5, 4), 0), [rooms.matte("wall", 0.9)])
     camera = rooms.camera((0.5, 1.5, 0.5), (3.9, 0.2, 3.9))
     (result,) = _rendered(variant, (room, camera), _sun(), _spp(64), 1)
@@ -226,7 +233,7 @@ def _sealed(variant: str) -> Claim:
     return Claim("a sealed room under a bright sky is black", f"max {top:g}", "0", top == 0)
 
 
-def _pane(variant: str) -> Claim:
+def _window_pane(variant: str) -> Claim:
     glazed = rooms.window_room(0.7, lumen=800, pane=True)
     (a,) = _rendered(variant, _window(), _sun(), _spp(16), 1)
     (b,) = _rendered(variant, glazed, _sun(), _spp(16), 1)
@@ -249,7 +256,7 @@ def _repeats(variant: str) -> Claim:
 
 
 def _nonfinite(variant: str) -> Claim:
-    # A lamp of infinite power beside the window: whatever sees it is no number.
+    # Hang a lamp of infinite power beside the window: every path that meets it is not finite.
     room = rooms.window_room(0.7, lumen=math.inf)
     (path,) = _rendered(variant, room, _sun(), _spp(16), 1)
     finite = bool(np.isfinite(path.outdoor).all() and np.isfinite(path.indoor).all())
@@ -269,11 +276,11 @@ _CLAIMS: Final[tuple[Callable[[str], Claim], ...]] = (
     _open_ground,
     _metropolis_is_path("sun through a window", _window, _sun),
     _metropolis_is_path("door ajar", rooms.door_ajar, dark_sky),
-    _direct_and_rest,
+    _direct_and_indirect,
     _groups_sum,
-    _twice,
-    _sealed,
-    _pane,
+    _doubled_emitters,
+    _sealed_room,
+    _window_pane,
     _repeats,
     _nonfinite,
 )

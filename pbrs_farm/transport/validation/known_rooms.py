@@ -1,4 +1,4 @@
-"""Small houses of boxes in which light is known or hard to find; built in code, no effects."""
+"""Small houses of boxes in which radiance is known or hard to estimate; built in code, no effects."""
 
 from __future__ import annotations
 
@@ -52,6 +52,7 @@ def quad(corners: Sequence[Triple], material: int, name: str = "quad") -> Surfac
 def box(low: Triple, high: Triple, material: int, name: str = "box") -> Surface:
     """A closed box, flat shaded, faces outwards."""
     x, y, z = zip(low, high, strict=True)
+    # Number the corners by the bits of x, y, z.
     points = np.array([(x[i & 1], y[i >> 1 & 1], z[i >> 2]) for i in range(8)], np.float32)
     quads = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
     faces = [f for a, b, c, d in quads for f in ((a, b, c), (a, c, d))]
@@ -60,6 +61,7 @@ def box(low: Triple, high: Triple, material: int, name: str = "box") -> Surface:
 
 def sphere(centre: Triple, radius: float, material: int, *, n: int = 24) -> Surface:
     """A latitude-longitude sphere with smooth normals, faces outwards."""
+    # Place the vertices by polar angle and azimuth.
     theta = np.linspace(0, np.pi, n // 2 + 1)
     phi = np.linspace(0, 2 * np.pi, n + 1)
     way = np.stack(
@@ -70,6 +72,7 @@ def sphere(centre: Triple, radius: float, material: int, *, n: int = 24) -> Surf
         ],
         -1,
     ).reshape(-1, 3)
+    # Cut each quad into two triangles, one at the poles.
     faces = []
     for i in range(n // 2):
         for j in range(n):
@@ -87,7 +90,8 @@ def sphere(centre: Triple, radius: float, material: int, *, n: int = 24) -> Surf
 def panel(
     low: Triple, high: Triple, hole: tuple[float, float, float, float], material: int
 ) -> list[Surface]:
-    """A box that is thin along z with a rectangular hole (x0, y0, x1, y1) cut through it."""
+    """A box that is thin along z with a rectangular opening (x0, y0, x1, y1)."""
+    # Leave four boxes around the opening: left, right, below, above.
     x0, y0, x1, y1 = hole
     z0, z1 = low[2], high[2]
     return [
@@ -116,7 +120,7 @@ def shell(
 
 
 def bulb(centre: Triple, material: int, lumen: float, *, radius: float = 0.05) -> Item:
-    """A shining sphere."""
+    """A lamp: a sphere that emits."""
     part = LightPart(
         centre, radius, lumen, PowerUnit.LUMEN, rgb_linear=(1, 0.8, 0.6), emitting=(0,)
     )
@@ -175,7 +179,7 @@ def camera(
 def window_room(
     albedo: float = 0.7, *, lumen: float = 0.0, pane: bool = False
 ) -> tuple[House, Camera]:
-    """4 x 2.5 x 4 m with a window of 1.4 x 1.2 m in the wall z = 0, a table, perhaps a bulb."""
+    """4 x 2.5 x 4 m with a window of 1.4 x 1.2 m in the wall z = 0, a table, and a bulb or none."""
     materials = [matte("wall", albedo), BULB, Material("pane", kind=MaterialKind.PANE, opacity=0.3)]
     hole = (1.3, 0.9, 2.7, 2.1)
     surfaces = shell((4.0, 2.5, 4.0), 0, front=False)
@@ -195,9 +199,9 @@ def window_room(
 
 
 def furnace(albedo: float) -> tuple[House, Camera]:
-    """A closed box whose walls all shine with luminance 1 and reflect albedo.
+    """A furnace: a closed box whose walls all emit luminance 1 and reflect albedo.
 
-    Radiance is the same everywhere: 1 + albedo + albedo^2 + ..., one term a path segment.
+    Luminance is the same everywhere: 1 + albedo + albedo^2 + ..., one term a path segment.
     """
     walls = box((0, 0, 0), (4, 2.5, 4), 0)
     area = 2 * (4 * 2.5 + 4 * 2.5 + 4 * 4)
@@ -212,9 +216,9 @@ def furnace(albedo: float) -> tuple[House, Camera]:
 
 
 def door_ajar(gap: float = 0.06) -> tuple[House, Camera]:
-    """Two rooms, a lamp in the far one, a doorway whose door leaves a gap of some centimetres.
+    """Two rooms, a lamp in the far one, and a door between them that stands ajar by gap metres.
 
-    No lamp is seen from the near room: all its light comes through the gap off the far walls.
+    The lamp does not light the near room directly: all light comes off the far walls, by the gap.
     """
     size = (4.0, 2.5, 8.2)
     surfaces = shell(size, 0)
