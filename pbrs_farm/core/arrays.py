@@ -8,6 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+F32 = NDArray[np.float32]  # of any shape, and so are the next three: docstrings say which
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
 ItemBuffer = NDArray[np.uint32]
 """(H, W) uint32: instance id of the item seen through each pixel's centre, 0 = nothing."""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-F64 = NDArray[np.float64]
+from pbrs_farm.core.arrays import F64
 
 _TINY = 1e-300  # divides a zero vector to zero
 

@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart
 from pbrs_farm.core.lighting import LightForm, flux_lm
 from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
@@ -28,7 +29,7 @@ _FORM_NUMBER = {LightForm.POINT: 0.0, LightForm.SPOT: 1.0, LightForm.LINE: 2.0}
 _N_FLOOR_POINTS = 2000
 
 
-def light_table(house: House) -> NDArray[np.float32]:
+def light_table(house: House) -> F32:
     """(L, 16) every light of the house, rows as LIGHT_FLOATS says; intensity is in cd x colour."""
     rows = [_row(part) for item in house.items for part in item.lights]
     return np.array(rows, np.float32).reshape(-1, LIGHT_FLOATS)
@@ -51,9 +52,7 @@ def _row(part: LightPart) -> list[float]:
     ]  # fmt: skip
 
 
-def best_lights(
-    lights: NDArray[np.float32], low: NDArray[np.float64], high: NDArray[np.float64], n_best: int
-) -> NDArray[np.int64]:
+def best_lights(lights: F32, low: F64, high: F64, n_best: int) -> NDArray[np.int64]:
     """(N, min(n_best, L)) for each box the lights that reach it most strongly, best first.
 
     low, high: (N, 3) boxes. Rank: I / d^2, I the largest channel, d from the light (for a line: from
@@ -69,9 +68,7 @@ def best_lights(
     return np.argsort(-reach, axis=1, kind="stable")[:, :n_best]
 
 
-def illuminance(
-    points: NDArray[np.float64], normals: NDArray[np.float64], lights: NDArray[np.float32]
-) -> NDArray[np.float64]:
+def illuminance(points: F64, normals: F64, lights: F32) -> F64:
     """(N,) lx that reaches points (N, 3) with unit normals (N, 3), unshadowed, as the shader has it.
 
     lights: (N, K, 16), each point's own.
@@ -110,9 +107,7 @@ def brightness_scale(house: House, n_best: int) -> float:
     return float(FLOOR_LEVEL / np.median(reached)) if len(reached) else 0.0
 
 
-def _spread_points(
-    items: list[Item],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def _spread_points(items: list[Item]) -> tuple[F64, F64, NDArray[np.int64]]:
     """Points spread by area over items' triangles: positions, unit normals, number of the item."""
     corners, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
     for number, item in enumerate(items):

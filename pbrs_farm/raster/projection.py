@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Matrix4
+from pbrs_farm.core.arrays import F64, Bools, Matrix4
 from pbrs_farm.core.camera import Camera
 
 NEAR_M = 0.02  # near plane: closer than any camera stands to a wall
@@ -27,7 +26,7 @@ def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
     return np.asarray(clip_from_camera @ np.linalg.inv(camera.world_from_camera))
 
 
-def far_plane(camera: Camera, low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+def far_plane(camera: Camera, low: F64, high: F64) -> float:
     """Depth of a far plane just beyond every box (N, 3) for the camera, and at least a metre."""
     if not len(low):
         return 1.0
@@ -36,9 +35,7 @@ def far_plane(camera: Camera, low: NDArray[np.float64], high: NDArray[np.float64
     return max(1.0, 1.01 * float(np.linalg.norm(reach)))
 
 
-def boxes_in_view(
-    clip: Matrix4, low: NDArray[np.float64], high: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def boxes_in_view(clip: Matrix4, low: F64, high: F64) -> Bools:
     """(N,) bool: the box is not wholly outside one plane of the view frustum."""
     # Read the six planes off the clip matrix (Gribb and Hartmann 2001).
     planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])
@@ -48,9 +45,7 @@ def boxes_in_view(
     return np.asarray((np.einsum("pk,pnk->pn", normal, farthest) + offset[:, None] >= 0).all(0))
 
 
-def distance_to_boxes(
-    eye: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def distance_to_boxes(eye: F64, low: F64, high: F64) -> F64:
     """(N,) distance from eye to the nearest point of each box."""
     gap = np.maximum(np.maximum(low - eye, eye - high), 0.0)
     return np.asarray(np.sqrt(np.einsum("nk,nk->n", gap, gap)))

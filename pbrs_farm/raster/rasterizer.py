@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import DepthZ, ItemBuffer, Srgb8Image
+from pbrs_farm.core.arrays import F64, DepthZ, ItemBuffer, Srgb8Image
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House
@@ -169,10 +169,10 @@ class Rasterizer:
             return srgb8_from_half(target.read("f2", 0, 3))
 
     @property
-    def _boxes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _boxes(self) -> tuple[F64, F64]:
         return self._mesh.draw_low, self._mesh.draw_high
 
-    def _front_to_back(self, camera: Camera, clip: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _front_to_back(self, camera: Camera, clip: F64) -> NDArray[np.int64]:
         """Numbers of the draws in the frustum, nearest box first, so that hidden pixels are not lit."""
         draws = np.nonzero(boxes_in_view(clip, *self._boxes))[0]
         low, high = self._boxes
@@ -180,7 +180,7 @@ class Rasterizer:
         return draws[np.argsort(distance, kind="stable")]
 
     def _visible_draws(
-        self, target: RenderTarget, draws: NDArray[np.int64], clip: NDArray[np.float64]
+        self, target: RenderTarget, draws: NDArray[np.int64], clip: F64
     ) -> NDArray[np.int64]:
         """The draws with a visible sample, by occlusion queries in a depth pre-pass.
 
@@ -203,9 +203,7 @@ class Rasterizer:
         kept[is_solid] = [self._queries[draw].samples > 0 for draw in draws[is_solid]]
         return np.asarray(draws[kept])
 
-    def _begin_surfaces(
-        self, mode: str, kind: int, camera: Camera, clip: NDArray[np.float64]
-    ) -> None:
+    def _begin_surfaces(self, mode: str, kind: int, camera: Camera, clip: F64) -> None:
         _set(
             self._program(mode, kind)[0],
             clip_from_world=clip,

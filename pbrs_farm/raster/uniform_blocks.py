@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.raster.light_choice import LIGHT_FLOATS, best_lights, light_table
@@ -16,7 +16,7 @@ LAMP_TRANSMISSION = 0.1  # share of light that passes through a lamp's own parts
 _EMISSION = {MaterialKind.BULB: 1.0, MaterialKind.SHADE: 0.5}
 
 
-def material_blocks(house: House) -> NDArray[np.float32]:
+def material_blocks(house: House) -> F32:
     """(n_materials, 16) the Material block of each material."""
     rows = [_material_block(m) for m in house.materials]
     return np.array(rows, np.float32).reshape(-1, MATERIAL_FLOATS)
@@ -37,7 +37,7 @@ def _material_block(material: Material) -> list[float]:
     ]  # fmt: skip
 
 
-def light_blocks(house: House, n_best: int) -> NDArray[np.float32]:
+def light_blocks(house: House, n_best: int) -> F32:
     """(n_items + 1, 4 + 16 n_best) the Lights block of each instance id: its best lights."""
     lights = light_table(house)
     block = np.zeros((len(house.items) + 1, _HEADER_FLOATS + LIGHT_FLOATS * n_best), np.float32)
@@ -51,7 +51,7 @@ def light_blocks(house: House, n_best: int) -> NDArray[np.float32]:
     return block
 
 
-def aligned_rows(rows: NDArray[np.float32], alignment_bytes: int) -> NDArray[np.float32]:
+def aligned_rows(rows: F32, alignment_bytes: int) -> F32:
     """Rows padded so that each starts at a multiple of alignment_bytes."""
     step = -(-rows.shape[1] * 4 // alignment_bytes) * alignment_bytes // 4
     padded = np.zeros((len(rows), step), np.float32)

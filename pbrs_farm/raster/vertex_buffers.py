@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.core.house import House, Surface
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 
@@ -21,14 +22,14 @@ class Mesh:
     draw_material: (D,) index into House.materials. draw_low, draw_high: (D, 3) box in the world.
     """
 
-    vertices: NDArray[np.float32]
+    vertices: F32
     indices: NDArray[np.uint32]
     draw_first: NDArray[np.int64]
     draw_count: NDArray[np.int64]
     draw_item: NDArray[np.int64]
     draw_material: NDArray[np.int64]
-    draw_low: NDArray[np.float64]
-    draw_high: NDArray[np.float64]
+    draw_low: F64
+    draw_high: F64
 
     @property
     def n_draws(self) -> int:
@@ -38,10 +39,10 @@ class Mesh:
 
 def mesh_from_house(house: House) -> Mesh:
     """The mesh of every surface of house, panes included; non-finite triangles are dropped."""
-    vertices: list[NDArray[np.float32]] = []
+    vertices: list[F32] = []
     indices: list[NDArray[np.uint32]] = []
     rows: list[tuple[int, int, int, int]] = []
-    boxes: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
+    boxes: list[tuple[F32, F32]] = []
     n_vertices = n_faces = 0
 
     for instance, item in enumerate(house.items, start=1):
@@ -74,10 +75,10 @@ def mesh_from_house(house: House) -> Mesh:
     )
 
 
-def _vertices(surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def _vertices(surface: Surface) -> tuple[F32, NDArray[np.int64]]:
     """(V, 8) vertices and (F, 3) faces of a surface; flat ones get three vertices per face."""
     points, faces = surface.positions, surface.faces.astype(np.int64)
-    finite: NDArray[np.bool_] = np.all(np.isfinite(points), axis=1)
+    finite: Bools = np.all(np.isfinite(points), axis=1)
     faces = faces[np.all(finite[faces], axis=1)]
     uvs = surface.uvs if surface.uvs is not None else np.zeros((len(points), 2), np.float32)
     normals = surface.normals
@@ -95,10 +96,10 @@ def _vertices(surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.int64]]
     return np.concatenate([points, normals, finite_uvs], 1, dtype=np.float32), faces
 
 
-def _unit_rows(normals: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _unit_rows(normals: F32) -> Bools:
     with np.errstate(invalid="ignore"):
         return np.asarray(np.abs(np.einsum("ij,ij->i", normals, normals) - 1) < 0.1)
 
 
-def _all_unit(normals: NDArray[np.float32]) -> bool:
+def _all_unit(normals: F32) -> bool:
     return bool(_unit_rows(normals).all())

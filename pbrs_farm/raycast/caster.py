@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import HitRecord, ItemBuffer
+from pbrs_farm.core.arrays import F32, I32, Bools, HitRecord, ItemBuffer
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners
@@ -39,9 +39,7 @@ class Caster:
         self._tracer = _tracer(self.variant, geometry, _hittable(geometry))
         self._without: tuple[bytes, RayTracer | None] = (b"", None)  # skipped faces, their tracer
 
-    def hit_record(
-        self, camera: Camera, *, skip_faces: NDArray[np.bool_] | None = None
-    ) -> HitRecord:
+    def hit_record(self, camera: Camera, *, skip_faces: Bools | None = None) -> HitRecord:
         """The first hit of the ray through each pixel's centre (rule 8).
 
         skip_faces: (F,) bool, faces to ignore; with the transparent ones ignored this is the hit
@@ -76,7 +74,7 @@ class Caster:
         origins: NDArray[np.floating],
         directions: NDArray[np.floating],
         max_distance: float | NDArray[np.floating] = np.inf,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    ) -> tuple[F32, I32]:
         """(N,) float32 distance, inf = nothing, and (N,) int32 face, -1 = nothing.
 
         origins, directions: (N, 3); distances are in lengths of each direction: metres when it
@@ -89,7 +87,7 @@ class Caster:
         reach = np.broadcast_to(np.asarray(max_distance, np.float32), (n,))
         return self._tracer.first_hit(*rays, reach)
 
-    def _tracer_without(self, skip_faces: NDArray[np.bool_]) -> RayTracer | None:
+    def _tracer_without(self, skip_faces: Bools) -> RayTracer | None:
         if skip_faces.shape != (len(self.geometry.faces),):
             raise ValueError(
                 f"skip_faces: expected ({len(self.geometry.faces)},), got {skip_faces.shape}"
@@ -102,7 +100,7 @@ class Caster:
         return self._without[1]
 
 
-def _tracer(variant: str, geometry: Geometry, keep: NDArray[np.bool_]) -> RayTracer | None:
+def _tracer(variant: str, geometry: Geometry, keep: Bools) -> RayTracer | None:
     if not keep.any():
         return None
     # Collapse a face that must not be hit to a point, so that all others keep their number.
@@ -112,7 +110,7 @@ def _tracer(variant: str, geometry: Geometry, keep: NDArray[np.bool_]) -> RayTra
     return build(variant, positions, faces)
 
 
-def _hittable(geometry: Geometry) -> NDArray[np.bool_]:
+def _hittable(geometry: Geometry) -> Bools:
     """(F,) bool: finite vertices and an area."""
     keep = np.zeros(len(geometry.faces), np.bool_)
     for start in range(0, len(keep), _FACES_PER_CHUNK):
@@ -122,7 +120,7 @@ def _hittable(geometry: Geometry) -> NDArray[np.bool_]:
     return keep
 
 
-def _faces(tracer: RayTracer | None, camera: Camera) -> NDArray[np.int32]:
+def _faces(tracer: RayTracer | None, camera: Camera) -> I32:
     if tracer is None:
         return np.full((camera.intrinsics.height_px, camera.intrinsics.width_px), -1, np.int32)
     return tracer.faces_of_camera(camera)

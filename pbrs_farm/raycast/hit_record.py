@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import HitRecord
+from pbrs_farm.core.arrays import F32, F64, I32, HitRecord
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
 from pbrs_farm.core.mesh import area_vectors, triangle_corners
 
 
-def hit_record_from_faces(geometry: Geometry, camera: Camera, face: NDArray[np.int32]) -> HitRecord:
+def hit_record_from_faces(geometry: Geometry, camera: Camera, face: I32) -> HitRecord:
     """The record of the camera's unjittered rays. face: (H, W) int32, -1 = nothing.
 
     The hit is where the ray meets the face's plane, computed in float64 and clamped to the
@@ -53,16 +53,16 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: NDArray[np.i
 class _Planes:
     """The planes of K triangles, as rays from one origin need them; float64."""
 
-    origin: NDArray[np.float64]  # (3,) of all rays
-    a: NDArray[np.float64]  # (K, 3) corners
-    b: NDArray[np.float64]
-    c: NDArray[np.float64]
-    normal: NDArray[np.float64]  # (K, 3) unit
-    grad_b: NDArray[np.float64]  # (K, 3) gradient of the barycentric coordinate of b
-    grad_c: NDArray[np.float64]  # (K, 3) and of c
+    origin: F64  # (3,) of all rays
+    a: F64  # (K, 3) corners
+    b: F64
+    c: F64
+    normal: F64  # (K, 3) unit
+    grad_b: F64  # (K, 3) gradient of the barycentric coordinate of b
+    grad_c: F64  # (K, 3) and of c
 
 
-def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: NDArray[np.float64]) -> _Planes:
+def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: F64) -> _Planes:
     corners = triangle_corners(geometry.positions, geometry.faces[faces])
     a, b, c = np.moveaxis(corners, 1, 0)
     # Divide by |n|^2: the gradient of b is 1 at b and 0 along the edge a c.
@@ -72,9 +72,7 @@ def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: NDArray[np.floa
     return _Planes(origin, a, b, c, n / np.sqrt(squared), grad_b, grad_c)
 
 
-def _intersect(
-    planes: _Planes, local: NDArray[np.intp], d: NDArray[np.float64], axis: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _intersect(planes: _Planes, local: NDArray[np.intp], d: F64, axis: F64) -> tuple[F64, F64]:
     """(N,) t along d (N, 3) to plane local[n], and (N, 3) weights of a, b, c, all >= 0."""
     # Solve the plane's equation for t and evaluate the barycentric coordinates there.
     from_a = planes.origin - planes.a
@@ -96,12 +94,7 @@ def _intersect(
     return t, weights
 
 
-def _shading_normal(
-    geometry: Geometry,
-    corner: NDArray[np.int32],
-    weights: NDArray[np.float64],
-    geo_normal: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _shading_normal(geometry: Geometry, corner: I32, weights: F64, geo_normal: F64) -> F64:
     """(N, 3) interpolated vertex normals on the geometric normal's side; that normal where flat."""
     # Interpolate and normalise; opposite vertex normals may cancel out.
     shading = _mixed(weights, geometry.normals, corner)
@@ -114,9 +107,7 @@ def _shading_normal(
     return shading
 
 
-def _mixed(
-    weights: NDArray[np.float64], values: NDArray[np.float32], corner: NDArray[np.int32]
-) -> NDArray[np.float64]:
+def _mixed(weights: F64, values: F32, corner: I32) -> F64:
     """(N, C) values (V, C) at the corners (N, 3), weighted."""
     mixed = weights[:, :1] * values[corner[:, 0]]
     for k in (1, 2):
@@ -124,7 +115,7 @@ def _mixed(
     return np.asarray(mixed)
 
 
-def _distinct(face: NDArray[np.int32], n_faces: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _distinct(face: I32, n_faces: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The distinct faces, ascending, and each pixel's index into them."""
     is_hit = np.zeros(n_faces, np.bool_)
     is_hit[face] = True
@@ -132,7 +123,7 @@ def _distinct(face: NDArray[np.int32], n_faces: int) -> tuple[NDArray[np.intp], 
     return np.flatnonzero(is_hit), index[face]
 
 
-def _dot(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def _dot(x: F64, y: F64) -> F64:
     return np.asarray(np.einsum("ij,ij->i", x, y))
 
 

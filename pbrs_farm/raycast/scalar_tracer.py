@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, I32
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.raycast.tracer import scene_from_mesh
 from pbrs_farm.raycast.variant import mitsuba
@@ -18,13 +19,11 @@ from pbrs_farm.raycast.variant import mitsuba
 class ScalarTracer:
     """RayTracer of scalar_rgb; the same answers as JitTracer but for ties."""
 
-    def __init__(
-        self, variant: str, positions: NDArray[np.float32], faces: NDArray[np.int32]
-    ) -> None:
+    def __init__(self, variant: str, positions: F32, faces: I32) -> None:
         self._variant = variant
         self._scene = scene_from_mesh(mitsuba(variant), positions, faces)
 
-    def faces_of_camera(self, camera: Camera) -> NDArray[np.int32]:
+    def faces_of_camera(self, camera: Camera) -> I32:
         origin, directions = camera.rays()
         flat = directions.reshape(-1, 3)
         origins = np.broadcast_to(origin, flat.shape)
@@ -32,12 +31,7 @@ class ScalarTracer:
         _t, face = self.first_hit(origins, flat, reach)
         return face.reshape(directions.shape[:2])
 
-    def first_hit(
-        self,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        max_distance: NDArray[np.float32],
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
         mi = mitsuba(self._variant)
         intersect = self._scene.ray_intersect_preliminary
         distance = np.full(len(origins), np.inf, np.float32)

@@ -13,6 +13,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, I32
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.raycast.variant import mitsuba
 
@@ -25,16 +26,11 @@ _D0, _DU, _DV, _EYE, _RAY_FLOATS = 0, 3, 6, 9, 12  # columns of _ray_table
 class RayTracer(Protocol):
     """Rays against one mesh in a Mitsuba variant; distances are in lengths of the direction."""
 
-    def faces_of_camera(self, camera: Camera) -> NDArray[np.int32]:
+    def faces_of_camera(self, camera: Camera) -> I32:
         """(H, W) face hit through each pixel's centre, -1 = nothing."""
         ...
 
-    def first_hit(
-        self,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        max_distance: NDArray[np.float32],
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
         """(N,) distance (inf = nothing) and (N,) face (-1 = nothing)."""
         ...
 
@@ -45,9 +41,7 @@ class RayTracer(Protocol):
         ...
 
 
-def scene_from_mesh(
-    mi: Any, positions: NDArray[np.float32], faces: NDArray[np.int32], *, watertight: bool = True
-) -> Any:
+def scene_from_mesh(mi: Any, positions: F32, faces: I32, *, watertight: bool = True) -> Any:
     """A Mitsuba scene of one mesh. watertight: no ray slips through an edge two faces share."""
     mesh = mi.Mesh("house", len(positions), len(faces))
     parameters = mi.traverse(mesh)
@@ -66,9 +60,7 @@ class JitTracer:
     faster one: 9 of a million pixels differed, a quarter more rays a second.
     """
 
-    def __init__(
-        self, variant: str, positions: NDArray[np.float32], faces: NDArray[np.int32]
-    ) -> None:
+    def __init__(self, variant: str, positions: F32, faces: I32) -> None:
         self._variant = variant
         self._mesh = (positions, faces)
 
@@ -80,19 +72,14 @@ class JitTracer:
     def _fast(self) -> Any:
         return scene_from_mesh(mitsuba(self._variant), *self._mesh, watertight=False)
 
-    def faces_of_camera(self, camera: Camera) -> NDArray[np.int32]:
+    def faces_of_camera(self, camera: Camera) -> I32:
         origin, directions = camera.rays()
         flat = directions.reshape(-1, 3)
         origins = np.broadcast_to(origin, flat.shape)
         _t, face = self._trace(origins, flat, None, coherent=True)
         return face.reshape(directions.shape[:2])
 
-    def first_hit(
-        self,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        max_distance: NDArray[np.float32],
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
         distance = np.full(len(origins), np.inf, np.float32)
         face = np.full(len(origins), -1, np.int32)
         for start in range(0, len(origins), _RAYS_PER_LAUNCH):
@@ -116,13 +103,8 @@ class JitTracer:
         return counts
 
     def _trace(
-        self,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        max_distance: NDArray[np.float32] | None,
-        *,
-        coherent: bool,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        self, origins: F32, directions: F32, max_distance: F32 | None, *, coherent: bool
+    ) -> tuple[F32, I32]:
         import drjit as dr
 
         mi = mitsuba(self._variant)
@@ -177,7 +159,7 @@ class JitTracer:
         return np.asarray(counts.numpy().reshape(len(cameras), n_labels))
 
 
-def _ray_table(cameras: Sequence[Camera]) -> NDArray[np.float32]:
+def _ray_table(cameras: Sequence[Camera]) -> F32:
     """(n, 12) of cameras of one size: d0, du, dv, eye; the direction at (u, v) is d0 + u du + v dv."""
     # Derive the three vectors from the intrinsics, then turn them into the world.
     i = cameras[0].intrinsics

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import LightFields
@@ -75,12 +76,12 @@ def photometric_warnings(room: Room, lux: dict[str, float]) -> list[str]:
     return lines
 
 
-def floor_points(room: Room, n: int, seed: int) -> NDArray[np.float64]:
+def floor_points(room: Room, n: int, seed: int) -> F64:
     """(n, 3) points uniform over a room's floor polygon, 5 cm above it."""
     # Draw points in the polygon's box and keep those inside, until there are enough.
     rng = np.random.default_rng(seed)
     low, high = room.polygon.min(0), room.polygon.max(0)
-    kept: list[NDArray[np.float64]] = []
+    kept: list[F64] = []
     for _attempt in range(_MAX_ATTEMPTS):
         tried = low + (high - low) * rng.random((4 * n, 2))
         kept.append(tried[_inside(tried, room.polygon)])
@@ -92,7 +93,7 @@ def floor_points(room: Room, n: int, seed: int) -> NDArray[np.float64]:
 
 
 def illuminance_lx(
-    scene: DeviceScene, emitters: Emitters, points: NDArray[np.float64], seed: int
+    scene: DeviceScene, emitters: Emitters, points: F64, seed: int
 ) -> tuple[float, float]:
     """(outdoor, indoor) mean illuminance in lx of level surfaces at points (N, 3), facing up."""
     up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
@@ -104,14 +105,14 @@ def illuminance_lx(
 def radiosity(
     scene: DeviceScene,
     emitters: Emitters,
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
+    points: F64,
+    normals: F64,
     spp: int,
     seed: int,
     *,
     lamps: NDArray[np.int64] | None = None,
     max_depth: int | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[F64, F64]:
     """(outdoor, indoor) radiance that white matte surfaces reflect: irradiance / pi, (N, 3) each.
 
     points, normals: (N, 3). lamps: (N,) the one lamp that counts for each, nothing outdoors then.
@@ -132,7 +133,7 @@ def radiosity(
     return outdoor_sum, indoor_sum
 
 
-def _columns(rows: NDArray[np.float64]) -> list[Any]:
+def _columns(rows: F64) -> list[Any]:
     return [device_array(mi.Float, rows[:, k].astype(np.float32)) for k in range(3)]
 
 
@@ -164,7 +165,7 @@ def _radiosity(context: PathContext, p: Any, normal: Any, key: Any, spp: Any) ->
     return outdoor, indoor
 
 
-def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _inside(points: F64, polygon: F64) -> Bools:
     """(N,) bool: the point lies inside the polygon, by the crossing rule."""
     # Flip at each edge that a ray towards +x from the point crosses.
     inside = np.zeros(len(points), bool)

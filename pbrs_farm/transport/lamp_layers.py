@@ -11,9 +11,8 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import RadianceImage
+from pbrs_farm.core.arrays import F32, RadianceImage
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter
@@ -22,7 +21,7 @@ MAX_SUMS: Final = 2**32  # pixels x lamps x 3 of one launch: the kernel counts t
 
 
 def with_lamp_layers(
-    result: LightResult, sums: NDArray[np.float32] | None, spp: int, lamps: Sequence[AreaEmitter]
+    result: LightResult, sums: F32 | None, spp: int, lamps: Sequence[AreaEmitter]
 ) -> LightResult:
     """The result with a layer for each lamp that lights the view, and indoor their sum to the bit.
 
@@ -43,9 +42,7 @@ def with_lamp_layers(
 
 
 def indoor_from_lamps(
-    layers: Mapping[int, RadianceImage],
-    factors: Mapping[int, NDArray[np.float32]],
-    shape: tuple[int, ...],
+    layers: Mapping[int, RadianceImage], factors: Mapping[int, F32], shape: tuple[int, ...]
 ) -> RadianceImage:
     """Sum of the lamps' layers in the order of their numbers, each times its factor.
 

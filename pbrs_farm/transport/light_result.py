@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import RadianceImage, UnitVectors
+from pbrs_farm.core.arrays import F32, RadianceImage, UnitVectors
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
@@ -66,12 +66,12 @@ def relative_noise(half_a: NDArray[np.floating], half_b: NDArray[np.floating]) -
 class GroupSums(Protocol):
     """Sums over the samples of each pixel, row by row, (N, 3); *_even: of every second sample."""
 
-    outdoor: NDArray[np.float32]
-    indoor: NDArray[np.float32]
-    outdoor_even: NDArray[np.float32]
-    indoor_even: NDArray[np.float32]
-    albedo: NDArray[np.float32]
-    normal: NDArray[np.float32]
+    outdoor: F32
+    indoor: F32
+    outdoor_even: F32
+    indoor_even: F32
+    albedo: F32
+    normal: F32
     n_bad: int  # paths that were not finite
 
 
@@ -83,7 +83,7 @@ def result_from_sums(
     n_even = max((spp + 1) // 2, 1)
     n_odd = max(spp - n_even, 1)
 
-    def picture(values: NDArray[np.float32], n: int) -> NDArray[np.float32]:
+    def picture(values: F32, n: int) -> F32:
         return np.ascontiguousarray((values / np.float32(n)).reshape(shape))
 
     # Divide each half buffer by its own number of samples.

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.errors import MachineFailed, RenderFailed
 from pbrs_farm.core.house import House
@@ -40,9 +41,7 @@ class LightScene:
     or left out. device_scene: the same on the device; None for scalar variants.
     """
 
-    def __init__(
-        self, tables: SceneTables, sky: Sky, portals: NDArray[np.float64], variant: str
-    ) -> None:
+    def __init__(self, tables: SceneTables, sky: Sky, portals: F64, variant: str) -> None:
         self.tables = tables
         self.sky = sky
         self.variant = variant
@@ -292,7 +291,7 @@ class LightScene:
         names = [lamp.name for lamp in self.tables.lamps]
         return emitters, {n: float(w) for n, w in zip(names, weights.lamps, strict=True)}
 
-    def _emitters_of_view(self, portals: NDArray[np.float64], weights: Any) -> Any:
+    def _emitters_of_view(self, portals: F64, weights: Any) -> Any:
         """The emitters, their tables built once, with the portals and weights of a view."""
         from pbrs_farm.transport.kernels.emitters import Emitters
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import HitRecord
+from pbrs_farm.core.arrays import F32, HitRecord
 from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import Geometry, House
 
@@ -39,7 +39,7 @@ def albedo_png(
     return np.asarray(_BYTE_OF_LINEAR[steps])
 
 
-def _texels(pixels: NDArray[np.uint8], uv: NDArray[np.float32]) -> NDArray[np.float32]:
+def _texels(pixels: NDArray[np.uint8], uv: F32) -> F32:
     """(N, 3) linear colour at uv (N, 2), bilinear, repeating."""
     # Place texel centres at half integers; v points up, rows count down.
     height, width = pixels.shape[:2]
@@ -52,7 +52,7 @@ def _texels(pixels: NDArray[np.uint8], uv: NDArray[np.float32]) -> NDArray[np.fl
     left, right = (x0 % width).astype(np.int64), ((x0 + 1) % width).astype(np.int64)
     top, bottom = (y0 % height).astype(np.int64), ((y0 + 1) % height).astype(np.int64)
 
-    def at(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float32]:
+    def at(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> F32:
         return _LINEAR_OF_BYTE[pixels[rows, columns, :3]]
 
     # Blend in linear light, along rows first.

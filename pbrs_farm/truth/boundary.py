@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import HitRecord, Mask
+from pbrs_farm.core.arrays import F32, HitRecord, Mask
 from pbrs_farm.core.camera import Camera
 
 OCCLUSION_GAP_M = 0.03  # least step in depth of an occlusion boundary
@@ -73,9 +73,7 @@ def _neighbours(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     return ((whole, low), (whole, high)) if axis == 1 else ((low, whole), (high, whole))
 
 
-def _is_gap(
-    hit: HitRecord, rays: NDArray[np.float32], first: tuple[slice, ...], second: tuple[slice, ...]
-) -> Mask:
+def _is_gap(hit: HitRecord, rays: F32, first: tuple[slice, ...], second: tuple[slice, ...]) -> Mask:
     """Whether depth steps between the pixels of each pair, and no plane explains the step."""
     # Ask for a step above the absolute and the relative threshold.
     z_first, z_second = hit.depth_z[first], hit.depth_z[second]
@@ -98,10 +96,10 @@ def _is_gap(
     return gap
 
 
-_End = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
+_End = tuple[F32, F32, F32]
 
 
-def _plane_miss(at: _End, other: _End) -> NDArray[np.float32]:
+def _plane_miss(at: _End, other: _End) -> F32:
     """(N,) how far the other's depth lies from the tangent plane here; an end: normal, depth, ray."""
     normal, depth, ray = at
     # Intersect the other pixel's ray with this pixel's plane n x = n (depth ray).
@@ -113,7 +111,7 @@ def _plane_miss(at: _End, other: _End) -> NDArray[np.float32]:
     return np.asarray(ahead - other[1], np.float32)
 
 
-def _nearer(a: NDArray[np.float32], b: NDArray[np.float32]) -> Mask:
+def _nearer(a: F32, b: F32) -> Mask:
     """The first is nearer than the second, where 0 is infinitely far."""
     infinity = np.float32(np.inf)
     return np.where(a > 0, a, infinity) < np.where(b > 0, b, infinity)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Mask
+from pbrs_farm.core.arrays import F32, F64, I32, Mask
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import Item
 
@@ -29,13 +29,13 @@ def coverage(item: Item, camera: Camera) -> Mask:
     return np.cumsum(starts, axis=1)[:, :-1] > 0
 
 
-def _camera_space(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
+def _camera_space(points: F32, camera: Camera) -> F64:
     """(V, 3) x right, y down, z forward."""
     moved = points.astype(np.float64) - camera.eye
     return np.asarray(moved @ camera.world_from_camera[:3, :3] * [1.0, -1.0, -1.0])
 
 
-def _add_triangles(starts: NDArray[np.int32], corners: NDArray[np.float64], i: Intrinsics) -> None:
+def _add_triangles(starts: I32, corners: F64, i: Intrinsics) -> None:
     """Add to starts, per row, +1 where a triangle (T, 3, 3) begins and -1 past where it ends."""
     # Cut the triangles into chunks of bounded rows, one triangle at least.
     first, n_rows = _rows_of_triangles(corners, i)
@@ -50,9 +50,7 @@ def _add_triangles(starts: NDArray[np.int32], corners: NDArray[np.float64], i: I
         begin = stop
 
 
-def _rows_of_triangles(
-    corners: NDArray[np.float64], i: Intrinsics
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _rows_of_triangles(corners: F64, i: Intrinsics) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(T,) first row whose pixel centres a triangle may cover, and how many rows follow from it."""
     # Project triangles that lie wholly before the camera; others may cover any row.
     z = corners[..., 2]
@@ -67,11 +65,7 @@ def _rows_of_triangles(
 
 
 def _add_spans(
-    starts: NDArray[np.int32],
-    corners: NDArray[np.float64],
-    first: NDArray[np.int64],
-    n_rows: NDArray[np.int64],
-    i: Intrinsics,
+    starts: I32, corners: F64, first: NDArray[np.int64], n_rows: NDArray[np.int64], i: Intrinsics
 ) -> None:
     # List one interval for each triangle and row; y is the row's ray at z = 1.
     owner = np.repeat(np.arange(len(corners)), n_rows)

@@ -56,10 +56,10 @@ def noisy(result: LightResult) -> LightResult:
 FAULTS = [
     (claims._furnace(claims._spp(128), "path", 0.3), brighter),
     (claims._floor, brighter),
-    (claims._sealed, leaking),
+    (claims._sealed_room, leaking),
     (claims._groups_sum, mixed),
-    (claims._twice, leaking),
-    (claims._pane, noisy),
+    (claims._doubled_emitters, leaking),
+    (claims._window_pane, noisy),
     (claims._repeats, noisy),
     (claims._nonfinite, silent),
 ]

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import RadianceImage, Srgb8Image, UnitVectors
+from pbrs_farm.core.arrays import F32, RadianceImage, Srgb8Image, UnitVectors
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group
 from pbrs_farm.core.recipe import ToneFields
@@ -31,7 +30,7 @@ class ToneMappedImage:
     """A tone-mapped image: rgb_srgb8 = tone(radiance * gains * exposure)."""
 
     rgb_srgb8: Srgb8Image
-    gains: NDArray[np.float32]  # (3,) factors of the white balance
+    gains: F32  # (3,) factors of the white balance
     exposure: float  # factor before the tone curve
 
     def facts(self) -> dict[str, Any]:
@@ -76,9 +75,7 @@ def develop(
     return images
 
 
-def white_balance(
-    radiance: RadianceImage, albedo: RadianceImage, strength: float
-) -> NDArray[np.float32]:
+def white_balance(radiance: RadianceImage, albedo: RadianceImage, strength: float) -> F32:
     """(3,) gains that turn the illuminant's colour towards white, as a camera's do; luminance 1.
 
     The illuminant is radiance over albedo, which is known here: the median of its logarithm over

@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import RadianceImage, Srgb8Image
+from pbrs_farm.core.arrays import F64, RadianceImage, Srgb8Image
 from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
 from pbrs_farm.core.recipe import ToneFields
 
@@ -58,7 +57,7 @@ def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
     return fields.key / float(np.exp(np.mean(np.log(clipped))))
 
 
-def _reinhard(rgb: NDArray[np.float64], key: float, exposure: float | None) -> NDArray[np.float64]:
+def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
     # Scale the log-average to the key and find the luminance that becomes white.
     luminance = rgb @ _MITSUBA_LUMINANCE
     average = float(np.exp(np.mean(np.log(luminance + _LOG_FLOOR))))
@@ -72,7 +71,7 @@ def _reinhard(rgb: NDArray[np.float64], key: float, exposure: float | None) -> N
     return np.asarray(rgb * ratio[..., None])
 
 
-def _rolled_off(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rolled_off(rgb: F64) -> F64:
     """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at _WHITE.
 
     It maps the largest component and keeps the hue; colours far beyond white fade to white.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import LUMINANCE
 
 _RGB_FROM_XYZ = np.array(
@@ -13,7 +13,7 @@ _RGB_FROM_XYZ = np.array(
 _HC_OVER_K = 1.438777e7  # nm K
 
 
-def rgb_from_kelvin(kelvin: float) -> NDArray[np.float64]:
+def rgb_from_kelvin(kelvin: float) -> F64:
     """(3,) linear sRGB, luminance 1, none negative, of Planck's radiator at 1000 to 20000 K."""
     # Weight Planck's law by the matching functions, every 5 nm of the visible spectrum.
     wavelength = np.arange(380.0, 781.0, 5.0)
@@ -24,10 +24,10 @@ def rgb_from_kelvin(kelvin: float) -> NDArray[np.float64]:
     return np.asarray(rgb / (rgb @ LUMINANCE))
 
 
-def _matching(wavelength: NDArray[np.float64]) -> NDArray[np.float64]:
+def _matching(wavelength: F64) -> F64:
     """(3, N) CIE 1931 matching functions, the multi-lobe fit of Wyman et al. 2013."""
 
-    def lobe(mean: float, below: float, above: float) -> NDArray[np.float64]:
+    def lobe(mean: float, below: float, above: float) -> F64:
         t = (wavelength - mean) * np.where(wavelength < mean, below, above)
         return np.asarray(np.exp(-0.5 * t * t))
 

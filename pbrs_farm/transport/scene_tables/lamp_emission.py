@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import Geometry, House, Item, LightPart, MaterialKind
 from pbrs_farm.core.lighting import flux_lm
@@ -30,14 +31,14 @@ class AreaEmitter:
     item: int  # index into House.items
     room_id: str | None
     faces: NDArray[np.int64]  # (T,) of the geometry
-    face_areas: NDArray[np.float64]  # (T,) m2
+    face_areas: F64  # (T,) m2
     radiance: tuple[float, float, float]  # W m-2 sr-1, linear RGB, from both sides of every face
     area_m2: float  # the sum of face_areas
     flux_lm: float
 
 
 def area_emitters_of_house(
-    house: House, geometry: Geometry, keep: NDArray[np.bool_], recipe: Recipe
+    house: House, geometry: Geometry, keep: Bools, recipe: Recipe
 ) -> tuple[AreaEmitter, ...]:
     """The emitters of every light part with a face, in the order of items and their light parts.
 
@@ -74,7 +75,7 @@ def area_emitters_of_house(
 _NONE = np.zeros(0, np.int64)
 
 
-def _faces_by_surface(geometry: Geometry, keep: NDArray[np.bool_]) -> dict[int, NDArray[np.int64]]:
+def _faces_by_surface(geometry: Geometry, keep: Bools) -> dict[int, NDArray[np.int64]]:
     """Number of a surface -> its faces that are kept; a surface's faces follow one another."""
     numbers, starts = np.unique(geometry.face_surface, return_index=True)
     runs = np.split(np.arange(len(geometry.face_surface)), starts[1:])
@@ -84,7 +85,7 @@ def _faces_by_surface(geometry: Geometry, keep: NDArray[np.bool_]) -> dict[int, 
 
 def _flux_and_rgb(
     house: House, part: LightPart, k: int, item: Item, recipe: Recipe
-) -> tuple[float, NDArray[np.float64]]:
+) -> tuple[float, F64]:
     """(flux in lm, colour of luminance 1) of a light part.
 
     The source states the flux that leaves the lamp. Its shade keeps part of the bulb's flux, so
@@ -99,7 +100,7 @@ def _flux_and_rgb(
 
 def lamp_rgb(
     rgb_linear: tuple[float, float, float], name: str, fields: EmissionFields, seed: int
-) -> NDArray[np.float64]:
+) -> F64:
     """(3,) colour of luminance 1: the source's, or a seeded warm white where that is white."""
     rgb = np.maximum(np.asarray(rgb_linear, np.float64), 0.0)
     if np.ptp(rgb) > 0.02 and rgb @ LUMINANCE > 0:
@@ -114,7 +115,7 @@ def _bulb_emitter(
     geometry: Geometry,
     place: tuple[int, int],
     faces: NDArray[np.int64],
-    flux_and_rgb: tuple[float, NDArray[np.float64]],
+    flux_and_rgb: tuple[float, F64],
     recipe: Recipe,
 ) -> AreaEmitter:
     index, k = place
@@ -145,9 +146,9 @@ def _shade_emitter(
     return AreaEmitter(name, index, item.room_id, faces, areas, radiance, area, flux)
 
 
-def _corners(geometry: Geometry, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _corners(geometry: Geometry, faces: NDArray[np.int64]) -> F64:
     return triangle_corners(geometry.positions, geometry.faces[faces])
 
 
-def _triple(v: NDArray[np.float64]) -> tuple[float, float, float]:
+def _triple(v: F64) -> tuple[float, float, float]:
     return float(v[0]), float(v[1]), float(v[2])

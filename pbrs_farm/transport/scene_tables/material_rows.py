@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.recipe import Recipe
@@ -54,9 +55,7 @@ def texture_atlas(house: House, textures: dict[str, NDArray[np.uint8]]) -> Textu
     return TextureAtlas(np.concatenate(parts), slots)
 
 
-def material_rows(
-    house: House, packed: TextureAtlas, recipe: Recipe
-) -> tuple[NDArray[np.float32], list[str]]:
+def material_rows(house: House, packed: TextureAtlas, recipe: Recipe) -> tuple[F32, list[str]]:
     """(M, 16) rows and notes on what had to be changed."""
     rows = np.zeros((max(len(house.materials), 1), MATERIAL_FLOATS), np.float32)
     scaled: list[str] = []
@@ -78,7 +77,7 @@ def material_rows(
     return rows, notes
 
 
-def _physical(material: Material, recipe: Recipe) -> tuple[NDArray[np.float32], bool]:
+def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
     """(row, whether Kd + Ks had to be scaled) in the preset `physical`.
 
     Ks is read as the strength of a clear coat, F0 = 0.08 Ks (0.04 = glass of index 1.5 at Ks
@@ -126,7 +125,7 @@ def _physical(material: Material, recipe: Recipe) -> tuple[NDArray[np.float32], 
     return row, too_much and has_coat
 
 
-def _released(material: Material) -> NDArray[np.float32]:
+def _released(material: Material) -> F32:
     """The preset `released`: diffuse with a linear Kd or its texture; glass is a null BSDF."""
     row = np.zeros(MATERIAL_FLOATS, np.float32)
     transparent = material.opacity < 1 or material.kind in (MaterialKind.GLASS, MaterialKind.PANE)

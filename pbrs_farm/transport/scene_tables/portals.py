@@ -7,13 +7,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, MaterialKind
 from pbrs_farm.core.mesh import face_areas
 
 MAX_PORTALS: Final = 6  # sampled for one view
 
 
-def portals_of_house(house: House) -> NDArray[np.float64]:
+def portals_of_house(house: House) -> F64:
     """(K, 4, 3) rectangles through which daylight enters: windows, and doors with panes."""
     # Count a door as a portal when one of its surfaces is a pane.
     glazed = {
@@ -29,7 +30,7 @@ def portals_of_house(house: House) -> NDArray[np.float64]:
     return np.array(quads).reshape(-1, 4, 3)
 
 
-def nearest_portals(portals: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
+def nearest_portals(portals: F64, eye: F64) -> F64:
     """At most MAX_PORTALS of them, those of the largest solid angle from eye (3,), roughly."""
     if len(portals) <= MAX_PORTALS:
         return portals

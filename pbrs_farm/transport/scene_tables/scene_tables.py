@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64, I32, Bools
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Geometry, House, MaterialKind, geometry_from_house
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
@@ -34,18 +35,18 @@ NO_LAMP: Final = 0xFFFF  # upper half of a face's tag that does not emit
 class SceneTables:
     """The arrays that the kernels gather from."""
 
-    positions: NDArray[np.float32]  # (V, 3) vertices of Mitsuba's mesh
-    faces: NDArray[np.int32]  # (F, 3), without degenerate ones
-    face_rows: NDArray[np.float32]  # (F, 28), columns as above
+    positions: F32  # (V, 3) vertices of Mitsuba's mesh
+    faces: I32  # (F, 3), without degenerate ones
+    face_rows: F32  # (F, 28), columns as above
     face_tags: NDArray[np.uint32]  # (F,) material + 65536 * lamp
-    transparent: NDArray[np.bool_]  # (F,) thin glass and alpha cut-outs: shadow rays may pass
-    material_rows: NDArray[np.float32]  # (M, 16), columns as in material_rows.py
+    transparent: Bools  # (F,) thin glass and alpha cut-outs: shadow rays may pass
+    material_rows: F32  # (M, 16), columns as in material_rows.py
     texels: NDArray[np.uint32]  # the texture atlas
     lamps: tuple[AreaEmitter, ...]  # L of them
-    lamp_rows: NDArray[np.float32]  # (L, 4) radiance r g b, area in m2
+    lamp_rows: F32  # (L, 4) radiance r g b, area in m2
     lamp_first: NDArray[np.uint32]  # (L + 1,) first of each lamp's triangles in the next two
     lamp_faces: NDArray[np.uint32]  # (T,) face
-    lamp_areas: NDArray[np.float32]  # (T,) running sum of areas over the lamp's area
+    lamp_areas: F32  # (T,) running sum of areas over the lamp's area
     notes: tuple[str, ...]  # what had to be changed or left out
 
 
@@ -94,12 +95,12 @@ def tables_from_house(
     )
 
 
-def _solid_faces(geometry: Geometry) -> NDArray[np.bool_]:
+def _solid_faces(geometry: Geometry) -> Bools:
     """(F,) bool: finite corners and an area that defines the face's plane."""
     return faces_with_area(triangle_corners(geometry.positions, geometry.faces), 0.5e-10)
 
 
-def _face_rows(geometry: Geometry, faces: NDArray[np.int32]) -> NDArray[np.float32]:
+def _face_rows(geometry: Geometry, faces: I32) -> F32:
     corners = triangle_corners(geometry.positions, faces)
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     flat = unit_normals(corners)
@@ -130,7 +131,7 @@ def _face_rows(geometry: Geometry, faces: NDArray[np.int32]) -> NDArray[np.float
 
 def _lamp_triangles(
     lamps: tuple[AreaEmitter, ...], new_number: NDArray[np.int64]
-) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]:
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32], F32]:
     """(first, faces, areas) as in SceneTables; new_number: of each face of the geometry."""
     first = np.cumsum([0, *(len(lamp.faces) for lamp in lamps)]).astype(np.uint32)
     faces = [new_number[lamp.faces] for lamp in lamps]
@@ -142,7 +143,7 @@ def _lamp_triangles(
     )
 
 
-def bounding_spheres(tables: SceneTables) -> NDArray[np.float64]:
+def bounding_spheres(tables: SceneTables) -> F64:
     """(L, 4) centre and radius in m of the sphere around the bounding box of each lamp's faces."""
     spheres = np.zeros((len(tables.lamps), 4))
     for k in range(len(tables.lamps)):

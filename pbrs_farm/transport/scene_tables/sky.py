@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.recipe import Recipe
@@ -37,9 +38,9 @@ class Sky:
     """Light from outside, in the world frame."""
 
     name: str  # of view.json
-    dome: NDArray[np.float32]  # (H, W, 3) radiance in W m-2 sr-1, sun removed
-    sun_direction: NDArray[np.float64]  # (3,) unit, towards the sun
-    sun_irradiance: NDArray[np.float64]  # (3,) W m-2 facing the sun, linear RGB; zeros = no sun
+    dome: F32  # (H, W, 3) radiance in W m-2 sr-1, sun removed
+    sun_direction: F64  # (3,) unit, towards the sun
+    sun_irradiance: F64  # (3,) W m-2 facing the sun, linear RGB; zeros = no sun
     sun_half_angle_rad: float = SUN_HALF_ANGLE_RAD  # of its disc
     rotation_rad: float = 0.0  # of the source about +y
     scale: float = 1.0  # of the source's radiance
@@ -169,7 +170,7 @@ def sky_from_panorama(
     return Sky(name, scaled, sun, irradiance, rotation_rad=turned_rad, scale=scale)
 
 
-def directions(height: int, width: int) -> NDArray[np.float64]:
+def directions(height: int, width: int) -> F64:
     """(H, W, 3) unit directions of the texels' centres."""
     theta = (np.arange(height) + 0.5) / height * math.pi
     phi = (np.arange(width) + 0.5) / width * 2 * math.pi
@@ -178,13 +179,13 @@ def directions(height: int, width: int) -> NDArray[np.float64]:
     return np.stack([s * np.sin(phi), y, -s * np.cos(phi)], -1)
 
 
-def solid_angles(height: int, width: int) -> NDArray[np.float64]:
+def solid_angles(height: int, width: int) -> F64:
     """(H,) exact solid angle of one texel of each row, sr."""
     edges = np.cos(np.arange(height + 1) / height * math.pi)
     return np.asarray((edges[:-1] - edges[1:]) * 2 * math.pi / width)
 
 
-def horizontal_irradiance(dome: NDArray[np.floating]) -> NDArray[np.float64]:
+def horizontal_irradiance(dome: NDArray[np.floating]) -> F64:
     """(3,) irradiance of level open ground by the upper half of a latitude-longitude image."""
     height, width = dome.shape[:2]
     up = np.maximum(directions(height, width)[..., 1], 0.0)
@@ -202,14 +203,14 @@ def _with_ground(sky: Sky) -> Sky:
     )
 
 
-def _hosek(sun: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+def _hosek(sun: F64) -> tuple[F32, F64]:
     """(dome (256, 512, 3) unscaled, colour of the sun (3,)) for a sun direction, world frame."""
     variant = choose_variant()
     mi = mitsuba(variant)
     towards = directions(*DOME_SHAPE).reshape(-1, 3)
 
     # Turn into Mitsuba's frame, +z up: world (x, y, z) is its (x, -z, y).
-    def turned(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    def turned(v: F64) -> F64:
         return np.stack([v[..., 0], -v[..., 2], v[..., 1]], -1)
 
     # Load sky and sun as two emitters, so that each can be evaluated alone.
@@ -220,9 +221,7 @@ def _hosek(sun: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.fl
     return dome, _evaluated(mi, variant, disc, turned(sun)[None])[0].astype(np.float64)
 
 
-def _evaluated(
-    mi: Any, variant: str, emitter: Any, towards: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def _evaluated(mi: Any, variant: str, emitter: Any, towards: F64) -> F32:
     """(N, 3) radiance of an emitter at infinity from directions (N, 3)."""
     if variant.startswith("scalar"):
         rows = []
@@ -238,9 +237,7 @@ def _evaluated(
     return np.asarray(emitter.eval(si).numpy().T, np.float32)
 
 
-def _without_sun(
-    picture: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _without_sun(picture: F64) -> tuple[F64, F64, F64]:
     """(image without its sun, unit direction of it, irradiance facing it) of a panorama.
 
     The sun's texels lie within 4 degrees of the brightest one and are brighter than 20 times the

@@ -94,14 +94,13 @@ def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], C
         means = [float((r.indoor @ LUMINANCE).mean()) for r in results]
         expected = sum(albedo**k for k in range(fields.max_depth))
         error = max(float(np.std(means, ddof=1)) / math.sqrt(len(means)), 5e-4 * expected)
-        is_near = (
-            abs(float(np.mean(means)) - expected) <= _SIGMAS * error < 0.01 * expected * _SIGMAS
-        )
+        is_near = abs(float(np.mean(means)) - expected) <= _SIGMAS * error
+        is_precise = error < 0.01 * expected
         return Claim(
             f"furnace room, {name}: the geometric series, albedo {albedo:g}",
             f"{np.mean(means):.5f}",
             f"{expected:.5f} +- {_SIGMAS * error:.5f}",
-            is_near and not any(r.outdoor.any() for r in results),
+            is_near and is_precise and not any(r.outdoor.any() for r in results),
         )
 
     return measure

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, I32
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
@@ -42,9 +43,7 @@ class ReferenceScene:
         self._sky = sky
         self._scenes: dict[Group, Any] = {}
 
-    def render(
-        self, camera: Camera, group: Group, fields: LightFields, seed: int
-    ) -> NDArray[np.float32]:
+    def render(self, camera: Camera, group: Group, fields: LightFields, seed: int) -> F32:
         """(H, W, 3) radiance of one group; fields.spp, max_depth and rr_depth count."""
         mi = mitsuba(self._variant)
         scene = self._scene(group)
@@ -81,7 +80,7 @@ class ReferenceScene:
         return shapes
 
 
-def _untextured(row: NDArray[np.float32], texels: NDArray[np.uint32]) -> NDArray[np.float32]:
+def _untextured(row: F32, texels: NDArray[np.uint32]) -> F32:
     """The material with its texture's mean colour in place of the texture."""
     first = int(row[FIRST_TEXEL : FIRST_TEXEL + 1].view(np.uint32)[0])
     if first == 0 or int(row[KIND]) == MIRROR:
@@ -95,9 +94,7 @@ def _untextured(row: NDArray[np.float32], texels: NDArray[np.uint32]) -> NDArray
     return untextured
 
 
-def _mesh(
-    mi: Any, positions: NDArray[np.float32], faces: NDArray[np.int32], fields: dict[str, Any]
-) -> Any:
+def _mesh(mi: Any, positions: F32, faces: I32, fields: dict[str, Any]) -> Any:
     # Keep the vertices in use; a mesh takes its BSDF and emitter when it is made.
     used, renumbered = np.unique(faces, return_inverse=True)
     properties = mi.Properties()
@@ -111,8 +108,8 @@ def _mesh(
     return mesh
 
 
-def _bsdf(row: NDArray[np.float32]) -> dict[str, Any]:
-    def rgb(values: NDArray[np.float32]) -> dict[str, Any]:
+def _bsdf(row: F32) -> dict[str, Any]:
+    def rgb(values: F32) -> dict[str, Any]:
         return {"type": "rgb", "value": [float(v) for v in values]}
 
     # Choose the plugin by the kind of BSDF.

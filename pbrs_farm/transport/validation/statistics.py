@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import LUMINANCE
 
 
-def blocks(picture: NDArray[np.float32], n: int = 4) -> NDArray[np.float64]:
+def blocks(picture: F32, n: int = 4) -> F64:
     """(n, n) mean luminance of a radiance image (H, W, 3), H and W multiples of n."""
     luminance = picture @ LUMINANCE
     h, w = luminance.shape
@@ -18,9 +18,7 @@ def blocks(picture: NDArray[np.float32], n: int = 4) -> NDArray[np.float64]:
     return np.asarray(means, np.float64)
 
 
-def z_scores(
-    a: Sequence[NDArray[np.float64]], b: Sequence[NDArray[np.float64]]
-) -> NDArray[np.float64]:
+def z_scores(a: Sequence[F64], b: Sequence[F64]) -> F64:
     """z of the difference of two means, one per block; a, b: independent runs of one shape.
 
     The variance is pooled over all blocks, each brought to relative terms first.
