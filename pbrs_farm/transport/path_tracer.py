@@ -134,27 +134,15 @@ def trace(
     max_depth: int | None = None,
 ) -> SampleSums:
     """Trace n_samples paths for every lane; max_depth replaces the fields' own."""
-    # Give every lane its pixel and, for the pilot, its emitter.
     lane = dr.arange(mi.UInt32, lanes.n_lanes)
-    per_pixel = dr.opaque(mi.UInt32, max(lanes.n_only, 1))
-    pixel, number = lane // per_pixel, mi.Int32(lane % per_pixel)
-    n_lamps = dr.opaque(mi.Int32, lanes.n_only_lamps)
-    is_single, is_lamp = dr.opaque(mi.Bool, lanes.n_only > 0), number < n_lamps
-    indoor = dr.select(is_lamp, number, NO_EMITTERS)
-    outdoor = dr.select(is_lamp, NO_EMITTERS, number - n_lamps)
-    emitter_filter = EmitterFilter(
-        indoor=dr.select(is_single, indoor, ALL_EMITTERS),
-        outdoor=dr.select(is_single, outdoor, ALL_EMITTERS),
-    )
+    pixel, emitter_filter = _pixels_and_emitters(lane, lanes)
     lamp_sums = None
     if lanes.n_lamps > 0:
         sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
         lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
-    context = PathContext(
-        scene, emitters, device_fields(fields, max_depth=max_depth), emitter_filter
-    )
+    depth_fields = device_fields(fields, max_depth=max_depth)
     total = _trace(
-        context,
+        PathContext(scene, emitters, depth_fields, emitter_filter),
         device_camera(camera),
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
@@ -179,6 +167,20 @@ def trace(
         rows(total.normal),
         int(np.sum(total.n_bad.numpy(), dtype=np.int64)),
         lamps,
+    )
+
+
+def _pixels_and_emitters(lane: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:
+    """(pixel, emitters that count) of each lane: all of them, or for the pilot a single one."""
+    per_pixel = dr.opaque(mi.UInt32, max(lanes.n_only, 1))
+    pixel, number = lane // per_pixel, mi.Int32(lane % per_pixel)
+    n_lamps = dr.opaque(mi.Int32, lanes.n_only_lamps)
+    is_single, is_lamp = dr.opaque(mi.Bool, lanes.n_only > 0), number < n_lamps
+    indoor = dr.select(is_lamp, number, NO_EMITTERS)
+    outdoor = dr.select(is_lamp, NO_EMITTERS, number - n_lamps)
+    return pixel, EmitterFilter(
+        indoor=dr.select(is_single, indoor, ALL_EMITTERS),
+        outdoor=dr.select(is_single, outdoor, ALL_EMITTERS),
     )
 
 

@@ -68,12 +68,24 @@ class Strategy(NamedTuple):
     is_view_independent: Any = False  # Bool: the MIS weights do not depend on wi
 
 
-class _Glass(NamedTuple):
-    """The choice between reflection and transmission."""
+class _Lobe(NamedTuple):
+    """The choice between reflection and transmission at glass."""
 
+    u: Any  # the random number, used for the lobe of a rough surface, too
     reflectance: Any
     probability: Any  # of choosing reflection
     reflected: Any  # Bool, at mirrors too
+
+
+class _Step(NamedTuple):
+    """A step under way: where the path has come to, and how it is to go on."""
+
+    context: PathContext
+    sampler: Sampler
+    path: PathState
+    vertex: Vertex
+    strategy: Strategy
+    lobe: _Lobe
 
 
 class _Scattered(NamedTuple):
@@ -100,33 +112,25 @@ def advance(
     no path's; only then are rays guided.
     """
     vertex = _next_vertex(context, path, active)
-    si, bsdf, depth = vertex.si, vertex.si.bsdf, vertex.depth
+    si, bsdf = vertex.si, vertex.si.bsdf
     missed = active & ~si.valid
     near = vertex.near if may_reconnect is False else None
-    u_lobe = sampler.get_1d(vertex.dim + _LOBE)
-    glass = _choose_reflection(vertex, path, near, u_lobe)
+    lobe = _choose_lobe(vertex, path, near, sampler.get_1d(vertex.dim + _LOBE))
 
     # Weigh what a guided ray has met; add the light of an emitter there.
     if near is not None:
-        only, ends = context.emitter_filter.indoor, missed | glass.reflected
+        only, ends = context.emitter_filter.indoor, missed | lobe.reflected
         weight = mis_weight(context.emitters, path, si, only, ends, vertex.is_rough)
         path = replace(path, beta=path.beta * weight)
     emitted_outdoor, emitted_indoor = _emitted_light(context, path, si, missed)
 
-    # Decide how the rays that leave the vertex are sampled.
-    goes_on = vertex.is_rough & (depth < context.fields.max_depth)
-    strategy = Strategy(near)
-    if near is not None:
-        may_aim = goes_on & (depth + 1 < context.fields.max_depth)
-        guiding = guiding_at(near, bsdf, path.beta, may_aim)
-        strategy = Strategy(near, guiding, 1 - guiding.share)
-    if may_reconnect is not False:
-        is_independent = may_reconnect & vertex.is_rough & is_reconnectable(bsdf)
-        strategy = Strategy(is_view_independent=is_independent)
-
+    # Send shadow rays, and go on.
+    goes_on = vertex.is_rough & (vertex.depth < context.fields.max_depth)
+    strategy = _strategy(context, path, vertex, goes_on, may_reconnect)
     outdoor, indoor = sample_direct_light(context, sampler, vertex, strategy, goes_on)
-    scattered = _scatter(context, sampler, path, vertex, strategy, glass, u_lobe, goes_on)
-    following, alive = _follow(context, sampler, path, vertex, strategy, glass, scattered)
+    step = _Step(context, sampler, path, vertex, strategy, lobe)
+    scattered = _scatter(step, goes_on)
+    following, alive = _follow(step, scattered)
     result = StepResult(
         emitted_outdoor=emitted_outdoor,
         emitted_indoor=emitted_indoor,
@@ -170,16 +174,29 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near)
 
 
-def _choose_reflection(vertex: Vertex, path: PathState, near: NearbyLamps | None, u: Any) -> _Glass:
-    """Reflect more of the rays at glass near lamps; _follow makes them weigh less."""
+def _choose_lobe(vertex: Vertex, path: PathState, near: NearbyLamps | None, u: Any) -> _Lobe:
+    """Reflect more of the rays at glass near lamps; _throughput makes them weigh less."""
     reflectance = thin_glass_reflectance(vertex.wi.z)
     probability = reflectance
     if near is not None:
         often = reflection_probability(reflectance, survival_boost(near))
         probability = dr.select(path.bsdf_pdf > 0, often, reflectance)
-    return _Glass(
-        reflectance, probability, vertex.is_mirror | (vertex.is_glass & (u < probability))
-    )
+    reflected = vertex.is_mirror | (vertex.is_glass & (u < probability))
+    return _Lobe(u, reflectance, probability, reflected)
+
+
+def _strategy(
+    context: PathContext, path: PathState, vertex: Vertex, goes_on: Any, may_reconnect: Any
+) -> Strategy:
+    """How the rays that leave a vertex are sampled."""
+    if may_reconnect is not False:
+        is_independent = may_reconnect & vertex.is_rough & is_reconnectable(vertex.si.bsdf)
+        return Strategy(is_view_independent=is_independent)
+    if vertex.near is None:
+        return Strategy()
+    may_aim = goes_on & (vertex.depth + 1 < context.fields.max_depth)
+    guiding = guiding_at(vertex.near, vertex.si.bsdf, path.beta, may_aim)
+    return Strategy(vertex.near, guiding, 1 - guiding.share)
 
 
 def _emitted_light(
@@ -276,85 +293,55 @@ def _direct_light(
     return DirectLightSample(light, sample.d, incident, sample.emitter)
 
 
-def _scatter(
-    context: PathContext,
-    sampler: Sampler,
-    path: PathState,
-    vertex: Vertex,
-    strategy: Strategy,
-    glass: _Glass,
-    u_lobe: Any,
-    goes_on: Any,
-) -> _Scattered:
+def _scatter(step: _Step, goes_on: Any) -> _Scattered:
     """Draw a direction at a rough surface; mirrors and glass keep one, and glass is no vertex."""
-    si, frame, wi = vertex.si, vertex.frame, vertex.wi
-    uv = sampler.get_2d(vertex.dim + _SCATTER)
+    context, path, vertex, lobe = step.context, step.path, step.vertex, step.lobe
+    si, frame, guiding = vertex.si, vertex.frame, step.strategy.guiding
+    uv = step.sampler.get_2d(vertex.dim + _SCATTER)
     is_guided, target_face = mi.Bool(False), mi.UInt32(NO_FACE)
-    if strategy.guiding is None:
-        d = mi.Vector3f(frame.to_world(sample_bsdf(si.bsdf, wi, u_lobe, uv)))
+    if guiding is None:
+        d = mi.Vector3f(frame.to_world(sample_bsdf(si.bsdf, vertex.wi, lobe.u, uv)))
     else:
-        to = sample_guided(strategy.guiding, context.scene, context.emitters, si, u_lobe, uv)
+        to = sample_guided(guiding, context.scene, context.emitters, si, lobe.u, uv)
         is_guided, target_face = to.is_guided, to.target_face
-        by_surface = mi.Vector3f(frame.to_world(sample_bsdf(si.bsdf, wi, to.u_bsdf, uv)))
+        by_surface = mi.Vector3f(frame.to_world(sample_bsdf(si.bsdf, vertex.wi, to.u_bsdf, uv)))
         d = dr.select(is_guided, to.d, by_surface)
         goes_on = goes_on & to.valid
     wo = frame.to_local(d)
-    value, pdf = evaluate_bsdf(si.bsdf, wi, wo)
+    value, pdf = evaluate_bsdf(si.bsdf, vertex.wi, wo)
     bounced = goes_on & (dr.dot(si.ng, d) * wo.z > 0) & (pdf > 0)
 
     # Reflect about the shading normal, or go straight on.
     mirror_d = path.d - 2 * dr.dot(si.n, path.d) * si.n
     may_pass = path.n_nulls < MAX_NULLS
     may_reflect = may_pass & (vertex.depth < context.fields.max_depth)
-    mirrored = glass.reflected & may_reflect & (dr.dot(mirror_d, si.ng) > 0)
-    passed = ((vertex.is_glass & ~glass.reflected) | (si.valid & si.is_cutout)) & may_pass
+    mirrored = lobe.reflected & may_reflect & (dr.dot(mirror_d, si.ng) > 0)
+    passed = ((vertex.is_glass & ~lobe.reflected) | (si.valid & si.is_cutout)) & may_pass
     return _Scattered(d, value, pdf, is_guided, target_face, bounced, mirrored, mirror_d, passed)
 
 
-def _follow(
-    context: PathContext,
-    sampler: Sampler,
-    path: PathState,
-    vertex: Vertex,
-    strategy: Strategy,
-    glass: _Glass,
-    scattered: _Scattered,
-) -> tuple[PathState, Any]:
+def _follow(step: _Step, scattered: _Scattered) -> tuple[PathState, Any]:
     """(the path behind the vertex, whether it goes on)."""
-    si, bounced, mirrored, passed = (
-        vertex.si,
-        scattered.bounced,
-        scattered.mirrored,
-        scattered.passed,
-    )
-    beta = _throughput(path, vertex, strategy, glass, scattered)
-
-    # Play roulette with what the surface draws.
-    q = dr.max(beta) / strategy.bsdf_share
-    if strategy.near is not None:
-        q *= survival_boost(strategy.near)
-    q = dr.minimum(q, _MAX_SURVIVAL)
-    tested = bounced & (vertex.depth >= context.fields.rr_depth)
-    survives = ~tested | scattered.is_guided | (sampler.get_1d(vertex.dim + _ROULETTE) < q)
+    path, vertex, strategy, si = step.path, step.vertex, step.strategy, step.vertex.si
+    bounced, mirrored, passed = scattered.bounced, scattered.mirrored, scattered.passed
+    beta = _throughput(step, scattered)
+    survival, survives = _roulette(step, scattered, beta)
     alive = (bounced | mirrored | passed) & survives & (dr.max(beta) > 0)
 
     # Divide by the pdf of all techniques that could have drawn the direction, over the surface's.
-    ratio = strategy.bsdf_share * dr.select(tested, dr.maximum(q, 1e-6), 1)
-    odds = mi.Float(0)
-    if strategy.guiding is not None:
-        pdf = scattered.pdf
-        ratio += cone_technique_pdf(strategy.guiding, scattered.d) / dr.maximum(pdf, 1e-30)
-        odds = target_technique_share(strategy.guiding) / (ratio * pdf)
+    ratio, odds, guiding = strategy.bsdf_share * survival, mi.Float(0), strategy.guiding
+    if guiding is not None:
+        ratio += cone_technique_pdf(guiding, scattered.d) / dr.maximum(scattered.pdf, 1e-30)
+        odds = target_technique_share(guiding) / (ratio * scattered.pdf)
     beta = dr.select(bounced, beta / ratio, beta)
 
     # Keep how the direction was drawn, for the weight of what it meets.
-    pdf = scattered.pdf * strategy.bsdf_share
-    if strategy.is_view_independent is not False:
+    pdf, is_independent = scattered.pdf * strategy.bsdf_share, strategy.is_view_independent
+    if is_independent is not False:
         independent = view_independent_pdf(si.bsdf, si.ng, scattered.d)
-        pdf = dr.select(strategy.is_view_independent, independent, scattered.pdf)
-    d = dr.select(
-        bounced, scattered.d, dr.select(mirrored, mi.Vector3f(scattered.mirror_d), path.d)
-    )
+        pdf = dr.select(is_independent, independent, scattered.pdf)
+    straight_d = dr.select(mirrored, mi.Vector3f(scattered.mirror_d), path.d)
+    d = dr.select(bounced, scattered.d, straight_d)
     outward = dr.select(dr.dot(d, si.ng) > 0, si.ng, -si.ng)
     here = no_reference(si.p) if vertex.near is None else vertex.near.reference
     is_null = passed | (vertex.is_glass & mirrored)
@@ -372,18 +359,27 @@ def _follow(
     ), alive
 
 
-def _throughput(
-    path: PathState, vertex: Vertex, strategy: Strategy, glass: _Glass, scattered: _Scattered
-) -> Any:
+def _roulette(step: _Step, scattered: _Scattered, beta: Any) -> tuple[Any, Any]:
+    """(probability to survive, Bool: survives) of Russian roulette, of what the surface draws."""
+    q = dr.max(beta) / step.strategy.bsdf_share
+    if step.strategy.near is not None:
+        q *= survival_boost(step.strategy.near)
+    q = dr.minimum(q, _MAX_SURVIVAL)
+    tested = scattered.bounced & (step.vertex.depth >= step.context.fields.rr_depth)
+    lives = step.sampler.get_1d(step.vertex.dim + _ROULETTE) < q
+    survives = ~tested | scattered.is_guided | lives
+    return dr.select(tested, dr.maximum(q, 1e-6), 1), survives
+
+
+def _throughput(step: _Step, scattered: _Scattered) -> Any:
     """The path's throughput times f |cos| / pdf, or times the share of a mirror or glass."""
-    bsdf = vertex.si.bsdf
+    vertex, lobe, bsdf = step.vertex, step.lobe, step.vertex.si.bsdf
     factor = dr.select(vertex.is_rough, scattered.value / scattered.pdf, mi.Color3f(1))
     factor = dr.select(vertex.is_mirror, bsdf.f0, factor)
-    beta = path.beta * dr.select(vertex.is_glass & scattered.passed, bsdf.tau, factor)
-    if strategy.near is None:
+    beta = step.path.beta * dr.select(vertex.is_glass & scattered.passed, bsdf.tau, factor)
+    if step.strategy.near is None:
         return beta
     # Make up for having chosen reflection more often than it happens.
-    r, p = glass.reflectance, glass.probability
-    return dr.select(
-        vertex.is_glass, beta * dr.select(glass.reflected, r / p, (1 - r) / (1 - p)), beta
-    )
+    r, p = lobe.reflectance, lobe.probability
+    share = dr.select(lobe.reflected, r / p, (1 - r) / (1 - p))
+    return dr.select(vertex.is_glass, beta * share, beta)
