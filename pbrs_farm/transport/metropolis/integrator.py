@@ -47,6 +47,7 @@ from pbrs_farm.transport.metropolis.markov_chains import (
     STORED_DIMS,
     Chains,
     ChainSums,
+    Mutations,
     draw_paths,
     mutate,
 )
@@ -186,7 +187,8 @@ def _run(
         first = totals.n_steps
         n = min(_STEPS_PER_LAUNCH, n_steps - first)
         steps = dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, first + n)
-        chains, sums = mutate(context, chains, steps, p_large, mutation_seed, reconnects)
+        how = Mutations(*steps, p_large, mutation_seed, reconnects)
+        chains, sums = mutate(context, chains, how)
         dr.eval(*chains, sums, context.film.splats)
         if n_shared > 0:
             if first % _STEPS_PER_PREFIX == 0:

@@ -128,19 +128,19 @@ class ChainSums:
         self.n_large += dr.select(is_large, mi.Float(1), 0)
 
 
-@dr.syntax
-def mutate(
-    context: ChainContext,
-    chains: Chains,
-    steps: tuple[Any, Any],
-    p_large: Any,
-    seed: Any,
-    reconnects: Any,
-) -> tuple[Chains, ChainSums]:
-    """Make steps [first, last) of every chain; splat the paths that are their own pixel's alone.
+class Mutations(NamedTuple):
+    """Which steps of the chains a launch makes, and how; all opaque."""
 
-    p_large: chance of a fresh path. reconnects: whether suffixes are reconnected afterwards.
-    """
+    first: Any  # step
+    last: Any  # one more than the last step
+    p_large: Any  # probability of a fresh path
+    seed: Any
+    reconnects: Any  # Bool: suffixes are reconnected after the launch
+
+
+@dr.syntax
+def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chains, ChainSums]:
+    """Make the steps of every chain; splat the paths that are their own pixel's alone."""
     film, n_chains = context.film, dr.width(chains.target)
     lane = dr.arange(mi.UInt32, n_chains)
     x_samples = _load(chains.samples, STORED_DIMS, n_chains)
@@ -150,15 +150,15 @@ def mutate(
     x = _State(chains.light, chains.target, chains.pixel, is_reconnectable, mi.Float(0))
     y = _camera_split_path(context.camera, mi.Float(0) * mi.Float(lane), mi.Float(0))
     sums = ChainSums(mi.Float(0), mi.Float(0), mi.Float(0), mi.UInt32(0))
-    chain_key = stream_key(lane, seed)
-    step = mi.UInt32(steps[0])
+    chain_key = stream_key(lane, how.seed)
+    step = mi.UInt32(how.first)
     fresh = mi.Bool(True)  # whether y has yet to start
-    active = step < steps[1]
+    active = step < how.last
 
     while active:
         # 1. Propose; the path's first ray leaves through the film position of dimensions 0 and 1.
         key = hash32(chain_key ^ hash32(step + 0x9E3779B9))
-        is_large = unit_float(hash32(key ^ 0x51ED270B)) < p_large
+        is_large = unit_float(hash32(key ^ 0x51ED270B)) < how.p_large
         proposal = MutatedSampler(x_samples, key, is_large)
         u = proposal.get_2d(mi.UInt32(0))
         pixel, at = sample_film(film, u, context.paths.fields.is_tent)
@@ -167,26 +167,21 @@ def mutate(
         done = active & ~alive
 
         # 2. Accept or stay.
-        proposed, good = _proposed_state(film, y, pixel, reconnects)
+        proposed, good = _proposed_state(film, y, pixel, how.reconnects)
         a = dr.select(x.target > 0, dr.minimum(proposed.target / x.target, 1), 1)
         accept = done & (unit_float(hash32(key ^ 0x2545F491)) < a)
         sums.add(proposed.target, done & is_large, accept, done & ~good)
 
-        # 3. Splat what is left behind: the old path with all the weight it has gathered, or the
-        #    rejected one. What is reconnectable waits for the launch's end (reconnection.py).
-        x.weight += dr.select(done, 1 - a, 0)
-        proposed.weight = a
-        left = dr.select(accept, x, proposed)
-        _splat_state(film, lane, left, done & ~left.is_reconnectable)
+        # 3. Splat the path that is left behind; move on, or stay.
         keeps_suffix = accept & proposed.is_reconnectable
         finish_suffix(y_suffix, proposed.light, y.suffix_light, keeps_suffix)
-        x = dr.select(accept, proposed, x)
+        x = _move(film, lane, x, proposed, a, accept, done)
         x_samples = _accept_samples(x_samples, proposal, accept)
         x_suffix = _copy(y_suffix, x_suffix, SUFFIX_FLOATS, keeps_suffix)
 
         step += dr.select(done, mi.UInt32(1), 0)
         fresh = mi.Bool(done)
-        active = step < steps[1]
+        active = step < how.last
 
     _splat_state(film, lane, x, ~x.is_reconnectable)
     samples = _store(x_samples, STORED_DIMS, n_chains)
@@ -271,6 +266,21 @@ def _proposed_state(film: Film, y: SplitPath, pixel: Any, reconnects: Any) -> tu
     light = dr.select(good, light, 0)
     target = target_function(film, pixel, light)
     return _State(light, target, pixel, y.is_reconnectable & reconnects, mi.Float(0)), good
+
+
+def _move(
+    film: Film, chain: Any, x: _State, proposed: _State, a: Any, accept: Any, done: Any
+) -> _State:
+    """Where a chain stands after a step that is accepted with probability a.
+
+    Splats what is left behind: the old path with all the weight it has gathered, or the rejected
+    one. What is reconnectable waits for the launch's end (reconnection.py).
+    """
+    x.weight += dr.select(done, 1 - a, 0)
+    proposed.weight = a
+    left = dr.select(accept, x, proposed)
+    _splat_state(film, chain, left, done & ~left.is_reconnectable)
+    return dr.select(accept, proposed, x)
 
 
 def _splat_state(film: Film, chain: Any, state: _State, active: Any) -> None:
