@@ -135,13 +135,12 @@ def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
     n = 1 << 16
     rng = mi.PCG32(size=n)
     p, up = mi.Point3f(1.3, 0.5, 2.0), mi.Vector3f(0, 1, 0)
-    emitter_filter, on = mi.Int32(-1), mi.Bool(True)
-    near = emitters.nearby.at_vertex(p, up, emitter_filter, on)
+    only, on = mi.Int32(-1), mi.Bool(True)
+    near = emitters.nearby.at_vertex(p, up, only, on)
+    assert near.reference.total.numpy()[0] > 0
     uv = mi.Point2f(rng.next_float32(), rng.next_float32())
-    to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, emitter_filter, on)
+    to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, only, on)
     # With the pdfs of all right, the mean of 1 / pdf is the solid angle of all lamps.
-    radius = emitters.nearby.at_vertex(p, up, emitter_filter, on).at
-    assert radius.total.numpy()[0] > 0
     inverse = dr.select(to.valid, dr.rcp(to.pdf), 0).numpy()
     area_over_d2 = sum(
         2 * float(lamp.area_m2) / 4 / ((1 + k - 1.3) ** 2 + 1.5**2)
