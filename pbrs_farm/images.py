@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
 
-MAX_PIXELS: Final = 16384 * 16384
-"""A picture that says it is larger is rejected before its pixels are read."""
+MAX_PIXELS: Final = 16384 * 16384  # larger pictures are rejected before their pixels are read
 
-_FIXED_DATE: Final = "2000:01:01 00:00:00"
+_FIXED_DATE: Final = "2000:01:01 00:00:00"  # of EXR files: equal images, equal bytes
 
 # (libpng filter, zlib level), the best of 24 measured on synthetic 640x480 pictures. Labels repeat
 # the row above: 16-bit depth takes 10 kB and a third of the time of libpng's own choice of filter
@@ -32,6 +31,7 @@ _FIXED_DATE: Final = "2000:01:01 00:00:00"
 _PNG_LABELS: Final = (32, 4)
 _PNG_PHOTO: Final = (64, 2)
 
+# First bytes -> kind of file.
 _MAGIC: Final = (
     (b"\x89PNG\r\n\x1a\n", ".png"),
     (b"\xff\xd8\xff", ".jpg"),
@@ -48,20 +48,19 @@ def png_from_array(
 ) -> bytes:
     """PNG bytes of (H, W) or (H, W, 3 or 4) uint8 or uint16; no alpha is added, no clock written.
 
-    attribution: written as the file's copyright.
-
-    Colour of 8 bits is marked sRGB; everything else is data and carries no colour space.
+    Colour of 8 bits is marked sRGB; everything else is data. attribution: the file's copyright.
     """
     channels = _channels(array, (1, 3, 4))
     if array.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"a PNG holds uint8 or uint16, got {array.dtype}")
+    # Compress photographs and labels each by what suits them.
     is_photo = channels >= 3 and array.dtype == np.uint8
     png_filter, level = _PNG_PHOTO if is_photo else _PNG_LABELS
     spec = oiio.ImageSpec(array.shape[1], array.shape[0], channels, str(array.dtype))
     spec["oiio:ColorSpace"] = "sRGB" if is_photo else "data"
     spec["png:filter"] = png_filter
     spec["png:compressionLevel"] = level
-    spec["oiio:UnassociatedAlpha"] = 1
+    spec["oiio:UnassociatedAlpha"] = 1  # colours are not multiplied by alpha
     if attribution:
         spec["Copyright"] = attribution
     return _encoded(array, spec, ".png")
@@ -101,10 +100,12 @@ def resized(
     height, width = array.shape[:2]
     if (height, width) == (height_px, width_px):
         return array
+    # Take the pixel whose centre is nearest: labels keep their values.
     if nearest:
         rows = (np.arange(height_px) + 0.5) * height / height_px
         columns = (np.arange(width_px) + 0.5) * width / width_px
         return np.asarray(array[rows.astype(np.intp)[:, None], columns.astype(np.intp)])
+    # Average over boxes.
     channels = _channels(array, (1, 3, 4))
     source = oiio.ImageBuf(np.ascontiguousarray(array).reshape(height, width, channels))
     target = oiio.ImageBuf(oiio.ImageSpec(width_px, height_px, channels, "uint8"))
@@ -123,11 +124,12 @@ def exr_from_layers(
 ) -> bytes:
     """OpenEXR bytes of named channels ("outdoor.R": (H, W) float32), all of one size.
 
-    half: 16-bit floats instead of 32. attribution: the file's copyright. compression: OpenEXR's name ("zip", "zips", "piz", "none").
-    Not handled: channels of unequal type.
+    half: 16-bit floats instead of 32. compression: OpenEXR's name ("zip", "zips", "piz", "none").
+    attribution: the file's copyright. Not handled: channels of unequal type.
     """
     if not layers:
         raise ValueError("an EXR needs at least one layer")
+    # Sort channels as OpenEXR does, so that files do not depend on the order of layers.
     names = sorted(layers)
     shapes = {layers[name].shape for name in names}
     if len(shapes) != 1 or any(len(shape) != 2 for shape in shapes):
@@ -181,6 +183,7 @@ def decode_texture(data: bytes, name: str, media_type: str = "") -> NDArray[np.u
     if kind not in _TEXTURE_KINDS:
         raise BadInput(name, "", "not a PNG, JPEG, GIF, BMP or TGA picture")
     pixels, spec = _decoded(data, name, kind, "uint8")
+    # Part alpha from colour; drop it where it is opaque everywhere.
     channels = pixels.shape[2]
     if channels in (2, 4) and (spec.alpha_channel >= 0 or channels == 4):
         colour, alpha = pixels[..., :-1], pixels[..., -1:]
@@ -199,6 +202,7 @@ def decode_radiance(data: bytes, name: str) -> NDArray[np.float32]:
     if kind not in (".hdr", ".exr"):
         raise BadInput(name, "", "not a Radiance HDR or OpenEXR picture")
     pixels, spec = _decoded(data, name, kind, "float")
+    # Find R, G and B by name: OpenEXR sorts channels.
     names = list(spec.channelnames)
     if all(channel in names for channel in "RGB"):
         pixels = pixels[..., [names.index(channel) for channel in "RGB"]]
@@ -255,6 +259,7 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
     """(H, W, C) array of type kind ("unknown": as stored) and the file's ImageSpec."""
     if suffix == ".png" and _is_cut_short(data):  # said here: libpng would write to stderr
         raise BadInput(name, "", "cannot be read as a picture: damaged or truncated")
+    # Read alpha as it is stored, not multiplied into the colours.
     config = oiio.ImageSpec()
     config["oiio:UnassociatedAlpha"] = 1
     with _temporary(suffix, data) as path:
@@ -266,7 +271,7 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
             if spec.width * spec.height > MAX_PIXELS:
                 raise BadInput(name, "", f"{spec.width}x{spec.height} pixels are too many")
             pixels = source.read_image(0, 0, 0, spec.nchannels, kind)
-            fault = source.geterror()
+            fault = source.geterror()  # a truncated file gives pixels and a fault
         finally:
             source.close()
     if pixels is None or fault:
@@ -276,8 +281,9 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
 
 def _is_cut_short(png: bytes) -> bool:
     """Whether a chunk of the PNG is longer than what is left of the file."""
-    at = 8
+    at = 8  # behind the signature
     while at < len(png):
+        # A chunk: length, type, data, checksum.
         end = at + 12 + int.from_bytes(png[at : at + 4], "big")
         if end > len(png):
             return True
@@ -288,5 +294,6 @@ def _is_cut_short(png: bytes) -> bool:
 
 
 def _reason(fault: str, path: Path) -> str:
+    # Take the temporary file's name out: it says nothing to the user.
     text = " ".join(fault.replace(str(path), "it").split())
     return f"cannot be read as a picture: {text or 'damaged or truncated'}"

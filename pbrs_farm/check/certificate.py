@@ -4,30 +4,29 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict
 
-MAX_LISTED = 20
-"""Failures of one check that are listed by place; all are counted."""
+MAX_LISTED = 20  # failures of one check that are listed by place; all are counted
 
 
 class Count(BaseModel):
-    """One check: things looked at, failed ones, and ties (two right answers at one pixel)."""
+    """How one check ended."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    checked: int = 0
+    checked: int = 0  # pixels, files or facts that were looked at
     failed: int = 0
-    ties: int = 0
+    ties: int = 0  # right by another of two right answers
 
 
 class Certificate(BaseModel):
-    """The outcome of verify. failures: at most MAX_LISTED lines per check, "check: place: what"."""
+    """The outcome of verify."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     folder: str
     all_pixels: bool
     n_houses: int
     n_views: int
-    counts: dict[str, Count]
-    failures: tuple[str, ...]
-    notes: tuple[str, ...] = ()
+    counts: dict[str, Count]  # check -> its count
+    failures: tuple[str, ...]  # "check: place: what", at most MAX_LISTED per check
+    notes: tuple[str, ...] = ()  # what is odd but no failure
 
     @property
     def is_clean(self) -> bool:
@@ -56,8 +55,8 @@ class Tally:
     """Collects counts and failures while verify runs."""
 
     def __init__(self) -> None:
-        self._counts: dict[str, list[int]] = {}
-        self._listed: dict[str, list[str]] = {}
+        self._counts: dict[str, list[int]] = {}  # check -> [checked, failed, ties]
+        self._listed: dict[str, list[str]] = {}  # check -> lines of failures
         self.notes: list[str] = []
 
     def add(self, check: str, checked: int, *, ties: int = 0) -> None:
@@ -95,8 +94,8 @@ class Tally:
             n_houses=n_houses,
             n_views=n_views,
             counts={
-                name: Count(checked=c[0], failed=c[1], ties=c[2])
-                for name, c in self._counts.items()
+                name: Count(checked=checked, failed=failed, ties=ties)
+                for name, (checked, failed, ties) in self._counts.items()
             },
             failures=tuple(line for lines in self._listed.values() for line in lines),
             notes=tuple(self.notes),

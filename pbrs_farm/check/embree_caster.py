@@ -22,6 +22,7 @@ class Rays:
     """First hits among triangles (all of them, or those chosen by keep (F,) bool)."""
 
     def __init__(self, triangles: Triangles, keep: NDArray[np.bool_] | None = None) -> None:
+        # Leave out triangles without an area: they have no normal.
         corners = triangles.vertices.astype(np.float64)[triangles.faces]
         with np.errstate(invalid="ignore"):
             cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -29,11 +30,12 @@ class Rays:
             solid = np.isfinite(length) & (length > 0)
         if keep is not None:
             solid &= keep
-        self._face = np.nonzero(solid)[0]
-        self._corner = corners[:, 0]
+        self._face = np.nonzero(solid)[0]  # Embree's number -> number of the triangle
+        self._corner = corners[:, 0]  # a point of each triangle's plane
         self._normal = cross / np.where(length > 0, length, 1)[:, None]
         self._caster: Any = None
         if len(self._face):
+            # process=False: merging vertices would renumber faces.
             mesh = trimesh.Trimesh(triangles.vertices, triangles.faces[self._face], process=False)
             self._caster = trimesh.ray.ray_pyembree.RayMeshIntersector(mesh, scale_to_box=False)
 
@@ -48,10 +50,10 @@ class Rays:
     def distance(self, face: Faces, origin: Floats, directions: Floats) -> Floats:
         """(N,) distance in lengths of directions to each face's plane; 0 where face is -1."""
         normal, corner = self._normal[face], self._corner[face]
+        # Intersect the ray with the plane through the corner.
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = np.einsum("ni,ni->n", normal, corner - origin) / np.einsum(
-                "ni,ni->n", normal, directions
-            )
+            height = np.einsum("ni,ni->n", normal, corner - origin)
+            t = height / np.einsum("ni,ni->n", normal, directions)
         return np.where(face >= 0, t, 0.0)
 
     def normal(self, face: Faces, directions: Floats) -> Floats:

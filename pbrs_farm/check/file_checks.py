@@ -15,15 +15,16 @@ from pbrs_farm.check.certificate import Tally
 
 def check_files(root: Path, house: Path, tally: Tally) -> None:
     """Compare manifest.jsonl of house with the files on disk and with the done markers."""
+    # Each listed file is there, with the bytes and the hash that are listed.
     rows = _manifest(house / "manifest.jsonl", house.name, tally)
     for key, row in rows.items():
         _check_row(root, key, row, tally)
     _check_markers(house, rows, tally)
+    # Find files that nothing lists.
     listed = {root / key for key in rows}
     for file in sorted(p for p in (house / "views").rglob("*") if p.is_file()):
-        tally.expect(
-            "files", str(file.relative_to(root)), file in listed, "is not in manifest.jsonl"
-        )
+        place = str(file.relative_to(root))
+        tally.expect("files", place, file in listed, "is not in manifest.jsonl")
 
 
 def check_root_manifest(root: Path, houses: list[Path], tally: Tally) -> None:
@@ -31,17 +32,9 @@ def check_root_manifest(root: Path, houses: list[Path], tally: Tally) -> None:
     merged = root / "manifest.jsonl"
     if not merged.is_file():
         return
-    parts = [
-        h.joinpath("manifest.jsonl").read_bytes()
-        for h in houses
-        if (h / "manifest.jsonl").is_file()
-    ]
-    tally.expect(
-        "files",
-        "manifest.jsonl",
-        merged.read_bytes() == b"".join(parts),
-        "differs from the houses'",
-    )
+    files = [h / "manifest.jsonl" for h in houses]
+    same = merged.read_bytes() == b"".join(f.read_bytes() for f in files if f.is_file())
+    tally.expect("files", "manifest.jsonl", same, "differs from the houses'")
 
 
 def _manifest(file: Path, house: str, tally: Tally) -> dict[str, dict[str, Any]]:
@@ -52,6 +45,7 @@ def _manifest(file: Path, house: str, tally: Tally) -> dict[str, dict[str, Any]]
         try:
             row = json.loads(line)
             key = str(row["key"])
+            # A key that leads out of the root is no row either.
             if not {"bytes", "sha256"} <= row.keys() or ".." in key.split("/") or key[:1] == "/":
                 raise ValueError
         except (ValueError, KeyError, TypeError):
@@ -81,6 +75,7 @@ def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -
         except (ValueError, KeyError, TypeError):
             tally.expect("markers", place, False, "is no marker")
             continue
+        # A marker and the manifest tell the same of each file.
         for key, sha256, n_bytes in pairs:
             row = rows.get(key, {})
             same = row.get("sha256") == sha256 and row.get("bytes") == n_bytes

@@ -20,6 +20,7 @@ from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
 
 Bools = NDArray[np.bool_]
+Labels = dict[str, NDArray[Any]]  # layer -> what is stored at N pixels: (N,) or (N, 3)
 
 RAY_LAYERS = (
     "instance", "semantic", "depth", "normal", "valid",
@@ -27,24 +28,18 @@ RAY_LAYERS = (
 )  # fmt: skip
 """Layers that a ray through the pixel's centre decides."""
 
-ROUNDING_MM = 0.505
+ROUNDING_MM = 0.505  # of depth stored in whole mm
+# Per metre of depth, over the cosine: rays with float32 directions, magnified by a slanting face.
 RAY_ERROR_MM = 2e-4
-"""Per metre of depth, over the cosine: rays with float32 directions, magnified by a slanting face."""
-
 MAX_RAY_ERROR_MM = 5.0
 NORMAL_TOLERANCE_DEG = 0.02
-TIE_DEPTH_M = 1e-4
-METRES = 2e-4
-"""Tolerance of depths and positions stored as floats."""
+TIE_DEPTH_M = 1e-4  # two surfaces closer than this may both be hit
+METRES = 2e-4  # tolerance of depths and positions stored as floats
 
-_JITTER_PX = 0.02
+_JITTER_PX = 0.02  # from the pixel's centre to the neighbouring rays
 _JITTER = _JITTER_PX * np.array(
     [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]], np.float64
 )
-
-
-Labels = dict[str, NDArray[Any]]
-"""Layer name -> what is stored at N pixels: (N,), normals and positions (N, 3)."""
 
 
 def labels_at(labels: Labels, index: NDArray[np.int64]) -> Labels:
@@ -54,11 +49,11 @@ def labels_at(labels: Labels, index: NDArray[np.int64]) -> Labels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdict:
-    """Per check (N,) bool: what is stored is right; tied: right by another triangle; (N,) faces."""
+    """What is right at N pixels."""
 
-    right: dict[str, Bools]
-    tied: Bools
-    face: Faces
+    right: dict[str, Bools]  # check -> (N,) what is stored is right
+    tied: Bools  # (N,) right by another triangle than the one that the centre's ray hit
+    face: Faces  # (N,) that triangle, -1 = nothing
 
 
 def judge(
@@ -69,6 +64,7 @@ def judge(
     scene: tuple[Triangles, Rays],
 ) -> Verdict:
     """Compare labels at pixels (rows, columns) with rays through the scene."""
+    # Explain what is stored by the triangle that the centre's ray hits.
     _, rays = scene
     origin, directions = view.rays(rows, columns)
     face = rays.first(origin, directions)
@@ -84,6 +80,7 @@ def judge(
     candidates.append(
         _coincident(labels_at(labels, open_), face[open_], origin, directions[open_], scene)
     )
+    # Take over a candidate where it leaves fewer checks wrong.
     best = np.sum([~right[name][open_] for name in right], axis=0)
     for other in candidates:
         trial = _explained(view, labels_at(labels, open_), other, directions[open_], scene)
@@ -108,6 +105,7 @@ def _explained(
     normal = rays.normal(face, directions)
     classes = np.zeros(max(triangles.nyu40, default=0) + 1, np.int64)
     classes[list(triangles.nyu40)] = list(triangles.nyu40.values())
+    # What depth, position and error of the ray would be for a hit there.
     mm = np.clip(z * 1000, 0.5, 65535)
     point = view.world_from_camera[:3, 3] + directions * z[:, None]
     cosine = np.abs(np.einsum("ni,ni->n", normal, directions))
@@ -150,6 +148,7 @@ def published_axes(world: Floats, view: StoredView) -> Floats:
 
 def normal_is_right(stored: NDArray[np.int64], expected: Floats) -> Bools:
     """(N,) stored 16-bit normals decode to the expected ones; where those are 0, to nothing."""
+    # Compare by the sine: the cosine of a small angle is too flat.
     decoded = stored * (2 / 65535) - 1
     length = np.linalg.norm(decoded, axis=1)
     sine = np.linalg.norm(np.cross(decoded, expected), axis=1)
@@ -169,6 +168,7 @@ def _coincident(
     found = np.full(len(face), -1, np.int64)
     first = rays.distance(face, origin, directions)
     for instance in np.unique(labels["instance"]):
+        # Look for a triangle of that instance at the depth of the first hit.
         own = np.nonzero(triangles.instance == instance)[0]
         for pixel in np.nonzero(labels["instance"] == instance)[0]:
             t = _pierced(triangles, own, origin, directions[pixel])
@@ -181,11 +181,13 @@ def _coincident(
 def _pierced(triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: Floats) -> Floats:
     """(F,) distance at which one ray pierces each of the triangles own; inf = misses it."""
     a, b, c = (triangles.vertices[triangles.faces[own, k]].astype(np.float64) for k in range(3))
+    # Moeller and Trumbore 1997, one ray and many triangles.
     e1, e2, s = b - a, c - a, origin - a
     p = np.cross(ray, e2)
     q = np.cross(s, e1)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1 / np.einsum("fi,fi->f", e1, p)
+        # Barycentric coordinates, with slack at the edges, and the distance.
         u, v = np.einsum("fi,fi->f", s, p) * inverse, (q @ ray) * inverse
         t = np.einsum("fi,fi->f", e2, q) * inverse
         inside = (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 0)

@@ -1,7 +1,4 @@
-"""K and poses: proper by themselves, and one view's points fall on what another view sees.
-
-No effects but reading what it is given.
-"""
+"""K and poses: proper by themselves, and one view's points fall on what another sees; no effects."""
 
 from __future__ import annotations
 
@@ -16,17 +13,18 @@ from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.stored_view import StoredView
 
 SLACK_M = 0.02
+# Share of points that a thin thing between two pixels may cost; a wrong pose costs far more.
 MAX_SEEN_PAST = 0.002
-"""Share of points that a thin thing between two pixels may cost; a wrong pose costs far more."""
 
-_MIN_COSINE = 0.5
-_MIN_NEARER = 0.7
-_STEP_PX = 16
-_MAX_PARTNERS = 40
+_MIN_COSINE = 0.5  # of a surface against the other view's ray
+_MIN_NEARER = 0.7  # own distance over the other view's
+_STEP_PX = 16  # of the grid of points
+_MAX_PARTNERS = 40  # views that one view is held against
 
 
 def check_pose(view: StoredView, tally: Tally) -> None:
     """The pose is a rotation and a position, both conventions agree, and K is a pinhole's."""
+    # Shapes first: nothing else can be computed without them.
     opencv = view.world_from_camera
     opengl = np.array(view.table["world_from_camera_opengl"], np.float64)
     shaped = opencv.shape == opengl.shape == (4, 4) and view.k.shape == (3, 3)
@@ -35,6 +33,7 @@ def check_pose(view: StoredView, tally: Tally) -> None:
     rotation = opencv[:3, :3]
     proper = np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-6 < np.linalg.det(rotation)
     tally.expect("pose", view.place, bool(proper), "the rotation is none")
+    # The two conventions differ by the signs of y and z.
     agree = np.abs(opengl @ np.diag([1.0, -1, -1, 1]) - opencv).max() < 1e-9
     tally.expect("pose", view.place, bool(agree), "the OpenGL and OpenCV poses differ")
     height, width = view.size
@@ -45,11 +44,11 @@ def check_pose(view: StoredView, tally: Tally) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenView:
-    """A view with the layers that reprojection needs: depth.png and normal.png as stored."""
+    """A view with the layers that reprojection needs."""
 
     view: StoredView
-    depth: NDArray[Any]
-    normal: NDArray[Any]
+    depth: NDArray[Any]  # as depth.png stores it
+    normal: NDArray[Any]  # as normal.png stores it
 
 
 def check_reprojection(views: list[SeenView], tally: Tally) -> None:
@@ -66,6 +65,7 @@ def check_reprojection(views: list[SeenView], tally: Tally) -> None:
     nearest = [_nearest(seen.depth) for seen in views]
     rng = np.random.default_rng(0)
     for a, seen in enumerate(views):
+        # Choose the views to hold it against.
         others = np.array([b for b in range(len(views)) if b != a], np.int64)
         if len(others) > _MAX_PARTNERS:
             others = rng.choice(others, _MAX_PARTNERS, replace=False)
@@ -86,6 +86,7 @@ def _points(seen: SeenView) -> NDArray[np.float64]:
     Only pixels amid a flat patch of 5 x 5: what is thinner here may be thinner than a pixel there.
     """
     view, (height, width) = seen.view, seen.view.size
+    # Normals of a grid of pixels, in the world.
     grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
     rows, columns = (g.reshape(-1) for g in grid)
     published = seen.normal[rows, columns] * (2 / 65535) - 1
@@ -94,6 +95,7 @@ def _points(seen: SeenView) -> NDArray[np.float64]:
     normal = camera @ view.world_from_camera[:3, :3].T
 
     centre, eye = _positions(seen, rows, columns), view.world_from_camera[:3, 3]
+    # Keep the pixels whose 5 x 5 neighbours lie on the plane of the normal.
     z = seen.depth[rows, columns] / 1000
     flat = (z > 0) & (z < 65)
     for dy, dx in np.ndindex(5, 5):
@@ -121,11 +123,13 @@ def _seen_past(
     points: NDArray[np.float64], view: StoredView, nearest: NDArray[np.float64]
 ) -> tuple[int, int]:
     """How many of the points lie in the view's picture, and in front of all it sees there."""
+    # Leave out surfaces seen from the side, or from much farther than their own view.
     towards = points[:, 0] - view.world_from_camera[:3, 3]
     distance = np.linalg.norm(towards, axis=1)
     own_distance = np.linalg.norm(points[:, 0] - points[:, 2], axis=1)
     broad = np.abs(np.einsum("ni,ni->n", points[:, 1], towards)) > _MIN_COSINE * distance
     broad &= own_distance > _MIN_NEARER * distance
+    # Project the others, and count those in front of what the view sees.
     camera = towards[broad] @ view.world_from_camera[:3, :3]
     camera = camera[camera[:, 2] > 0.05]
     pixel = camera @ view.k.T

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_DTYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
-_SEE_THROUGH = ("glass", "pane")
+_DTYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # glTF component types
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}  # components of an element
+_SEE_THROUGH = ("glass", "pane")  # kinds of material
 
 
 class BadGlb(ValueError):
@@ -24,17 +24,14 @@ class BadGlb(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangles:
-    """vertices (V, 3) float32; faces (F, 3) int64; per face: instance id, material index.
+    """The F triangles of a house."""
 
-    nyu40: instance id -> class as the GLB says. see_through: (F,) bool glass and panes.
-    """
-
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.int64]
-    instance: NDArray[np.int64]
-    material: NDArray[np.int64]
-    nyu40: dict[int, int]
-    see_through: NDArray[np.bool_]
+    vertices: NDArray[np.float32]  # (V, 3) metres
+    faces: NDArray[np.int64]  # (F, 3) indices of vertices
+    instance: NDArray[np.int64]  # (F,) instance id
+    material: NDArray[np.int64]  # (F,) index of the GLB's materials
+    nyu40: dict[int, int]  # instance id -> class as the GLB says
+    see_through: NDArray[np.bool_]  # (F,) glass and panes
 
 
 def triangles_from_glb(data: bytes) -> Triangles:
@@ -49,6 +46,7 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     magic, version, length = struct.unpack_from("<4sII", data)
     if magic != b"glTF" or version != 2 or length != len(data):
         raise ValueError("not a whole glTF 2.0 binary")
+    # The JSON chunk comes first; the binary one follows behind its own header.
     n_json, _ = struct.unpack_from("<I4s", data, 12)
     document = json.loads(data[20 : 20 + n_json])
     return document, data[20 + n_json + 8 :]
@@ -68,16 +66,17 @@ def _accessor(document: dict[str, Any], binary: bytes, index: int) -> NDArray[An
 def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
     vertices = [np.zeros((0, 3), np.float32)]
     faces = [np.zeros((0, 3), np.int64)]
-    owners: list[tuple[int, int, int]] = []
+    owners: list[tuple[int, int, int]] = []  # instance, material, number of faces
     nyu40: dict[int, int] = {}
     n_vertices = 0
+    # Join the primitives of all nodes: those of this package carry no transform.
     for node in document.get("nodes", []):
         instance = int(node["extras"]["instance"])
         nyu40[instance] = int(node["extras"]["nyu40"])
         mesh = document["meshes"][node["mesh"]] if "mesh" in node else {"primitives": []}
         for primitive in mesh["primitives"]:
             if primitive.get("mode", 4) != 4:
-                continue
+                continue  # not triangles
             points = _accessor(document, binary, primitive["attributes"]["POSITION"])
             corners = _accessor(document, binary, primitive["indices"]).reshape(-1, 3)
             vertices.append(points)
@@ -85,6 +84,7 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
             owners.append((instance, int(primitive["material"]), len(corners)))
             n_vertices += len(points)
 
+    # Repeat each primitive's instance and material for its faces.
     table = np.array(owners, np.int64).reshape(-1, 3)
     material = np.repeat(table[:, 1], table[:, 2])
     kinds = [m.get("extras", {}).get("kind", "opaque") for m in document.get("materials", [])]

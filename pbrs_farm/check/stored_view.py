@@ -19,10 +19,10 @@ from pbrs_farm.images import array_from_png, layers_from_exr
 
 @dataclass(frozen=True)
 class StoredView:
-    """One views/<view_id> folder. place: how messages name it."""
+    """One views/<view_id> folder."""
 
     folder: Path
-    table: dict[str, Any]
+    table: dict[str, Any]  # view.json
 
     @property
     def place(self) -> str:
@@ -65,6 +65,7 @@ class StoredView:
         self, rows: NDArray[Any], columns: NDArray[Any]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Origin (3,) and directions (N, 3) of unit depth through (column + 0.5, row + 0.5)."""
+        # Through the middle of each pixel, turned into the world.
         pixel = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))], axis=1)
         camera = np.linalg.solve(self.k, pixel.T).T
         return self.world_from_camera[:3, 3], camera @ self.world_from_camera[:3, :3].T

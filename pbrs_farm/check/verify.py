@@ -26,19 +26,16 @@ from pbrs_farm.check.view_checks import check_consistency, check_pictures, read_
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 
-SAMPLE = 2000
-"""Pixels of each view that are recomputed unless told otherwise."""
-
-MAX_TIES = 0.0002
-"""Share of pixels whose instance may be the other of two right answers."""
+SAMPLE = 2000  # pixels of each view that are recomputed by default
+MAX_TIES = 0.0002  # share of pixels whose instance may be the other of two right answers
 
 
 @dataclass(frozen=True, slots=True)
 class Scenes:
-    """What rays are cast into: every triangle, and those that are neither glass nor pane."""
+    """What rays are cast into."""
 
     all: tuple[Triangles, Rays]
-    opaque: tuple[Triangles, Rays]
+    opaque: tuple[Triangles, Rays]  # without glass and panes
 
 
 def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False) -> Certificate:
@@ -70,17 +67,16 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
         what = f"house.glb {error}" if isinstance(error, BadGlb) else str(error)
         tally.expect("layers", house.name, False, what)
         return 0
-    scenes = Scenes(
-        (triangles, Rays(triangles)), (triangles, Rays(triangles, ~triangles.see_through))
-    )
+    opaque = Rays(triangles, ~triangles.see_through)
+    scenes = Scenes((triangles, Rays(triangles)), (triangles, opaque))
+    # Check each view by itself; a damaged one fails and the rest goes on.
     seen: list[SeenView] = []
     for view in views:
         try:
             arrays = _check_view(view, scenes, n_pixels, tally)
         except (KeyError, TypeError, ValueError, IndexError, np.linalg.LinAlgError) as error:
-            tally.expect(
-                "layers", f"{view.place}/view.json", False, f"{type(error).__name__}: {error}"
-            )
+            what = f"{type(error).__name__}: {error}"
+            tally.expect("layers", f"{view.place}/view.json", False, what)
             continue
         if arrays is not None:
             seen.append(SeenView(view, arrays["depth"], arrays["normal"]))
@@ -116,6 +112,7 @@ def _check_rays(
         (scenes.all, "ray: ", {name: name for name in RAY_LAYERS}),
         (scenes.opaque, "ray: behind glass ", behind),
     ):
+        # Judge the layers that the view has, as whole numbers where they are.
         present = {name: file for name, file in names.items() if file in arrays}
         if "instance" not in present:
             continue
@@ -124,6 +121,7 @@ def _check_rays(
         verdict = judge(view, labels, rows, columns, scene)
         for check, right in verdict.right.items():
             tally.add(f"{prefix}{check}", len(rows), ties=int(verdict.tied.sum()))
+            # Name each wrong pixel.
             for k in np.nonzero(~right)[0]:
                 tally.fail(f"{prefix}{check}", view.place, f"row {rows[k]}, column {columns[k]}")
 

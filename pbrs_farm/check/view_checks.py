@@ -24,6 +24,7 @@ def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | Non
     """The basic layers by name, None when one of them is missing, damaged or of a wrong shape."""
     arrays = {}
     for layer in LAYERS:
+        # A basic layer that is missing fails; an optional one may be absent.
         if layer.name in BASIC or (view.has(layer.file) and layer.name != "radiance"):
             array = _read(view, layer, tally)
             if array is not None:
@@ -68,28 +69,29 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
             if constant:
                 tally.notes.append(f"{place} is one colour: {picture[0, 0].tolist()}")
     if view.has("radiance.exr"):
-        try:
-            channels = view.exr("radiance.exr")
-        except BadInput as error:
-            tally.expect("radiance", view.place, False, str(error))
-            return
-        names = {f"{g}.{c}" for g in ("outdoor", "indoor", "albedo") for c in "RGB"}
-        tally.expect(
-            "radiance", view.place, names <= channels.keys(), f"lacks {names - channels.keys()}"
-        )
-        names |= {name for name in channels if name.startswith("lamp")}
-        for name in sorted(names & channels.keys()):
-            plane = channels[name]
-            bad = int((~(np.isfinite(plane) & (plane >= 0))).sum())
-            tally.add("radiance", plane.size)
-            if bad or plane.shape != view.size:
-                tally.fail(
-                    "radiance",
-                    f"{view.place} {name}",
-                    f"{bad} pixels negative or not finite",
-                    max(bad, 1),
-                )
-        _check_lamps(view, channels, tally)
+        _check_radiance(view, tally)
+
+
+def _check_radiance(view: StoredView, tally: Tally) -> None:
+    """Every group of light is there, finite and not negative."""
+    try:
+        channels = view.exr("radiance.exr")
+    except BadInput as error:
+        tally.expect("radiance", view.place, False, str(error))
+        return
+    names = {f"{g}.{c}" for g in ("outdoor", "indoor", "albedo") for c in "RGB"}
+    lacking = names - channels.keys()
+    tally.expect("radiance", view.place, not lacking, f"lacks {lacking}")
+    # Normals may be negative; light and albedo may not.
+    names |= {name for name in channels if name.startswith("lamp")}
+    for name in sorted(names & channels.keys()):
+        plane = channels[name]
+        bad = int((~(np.isfinite(plane) & (plane >= 0))).sum())
+        tally.add("radiance", plane.size)
+        if bad or plane.shape != view.size:
+            what = f"{bad} pixels negative or not finite"
+            tally.fail("radiance", f"{view.place} {name}", what, max(bad, 1))
+    _check_lamps(view, channels, tally)
 
 
 def _check_lamps(view: StoredView, channels: dict[str, NDArray[Any]], tally: Tally) -> None:
@@ -99,10 +101,10 @@ def _check_lamps(view: StoredView, channels: dict[str, NDArray[Any]], tally: Tal
         return
     names = [row["layer"] for row in table if row["layer"]]
     needed = {f"{name}.{c}" for name in ("indoor", *names) for c in "RGB"}
-    if not tally.expect(
-        "lamps", view.place, needed <= channels.keys(), f"lacks {needed - channels.keys()}"
-    ):
+    lacking = needed - channels.keys()
+    if not tally.expect("lamps", view.place, not lacking, f"lacks {lacking}"):
         return
+    # Sum in float32, one lamp after the other, as the trace does.
     for c in "RGB":
         total = np.zeros(view.size, np.float32)
         for name in names:
@@ -116,10 +118,8 @@ def check_consistency(view: StoredView, arrays: dict[str, NDArray[Any]], tally: 
     _same(view, tally, "valid = depth", (valid == 255) == (depth > 0))
     _same(view, tally, "valid is 0 or 255", (valid == 255) | (valid == 0))
     _same(view, tally, "instance = depth", (instance > 0) == (depth > 0))
-    length = np.linalg.norm(arrays["normal"] * (2 / 65535) - 1, axis=-1)
-    _same(
-        view, tally, "unit normals", np.where(valid > 0, np.abs(length - 1) < 1e-3, length < 1e-4)
-    )
+    _same(view, tally, "unit normals", _is_unit(arrays["normal"], valid))
+    # Look the class of each instance up in the table.
     classes = np.zeros(65536, np.int64)
     for instance_id, nyu40 in view.nyu40.items():
         classes[instance_id] = nyu40
@@ -141,15 +141,21 @@ def _check_optional(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Ta
         if name in arrays:
             _same(view, tally, name, np.isin(arrays[name], values))
     if "normal_shading" in arrays:
-        length = np.linalg.norm(arrays["normal_shading"] * (2 / 65535) - 1, axis=-1)
-        unit = np.where(arrays["valid"] > 0, np.abs(length - 1) < 1e-3, length < 1e-4)
+        unit = _is_unit(arrays["normal_shading"], arrays["valid"])
         _same(view, tally, "normal_shading", unit)
     if "class_source" in arrays:
         _same(view, tally, "class_source", _source_class_is_right(view, arrays))
 
 
+def _is_unit(normal_png: NDArray[Any], valid: NDArray[Any]) -> NDArray[np.bool_]:
+    """(H, W) bool: stored normals have length 1 where something is hit, 0 elsewhere."""
+    length = np.linalg.norm(normal_png * (2 / 65535) - 1, axis=-1)
+    return np.asarray(np.where(valid > 0, np.abs(length - 1) < 1e-3, length < 1e-4), bool)
+
+
 def _source_class_is_right(view: StoredView, arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
     """(H, W) bool: the id's name in the table is the source class of the instance there."""
+    # Number of each instance's source class, 0 where it has none.
     names = {int(k): name for k, name in view.table.get("source_classes", {}).items()}
     number = {name: k for k, name in names.items()}
     expected = np.zeros(65536, np.int64)
@@ -167,6 +173,7 @@ def _same(view: StoredView, tally: Tally, check: str, right: NDArray[np.bool_]) 
 
 def _boundary(ids: NDArray[Any]) -> NDArray[np.bool_]:
     """The published instance boundary: any unequal adjacent pair in the block to the lower right."""
+    # The pixel and its neighbours right, below, and right below; edges repeat themselves.
     padded = np.pad(ids.astype(np.int64), ((0, 1), (0, 1)), mode="edge")
     a, b, c, d = padded[:-1, :-1], padded[:-1, 1:], padded[1:, :-1], padded[1:, 1:]
     return np.asarray((a != b) | (a != c) | (b != d) | (c != d), bool)
@@ -174,12 +181,14 @@ def _boundary(ids: NDArray[Any]) -> NDArray[np.bool_]:
 
 def _check_table(view: StoredView, instance: NDArray[Any], tally: Tally) -> None:
     """The table has a row for each id in the picture, with its pixels, share, box and class name."""
+    # The ids in the picture are those of the table.
     counts = np.bincount(instance.reshape(-1), minlength=1)
     seen = {int(i) for i in np.nonzero(counts)[0]} - {0}
     rows = {int(row["id"]): row for row in view.table["instances"]}
     tally.expect("table", view.place, seen == rows.keys(), f"ids {sorted(seen ^ rows.keys())[:5]}")
     boxes = ndimage.find_objects(instance.astype(np.int32))
     for i in sorted(seen & rows.keys()):
+        # Pixels, share, box and class name follow from the picture.
         row, (ys, xs) = rows[i], boxes[i - 1]
         place = f"{view.place} instance {i}"
         tally.expect("table", place, row["pixels"] == counts[i], f"{counts[i]} pixels")

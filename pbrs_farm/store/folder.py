@@ -14,9 +14,13 @@ from pbrs_farm.core.errors import ObjectMissing, StoreFailed, StoreRefused, Stor
 from pbrs_farm.store.interface import Head, check_key, check_prefix
 
 T = TypeVar("T")
-TEMPORARY: Final = ".incomplete"
+TEMPORARY: Final = ".incomplete"  # folder of unfinished files
+
+# What an OSError's number says of the store.
 _FULL: Final = {errno.ENOSPC, errno.EDQUOT}
-_SICK: Final = {errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EAGAIN, errno.EINTR, errno.ENETDOWN}
+_UNAVAILABLE: Final = {
+    errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EAGAIN, errno.EINTR, errno.ENETDOWN,
+}  # fmt: skip
 _FORBIDDEN: Final = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 
@@ -39,6 +43,7 @@ class FolderStore:
         path = self._path(key)
         try:
             temporary = self._write_temporary(data)
+            # Rename over what may be there: a reader sees the old or the new, whole.
             try:
                 _with_parent(path, lambda: temporary.replace(path))
             except OSError:
@@ -51,9 +56,11 @@ class FolderStore:
     def put_if_absent(self, key: str, data: bytes) -> bool:
         path = self._path(key)
         try:
+            # Spare the write where the object is there already.
             if path.exists():
                 return False
             temporary = self._write_temporary(data)
+            # Let the file system decide: of many writers one makes the link.
             try:
                 _with_parent(path, lambda: os.link(temporary, path))
             except FileExistsError:
@@ -95,7 +102,7 @@ class FolderStore:
     def sweep(self, older_than_s: float = 24 * 3600.0) -> int:
         """Remove unfinished files that killed writers left; their count."""
         n_removed = 0
-        oldest = time.time() - older_than_s
+        oldest = time.time() - older_than_s  # younger ones may be in use
         for path in (self.root / TEMPORARY).glob("*"):
             if path.stat().st_mtime < oldest:
                 _unlink(path)
@@ -111,6 +118,7 @@ class FolderStore:
         descriptor = _with_parent(temporary, lambda: os.open(temporary, flags, 0o666))
         try:
             with os.fdopen(descriptor, "wb", buffering=0) as file:
+                # Unbuffered writes may take a part only.
                 view = memoryview(data)
                 while view:
                     view = view[file.write(view) :]
@@ -122,6 +130,7 @@ class FolderStore:
         return temporary
 
     def _flush_folder(self, folder: Path) -> None:
+        # Make the new name last, too: it is the folder's content.
         if not self._fsync:
             return
         descriptor = os.open(folder, os.O_RDONLY)
@@ -135,12 +144,12 @@ class FolderStore:
             with os.scandir(self.root / prefix) as entries:
                 found = sorted(entries, key=lambda entry: entry.name)
         except (FileNotFoundError, NotADirectoryError):
-            return
+            return  # no such folder: no objects
         except OSError as error:
             raise self._failure(prefix, error) from error
         for entry in found:
             if entry.name.startswith("."):
-                continue
+                continue  # unfinished or foreign
             if entry.is_dir():
                 yield from self._walk(f"{prefix}{entry.name}/")
             else:
@@ -153,7 +162,7 @@ class FolderStore:
             return StoreUnavailable(key, f"{self.root} is full: {reason}", hint="free some space")
         if code in _FORBIDDEN:
             return StoreRefused(key, f"{self.root} cannot be written: {reason}")
-        if code in _SICK:
+        if code in _UNAVAILABLE:
             return StoreUnavailable(key, f"{self.root} does not answer: {reason}")
         return StoreFailed(key, f"{self.root}: {reason}")
 

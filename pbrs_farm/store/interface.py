@@ -9,9 +9,10 @@ from typing import Final, Protocol
 
 from pbrs_farm.core.errors import StoreFailed
 
+# No leading dot, no slash, nothing that a shell or a URL would take amiss.
 _SEGMENT: Final = re.compile(r"[A-Za-z0-9_\-+=@,~ ()\[\]!][A-Za-z0-9_.\-+=@,~ ()\[\]!]*")
-_MAX_KEY: Final = 900
-_MAX_SEGMENT: Final = 200
+_MAX_KEY: Final = 900  # characters; S3 takes 1024 bytes with the prefix
+_MAX_SEGMENT: Final = 200  # characters; file systems take 255 bytes
 
 CONTENT_TYPES: Final = {
     "png": "image/png",
@@ -28,7 +29,7 @@ CONTENT_TYPES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What a store knows about an object without reading it."""
+    """What a store knows about an object that it has not read."""
 
     n_bytes: int
 

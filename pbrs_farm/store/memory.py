@@ -13,7 +13,7 @@ class MemoryStore:
     """Objects in a dictionary behind a lock; other processes do not see them."""
 
     def __init__(self) -> None:
-        self._objects: dict[str, bytes] = {}
+        self._objects: dict[str, bytes] = {}  # key -> bytes
         self._lock = threading.Lock()
 
     @property
@@ -44,6 +44,7 @@ class MemoryStore:
     def list(self, prefix: str = "") -> Iterator[str]:
         check_prefix(prefix)
         with self._lock:
+            # Take a copy: the caller may put and delete while it lists.
             found = [key for key in self._objects if key.startswith(prefix)]
         return iter(sorted(found))
 

@@ -25,6 +25,7 @@ def retried(
 
     Pauses grow exponentially to max_pause_s, each times a random factor of the range jitter.
     """
+    # Try until it works, fails otherwise, or the next pause would end too late.
     deadline = time.monotonic() + timeout_s
     n_tries = 0
     while True:
@@ -70,6 +71,7 @@ class RetryingStore:
         return self._call(lambda: self._store.head(key))
 
     def list(self, prefix: str = "") -> Iterator[str]:
+        # List the whole at once: an iterator could fail half-way, out of reach of a retry.
         return iter(self._call(lambda: [*self._store.list(prefix)]))
 
     def delete(self, key: str) -> None:

@@ -24,34 +24,30 @@ from pbrs_farm.store.retrying import retried
 from pbrs_farm.store.secret import Secret
 
 T = TypeVar("T")
-_LIST_CHUNK: Final = 1000
+_LIST_CHUNK: Final = 1000  # keys of one request, the most S3 gives
 
 
 @dataclass(frozen=True, slots=True)
 class S3Settings:
-    """How an S3 store is reached; empty credentials mean the environment's own (AWS_*, IAM).
-
-    path_style: https://endpoint/bucket/key, which most vendors want. timeout_s: of one request.
-    retry_timeout_s: how long one call is retried.
-    """
+    """How an S3 store is reached."""
 
     endpoint: str = ""
     region: str = "us-east-1"
-    access_key: str = ""
+    access_key: str = ""  # credentials: empty means the environment's own (AWS_*, IAM)
     secret_key: Secret = field(default_factory=Secret)
     session_token: Secret = field(default_factory=Secret)
     allow_http: bool = False
-    path_style: bool = True
-    timeout_s: float = 120.0
-    retry_timeout_s: float = 60.0
+    path_style: bool = True  # https://endpoint/bucket/key, which most vendors want
+    timeout_s: float = 120.0  # of one request
+    retry_timeout_s: float = 60.0  # of one call with its retries
 
 
 @dataclass(slots=True)
 class _ForkGuard:
     """Which process may talk to S3: the first one that did, never its children."""
 
-    first_pid: int = 0
-    forbidden_pid: int = 0
+    first_pid: int = 0  # the process that called first, 0 = none yet
+    forbidden_pid: int = 0  # the process that must not call, 0 = none
 
     def enter(self, key: str) -> None:
         pid = os.getpid()
@@ -137,6 +133,7 @@ class S3Store:
         )
 
     def _list(self, prefix: str) -> Iterator[str]:
+        # Ask for a request's worth of keys at a time, each a call with retries of its own.
         last = ""
         while True:
             chunk = self._chunk(prefix, last)
@@ -156,6 +153,7 @@ class S3Store:
 
     def _call(self, key: str, act: Callable[[int], T]) -> T:
         """act(number of earlier tries) until it does not fail transiently, with full jitter."""
+        # Refuse before the network is touched.
         check_key(key)
         _guard.enter(key)
 
@@ -168,6 +166,7 @@ class S3Store:
         return retried(once, self._retry_timeout_s)
 
     def _failure(self, key: str, error: Exception) -> StoreFailed:
+        # Sort obstore's errors by what a caller can do about them.
         kinds = self._obstore.exceptions
         text = " ".join(str(error).split())
         if isinstance(error, FileNotFoundError | kinds.NotFoundError):
@@ -195,6 +194,7 @@ def _client_options(prefix: str, settings: S3Settings) -> dict[str, Any]:
         # Retry in _call alone, so that retry_timeout_s is the only limit.
         "retry_config": {"max_retries": 1, "retry_timeout": timedelta(seconds=settings.timeout_s)},
     }
+    # Leave out what is empty: obstore then takes the environment's.
     secrets = {
         "prefix": prefix,
         "endpoint": settings.endpoint,

@@ -1,4 +1,4 @@
-"""A word that must not be seen: prints as ***. No effects."""
+"""A password or key that prints as ***; no effects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Secret:
         self._text = text
 
     def reveal(self) -> str:
-        """The word itself, for whoever must send it."""
+        """The text itself, for whoever must send it."""
         return self._text
 
     def __bool__(self) -> bool:

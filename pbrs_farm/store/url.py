@@ -17,7 +17,7 @@ from pbrs_farm.store.s3 import S3Settings, S3Store
 class StoreSettings:
     """How stores behave; the URL says where they are."""
 
-    fsync: bool = False
+    fsync: bool = False  # of folders
     s3: S3Settings = field(default_factory=S3Settings)
 
 
@@ -36,9 +36,7 @@ def store_from_url(url: str, settings: StoreSettings | None = None) -> Store:
         return S3Store(parts.netloc, parts.path, settings.s3)
     if not parts.scheme and url:
         return FolderStore(Path(url), fsync=settings.fsync)
-    raise BadInput(
-        f"{parts.scheme}:..." if "@" in url else repr(url),
-        "",
-        "not a store",
-        hint="file:///folder, s3://bucket/prefix or memory:",
-    )
+    # Do not repeat a URL that may hold a password.
+    shown = f"{parts.scheme}:..." if "@" in url else repr(url)
+    hint = "file:///folder, s3://bucket/prefix or memory:"
+    raise BadInput(shown, "", "not a store", hint=hint)
