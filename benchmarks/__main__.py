@@ -11,7 +11,7 @@ import time
 import traceback
 
 DEFAULT = ("demo", "view", "houses", "cameras", "labels", "gl", "lux", "selection")
-OWN_TARGET = ("house", "light", "presets", "cycles", "luxcore", "farm")
+OWN_TARGET = ("house", "light", "presets", "cycles", "luxcore", "farm", "hostile")
 
 
 def main(names: list[str]) -> int:
