@@ -13,8 +13,8 @@ from pbrs_farm.assets.debian import cache_folder, fetched_deb
 
 PACKAGE: Final = "blender-data"
 TESTED_VERSION: Final = "3.4.1+dfsg-2"
+# Those of its panoramas that show a daylight sky (interior, studio, courtyard, night do not).
 NAMES: Final = ("city", "forest", "sunrise", "sunset")
-"""Those of its panoramas that show a daylight sky (interior, studio, courtyard, night do not)."""
 
 
 def fetch_skies(cache: Path | None = None) -> Path:

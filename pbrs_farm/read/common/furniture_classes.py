@@ -19,8 +19,8 @@ _PRIMITIVES: Final = frozenset(
     {"eTeks#texturableBox", "eTeks#texturableCylinder", "eTeks#texturableTriangle"}
 )
 _PRIMITIVE_NAMES: Final = frozenset({"box", "cylinder", "triangle", ""})
+# What follows these words describes the thing; the thing itself is named before them.
 _ASIDE: Final = frozenset({"with", "and", "on", "of", "for", "from", "under", "without", "in"})
-"""What follows these words describes the thing; the thing itself is named before them."""
 
 _PLANT: Final = "plant"
 _STAIRS: Final = "stairs"

@@ -7,6 +7,7 @@ from typing import Final
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Note
 
+# Kinds of notes that strict reading accepts: nothing that can be seen is missing or guessed.
 HARMLESS: Final = frozenset(
     {
         "unmapped-class",  # the item is otherprop
@@ -17,7 +18,6 @@ HARMLESS: Final = frozenset(
         "package-version",  # of the example homes, another than the tested one
     }
 )
-"""Kinds of notes that strict reading accepts: nothing that can be seen is missing or guessed."""
 
 
 class Notes:

@@ -12,8 +12,7 @@ from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.mesh import area_vectors, closed_edge_share, triangle_corners
 from pbrs_farm.read.common.placed_mesh import part_of
 
-MAX_PLANES: Final = 200
-"""A wall of more planes is sculpted, not built of sheets, and stays whole."""
+MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
 
 _WELD_M: Final = 1e-4
 

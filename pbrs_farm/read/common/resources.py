@@ -87,17 +87,6 @@ class ZipResources:
         return tuple(self._entries)
 
 
-class DictResources:
-    """Contents held in a dictionary."""
-
-    def __init__(self, contents: dict[str, bytes]) -> None:
-        self._contents = dict(contents)
-
-    def read(self, name: str) -> bytes | None:
-        """The content's bytes, or None."""
-        return self._contents.get(name)
-
-
 class Layered:
     """Contents looked up in several places, the first that has them."""
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 
+# A floor of more triangles is taken by its convex hull, so that time stays bounded.
 MAX_OUTLINE_FACES: Final = 20_000
-"""A floor of more triangles is taken by its convex hull, so that time stays bounded."""
 
 _SAME_HEIGHT_M: Final = 0.02
 _CRACK_M: Final = 1e-4

@@ -19,12 +19,13 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, entry, gltf_from_glb, view_bytes
 from pbrs_farm.formats.serialise import json_from_bytes
 
+# A relative name -> the bytes of that file beside the scene, or None if there is none.
 Fetch = Callable[[str], bytes | None]
-"""A relative name -> the bytes of that file beside the scene, or None if there is none."""
 
 MAX_NODES: Final = 200_000
 MAX_DEPTH: Final = 200
 
+# Extensions that a file may require.
 UNDERSTOOD: Final = frozenset(
     {
         "KHR_lights_punctual",
@@ -38,7 +39,6 @@ UNDERSTOOD: Final = frozenset(
         "EXT_texture_webp",
     }
 )
-"""Extensions that a file may require."""
 
 
 class MissingFile(BadHouse):

@@ -14,8 +14,8 @@ from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrar
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import Fetch, MissingFile, image_bytes, numbers
 
+# Reflectance of a dielectric at normal incidence, linear (glTF 2.0, appendix B).
 F0: Final = 0.04
-"""Reflectance of a dielectric at normal incidence, linear (glTF 2.0, appendix B)."""
 
 MAX_SHININESS: Final = 10_000.0
 

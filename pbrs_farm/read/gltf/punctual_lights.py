@@ -15,8 +15,8 @@ from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.gltf.document import numbers
 
+# Flux of a lamp whose strength the scene does not tell: a 60 W incandescent bulb's.
 ASSUMED_LM: Final = 800.0
-"""Flux of a lamp whose strength the scene does not tell: a 60 W incandescent bulb's."""
 
 _RADIUS_M: Final = 0.0325
 

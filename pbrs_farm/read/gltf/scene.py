@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, Item, ItemKind, Source
+from pbrs_farm.core.house import House, Item, ItemKind, Level, Room, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
@@ -85,29 +85,15 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
     gltf = gltf_document(data, name, beside.fetch)
     materials = SceneMaterials(gltf, beside.fetch, notes)
     items = list(items_of_scene(gltf, mapping, materials, notes, fields))
-    rooms = (
-        rooms_from_floors(items)
-        if beside.rooms is None
-        else rooms_from_json(beside.rooms, f"{stem}.rooms.json", items)
-    )
+    if beside.rooms is None:
+        rooms = rooms_from_floors(items)
+    else:
+        rooms = rooms_from_json(beside.rooms, f"{stem}.rooms.json", items)
     if not rooms:
-        raise BadHouse(
-            name,
-            "scene",
-            "has no floor",
-            hint=f"name a node `floor`, map one in {stem}.classes.json, or give {stem}.rooms.json",
-        )
+        hint = f"name a node `floor`, map one in {stem}.classes.json, or give {stem}.rooms.json"
+        raise BadHouse(name, "scene", "has no floor", hint=hint)
     levels, numbered = levels_of(rooms)
-    items = [
-        replace(
-            item,
-            level_id=level_of(levels, float(_extent(item)[0, 1])),
-            room_id=None
-            if item.kind is ItemKind.WALL
-            else room_at(numbered, _extent(item).mean(0)),
-        )
-        for item in items
-    ]
+    items = [_placed(item, levels, numbered) for item in items]
     sha256 = keys.sha256(data)
     copyright_line = gltf.document["asset"].get("copyright", "")
     return House(
@@ -122,6 +108,13 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
         openings=openings(items),
         notes=notes.all(),
     )
+
+
+def _placed(item: Item, levels: tuple[Level, ...], rooms: tuple[Room, ...]) -> Item:
+    """The item with its level, and its room unless it is a wall."""
+    extent = _extent(item)
+    room_id = None if item.kind is ItemKind.WALL else room_at(rooms, extent.mean(0))
+    return replace(item, level_id=level_of(levels, float(extent[0, 1])), room_id=room_id)
 
 
 def _extent(item: Item) -> NDArray[np.float64]:

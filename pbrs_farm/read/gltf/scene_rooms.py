@@ -31,8 +31,8 @@ _STOREY_M: Final = 2.5
 _SAME_LEVEL_M: Final = 0.5
 _SLACK_M: Final = 0.3
 _EDGE_M: Final = 0.1
+# A ceiling that covers less of a room than this share is the next room's.
 _NEXT_ROOM: Final = 0.05
-"""A ceiling that covers less of a room than this share is the next room's."""
 
 
 def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]:

@@ -46,11 +46,24 @@ class ObjModel:
 
 @dataclass(slots=True)
 class _Part:
+    """Faces of one group, material and shading, as written."""
+
     group: str
     material: str
     is_flat: bool
-    lines: list[bytes] = field(default_factory=list)
-    seen: list[tuple[int, int, int]] = field(default_factory=list)
+    lines: list[bytes] = field(default_factory=list)  # what follows each "f"
+    seen: list[tuple[int, int, int]] = field(default_factory=list)  # v, vt, vn before it, or zeros
+
+
+@dataclass(slots=True)
+class _Statements:
+    """An OBJ's statements by kind, numbers not yet parsed."""
+
+    vertices: list[bytes] = field(default_factory=list)
+    uvs: list[bytes] = field(default_factory=list)
+    normals: list[bytes] = field(default_factory=list)
+    libraries: list[str] = field(default_factory=list)
+    parts: dict[tuple[str, str, bool], _Part] = field(default_factory=dict)
 
 
 def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjModel:
@@ -59,38 +72,48 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
     Raises BadHouse for a number that is none or not finite, a face index out of range, or more
     than max_triangles triangles.
     """
+    # Bound the work by counting lines before any is looked at.
     for key, most in ((b"\nf", max_triangles), (b"\nv ", 3 * max_triangles)):
         if data.count(key) > most:
             raise _too_many(file, data.count(key), key, max_triangles)
-    vertices: list[bytes] = []
-    uvs: list[bytes] = []
-    normals: list[bytes] = []
-    libraries: list[str] = []
-    parts: dict[tuple[str, str, bool], _Part] = {}
-    group, material, is_flat = "", "", False
-    part: _Part | None = None
+    # Join continued lines.
     if b"\\\n" in data or b"\\\r\n" in data:
         data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    found = _statements(data)
+    pools = (
+        _numbers(found.vertices, 3, file, "v"),
+        _numbers(found.uvs, 2, file, "vt"),
+        _numbers(found.normals, 3, file, "vn"),
+    )
+    # Bound what n-gons triangulate to.
+    parts = found.parts.values()
+    n_triangles = sum(max(0, len(x.split()) - 2) for p in parts for x in p.lines)
+    if n_triangles > max_triangles:
+        raise _too_many(file, n_triangles, b"", max_triangles)
+    built = [_mesh(p, pools, file) for p in parts]
+    meshes = tuple(mesh for mesh, _ in built if mesh is not None)
+    return ObjModel(meshes, tuple(found.libraries), sum(dropped for _, dropped in built))
+
+
+def _statements(data: bytes) -> _Statements:
+    found = _Statements()
+    pools = {b"v": found.vertices, b"vt": found.uvs, b"vn": found.normals}
+    group, material, is_flat = "", "", False
+    part: _Part | None = None  # where faces go, None after a change of group, material, shading
     for raw in data.splitlines():
-        line = raw.lstrip()
-        key, _, rest = line.partition(b" ")
-        if key == b"v":
-            vertices.append(rest)
-        elif key == b"vn":
-            normals.append(rest)
-        elif key == b"vt":
-            uvs.append(rest)
+        key, _, rest = raw.lstrip().partition(b" ")
+        if key in pools:
+            pools[key].append(rest)
         elif key == b"f":
             if part is None:
                 name = (group, material, is_flat)
-                part = parts.setdefault(name, _Part(*name))
+                part = found.parts.setdefault(name, _Part(*name))
             part.lines.append(rest)
-            if b"-" in rest:
-                part.seen.append((len(vertices), len(uvs), len(normals)))
-            else:
-                part.seen.append((0, 0, 0))
+            # Negative indices count back from the lines so far.
+            sizes = (len(found.vertices), len(found.uvs), len(found.normals))
+            part.seen.append(sizes if b"-" in rest else (0, 0, 0))
         elif b"\t" in key:
-            return parse_obj(data.replace(b"\t", b" "), file, max_triangles=max_triangles)
+            return _statements(data.replace(b"\t", b" "))
         elif key in (b"g", b"o"):
             group, part = _text(rest), None
         elif key == b"usemtl":
@@ -98,22 +121,8 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
         elif key == b"s":
             is_flat, part = rest.strip() in (b"off", b"0"), None
         elif key == b"mtllib":
-            libraries.append(_text(rest))
-    pools = (
-        _numbers(vertices, 3, file, "v"),
-        _numbers(uvs, 2, file, "vt"),
-        _numbers(normals, 3, file, "vn"),
-    )
-    n_triangles = sum(max(0, len(x.split()) - 2) for p in parts.values() for x in p.lines)
-    if n_triangles > max_triangles:
-        raise _too_many(file, n_triangles, b"", max_triangles)
-    meshes, n_dropped = [], 0
-    for p in parts.values():
-        mesh, dropped = _mesh(p, pools, file)
-        n_dropped += dropped
-        if mesh is not None:
-            meshes.append(mesh)
-    return ObjModel(tuple(meshes), tuple(libraries), n_dropped)
+            found.libraries.append(_text(rest))
+    return found
 
 
 def _too_many(file: str, n: int, key: bytes, most: int) -> BadHouse:

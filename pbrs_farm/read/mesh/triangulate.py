@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.mesh import area_vectors
 
+# Polygons of more corners become fans: ear cutting may take the square of their number.
 MAX_EAR_CUT = 5_000
-"""Polygons of more corners become fans: ear cutting may take the square of their number."""
 
 
 def triangle_corners(positions: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:

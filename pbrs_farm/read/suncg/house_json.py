@@ -14,8 +14,8 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.serialise import json_from_bytes
 
 NODE_TYPES: Final = ("Room", "Object", "Ground", "Box")
+# What a model or a texture may be called; a file name that stays in its folder.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}")
-"""What a model or a texture may be called; a file name that stays in its folder."""
 
 _COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
 MAX_NODES: Final = 100_000

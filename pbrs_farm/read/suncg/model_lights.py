@@ -15,8 +15,8 @@ from pbrs_farm.core.house import LightPart, Surface
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.read.common.placed_mesh import part_of
 
+# Power of a lamp that has bulbs but no row in suncgModelLights.json; shared by its bulbs.
 ASSUMED_WATT = 60.0
-"""Power of a lamp that has bulbs but no row in suncgModelLights.json; shared by its bulbs."""
 
 _FALLBACK_RADIUS_M = 0.0325
 

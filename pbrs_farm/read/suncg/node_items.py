@@ -28,8 +28,8 @@ from pbrs_farm.read.suncg.model_materials import ModelMaterials
 
 _T = TypeVar("_T")
 
+# Grounds and boxes have no row in the category table and stay unlabelled, as published.
 UNLABELLED: Final = 0
-"""Grounds and boxes have no row in the category table and stay unlabelled, as published."""
 
 _WALL_GROUP: Final = re.compile(r"Wall(?:Inside|Outside)#.*_(\d+)")
 

@@ -42,21 +42,6 @@ _STOREY_M: Final = 2.7
 _FLOOR_SLAB_M: Final = 0.05
 
 
-def suncg_houses(root: Path) -> tuple[str, ...]:
-    """The ids of every house below a SUNCG root, sorted; empty if it is none."""
-    return tuple(
-        sorted(p.parent.name for p in root.glob("house/*/house.json") if _is_id(p.parent.name))
-    )
-
-
-def suncg_house_at(path: Path) -> tuple[Path, str] | None:
-    """(root, house id) where path is ROOT/house/<id> or its house.json; None if it is neither."""
-    folder = path.parent if path.name == "house.json" else path
-    folder = folder.absolute()
-    is_house = folder.parent.name == "house" and (folder / "house.json").is_file()
-    return (folder.parent.parent, folder.name) if is_house and _is_id(folder.name) else None
-
-
 def _is_id(name: str) -> bool:
     return _HOUSE_ID.fullmatch(name) is not None
 

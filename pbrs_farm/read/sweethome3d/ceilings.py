@@ -18,8 +18,7 @@ from pbrs_farm.read.sweethome3d.wall_solids import top_heights
 F64 = NDArray[np.float64]
 KINK_M = 0.01
 TIE_M = 1e-3
-NEAR_M = 0.10
-"""A wall's corner this near to a room's edge can bend the ceiling there."""
+NEAR_M = 0.10  # A wall's corner this near to a room's edge can bend the ceiling there
 
 
 class CeilingHeights:

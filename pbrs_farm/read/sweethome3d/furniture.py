@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.classes import NYU40_NAMES
-from pbrs_farm.core.house import Item, MaterialKind, Opening, Surface
+from pbrs_farm.core.house import Item, MaterialKind, Opening
 from pbrs_farm.read.common.furniture_classes import kind_of, nyu40_of
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall, opening_of
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
@@ -19,8 +19,7 @@ from pbrs_farm.read.sweethome3d.placement import Frame, frame_of, local_from_mod
 
 DOOR, WINDOW = NYU40_NAMES.index("door"), NYU40_NAMES.index("window")
 LAMP, OTHERPROP = NYU40_NAMES.index("lamp"), NYU40_NAMES.index("otherprop")
-NEAR_M = 0.5
-"""A piece outside every room belongs to a room no farther than this."""
+NEAR_M = 0.5  # A piece outside every room belongs to a room no farther than this
 
 
 def piece_item(
@@ -41,15 +40,10 @@ def piece_item(
     matrix = local_from_model(piece, model)
     points = [m.positions @ matrix[:3, :3].T + matrix[:3, 3] for m in model.meshes]
     frame = frame_of(piece, level, np.concatenate(points) if points else None)
-    surfaces: list[Surface] = []
-    emitting: list[int] = []
-    for mesh, local in zip(model.meshes, points, strict=True):
-        painted = piece_material(piece, mesh, model, materials)
-        if painted is None:
-            continue
-        if painted.emits:
-            emitting.append(len(surfaces))
-        surfaces.append(placed_surface(mesh, painted, frame, local, matrix))
+    pairs = [(m, piece_material(piece, m, model, materials)) for m in model.meshes]
+    shown = [(m, p, at) for (m, p), at in zip(pairs, points, strict=True) if p is not None]
+    surfaces = [placed_surface(m, p, frame, at, matrix) for m, p, at in shown]
+    emitting = [k for k, (_, p, _) in enumerate(shown) if p.emits]
     nyu40, tags = _label(piece, model, materials)
     lights = light_parts(piece, frame, tuple(emitting))
     if not surfaces and not lights:

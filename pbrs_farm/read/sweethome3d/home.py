@@ -39,37 +39,31 @@ def read_home(
     package: str = "",
     package_note: str = "",
 ) -> House:
-    """The house in a .sh3d archive or a bare Home.xml, unrepaired.
+    """The house in a .sh3d archive or a bare Home.xml, unrepaired; equal bytes give equal Houses.
 
-    data: the file's bytes. name: the file's name, for messages and the house's id. resources: the
-    program's own models (homes.fetch), for files that refer to them. package: where the file came
-    from; package_note: what is odd about it (homes.Package.note). The same bytes give the same House. Raises BadHouse, which names the file and the place.
+    name: the file's, for messages and the house's id. resources: the program's own models, for
+    files that refer to them. package: where the file came from; package_note: what is odd about
+    it (homes.Package). Raises BadHouse, which names the file and the place.
     """
     fields = fields or ReadFields()
     file = PurePath(name).name
     container = open_container(data, file, resources)
-    plan = parse_plan(container.root, file, fields.max_extent_m)
-    if fields.hidden_levels:
-        plan = replace(plan, levels=tuple(replace(x, is_visible=True) for x in plan.levels))
+    plan = _shown(parse_plan(container.root, file, fields.max_extent_m), fields)
     materials = HomeMaterials(container.contents, Notes(file, strict=fields.strict))
     if package_note:
         materials.notes.add("package-version", package, package_note)
-    visible = [level for level in plan.levels if level.is_visible]
-    house_level = {level.id: str(k) for k, level in enumerate(visible)} | {"": "0"}
-    _note_hidden_levels(plan, materials)
-
+    house_level = _house_levels(plan, materials.notes)
     outlines = outlines_of(plan.walls)
     rooms = read_rooms(plan, materials, house_level)
     if not rooms:
-        raise BadHouse(
-            file, "", "no rooms", hint="draw rooms (Plan > Create rooms) and save the home again"
-        )
+        hint = "draw rooms (Plan > Create rooms) and save the home again"
+        raise BadHouse(file, "", "no rooms", hint=hint)
+    # Walls, floors and ceilings; staircases cut the last two.
     ceilings = CeilingHeights(plan, outlines)
     floor_cuts, ceiling_cuts = staircase_cuts(plan, materials, house_level)
     structure = wall_items(plan, outlines, materials, house_level)
     structure += plane_items(rooms, ceilings, materials, floor_cuts, ceiling_cuts)
     pieces, openings = _furniture(plan, materials, outlines, rooms, house_level, file, fields)
-
     items = (*structure, *pieces)
     if len(items) > MAX_INSTANCES:
         raise BadHouse(file, "", f"{len(items)} items, at most {MAX_INSTANCES} have instance ids")
@@ -89,6 +83,12 @@ def read_home(
     )
 
 
+def _shown(plan: Plan, fields: ReadFields) -> Plan:
+    """The plan with its hidden levels made visible where the recipe says so."""
+    shown = tuple(replace(x, is_visible=x.is_visible or fields.hidden_levels) for x in plan.levels)
+    return replace(plan, levels=shown)
+
+
 def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:
     if not plan.levels:
         return (Level("0", "", 0.0, plan.wall_height),)
@@ -99,14 +99,14 @@ def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:
     )
 
 
-def _note_hidden_levels(plan: Plan, materials: HomeMaterials) -> None:
+def _house_levels(plan: Plan, notes: Notes) -> dict[str, str]:
+    """The home's level id -> the House's; hidden levels are noted and left out."""
     for level in plan.levels:
         if not level.is_visible:
-            materials.notes.add(
-                "hidden-level",
-                f"level {level.id} '{level.name}'",
-                "not visible: left out (read.hidden_levels)",
-            )
+            place = f"level {level.id} '{level.name}'"
+            notes.add("hidden-level", place, "not visible: left out (read.hidden_levels)")
+    visible = [level for level in plan.levels if level.is_visible]
+    return {level.id: str(k) for k, level in enumerate(visible)} | {"": "0"}
 
 
 def _furniture(

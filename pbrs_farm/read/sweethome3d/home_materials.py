@@ -10,8 +10,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.read.sweethome3d.home_xml import Paint
 
-SHININESS_SCALE = 128.0
-"""Phong exponent of the program's shininess 1."""
+SHININESS_SCALE = 128.0  # Phong exponent of the program's shininess 1
 
 
 class HomeMaterials:

@@ -120,8 +120,6 @@ class DoorFrame:
     """How a door or window sits in its wall; fractions of its width, depth and height."""
 
     cut_out: str
-    wall_thickness: float
-    wall_distance: float
     wall_width: float
     wall_left: float
     wall_height: float

@@ -67,8 +67,6 @@ def _transformations(a: Attributes) -> tuple[tuple[str, tuple[float, ...]], ...]
 def _frame(a: Attributes) -> DoorFrame:
     return DoorFrame(
         cut_out=a.text("cutOutShape", FULL_CUT_OUT),
-        wall_thickness=a.within("wallThickness", 1.0, -1.0, 2.0),
-        wall_distance=a.within("wallDistance", 0.0, -1.0, 2.0),
         wall_width=a.within("wallWidth", 1.0, -1.0, 2.0),
         wall_left=a.within("wallLeft", 0.0, -1.0, 2.0),
         wall_height=a.within("wallHeight", 1.0, -1.0, 2.0),

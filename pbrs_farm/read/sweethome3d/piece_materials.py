@@ -13,8 +13,7 @@ from pbrs_farm.read.sweethome3d.home_xml import Paint, Picture, PlanPiece
 from pbrs_farm.read.sweethome3d.piece_models import LIGHT, MIRROR, PANE, Model, content_name
 
 PANE_OPACITY = 0.2
-CLEAR = 0.95
-"""Opacity below which a material counts as glass."""
+CLEAR = 0.95  # Opacity below which a material counts as glass
 
 
 @dataclass(frozen=True, slots=True)

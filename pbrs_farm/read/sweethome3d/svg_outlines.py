@@ -17,8 +17,7 @@ from pbrs_farm.core.arrays import Points2
 
 MAX_TEXT: Final = 100_000
 MAX_POINTS: Final = 20_000
-MAX_CLOSES: Final = 1_000
-"""The library looks back for the start of a sub-path at every close."""
+MAX_CLOSES: Final = 1_000  # The library looks back for the start of a sub-path at every close
 
 MAX_COORDINATE: Final = 1e6
 CURVE_STEPS: Final = 16

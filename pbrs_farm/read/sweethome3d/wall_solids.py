@@ -22,8 +22,7 @@ from pbrs_farm.read.sweethome3d.home_xml import (
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 
 F64 = NDArray[np.float64]
-SUNK_M = 0.002
-"""How deep a baseboard's back stands in its wall, so that the two share no plane."""
+SUNK_M = 0.002  # How deep a baseboard's back stands in its wall, so that the two share no plane
 
 
 def wall_items(

@@ -11,7 +11,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, 
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
-from pbrs_farm.read.suncg.suncg_house import read_suncg, suncg_house_at, suncg_houses
+from pbrs_farm.read.suncg.suncg_house import read_suncg
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import HOUSE
 
@@ -388,14 +388,6 @@ def test_hidden_parts_are_left_out(tmp_path: Path) -> None:
     room = house.room("0_1")
     assert not room.has_floor
     assert np.allclose(room.polygon.min(0), [4.095, 0], atol=1e-3)  # between the walls
-
-
-def test_a_root_lists_its_houses(root: Path) -> None:
-    assert suncg_houses(root) == (HOUSE,)
-    assert suncg_house_at(root / "house" / HOUSE) == (root, HOUSE)
-    assert suncg_house_at(root / "house" / HOUSE / "house.json") == (root, HOUSE)
-    assert suncg_house_at(root) is None
-    assert suncg_house_at(root / "house" / "nothing") is None
 
 
 def test_without_tables_everything_is_otherprop_and_said_so(tmp_path: Path) -> None:

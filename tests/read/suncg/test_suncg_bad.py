@@ -16,7 +16,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.house_bundle import bundle_from_house
-from pbrs_farm.read.suncg.suncg_house import read_suncg, suncg_house_at
+from pbrs_farm.read.suncg.suncg_house import read_suncg
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import HOUSE
 
@@ -207,7 +207,6 @@ def test_ids_that_are_no_names_are_refused(root: Path, house_id: str) -> None:
 def test_a_house_that_is_not_there_is_refused(root: Path) -> None:
     with pytest.raises(BadHouse, match="does not exist"):
         read_suncg(root, "nothing", ReadFields())
-    assert suncg_house_at(root / "house" / "nothing") is None
 
 
 def test_equal_ids_are_made_different_and_noted(root: Path) -> None:
