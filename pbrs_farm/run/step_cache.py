@@ -27,41 +27,42 @@ from pbrs_farm.store.interface import Store
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Everything a step may need. source: only the house step reads it. layers: optional ones."""
+    """Everything a step may need."""
 
     store: Store
     recipe: Recipe
     house_id: str
     house_cache: HouseCache
-    source: SourceRef | None = None
-    view_id: str | None = None
-    layers: tuple[str, ...] = ()
+    source: SourceRef | None = None  # only the house step reads it
+    view_id: str | None = None  # of a step of a view
+    layers: tuple[str, ...] = ()  # optional layers to write too
     inputs: Mapping[str, str] = field(default_factory=dict)  # step it reads -> digest of its marker
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
-    """What a step made: files by name (relative to the house or view folder) and its facts."""
+class StepOutput:
+    """What a step gives."""
 
-    files: Mapping[str, bytes]
-    facts: dict[str, Any] = field(default_factory=dict)
+    files: Mapping[str, bytes]  # by name below the house's or the view's folder
+    facts: dict[str, Any] = field(default_factory=dict)  # of its marker
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A step's marker, and whether it was there already."""
+    """What came of a step."""
 
     marker: Marker
-    was_done: bool
+    was_done: bool  # it was there already
 
 
-def run_marked(
-    name: str, work: Work, function: Callable[[Work], Made], *, attempt: int = 1
+def run_unless_done(
+    name: str, work: Work, function: Callable[[Work], StepOutput], *, attempt: int = 1
 ) -> Outcome:
     """Do one step unless its marker says it is done. Raises PbrsError; nothing half-done is left.
 
     Raises BadInput if a step before it has not been done.
     """
+    # Digest everything the step depends on, and compare it with the marker that is there.
     step = plan.STEPS[name]
     view_id = work.view_id if step.per_view else None
     inputs = _inputs(step, work)
@@ -70,9 +71,11 @@ def run_marked(
     old = read_marker(work.store, key)
     if old is not None and old.digest == digest:
         return Outcome(old, was_done=True)
+    # Remove the marker before its files change: a crash leaves a step that is not done.
     if old is not None:
         work.store.delete(key)
 
+    # Do the step, put its files, then its marker.
     started = time.perf_counter()
     made = function(replace(work, inputs=inputs))
     files = tuple(_put(work, name, file, made.files[file]) for file in sorted(made.files))
@@ -93,6 +96,7 @@ def run_marked(
 
 
 def _inputs(step: plan.Step, work: Work) -> dict[str, str]:
+    """Step -> digest of its marker, of the steps that step reads; BadInput where it needs one."""
     digests = {}
     for before in step.after:
         per_view = plan.STEPS[before].per_view
@@ -125,6 +129,7 @@ def camera_file_text(fields: CameraFields) -> str:
 
 
 def required_source(work: Work) -> SourceRef:
+    """The house's source; BadInput when the work has none."""
     if work.source is None:
         raise BadInput(work.house_id, "", "the house step needs the house's source")
     return work.source

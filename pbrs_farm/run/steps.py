@@ -1,6 +1,6 @@
-"""The story: get -> pure stage -> put. Each step reads the store, calls one stage, gives files.
+"""The steps of a run: each reads the store, calls one stage and gives the bytes of its files.
 
-Effects: reads the store; run/step_cache.py writes what a step made and its marker.
+Effects: reads the store; run/step_cache.py writes what a step gives, and its marker.
 """
 
 from __future__ import annotations
@@ -34,21 +34,23 @@ from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.step_cache import (
-    Made,
     Outcome,
+    StepOutput,
     Work,
     camera_file_text,
     required_source,
-    run_marked,
+    run_unless_done,
 )
 from pbrs_farm.run.view_histogram import view_histogram
 
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
     from pbrs_farm.sample import CameraReport
+    from pbrs_farm.transport.light_result import LightResult
 
 
-def _loaded(work: Work) -> CachedHouse:
+def _cached_house(work: Work) -> CachedHouse:
+    """The house of this process, loaded anew when its house step was done anew."""
     digest = work.inputs.get("house") or _marker_of_house(work, "house").digest
     return work.house_cache.get(work.store, work.recipe, work.house_id, digest)
 
@@ -60,18 +62,17 @@ def _marker_of_house(work: Work, step: str) -> Marker:
     return marker
 
 
-def _view_at_size(work: Work, loaded: CachedHouse) -> tuple[View, Camera]:
-    view = loaded.view(work.view_id or "", work.inputs["cameras"])
+def _view_at_size(work: Work, cached: CachedHouse) -> tuple[View, Camera]:
+    view = cached.view(work.view_id or "", work.inputs["cameras"])
     image = work.recipe.image
     return view, view.camera.with_size(image.width_px, image.height_px)
 
 
-# The steps, in the order they run.
-
-
-def _house(work: Work) -> Made:
+def _house(work: Work) -> StepOutput:
+    """house.glb, house.json, repair.json: the source read and repaired."""
     from pbrs_farm.formats.house_bundle import bundle_from_house
 
+    # The submitted id has the source's digest: another one means another file at that place.
     source = required_source(work)
     repaired, report = repaired_house(source, work.recipe)
     if repaired.id != work.house_id:
@@ -83,7 +84,7 @@ def _house(work: Work) -> Made:
         "items": len(repaired.items),
         "notes": len(repaired.notes),
     }
-    return Made(files, facts)
+    return StepOutput(files, facts)
 
 
 def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
@@ -91,6 +92,7 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.repair import RepairReport, repair
 
+    # An object without context has no walls to close.
     house = read_house(source, recipe.read)
     if source.kind == "object":
         return house, RepairReport(house_id=house.id, was_repaired=True)
@@ -101,19 +103,21 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
     return repair(house, recipe.repair, occluder_from=occluder_from)
 
 
-def _cameras(work: Work) -> Made:
+def _cameras(work: Work) -> StepOutput:
+    """cameras.json: around an object, from the user's file, or sampled (paper section 3.1)."""
     from pbrs_farm.sample import cameras
 
-    loaded = _loaded(work)
-    house, fields = loaded.house, work.recipe.cameras
+    cached = _cached_house(work)
+    house, fields = cached.house, work.recipe.cameras
     seed = camera_seed(work.house_id, work.recipe)
-    if is_object(work):
+    if keys.is_object(work.house_id):
         return _object_cameras(work, house, seed)
     if fields.source == "file":
-        return _file_cameras(loaded, fields)
-    views, report = cameras(house, fields, seed=seed, counter=loaded.caster.item_counts)
-    made = _made_cameras(views, report.model_dump(mode="json"))
-    return made if views else Made(made.files, {**made.facts, "why_none": why_none(report)})
+        return _file_cameras(cached, fields)
+    # Sampled views and stored ones: the sampler's fields say which. Say why where there are none.
+    views, report = cameras(house, fields, seed=seed, counter=cached.caster.item_counts)
+    made = _camera_output(views, report.model_dump(mode="json"))
+    return made if views else StepOutput(made.files, {**made.facts, "why_none": why_none(report)})
 
 
 def why_none(report: CameraReport) -> str:
@@ -128,30 +132,30 @@ def why_none(report: CameraReport) -> str:
     return "; ".join(reasons[:3]) + more
 
 
-def _object_cameras(work: Work, house: House, seed: int) -> Made:
+def _object_cameras(work: Work, house: House, seed: int) -> StepOutput:
     from pbrs_farm.sample.object_cameras import object_views
 
     f = work.recipe.cameras
     intrinsics = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
     views = object_views(house.items[0].bounds, intrinsics, seed, (house.id,))
-    return _made_cameras(views, {"preset": "objects", "n_views": len(views)})
+    return _camera_output(views, {"preset": "objects", "n_views": len(views)})
 
 
-def _file_cameras(loaded: CachedHouse, fields: CameraFields) -> Made:
+def _file_cameras(cached: CachedHouse, fields: CameraFields) -> StepOutput:
     from pbrs_farm.sample.camera_file import cameras_from_file_text
     from pbrs_farm.sample.stored_cameras import views_from_cameras
 
     given = cameras_from_file_text(
         camera_file_text(fields), fields.file, fields.score_width_px, fields.score_height_px
     )
-    counter = loaded.caster.item_counts
-    views = views_from_cameras(loaded.house, given, fields, counter, origin="file")
-    return _made_cameras(views, {"source": "file", "n_views": len(views)})
+    counter = cached.caster.item_counts
+    views = views_from_cameras(cached.house, given, fields, counter, origin="file")
+    return _camera_output(views, {"source": "file", "n_views": len(views)})
 
 
-def _made_cameras(views: Sequence[View], report: dict[str, Any]) -> Made:
+def _camera_output(views: Sequence[View], report: dict[str, Any]) -> StepOutput:
     facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
-    return Made({"cameras.json": cameras_json(views, report)}, facts)
+    return StepOutput({"cameras.json": cameras_json(views, report)}, facts)
 
 
 def room_of(house: House, view: View) -> Room | None:
@@ -159,78 +163,79 @@ def room_of(house: House, view: View) -> Room | None:
     return next((room for room in house.rooms if room.id == view.room_id), None)
 
 
-def is_object(work: Work) -> bool:
-    """The work is on an object without context (paper section 4.1), not on a house."""
-    return keys.is_object(work.house_id)
-
-
 def camera_seed(house_id: str, recipe: Recipe) -> int:
     """The sampler's seed for a house under a recipe."""
     return keys.seed(house_id, "cameras", recipe.digest("cameras"))
 
 
-def _truth(work: Work) -> Made:
+def _truth(work: Work) -> StepOutput:
+    """Every label of a view, and its table for view.json."""
     from pbrs_farm import truth
 
-    loaded = _loaded(work)
-    view, camera = _view_at_size(work, loaded)
-    caster, house = loaded.caster, loaded.house
+    # Cast one ray through each pixel's centre: all labels come from this record (rule 8).
+    cached = _cached_house(work)
+    view, camera = _view_at_size(work, cached)
+    caster, house = cached.caster, cached.house
     hit = caster.hit_record(camera)
     arrays = truth.layers_from_hit(hit, house, camera)
     table = truth.view_table(hit.item, house, camera)
     room = room_of(house, view)
     if room is not None:
         table["layout"] = truth.layout_table(room, camera, hit.depth_z)
+    # Add the layers that were asked for; those behind glass cast once more without it.
     if work.layers:
         label_inputs = truth.LabelInputs(
             hit,
             house,
-            loaded.geometry,
+            cached.geometry,
             camera,
             lambda skip: caster.hit_record(camera, skip_faces=skip),
-            loaded.textures,
+            cached.textures,
             keys.seed(work.house_id, view.id, "truth", work.recipe.seed),
         )
         arrays |= truth.optional_layers(work.layers, label_inputs)
         table |= truth.optional_tables(work.layers, house)
     credit = house.source.attribution
     files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
-    return Made(files, {"table": table})
+    return StepOutput(files, {"table": table})
 
 
-def _opengl(work: Work, mode: str) -> Made:
-    loaded = _loaded(work)
-    _view, camera = _view_at_size(work, loaded)
-    rasterizer = loaded.rasterizer
+def _opengl(work: Work, mode: str) -> StepOutput:
+    cached = _cached_house(work)
+    _view, camera = _view_at_size(work, cached)
+    rasterizer = cached.rasterizer
     draw = rasterizer.render_dl if mode == "opengl_dl" else rasterizer.render_il
     rgb = draw(camera)
-    if is_object(work):
-        rgb = np.where(_missed(loaded, camera), np.uint8(0), rgb)
-    png = layer_bytes(mode, rgb, loaded.house.source.attribution)
-    return Made({LAYER[mode].file: png}, {"renderer": rasterizer.name})
+    if keys.is_object(work.house_id):
+        rgb = np.where(_missed(cached, camera), np.uint8(0), rgb)
+    png = layer_bytes(mode, rgb, cached.house.source.attribution)
+    return StepOutput({LAYER[mode].file: png}, {"renderer": rasterizer.name})
 
 
-def _missed(loaded: CachedHouse, camera: Camera) -> NDArray[np.bool_]:
+def _missed(cached: CachedHouse, camera: Camera) -> NDArray[np.bool_]:
     """(H, W, 1) bool: nothing is seen; of an object without context such pixels are 0."""
-    return np.asarray(loaded.caster.item_buffer(camera) == 0)[..., None]
+    return np.asarray(cached.caster.item_buffer(camera) == 0)[..., None]
 
 
-def _opengl_dl(work: Work) -> Made:
+def _opengl_dl(work: Work) -> StepOutput:
     return _opengl(work, "opengl_dl")
 
 
-def _opengl_il(work: Work) -> Made:
+def _opengl_il(work: Work) -> StepOutput:
     return _opengl(work, "opengl_il")
 
 
-def _light(work: Work) -> Made:
+def _light(work: Work) -> StepOutput:
+    """radiance.exr: both light groups (and each lamp) as linear images, with the denoiser's guides."""
     from pbrs_farm.transport.lamp_layers import layer_name
 
-    loaded = _loaded(work)
-    view, camera = _view_at_size(work, loaded)
+    # Render; the seed knows all that changes the picture and nothing else.
+    cached = _cached_house(work)
+    view, camera = _view_at_size(work, cached)
     digest = work.recipe.picture_digest(*plan.STEPS["light"].groups)
     seed = keys.seed(work.house_id, view.id, "light", digest)
-    result = loaded.light_scene.render(camera, view.room_id, work.recipe.light, seed)
+    result = cached.light_scene.render(camera, view.room_id, work.recipe.light, seed)
+    # Name the images as the file does; of an object, pixels that miss it are 0.
     images = {
         "outdoor": result.outdoor,
         "indoor": result.indoor,
@@ -238,49 +243,59 @@ def _light(work: Work) -> Made:
         "normal": result.normal,
         **{layer_name(number): image for number, image in result.lamps.items()},
     }
-    if is_object(work):
-        missed = _missed(loaded, camera)
+    if keys.is_object(work.house_id):
+        missed = _missed(cached, camera)
         images = {name: np.where(missed, np.float32(0), image) for name, image in images.items()}
+    exr = radiance_exr(images, attribution=cached.house.source.attribution)
+    return StepOutput({RADIANCE_EXR: exr}, _facts_of_light(work, cached, view, result))
+
+
+def _facts_of_light(
+    work: Work, cached: CachedHouse, view: View, result: LightResult
+) -> dict[str, Any]:
+    """What view.json says of a view's light."""
     facts = {
         **result.facts,
         "noise": result.noise,
         **({"spp": result.spp} if result.spp else {}),
         "n_nonfinite": result.n_nonfinite,
-        "variant": loaded.light_scene.variant,
-        "sky": loaded.sky.facts(),
+        "variant": cached.light_scene.variant,
+        "sky": cached.sky.facts(),
     }
+    # The transport knows a lamp's item, the house its name.
     if "lamps" in facts:
-        items = loaded.house.items
+        items = cached.house.items
         named = [{**row, "name": items[row["instance"] - 1].name} for row in facts["lamps"]]
         facts["lamps"] = named
-    room = room_of(loaded.house, view)
+    # Repeat the room's row of illuminance.json.
+    room = room_of(cached.house, view)
     if room is not None:
         lit = _marker_of_house(work, "illuminance").facts
         facts["floor_lux"] = lit["floor_lux"].get(room.id)
         facts["warnings"] = lit["warnings"].get(room.id, [])
-    if loaded.light_scene.n_lamps == 0:
+    if cached.light_scene.n_lamps == 0:
         facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
-    exr = radiance_exr(images, attribution=loaded.house.source.attribution)
-    return Made({RADIANCE_EXR: exr}, facts)
+    return facts
 
 
-def _illuminance(work: Work) -> Made:
-    """How bright every floor is by each light group: it needs the sky, so repair cannot know it."""
+def _illuminance(work: Work) -> StepOutput:
+    """illuminance.json: the mean illuminance of every room's floor by each light group."""
     from pbrs_farm.transport.illuminance import illuminance_record
 
-    loaded = _loaded(work)
-    lux = loaded.light_scene.floor_lux(
-        loaded.house, seed=keys.seed(work.house_id, "floor_lux", work.recipe.seed)
+    cached = _cached_house(work)
+    lux = cached.light_scene.floor_lux(
+        cached.house, seed=keys.seed(work.house_id, "floor_lux", work.recipe.seed)
     )
-    record = illuminance_record(loaded.house, lux)
+    record = illuminance_record(cached.house, lux)
     warnings = {row["room"]: row["warnings"] for row in record["rooms"] if row["warnings"]}
-    return Made(
-        {"illuminance.json": illuminance_json(record, loaded.sky.facts())},
+    return StepOutput(
+        {"illuminance.json": illuminance_json(record, cached.sky.facts())},
         {"floor_lux": lux, "warnings": warnings},
     )
 
 
-def _develop(work: Work) -> Made:
+def _develop(work: Work) -> StepOutput:
+    """The PNGs of the light modes: groups summed, denoised, white-balanced, tone-mapped."""
     from pbrs_farm.run.relight import linear_aovs
     from pbrs_farm.transport.develop.mode_pictures import develop
 
@@ -289,7 +304,7 @@ def _develop(work: Work) -> Made:
     denoise = work.recipe.light.denoise
     images = develop(aovs, work.recipe.tone, denoise=denoise)
     credit = attribution(work.store, work.house_id)
-    return Made(
+    return StepOutput(
         {
             LAYER[mode].file: layer_bytes(mode, made.rgb_srgb8, credit)
             for mode, made in images.items()
@@ -298,9 +313,10 @@ def _develop(work: Work) -> Made:
     )
 
 
-def _view(work: Work) -> Made:
-    loaded = _loaded(work)
-    view = loaded.view(work.view_id or "", work.inputs["cameras"])
+def _view(work: Work) -> StepOutput:
+    """view.json and histogram.json: what the other steps of the view have said and made."""
+    cached = _cached_house(work)
+    view = cached.view(work.view_id or "", work.inputs["cameras"])
     facts = _facts_of_view(work)
     description = view_description(
         view,
@@ -310,9 +326,10 @@ def _view(work: Work) -> Made:
         versions=versions(),
     )
     files = {"view.json": view_json(description)}
+    # Without any picture there is nothing to select by.
     rendered = [m for m in ALL_MODES if m.value in facts or (m.groups and "develop" in facts)]
     if rendered:
-        house = loaded.house
+        house = cached.house
         room = room_of(house, view)
         place = {
             "house": work.house_id,
@@ -323,7 +340,7 @@ def _view(work: Work) -> Made:
         files["histogram.json"] = view_histogram(
             work.store, place, rendered, description, house.notes, work.recipe.histogram
         )
-    return Made(files)
+    return StepOutput(files)
 
 
 def _facts_of_view(work: Work) -> dict[str, dict[str, Any]]:
@@ -338,8 +355,8 @@ def _facts_of_view(work: Work) -> dict[str, dict[str, Any]]:
 
 
 def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
-    """Do one step unless its marker says it is done; see marked.run_marked."""
-    return run_marked(name, work, _FUNCTIONS[name], attempt=attempt)
+    """Do one step unless its marker says it is done; see step_cache.run_unless_done."""
+    return run_unless_done(name, work, _FUNCTIONS[name], attempt=attempt)
 
 
 def versions() -> dict[str, str]:
@@ -353,7 +370,7 @@ def versions() -> dict[str, str]:
     return found
 
 
-_FUNCTIONS: Final[Mapping[str, Callable[[Work], Made]]] = {
+_FUNCTIONS: Final[Mapping[str, Callable[[Work], StepOutput]]] = {
     "house": _house,
     "cameras": _cameras,
     "truth": _truth,

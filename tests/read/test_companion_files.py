@@ -18,7 +18,7 @@ from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.read.source import SourceRef, object_source, read_house, resolve
 from pbrs_farm.run.house_cache import HouseCache
-from pbrs_farm.run.step_cache import Made, Work, run_marked
+from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.store.memory import MemoryStore
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import picture
@@ -42,13 +42,13 @@ class HouseStep:
     def was_kept(self) -> bool:
         source = self._named()
         work = Work(self._store, Recipe(), source.house_id, HouseCache(), source)
-        return run_marked("house", work, self._read).was_done
+        return run_unless_done("house", work, self._read).was_done
 
-    def _read(self, work: Work) -> Made:
+    def _read(self, work: Work) -> StepOutput:
         assert work.source is not None
         read_house(work.source, ReadFields())
         self.n_read += 1
-        return Made({})
+        return StepOutput({})
 
 
 def assert_notices(named: Callable[[], SourceRef], companions: list[Path]) -> None:

@@ -8,15 +8,15 @@ import time
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.run.plan import STEPS
-from pbrs_farm.run.step_cache import Made, Outcome, Work, run_marked
+from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, run_unless_done
 
 
 def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
     """A step that writes its own name, unless the recipe's name says otherwise for it."""
-    return run_marked(name, work, lambda w: _make(name, w), attempt=attempt)
+    return run_unless_done(name, work, lambda w: _make(name, w), attempt=attempt)
 
 
-def _make(name: str, work: Work) -> Made:
+def _make(name: str, work: Work) -> StepOutput:
     word, _, where = work.recipe.name.partition(":")
     at = f"{name}.{work.view_id}" if STEPS[name].per_view else name
     if at == where:
@@ -29,4 +29,4 @@ def _make(name: str, work: Work) -> Made:
         if word == "bug":
             raise ZeroDivisionError("a bug")
     facts = {"views": [["0_0_0", "0_0", 2.0], ["0_0_1", "0_0", 1.0]]} if name == "cameras" else {}
-    return Made({f"{name}.txt": at.encode()}, facts)
+    return StepOutput({f"{name}.txt": at.encode()}, facts)
