@@ -1,7 +1,7 @@
-"""The lamps' lights as OpenGL-IL uses them: the best ones per item, and their scale; no effects.
+"""Light choice of OpenGL-IL: the lights that matter most to each item, and their scale; no effects.
 
-Paper section 3.2; docs/spec/suncg.md section 4. The published code kept the worst eight lights of a node and
-matched none of them: this is its intent.
+Source: paper section 3.2, docs/spec/suncg.md section 4. The published code kept the worst eight
+lights of a node and matched none of them to it; its intent is computed here.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from pbrs_farm.core.house import House, Item, ItemKind, LightPart
 from pbrs_farm.core.lighting import LightForm, flux_lm
 from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
 
-SOFTENING_M = 0.35
-"""Added in quadrature to every distance: a lamp's own shade does not burn out."""
-
-FLOOR_LEVEL = 0.6
-"""Linear brightness, before compression, of a white floor with the house's median lamp light."""
-
-LIGHT_FLOATS = 16
-"""Floats of one light: position, form | intensity, dropoff | direction, cos cutoff | end, length."""
+SOFTENING_M = 0.35  # added in quadrature to every distance, so that a lampshade does not burn out
+FLOOR_LEVEL = 0.6  # linear brightness, before the tone curve, of a white floor in median lamp light
+LIGHT_FLOATS = 16  # columns of a light's row, four vec4 of the shader:
+POSITION, FORM = slice(0, 3), 3  # m, world; number of the form
+INTENSITY, DROPOFF = slice(4, 7), 7  # cd x colour; exponent of a spot's cosine
+DIRECTION, COS_CUTOFF = slice(8, 11), 11  # unit axis of a spot; cosine of its half angle
+END = slice(12, 15)  # other end of a line, with its length in the last column
 
 _FORM_NUMBER = {LightForm.POINT: 0.0, LightForm.SPOT: 1.0, LightForm.LINE: 2.0}
-_N_FLOOR_POINTS = 2000
+_N_FLOOR_POINTS = 2000  # of a house, for its scale
 
 
 def light_table(house: House) -> F32:
-    """(L, 16) every light of the house, rows as LIGHT_FLOATS says; intensity is in cd x colour."""
+    """(L, 16) every light of the house, columns as above."""
     rows = [_row(part) for item in house.items for part in item.lights]
     return np.array(rows, np.float32).reshape(-1, LIGHT_FLOATS)
 
 
 def _row(part: LightPart) -> list[float]:
+    # Take a form that lacks a line's end or a spot's angle for a point that shines everywhere.
     candela = flux_lm(part.power, part.unit, part.share) / (4 * math.pi)
     intensity = [candela * c for c in part.rgb_linear]
     is_line = part.form is LightForm.LINE and part.position_end is not None
@@ -53,15 +53,16 @@ def _row(part: LightPart) -> list[float]:
 
 
 def best_lights(lights: F32, low: F64, high: F64, n_best: int) -> NDArray[np.int64]:
-    """(N, min(n_best, L)) for each box the lights that reach it most strongly, best first.
+    """(N, min(n_best, L)) indices of the lights with the largest I / d^2 at each box, best first.
 
-    low, high: (N, 3) boxes. Rank: I / d^2, I the largest channel, d from the light (for a line: from
-    the nearest of five points along it) to the nearest point of the box. Ties keep their order.
+    low, high: (N, 3) boxes. I: the largest channel. d: from the light (for a line: from the nearest
+    of five points along it) to the nearest point of the box. Ties keep their order.
     """
-    brightest = lights[:, 4:7].max(axis=1) if len(lights) else np.zeros(0, np.float32)
+    brightest = lights[:, INTENSITY].max(axis=1) if len(lights) else np.zeros(0, np.float32)
     squared = np.full((len(low), len(lights)), np.inf)
+    # Measure from points along each line to the boxes; a point's or spot's two ends coincide.
     for t in np.linspace(0, 1, 5):
-        point = lights[:, 0:3] * (1 - t) + lights[:, 12:15] * t
+        point = lights[:, POSITION] * (1 - t) + lights[:, END] * t
         gap = np.maximum(np.maximum(low[:, None] - point, point - high[:, None]), 0.0)
         squared = np.minimum(squared, np.einsum("nlk,nlk->nl", gap, gap))
     reach = brightest / (squared + SOFTENING_M**2)
@@ -69,36 +70,40 @@ def best_lights(lights: F32, low: F64, high: F64, n_best: int) -> NDArray[np.int
 
 
 def illuminance(points: F64, normals: F64, lights: F32) -> F64:
-    """(N,) lx that reaches points (N, 3) with unit normals (N, 3), unshadowed, as the shader has it.
+    """(N,) illuminance in lx of points (N, 3) with unit normals (N, 3), without shadows.
 
-    lights: (N, K, 16), each point's own.
+    lights: (N, K, 16), each point's own. The same formula as in surface.frag.glsl.
     """
-    start, end = lights[..., 0:3].astype(np.float64), lights[..., 12:15].astype(np.float64)
+    # Find the nearest point of each light: along a line, or the light's position.
+    start, end = lights[..., POSITION].astype(np.float64), lights[..., END].astype(np.float64)
     along, p = end - start, points[:, None]
     squared_length = np.maximum(np.einsum("nkj,nkj->nk", along, along), 1e-12)
     t = np.clip(np.einsum("nkj,nkj->nk", p - start, along) / squared_length, 0, 1)
     to_light = start + t[..., None] * along - p
     squared = np.einsum("nkj,nkj->nk", to_light, to_light)
+    # Apply both cosines, the spot's cone, and the softened inverse square.
     unit = to_light / np.sqrt(np.maximum(squared, 1e-12))[..., None]
     cosine = np.maximum(np.einsum("nkj,nj->nk", unit, normals), 0)
-    leaving = np.maximum(-np.einsum("nkj,nkj->nk", unit, lights[..., 8:11].astype(np.float64)), 0)
-    spot = np.where(leaving >= lights[..., 11], leaving ** lights[..., 7], 0.0)
-    spot = np.where(lights[..., 3] == _FORM_NUMBER[LightForm.SPOT], spot, 1.0)
-    candela = lights[..., 4:7].max(axis=2)
+    axis = lights[..., DIRECTION].astype(np.float64)
+    leaving = np.maximum(-np.einsum("nkj,nkj->nk", unit, axis), 0)
+    spot = np.where(leaving >= lights[..., COS_CUTOFF], leaving ** lights[..., DROPOFF], 0.0)
+    spot = np.where(lights[..., FORM] == _FORM_NUMBER[LightForm.SPOT], spot, 1.0)
+    candela = lights[..., INTENSITY].max(axis=2)
     return np.asarray((candela * spot * cosine / (squared + SOFTENING_M**2)).sum(1))
 
 
 def brightness_scale(house: House, n_best: int) -> float:
     """Linear brightness of white per lx of lamp light, one number for the whole house.
 
-    The median illuminance over points spread evenly by area on the floors (on all faces in a
-    house without floors) that any lamp reaches becomes FLOOR_LEVEL. 0 in a house without lights.
+    It turns the median illuminance of the floors (of all faces in a house without floors), where
+    there is any, into FLOOR_LEVEL. 0 in a house without lights.
     """
     lights = light_table(house)
     floors = [item for item in house.items if item.kind is ItemKind.FLOOR] or list(house.items)
     points, normals, owner = _spread_points(floors)
     if not len(lights) or not len(points):
         return 0.0
+    # Light each point by the lights of its item, on the side that faces up.
     bounds = np.array([item.bounds for item in floors])
     best = best_lights(lights, bounds[:, 0], bounds[:, 1], n_best)
     up = np.where(normals[:, 1:2] < 0, -normals, normals)
@@ -108,7 +113,7 @@ def brightness_scale(house: House, n_best: int) -> float:
 
 
 def _spread_points(items: list[Item]) -> tuple[F64, F64, NDArray[np.int64]]:
-    """Points spread by area over items' triangles: positions, unit normals, number of the item."""
+    """Points stratified by area over items' triangles: positions, unit normals, number of the item."""
     corners, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
     for number, item in enumerate(items):
         for s in item.surfaces:
@@ -118,6 +123,7 @@ def _spread_points(items: list[Item]) -> tuple[F64, F64, NDArray[np.int64]]:
     area = np.nan_to_num(face_areas(triangles))
     if not area.sum() > 0:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)
+    # Choose faces at even steps of the running area, and a uniform point in each.
     rng = np.random.default_rng(0)
     at = (np.arange(_N_FLOOR_POINTS) + 0.5) / _N_FLOOR_POINTS * area.sum()
     face = np.searchsorted(np.cumsum(area), at).clip(0, len(area) - 1)

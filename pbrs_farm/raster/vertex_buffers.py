@@ -1,4 +1,4 @@
-"""House -> one vertex buffer, one index buffer and the draws that cut it up; no effects."""
+"""Vertex buffers: a house as one vertex buffer, one index buffer and draw calls; no effects."""
 
 from __future__ import annotations
 
@@ -14,26 +14,20 @@ from pbrs_farm.core.mesh import triangle_corners, unit_normals
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """All triangles of a house as OpenGL wants them, and the draws they are drawn in.
+    """All triangles of a house for OpenGL; a draw is those of one item with one material."""
 
-    vertices: (V, 8) float32 rows of position (world, m), normal (unit) and uv (v up).
-    indices: (F, 3) uint32. A draw is the triangles of one item with one material:
-    draw_first, draw_count: (D,) int64, in triangles. draw_item: (D,) instance id.
-    draw_material: (D,) index into House.materials. draw_low, draw_high: (D, 3) box in the world.
-    """
-
-    vertices: F32
-    indices: NDArray[np.uint32]
-    draw_first: NDArray[np.int64]
-    draw_count: NDArray[np.int64]
-    draw_item: NDArray[np.int64]
-    draw_material: NDArray[np.int64]
-    draw_low: F64
+    vertices: F32  # (V, 8) position (world, m), normal (unit), uv (v up)
+    indices: NDArray[np.uint32]  # (F, 3)
+    draw_first: NDArray[np.int64]  # (D,) first triangle
+    draw_count: NDArray[np.int64]  # (D,) number of triangles
+    draw_item: NDArray[np.int64]  # (D,) instance id
+    draw_material: NDArray[np.int64]  # (D,) index into House.materials
+    draw_low: F64  # (D, 3) corners of the bounding box in the world
     draw_high: F64
 
     @property
     def n_draws(self) -> int:
-        """How many draws there are."""
+        """The number of draws."""
         return len(self.draw_first)
 
 
@@ -45,6 +39,7 @@ def mesh_from_house(house: House) -> Mesh:
     boxes: list[tuple[F32, F32]] = []
     n_vertices = n_faces = 0
 
+    # Write item by item, and within an item material by material: each pair is one draw.
     for instance, item in enumerate(house.items, start=1):
         for material in dict.fromkeys(s.material for s in item.surfaces):
             first, corners = n_faces, []
@@ -66,40 +61,33 @@ def mesh_from_house(house: House) -> Mesh:
     return Mesh(
         np.concatenate([np.zeros((0, 8), np.float32), *vertices]),
         np.concatenate([np.zeros((0, 3), np.uint32), *indices]),
-        draw_first=table[:, 0],
-        draw_count=table[:, 1],
-        draw_item=table[:, 2],
-        draw_material=table[:, 3],
-        draw_low=box[:, 0],
-        draw_high=box[:, 1],
-    )
+        *table.T, *np.moveaxis(box, 1, 0),
+    )  # fmt: skip
 
 
 def _vertices(surface: Surface) -> tuple[F32, NDArray[np.int64]]:
     """(V, 8) vertices and (F, 3) faces of a surface; flat ones get three vertices per face."""
+    # Drop faces with a vertex that is not finite.
     points, faces = surface.positions, surface.faces.astype(np.int64)
     finite: Bools = np.all(np.isfinite(points), axis=1)
     faces = faces[np.all(finite[faces], axis=1)]
     uvs = surface.uvs if surface.uvs is not None else np.zeros((len(points), 2), np.float32)
     normals = surface.normals
-    if normals is None or not _all_unit(normals[faces.reshape(-1)]):
+    # Split vertices where a normal is missing or not of unit length: faces have their own there.
+    if normals is None or not _is_unit(normals[faces.reshape(-1)]).all():
         corner = faces.reshape(-1)
         own = unit_normals(triangle_corners(points, faces))
         own[~own.any(1)] = (0.0, 1.0, 0.0)  # up, where a triangle has no area
         flat = np.repeat(own.astype(np.float32), 3, axis=0)
         if normals is not None:
-            kept = normals[corner]
-            flat = np.where(_unit_rows(kept)[:, None], kept, flat)
+            given = normals[corner]
+            flat = np.where(_is_unit(given)[:, None], given, flat)
         points, normals, uvs = points[corner], flat, uvs[corner]
         faces = np.arange(len(corner)).reshape(-1, 3)
     finite_uvs = np.where(np.isfinite(uvs), uvs, np.float32(0))
     return np.concatenate([points, normals, finite_uvs], 1, dtype=np.float32), faces
 
 
-def _unit_rows(normals: F32) -> Bools:
+def _is_unit(normals: F32) -> Bools:
     with np.errstate(invalid="ignore"):
         return np.asarray(np.abs(np.einsum("ij,ij->i", normals, normals) - 1) < 0.1)
-
-
-def _all_unit(normals: F32) -> bool:
-    return bool(_unit_rows(normals).all())
