@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, no_targets
+from pbrs_farm.transport.kernels.packets import point
 from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, bounding_spheres
 
@@ -116,7 +117,7 @@ class NearbyLampSampler:
         alone = dr.select(mi.UInt32(only) == lamp, mi.Float(1), 0)
         weight = dr.select(only >= 0, alone, row[0])
         # Weigh by 1 / distance^2, held at the sphere's radius, and by the part in front.
-        to = mi.Point3f(sphere[0], sphere[1], sphere[2]) - p
+        to = point(sphere) - p
         d = dr.sqrt(dr.maximum(dr.squared_norm(to), dr.square(sphere[3])))
         is_two_sided = dr.squared_norm(n) < 0.5
         cos = dr.select(is_two_sided, 1, dr.maximum(dr.dot(n, to) + sphere[3], 0) / d)
@@ -128,7 +129,7 @@ class NearbyLampSampler:
         total = mi.Float(0)
         for lamp, aimed in zip(lamps, guided, strict=True):
             sphere = dr.gather(mi.Vector4f, self._interiors, lamp, active)
-            to = mi.Point3f(sphere[0], sphere[1], sphere[2]) - p
+            to = point(sphere) - p
             d2 = dr.maximum(dr.squared_norm(to), 1e-8)
             sin2 = dr.square(sphere[3]) / d2
             importances.append(dr.select((sin2 > 0) & (sin2 < _MAX_SIN2), aimed, 0))

@@ -1,6 +1,6 @@
-"""EmitterWeights of lamps and outdoor techniques for one view, from a small picture per emitter.
+"""Weights of lamps and outdoor techniques for one view, from a small picture per emitter; no effects.
 
-No effects. A home has 12 to 18 lamps and most shadow rays of a uniform choice go to other rooms.
+A home has 12 to 18 lamps and most shadow rays of a uniform choice go to other rooms.
 The pilot renders 32x24 pixels with each emitter alone, in one launch, and chooses in proportion to
 the root of the mean square that a path brings from it, with a floor so that nothing is forgotten.
 """
@@ -19,10 +19,11 @@ from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, EmitterWeights
 from pbrs_farm.transport.path_tracer import Lanes, trace
 
+# Least weights: what no pilot path has found may still be there.
 LAMP_FLOOR: Final = 0.01
 _SUN_FLOOR: Final = 0.1
 _DOME_FLOOR: Final = 0.05
-_PILOT_SIZE: Final = (32, 24)
+_PILOT_SIZE: Final = (32, 24)  # px
 
 
 def uniform_weights(n_lamps: int, n_portals: int) -> EmitterWeights:
@@ -32,14 +33,14 @@ def uniform_weights(n_lamps: int, n_portals: int) -> EmitterWeights:
 
 
 def weights_by_distance(
-    balls: NDArray[np.float64], place: NDArray[np.float64], n_portals: int
+    spheres: NDArray[np.float64], place: NDArray[np.float64], n_portals: int
 ) -> EmitterWeights:
     """Lamps by 1 / distance squared (1 m at least) from a place (3,), outdoor techniques alike.
 
-    balls: (L, 4) centre and radius of each lamp.
+    spheres: (L, 4) centre and radius of each lamp.
     """
-    squared = ((balls[:, :3] - place) ** 2).sum(1)
-    lamps = _with_floors(1 / np.maximum(squared, 1), np.full(len(balls), LAMP_FLOOR))
+    squared = ((spheres[:, :3] - place) ** 2).sum(1)
+    lamps = _with_floors(1 / np.maximum(squared, 1), np.full(len(spheres), LAMP_FLOOR))
     return EmitterWeights(lamps, uniform_weights(0, n_portals).outdoor)
 
 
@@ -52,7 +53,8 @@ def pilot_weights(
     fields: LightFields,
     seed: int,
 ) -> EmitterWeights:
-    """EmitterWeights for a view; those that emitters carry already change the pilot's noise only."""
+    """Weights for a view; those that emitters carry already change the pilot's noise only."""
+    # Render the view small, a lane for each pixel and emitter.
     n_outdoor = FIRST_PORTAL + n_portals
     width, height = _PILOT_SIZE
     lanes = Lanes(
@@ -62,7 +64,7 @@ def pilot_weights(
     brought = ((sums.outdoor + sums.indoor) @ LUMINANCE / fields.pilot_spp).reshape(
         width * height, n_lamps + n_outdoor
     )
-    # A pixel's noise matters relative to its brightness.
+    # Weigh a pixel's noise relative to its brightness.
     bright = brought.sum(1, keepdims=True)
     relative = brought / (bright + max(float(bright.mean()), 1e-12))
     strength = np.sqrt((relative.astype(np.float64) ** 2).mean(0))
@@ -78,11 +80,13 @@ def outdoor_weights(
     Dome and portals are techniques for one emitter, the sky: the better of the two tells how
     strong it is, and portals take most of it where most of its light comes through them.
     """
+    # Measure how much of the dome's light comes through the portals.
     portal = strength[FIRST_PORTAL:]
     by_portals = float(np.sqrt((portal**2).sum()))
     light = float(brought[DOME])
     through = min(float(brought[FIRST_PORTAL:].sum()) / light, 1.0) if light > 0 else 0.0
     share = 0.85 * through if through > 0.5 else 0.0
+    # Give portals most of the sky's weight, each by its own strength.
     sky = min(float(strength[DOME]), by_portals) if share > 0 else float(strength[DOME])
     within = portal / portal.sum() if portal.sum() > 0 else np.zeros(len(portal))
     raw = np.array([float(strength[SUN]), sky * (1 - share), *(sky * share * within)])

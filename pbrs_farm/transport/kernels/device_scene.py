@@ -12,18 +12,18 @@ import mitsuba as mi
 
 from pbrs_farm.raycast.tracer import scene_from_mesh
 from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance
+from pbrs_farm.transport.kernels.packets import colour, point, vector
 from pbrs_farm.transport.kernels.sampler import device_array
-from pbrs_farm.transport.scene_tables.material_rows import GLASS, MIRROR, NULL
+from pbrs_farm.transport.scene_tables.material_rows import GLASS, MATERIAL_FLOATS, MIRROR, NULL
 from pbrs_farm.transport.scene_tables.scene_tables import FACE_FLOATS, SceneTables
 
 _RAY_OFFSET = 2e-5  # of a point's largest coordinate plus 1 m
 _MAX_TRANSPARENT = 16  # surfaces that a shadow ray passes
 _FACE_PACKETS = FACE_FLOATS // 4
-_FRONT_PDF, _BACK_PDF, _TARGET_EMITTER = (
-    19,
-    23,
-    27,
-)  # columns of a face's row that tables leave free
+_MATERIAL_PACKETS = MATERIAL_FLOATS // 4
+
+# Columns of a face's row that the tables leave free for guiding.
+_FRONT_PDF, _BACK_PDF, _TARGET_EMITTER = 19, 23, 27
 
 
 class SurfaceInteraction(NamedTuple):
@@ -52,7 +52,7 @@ class DeviceScene:
         self._opaque = self._all
         self._transparent: Any = None
         if self.has_transparent:
-            # Shadow rays ask the opaque faces first, then walk through the see-through ones.
+            # Ask the opaque faces first; go through the transparent ones one by one.
             self._transparent = scene_from_mesh(mi, tables.positions, tables.faces[transparent])
             self._transparent_faces = device_array(
                 mi.UInt32, transparent.nonzero()[0].astype("uint32")
@@ -90,31 +90,32 @@ class DeviceScene:
         go_on = mi.Bool(clear)
         n = mi.UInt32(0)
         while go_on:
+            # Find the next transparent surface.
             found = self._transparent.ray_intersect_preliminary(_ray(here, d, reach), False, go_on)
             met = go_on & found.is_valid()
             face = dr.gather(mi.UInt32, self._transparent_faces, found.prim_index, met)
             si = self._interaction(face, found.prim_uv, d, met)
-            passes = 1 - thin_glass_reflectance(dr.dot(si.n, d))
-            glass = si.bsdf.kind == GLASS
-            through = dr.select(glass, si.bsdf.tau * passes, 0)
+            # Let through what glass does not reflect, all at a cut-out.
+            transmitted = 1 - thin_glass_reflectance(dr.dot(si.n, d))
+            through = dr.select(si.bsdf.kind == GLASS, si.bsdf.tau * transmitted, 0)
             through = dr.select(si.is_cutout, mi.Color3f(1), through)
             left = dr.select(met, left * through, left)
+            # Go on behind it.
             beyond = offset_ray_origin(si.p, -si.ng)
             reach = dr.select(met, reach - dr.dot(beyond - here, d), reach)
             here = dr.select(met, beyond, here)
             n += 1
             brightest: Any = dr.max(left)
             go_on = met & (brightest > 0) & (reach > 0) & (n < _MAX_TRANSPARENT)
-        # More sheets than anyone hangs in a row: treat the rest as opaque.
+        # Treat what is behind more sheets than anyone hangs in a row as opaque.
         return dr.select(n >= _MAX_TRANSPARENT, 0, left)
 
     def sample_face(self, face: Any, u: Any, active: Any) -> tuple[Any, Any]:
         """(point, unit normal) uniform over a face."""
         bary = mi.warp.square_to_uniform_triangle(u)
-        v0 = self._packet(face, 0, active)
-        e1, e2 = self._packet(face, 1, active), self._packet(face, 2, active)
-        a, b = mi.Vector3f(e1[0], e1[1], e1[2]), mi.Vector3f(e2[0], e2[1], e2[2])
-        p = mi.Point3f(v0[0], v0[1], v0[2]) + bary.x * a + bary.y * b
+        v0, e1, e2 = (self._packet(face, k, active) for k in range(3))
+        a, b = vector(e1), vector(e2)
+        p = point(v0) + bary.x * a + bary.y * b
         return p, dr.normalize(dr.cross(a, b))
 
     def set_guiding_targets(self, faces: Any, front: Any, back: Any, lamps: Any) -> None:
@@ -132,62 +133,75 @@ class DeviceScene:
         return dr.gather(mi.Vector4f, self._rows, face * _FACE_PACKETS + k, active)
 
     def _interaction(self, face: Any, bary: Any, d: Any, valid: Any) -> SurfaceInteraction:
+        # Interpolate the position, the shading normal and the texture coordinates.
         rows = [self._packet(face, k, valid) for k in range(_FACE_PACKETS)]
-        e1 = mi.Vector3f(rows[1][0], rows[1][1], rows[1][2])
-        e2 = mi.Vector3f(rows[2][0], rows[2][1], rows[2][2])
+        e1, e2 = vector(rows[1]), vector(rows[2])
         v, w = bary.x, bary.y
-        p = mi.Point3f(rows[0][0], rows[0][1], rows[0][2]) + v * e1 + w * e2
+        p = point(rows[0]) + v * e1 + w * e2
         ng = dr.normalize(dr.cross(e1, e2))
-        smooth = rows[4] * (1 - v - w) + rows[5] * v + rows[6] * w
-        n = dr.normalize(mi.Vector3f(smooth[0], smooth[1], smooth[2]))
-
-        # Both normals on the ray's side; a shading normal that turns away is bent back.
-        turned = dr.dot(ng, d) > 0
-        ng, smooth = dr.select(turned, -ng, ng), dr.select(turned, -n, n)
-        n = bend_normal(smooth, d)
-
-        tag = dr.gather(mi.UInt32, self._tags, face, valid)
-        u = mi.Point2f(
+        normal = rows[4] * (1 - v - w) + rows[5] * v + rows[6] * w
+        normal = dr.normalize(vector(normal))
+        uv = mi.Point2f(
             rows[0][3] + v * rows[2][3] + w * rows[3][1],
             rows[1][3] + v * rows[3][0] + w * rows[3][2],
         )
-        bsdf, is_cutout = self._material(tag & 0xFFFF, u, valid)
-        aim = dr.select(turned, rows[5][3], rows[4][3])
-        aim_lamp = dr.reinterpret_array(mi.UInt32, rows[6][3])
+
+        # Turn both normals to the ray's side; bend a shading normal back that turns away.
+        turned = dr.dot(ng, d) > 0
+        ng, normal = dr.select(turned, -ng, ng), dr.select(turned, -normal, normal)
+
+        tag = dr.gather(mi.UInt32, self._tags, face, valid)  # material + 65536 * emitter
+        bsdf, is_cutout = self._material(tag & 0xFFFF, uv, valid)
         return SurfaceInteraction(
-            valid, p, ng, n, smooth, tag >> 16, bsdf, is_cutout, face, aim, aim_lamp
+            valid=valid,
+            p=p,
+            ng=ng,
+            n=bend_normal(normal, d),
+            n_interpolated=normal,
+            emitter=tag >> 16,
+            bsdf=bsdf,
+            is_cutout=is_cutout,
+            face=face,
+            target_pdf=dr.select(turned, rows[5][3], rows[4][3]),
+            target_emitter=dr.reinterpret_array(mi.UInt32, rows[6][3]),
         )
 
     def _material(self, index: Any, uv: Any, active: Any) -> tuple[Bsdf, Any]:
-        rows = [dr.gather(mi.Vector4f, self._materials, index * 4 + k, active) for k in range(4)]
-        first: Any = dr.reinterpret_array(mi.UInt32, rows[3][0])
-        has_texture: Any = active & (first > mi.UInt32(0))
-        rgb, is_solid = self._texture(first, rows[3][1], rows[3][2], uv, has_texture)
-        kind = mi.UInt32(rows[2][3])
-        kd = mi.Color3f(rows[0][0], rows[0][1], rows[0][2])
-        tau = mi.Color3f(rows[2][0], rows[2][1], rows[2][2])
+        """(parameters, whether nothing is here) of a material where its texture is uv."""
+        first = index * _MATERIAL_PACKETS
+        packets = [
+            dr.gather(mi.Vector4f, self._materials, first + k, active)
+            for k in range(_MATERIAL_PACKETS)
+        ]
+        kd, f0, tau, texture = packets
+        first_texel: Any = dr.reinterpret_array(mi.UInt32, texture[0])
+        has_texture: Any = active & (first_texel > mi.UInt32(0))
+        rgb, is_solid = self._texture(first_texel, texture[1], texture[2], uv, has_texture)
+        kind = mi.UInt32(tau[3])
         tinted = has_texture & (kind != MIRROR)
         bsdf = Bsdf(
-            kd=dr.select(tinted, kd * rgb, kd),
-            f0=mi.Color3f(rows[1][0], rows[1][1], rows[1][2]),
-            tau=dr.select(tinted, tau * rgb, tau),
-            alpha=rows[1][3],
+            kd=dr.select(tinted, colour(kd) * rgb, colour(kd)),
+            f0=colour(f0),
+            tau=dr.select(tinted, colour(tau) * rgb, colour(tau)),
+            alpha=f0[3],
             kind=kind,
         )
-        is_cut: Any = rows[3][3] > 0
-        cut = has_texture & is_cut & ~is_solid
-        return bsdf, active & (cut | (kind == NULL))
+        may_be_cut: Any = texture[3] > 0
+        is_cut = has_texture & may_be_cut & ~is_solid
+        return bsdf, active & (is_cut | (kind == NULL))
 
     def _texture(
         self, first: Any, width: Any, height: Any, uv: Any, active: Any
     ) -> tuple[Any, Any]:
-        # Row 0 is the top (v = 1); both axes repeat; four texels are blended.
+        """(Color3f, whether it is opaque): four texels blended, both axes repeating."""
+        # Find the texel to the top left; row 0 is the top (v = 1).
         w, h = dr.maximum(mi.Int32(width), 1), dr.maximum(mi.Int32(height), 1)
         x = (uv.x - dr.floor(uv.x)) * width - 0.5
         y = (1 - (uv.y - dr.floor(uv.y))) * height - 0.5
         fx, fy = dr.floor(x), dr.floor(y)
         x0, y0 = mi.Int32(fx), mi.Int32(fy)
         tx, ty = x - fx, y - fy
+        # Blend; a texel holds square roots in 10 bits each, and alpha.
         total = mi.Color3f(0)
         solid = mi.Float(0)
         for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):

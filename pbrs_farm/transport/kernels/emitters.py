@@ -28,6 +28,7 @@ from pbrs_farm.transport.guiding.nearby_lamps import (
 )
 from pbrs_farm.transport.kernels.alias_table import alias_rows, sample_alias_table
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
+from pbrs_farm.transport.kernels.packets import colour, vector
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
@@ -153,7 +154,7 @@ class Emitters:
         weight = dr.select(only >= 0, 1, weight)
         pdf = weight * dr.square(distance) / dr.maximum(row[3] * cos, 1e-12)
         counts = (only < 0) | (mi.UInt32(only) == lamp)
-        return dr.select(counts, mi.Color3f(row[0], row[1], row[2]), 0), pdf
+        return dr.select(counts, colour(row), 0), pdf
 
     def sample_outdoor(self, p: Any, u: Any, uv: Any, only: Any, active: Any) -> DirectionSample:
         """A direction in which outdoor light may come to p."""
@@ -216,7 +217,7 @@ class Emitters:
         """(corner, first edge, second edge) of a portal."""
         first = k * _PORTAL_PACKETS
         rows = [dr.gather(mi.Vector4f, self._portals, first + j, active) for j in range(3)]
-        return tuple(mi.Vector3f(r[0], r[1], r[2]) for r in rows)
+        return tuple(vector(row) for row in rows)
 
     def _texel_direction(self, texel: Any, uv: Any) -> Any:
         width = self._dome_width
@@ -252,7 +253,7 @@ class Emitters:
             column = dr.select(column < 0, column + w, dr.select(column >= w, column - w, column))
             texel = dr.gather(mi.Vector4f, self._dome, mi.UInt32(row * w + column), active)
             weight = (tx if dx else 1 - tx) * (ty if dy else 1 - ty)
-            total += weight * mi.Color3f(texel[0], texel[1], texel[2])
+            total += weight * colour(texel)
         return total, pdf
 
     def _set_lamps(self, tables: SceneTables, weights: NDArray[np.float64]) -> None:

@@ -12,8 +12,8 @@ from typing import Any, Protocol
 import drjit as dr
 import mitsuba as mi
 
-CAMERA_DIMS = 2
-VERTEX_DIMS = 10
+CAMERA_DIMS = 2  # dimensions of the film position
+VERTEX_DIMS = 10  # of each vertex (path_step.py)
 
 
 class Sampler(Protocol):
@@ -53,12 +53,14 @@ class SobolSampler:
 
     def get_1d(self, dim: Any) -> Any:
         """Float of one dimension."""
+        # Shuffle the sample's index, then scramble the digits of its van der Corput point.
         seed = hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B))
         index = dr.brev(_laine_karras(self._reversed, seed))
         return unit_float(dr.brev(_laine_karras(index, hash32(seed + 0x68BC21EB))))
 
     def get_2d(self, dim: Any) -> Any:
         """Point2f of dimensions dim and dim + 1."""
+        # Shuffle the index once for the pair, scramble each dimension by itself.
         seed = hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B))
         index = dr.brev(_laine_karras(self._reversed, seed))
         x = dr.brev(_laine_karras(index, hash32(seed + 0x68BC21EB)))
@@ -73,10 +75,10 @@ def device_array(kind: Any, values: Any) -> Any:
     apart into single ones, and the kernel is another one each time.
     """
     wrapped = kind(values)
-    own = dr.empty(kind, len(wrapped))
-    dr.scatter(own, wrapped, dr.arange(mi.UInt32, len(wrapped)))
-    dr.eval(own)
-    return own
+    copy = dr.empty(kind, len(wrapped))
+    dr.scatter(copy, wrapped, dr.arange(mi.UInt32, len(wrapped)))
+    dr.eval(copy)
+    return copy
 
 
 def opaque3(kind: Any, values: Any) -> Any:
@@ -105,7 +107,7 @@ def unit_float(bits: Any) -> Any:
 
 
 def _laine_karras(x: Any, seed: Any) -> Any:
-    # Nested uniform scrambling of a bit-reversed number; constants of Vegdahl 2021.
+    # Scramble a bit-reversed number uniformly, nested; constants of Vegdahl 2021.
     x = x ^ (x * mi.UInt32(0x3D20ADEA))
     x = x + seed
     x = x * ((seed >> 16) | 1)
@@ -114,7 +116,7 @@ def _laine_karras(x: Any, seed: Any) -> Any:
 
 
 def _pascal(x: Any) -> Any:
-    # Sobol's second dimension is Pascal's triangle modulo 2, applied here by butterflies.
+    # Multiply by Pascal's triangle modulo 2, Sobol's second dimension, by butterflies.
     for shift, mask in (
         (16, 0xFFFF),
         (8, 0xFF00FF),

@@ -37,6 +37,7 @@ from pbrs_farm.transport.kernels.device_scene import (
     bend_normal,
     offset_ray_origin,
 )
+from pbrs_farm.transport.kernels.packets import colour, point, vector
 from pbrs_farm.transport.kernels.path_state import EmitterFilter, PathState, StepResult, camera_path
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
@@ -306,15 +307,15 @@ def _contribution(
     """K of a chain's suffix at a prefix; at its own prefix, as the chain has found it."""
     x1 = _packets(prefixes, pixel, _PREFIX_PACKETS, active)
     x2 = _packets(suffixes, chain, _SUFFIX_PACKETS, True)
-    p1, p2 = _point(x1[0]), _point(x2[0])
-    ng1, ng2 = _vector(x1[2]), _vector(x2[2])
+    p1, p2 = point(x1[0]), point(x2[0])
+    ng1, ng2 = vector(x1[2]), vector(x2[2])
     wi1 = mi.Vector3f(x1[2][3], x1[3][3], x1[4][3])
     way = p2 - p1
     distance2 = dr.squared_norm(way)
     d = way * dr.rsqrt(distance2)
 
     # From x1 to x2: f1 and the geometry term of the two.
-    frame1 = mi.Frame3f(_vector(x1[1]))
+    frame1 = mi.Frame3f(vector(x1[1]))
     local = frame1.to_local(wi1)
     local.z = dr.maximum(local.z, 1e-4)
     out = frame1.to_local(d)
@@ -333,20 +334,20 @@ def _contribution(
     to = p2 - begin
     reach = dr.norm(to)
     clear = scene.transmittance(begin, to / reach, reach * (1 - 1e-4), valid)
-    value = _colour(x1[6]) * value1 * inner * clear * (cos2 / distance2)
-    return dr.select(is_other, dr.select(valid, value, 0), _colour(x2[8]))
+    value = colour(x1[6]) * value1 * inner * clear * (cos2 / distance2)
+    return dr.select(is_other, dr.select(valid, value, 0), colour(x2[8]))
 
 
 def _scattered_suffix(x2: list[Any], ng: Any, d: Any) -> tuple[Any, Any]:
     """(light that a suffix scatters back along d, pdf of its own direction at x2)."""
-    bsdf, frame = _bsdf(x2), mi.Frame3f(bend_normal(_vector(x2[1]), d))
+    bsdf, frame = _bsdf(x2), mi.Frame3f(bend_normal(vector(x2[1]), d))
     wi = frame.to_local(-d)
     wi.z = dr.maximum(wi.z, 1e-4)
     to_emitter = mi.Vector3f(x2[5][3], x2[6][3], x2[7][3])
     to_x3 = mi.Vector3f(x2[2][3], x2[3][3], x2[4][3])
     from_emitter, _pdf = _evaluate_consistent(bsdf, frame, ng, wi, to_emitter)
     from_x3, pdf = _evaluate_consistent(bsdf, frame, ng, wi, to_x3)
-    return from_emitter * _colour(x2[6]) * pdf + from_x3 * _colour(x2[7]), pdf
+    return from_emitter * colour(x2[6]) * pdf + from_x3 * colour(x2[7]), pdf
 
 
 def _evaluate_consistent(bsdf: Bsdf, frame: Any, ng: Any, wi: Any, d: Any) -> tuple[Any, Any]:
@@ -363,19 +364,7 @@ def _packets(rows: Any, index: Any, n: int, active: Any) -> list[Any]:
 
 def _bsdf(row: list[Any]) -> Bsdf:
     """The material of a prefix or suffix: both keep it in the same columns."""
-    return Bsdf(_colour(row[3]), _colour(row[4]), _colour(row[5]), row[1][3], mi.UInt32(0))
-
-
-def _point(packet: Any) -> Any:
-    return mi.Point3f(packet[0], packet[1], packet[2])
-
-
-def _vector(packet: Any) -> Any:
-    return mi.Vector3f(packet[0], packet[1], packet[2])
-
-
-def _colour(packet: Any) -> Any:
-    return mi.Color3f(packet[0], packet[1], packet[2])
+    return Bsdf(colour(row[3]), colour(row[4]), colour(row[5]), row[1][3], mi.UInt32(0))
 
 
 def _xyz(v: Any) -> tuple[Any, Any, Any]:
