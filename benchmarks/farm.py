@@ -278,7 +278,7 @@ def lost_worker() -> dict[str, Any]:
         job = farm.submit(houses, new_spec(recipe_from_name("fast"))).job_id
         while not _runner_of(farm, job):
             time.sleep(0.1)
-        time.sleep(25)  # past its first beat
+        time.sleep(25)  # past its first heartbeat
         bench.python("w2", "workers.node.supervisor", PBRS_FARM_WORKER="w2", PBRS_BENCH_SLEEP="0")
         bench.end("w1")
         began = time.monotonic()

@@ -35,20 +35,21 @@ def settings_from_environment(environment: Mapping[str, str] | None = None) -> S
     """
     env = dict(os.environ if environment is None else environment)
     s3 = S3Settings(
-        endpoint=_value(env, "PBRS_S3_ENDPOINT"),
-        region=_value(env, "PBRS_S3_REGION") or "us-east-1",
-        access_key=_value(env, "PBRS_S3_ACCESS_KEY"),
-        secret_key=Secret(_value(env, "PBRS_S3_SECRET_KEY")),
-        allow_http=_value(env, "PBRS_S3_ALLOW_HTTP") == "1",
+        endpoint=value_or_file(env, "PBRS_S3_ENDPOINT"),
+        region=value_or_file(env, "PBRS_S3_REGION") or "us-east-1",
+        access_key=value_or_file(env, "PBRS_S3_ACCESS_KEY"),
+        secret_key=Secret(value_or_file(env, "PBRS_S3_SECRET_KEY")),
+        allow_http=value_or_file(env, "PBRS_S3_ALLOW_HTTP") == "1",
     )
-    redis_url = _value(env, "PBRS_REDIS_URL") or DEFAULT_REDIS
+    redis_url = value_or_file(env, "PBRS_REDIS_URL") or DEFAULT_REDIS
     return Settings(
-        store=StoreSettings(fsync=_value(env, "PBRS_FSYNC") == "1", s3=s3),
+        store=StoreSettings(fsync=value_or_file(env, "PBRS_FSYNC") == "1", s3=s3),
         redis_url=Secret(redis_url),
     )
 
 
-def _value(environment: Mapping[str, str], name: str) -> str:
+def value_or_file(environment: Mapping[str, str], name: str) -> str:
+    """A variable's value, or what the file holds that NAME_FILE names; "" when neither is set."""
     file = environment.get(f"{name}_FILE", "")
     if not file:
         return environment.get(name, "")

@@ -16,7 +16,7 @@ from urllib.parse import quote, urlsplit, urlunsplit
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
-from pbrs_farm.settings import settings_from_environment
+from pbrs_farm.settings import settings_from_environment, value_or_file
 from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings
 from workers.ids import GEOMETRY, GL, LIGHT, QUEUES
@@ -25,6 +25,7 @@ from workers.liveness import alive_file
 _PREFIX: Final = "PBRS_FARM_"
 
 
+# A field's least value stands in its metadata: _check raises BadInput below it.
 def _above(default: float, limit: float = 0.0) -> Any:
     return field(default=default, metadata={"above": limit})
 
@@ -35,18 +36,14 @@ def _least(default: int, limit: int) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """When a renderer is killed. A stage's deadline is for one task of it.
+    """When a render process is killed, and after how many tasks it is replaced."""
 
-    silence_s: without a step or a line in the log. memory_mb: of one renderer; 0 = share of the
-    machine's. tasks_per_renderer: then it starts afresh.
-    """
-
-    geometry_s: float = _above(1800.0)
+    geometry_s: float = _above(1800.0)  # deadline of one task of the stage; so the next three
     gl_s: float = _above(1800.0)
     light_s: float = _above(4 * 3600.0)
-    reduce_s: float = _above(3600.0)
-    silence_s: float = _above(1800.0)
-    memory_mb: int = _least(0, 0)
+    reduce_s: float = _above(3600.0)  # of shard and job too
+    silence_s: float = _above(1800.0)  # without a step or a line in the log
+    memory_mb: int = _least(0, 0)  # of one process; 0 = its share of the machine
     tasks_per_renderer: int = _least(2000, 1)
 
     def __post_init__(self) -> None:
@@ -71,38 +68,31 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class FarmConfig:
-    """Everything a coordinator, a worker or a client needs to know. Raises BadInput.
-
-    redis_ca: file of the CA for rediss://, "" = the system's. sticky_s: a task this long takes
-    another of its house with it. breaker_s: claims stop this long after a storage failure.
-    cooldown_s: an unhealthy worker claims nothing for this long. grace_s: from TERM to having handed
-    everything back. min_free_mb: scratch space a worker wants before it starts. window_min: tasks in
-    flight per stage, at least. metrics_port: of the coordinator's Prometheus endpoint, 0 = off.
-    """
+    """Everything a coordinator, a worker or a client needs to know. Raises BadInput."""
 
     redis_url: Secret
-    redis_ca: str = ""
+    redis_ca: str = ""  # file of the CA for rediss://, "" = the system's
     store_url: str = ""
     store: StoreSettings = field(default_factory=StoreSettings)
-    prefix: str = "pbrs:"
-    worker: str = ""
-    slots: int = _least(1, 1)
-    queues: tuple[str, ...] = ()
+    prefix: str = "pbrs:"  # of every key in Redis
+    worker: str = ""  # its name in the ledger
+    slots: int = _least(1, 1)  # tasks at once
+    queues: tuple[str, ...] = ()  # () = all
     scratch: Path = Path("/tmp")
-    runner: str = "workers.node.house_runner:runner"
-    lease_s: float = _above(120.0)
+    runner: str = "workers.node.house_runner:runner"  # what does the tasks
+    lease_s: float = _above(120.0)  # without a heartbeat, then the task is somebody else's
     heartbeat_s: float = _above(20.0)
-    sticky_s: float = 2.0
-    retry_delay_s: float = 10.0
-    storage_patience_s: float = 600.0
-    breaker_s: int = _least(30, 1)
-    cooldown_s: float = 600.0
-    grace_s: float = _above(600.0)
-    min_free_mb: int = _least(500, 0)
-    window_per_slot: int = _least(4, 1)
-    window_min: int = _least(128, 1)
-    resend_s: float = _above(60.0)
-    metrics_port: int = _least(0, 0)
+    sticky_s: float = 2.0  # a task this long takes another of its house with it
+    retry_delay_s: float = 10.0  # times the number of the attempt
+    storage_patience_s: float = 600.0  # a step waits so long for storage that does not answer
+    breaker_s: int = _least(30, 1)  # claims stop this long after a storage failure
+    cooldown_s: float = 600.0  # an unhealthy worker claims nothing for this long
+    grace_s: float = _above(600.0)  # from TERM until every task is done or given back
+    min_free_mb: int = _least(500, 0)  # scratch space a worker wants before it starts
+    window_per_slot: int = _least(4, 1)  # tasks in flight per stage and slot
+    window_min: int = _least(128, 1)  # tasks in flight per stage, at least
+    resend_s: float = _above(60.0)  # a message unclaimed for so long may be lost
+    metrics_port: int = _least(0, 0)  # of the coordinator's Prometheus endpoint, 0 = off
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
@@ -132,7 +122,8 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
     """
     env = dict(os.environ if environment is None else environment)
     settings = settings_from_environment(env)
-    password = _secret(env, "PBRS_REDIS_PASSWORD")
+    password = value_or_file(env, "PBRS_REDIS_PASSWORD")
+    # PBRS_FARM_LIMITS_* are fields of Limits, the other PBRS_FARM_* of FarmConfig.
     limits = f"{_PREFIX}LIMITS_"
     of_limits = {n: text for n, text in env.items() if n.startswith(limits)}
     of_farm = {n: text for n, text in env.items() if n.startswith(_PREFIX) and n not in of_limits}
@@ -147,6 +138,7 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
     )
 
 
+# Type of a field -> its value from text.
 _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     "int": int,
     "float": float,
@@ -154,15 +146,17 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     "Path": Path,
     "tuple[str, ...]": lambda text: tuple(x for x in text.split(",") if x),
 }
+# Settings that had another name once -> their field.
 _FORMER_NAMES: Final = {"beat_s": "heartbeat_s", "forgive_s": "cooldown_s"}
+# Fields that other variables set.
 _ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits"}
 
 
-def _read(cls: type[FarmConfig | Limits], words: Mapping[str, str], prefix: str) -> dict[str, Any]:
+def _read(cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str) -> dict[str, Any]:
     """Field -> its value from its variable's text; BadInput for what is none."""
     kinds = {f.name: str(f.type) for f in fields(cls) if f.name not in _ELSEWHERE}
     values = {}
-    for name, text in words.items():
+    for name, text in given.items():
         setting = name.removeprefix(prefix).lower()
         setting = _FORMER_NAMES.get(setting, setting)
         kind = kinds.get(setting)
@@ -176,21 +170,12 @@ def _read(cls: type[FarmConfig | Limits], words: Mapping[str, str], prefix: str)
 
 
 def _check(config: FarmConfig | Limits, prefix: str) -> None:
+    # NaN fails the comparison too.
     for f in fields(config):
         value, above = getattr(config, f.name), f.metadata.get("above")
         if above is not None and not value > above:
             name = f"{prefix}{f.name.upper()}"
             raise BadInput("environment", name, f"expected more than {above:g}, got {value}")
-
-
-def _secret(env: Mapping[str, str], name: str) -> str:
-    file = env.get(f"{name}_FILE")
-    if not file:
-        return env.get(name, "")
-    try:
-        return Path(file).read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(file, f"{name}_FILE", f"cannot be read: {error}") from None
 
 
 def _with_password(url: str, password: str) -> str:

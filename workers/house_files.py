@@ -1,4 +1,4 @@
-"""Houses on their way to the workers: words of the user -> entries of a job, files into the store.
+"""Houses on their way to the workers: arguments of the user -> entries of a job, files into the store.
 
 Effects: reads the user's files, writes the store; on a worker, fills its cache from the store.
 """
@@ -20,15 +20,15 @@ FOLDER: Final = "jobs/sources/"
 _UPLOADED: Final = (".sh3d", ".xml", ".zip", ".glb")
 
 
-def entries_from_words(words: Sequence[str]) -> list[tuple[HouseEntry, SourceRef]]:
-    """The houses that words name: files, folders of files, example homes, `builtin`.
+def entries_from_arguments(arguments: Sequence[str]) -> list[tuple[HouseEntry, SourceRef]]:
+    """The houses that arguments name: files, folders of files, example homes, `builtin`.
 
-    Touches no store. Raises BadHouse for a word that names no house.
+    Touches no store. Raises BadHouse for one that names no house.
     """
     found: dict[str, tuple[HouseEntry, SourceRef]] = {}
     files = SourceFiles()
-    for word in words:
-        for one in _expanded(word):
+    for argument in arguments:
+        for one in _expanded(argument):
             ref = resolve(one, files)
             entry = HouseEntry(
                 house_id=ref.house_id, source=_placed(ref).model_dump_json(), sha256=ref.fingerprint

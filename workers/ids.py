@@ -14,12 +14,13 @@ from typing import Final
 
 from pbrs_farm.core.errors import BadInput
 
-GEOMETRY: Final = "geometry"
-GL: Final = "gl"
-LIGHT: Final = "light"
-REDUCE: Final = "reduce"
-SHARD: Final = "shard"
-JOB: Final = "job"
+# Stages of a job's work; a queue carries those of one kind of worker.
+GEOMETRY: Final = "geometry"  # a house: read, repaired, its cameras placed
+GL: Final = "gl"  # a batch of its views: labels and OpenGL
+LIGHT: Final = "light"  # a batch of its views: path or Metropolis, developed
+REDUCE: Final = "reduce"  # a house: its manifest
+SHARD: Final = "shard"  # some hundred houses: their manifests as one
+JOB: Final = "job"  # the root's manifest, the report
 STAGES: Final = (GEOMETRY, GL, LIGHT, REDUCE, SHARD, JOB)
 LIGHT_GPU: Final = "light.gpu"  # the queue of light on a GPU, and its leases
 QUEUES: Final = (GEOMETRY, GL, LIGHT, LIGHT_GPU, REDUCE)

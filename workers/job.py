@@ -14,7 +14,7 @@ from workers.ids import GL, LIGHT
 class HouseEntry(BaseModel):
     """A house of a job. source: JSON the runner understands; it travels to the geometry task only.
 
-    sha256: of the source, so that a house that changed since submission is told.
+    sha256: of the source, so that a house that changed since submission is noticed.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Final
 
-STALE_S: Final = 120.0
+STALE_S: Final = 120.0  # main loops touch the file every few seconds
 
 
 def alive_file(scratch: Path, worker: str) -> Path:

@@ -22,36 +22,33 @@ OnText = Callable[[str], None]
 
 
 class Request(BaseModel):
-    """A task for the runner. views: of its batch. source: of the house, for geometry only."""
+    """A task for the runner."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     job_id: str
     house: str
     unit: str
     stage: str
-    views: tuple[str, ...] = ()
-    source: str = ""
+    views: tuple[str, ...] = ()  # of its batch
+    source: str = ""  # of the house, JSON; for geometry only
     attempt: int = 1
 
 
 class Result(BaseModel):
-    """What came of it. batches: of views to be made, only after geometry."""
+    """What came of a task."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    batches: tuple[tuple[str, ...], ...] = ()
+    batches: tuple[tuple[str, ...], ...] = ()  # of views to be made, only after geometry
     n_views: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """What storage says of a house. missing: unit -> first stage not done, "" when all are.
+    """What storage says of a house."""
 
-    batches is None while the house's geometry is not done. reduced: the house is finished.
-    """
-
-    batches: tuple[tuple[str, ...], ...] | None = None
-    missing: Mapping[str, str] = field(default_factory=dict)
-    reduced: bool = False
+    batches: tuple[tuple[str, ...], ...] | None = None  # None while its geometry is not done
+    missing: Mapping[str, str] = field(default_factory=dict)  # unit -> first stage not done, or ""
+    reduced: bool = False  # the house is finished
 
 
 class StepRunner(Protocol):

@@ -57,7 +57,7 @@ def add_verbs(verb: Verb) -> None:
     p = farm_verb("recover", _recover, "rebuild the ledger of a job from storage")
     p.add_argument("job")
     verb("coordinator", _coordinator, "lead the farm, or stand by")
-    p = verb("worker", _worker, "work for the farm until told to leave")
+    p = verb("worker", _worker, "work for the farm until asked to leave")
     p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
 
 
@@ -157,10 +157,10 @@ def _workers(args: argparse.Namespace) -> int:
 def _recover(args: argparse.Namespace) -> int:
     farm = farm_of(args)
 
-    def tell(line: str) -> None:
+    def progress(line: str) -> None:
         sys.stderr.write(f"recover: {line}\n")
 
-    farm.recover(args.job, tell)
+    farm.recover(args.job, progress)
     status = farm.status(args.job)
     _show(args, status, lambda: status_text(status))
     return 0

@@ -47,10 +47,15 @@ def add_verbs(verb: Verb) -> None:
 def _submit(args: argparse.Namespace) -> int:
     from workers.client.estimate import estimate
     from workers.client.farm_client import completed
-    from workers.house_files import entries_from_words, is_left_in_place, placed_reference, upload
+    from workers.house_files import (
+        entries_from_arguments,
+        is_left_in_place,
+        placed_reference,
+        upload,
+    )
 
     spec = _spec(args)
-    found = entries_from_words(home_arguments(args.homes, args.houses))
+    found = entries_from_arguments(home_arguments(args.homes, args.houses))
     reference = placed_reference(args.reference) if args.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
     houses = [entry for entry, _ref in found]

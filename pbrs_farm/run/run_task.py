@@ -23,6 +23,7 @@ from pbrs_farm.run.processes.task import Event, Setting, Task, task_from_line
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.store import store_from_url
 
+# Steps that start Dr.Jit, whose number of threads is fixed from then on.
 _DRJIT_STEPS = ("house", "cameras", "truth", "illuminance", "light", "develop")
 
 
@@ -53,6 +54,7 @@ def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Task) 
         view_id=task.view_id,
         layers=task.layers,
     )
+    # A step is left out when one it reads failed; view.json lists whatever there is.
     failed: set[str] = set()
     for name in task.steps:
         is_blocked = name != "view" and bool(failed.intersection(plan.STEPS[name].after))

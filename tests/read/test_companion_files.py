@@ -26,7 +26,7 @@ from tests.read.suncg.test_suncg_arch import arch_json, write_v2
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, home_xml, piece, sh3d
 from tests.read.test_reader_contract import FORMATS
 from tests.read.textured_sources import MTL, QUAD_OBJ
-from workers.house_files import entries_from_words, is_left_in_place
+from workers.house_files import entries_from_arguments, is_left_in_place
 
 PNG = picture((10, 20, 30), "PNG")
 
@@ -211,9 +211,9 @@ def test_files_that_houses_share_are_read_once(
 
 def test_a_scene_with_side_files_is_left_where_it_lies(tmp_path: Path) -> None:
     source = FORMATS["gltf"](tmp_path, PNG)
-    ((entry, ref),) = entries_from_words([source.location])
+    ((entry, ref),) = entries_from_arguments([source.location])
     assert is_left_in_place(ref)
     assert entry.sha256 == source.fingerprint != source.sha256
     (tmp_path / "picture.any").unlink()
-    ((_, alone),) = entries_from_words([source.location])
+    ((_, alone),) = entries_from_arguments([source.location])
     assert not is_left_in_place(alone)

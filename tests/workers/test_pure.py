@@ -27,7 +27,7 @@ from workers.client.farm_client import completed, new_spec
 from workers.client.text import duration_text
 from workers.config import FarmConfig, Limits
 from workers.coordinator.progress_rates import Rates, quantile_s, stage_views
-from workers.house_files import entries_from_words, is_left_in_place
+from workers.house_files import entries_from_arguments, is_left_in_place
 from workers.ids import check_job_id, job_key, queue_of, stages_of_queue, task_from_text
 from workers.job import HouseEntry
 from workers.ledger.interface import JobView
@@ -200,7 +200,7 @@ def test_a_worker_that_does_not_see_a_suncg_folder_is_itself_at_fault(tmp_path: 
     house = tmp_path / "root/house/0a1b"
     house.mkdir(parents=True)
     (house / "house.json").write_text("{}")
-    ((entry, ref),) = entries_from_words([str(house)])
+    ((entry, ref),) = entries_from_arguments([str(house)])
     assert is_left_in_place(ref)
     store = MemoryStore()
     _houses, job = completed([entry], new_spec(recipe_from_name("preview")))
@@ -217,7 +217,7 @@ def test_a_worker_that_does_not_see_a_suncg_folder_is_itself_at_fault(tmp_path: 
 
 def test_a_folder_that_is_no_house_says_what_would_be_one(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"holds no house\.json"):
-        entries_from_words([str(tmp_path)])
+        entries_from_arguments([str(tmp_path)])
     (tmp_path / "house").mkdir()
     with pytest.raises(BadInput, match="--houses LIST"):
-        entries_from_words([str(tmp_path)])
+        entries_from_arguments([str(tmp_path)])

@@ -1,7 +1,7 @@
 """What a job will cost before it runs: tasks, hours, storage; pure.
 
 The constants were measured on the example homes on two cores (docs/farm.md says when); they are
-there to tell an hour from a month, not to be right to ten per cent.
+there to distinguish an hour from a month, not to be right to ten per cent.
 """
 
 from __future__ import annotations
@@ -15,15 +15,16 @@ from workers.node.view_batches import TARGET_S
 
 # 779,342 views of 45,622 houses, the paper's own count.
 VIEWS_PER_HOUSE: Final = 17.1
-_SECONDS_PER_MEGASAMPLE: Final = 0.6
-_LABELS_S: Final = 1.0
-_HOUSE_S: Final = 60.0
+_SECONDS_PER_MEGASAMPLE: Final = 0.6  # of light
+_LABELS_S: Final = 1.0  # and OpenGL, a view
+_HOUSE_S: Final = 60.0  # repair and cameras, a house
 _BYTES_PER_PIXEL: Final = {"light": 22.0, "labels": 4.0}
 
 
 def seconds_per_view(recipe: Recipe) -> float:
     """Expected seconds of light for a view on one slot of two cores."""
     light = recipe.light
+    # Outdoor and indoor light: two samples where the recipe says one.
     is_path = light.integrator == "path"
     per_pixel = light.spp if is_path else light.direct_spp + light.mutations_per_pixel
     megasamples = 2 * per_pixel * recipe.image.width_px * recipe.image.height_px / 1e6
@@ -36,6 +37,7 @@ def estimate(spec: JobSpec, n_slots: int) -> dict[str, float | int | str]:
     n_views = round(spec.n_houses * per_house)
     per_batch = max(1.0, TARGET_S / spec.seconds_per_view)
     n_batches = spec.n_houses * math.ceil(per_house / per_batch)
+    # geometry and reduce a house, then each stage of each batch.
     n_tasks = 2 * spec.n_houses + n_batches * len(spec.batch_stages)
     has_light = "light" in spec.batch_stages
     seconds = spec.n_houses * _HOUSE_S + n_views * (

@@ -15,6 +15,7 @@ _TEXTS = {letter: name.lower() for name, letter in STATES.items()} | {
     STATES["LOADED"]: "loaded, its house not admitted yet",
     STATES["FAILED"]: "failed for good",
 }
+# What may have an obstacle.
 _WAITING = {_TEXTS[STATES[name]] for name in ("LOADED", "READY", "QUEUED")}
 
 
@@ -28,9 +29,11 @@ def explain(
     house, _, rest = text.partition("/")
     states = ledger.unit_states(view.job_id, house)
     batches = ledger.batches(view.job_id, house)
+    # The house's hash holds other fields beside its units.
     units = {u: at for u, at in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
     units = {u: at for u, at in units.items() if ":" in at}
     wanted = rest.partition("/")[0]
+    # A view names the batch that holds it.
     if states and wanted and wanted not in units:
         holding = [str(k) for k, views in enumerate(batches) if wanted in views]
         if not holding:
@@ -59,6 +62,7 @@ def _row(
     row: dict[str, Any] = {"task": task, "state": _TEXTS.get(letter, letter)}
     if unit.isdigit():
         row["views"] = list(batches[int(unit)])
+    # Ready, but only after a delay.
     if letter == STATES["READY"] and "not_before" in facts:
         row["state"] = "waits before it is tried again"
     if "claim" in facts:
@@ -76,6 +80,7 @@ def _obstacle(registry: Registry, view: JobView, task: str) -> str:
         return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
     if reason := registry.breaker():
         return f"storage is unhealthy: {reason}"
+    # Then the workers: none takes its queue, or all are leaving.
     queue = queue_of(task_from_text(task).stage, gpu=view.fields.get("gpu") == "1")
     takers = [
         w

@@ -1,4 +1,4 @@
-"""The farm from outside: submit, watch, steer. What the command line calls, in the same words.
+"""The farm from outside: submit, watch, steer. What the command line calls, by the same verbs.
 
 Effects: Redis and the store. To look at a job it imports neither numpy nor celery nor mitsuba, nor
 the recipe's models: `status` is asked often, of machines that are busy.
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Submitted:
-    """A job that is on the farm. was: its state before, "" when it is new."""
+    """A job that is on the farm."""
 
     job_id: str
     n_houses: int
-    was: str
+    was: str  # its state before, "" when it is new
 
 
 class Farm:
@@ -79,10 +79,12 @@ class Farm:
         view = self.ledger.view(spec.job_id)
         if view is not None and view.state in ("running", "paused", "done"):
             return Submitted(spec.job_id, len(houses), view.state)
+        # Cut houses fine enough for the slots there are.
         n_slots = max(self.registry.slots().values(), default=_SLOTS_UNKNOWN)
         spec = spec.model_copy(
             update={"min_batches": math.ceil(_BATCHES_PER_SLOT * n_slots / len(houses))}
         )
+        # Storage first: from here on the job can be recovered.
         claim_root(self.store, spec.recipe, update=update)
         self.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
         self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
@@ -160,7 +162,7 @@ class Farm:
     def explain(self, job: str, text: str) -> list[dict[str, Any]]:
         """What is known of a task, of all tasks of a house, or of one view (HOUSE/VIEW).
 
-        Says in words what each waits for. Raises BadInput when the job has no such house.
+        Says what each waits for. Raises BadInput when the job has no such house.
         """
         rows = explain(self.ledger, self.registry, self.view(job), text)
         return rows or self._explain_not_admitted(job, text.partition("/")[0])
@@ -168,6 +170,7 @@ class Farm:
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
         """The stored log of a task's attempt (the last one by default); BadInput when none."""
         task = task_from_text(text)
+        # One object an attempt: jobs/<id>/logs/<task>.<attempt>.txt
         prefix = log_key(job, str(task), 0).removesuffix("0.txt")
         folder = prefix.rpartition("/")[0] + "/"
         found = {
@@ -237,6 +240,7 @@ class Farm:
         from workers.coordinator.recover import rebuild
         from workers.runner import runner_maker
 
+        # A submission that was cut off leaves the state "loading": only an old one is taken over.
         was = ""
         view = self.ledger.view(spec.job_id)
         if view is not None:
@@ -246,6 +250,7 @@ class Farm:
             self.ledger.forget(spec.job_id)
         if self.ledger.create(spec) != "":
             raise BadInput(spec.job_id, "", "is being submitted by somebody else", hint=_WAIT)
+        # The runner says what the markers of a house mean; it renders nothing here.
         runner = runner_maker(self.config.runner)(self.config, lambda _reason: None)
         rebuild(self.ledger, self.store, runner, spec, houses, progress)
         self.ledger.open(spec.job_id, spec.priority)

@@ -28,8 +28,8 @@ def status_text(status: Mapping[str, Any]) -> str:
         )
     for name in ("failures", "handed_back"):
         if status[name]:
-            told = ", ".join(f"{n} {k}" for k, n in sorted(status[name].items()))
-            lines.append(f"{name.replace('_', ' ')}: {told}")
+            counts = ", ".join(f"{n} {k}" for k, n in sorted(status[name].items()))
+            lines.append(f"{name.replace('_', ' ')}: {counts}")
     lines += [f"refuses: {r['worker']}: {r['why']}" for r in status["refusing"]]
     if status["storage"] != "ok":
         lines.append(f"storage: {status['storage']}")
@@ -77,10 +77,10 @@ def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
     lines = [f"{'worker':<32}{'seen':>8}{'slots':>6}  {'version':<9}queues"]
     for row in rows:
         state = " draining" if row.get("drain") == "1" else ""
-        why = f" refuses: {row['refuses']}" if row.get("refuses") else ""
+        refusal = f" refuses: {row['refuses']}" if row.get("refuses") else ""
         lines.append(
             f"{row['worker']:<32}{duration_text(row['age_s']):>8}{row.get('slots', '?'):>6}  "
-            f"{row.get('version', '?'):<9}{row.get('queues', '')}{state}{why}"
+            f"{row.get('version', '?'):<9}{row.get('queues', '')}{state}{refusal}"
         )
     return "\n".join(lines)
 
@@ -89,6 +89,7 @@ def duration_text(seconds: float | None) -> str:
     """ "42s", "7m", "3.1h", "2.5d"; "-" when not known."""
     if seconds is None:
         return "-"
+    # Each unit up to some multiple of it: 119 s, but 2 m.
     for unit, size, limit in (("s", 1, 120), ("m", 60, 120), ("h", 3600, 48)):
         if seconds < limit * size:
             value = seconds / size

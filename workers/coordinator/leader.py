@@ -28,9 +28,10 @@ from workers.liveness import touch
 from workers.logs import log_to_stderr
 
 _log = logging.getLogger("pbrs.coordinator")
-_BUSY_PAUSE_S: Final = 0.05
-_IDLE_PAUSE_S: Final = 0.5
-_STANDBY_PAUSE_S: Final = 1.0
+_BUSY_PAUSE_S: Final = 0.05  # after a turn that sent something
+_IDLE_PAUSE_S: Final = 0.5  # at most, after one that did not: a ready task notifies
+_STANDBY_PAUSE_S: Final = 1.0  # between two tries to take the lead
+_REDIS_AWAY_S: Final = 2.0
 _REAP_EVERY_S: Final = 5.0
 _RESEND_EVERY_S: Final = 15.0
 _RATES_EVERY_S: Final = 10.0
@@ -61,8 +62,8 @@ class Coordinator:
         self._send = send
         self._clock = clock
         self._token = f"{platform.node()}:{os.getpid()}:{secrets.token_hex(4)}"
-        self._due: dict[str, float] = {}
-        self._slots: dict[str, int] = {}
+        self._due: dict[str, float] = {}  # duty -> when it is due next
+        self._slots: dict[str, int] = {}  # stage -> tasks the workers can run at once
         self._rates = Rates()
         self.leading = False
 
@@ -79,7 +80,8 @@ class Coordinator:
             except LedgerUnavailable as error:
                 _log.warning("%s; trying again", error)
                 self.leading = False
-                stop.wait(2.0)
+                stop.wait(_REDIS_AWAY_S)
+        # A standby need not wait for the lead to run out.
         try:
             self._ledger.resign(self._token)
         except LedgerUnavailable as error:
@@ -87,6 +89,7 @@ class Coordinator:
 
     def turn(self) -> int:
         """One round of duties; how many messages were sent."""
+        # A standby is alive as well.
         if self._is_due("alive", _REAP_EVERY_S):
             touch(self._config.heartbeat_file)
         leading = self._ledger.lead(self._token)
@@ -95,6 +98,7 @@ class Coordinator:
             self.leading = leading
         if not leading:
             return 0
+        # End the leases of the dead, and see who is left.
         if self._is_due("slots", _REAP_EVERY_S):
             self._slots = self._registry.slots()
             self._ledger.reap(self._token)
@@ -102,6 +106,7 @@ class Coordinator:
         if self._is_due("rates", _RATES_EVERY_S):
             for view in views:
                 self._ledger.set_rates(view.job_id, self._rates.update(view, self._clock()))
+        # While storage is unhealthy nothing is sent: it could only fail.
         if self._registry.breaker():
             return 0
         n_sent = self._dispatch(views)
@@ -112,6 +117,7 @@ class Coordinator:
     def _dispatch(self, views: list[JobView]) -> int:
         room = self._room(views)
         n_sent = 0
+        # Jobs come most urgent first and share the room on the queues.
         for view in views:
             tasks = self._ledger.dispatch(
                 view.job_id, self._token, max_open=self._max_open(), room=room
@@ -130,6 +136,7 @@ class Coordinator:
         """Stage -> messages that may be sent now, over all jobs."""
         room = {}
         for stage in STAGES:
+            # What is queued or runs; the rest of the window may be filled.
             in_flight = sum(v.counts.get(f"{stage}:{s}", 0) for v in views for s in "qr")
             wanted = self._config.window_per_slot * self._slots.get(stage, 0)
             room[stage] = max(0, int(max(self._config.window_min, wanted) - in_flight))
@@ -144,6 +151,7 @@ class Coordinator:
         n_sent = 0
         for view in views:
             for stage in STAGES:
+                # A message that waits on its queue is late, not lost.
                 queue = queue_of(stage, gpu=view.fields.get("gpu") == "1")
                 if not view.counts.get(f"{stage}:q") or self._ledger.queue_length(queue):
                     continue
@@ -180,6 +188,7 @@ def celery_sender(app: Any) -> Send:
 
     def send(messages: Iterable[tuple[str, str, str, str]]) -> None:
         try:
+            # One connection and one round trip for the whole batch of messages.
             pool = app.producer_pool
             with pool.acquire(block=True, timeout=10) as producer, producer.batch():
                 for queue, job, task, recipe in messages:

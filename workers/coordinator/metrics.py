@@ -17,6 +17,7 @@ from prometheus_client.core import (
 )
 
 from workers.config import FarmConfig
+from workers.coordinator.progress_rates import durations
 from workers.ids import QUEUES, STAGES
 from workers.ledger.interface import ALIVE_S, STATES, JobView, LedgerUnavailable
 from workers.ledger.redis_ledger import RedisLedger
@@ -108,15 +109,10 @@ def _seconds(views: list[JobView]) -> Metric:
     metric = HistogramMetricFamily("pbrs_task_seconds", "task durations", labels=["job", "stage"])
     for view in views:
         for stage in STAGES:
-            prefix = f"took:{stage}:"
-            powers = {
-                int(k.removeprefix(prefix)): n
-                for k, n in view.counts.items()
-                if k.startswith(prefix)
-            }
+            # Prometheus' buckets are cumulative, their bounds upper ends.
             buckets, total = [], 0.0
-            for power in sorted(powers):
-                total += powers[power]
+            for power, n in sorted(durations(view, stage).items()):
+                total += n
                 buckets.append((str(2.0**power), total))
             buckets.append(("+Inf", total))
             seconds = view.counts.get(f"seconds:{stage}", 0.0)

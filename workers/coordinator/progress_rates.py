@@ -7,18 +7,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from workers.ids import STAGES
+from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, STAGES
 from workers.ledger.interface import JobView
 
-_TAU_S: Final = 120.0
+_TAU_S: Final = 120.0  # of the exponential average
+_LEAST_RATE: Final = 1e-6  # tasks per second below which there is no time left to tell
 
 
 @dataclass(slots=True)
 class Rates:
     """Tasks finished per second and stage, averaged with a memory of two minutes."""
 
+    # job -> when it was looked at last, tasks done of each stage by then
     _last: dict[str, tuple[float, Mapping[str, float]]] = field(default_factory=dict)
-    _rate: dict[str, dict[str, float]] = field(default_factory=dict)
+    _rate: dict[str, dict[str, float]] = field(default_factory=dict)  # job -> stage -> 1/s
 
     def update(self, view: JobView, now_s: float) -> dict[str, float]:
         """Stage -> tasks per second, from this look at the job and the ones before."""
@@ -28,6 +30,7 @@ class Rates:
         self._last[view.job_id] = (now_s, done)
         if before is None or now_s <= before[0]:
             return dict(rates)
+        # Weigh the new rate by the share of the average's memory that has passed.
         seconds = now_s - before[0]
         keep = math.exp(-seconds / _TAU_S)
         for stage in STAGES:
@@ -39,20 +42,20 @@ class Rates:
 
 @dataclass(frozen=True, slots=True)
 class StageView:
-    """One row of `status`. total: expected, from the houses seen so far."""
+    """One row of `status`: tasks of a stage in each state, and how long they take."""
 
     stage: str
     done: int
     running: int
-    queued: int
-    waiting: int
-    failed: int
-    total: int
+    queued: int  # a message is on the queue
+    waiting: int  # everything else that is to come
+    failed: int  # for good
+    total: int  # expected, from the houses seen so far
     per_s: float
-    mean_s: float
+    mean_s: float  # of a task; so the next two
     p50_s: float
     p90_s: float
-    eta_s: float | None
+    eta_s: float | None  # None while nothing is known
 
 
 def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
@@ -63,7 +66,7 @@ def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
 
 
 def _known(view: JobView, stage: str) -> bool:
-    return stage not in ("gl", "light") or stage in view.fields.get("stages", "").split(",")
+    return stage not in (GL, LIGHT) or stage in view.fields.get("stages", "").split(",")
 
 
 def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
@@ -72,13 +75,14 @@ def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
     running, queued = int(c.get(f"{stage}:r", 0)), int(c.get(f"{stage}:q", 0))
     total = expected_total(view, stage)
     left = max(0, total - done - failed)
-    counts = _took(view, stage)
+    counts = durations(view, stage)
     p50, p90 = quantile_s(counts, 0.5), quantile_s(counts, 0.9)
     rate = view.rates.get(stage, 0.0)
+    # From the measured rate; before there is one, from the typical task and the slots.
     eta: float | None = None
     if left == 0 and (total or view.state == "done"):
         eta = 0.0
-    elif rate > 1e-6:
+    elif rate > _LEAST_RATE:
         eta = left / rate
     elif n_slots and p50:
         eta = left * p50 / n_slots
@@ -96,22 +100,24 @@ def expected_total(view: JobView, stage: str) -> int:
     0 while nothing is known. Houses that were given up have none that are still to come.
     """
     n_houses = int(view.fields.get("n_houses", 0))
-    if stage == "job":
+    if stage == JOB:
         return 1
-    if stage == "shard":
+    if stage == SHARD:
         return max(1, math.ceil(n_houses / int(view.fields.get("shard_size", 500))))
-    if stage == "geometry":
+    if stage == GEOMETRY:
         return n_houses
     n_given_up = int(view.counts.get("houses:quarantined", 0))
-    if stage == "reduce":
+    if stage == REDUCE:
         return n_houses - n_given_up
+    # Batches of the houses read so far, and as many a house for those still unread.
     opened = view.counts.get("done:geometry", 0)
     batches = view.counts.get("batches", 0)
     unread = view.counts.get("geometry:f", 0) + view.counts.get("geometry:x", 0)
     return int(batches + (n_houses - opened - unread) * (batches / opened if opened else 0))
 
 
-def _took(view: JobView, stage: str) -> dict[int, float]:
+def durations(view: JobView, stage: str) -> dict[int, float]:
+    """Histogram of a stage's task durations: k -> tasks that took 2^(k-1) to 2^k seconds."""
     prefix = f"took:{stage}:"
     return {
         int(name.removeprefix(prefix)): n

@@ -20,8 +20,8 @@ from workers.ledger.interface import HouseState
 from workers.ledger.redis_ledger import RedisLedger
 from workers.runner import StepRunner
 
-_THREADS: Final = 16
-_CHUNK: Final = 1000
+_THREADS: Final = 16  # storage answers slowly but many at once
+_CHUNK: Final = 1000  # houses in memory at a time
 
 
 def rebuild(
@@ -32,7 +32,7 @@ def rebuild(
     houses: list[HouseEntry],
     progress: Callable[[str], None] = lambda _line: None,
 ) -> None:
-    """Enter every house of the job as its markers tell it. The job must have just been created."""
+    """Enter every house of the job as far as its markers say. The job must have just been created."""
     done = done_steps(store) if houses else {}
     progress(f"{sum(map(len, done.values()))} markers of {len(done)} houses")
     numbered = iter(enumerate(houses))
@@ -64,6 +64,7 @@ def _state(
     survey = runner.survey(spec, house.house_id, names) if names else None
     if survey is None or survey.batches is None:
         return None
+    # Each batch stands at its first stage that is not done, the house where its batches allow.
     units: dict[str, tuple[str, str]] = {}
     for unit, stage in survey.missing.items():
         units[unit] = (stage, "l") if stage else (spec.batch_stages[-1], "d")

@@ -49,25 +49,25 @@ class LedgerUnavailable(PbrsError, Transient):
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The answer to a claim. detail: the attempt's number for "run", otherwise why not."""
+    """The answer to a claim."""
 
     verdict: Verdict
-    detail: str = ""
-    inputs: str = ""
-    token: str = ""
+    detail: str = ""  # the attempt's number for "run", otherwise the reason
+    inputs: str = ""  # the house's source for geometry, its batches of views for what follows
+    token: str = ""  # fences off whoever lost the lease
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A task that ended badly, as the ledger keeps it. log: key of the log object, or ""."""
+    """A task that ended badly, as the ledger keeps it."""
 
     fault: FaultClass
-    fingerprint: str
-    message: str
+    fingerprint: str  # equal for faults alike
+    message: str  # for people
     worker: str = ""
     attempt: int = 0
-    log: str = ""
-    tail: str = ""
+    log: str = ""  # key of the log object, or ""
+    tail: str = ""  # the end of the log
 
     def json(self) -> str:
         """The fault as fault_from_json reads it."""
@@ -75,39 +75,40 @@ class Fault:
 
 
 def fault_from_json(text: str) -> Fault:
-    """The fault a JSON object tells of; names it does not know are left out."""
+    """The fault that JSON text holds; names it does not know are left out."""
     known = {f.name for f in fields(Fault)}
     return Fault(**{name: value for name, value in json.loads(text).items() if name in known})
 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """How a task ended well. batches: of views, only after geometry."""
+    """How a task ended well."""
 
     seconds: float
-    batches: tuple[tuple[str, ...], ...] = ()
+    batches: tuple[tuple[str, ...], ...] = ()  # of views, only after geometry
     n_views: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class HouseState:
-    """A house as storage tells it. units: unit -> (stage, "d" done | "l" to be run)."""
+    """A house as storage has it."""
 
-    index: int
+    index: int  # in the job's order
     house_id: str
     done: bool
     batches: tuple[tuple[str, ...], ...] = ()
+    # unit -> (stage, letter: "d" done, "l" to be run)
     units: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class JobView:
-    """A job as the ledger sees it now, from O(1) reads. counts: "gl:q", "done:gl", "houses:open"."""
+    """A job as the ledger sees it now, from O(1) reads."""
 
     job_id: str
-    fields: Mapping[str, str]
-    counts: Mapping[str, float]
-    rates: Mapping[str, float]
+    fields: Mapping[str, str]  # what it was entered with, its state and the reason for it
+    counts: Mapping[str, float]  # "gl:q", "done:gl", "houses:open", ...
+    rates: Mapping[str, float]  # stage -> tasks per second
     n_waiting_houses: int
 
     @property
@@ -118,22 +119,24 @@ class JobView:
 
 @dataclass(frozen=True, slots=True)
 class WorkerView:
-    """A worker as it registered itself. age_s: since its last sign of life."""
+    """A worker as it registered itself."""
 
     name: str
-    age_s: float
+    age_s: float  # since its last heartbeat
     fields: Mapping[str, str]
 
 
 class Ledger(Protocol):
     """Every method is atomic and may be called again after a lost answer."""
 
+    # The job: submit and recover
     def create(self, spec: JobSpec) -> str: ...
     def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None: ...
     def load_houses(self, job: str, houses: Iterable[HouseState]) -> int: ...
     def open(self, job: str, priority: int) -> None: ...
     def forget(self, job: str) -> None: ...
 
+    # One task: slots
     def claim(
         self, job: str, task: str, *, token: str, recipe: str, direct: bool = False
     ) -> Claim: ...
@@ -141,6 +144,7 @@ class Ledger(Protocol):
     def finish(self, job: str, task: str, token: str, end: Finished, *, sticky: bool) -> str: ...
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str: ...
 
+    # What the coordinator does; only the leader's token moves anything
     def lead(self, token: str) -> bool: ...
     def resign(self, token: str) -> None: ...
     def reap(self, token: str) -> int: ...
@@ -150,6 +154,7 @@ class Ledger(Protocol):
     def wait(self, seconds: float) -> None: ...
     def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None: ...
 
+    # Steering and reading
     def steer(self, job: str, what: str, reason: str = "") -> str: ...
     def retry(self, job: str, task: str) -> bool: ...
     def view(self, job: str) -> JobView | None: ...

@@ -41,8 +41,10 @@ _SCRIPTS: Final = (
     "claim", "heartbeat", "finish", "fail", "reap", "dispatch", "resend", "create", "load",
     "retry", "steer", "lead",
 )  # fmt: skip
-_CHUNK: Final = 1000
+_CHUNK: Final = 1000  # keys or houses in one round trip
 _LEAD_S: Final = 15
+_REAP_MOST: Final = 200  # in one script, which nobody else can interrupt
+_RESEND_MOST: Final = 500
 
 
 def redis_client(config: FarmConfig) -> Any:
@@ -51,6 +53,7 @@ def redis_client(config: FarmConfig) -> Any:
     Typed Any: redis-py types every answer as str, bytes, None or an awaitable.
     """
     url = config.redis_url.reveal()
+    # TLS with a checked certificate, or none at all.
     options: dict[str, Any] = {}
     if url.startswith("rediss:"):
         options["ssl_cert_reqs"] = "required"
@@ -59,7 +62,7 @@ def redis_client(config: FarmConfig) -> Any:
     return redis.Redis.from_url(
         url,
         decode_responses=True,
-        socket_timeout=30,
+        socket_timeout=30,  # above the longest blocking read
         socket_connect_timeout=5,
         socket_keepalive=True,
         health_check_interval=25,
@@ -71,7 +74,7 @@ def redis_client(config: FarmConfig) -> Any:
 
 
 def lua_constants() -> str:
-    """What Lua and Python must agree on, as Lua: told by Python, so that it stands once."""
+    """What Lua and Python must agree on, as the first lines of every script."""
     lines = [f"local {name} = '{letter}'" for name, letter in STATES.items()]
     lines += [f"local {name.upper()}_STAGE = '{name}'" for name in STAGES]
     lines += [f"local STAGES = {{ {', '.join(f'{s!r}' for s in STAGES)} }}"]
@@ -104,6 +107,7 @@ class RedisLedger:
 
     def create(self, spec: JobSpec) -> str:
         """Make the job unless it exists; its state before, "" when it was made now."""
+        # What scripts read of the job; the rest of the spec stays in storage.
         rules = spec.rules
         fields: dict[str, object] = {
             "version": spec.version,
@@ -137,7 +141,8 @@ class RedisLedger:
                 pipe.execute()
 
     def load_houses(self, job: str, houses: Iterable[HouseState]) -> int:
-        """Enter houses as storage tells them, in the job's order; how many were new."""
+        """Enter houses as storage has them, in the job's order; how many were new."""
+        # Many calls in one round trip; each script is one house, and atomic.
         n_new = 0
         script, keys = self._scripts["load"], self._keys(job)
         with self.errors():
@@ -167,6 +172,7 @@ class RedisLedger:
         with self.errors():
             self.client.zrem(f"{self._g}jobs", job)
             self.client.zrem(f"{self._g}known", job)
+            # The farm's leases of this job, then every key of its own.
             for name in LEASES:
                 key = f"{self._g}lease:{name}"
                 members = self.client.zscan_iter(key, match=f"{job}|*")
@@ -230,7 +236,7 @@ class RedisLedger:
 
     def reap(self, token: str) -> int:
         """End leases that ran out; how many, -1 when not leading."""
-        return int(self._run("reap", "", token, 200, *LEASES))
+        return int(self._run("reap", "", token, _REAP_MOST, *LEASES))
 
     def dispatch(
         self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
@@ -241,7 +247,7 @@ class RedisLedger:
 
     def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None:
         """Tasks whose message was sent age_s ago and never claimed; None: not leading."""
-        return _tasks(self._run("resend", job, token, stage, age_s, 500))
+        return _tasks(self._run("resend", job, token, stage, age_s, _RESEND_MOST))
 
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
         """Keep stage -> tasks per second for whoever asks."""

@@ -13,7 +13,7 @@ from workers.ids import QUEUES, stages_of_queue
 from workers.ledger.interface import ALIVE_S, WorkerView
 from workers.ledger.redis_ledger import RedisLedger
 
-_GONE_S = 3600.0
+_GONE_S = 3600.0  # a worker not seen for so long is forgotten
 
 
 class Registry:
@@ -28,6 +28,7 @@ class Registry:
         config, client = self._ledger.config, self._ledger.client
         key = f"{self._g}worker:{config.worker}"
         with self._ledger.errors():
+            # One round trip: be seen, as a worker and for each stage; then read the order to leave.
             now = self._ledger.now()
             pipe = client.pipeline(transaction=False)
             pipe.zadd(f"{self._g}workers", {config.worker: now})

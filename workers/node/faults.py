@@ -16,12 +16,14 @@ from pbrs_farm.core.errors import (
 )
 from workers.ledger.interface import FaultClass
 
+# Hex addresses, digests and ids, then any number.
 _NUMBERS: Final = re.compile(r"0x[0-9a-f]+|[0-9a-f]{8,}|\d+(\.\d+)?")
 _PATHS: Final = re.compile(r"(/[\w.\-+]+)+/?")
 
 
 def class_of(error: BaseException) -> FaultClass:
     """data: the input's fault, no other try. storage: nobody's, not counted. Else: try again."""
+    # From the outermost: what is nobody's fault, the input's, the machine's, ours.
     if isinstance(error, StoreRefused | Transient):
         return "storage"
     if isinstance(error, BadInput | BadRecipe):
@@ -35,6 +37,7 @@ def class_of(error: BaseException) -> FaultClass:
 
 def fingerprint(error: BaseException) -> str:
     """Equal for faults alike: type, place in our code, and the message without its numbers."""
+    # The innermost frame in our own code; library frames differ by version.
     place = ""
     for frame in traceback.extract_tb(error.__traceback__):
         if "pbrs_farm" in frame.filename or "workers" in frame.filename:
@@ -48,7 +51,7 @@ def without_numbers(text: str) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """What to tell a person."""
+    """The error as a line for people, at most 500 characters."""
     text = " ".join(str(error).split()) or "no message"
     name = "" if isinstance(error, BadInput | StoreFailed) else f"{type(error).__name__}: "
     return f"{name}{text}"[:500]

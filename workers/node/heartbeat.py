@@ -16,7 +16,7 @@ from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
 
 _log = logging.getLogger("pbrs.worker")
-_EVERY_S: Final = 10.0
+_EVERY_S: Final = 10.0  # well below ALIVE_S, so that one lost heartbeat hurts nobody
 
 
 class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
@@ -48,6 +48,7 @@ class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
         try:
             if self._registry.heartbeat():
                 _log.info("drained: finishing what runs, then leaving")
+                # Celery's warm shutdown: no more messages, what runs ends.
                 state.should_stop = os.EX_OK
         except LedgerUnavailable as error:
             _log.warning("%s", error)

@@ -33,8 +33,8 @@ from workers.node.merge_manifests import merge_job, merge_shard
 from workers.node.view_batches import batches_from_views
 from workers.runner import OnText, Request, Result, Survey
 
-_HOUSE_STEPS: Final = ("house", "cameras")
-_LIGHT_STEPS: Final = ("light", "develop")
+_HOUSE_STEPS: Final = ("house", "cameras")  # of the stage geometry
+_LIGHT_STEPS: Final = ("light", "develop")  # of the stage light
 
 
 def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
@@ -80,6 +80,7 @@ class HouseRunner:
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
         """What the markers' names say of a house: see workers.runner.Survey."""
+        # Without its cameras nobody knows the views of the house.
         if not done.issuperset(_HOUSE_STEPS):
             return Survey()
         batches = self._batches(spec, house)
@@ -122,6 +123,7 @@ class HouseRunner:
         )
 
     def _batches(self, spec: JobSpec, house: str) -> tuple[tuple[str, ...], ...]:
+        # The cameras step's marker lists the views: id, room, score.
         marker = read_marker(self._store, keys.marker_key(house, "cameras"))
         if marker is None:
             return ()
@@ -158,6 +160,7 @@ class HouseRunner:
         """The house's source; when it is kept in the store, on scratch under its own name."""
         source = SourceRef.model_validate_json(text)
         if not source.location.startswith(FOLDER):
+            # Not uploaded: this worker sees it at the path it was submitted by, or cannot do it.
             if is_left_in_place(source) and not Path(source.location).exists():
                 raise MachineFailed(
                     f"this worker does not see {source.location}",
@@ -165,6 +168,7 @@ class HouseRunner:
                 )
             return source
         name = source.location.rpartition("/")[2]
+        # Uploaded: write it under its own name, which readers go by.
         data = self._store.get(source.location)
         if keys.sha256(data) != source.sha256:
             raise BadHouse(source.location, "", "not the file that was submitted")

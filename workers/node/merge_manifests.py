@@ -53,13 +53,14 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
     own = set(houses)
     missing: list[str] = []
     n_objects = 0
+    # Merge two streams that are sorted by house: nothing but a shard's rows is held.
     with TemporaryFile() as file:
         for house, part in _merged(store, own, _new_rows(store, spec, houses, on_step)):
             if part is None:
                 missing.append(house)
             else:
                 file.write(part)
-                n_objects += part.count(b"\n") if house in own else 0
+                n_objects += part.count(b"\n") if house in own else 0  # a row an object
         _put_file(store, keys.MANIFEST, file)
     report: dict[str, Any] = {
         "job": spec.job_id,
@@ -97,6 +98,7 @@ def _new_rows(
     for first in range(0, len(houses), size):
         on_step(f"merge shard {first // size}")
         members = houses[first : first + size]
+        # A house that was finished after its shard was merged has its own manifest.
         merged = _get(store, shard_key(spec.job_id, first // size))
         found = dict(lines_by_house(merged)) if merged is not None else {}
         for house in members:

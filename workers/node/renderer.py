@@ -19,6 +19,7 @@ HANDLER = f"{__name__}:make_handler"
 def make_handler(send: Send) -> Handler:
     """The handler of the runner that this machine's configuration names."""
 
+    # The supervisor of this process stops its clocks, the slot opens the breaker.
     def on_waiting(reason: str) -> None:
         send(Message("waiting", reason))
 

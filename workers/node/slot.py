@@ -40,13 +40,15 @@ from workers.runner import Request, Result
 
 T = TypeVar("T")
 _log = logging.getLogger("pbrs.slot")
-# Ends that say nothing of the task: no log of them is stored.
+# Classes that say nothing of the task: no log of them is stored.
 _NO_LOG: Final = {*UNCOUNTED, "cancelled", "lost"}
+# Refusals that another worker may not meet: wait, so that it comes first.
 _WAIT_AFTER_REFUSAL: Final = {"version", "recipe", "draining", "blocked", "elsewhere"}
 _POLL_S: Final = 1.0
-_LOG_EVERY_S: Final = 60.0
-_RETRY_S: Final = 600.0
-_TAIL_IN_FAULT: Final = 2000
+_LOG_EVERY_S: Final = 60.0  # a long task's log is stored so often
+_RETRY_S: Final = 600.0  # how long Redis may be away
+_TAIL_IN_FAULT: Final = 2000  # bytes of the log that the ledger keeps
+_LOG_STORE_S: Final = 5.0  # how long a log waits for storage
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +134,7 @@ class Slot:
             self._failed(held, ended)
             return None
         result = Result.model_validate(ended.body)
+        # A task of seconds gains nothing from the scene another one of its house has loaded.
         sticky = ended.seconds >= self._config.sticky_s and not self._is_preempted()
         end = Finished(ended.seconds, result.batches, result.n_views or len(request.views))
         more = self._retry(
@@ -184,6 +187,7 @@ class Slot:
             self._put(fault.log, self._process.log_tail())
         if fault.fault == "storage":
             self._open_breaker(ended.text)
+        # Later and later, and not all at once.
         delay_s = 0.0
         if fault.fault != "preempted":
             delay_s = self._config.retry_delay_s * held.attempt * random.uniform(0.7, 1.3)
@@ -194,6 +198,7 @@ class Slot:
         _log.warning(
             "%s attempt %d: %s (%s): %s", task, held.attempt, fault.fault, verdict, fault.message
         )
+        # A task that failed for good leaves a record that outlives Redis.
         if verdict == "failed":
             self._put(failed_key(held.job, task), fault.json())
 
@@ -251,8 +256,8 @@ class Slot:
         try:
             if self._store is None:
                 settings = self._config.store
-                hasty = replace(settings, s3=replace(settings.s3, retry_timeout_s=5.0))
-                self._store = store_from_url(self._config.store_url, hasty)
+                settings = replace(settings, s3=replace(settings.s3, retry_timeout_s=_LOG_STORE_S))
+                self._store = store_from_url(self._config.store_url, settings)
             self._store.put(key, text.encode())
         except (StoreFailed, PbrsError) as error:
             _log.warning("not stored: %s", error)

@@ -1,7 +1,7 @@
 """A worker's outermost process (PID 1 in a container): starts Celery, and leaves in good order.
 
 Effects: starts and ends processes; files on scratch. TERM: take no more, finish what runs; when
-the grace is nearly over, hand it back to the ledger, uncounted. INT, QUIT: hand back at once.
+the grace is nearly over, give it back to the ledger, uncounted. INT, QUIT: give it back at once.
 """
 
 from __future__ import annotations
@@ -30,23 +30,25 @@ from workers.liveness import touch
 from workers.logs import log_to_stderr
 
 _log = logging.getLogger("pbrs.supervisor")
-_PREEMPT_S: Final = 20.0
+_PREEMPT_S: Final = 20.0  # what giving everything back may take
+_POLL_S: Final = 0.2
 # On scratch when a signal made the worker leave: deploy/slurm/worker.sbatch asks for it.
 PREEMPTED_NOTE: Final = "preempted"
 
 
 @dataclass(slots=True)
 class _Orders:
-    """What signals asked for. leave_at: when TERM came."""
+    """What signals asked for."""
 
-    leave_at: float | None = None
-    was_told: bool = False
-    at_once: bool = False
-    told: set[str] = field(default_factory=set)
+    leave_at: float | None = None  # when leaving began
+    was_signalled: bool = False  # it leaves because of a signal, not because its time is over
+    at_once: bool = False  # without finishing what runs
+    done: set[str] = field(default_factory=set)  # what was done already on the way out
 
     def on_signal(self, number: int, _frame: FrameType | None) -> None:
-        self.was_told = True
+        self.was_signalled = True
         self.leave_at = self.leave_at or time.monotonic()
+        # Ctrl-C in a terminal, or a second signal of a scheduler that is in a hurry.
         self.at_once = self.at_once or number in (signal.SIGINT, signal.SIGQUIT)
 
 
@@ -77,6 +79,7 @@ def sweep(config: FarmConfig) -> None:
     """Remove what an earlier life of this worker left on scratch."""
     config.preemption_file.unlink(missing_ok=True)
     config.heartbeat_file.unlink(missing_ok=True)
+    # Logs of pool processes that are gone; "pbrs-<worker>-<pid>".
     for folder in config.scratch.glob(f"pbrs-{config.worker}-*"):
         pid = folder.name.rpartition("-")[2]
         if pid.isdigit() and not Path(f"/proc/{pid}").exists():
@@ -84,7 +87,7 @@ def sweep(config: FarmConfig) -> None:
 
 
 def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
-    """Run a worker until it is told to leave; Celery's exit status.
+    """Run a worker until a signal asks it to leave; Celery's exit status.
 
     until_s: leave by itself after so many seconds, the grace before them (Slurm's wall time).
     """
@@ -100,37 +103,40 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
             return code
         if until_s is not None and time.monotonic() - began > until_s - config.grace_s:
             orders.leave_at = orders.leave_at or time.monotonic()
-        if orders.was_told:
+        # A Slurm job that was preempted puts itself back into the queue, one that is over does not.
+        if orders.was_signalled:
             touch(config.scratch / PREEMPTED_NOTE)
         if orders.leave_at is not None:
             _leave(config, celery, orders, time.monotonic() - orders.leave_at)
-        time.sleep(0.2)
+        time.sleep(_POLL_S)
 
 
 def _leave(
     config: FarmConfig, celery: subprocess.Popen[bytes], orders: _Orders, since_s: float
 ) -> None:
     """The next thing to do on the way out, each once."""
+    # Name, seconds after leaving began, what to do.
     steps: list[tuple[str, float, Callable[[], None]]] = [
         ("finish what runs", 0.0, lambda: celery.send_signal(signal.SIGTERM)),
         (
-            "hand back what runs",
+            "give back what runs",
             0.0 if orders.at_once else max(0.0, config.grace_s - _PREEMPT_S),
             lambda: touch(config.preemption_file),
         ),
         ("kill", config.grace_s if not orders.at_once else _PREEMPT_S, celery.kill),
     ]
     for name, after_s, act in steps:
-        if since_s >= after_s and name not in orders.told:
-            orders.told.add(name)
+        if since_s >= after_s and name not in orders.done:
+            orders.done.add(name)
             _log.info("leaving: %s", name)
             act()
 
 
 def _reap(celery: subprocess.Popen[bytes]) -> int | None:
-    """Celery's exit status once it has ended; as PID 1, also buries orphans."""
+    """Celery's exit status once it has ended; as PID 1, also reaps orphans."""
     if os.getpid() != 1:
         return celery.poll()
+    # Whatever a killed pool process leaves behind becomes a child of process 1.
     with contextlib.suppress(ChildProcessError):
         while True:
             pid, status = os.waitpid(-1, os.WNOHANG)
@@ -141,11 +147,11 @@ def _reap(celery: subprocess.Popen[bytes]) -> int | None:
     return celery.returncode
 
 
-def main(words: list[str] | None = None) -> int:
-    """`python -m workers.node.supervisor [--until SECONDS]`: a worker, until told to leave."""
+def main(arguments: list[str] | None = None) -> int:
+    """`python -m workers.node.supervisor [--until SECONDS]`: a worker, until a signal asks it to leave."""
     parser = argparse.ArgumentParser(prog="workers.node.supervisor", description=main.__doc__)
     parser.add_argument("--until", type=float, default=None, metavar="SECONDS")
-    args = parser.parse_args(words)
+    args = parser.parse_args(arguments)
     log_to_stderr()
     try:
         config = config_from_environment()

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-TARGET_S: Final = 120.0
-MAX_S: Final = 300.0
+TARGET_S: Final = 120.0  # work in a batch: above the cost of a task, below what is lost with it
+MAX_S: Final = 300.0  # work in a batch of one room, whose views share what is loaded
 
 
 def batches_from_views(
@@ -20,9 +20,11 @@ def batches_from_views(
     """
     per_batch = max(1, round(TARGET_S / seconds_per_view))
     most = max(1, math.floor(MAX_S / seconds_per_view))
+    # A job of few houses is cut finer, or slots would stand idle.
     if min_batches > 1:
         per_batch = min(per_batch, math.ceil(len(views) / min_batches)) or 1
         most = min(most, per_batch)
+    # Fill batches room by room: a small room joins the one before it while there is room.
     batches: list[list[str]] = []
     for room_views in _rooms(views):
         for part in _parts(room_views, most, per_batch):

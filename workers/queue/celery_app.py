@@ -22,9 +22,9 @@ from pbrs_farm.store.s3 import forbid_in_this_process
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES
 
-MAX_MESSAGE: Final = 2048
-_VISIBILITY_S: Final = 6 * 3600
-_TASK_LIMIT_S: Final = 5 * 3600
+MAX_MESSAGE: Final = 2048  # bytes
+_VISIBILITY_S: Final = 6 * 3600  # a message unacknowledged for so long is delivered again
+_TASK_LIMIT_S: Final = 5 * 3600  # above every deadline of a task, below the visibility
 
 
 def _encode(value: Any) -> str:
@@ -37,59 +37,65 @@ def _decode(data: str | bytes) -> Any:
     return json.loads(data)
 
 
+# The only content type that is decoded: JSON of bounded size, never a pickle.
 register(
     "pbrs-json", _encode, _decode, content_type="application/x-pbrs-json", content_encoding="utf-8"
 )
 
 
+# Why each stands as it does: docs/farm.md.
+_SETTINGS: Final[dict[str, Any]] = {
+    "accept_content": ["pbrs-json"],
+    "task_serializer": "pbrs-json",
+    # Messages go to queues by name; nothing is declared when they are sent.
+    "task_queues": [Queue(name, Exchange(name), routing_key=name) for name in QUEUES],
+    "task_default_queue": QUEUES[0],
+    "task_create_missing_queues": False,
+    # No results: the ledger knows what became of a task.
+    "task_ignore_result": True,
+    "task_store_errors_even_if_ignored": False,
+    # A message is acknowledged after its task: a killed worker's comes back.
+    "task_acks_late": True,
+    "task_reject_on_worker_lost": True,
+    "task_acks_on_failure": True,
+    "task_acks_on_timeout": True,
+    "worker_prefetch_multiplier": 1,
+    # The last resort only: the slot gives each task a shorter deadline.
+    "task_time_limit": _TASK_LIMIT_S,
+    "worker_send_task_events": False,
+    "worker_enable_remote_control": False,
+    "worker_hijack_root_logger": False,
+    # A broker that comes back finds the workers still there.
+    "worker_cancel_long_running_tasks_on_connection_loss": False,
+    "broker_transport": "workers.queue.redis_transport:Transport",
+    "broker_connection_retry_on_startup": True,
+    "broker_connection_max_retries": None,
+    "visibility_timeout": _VISIBILITY_S,
+}
+_TRANSPORT: Final[dict[str, Any]] = {
+    "visibility_timeout": _VISIBILITY_S,
+    "unacked_restore_interval": 10,
+    "unacked_restore_throttle": 1,
+    "socket_timeout": 30,
+    "socket_connect_timeout": 5,
+    "socket_keepalive": True,
+    "health_check_interval": 25,
+    "sep": ":",
+    "client_name": "pbrs-celery",
+}
+
+
 def make_app(config: FarmConfig) -> Celery:
     """A Celery application for this farm."""
-    url = config.redis_url.reveal()
-    app = Celery("pbrs_farm", broker=url, include=["workers.queue.task"], set_as_current=False)
-    app.conf.update(
-        accept_content=["pbrs-json"],
-        task_serializer="pbrs-json",
-        task_queues=[Queue(name, Exchange(name), routing_key=name) for name in QUEUES],
-        task_default_queue=QUEUES[0],
-        task_create_missing_queues=False,
-        task_ignore_result=True,
-        task_store_errors_even_if_ignored=False,
-        # A message is acknowledged after its task: a killed worker's comes back.
-        task_acks_late=True,
-        task_reject_on_worker_lost=True,
-        task_acks_on_failure=True,
-        task_acks_on_timeout=True,
-        worker_prefetch_multiplier=1,
-        # The last resort only: the slot gives each task a shorter deadline.
-        task_time_limit=_TASK_LIMIT_S,
-        worker_send_task_events=False,
-        worker_enable_remote_control=False,
-        worker_hijack_root_logger=False,
-        worker_cancel_long_running_tasks_on_connection_loss=False,
-        broker_transport="workers.queue.redis_transport:Transport",
-        broker_connection_retry_on_startup=True,
-        broker_connection_max_retries=None,
-        visibility_timeout=_VISIBILITY_S,
-        broker_transport_options={
-            "visibility_timeout": _VISIBILITY_S,
-            "unacked_restore_interval": 10,
-            "unacked_restore_throttle": 1,
-            "socket_timeout": 30,
-            "socket_connect_timeout": 5,
-            "socket_keepalive": True,
-            "health_check_interval": 25,
-            "sep": ":",
-            "global_keyprefix": config.prefix,
-            "client_name": "pbrs-celery",
-        },
-    )
-    if url.startswith("rediss:"):
-        tls: dict[str, Any] = {"ssl_cert_reqs": ssl.CERT_REQUIRED}
-        app.conf.broker_use_ssl = tls | (
-            {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
-        )
     from workers.node.heartbeat import Heartbeat
 
+    url = config.redis_url.reveal()
+    app = Celery("pbrs_farm", broker=url, include=["workers.queue.task"], set_as_current=False)
+    app.conf.update(_SETTINGS)
+    app.conf.broker_transport_options = _TRANSPORT | {"global_keyprefix": config.prefix}
+    if url.startswith("rediss:"):
+        ca = {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
+        app.conf.broker_use_ssl = {"ssl_cert_reqs": ssl.CERT_REQUIRED, **ca}
     app.steps["worker"].add(Heartbeat)
     return app
 

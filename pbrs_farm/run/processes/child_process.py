@@ -19,7 +19,7 @@ from typing import Final, Protocol
 from pbrs_farm.run.processes.limits import resident_mb
 
 _PR_SET_PDEATHSIG: Final = 1
-_CLOSE_S: Final = 10.0
+_CLOSE_S: Final = 10.0  # what freeing GL and Mitsuba may take
 # The child sees the modules its parent sees, wherever it was started.
 _BOOT: Final = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
@@ -48,10 +48,11 @@ class ChildProcess:
     def __init__(self, target: str, log: Path) -> None:
         self._log = log
         self._buffer = b""
-        words = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
+        # A session of its own: Ctrl-C does not reach it, and its children die with it.
+        command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
         with log.open("ab") as file:
             self._process = subprocess.Popen(
-                words,
+                command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=file,
@@ -62,7 +63,7 @@ class ChildProcess:
         self._requests, self._replies = self._process.stdin, self._process.stdout
 
     def send(self, line: bytes) -> None:
-        """Put a line into its pipe; nothing when it is dead, which exit_code tells."""
+        """Put a line into its pipe; nothing when it is dead, as exit_code then says."""
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             self._requests.write(line + b"\n")
             self._requests.flush()

@@ -71,6 +71,8 @@ class Pool:
 
     def give(self, task: Task) -> None:
         """Hand a task to an idle process, one that holds its house if there is one."""
+        # Loading a house costs more than the views of a room: prefer the process that has it, then
+        # a fresh process, then any.
         idle = [w for w in self._workers if w.task is None]
         idle.sort(key=lambda w: w.held_house != task.house_id)
         holds = bool(idle) and idle[0].held_house == task.house_id
@@ -92,7 +94,7 @@ class Pool:
                 if isinstance(heard, Ended):
                     yield from self._ended(worker, worker.task, heard)
                 else:
-                    yield from _told(worker, worker.task, heard)
+                    yield from _events_in(worker, worker.task, heard)
 
     def _begin(self, worker: _Worker, task: Task) -> None:
         worker.task, worker.step, worker.done = task, task.steps[0], []
@@ -105,6 +107,7 @@ class Pool:
         if not ended.cause:
             yield Event(**ended.body)
             return
+        # What native libraries printed last says more than the signal.
         lines = last_lines(worker.process.log_tail())
         reason = f"{ended.text}: {lines}" if lines else ended.text
         yield Event("failed", task.house_id, task.view_id, worker.step, message=reason)
@@ -115,8 +118,8 @@ class Pool:
             yield Event("end", task.house_id, task.view_id, "")
 
 
-def _told(worker: _Worker, task: Task, message: Message) -> Iterator[Event]:
-    """The event that a message of a running task tells of; none when it is only ready."""
+def _events_in(worker: _Worker, task: Task, message: Message) -> Iterator[Event]:
+    """The event in a message of a running task; none when it is only ready."""
     if message.kind == "step":
         worker.step = message.text
         yield Event("begin", task.house_id, task.view_id, message.text)

@@ -27,7 +27,7 @@ class Ended:
 
     cause: "" when it was done; "reported" when the process itself says what went wrong; "crash" when
     it died; "resource" when it held too much memory or was killed from outside; "machine" when it did
-    not start; "timeout", "silent" for a limit of time; else what kill() was told.
+    not start; "timeout", "silent" for a limit of time; else the cause given to kill().
     """
 
     seconds: float

@@ -29,17 +29,14 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What the tasks of one run have in common. debug: tracebacks travel with failures.
-
-    runner: "module:function" that does a step as steps.run_step does (tests put their own).
-    """
+    """What the tasks of one run have in common."""
 
     store_url: str
     recipe: Recipe
     n_threads: int
-    debug: bool = False
+    debug: bool = False  # tracebacks travel with failures
     store: StoreSettings = field(default_factory=StoreSettings)
-    runner: str = "pbrs_farm.run.steps:run_step"
+    runner: str = "pbrs_farm.run.steps:run_step"  # does a step; tests put their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +44,6 @@ class Event:
     """Something that happened to a step.
 
     kind: "begin", "done" (made now), "kept" (was there already), "failed", or "end" of a task.
-    facts: of the step's marker. peak_mb: largest resident memory of the process so far.
     """
 
     kind: Literal["begin", "done", "kept", "failed", "end"]
@@ -56,11 +52,12 @@ class Event:
     step: str
     seconds: float = 0.0
     message: str = ""
-    facts: dict[str, Any] = field(default_factory=dict)
-    peak_mb: float = 0.0
+    facts: dict[str, Any] = field(default_factory=dict)  # of the step's marker
+    peak_mb: float = 0.0  # largest resident memory of the process so far
 
 
 _TASK = TypeAdapter(Task)
+# What str() would blot out: revealed for the pipe to our own child, never for a file.
 _SECRETS = ("secret_key", "session_token")
 
 

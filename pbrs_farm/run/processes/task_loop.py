@@ -32,11 +32,12 @@ def main(target: str) -> int:
     module, _, function = target.partition(":")
     try:
         handle = getattr(import_module(module), function)(send)
-    except Exception as error:  # noqa: BLE001 - the parent is told why
+    except Exception as error:  # noqa: BLE001 - the parent learns why
         traceback.print_exc()
         send(Message("fault", f"{type(error).__name__}: {error}"))
         return 1
     send(Message("ready"))
+    # Ends when the parent closes the pipe.
     for line in requests:
         send(handle(line))
     return 0
