@@ -12,7 +12,7 @@ import os
 import shutil
 import tempfile
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Final
@@ -90,6 +90,13 @@ def main(parts: Sequence[str] = ()) -> None:
         print(f"{len(chosen)} inputs; the sound home alone takes {done.seconds:.1f} s")
         with ThreadPoolExecutor(N_PROCESSES) as pool:
             verdicts = list(pool.map(lambda case: _judged(case, work, sound, stored), chosen))
+        # Try slow ones again, one at a time: a busy machine makes anything slow.
+        for k, verdict in enumerate(verdicts):
+            if "over_20_s" in verdict.what:
+                again = _judged(verdict.case, work, sound, stored)
+                verdicts[k] = min(verdict, again, key=lambda v: v.seconds)
+                if "over_20_s" in verdicts[k].what:
+                    _tell(verdicts[k], ("over_20_s",))
     _write(verdicts, done.seconds)
 
 
@@ -119,9 +126,15 @@ def _judged(case: Case, work: Path, sound: Path, stored: Path) -> Verdict:
         verdict = Verdict(case, what={"unbuilt": repr(error)})
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-    for figure, line in verdict.what.items():
-        print(f"{case.fault:<9} {case.name:<44} {figure:<16} {line[:300]}", flush=True)
+    _tell(verdict, [name for name in verdict.what if name != "over_20_s"])
     return verdict
+
+
+def _tell(verdict: Verdict, figures: Iterable[str]) -> None:
+    """Print a line for each of these figures that the case breaks."""
+    case = verdict.case
+    for name in figures:
+        print(f"{case.fault:<9} {case.name:<44} {name:<16} {verdict.what[name][:300]}", flush=True)
 
 
 def _write(verdicts: Sequence[Verdict], alone_s: float) -> None:
