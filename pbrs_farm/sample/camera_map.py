@@ -35,8 +35,8 @@ COLOURS: Final = {
 }
 
 _PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0  # scale, largest width of a panel, border
-_ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = (16.0, 12.0, 0.56, 200.0)  # px of text
-_ROOM, _FURNITURE, _WALL, _INK = ("#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222")  # fills
+_ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = 16.0, 12.0, 0.56, 200.0  # px
+_ROOM, _FURNITURE, _WALL, _INK = "#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222"
 
 
 def camera_map_svg(house: House, sampling: Sampling) -> str:

@@ -1,18 +1,17 @@
-"""room_camera.txt and its companions, the published camera files (docs/spec/suncg.md section 3.3): text only.
+"""room_camera.txt, the published camera file (docs/spec/suncg.md section 3.3), as cameras; no effects.
 
-No effects: text in, text out. Half-angles are in radians; yf is recomputed from xf and the
-picture's shape, and up is made perpendicular again, as every published reader does.
+Half-angles are in radians; yf is recomputed from xf and the picture's shape, and up is made
+perpendicular again, as every published reader does.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
 
 
@@ -59,54 +58,3 @@ def _camera(words: list[str], file: str, line: int, width_px: int, height_px: in
     intrinsics = Intrinsics.from_hfov(width_px, height_px, 2 * half_angle)
     x, y, z = (float(u) for u in up)
     return RoomCamera(Camera.look(intrinsics, eye, towards, (x, y, z)), score)
-
-
-def text_from_views(views: Sequence[View]) -> str:
-    """room_camera.txt of views, a line each, numbers to six digits as the published files have."""
-    lines = []
-    for view in views:
-        i, pose = view.camera.intrinsics, view.camera.world_from_camera
-        xf = math.atan(0.5 * i.width_px / i.fx)  # half the horizontal field of view, radians
-        yf = math.atan(0.5 * i.height_px / i.fy)
-        groups = (view.camera.eye, view.camera.towards, pose[:3, 1], (xf, yf), (view.score,))
-        lines.append("  ".join(" ".join(f"{float(x):g}" for x in group) for group in groups))
-    return "".join(line + "\n" for line in lines)
-
-
-def names_from_views(views: Sequence[View]) -> str:
-    """room_camera_name.txt of views: `Room#<level>_<room>_<sector>`, a line each."""
-    return "".join(f"Room#{view.room_id}_{view.sector}\n" for view in views)
-
-
-def names_from_text(text: str, file: str) -> list[tuple[str, int]]:
-    """(room id, sector) of each line of a room_camera_name.txt. Raises BadInput."""
-    names = []
-    for number, line in enumerate(text.split(), 1):
-        # Split at the last underscore: room ids contain some.
-        room, _, sector = line.removeprefix("Room#").rpartition("_")
-        if not line.startswith("Room#") or not room or not sector.isdigit():
-            raise BadInput(file, f"line {number}", f"expected Room#<room>_<sector>, got {line!r}")
-        names.append((room, int(sector)))
-    return names
-
-
-def good_from_text(text: str, file: str) -> list[bool]:
-    """room_camera_good.txt: per camera whether its room has a lamp, window or door. BadInput."""
-    words = text.split()
-    for number, word in enumerate(words, 1):
-        if word not in ("0", "1"):
-            raise BadInput(file, f"line {number}", f"expected 0 or 1, got {word!r}")
-    return [word == "1" for word in words]
-
-
-def nodes_from_text(text: str, file: str) -> dict[int, str]:
-    """room_camera_node.txt: value in the published node.png -> node name. Raises BadInput."""
-    nodes: dict[int, str] = {}
-    for number, line in enumerate(text.splitlines(), 1):
-        words = line.split(maxsplit=1)
-        if not words:
-            continue
-        if len(words) != 2 or not words[0].isdigit():
-            raise BadInput(file, f"line {number}", "expected `<number> <node name>`")
-        nodes[int(words[0])] = words[1].strip()
-    return nodes

@@ -21,7 +21,7 @@ from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.plan_geometry import Shape
-from pbrs_farm.repair.structure.prisms import Plane, polygons_of
+from pbrs_farm.repair.structure.prisms import Plane, lifted, polygons_of
 
 WITHIN_M = 0.005  # how near to an edge rays start
 _MAX_LEAKS = 50  # of a space, kept with their rays
@@ -130,7 +130,7 @@ def _along(area: Shape, plane: Plane, step_m: float, rng: np.random.Generator) -
         n = max(int(ring.length / step_m), 8)
         steps = ring.length * (np.arange(n) + rng.random()) / n  # stratified, one random shift
         points = shapely.get_coordinates(shapely.line_interpolate_point(ring, steps))
-        found.append(_lifted(points, plane.at(points)))
+        found.append(lifted(points, plane.at(points)))
     return found
 
 
@@ -143,12 +143,8 @@ def _upright(
         for corner, y0, y1 in zip(corners, low.at(corners), high.at(corners), strict=True):
             n = max(int((y1 - y0) / step_m), 2)
             y = y0 + (np.arange(n) + rng.random()) / n * (y1 - y0)
-            found.append(_lifted(np.tile(corner, (n, 1)), y))
+            found.append(lifted(np.tile(corner, (n, 1)), y))
     return found
-
-
-def _lifted(plan_points: F64, y: F64) -> F64:
-    return np.stack([plan_points[:, 0], y, plan_points[:, 1]], 1)
 
 
 def _inside(interior: RoomInterior, n: int, rng: np.random.Generator) -> F64:
@@ -163,7 +159,7 @@ def _inside(interior: RoomInterior, n: int, rng: np.random.Generator) -> F64:
         found = np.concatenate([found, points[shapely.contains_xy(area, *points.T)]])
     found = found[:n]
     low, high = interior.low.at(found) + 0.02, interior.high.at(found) - 0.02
-    return _lifted(found, low + rng.random(n) * (high - low))
+    return lifted(found, low + rng.random(n) * (high - low))
 
 
 def _measured(

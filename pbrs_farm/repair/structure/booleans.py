@@ -96,6 +96,12 @@ def _solid(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold
     return solid
 
 
+def faces_of_patches(patches: Sequence[Patch]) -> NDArray[np.int64]:
+    """(F, 3) faces of all patches, corners numbered through the concatenated vertices."""
+    starts = np.cumsum([0, *(len(p.positions) for p in patches)])
+    return np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
+
+
 def _welded(
     patches: Sequence[Patch], weld_m: float
 ) -> tuple[F64, NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint64]]:
@@ -106,9 +112,7 @@ def _welded(
     canonical = first[np.ravel(inverse)]  # each vertex -> the first at its place
     if weld_m:
         positions = positions[canonical]
-    # Number corners through all patches.
-    starts = np.cumsum([0, *(len(p.positions) for p in patches)])
-    faces = np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
+    faces = faces_of_patches(patches)
     # List the vertices to merge with an earlier one.
     twins = np.flatnonzero(canonical != np.arange(len(canonical)))
     uvs = np.concatenate([p.uvs for p in patches])

@@ -13,7 +13,13 @@ from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import face_areas, unit_normals
-from pbrs_farm.repair.structure.booleans import F64, Patch, TagTable, solid_from_patches
+from pbrs_farm.repair.structure.booleans import (
+    F64,
+    Patch,
+    TagTable,
+    faces_of_patches,
+    solid_from_patches,
+)
 from pbrs_farm.repair.structure.patches import patch_from_surface
 
 _FLAT_M = 1e-3  # how far corners may lie off the plane of a planar wall
@@ -61,8 +67,7 @@ def components(patches: Sequence[Patch]) -> list[NDArray[np.int64]]:
     keys = np.round(positions / _WELD_M)
     _, inverse = np.unique(keys, axis=0, return_inverse=True)
     node = np.ravel(inverse)
-    starts = np.cumsum([0, *(len(p.positions) for p in patches)])
-    faces = np.concatenate([node[p.faces + s] for p, s in zip(patches, starts[:-1], strict=True)])
+    faces = node[faces_of_patches(patches)]
     # Connect the corners of each face, then label connected places.
     rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
     n = int(node.max()) + 1
@@ -93,9 +98,7 @@ def flat_patch(item: Item, index: int) -> FlatPatch | None:
     patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
     if not patches:
         return None
-    starts = np.cumsum([0, *(len(p.positions) for p in patches)])
-    positions = np.concatenate([p.positions for p in patches])
-    faces = np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
+    positions, faces = np.concatenate([p.positions for p in patches]), faces_of_patches(patches)
     corners = positions[faces]
     # Average the normals by area; two faces back to back leave no normal.
     normal = (unit_normals(corners) * face_areas(corners)[:, None]).sum(0)

@@ -13,9 +13,9 @@ import shapely
 from manifold3d import Manifold
 
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import TagTable, solid_from_patches
+from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
-from pbrs_farm.repair.structure.prisms import level_plane, polygons_of, prism
+from pbrs_farm.repair.structure.prisms import level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
 
@@ -69,9 +69,7 @@ def _joint(a: Wall, b: Wall, rooms: plan.Shape, table: TagTable) -> list[Manifol
         if high - low < _OVERLAP_M:
             continue
         tags = (a.tag("joint"),) * 3
-        solid = solid_from_patches(prism(polygon, level_plane(low), level_plane(high), tags), table)
-        if solid is not None:
-            solids.append(solid)
+        solids += solid_prisms([polygon], level_plane(low), level_plane(high), tags, table)
     return solids
 
 
@@ -141,8 +139,6 @@ def joints_with_surface(
             low, high = (near, far) if surface.is_ceiling else (far, near)
             if (high.at(corners) - low.at(corners)).min() < _RECESS_M:
                 continue
-            patches = prism(polygon, low, high, (wall.tag("joint"),) * 3)
-            solid = solid_from_patches(patches, table)
-            if solid is not None:
-                found.append((wall, solid))
+            tags = (wall.tag("joint"),) * 3
+            found += [(wall, s) for s in solid_prisms([polygon], low, high, tags, table)]
     return found

@@ -15,8 +15,15 @@ from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import F64, Patch, Tag, TagTable, bounds
 from pbrs_farm.repair.structure.closed_shells import shells_from_item
-from pbrs_farm.repair.structure.prisms import Plane, UvMap, level_plane, plane_of_points
+from pbrs_farm.repair.structure.prisms import (
+    Plane,
+    UvMap,
+    affine_uv_map,
+    level_plane,
+    plane_of_points,
+)
 
+_MAX_UV_OFF = 1e-3  # texture widths; beyond it a texture is no affine map of the plan
 _SAME_FACING = 1.0 - 1e-6  # cosine between normals of one plane
 
 
@@ -131,15 +138,5 @@ def _uv_map(surface: Surface, faces: NDArray[np.int32]) -> UvMap | None:
         return None
     used = np.unique(faces)
     points = surface.positions[used].astype(np.float64)
-    uvs = surface.uvs[used].astype(np.float64)
-    columns = np.stack([points[:, 0], points[:, 2], np.ones(len(points))], 1)
-    affine = np.linalg.lstsq(columns, uvs, rcond=None)[0]
-    # Give up where the texture is no affine map, within a thousandth of its width.
-    if np.abs(columns @ affine - uvs).max() > 1e-3:
-        return None
-
-    def uv(positions: F64) -> F64:
-        flat = np.stack([positions[:, 0], positions[:, 2], np.ones(len(positions))], 1)
-        return np.asarray(flat @ affine)
-
-    return uv
+    uv, off = affine_uv_map(points, surface.uvs[used].astype(np.float64))
+    return None if off > _MAX_UV_OFF else uv

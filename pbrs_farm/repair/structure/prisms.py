@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import manifold3d
 import numpy as np
 import shapely
+from manifold3d import Manifold
 from numpy.typing import NDArray
 
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import F64, Patch, Tag
+from pbrs_farm.repair.structure.booleans import F64, Patch, Tag, TagTable, solid_from_patches
 
 UvMap = Callable[[F64], F64]
 """Texture coordinates (N, 2) of positions (N, 3)."""
@@ -46,11 +47,24 @@ def plane_of_points(points: F64, *, tolerance_m: float = 1e-3) -> Plane | None:
     if high - low <= 1e-6:
         return level_plane(high)
     # Fit y = a x + b z + c and see how far off the points lie.
-    columns = np.stack([points[:, 0], points[:, 2], np.ones(len(points))], 1)
-    (a, b, c), _, rank, _ = np.linalg.lstsq(columns, points[:, 1], rcond=None)
+    (a, b, c), _, rank, _ = np.linalg.lstsq(_affine_columns(points), points[:, 1], rcond=None)
     plane = Plane(float(a), float(b), float(c))
     off = np.abs(plane.at(points[:, [0, 2]]) - points[:, 1]).max()
     return plane if rank == 3 and off <= tolerance_m else None
+
+
+def affine_uv_map(positions: F64, uvs: F64) -> tuple[UvMap, float]:
+    """The affine map of x and z that fits uvs (N, 2) best, and the most it is off by."""
+    affine = np.linalg.lstsq(_affine_columns(positions), uvs, rcond=None)[0]
+
+    def uv(positions: F64) -> F64:
+        return np.asarray(_affine_columns(positions) @ affine)
+
+    return uv, float(np.abs(uv(positions) - uvs).max())
+
+
+def _affine_columns(positions: F64) -> F64:
+    return np.stack([positions[:, 0], positions[:, 2], np.ones(len(positions))], 1)
 
 
 def polygons_of(shape: plan.Shape, *, min_area_m2: float = 1e-6) -> list[shapely.Polygon]:
@@ -79,7 +93,7 @@ def prism(
     rings = [np.asarray(r.coords)[:-1] for r in (polygon.exterior, *polygon.interiors)]
     plan = np.concatenate(rings)
     triangles = np.asarray(manifold3d.triangulate(rings), np.int64).reshape(-1, 3)
-    lows, highs = _lifted(plan, low.at(plan)), _lifted(plan, high.at(plan))
+    lows, highs = lifted(plan, low.at(plan)), lifted(plan, high.at(plan))
     bottom_tag, top_tag, side_tag = tags
     return [
         # Turn the top round: both triangulations look down.
@@ -89,7 +103,21 @@ def prism(
     ]  # fmt: skip
 
 
-def _lifted(plan: F64, y: F64) -> F64:
+def solid_prisms(
+    polygons: Iterable[shapely.Polygon],
+    low: Plane,
+    high: Plane,
+    tags: tuple[Tag, Tag, Tag],
+    table: TagTable,
+    uv: UvMap | None = None,
+) -> list[Manifold]:
+    """The prisms over polygons as solids, those left out that have no volume."""
+    solids = (solid_from_patches(prism(p, low, high, tags, uv), table) for p in polygons)
+    return [s for s in solids if s is not None]
+
+
+def lifted(plan: F64, y: F64) -> F64:
+    """(N, 3) plan points (N, 2) at the heights y (N,)."""
     return np.stack([plan[:, 0], y, plan[:, 1]], 1)
 
 

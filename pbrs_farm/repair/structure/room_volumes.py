@@ -18,10 +18,9 @@ from pbrs_farm.repair.structure.booleans import (
     bounds,
     overlap_of_bounds,
     reduced,
-    solid_from_patches,
 )
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
-from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, prism
+from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.slabs import GAP_M, SAME_HEIGHT_M
 from pbrs_farm.repair.structure.walls import Wall
 
@@ -99,15 +98,11 @@ def without_volumes(
     """
     cutters = []
     for volume in volumes:
-        if (
-            item in volume.items
-            or (overlap_of_bounds(bounds(solid), volume.bounds) < _TOUCH_M).any()
-        ):
+        overlap = overlap_of_bounds(bounds(solid), volume.bounds)
+        if item in volume.items or (overlap < _TOUCH_M).any():
             continue
         # Cut with the volume, its faces tagged as the solid's own.
-        cutter = solid_from_patches(prism(volume.area, volume.low, volume.high, (tag,) * 3), table)
-        if cutter is not None:
-            cutters.append(cutter)
+        cutters += solid_prisms([volume.area], volume.low, volume.high, (tag,) * 3, table)
     return reduced(solid, cutters)
 
 
@@ -136,9 +131,7 @@ def with_own_sides_visible(
                 continue
             # Draw the wall back from the whole height of the other room.
             low, high = level_plane(room.floor_y - GAP_M), level_plane(room.ceiling_y + GAP_M)
-            for polygon in polygons_of(plan.grown(area, _COINCIDE_M)):
-                patches = prism(polygon, low, high, (wall.tag("hidden"),) * 3)
-                cutters.append(solid_from_patches(patches, table))
-        solid = reduced(wall.solid, [c for c in cutters if c is not None])
-        found.append(replace(wall, solid=solid))
+            polygons = polygons_of(plan.grown(area, _COINCIDE_M))
+            cutters += solid_prisms(polygons, low, high, (wall.tag("hidden"),) * 3, table)
+        found.append(replace(wall, solid=reduced(wall.solid, cutters)))
     return found

@@ -13,9 +13,9 @@ import shapely
 from manifold3d import Manifold
 
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import TagTable, solid_from_patches
+from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
-from pbrs_farm.repair.structure.prisms import Plane, polygons_of, prism
+from pbrs_farm.repair.structure.prisms import Plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.walls import Wall
 
 GAP_M = 0.05
@@ -118,10 +118,7 @@ def slab(
         near, far = surface.plane.raised(away * near_m), surface.plane.raised(away * far_m)
         low, high = (near, far) if surface.is_ceiling else (far, near)
         tags = (tag, hidden, hidden) if surface.is_ceiling else (hidden, tag, hidden)
-        for polygon in polygons_of(area):
-            solid = solid_from_patches(prism(polygon, low, high, tags, surface.uv), table)
-            if solid is not None:
-                solids.append(solid)
+        solids += solid_prisms(polygons_of(area), low, high, tags, table, surface.uv)
     return solids
 
 
@@ -141,9 +138,6 @@ def bridged(
         a: Plane = surface.plane.raised(away * 0.5 * thickness_m)
         b: Plane = surface.plane.raised(away * thickness_m)
         hidden = surface.tag("hidden")
-        for polygon in polygons_of(area):
-            low, high = (a, b) if surface.is_ceiling else (b, a)
-            solid = solid_from_patches(prism(polygon, low, high, (hidden,) * 3), table)
-            if solid is not None:
-                solids.append(solid)
+        low, high = (a, b) if surface.is_ceiling else (b, a)
+        solids += solid_prisms(polygons_of(area), low, high, (hidden,) * 3, table)
     return solids

@@ -23,6 +23,7 @@ from pbrs_farm.repair.structure.booleans import (
 from pbrs_farm.repair.structure.closed_shells import flat_patch, shells_from_item
 from pbrs_farm.repair.structure.prisms import (
     Plane,
+    affine_uv_map,
     level_plane,
     plane_of_points,
     polygons_of,
@@ -156,12 +157,7 @@ def extruded(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | Non
     origin = patch.positions[0]
     local = (patch.positions - origin) @ axes.T
     # Carry the texture on by the affine map that fits it.
-    columns = np.concatenate([local, np.ones((len(local), 1))], 1)[:, [0, 2, 3]]
-    affine = np.linalg.lstsq(columns, patch.uvs, rcond=None)[0]
-
-    def uv(positions: F64) -> F64:
-        flat = np.stack([positions[:, 0], positions[:, 2], np.ones(len(positions))], 1)
-        return np.asarray(flat @ affine)
+    uv, _ = affine_uv_map(local, patch.uvs)
 
     # Raise a prism behind the face, in that frame, and turn it back.
     polygons = polygons_of(plan.polygon_of_triangles(local, patch.faces))
