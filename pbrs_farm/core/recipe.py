@@ -299,6 +299,7 @@ def recipe_from_name(name: str, overrides: Mapping[str, str] | None = None) -> R
     """
     if name not in _PRESETS:
         raise BadRecipe(f"no recipe {name!r}", hint=f"one of {', '.join(RECIPE_NAMES)}")
+    # Start from the preset, then override field by field; pydantic judges the whole.
     fields: dict[str, Any] = {"name": name}
     for group, values in _PRESETS[name].items():
         fields[group] = dict(values)

@@ -32,6 +32,7 @@ def _json_of_view(view: View) -> dict[str, Any]:
         "sector": view.sector,
         "origin": view.origin,
         "score": view.score,
+        # JSON keys are text.
         "objects": {str(k): n for k, n in sorted(view.objects.items())},
         "intrinsics": {
             "width_px": i.width_px, "height_px": i.height_px,

@@ -14,10 +14,10 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.serialise import json_from_bytes
 
 _MAGIC: Final = b"glTF"
-_JSON_CHUNK: Final = 0x4E4F534A
-_BIN_CHUNK: Final = 0x004E4942
-_ARRAY_BUFFER: Final = 34962
-_ELEMENT_ARRAY_BUFFER: Final = 34963
+_JSON_CHUNK: Final = 0x4E4F534A  # "JSON", little-endian
+_BIN_CHUNK: Final = 0x004E4942  # "BIN"
+_ARRAY_BUFFER: Final = 34962  # vertices, in OpenGL's numbers
+_ELEMENT_ARRAY_BUFFER: Final = 34963  # indices
 
 DTYPES: Final[dict[int, np.dtype[Any]]] = {
     5120: np.dtype("<i1"),
@@ -35,11 +35,11 @@ WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 @dataclass(frozen=True, slots=True)
 class Gltf:
-    """A glTF document and its buffers. file: its name, for messages."""
+    """A glTF document and its buffers."""
 
     document: dict[str, Any]
     buffers: tuple[bytes, ...]
-    file: str
+    file: str  # its name, for messages
 
 
 class GlbWriter:
@@ -87,6 +87,7 @@ class GlbWriter:
 
     def glb(self, document: dict[str, Any]) -> bytes:
         """The file: document (empty lists dropped, as glTF asks) with buffers, and the binary."""
+        # Chunks are padded to 4 bytes: JSON with spaces, the binary one with zeros.
         document = {
             **document,
             "accessors": self._accessors,
@@ -108,6 +109,7 @@ def _little(array: NDArray[Any], dtype: str) -> bytes:
 
 def gltf_from_glb(data: bytes, file: str) -> Gltf:
     """Document and binary chunk of a GLB; BadHouse if it is damaged or no glTF 2.0."""
+    # Header: magic, version, length of the file.
     if len(data) < 20 or data[:4] != _MAGIC:
         raise BadHouse(file, "", "is no GLB file")
     version, length = struct.unpack_from("<II", data, 4)
@@ -115,6 +117,7 @@ def gltf_from_glb(data: bytes, file: str) -> Gltf:
         raise BadHouse(file, "", f"is glTF {version}; only glTF 2.0 is read")
     if length > len(data):
         raise BadHouse(file, "", f"is cut short: {len(data)} of {length} bytes")
+    # Chunks: length, kind, bytes; the first of each kind counts.
     chunks: dict[int, bytes] = {}
     at = 12
     while at + 8 <= length:
@@ -173,6 +176,7 @@ def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
     if dtype is None or width is None or "sparse" in accessor:
         raise BadHouse(gltf.file, place, "is sparse or of a type that no mesh uses")
     n = count(gltf, accessor, "count", place)
+    # Elements may be interleaved with others: step over the bytes between them.
     data = view_bytes(gltf, accessor.get("bufferView"))
     view = entry(gltf, "bufferViews", accessor["bufferView"])
     size = width * dtype.itemsize

@@ -32,6 +32,7 @@ def bundle_from_house(house: House) -> tuple[bytes, bytes]:
 
     Raises BadHouse naming the item whose geometry is not finite or whose faces are out of range.
     """
+    # Tie the two files together by the digest of the binary one.
     glb_bytes = glb_from_house(house)
     data = _json_of_house(house)
     data["format"] = FORMAT
@@ -82,6 +83,7 @@ def house_from_bundle(glb_data: bytes, json_data: bytes) -> House:
         raise BadHouse("house.json", "format", f"expected {FORMAT!r}; this is no house bundle")
     if data.get("glb_sha256") != keys.sha256(glb_data):
         raise BadHouse("house.json", "glb_sha256", "house.glb is not the one it was written with")
+    # Put arrays and pictures of house.glb where house.json left them out.
     gltf = glb.gltf_from_glb(glb_data, "house.glb")
     data["items"] = [
         _item_with_arrays(gltf, item, i) for i, item in enumerate(_dicts(data, "items"))
@@ -105,6 +107,7 @@ def _item_with_arrays(gltf: glb.Gltf, item: dict[str, Any], index: int) -> dict[
     primitives = iter(_dicts(mesh, "primitives") if mesh else [])
     surfaces = []
     for j, surface in enumerate(_dicts(item, "surfaces")):
+        # Only surfaces with vertices have a primitive: an empty one takes none.
         place = f"items[{index}].surfaces[{j}]"
         arrays: dict[str, Any] = {
             "positions": np.zeros((0, 3), np.float32),
@@ -133,6 +136,7 @@ def _arrays_of_primitive(gltf: glb.Gltf, primitive: dict[str, Any], place: str) 
     if "NORMAL" in attributes:
         arrays["normals"] = glb.accessor_array(gltf, attributes["NORMAL"])
     if "TEXCOORD_0" in attributes:
+        # glTF measures v downwards.
         uvs = glb.accessor_array(gltf, attributes["TEXCOORD_0"])
         arrays["uvs"] = uvs * V_DOWN
     n = len(arrays["positions"])
@@ -158,6 +162,7 @@ def _textures_with_data(gltf: glb.Gltf, textures: list[dict[str, Any]]) -> dict[
 
 
 def _check_references(house: House) -> None:
+    # Every id and index must lead somewhere: the stages do not ask again.
     levels = {level.id for level in house.levels}
     rooms = {room.id for room in house.rooms}
     for i, room in enumerate(house.rooms):

@@ -84,6 +84,7 @@ def _item_extras(item: Item, instance: int) -> dict[str, Any]:
 
 
 def _primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> dict[str, Any]:
+    # Refuse what a viewer could not open.
     place = f"item {item.id}, surface {s.name}"
     for array in (s.positions, s.uvs, s.normals):
         if array is not None and not np.isfinite(array).all():
@@ -120,6 +121,7 @@ def _write_textures(
 
 def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
     alpha, mode = _alpha(material)
+    # glTF knows metal and roughness: a mirror is smooth metal, all else as rough as its Phong lobe.
     shininess = max(material.shininess, 0.0)
     is_mirror = material.kind is MaterialKind.MIRROR
     look: dict[str, Any] = {
@@ -147,6 +149,7 @@ def _linear(rgb: tuple[float, float, float]) -> list[float]:
 
 def _alpha(material: Material) -> tuple[float, str]:
     alpha = float(np.clip(material.opacity, 0, 1))
+    # Glass is blended even where its source says opaque.
     if material.kind in (MaterialKind.GLASS, MaterialKind.PANE):
         return (alpha if alpha < 1 else _PANE_ALPHA), "BLEND"
     if alpha < 1:

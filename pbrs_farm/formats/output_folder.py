@@ -17,24 +17,24 @@ from pbrs_farm.core.errors import BadInput
 
 @dataclass(frozen=True, slots=True)
 class HouseEntry:
-    """A house of the folder. rooms: room id -> its name. attribution: the line to carry, or ""."""
+    """A house of the folder."""
 
     id: str
     name: str
-    attribution: str
-    rooms: dict[str, str] = field(default_factory=dict)
+    attribution: str  # the line to carry, or ""
+    rooms: dict[str, str] = field(default_factory=dict)  # id -> name
 
 
 @dataclass(frozen=True, slots=True)
 class ViewEntry:
-    """A view of the folder. facts: view.json, {} where there is none yet."""
+    """A view of the folder."""
 
     house: HouseEntry
     id: str
     room_id: str
     room_name: str
     folder: Path
-    facts: dict[str, Any] = field(default_factory=dict)
+    facts: dict[str, Any] = field(default_factory=dict)  # view.json, {} where there is none yet
 
     def file(self, name: str) -> Path | None:
         """The view's file of that name, or None."""
@@ -87,6 +87,7 @@ def _room_id(view_id: str, facts: dict[str, Any], house: HouseEntry) -> str:
     room = room.get("id", "") if isinstance(room, dict) else room
     if room:
         return str(room)
+    # Without view.json: the longest room id that the view's id begins with.
     owners = [r for r in house.rooms if view_id.startswith(f"{r}_")]
     return max(owners, key=len) if owners else view_id.rpartition("_")[0]
 

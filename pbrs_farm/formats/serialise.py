@@ -101,6 +101,7 @@ def value_from_json(hint: Any, data: Any, file: str, place: str) -> Any:
     if origin is np.ndarray:
         dtype = typing.get_args(typing.get_args(hint)[1])[0]
         return _array(dtype, data, file, place)
+    # "X | None" is the only union among the fields.
     if origin in (typing.Union, types.UnionType):
         kinds = [a for a in typing.get_args(hint) if a is not type(None)]
         return None if data is None else value_from_json(kinds[0], data, file, place)
@@ -141,11 +142,13 @@ def _dataclass(cls: type, data: Any, file: str, place: str) -> Any:
 
 
 def _array(dtype: Any, data: Any, file: str, place: str) -> np.ndarray[Any, Any]:
+    # Arrays from house.glb stand in the data already.
     if isinstance(data, np.ndarray):
         if data.dtype != dtype:
             raise BadHouse(file, place, f"expected {np.dtype(dtype)}, got {data.dtype}")
         return data
     try:
+        # Convert from the widest type, to see what the asked one cannot hold.
         wide = np.array(data, np.int64 if np.issubdtype(dtype, np.integer) else np.float64)
         with np.errstate(over="ignore"):  # what overflows is told below
             array = wide.astype(dtype)
@@ -159,6 +162,7 @@ def _array(dtype: Any, data: Any, file: str, place: str) -> np.ndarray[Any, Any]
 def _shaped(
     array: np.ndarray[Any, Any], shape: tuple[int | None, ...], file: str, place: str
 ) -> np.ndarray[Any, Any]:
+    # An empty list in JSON has lost its width.
     if array.size == 0 and shape[0] is None:
         return array.reshape(0, *[n or 0 for n in shape[1:]])
     if array.ndim != len(shape) or any(
@@ -196,6 +200,7 @@ def _enum(hint: type[Enum], data: Any, file: str, place: str) -> Enum:
 
 
 def _scalar(hint: Any, data: Any, file: str, place: str) -> Any:
+    # An int is a float where one is asked for; a bool is no number.
     if hint is float and isinstance(data, (int, float)) and not isinstance(data, bool):
         try:
             number = float(data)

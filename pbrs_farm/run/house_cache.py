@@ -103,6 +103,7 @@ class CachedHouse:
 
     def close(self) -> None:
         """Free what the GPU or Mitsuba holds."""
+        # Drop each cached property by name: scenes before the arrays they refer to.
         rasterizer = self.__dict__.pop("rasterizer", None)
         if rasterizer is not None:
             rasterizer.close()
@@ -133,6 +134,7 @@ class HouseCache:
 
     def get(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> CachedHouse:
         """The loaded house, the same object as long as nothing it depends on changes."""
+        # Scenes depend on the recipe, too.
         key = (store.url, house_id, digest, recipe.digest())
         if self._held is None or self._held[0] != key:
             self.clear()

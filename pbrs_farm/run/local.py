@@ -30,40 +30,33 @@ Observer = Callable[[Event], None]
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What is asked of a local run. homes: words as sources.resolve takes them, sources: resolved.
+    """What is asked of a local run."""
 
-    A process is killed when a step takes step_timeout_s, when it neither begins a step nor writes to
-    its log for silence_s (0 = step_timeout_s), or when it holds memory_mb (0 = share of the machine).
-    """
-
-    homes: Sequence[str]
+    homes: Sequence[str]  # words as read.source.resolve takes them
     store_url: str
     recipe: Recipe
     want: Wanted = field(default_factory=Wanted)
-    n_jobs: int = 1
-    update: bool = False
-    step_timeout_s: float = 3600.0
-    silence_s: float = 0.0
-    memory_mb: float = 0.0
-    debug: bool = False
+    n_jobs: int = 1  # render processes
+    update: bool = False  # replace the root's recipe where it is another
+    step_timeout_s: float = 3600.0  # a process whose step takes longer is killed
+    silence_s: float = 0.0  # and one without a step begun or a line in its log; 0 = step_timeout_s
+    memory_mb: float = 0.0  # and one that holds more; 0 = its share of the machine
+    debug: bool = False  # tracebacks travel with failures
     store: StoreSettings = field(default_factory=StoreSettings)
-    sources: Sequence[SourceRef] = ()
+    sources: Sequence[SourceRef] = ()  # homes that are resolved already
 
 
 @dataclass(slots=True)
 class Summary:
-    """What came of a run. failures: (what, message, command that reproduces it).
-
-    without_views: (house id, why none of its rooms has a view).
-    """
+    """What came of a run."""
 
     houses: list[str] = field(default_factory=list)
     n_views: int = 0
-    n_done: int = 0
-    n_kept: int = 0
-    peak_mb: float = 0.0
-    failures: list[tuple[str, str, str]] = field(default_factory=list)
-    without_views: list[tuple[str, str]] = field(default_factory=list)
+    n_done: int = 0  # steps
+    n_kept: int = 0  # steps that were done already
+    peak_mb: float = 0.0  # of the largest process
+    failures: list[tuple[str, str, str]] = field(default_factory=list)  # what, message, command
+    without_views: list[tuple[str, str]] = field(default_factory=list)  # house, why it has none
 
 
 def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:

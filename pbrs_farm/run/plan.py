@@ -59,11 +59,11 @@ PICTURE_GROUPS: Final = tuple(sorted({g for step in STEPS.values() for g in step
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a run was asked to make. layers: optional layers, by name. n_views: per house, 0 = all."""
+    """What a run was asked to make."""
 
     modes: tuple[Mode, ...] = ALL_MODES
-    layers: tuple[str, ...] = ()
-    n_views: int = 0
+    layers: tuple[str, ...] = ()  # optional layers, by name
+    n_views: int = 0  # per house, 0 = all
 
 
 def wanted(modes: Iterable[str], layers: Iterable[str], n_views: int = 0) -> Wanted:
@@ -133,6 +133,7 @@ def spread(view_rooms: Iterable[tuple[str, str, float]], n_views: int) -> list[s
     rows = list(view_rooms)
     if n_views <= 0 or n_views >= len(rows):
         return [view for view, _room, _score in rows]
+    # A room's best view is in the first round, its second best in the next.
     rounds: dict[str, int] = {}
     ranked: list[tuple[int, float, str]] = []
     for view, room, score in sorted(rows, key=lambda r: (-r[2], r[0])):

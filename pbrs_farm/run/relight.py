@@ -26,10 +26,10 @@ from pbrs_farm.transport.lamp_layers import indoor_from_lamps
 
 @dataclass(frozen=True, slots=True)
 class LampFactor:
-    """What a word asks of lamps: which (number, item, name or pattern), and times what (R, G, B)."""
+    """What one --lamp asks."""
 
-    word: str
-    rgb: tuple[float, float, float]
+    word: str  # a lamp's number, item, name, or a pattern of these
+    rgb: tuple[float, float, float]  # what its light is multiplied by
 
 
 def linear_aovs(radiance: RadianceExr) -> LinearAovs:
@@ -51,6 +51,7 @@ def relit(
     file = view / RADIANCE_EXR
     radiance = radiance_from_exr(_read(file), str(file))
     aovs = linear_aovs(radiance)
+    # Sum indoor light anew from the lamps' own layers.
     if lamps:
         rows = lamps_of_view(view)
         factors = lamp_factors(rows, lamps)
