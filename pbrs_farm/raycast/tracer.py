@@ -107,6 +107,7 @@ class JitTracer:
     ) -> tuple[F32, I32]:
         import drjit as dr
 
+        # Hand rays over component by component, as Dr.Jit stores vectors.
         mi = mitsuba(self._variant)
         ray = mi.Ray3f(
             mi.Point3f(np.ascontiguousarray(origins.T)),
@@ -115,6 +116,7 @@ class JitTracer:
         if max_distance is not None:
             ray.maxt = mi.Float(max_distance)
         hit = self._watertight.ray_intersect_preliminary(ray, coherent)
+        # Read distance and face back together: one kernel.
         valid = hit.is_valid()
         t = dr.select(valid, hit.t, dr.inf)
         face = dr.select(valid, mi.Int32(hit.prim_index), -1)

@@ -33,6 +33,7 @@ _SIGMAS: Final = 5.0
 _BLOCK_SIGMAS: Final = 5.0
 _MEASURING_SEEDS: Final = range(12)
 _LM_PER_W: Final = 179
+# Fields of both integrators: no pilot and no denoiser, so that nothing but the estimator is tested.
 _PATH: Final = LightFields(filter="box", pilot_spp=0, denoise=False)
 _CHAINS: Final = LightFields(
     integrator="metropolis",
@@ -42,6 +43,7 @@ _CHAINS: Final = LightFields(
     mutations_per_pixel=128,
     chains=2048,
 )
+# Half of the mutations, for the rooms in which every path is lit.
 _FEW_CHAINS: Final = _CHAINS.model_copy(update={"mutations_per_pixel": 64})
 _SKY_OF_ONE: Final = (1.0, 1.0, 1.0)
 

@@ -88,11 +88,11 @@ def sphere(centre: Triple, radius: float, material: int, *, n: int = 24) -> Surf
 
 
 def panel(
-    low: Triple, high: Triple, hole: tuple[float, float, float, float], material: int
+    low: Triple, high: Triple, opening: tuple[float, float, float, float], material: int
 ) -> list[Surface]:
     """A box that is thin along z with a rectangular opening (x0, y0, x1, y1)."""
     # Leave four boxes around the opening: left, right, below, above.
-    x0, y0, x1, y1 = hole
+    x0, y0, x1, y1 = opening
     z0, z1 = low[2], high[2]
     return [
         box(low, (x0, high[1], z1), material),
@@ -181,11 +181,11 @@ def window_room(
 ) -> tuple[House, Camera]:
     """4 x 2.5 x 4 m with a window of 1.4 x 1.2 m in the wall z = 0, a table, and a bulb or none."""
     materials = [matte("wall", albedo), BULB, Material("pane", kind=MaterialKind.PANE, opacity=0.3)]
-    hole = (1.3, 0.9, 2.7, 2.1)
+    opening = (1.3, 0.9, 2.7, 2.1)
     surfaces = shell((4.0, 2.5, 4.0), 0, front=False)
-    surfaces += panel((0, 0, -0.1), (4.0, 2.5, 0.0), hole, 0)
+    surfaces += panel((0, 0, -0.1), (4.0, 2.5, 0.0), opening, 0)
     surfaces.append(box((1.5, 0.6, 2.2), (2.5, 0.65, 2.9), 0, "table"))
-    x0, y0, x1, y1 = hole
+    x0, y0, x1, y1 = opening
     rectangle = np.array(
         [[x0, y0, -0.05], [x1, y0, -0.05], [x1, y1, -0.05], [x0, y1, -0.05]], np.float64
     )
