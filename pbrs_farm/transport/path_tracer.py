@@ -6,7 +6,7 @@ waits for the longest path. A lane sums its samples in order: the same seed give
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -49,16 +49,11 @@ class SampleSums:
     lamps: NDArray[np.float32] | None = None  # (N, L, 3) indoor light by lamp, if asked for
 
     def __add__(self, other: SampleSums) -> SampleSums:
-        return SampleSums(
-            self.outdoor + other.outdoor,
-            self.indoor + other.indoor,
-            self.outdoor_even + other.outdoor_even,
-            self.indoor_even + other.indoor_even,
-            self.albedo + other.albedo,
-            self.normal + other.normal,
-            self.n_bad + other.n_bad,
-            None if self.lamps is None or other.lamps is None else self.lamps + other.lamps,
-        )
+        def total(name: str) -> Any:
+            a, b = getattr(self, name), getattr(other, name)
+            return None if a is None or b is None else a + b
+
+        return SampleSums(**{field.name: total(field.name) for field in fields(self)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,18 +124,18 @@ def trace(
     emitters: Emitters,
     camera: Camera,
     lanes: Lanes,
-    fields: LightFields,
+    light: LightFields,
     *,
     max_depth: int | None = None,
 ) -> SampleSums:
-    """Trace n_samples paths for every lane; max_depth replaces the fields' own."""
+    """Trace n_samples paths for every lane; max_depth replaces the recipe's."""
     lane = dr.arange(mi.UInt32, lanes.n_lanes)
     pixel, emitter_filter = _pixels_and_emitters(lane, lanes)
     lamp_sums = None
     if lanes.n_lamps > 0:
         sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
         lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
-    depth_fields = device_fields(fields, max_depth=max_depth)
+    depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(
         PathContext(scene, emitters, depth_fields, emitter_filter),
         device_camera(camera),
@@ -151,23 +146,15 @@ def trace(
         lamp_sums,
     )
     dr.eval(total)
-
-    def rows(values: Any) -> NDArray[np.float32]:
-        return np.ascontiguousarray(values.numpy().T, np.float32)
-
+    rows = {
+        f.name: np.ascontiguousarray(getattr(total, f.name).numpy().T, np.float32)
+        for f in fields(total)
+        if f.name != "n_bad"
+    }
     lamps = None
     if lamp_sums is not None:
         lamps = lamp_sums.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
-    return SampleSums(
-        rows(total.outdoor),
-        rows(total.indoor),
-        rows(total.outdoor_even),
-        rows(total.indoor_even),
-        rows(total.albedo),
-        rows(total.normal),
-        int(np.sum(total.n_bad.numpy(), dtype=np.int64)),
-        lamps,
-    )
+    return SampleSums(**rows, n_bad=int(np.sum(total.n_bad.numpy(), dtype=np.int64)), lamps=lamps)
 
 
 def _pixels_and_emitters(lane: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:

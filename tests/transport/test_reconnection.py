@@ -1,4 +1,4 @@
-"""Tails shown from many pixels: the groups, and that sharing changes no mean."""
+"""Suffixes reconnected to many pixels: the groups, and that sharing changes no mean."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(
 @pytest.mark.parametrize(
     ("height", "width", "n"), [(24, 32, 64), (23, 31, 256), (5, 7, 1024), (4, 4, 1)]
 )
-def test_every_pixel_is_dealt_once_and_groups_are_no_larger_than_asked(
+def test_every_pixel_is_in_one_group_and_groups_are_no_larger_than_asked(
     height: int, width: int, n: int
 ) -> None:
     from pbrs_farm.transport.metropolis.reconnection import stratified_groups
@@ -87,7 +87,7 @@ def coated_room() -> tuple[House, Camera]:
     )
 
 
-def test_tails_of_every_material_leave_the_mean_as_path_has_it() -> None:
+def test_suffixes_of_every_material_leave_the_mean_as_path_has_it() -> None:
     # Significance: 16 blocks, |z| < 5: missed by chance once in 100,000 runs.
     house, camera = coated_room()
     scene = LightScene.load(house, {}, RECIPE, dark_sky())
@@ -103,7 +103,7 @@ def test_tails_of_every_material_leave_the_mean_as_path_has_it() -> None:
     assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.02)
 
 
-def test_showing_tails_cuts_the_error_of_the_same_chains() -> None:
+def test_reconnecting_suffixes_cuts_the_error_of_the_same_chains() -> None:
     house, camera = rooms.window_room(0.7, lumen=800)
     scene = LightScene.load(house, {}, RECIPE, dark_sky())
     camera = camera.with_size(32, 24)

@@ -150,33 +150,20 @@ def film_position(u: Any, is_tent: Any) -> Any:
 def camera_path(camera: DeviceCamera, x: Any, y: Any) -> PathState:
     """The path that leaves the camera through film position (x, y), in pixels."""
     d = dr.normalize(camera.d0 + x * camera.du + y * camera.dv)
-    return PathState(
-        o=mi.Point3f(camera.eye),
-        d=mi.Vector3f(d),
-        beta=mi.Color3f(1),
-        depth=mi.UInt32(0),
-        n_nulls=mi.UInt32(0),
-        reference=no_reference(camera.eye),
-        bsdf_pdf=mi.Float(0),
-        guiding_odds=mi.Float(0),
-        target_face=mi.UInt32(NO_FACE),
-    )
+    origin, reference = mi.Point3f(camera.eye), no_reference(camera.eye)
+    return _first_ray(origin, mi.Vector3f(d), mi.UInt32(0), reference, mi.Float(0))
 
 
 def surface_path(vertex: Vertex, d: Any, pdf: Any) -> PathState:
     """The path that leaves a white_vertex in direction d, drawn with a pdf."""
     assert vertex.near is not None
-    return PathState(
-        o=offset_ray_origin(vertex.si.p, vertex.si.ng),
-        d=d,
-        beta=mi.Color3f(1),
-        depth=mi.UInt32(1),
-        n_nulls=mi.UInt32(0),
-        reference=vertex.near.reference,
-        bsdf_pdf=mi.Float(pdf),
-        guiding_odds=mi.Float(0),
-        target_face=mi.UInt32(NO_FACE),
-    )
+    origin = offset_ray_origin(vertex.si.p, vertex.si.ng)
+    return _first_ray(origin, d, mi.UInt32(1), vertex.near.reference, mi.Float(pdf))
+
+
+def _first_ray(o: Any, d: Any, depth: Any, reference: ReferencePoint, pdf: Any) -> PathState:
+    white, none, unguided = mi.Color3f(1), mi.UInt32(0), mi.UInt32(NO_FACE)
+    return PathState(o, d, white, depth, none, reference, pdf, mi.Float(0), unguided)
 
 
 def white_vertex(p: Any, n: Any, near: NearbyLamps) -> Vertex:

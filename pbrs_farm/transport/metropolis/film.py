@@ -1,4 +1,4 @@
-"""The film that Metropolis splats on, and the chains' target function; kernels, no effects."""
+"""What Metropolis's chains share: states, target function, and the film; kernels, no effects."""
 
 from __future__ import annotations
 
@@ -27,6 +27,17 @@ class ChainContext(NamedTuple):
     camera: DeviceCamera
     film: Film
     min_segments: Any  # of paths whose light counts
+
+
+class Chains(NamedTuple):
+    """Where N chains stand."""
+
+    samples: Any  # (STORED_DIMS * N,) numbers in the unit cube, dimension by dimension
+    light: Any  # Color3f
+    target: Any  # target function of the light
+    pixel: Any  # UInt32
+    is_reconnectable: Any  # Bool: the path's suffix can be seen from other pixels
+    suffixes: Any  # (SUFFIX_FLOATS * N,), column by column (reconnection.py)
 
 
 def sample_film(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any]:

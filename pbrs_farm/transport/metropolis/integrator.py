@@ -42,10 +42,9 @@ from pbrs_farm.transport.kernels.path_state import (
     device_fields,
 )
 from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
-from pbrs_farm.transport.metropolis.film import ChainContext, Film
+from pbrs_farm.transport.metropolis.film import ChainContext, Chains, Film
 from pbrs_farm.transport.metropolis.markov_chains import (
     STORED_DIMS,
-    Chains,
     ChainSums,
     Mutations,
     draw_paths,

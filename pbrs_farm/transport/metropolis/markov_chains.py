@@ -31,6 +31,7 @@ from pbrs_farm.transport.kernels.sampler import (
 )
 from pbrs_farm.transport.metropolis.film import (
     ChainContext,
+    Chains,
     Film,
     sample_film,
     splat,
@@ -74,17 +75,6 @@ class MutatedSampler:
     def get_2d(self, dim: Any) -> Any:
         """Point2f of dimensions dim and dim + 1."""
         return mi.Point2f(self.get_1d(dim), self.get_1d(mi.UInt32(dim) + 1))
-
-
-class Chains(NamedTuple):
-    """Where N chains stand."""
-
-    samples: Any  # (STORED_DIMS * N,) numbers in the unit cube, dimension by dimension
-    light: Any  # Color3f
-    target: Any  # target function of the light
-    pixel: Any  # UInt32
-    is_reconnectable: Any  # Bool: the path's suffix can be seen from other pixels
-    suffixes: Any  # (SUFFIX_FLOATS * N,), column by column (reconnection.py)
 
 
 @dataclass

@@ -24,7 +24,7 @@ leave a path to its own pixel.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -43,6 +43,7 @@ from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
 from pbrs_farm.transport.metropolis.film import (
     ChainContext,
+    Chains,
     Film,
     sample_pixel,
     splat,
@@ -51,33 +52,14 @@ from pbrs_farm.transport.metropolis.film import (
 from pbrs_farm.transport.scene_tables.material_rows import GLASS
 
 SUFFIX_FLOATS: Final = 36
-MIN_DISTANCE_M: Final = 0.1
+MIN_DISTANCE_M: Final = 0.1  # nearer, 1 / distance^2 makes fireflies
 _SUFFIX_PACKETS: Final = SUFFIX_FLOATS // 4
 _PREFIX_PACKETS: Final = 7
-_LANES_PER_LAUNCH: Final = 1 << 22
+_LANES_PER_LAUNCH: Final = 1 << 22  # pairs of chain and pixel, against memory
 _NO_PIXEL: Final = 0xFFFFFFFF
 
 # Columns of a suffix that are written one by one; record_suffix lists the others.
 _PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT = 3, 28, 31, 32
-
-
-class ChainStates(Protocol):
-    """Where N chains stand (markov_chains.Chains)."""
-
-    @property
-    def pixel(self) -> Any:
-        """(N,) UInt32."""
-        ...
-
-    @property
-    def is_reconnectable(self) -> Any:
-        """(N,) Bool: whether the path's suffix can be reconnected to other prefixes."""
-        ...
-
-    @property
-    def suffixes(self) -> Any:
-        """(SUFFIX_FLOATS * N,), column by column."""
-        ...
 
 
 class PixelGroups(NamedTuple):
@@ -110,6 +92,7 @@ def stratified_groups(height: int, width: int, n: int, seed: int) -> PixelGroups
     The picture is cut into as many square cells as a group may have pixels; every cell gives its
     pixels to different groups, at random, so that neighbours do not share their noise.
     """
+    # Find the smallest cells of which there are no more than n.
     side = 1
     while -(-height // side) * -(-width // side) > max(n, 1):
         side += 1
@@ -237,17 +220,13 @@ def finish_suffix(suffix: Any, light: Any, arriving: Any, active: Any) -> None:
 
 
 def reconnect(
-    scene: DeviceScene,
-    film: Film,
-    prefixes: Any,
-    groups: PixelGroups,
-    chains: ChainStates,
-    weight: Any,
+    scene: DeviceScene, film: Film, prefixes: Any, groups: PixelGroups, chains: Chains, weight: Any
 ) -> None:
     """Splat every chain's suffix at all prefixes of its pixel's group.
 
     prefixes: rows of trace_prefixes(); weight: what each chain has to splat.
     """
+    # Choose the chains whose suffix can be seen from elsewhere.
     chosen = dr.compress(chains.is_reconnectable)
     n_chains = dr.width(chosen)
     # Transpose: a row a suffix.
@@ -275,6 +254,7 @@ def _reconnect_some(
     weight: Any,
 ) -> None:
     """Splat the suffixes of some chains, a lane a pair of chain and pixel."""
+    # Pair each chain with the pixels of its own pixel's group.
     n = dr.opaque(mi.UInt32, groups.n)
     lane = dr.arange(mi.UInt32, dr.width(chains) * groups.n)
     row, k = lane // n, lane % n
@@ -305,6 +285,7 @@ def _contribution(
     active: Any,
 ) -> Any:
     """K of a chain's suffix at a prefix; at its own prefix, as the chain has found it."""
+    # Gather both vertices.
     x1 = _packets(prefixes, pixel, _PREFIX_PACKETS, active)
     x2 = _packets(suffixes, chain, _SUFFIX_PACKETS, True)
     p1, p2 = point(x1[0]), point(x2[0])
