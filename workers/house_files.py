@@ -16,7 +16,9 @@ from pbrs_farm.read.source import SourceRef, resolve
 from pbrs_farm.store.interface import Store
 from workers.job import HouseEntry
 
+# Where sources lie in the store.
 FOLDER: Final = "jobs/sources/"
+# Formats that are one file.
 _UPLOADED: Final = (".sh3d", ".xml", ".zip", ".glb")
 
 
@@ -42,10 +44,12 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
 
     Folders (SUNCG, glTF with side files) are not copied: workers must see them at the same path.
     """
+    # A source in one file goes into the store, below its house's id.
     for ref in refs:
         placed = _placed(ref)
         if placed.location != ref.location:
             store.put_if_absent(placed.location, Path(ref.location).read_bytes())
+    # Homes take furniture from the examples' package: workers need it too.
     package = homes.cached()
     if package is not None and any(ref.kind in ("example", "sweethome3d") for ref in refs):
         for deb in sorted(cache_folder().glob(f"{homes.PACKAGE}_*.deb")):
@@ -76,6 +80,7 @@ def fill_cache(store: Store) -> None:
         if name.startswith(f"{homes.PACKAGE}_") and name.endswith(".deb"):
             folder = cache_folder()
             folder.mkdir(parents=True, exist_ok=True)
+            # It appears whole or not at all.
             part = folder / f".{name}.part"
             part.write_bytes(store.get(key))
             part.replace(folder / name)

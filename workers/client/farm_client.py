@@ -74,6 +74,7 @@ class Farm:
         from pbrs_farm.run.output_root import claim_root
         from workers.job import lines_from_houses
 
+        # The same work has the same id: a job that is there is left alone.
         houses, spec = completed(houses, spec)
         self.ledger.ping()
         view = self.ledger.view(spec.job_id)
@@ -134,6 +135,7 @@ class Farm:
         """State, stages (done, running, queued, failed, rate, ETA), houses, workers, storage."""
         view = self.view(job)
         workers = self.registry.workers()
+        # A handful of reads, whatever the size of the job.
         stages = stage_views(view, self.registry.slots())
         return {
             "job": job,
@@ -186,6 +188,7 @@ class Farm:
 
     def failures(self, job: str) -> list[dict[str, Any]]:
         """Tasks that failed for good, alike ones together, most frequent first."""
+        # fingerprint -> row; faults alike differ in numbers, ids and paths only
         kinds: dict[str, dict[str, Any]] = {}
         for task, fault in self.ledger.faults(job):
             kind = kinds.setdefault(
@@ -199,6 +202,7 @@ class Farm:
 
     def retry(self, job: str, tasks: Sequence[str] = ()) -> list[str]:
         """Fresh attempts for these tasks, or for all that failed; those that were put back."""
+        # The ledger forgets the failure, then storage does.
         chosen = list(tasks) or [task for task, _fault in self.ledger.faults(job)]
         again = [t for t in chosen if self.ledger.retry(job, str(task_from_text(t)))]
         for task in again:
@@ -288,6 +292,7 @@ def completed(
 
     if not houses:
         raise BadInput("submit", "", "no house")
+    # An id is a folder of the store: two houses of one id would overwrite each other.
     twice = [h for h, n in Counter(h.house_id for h in houses).items() if n > 1]
     if twice:
         raise BadInput("submit", twice[0], "named twice")

@@ -34,6 +34,7 @@ class FarmCollector:
     def collect(self) -> Iterator[Metric]:
         """All metrics; only pbrs_up 0 when Redis does not answer."""
         try:
+            # All or nothing: half an answer would look like a farm that lost its jobs.
             metrics = [*self._farm(), *self._jobs()]
         except LedgerUnavailable:
             yield GaugeMetricFamily("pbrs_up", "1 when Redis answers", value=0)
@@ -42,6 +43,7 @@ class FarmCollector:
         yield from metrics
 
     def _farm(self) -> Iterator[Metric]:
+        # Queues, slots and workers: what an autoscaler and a person on call look at.
         depth = GaugeMetricFamily("pbrs_queue_messages", "messages waiting", labels=["queue"])
         for queue in QUEUES:
             depth.add_metric([queue], self._ledger.queue_length(queue))
@@ -52,6 +54,7 @@ class FarmCollector:
         yield slots
         alive = sum(w.age_s <= ALIVE_S for w in self._registry.workers())
         yield GaugeMetricFamily("pbrs_workers", f"workers seen in {ALIVE_S:.0f} s", value=alive)
+        # Storage and Redis, without which nothing moves.
         is_open = bool(self._registry.breaker())
         yield GaugeMetricFamily("pbrs_breaker_open", "1 while storage is unhealthy", value=is_open)
         used = self._ledger.client.info("memory")["used_memory"]

@@ -33,6 +33,7 @@ def rebuild(
     progress: Callable[[str], None] = lambda _line: None,
 ) -> None:
     """Enter every house of the job as far as its markers say. The job must have just been created."""
+    # One listing for all houses, then a look at each that has begun.
     done = done_steps(store) if houses else {}
     progress(f"{sum(map(len, done.values()))} markers of {len(done)} houses")
     numbered = iter(enumerate(houses))
@@ -44,6 +45,7 @@ def rebuild(
 
 def done_steps(store: Store) -> dict[str, frozenset[str]]:
     """House -> names of its markers, from one listing of the store."""
+    # Keys look like houses/<id>/done/<step>[.<view>].json
     names: dict[str, list[str]] = {}
     for key in store.list(f"{keys.FOLDERS[0]}/"):
         at = keys.parse_house_key(key)
@@ -94,6 +96,7 @@ def _enter(
 def _runs(
     chunk: list[tuple[int, HouseEntry]], states: list[HouseState | None]
 ) -> Iterator[tuple[bool, list[tuple[int, HouseEntry, HouseState | None]]]]:
+    # Cut where fresh houses and houses with a past meet.
     current: list[tuple[int, HouseEntry, HouseState | None]] = []
     for (index, house), state in zip(chunk, states, strict=True):
         if current and (state is None) != (current[0][2] is None):

@@ -347,6 +347,7 @@ class RedisLedger:
         """Inside: whatever Redis refuses or fails at becomes LedgerUnavailable, one clear line."""
         try:
             yield
+        # From the special to the general; the URL is shown without its password.
         except redis.AuthenticationError as error:
             raise LedgerUnavailable(f"{self._where} refuses these credentials: {error}") from error
         except redis.exceptions.NoPermissionError as error:

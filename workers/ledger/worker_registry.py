@@ -72,6 +72,7 @@ class Registry:
         client = self._ledger.client
         with self._ledger.errors():
             now = self._ledger.now()
+            # Forget who is gone, then read everybody in one round trip.
             client.zremrangebyscore(f"{self._g}workers", "-inf", now - _GONE_S)
             seen = client.zrange(f"{self._g}workers", 0, -1, withscores=True)
             pipe = client.pipeline(transaction=False)

@@ -59,6 +59,7 @@ class HouseRunner:
         if request.stage == GEOMETRY:
             return self._geometry(request, spec, on_step)
         if request.stage in (GL, LIGHT):
+            # What light needs of the house: the first batch that comes here makes it.
             if request.stage == LIGHT:
                 for step in plan.needed_of_house("light", request.house):
                     self._step(request, spec, on_step, step)

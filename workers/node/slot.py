@@ -154,11 +154,13 @@ class Slot:
             heard = self._process.poll(_POLL_S)
             if isinstance(heard, Ended):
                 return heard
+            # Keep the others from claiming what would wait as well.
             if heard is not None and heard.kind == "waiting":
                 self._open_breaker(heard.text)
             stop = self._why_stop(held)
             if stop is not None:
                 return self._process.kill(stop, f"stopped: {stop}")
+            # A long task's log can be read while it runs.
             if self._clock() >= self._upload_at:
                 self._upload_at = self._clock() + _LOG_EVERY_S
                 self._put(held.log_key, self._process.log_tail())
@@ -222,6 +224,7 @@ class Slot:
             logging.DEBUG if claim.verdict in ("done", "early") else logging.INFO,
             "%s/%s not run: %s %s", job, task, claim.verdict, claim.detail,
         )  # fmt: skip
+        # A message came twice, or its holder died with the Celery child that took it.
         if claim.verdict == "leased":
             self._release_dead_sibling(job, task, claim.detail)
         if claim.verdict in ("version", "recipe"):

@@ -78,6 +78,7 @@ class RenderProcess:
     def begin(self, request: bytes, *, task_s: float = math.inf) -> None:
         """Give it a task of at most task_s seconds; the process is started when there is none."""
         assert not self._is_busy, "one task at a time"
+        # Start a process unless one lives; the request waits in its pipe until it is ready.
         child = self._child
         if child is None or child.exit_code() is not None:
             self.stop()
@@ -95,6 +96,7 @@ class RenderProcess:
         child = self._child
         assert child is not None
         assert self._is_busy, "no task to wait for"
+        # Look at the limits once a second, also while it talks without pause.
         if self._clock() >= self._check_at:
             self._check_at = self._clock() + CHECK_EVERY_S
             exceeded = self._exceeded(child)
@@ -168,6 +170,7 @@ class RenderProcess:
         used_mb = child.resident_mb()
         if used_mb > limits.memory_mb:
             return "resource", f"{used_mb:.0f} MB resident, {limits.memory_mb:.0f} allowed; killed"
+        # Starting: its task and its step have not begun.
         if not self._is_ready:
             if now - self._begun_at > limits.start_s:
                 return "machine", f"the process did not start within {limits.start_s:.0f} s"
