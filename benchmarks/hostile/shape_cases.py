@@ -93,12 +93,7 @@ def fan_scene(corners: list[Point]) -> bytes:
     for name, y in (("Floor", 0.0), ("Ceiling", 2.6)):
         ring = [[x, y, z] for x, z in corners]
         ring = ring if name == "Ceiling" else ring[::-1]
-        centre = [0.0, y, 0.0]
-        quads = [
-            [centre, a, [(p + q) / 2 for p, q in zip(a, b)], b]
-            for a, b in zip(ring, [*ring[1:], ring[0]])
-        ]
-        s.node(name, mesh=s.mesh(quads))
+        s.node(name, mesh=_fan(s, ring))
     sides = [
         [[a[0], 0, a[1]], [b[0], 0, b[1]], [b[0], 2.6, b[1]], [a[0], 2.6, a[1]]]
         for a, b in zip(corners, [*corners[1:], corners[0]])
@@ -106,6 +101,18 @@ def fan_scene(corners: list[Point]) -> bytes:
     s.node("Walls", mesh=s.mesh(sides))
     s.node("chair", mesh=s.box([-0.3, 0, -0.3], [0.3, 0.8, 0.3]))
     return s.glb()
+
+
+def _fan(s: Scene, ring: list[list[float]]) -> int:
+    """A mesh of one polygon, a fan of triangles about its first corner: two fewer than corners."""
+    n = len(ring)
+    positions = s.writer.add_vertices(np.array(ring, np.float32), with_bounds=True)
+    faces = np.array([[0, k, k + 1] for k in range(1, n - 1)], np.int32)
+    attributes = {"POSITION": positions}
+    s.meshes.append(
+        {"primitives": [{"attributes": attributes, "indices": s.writer.add_faces(faces)}]}
+    )
+    return len(s.meshes) - 1
 
 
 def _suncg_fan(seed: int, place: Place) -> list[Words]:
