@@ -1,7 +1,7 @@
-"""The `pbrs-farm` command: words -> one verb's handler -> exit code. Effects: the verb's.
+"""The `pbrs-farm` command: arguments -> one verb's handler -> exit code. Effects: the verb's.
 
 A command imports the module of its own verb only. Exit codes: 0 done; 1 something failed, the rest
-was done; 2 the words are wrong; 130 interrupted.
+was done; 2 the arguments are wrong; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ MODULES: Final = {
 }  # fmt: skip
 """Module of pbrs_farm.commands -> the verbs it adds."""
 
-_OF_THE_FARM: Final = ("submitting", "steering")
+_OF_THE_FARM: Final = ("submitting", "steering")  # modules that need celery and redis
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code."""
+    # Find the verb's module: no other is imported.
     words = sys.argv[1:] if argv is None else argv
     verb = words[0] if words else ""
     module = next((name for name, verbs in MODULES.items() if verb in verbs), None)
@@ -59,8 +60,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt:
         warn("interrupted; the same command goes on where it stopped")
-        return 130
+        return 130  # 128 + SIGINT, as shells have it
     except BrokenPipeError:
+        # The reader of the pipe is gone: keep Python from complaining as it exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 

@@ -86,6 +86,7 @@ def _llvm() -> Finding:
     library = find_llvm()
     if library is not None:
         return Finding("LLVM", "ok", str(library))
+    # Say which versions there are: an old one looks like a good one to apt.
     old = ", ".join(".".join(map(str, v)) for v, _path in llvm_libraries())
     text = f"only {old}; 14 to 16 crash inside Dr.Jit" if old else "no libLLVM found"
     text += f"; {MIN_LLVM} or later is needed (19 is what we test); running with scalar_rgb, several times slower"
@@ -137,6 +138,7 @@ def _probe(
     """
     code = f"import sys; from {__name__} import {check.__name__} as f; print(f(sys.argv[1]))"
     command = [sys.executable, "-c", code, argument]
+    # The child imports the check by name; its last line is what it found.
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PROBE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
@@ -144,6 +146,7 @@ def _probe(
         return Finding(part, state, text, remedy, needed)
     if done.returncode == 0:
         return Finding(part, "ok", done.stdout.strip().splitlines()[-1], "", needed)
+    # The last line of a traceback, or of SystemExit, is the fault.
     lines = [line for line in done.stderr.splitlines() if line.strip()]
     text = lines[-1] if lines else f"ended with exit code {done.returncode}"
     return Finding(part, state, text[:200], remedy, needed)
@@ -197,6 +200,7 @@ def check_pictures(_argument: str) -> str:
 
 def check_redis(url: str) -> str:
     """The Redis at url answers."""
+    # By name: the package itself does without Redis.
     client = import_module("redis").Redis.from_url(url, socket_timeout=5)
     return f"answers, version {client.info('server')['redis_version']}"
 

@@ -82,6 +82,7 @@ class _PlainLines(ProgressReporter):
         if event.kind == "failed":
             sys.stderr.write(f"{clock} {name} {event.step}: FAILED: {event.message}\n")
         elif event.kind in ("done", "kept"):
+            # Add the step to its view; say a house's steps at once.
             self._seconds[name] = self._seconds.get(name, 0.0) + event.seconds
             self._made[name] = self._made.get(name, 0) + (event.kind == "done")
             if event.view_id is None:
@@ -141,6 +142,7 @@ class _Bars(ProgressReporter):
             self._progress.update(self._views, note=f"{self._rate()}  {note}")
         elif event.step == "cameras" and event.kind in ("done", "kept"):
             n = len(event.facts.get("views", []))
+            # The number of views is known once the cameras are.
             self._n_views += min(n, self._limit) if self._limit else n
             self._progress.update(self._views, total=self._n_views)
         elif event.kind == "end" and event.view_id is None:
@@ -151,5 +153,6 @@ class _Bars(ProgressReporter):
             self._progress.advance(self._views)
 
     def _rate(self) -> str:
+        # Leave out the first view: its time includes the house's.
         seconds = time.monotonic() - self._started if self._started else 0.0
         return f"{60 * (self._n_ended - 1) / seconds:.1f}/min" if self._n_ended > 1 else ""

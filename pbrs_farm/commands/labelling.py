@@ -55,6 +55,7 @@ def _label_sheet(args: argparse.Namespace) -> int:
     from pbrs_farm.images import png_from_array
     from pbrs_farm.store.folder import FolderStore
 
+    # The root is OUT of OUT/houses/<house>/views/<view>.
     folder = args.view.resolve()
     root = folder.parents[3] if len(folder.parents) > 3 else folder
     view = next((v for v in views_of(root) if v.folder.resolve() == folder), None)

@@ -35,14 +35,14 @@ def _doctor(args: argparse.Namespace) -> int:
         echo_json({"can_run": fine, "findings": [asdict(f) for f in findings]})
         return 0 if fine else 1
     for f in findings:
+        # One line a part, and what to do where it is not fine.
         mark = {"ok": "ok      ", "degraded": "degraded", "missing": "MISSING "}[f.state]
         echo(f"{mark}  {f.part:<20} {f.text}")
         if f.state != "ok" and f.remedy:
             echo(f"{'':<32}-> {f.remedy}")
     echo()
-    echo(
-        "This machine can render." if fine else "This machine cannot render yet: see MISSING above."
-    )
+    missing = "This machine cannot render yet: see MISSING above."
+    echo("This machine can render." if fine else missing)
     return 0 if fine else 1
 
 
@@ -81,6 +81,7 @@ def _recipes(args: argparse.Namespace) -> int:
     echo(f"# recipe {args.name}; --set group.field=value overrides any field")
     for group, info in Recipe.model_fields.items():
         value = getattr(recipe, group)
+        # Fields of the recipe itself, like the seed, stand alone.
         if not hasattr(type(value), "model_fields"):
             echo(f"{group} = {json.dumps(value)}")
             continue

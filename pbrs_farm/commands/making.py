@@ -118,6 +118,7 @@ def _run_homes(
         store=settings_from_environment().store,
         sources=sources,
     )
+    # Run it, reporting progress as standard output suits.
     _warn_of_slowness()
     started = time.monotonic()
     n_homes = len(homes) + len(sources)
@@ -139,6 +140,7 @@ def _warn_of_slowness() -> None:
 
 
 def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
+    # For machines: one line of JSON.
     if args.json:
         row = {
             "event": "summary", "houses": summary.houses, "views": summary.n_views,
@@ -158,10 +160,9 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
     for house, reason in summary.without_views:
         warn(f"{house}: no view: {reason}")
     for what, message, command in summary.failures:
-        if command:  # the message was printed when it happened
-            warn(f"{what} failed; reproduce: {command}")
-        else:
-            warn(message if message.startswith(what) else f"{what}: {message}")
+        text = message if message.startswith(what) else f"{what}: {message}"
+        # A step that failed has printed its message when it happened.
+        warn(f"{what} failed; reproduce: {command}" if command else text)
 
 
 def _demo(args: argparse.Namespace) -> int:
@@ -169,6 +170,7 @@ def _demo(args: argparse.Namespace) -> int:
     if home != "builtin" and not Path(home).exists():
         from pbrs_farm.assets import homes
 
+        # Without a network the demo still shows something.
         try:
             homes.fetch()
         except (MachineFailed, BadInput) as error:
@@ -189,6 +191,7 @@ def _step(args: argparse.Namespace) -> int:
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 
+    # The recipe is the stored one, so that the step does what the run did.
     if args.step not in STEPS:
         raise BadInput("step", args.step, "no such step", hint=f"of {', '.join(STEPS)}")
     store = store_from_url(args.out, settings_from_environment().store)
@@ -216,6 +219,7 @@ def _objects(args: argparse.Namespace) -> int:
     if args.count < 1:
         raise BadInput("--count", str(args.count), "expected at least one model")
     categories = args.categories.split(",") if args.categories else []
+    # Pick at random by the recipe's seed: the same models each time.
     models = find_models(args.models)
     files = SourceFiles()
     chosen = pick_models(models, categories, args.count, recipe_of(args).seed)

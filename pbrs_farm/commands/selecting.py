@@ -92,11 +92,13 @@ def _select(args: argparse.Namespace) -> int:
     store = store_from_url(args.folder, settings_from_environment().store)
     recipe = Recipe.model_validate_json(store.get("recipe.json"))
     fields = _fields(recipe, args)
+    # Read the reference, or build it from photographs as the views' recipe says.
     is_file = args.reference.is_file() and args.reference.suffix != ".mat"
     reference = (
         read_reference(args.reference) if is_file else _built(args, recipe.histogram, fields)
     )
     summary = select(store, reference, fields, reference_name=str(args.reference), run=args.run)
+    # Write the page from the run as it is stored now.
     if args.report:
         from pbrs_farm.curate.selection_report import selection_report
 
@@ -118,5 +120,6 @@ def _fields(recipe: Recipe, args: argparse.Namespace) -> SelectionFields:
     for field in ("score_mode", "balance", "per_room_cap"):
         if getattr(args, field) is not None:
             changed[f"selection.{field}"] = str(getattr(args, field))
+    # Validate all of them together, as a recipe.
     held = {f"selection.{k}": str(v) for k, v in recipe.selection.model_dump(mode="json").items()}
     return recipe_from_name("fast", held | changed).selection

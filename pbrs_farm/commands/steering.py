@@ -30,11 +30,8 @@ def add_verbs(verb: Verb) -> None:
 
     p = farm_verb("status", _status, "how far a job is: stages, rate, time left, workers")
     _add_job(p)
-    p.add_argument(
-        "--watch",
-        action="store_true",
-        help="again every two seconds, to the end (--json: a line each)",
-    )
+    text = "again every two seconds, to the end (--json: a line each)"
+    p.add_argument("--watch", action="store_true", help=text)
     p = farm_verb("why", _why, "what a task, a house or a view waits for")
     p.add_argument("task", help="HOUSE, HOUSE/VIEW or HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
@@ -61,6 +58,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
 
 
+# Verbs that change a job's state -> what they do.
 _STEERING = {
     "pause": "start nothing more; what runs, ends",
     "resume": "go on with a paused job",
@@ -71,7 +69,7 @@ _STEERING = {
 
 def _add_job(p: argparse.ArgumentParser, *, flag: bool = False) -> None:
     text = "job id (default: the newest)"
-    if flag:
+    if flag:  # of a verb whose positional arguments name tasks
         p.add_argument("--job", default="", help=text)
     else:
         p.add_argument("job", nargs="?", default="", help=text)
@@ -93,12 +91,13 @@ def _show(args: argparse.Namespace, value: Any, text: Callable[[], str]) -> None
 
 def _status(args: argparse.Namespace) -> int:
     farm, job = _farm_and_job(args)
+    # Ask again every two seconds while --watch holds and the job is not over.
     while True:
         status = farm.status(job)
         if args.watch and args.json:
             echo(json.dumps(status, sort_keys=True))
         elif args.watch and sys.stdout.isatty():
-            echo(f"\x1b[H\x1b[2J{status_text(status)}")
+            echo(f"\x1b[H\x1b[2J{status_text(status)}")  # home, clear the screen
         else:
             _show(args, status, lambda s=status: status_text(s))  # type: ignore[misc]
         sys.stdout.flush()
@@ -137,6 +136,7 @@ def _retry(args: argparse.Namespace) -> int:
 
 def _steer(args: argparse.Namespace) -> int:
     farm, job = _farm_and_job(args)
+    # Each of these verbs is a method of the farm.
     state: str = getattr(farm, args.what)(job)
     _show(args, {"job": job, "state": state}, lambda: f"{job} {state}")
     return 0

@@ -55,6 +55,7 @@ def _submit(args: argparse.Namespace) -> int:
     )
 
     spec = _spec(args)
+    # Read the homes: what each is, and where workers will find it.
     found = entries_from_arguments(home_arguments(args.homes, args.houses))
     reference = placed_reference(args.reference) if args.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
@@ -64,6 +65,7 @@ def _submit(args: argparse.Namespace) -> int:
         where = f"{in_place[0].location}{' ...' if len(in_place) > 1 else ''}"
         count = counted(len(in_place), "house")
         warn(f"{count} not uploaded: {where}; workers must see that path")
+    # Estimate, and touch neither the store nor Redis.
     if args.dry_run:
         plan = estimate(completed(houses, spec)[1], args.slots)
         if args.json:
@@ -71,6 +73,7 @@ def _submit(args: argparse.Namespace) -> int:
         else:
             echo("\n".join(f"{k:<14}{v}" for k, v in plan.items()))
         return 0
+    # Fail before anything is uploaded where Redis does not answer.
     farm = farm_of(args)
     farm.ledger.ping()
     upload(farm.store, [ref for _entry, ref in found])
@@ -80,6 +83,7 @@ def _submit(args: argparse.Namespace) -> int:
     if args.json:
         echo_json({"job": job.job_id, "houses": job.n_houses, "was": job.was})
         return 0
+    # The same homes and recipe are the same job.
     if job.was:
         warn(f"this job is there already, {job.was}")
     echo(job.job_id)

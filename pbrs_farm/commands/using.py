@@ -96,6 +96,7 @@ def _verify_light(args: argparse.Namespace) -> int:
     from pbrs_farm.transport.validation.claims import light_claims
 
     variant, claims = choose_variant(), []
+    # Print each claim as it is proved.
     if not args.json:
         echo(f"{'':<5}{'claim':<63}{'measured':<48}expected")
     for claim in light_claims(variant):
@@ -123,6 +124,7 @@ def _relight(args: argparse.Namespace) -> int:
             what = "lists the lamps and makes no picture: not with --lamp, --out"
             raise BadInput("--list", "", what)
         return _list_lamps(args.view)
+    # Factors scale radiance: none may be negative.
     for name, factor in (("--indoor", args.indoor), ("--outdoor", args.outdoor)):
         if not 0 <= factor < math.inf:
             raise BadInput(name, str(factor), "expected a number that is finite and not negative")
@@ -143,6 +145,7 @@ def _list_lamps(view: Path) -> int:
     rows = lamps_of_view(view)
     echo(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
     for row in rows:
+        # A lamp that brings no light to the view has no layer.
         share = f"{row['share']:.1%}" if row["layer"] else "-"
         place = f"{row['item']:<12} {row['room'] or '-':<8}"
         echo(f"{row['number']:>4} {share:>6} {row['lm']:>7.0f}  {place} {row['name']}")
@@ -161,5 +164,6 @@ def _lamp_factor(argument: str) -> LampFactor:
     if not name or len(factors) not in (1, 3) or not all(0 <= f < math.inf for f in factors):
         expected = "expected LAMP=F or LAMP=R,G,B, numbers that are finite and not negative"
         raise BadInput("--lamp", argument, expected)
+    # One number is the factor of all three channels.
     r, g, b = factors * (3 // len(factors))
     return LampFactor(name, (r, g, b))

@@ -18,6 +18,7 @@ from pbrs_farm.images import array_from_png
 PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
 """The picture of a view is the first of these it has."""
 
+# Classes of the supercategory "structure"; all others are objects.
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
 
 
@@ -37,20 +38,19 @@ def write_coco(views: list[ViewEntry], out: Path) -> int:
     document = {
         "info": {"description": "pbrs_farm", "version": "1.0"},
         "licenses": _licences(views),
-        "categories": [
-            {
-                "id": i,
-                "name": name,
-                "supercategory": "structure" if name in _STRUCTURE else "object",
-            }
-            for i, name in enumerate(NYU40_NAMES)
-            if i > 0
-        ],
+        "categories": _categories(),
         "images": images,
         "annotations": annotations,
     }
     (out / "annotations.json").write_text(json.dumps(document, separators=(",", ":")) + "\n")
     return 1 + sum("file_name" in image for image in images)
+
+
+def _categories() -> list[dict[str, Any]]:
+    kinds = ["structure" if name in _STRUCTURE else "object" for name in NYU40_NAMES]
+    rows = zip(NYU40_NAMES, kinds, strict=True)
+    # Id 0 is no class.
+    return [{"id": i, "name": n, "supercategory": k} for i, (n, k) in enumerate(rows) if i]
 
 
 def _licences(views: list[ViewEntry]) -> list[dict[str, Any]]:
@@ -68,6 +68,7 @@ def _image(view: ViewEntry, number: int, out: Path) -> dict[str, Any]:
         "K": view.facts["K"],
         "world_from_camera_opencv": view.facts["world_from_camera_opencv"],
     }
+    # Copy the picture of the best mode there is.
     picture = next((f for f in (view.file(f"{m}.png") for m in PICTURES) if f), None)
     if picture is not None:
         name = f"images/{view.house.id}/{view.id}.png"
@@ -81,11 +82,11 @@ def _annotations(view: ViewEntry) -> Iterator[dict[str, Any]]:
     instance = array_from_png((view.folder / "instance.png").read_bytes(), str(view.folder))
     for row in view.facts["instances"]:
         if not row["nyu40"]:
-            continue
+            continue  # no category
         x0, y0, x1, y1 = row["box2d"]
         yield {
             "category_id": row["nyu40"],
-            "bbox": [x0, y0, x1 - x0, y1 - y0],
+            "bbox": [x0, y0, x1 - x0, y1 - y0],  # left, top, width, height
             "area": row["pixels"],
             "iscrowd": 0,
             "segmentation": run_lengths(instance == row["id"]),
@@ -97,6 +98,7 @@ def _annotations(view: ViewEntry) -> Iterator[dict[str, Any]]:
 
 def run_lengths(mask: NDArray[np.bool_]) -> dict[str, list[int]]:
     """COCO's uncompressed run lengths of mask (H, W): column by column, zeros first."""
+    # Cut where the value changes; a mask that starts with ones has a first run of 0.
     flat = mask.T.reshape(-1)
     changes = np.nonzero(np.diff(flat, prepend=False))[0]
     counts = np.diff(np.concatenate([[0], changes, [flat.size]]))
@@ -106,5 +108,6 @@ def run_lengths(mask: NDArray[np.bool_]) -> dict[str, list[int]]:
 def mask_from_run_lengths(runs: dict[str, list[int]]) -> NDArray[np.bool_]:
     """The mask (H, W) that run_lengths wrote."""
     height, width = runs["size"]
+    # Runs alternate between zeros and ones.
     values = np.arange(len(runs["counts"])) % 2 == 1
     return np.repeat(values, runs["counts"]).reshape(width, height).T

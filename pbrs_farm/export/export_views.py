@@ -1,7 +1,7 @@
 """`pbrs-farm export`: a finished output folder in the forms other tools read.
 
-Effects: reads an output folder, writes a new folder; it appears whole or not at all. The forms
-are in export_coco, export_hdf5, export_webdataset and export_released; docs/formats.md tells them.
+Effects: reads an output folder, writes a new folder; it appears whole or not at all. Each form has
+a module here; docs/formats.md describes them.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from pbrs_farm.export.released_layout import write_released
 from pbrs_farm.export.webdataset import write_webdataset
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 
-Writer = Callable[[list[ViewEntry], Path], int]
-"""Views and a folder to write them into -> number of files written."""
+Writer = Callable[[list[ViewEntry], Path], int]  # (views, new folder) -> files written
 
 FORMS: Final[Mapping[str, Writer]] = {
     "coco": write_coco,
@@ -42,6 +41,7 @@ def export(folder: Path, out: Path, form: str, *, selection: str | None = None) 
     if form not in FORMS:
         raise BadInput("--to", form, "no such form", hint=f"of {', '.join(FORMS)}")
     views = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
+    # Leave out views that the selection does not keep.
     if selection is not None:
         kept = _kept(folder, selection)
         views = [v for v in views if (v.house.id, v.id) in kept]
@@ -67,13 +67,14 @@ def _whole_folder(out: Path) -> Iterator[Path]:
     """A folder beside out that becomes out at the end, and is removed on any error."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(out, "", "is there already", hint="name a new folder")
+    # Write beside it, on the same file system, then rename.
     scratch = out.with_name(f".{out.name}.partial")
     shutil.rmtree(scratch, ignore_errors=True)
     try:
         scratch.mkdir(parents=True)
         yield scratch
         if out.exists():
-            out.rmdir()
+            out.rmdir()  # empty, as checked above
         scratch.rename(out)
     except OSError as error:
         raise BadInput(out, "", f"cannot be written: {error.strerror or error}") from error

@@ -35,13 +35,12 @@ def write_hdf5(views: list[ViewEntry], out: Path) -> int:
     for number, view in enumerate(views):
         with h5py.File(out / f"{number}.hdf5", "w") as file:
             for name, value in _datasets(view).items():
-                if isinstance(value, str):
+                if isinstance(value, str):  # JSON: a scalar, which HDF5 cannot compress
                     file.create_dataset(name, data=np.bytes_(value.encode()))
                 else:
                     file.create_dataset(name, data=value, compression="gzip")
-        index.append(
-            json.dumps({"file": f"{number}.hdf5", "house": view.house.id, "view": view.id})
-        )
+        row = {"file": f"{number}.hdf5", "house": view.house.id, "view": view.id}
+        index.append(json.dumps(row))
     (out / "index.jsonl").write_text("\n".join(index) + "\n")
     return len(views) + 1
 
@@ -51,6 +50,7 @@ def _datasets(view: ViewEntry) -> dict[str, NDArray[Any] | str]:
         return array_from_png((view.folder / file).read_bytes(), f"{view.folder}/{file}")
 
     data: dict[str, NDArray[Any] | str] = {}
+    # The last written is the first of PICTURES.
     for mode in reversed(PICTURES):
         if view.file(f"{mode}.png"):
             data[str(mode)] = data["colors"] = png(f"{mode}.png")
@@ -58,16 +58,14 @@ def _datasets(view: ViewEntry) -> dict[str, NDArray[Any] | str]:
     published = png("normal.png") * np.float32(2 / 65535) - np.float32(1)
     # Published axes are x right, y forward, z up; OpenGL's are x right, y up, z backward.
     opengl = np.stack([published[..., 0], published[..., 2], -published[..., 1]], axis=-1)
+    # Labels keep their numbers; depth is in metres, nothing is 0.
     data["depth"] = png("depth.png").astype(np.float32) / np.float32(1000)
     data["normals"] = np.where(valid[..., None], (opengl + 1) / 2, 0).astype(np.float32)
     data["category_id_segmaps"] = png("semantic.png")
     data["instance_segmaps"] = png("instance.png")
-    data["instance_attribute_maps"] = json.dumps(
-        [
-            {"idx": row["id"], "name": row["name"], "category_id": row["nyu40"]}
-            for row in view.facts["instances"]
-        ]
-    )
+    rows = view.facts["instances"]
+    maps = [{"idx": r["id"], "name": r["name"], "category_id": r["nyu40"]} for r in rows]
+    data["instance_attribute_maps"] = json.dumps(maps)
     pose = view.facts["world_from_camera_opengl"]
     data["campose"] = json.dumps({"cam_K": view.facts["K"], "cam2world_matrix": pose})
     return data

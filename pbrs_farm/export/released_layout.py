@@ -34,14 +34,14 @@ def write_released(views: list[ViewEntry], out: Path) -> int:
     houses: dict[str, list[ViewEntry]] = defaultdict(list)
     for view in views:
         houses[view.house.id].append(view)
-    n_files, good = 0, []
+    n_files, good = 0, []  # files written, lines of the list of good views
     for house, own in houses.items():
         for number, view in enumerate(own):
+            place = {"house": house, "id": f"{number:06d}"}
             for stored, published in FILES.items():
-                n_files += _copied(
-                    view.file(stored), out / published.format(house=house, id=f"{number:06d}")
-                )
-            good.append(f"{house}/{number:06d}\n")
+                n_files += _copied(view.file(stored), out / published.format(**place))
+            good.append("{house}/{id}\n".format(**place))
+        # A line of the camera file for each view, in the same order.
         folder = out / "camera_v2" / house
         folder.mkdir(parents=True)
         (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in own))
@@ -65,6 +65,7 @@ def camera_line(view: ViewEntry) -> str:
     pose = np.array(view.facts["world_from_camera_opengl"], np.float64)
     width, height = view.facts["width_px"], view.facts["height_px"]
     k = np.array(view.facts["K"], np.float64)
+    # Half the fields of view, horizontal and vertical.
     half = (math.atan(width / 2 / k[0, 0]), math.atan(height / 2 / k[1, 1]))
     groups = (pose[:3, 3], -pose[:3, 2], pose[:3, 1], half, (view.facts.get("score") or 0.0,))
     return "  ".join(" ".join(f"{x:g}" for x in group) for group in groups) + "\n"

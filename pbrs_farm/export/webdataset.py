@@ -25,9 +25,8 @@ def write_webdataset(views: list[ViewEntry], out: Path) -> int:
     """
     n_shards = 0
     for start in range(0, len(views), VIEWS_PER_SHARD):
-        with tarfile.open(
-            out / f"shard-{n_shards:06d}.tar", "w", format=tarfile.USTAR_FORMAT
-        ) as tar:
+        shard = out / f"shard-{n_shards:06d}.tar"
+        with tarfile.open(shard, "w", format=tarfile.USTAR_FORMAT) as tar:
             for view in views[start : start + VIEWS_PER_SHARD]:
                 _add_sample(tar, view)
         n_shards += 1
@@ -35,6 +34,7 @@ def write_webdataset(views: list[ViewEntry], out: Path) -> int:
 
 
 def _add_sample(tar: tarfile.TarFile, view: ViewEntry) -> None:
+    # A dot would end the key.
     key = f"{view.house.id}__{view.id}".replace(".", "_")
     parts = {"json": view.folder / "view.json"}
     for layer in LAYERS:
@@ -43,6 +43,7 @@ def _add_sample(tar: tarfile.TarFile, view: ViewEntry) -> None:
             parts[f"{layer.name}{file.suffix}"] = file
     for part, file in parts.items():
         data = file.read_bytes()
+        # TarInfo's own defaults: time 0, no owner.
         member = tarfile.TarInfo(f"{key}.{part}")
         member.size = len(data)
         tar.addfile(member, io.BytesIO(data))
