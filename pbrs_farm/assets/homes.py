@@ -112,6 +112,7 @@ def fetch(cache: Path | None = None) -> Package:
 def _unpacked(deb: Deb) -> Package:
     jar = deb.path.parent / f"{PACKAGE}-{deb.sha256[:16]}.jar"
     if not jar.exists():
+        # Unpack the jar under its package's hash, written whole or not at all.
         files = deb.members(lambda name: name == JAR)
         if JAR not in files:
             raise deb.damaged(f"holds no {JAR}")

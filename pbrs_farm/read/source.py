@@ -88,6 +88,7 @@ def _reference(kind: Kind, location: str, files: SourceFiles) -> SourceRef:
         path = Path(location)
         data, name = _bytes(path), path.name
         companions = _companions(kind, path, data, files)
+    # The house's id depends on its own file alone, so companions never rename a house.
     sha = keys.sha256(data)
     house_id = keys.house_id(Path(name).stem, sha)
     return SourceRef(

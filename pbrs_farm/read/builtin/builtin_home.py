@@ -129,6 +129,7 @@ def _walls(index: dict[str, int]) -> tuple[Item, ...]:
     o = OUTER_M
     inner = np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]])
     outer = np.array([[x0 - o, z0 - o], [x1 + o, z0 - o], [x1 + o, z1 + o], [x0 - o, z1 + o]])
+    # Four mitred outer walls, then the wall between the rooms.
     outlines = [
         (outer[[k, (k + 1) % 4]], inner[[k, (k + 1) % 4]], ("wall_default", "wall_default"))
         for k in range(4)
@@ -190,6 +191,7 @@ def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
         openings.append(
             Opening(f"opening_{item_id}", "0", item_id, is_window, cutter, quad, axes[:, 2])
         )
+        # The joinery stands in the hole, turned with the wall.
         piece = _window_piece(width, y1 - y0) if is_window else _door_piece(width, y1 - y0)
         turn = 0.0 if along == "x" else 90.0
         items.append(furniture.place(piece, item_id, room_id, (x, y0, z), turn, index))

@@ -25,12 +25,14 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 def planks(size_px: int = 128, n: int = 8) -> NDArray[np.uint8]:
     """A square metre of wooden floor, n boards along v; tiles in both directions."""
     rng = np.random.default_rng(7)
+    # Give each board its shade and the place of its joint.
     board = np.arange(size_px) * n // size_px
     shade = 0.85 + 0.15 * rng.random((n, 2))
     joint = rng.integers(0, size_px, n)
     x = (np.arange(size_px)[None, :] - joint[:, None]) % size_px
     half = (x >= size_px // 2).astype(int)
     value = np.take_along_axis(shade, half, 1)[board]
+    # Add grain along the board, and dark seams between boards.
     grain = 1 + 0.04 * np.sin(2 * np.pi * 3 * np.arange(size_px) / size_px + 5 * board[:, None])
     seam = (np.arange(size_px) * n % size_px < n)[:, None] | (x == 0)[board]
     value = np.where(seam, 0.45, value * grain)

@@ -53,6 +53,7 @@ def _parted(name: str) -> str:
 
 def _class_of(name: str) -> str | None:
     # The class or kind that the name's last known word (or two) before an aside stands for.
+    # Look before an aside first ("lamp with table" is a lamp), then behind it.
     words = re.findall(r"\d+|[^\W\d_]+", _parted(name))
     aside = next((k for k, w in enumerate(words) if k and (w in _ASIDE or w.isdigit())), len(words))
     return _last_known(words[:aside]) or _last_known(words[aside:])
@@ -60,6 +61,7 @@ def _class_of(name: str) -> str | None:
 
 def _last_known(words: list[str]) -> str | None:
     known = _vocabulary()
+    # The last known word says what the thing is; two words go before one.
     for k in range(len(words) - 1, -1, -1):
         for phrase in (" ".join(words[k - 1 : k + 1]) if k else "", words[k]):
             singular = phrase[: -2 if phrase.endswith(("shes", "ches", "xes", "sses")) else -1]

@@ -55,11 +55,13 @@ def oriented_box(meshes: Sequence[Mesh], world_from_model: NDArray[np.float64]) 
     """The model's own axis-aligned box in the world; None where the transform shears."""
     low = np.min([m.positions.min(0) for m in meshes], 0)
     high = np.max([m.positions.max(0) for m in meshes], 0)
+    # Part the transform into scale and axes; a shear has no such parts.
     scale = np.linalg.norm(world_from_model[:3, :3], axis=0)
     axes = world_from_model[:3, :3] / scale
     if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-4):
         return None
     if np.linalg.det(axes) < 0:
+        # Keep the axes right-handed; a box is symmetric, so nothing moves.
         axes = axes * np.array([-1.0, 1.0, 1.0])
     centre = world_from_model[:3, :3] @ ((low + high) / 2) + world_from_model[:3, 3]
     return Box(centre, scale * (high - low) / 2, axes)

@@ -28,6 +28,7 @@ def planar_parts(item: Item) -> tuple[Item, ...]:
     n = int(plane_of_face.max(initial=0)) + 1
     if not 1 < n <= MAX_PLANES:
         return (item,)
+    # Gather the faces of each plane from all surfaces.
     ends = np.cumsum([len(s.faces) for s in item.surfaces])[:-1]
     by_surface = np.split(plane_of_face, ends)
     found = []
@@ -56,10 +57,13 @@ def _planes(surfaces: tuple[Surface, ...]) -> NDArray[np.int64]:
     p = _corners(surfaces)
     n = area_vectors(p)
     n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
+    # Make the two sides of a plane one: the leading component of its normal is positive.
     leading = np.abs(n).argmax(1)
     n *= np.sign(n[np.arange(len(n)), leading])[:, None]
     offset = np.einsum("ij,ij->i", n, p.mean(1))
+    # Equal planes agree in normal to about a degree and in offset to a centimetre.
     key = np.rint(np.column_stack([n * 50, offset * 100]))
     _, first, plane = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    # Number planes by first appearance, so that ids are stable.
     order = np.argsort(np.argsort(first))
     return np.asarray(order[plane.reshape(-1)], np.int64)

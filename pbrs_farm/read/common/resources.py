@@ -1,6 +1,6 @@
 """Named contents beside a house's plan: models, textures; reads bytes that are already in memory.
 
-Nothing is trusted: names with `..`, absolute names and entries of absurd size are refused, and a
+Nothing is trusted: names with `..`, absolute names and entries of absurd size are rejected, and a
 compressed entry is never unpacked further than it may be.
 """
 
@@ -46,6 +46,7 @@ class ZipResources:
             raise BadHouse(file, "", f"{len(entries)} zip entries, at most {MAX_ENTRIES} are read")
         for entry in entries:
             self._check(entry)
+        # Bound what the archive as a whole unpacks to.
         total = sum(e.file_size for e in entries)
         if total > MAX_TOTAL_BYTES:
             raise BadHouse(file, "", f"unpacks to {total} bytes, at most {MAX_TOTAL_BYTES}")

@@ -45,6 +45,7 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> NDArray
     corners = _facing(floor, 1)
     if not len(corners):
         return None
+    # Take the topmost faces as the floor, and what no wall stands on as walkable.
     y = corners[..., 1].mean(1)
     area = _outline(corners[y > y.max() - _SAME_HEIGHT_M])
     standing = _facing(walls, 1), _facing(walls, -1)
@@ -69,9 +70,11 @@ def floor_polygons(
     corners = _facing(floor, 1)
     if not len(corners):
         return []
+    # Cut closed walls by their footprint, planar walls by a strip along them.
     between = shapely.difference(_outline(corners), _outline(_facing(walls, 1)))
     between = shapely.difference(between, _outline(_facing(walls, -1)))
     pieces = shapely.get_parts(shapely.difference(between, _traces(walls)))
+    # Keep pieces that are large and wide enough; give back what the strips took.
     fit = [p for p in pieces if p.area >= min_area_m2 and not p.buffer(-min_width_m / 2).is_empty]
     fit.sort(key=lambda p: (-p.area, p.bounds))
     found = [polygon_of(p.buffer(_TRACE_M, join_style="mitre")) for p in fit]
@@ -92,6 +95,7 @@ def _traces(walls: Sequence[Surface]) -> Any:
 
 def enclosed_polygon(walls: Sequence[Surface]) -> NDArray[np.float64] | None:
     """The largest piece of plan between walls, for a room without a floor; None if there is none."""
+    # What the walls' hull encloses and no wall covers lies between them.
     footprint = _outline(np.concatenate([_facing(walls, 1), _facing(walls, -1)]))
     return polygon_of(shapely.difference(footprint.convex_hull, footprint))
 
@@ -130,6 +134,7 @@ def _outline(corners: NDArray[np.float64]) -> Any:
     plan = corners[:, :, [0, 2]]
     if len(plan) > MAX_OUTLINE_FACES:
         return shapely.MultiPoint(plan.reshape(-1, 2)).convex_hull
+    # Widen triangles a little before their union, so that cracks between them close.
     triangles: Any = shapely.polygons(plan)
     triangles = triangles[shapely.area(triangles) > 1e-10]
     return shapely.union_all(shapely.buffer(triangles, _CRACK_M, join_style="mitre")).buffer(

@@ -13,7 +13,7 @@ class RootFolder:
     """The files of a source below root; remembers what was read, so that a digest covers it all.
 
     Names are relative, with "/" between folders. A name or a symlink that leads out of root is
-    refused with BadHouse, as is a file larger than its limit.
+    rejected with BadHouse, as is a file larger than its limit.
     """
 
     def __init__(self, root: Path) -> None:

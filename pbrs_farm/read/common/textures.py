@@ -42,11 +42,13 @@ def _texture(picture: Image.Image, data: bytes, name: str) -> tuple[Texture, boo
     width, height = picture.size
     if max(width, height) > MAX_EDGE_PX or width * height > MAX_PIXELS:
         raise ValueError(f"the picture is too large: {width} x {height}")
+    # Decode in full, a JPEG at an eighth: a header alone proves nothing.
     media_type = _KEPT.get(picture.format or "")
     if media_type == "image/jpeg":
         picture.draft("RGB", (max(width // 8, 1), max(height // 8, 1)))  # quick: eighth size
     picture.load()
     has_holes = _has_holes(picture)
+    # Store other kinds as PNG, with alpha where it cuts holes.
     if media_type is None:
         buffer = io.BytesIO()
         picture.convert("RGBA" if has_holes else "RGB").save(buffer, "PNG")

@@ -47,11 +47,11 @@ class MissingFile(BadHouse):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A node of the scene. path: its index and those of its ancestors, outermost first."""
+    """A node of the scene."""
 
-    index: int
-    path: tuple[int, ...]
-    world_from_node: NDArray[np.float64]
+    index: int  # of the node
+    path: tuple[int, ...]  # node indices from the root, its own last
+    world_from_node: NDArray[np.float64]  # (4, 4)
 
 
 def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
@@ -63,6 +63,7 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
     gltf = _parsed(data, file)
     if not isinstance(gltf.document.get("asset"), dict):
         raise BadHouse(file, "asset", "is missing; this is no glTF file")
+    # Reject what the file says it cannot be read without.
     required = gltf.document.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else []:
         if name not in UNDERSTOOD:
@@ -144,6 +145,7 @@ def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
     """
     scene = gltf.document.get("scene", 0)
     roots = _indices(gltf, entry(gltf, "scenes", scene), f"scenes[{scene}]", "nodes")
+    # Visit nodes depth first, parents before children, in the file's order.
     stack = [Placed(i, (i,), np.eye(4)) for i in reversed(roots)]
     n = 0
     while stack:
@@ -177,6 +179,7 @@ def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> NDArray[n
             raise BadHouse(gltf.file, f"{place}.matrix", "is not affine (column-major)")
         return np.asarray(m)
     x, y, z, w = numbers(gltf, node.get("rotation", [0, 0, 0, 1]), 4, f"{place}.rotation")
+    # Turn the unit quaternion into a rotation, then scale and move (T * R * S).
     length = (x * x + y * y + z * z + w * w) ** 0.5
     if not 0.5 < length < 2:
         raise BadHouse(gltf.file, f"{place}.rotation", "is no unit quaternion")

@@ -63,16 +63,16 @@ class Mapping:
 
 def mapping_from_json(data: bytes, file: str) -> Mapping:
     """The mapping in a JSON file; BadHouse naming the row that is wrong."""
-    plain = json_from_bytes(data, file)
-    nodes = plain.get("nodes") if isinstance(plain, dict) else None
+    fields_json = json_from_bytes(data, file)
+    nodes = fields_json.get("nodes") if isinstance(fields_json, dict) else None
     if not isinstance(nodes, dict):
         raise BadHouse(file, "nodes", 'expected {"nodes": {"name or pattern": "class"}}')
     return Mapping(tuple((pattern, _row(row, file, pattern)) for pattern, row in nodes.items()))
 
 
 def _row(row: Any, file: str, pattern: str) -> NodeClass:
-    plain = {"class": row} if isinstance(row, (str, int)) else row
-    found = _tagged(plain) if isinstance(plain, dict) else None
+    fields_json = {"class": row} if isinstance(row, (str, int)) else row
+    found = _tagged(fields_json) if isinstance(fields_json, dict) else None
     if found is None:
         text = f"{str(row)[:60]!r} names no class; one of {', '.join(NYU40_NAMES[1:])}"
         raise BadHouse(file, f"nodes[{pattern[:60]!r}]", text)
@@ -105,10 +105,10 @@ def collection_of(name: str, seen: NodeClass) -> NodeClass | None:
     return None
 
 
-def _tagged(plain: dict[str, Any]) -> NodeClass | None:
-    kind_word = str(plain.get("kind", "")).lower()
+def _tagged(fields_json: dict[str, Any]) -> NodeClass | None:
+    kind_word = str(fields_json.get("kind", "")).lower()
     kind = next((k for k in ItemKind if k.value == kind_word), None)
-    nyu40 = plain.get("nyu40", plain.get("class"))
+    nyu40 = fields_json.get("nyu40", fields_json.get("class"))
     if isinstance(nyu40, str):
         word = re.sub(r"[ _-]", "", nyu40.lower())
         nyu40 = int(word) if word.isascii() and word.isdigit() and len(word) < 3 else _IDS.get(word)

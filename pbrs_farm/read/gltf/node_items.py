@@ -91,20 +91,20 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
     members: dict[tuple[int, ...], NodeClass] = {}
     found: list[_Thing] = []
     for node in placed_nodes(gltf):
-        plain = entry(gltf, "nodes", node.index)
-        name = str(plain.get("name", ""))[:200]
-        extras = plain["extras"] if isinstance(plain.get("extras"), dict) else {}
+        fields_json = entry(gltf, "nodes", node.index)
+        name = str(fields_json.get("name", ""))[:200]
+        extras = fields_json["extras"] if isinstance(fields_json.get("extras"), dict) else {}
         above = owner.get(node.path[:-1])
         seen = class_of_node(name, extras, mapping) or members.get(node.path[:-1])
-        if seen and not seen.is_tagged and "mesh" not in plain:
+        if seen and not seen.is_tagged and "mesh" not in fields_json:
             grouped = collection_of(name, seen)
             if grouped is not None:
                 seen = None
                 if grouped.nyu40 and above is None:
                     members[node.path] = grouped
-        extensions = plain.get("extensions")
+        extensions = fields_json.get("extensions")
         has_light = isinstance(extensions, dict) and "KHR_lights_punctual" in extensions
-        has_part = "mesh" in plain or has_light
+        has_part = "mesh" in fields_json or has_light
         if (seen and (above is None or seen.is_tagged)) or (above is None and has_part):
             above = _Thing(node, name, seen or _UNMAPPED, extras)
             found.append(above)

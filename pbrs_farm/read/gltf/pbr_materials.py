@@ -36,26 +36,29 @@ class SceneMaterials:
         """
         if number is None:
             return Material("default", is_default=True), None
-        plain = entry(self._gltf, "materials", number)
+        fields_json = entry(self._gltf, "materials", number)
         place = f"materials[{number}]"
-        look = _object(plain, "pbrMetallicRoughness")
+        look = _object(fields_json, "pbrMetallicRoughness")
         factor = numbers(self._gltf, look.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
+        # The metallic-roughness factors; a texture of them is not looked at.
         metallic = self._fraction(look, "metallicFactor", 1.0, place)
         roughness = self._fraction(look, "roughnessFactor", 1.0, place)
         if "metallicRoughnessTexture" in look:
             metallic = 0.0  # the factors only scale a picture that this reader does not look at
         found = self._texture(look.get("baseColorTexture"), place)
-        transmission = _object(_object(plain, "extensions"), "KHR_materials_transmission")
+        transmission = _object(_object(fields_json, "extensions"), "KHR_materials_transmission")
         passes = self._fraction(transmission, "transmissionFactor", 0.0, place)
-        mode = plain.get("alphaMode", "OPAQUE")
+        # Opacity is what blending lets through, or transmission, whichever is less.
+        mode = fields_json.get("alphaMode", "OPAQUE")
         opacity = float(np.clip(factor[3], 0, 1)) if mode == "BLEND" else 1.0
         opacity = min(opacity, 1.0 - passes)
         colour = np.clip(factor[:3], 0, 1)
+        # Roughness to a Phong exponent: alpha = roughness^2, n = 2 / alpha^2 - 2.
         shininess = min(2.0 / max(roughness, 1e-3) ** 4 - 2.0, MAX_SHININESS)
         specular = F0 + (colour - F0) * metallic if shininess > 0 else np.zeros(3)
         material = Material(
-            name=str(plain.get("name", ""))[:100],
-            kind=self._kind(plain, clear, opacity, metallic, roughness),
+            name=str(fields_json.get("name", ""))[:100],
+            kind=self._kind(fields_json, clear, opacity, metallic, roughness),
             diffuse=_encoded(colour if found else colour * (1 - metallic)),
             specular=_encoded(specular),
             shininess=shininess,
@@ -64,17 +67,17 @@ class SceneMaterials:
             alpha_cutout=bool(found and found.has_holes and mode != "OPAQUE"),
             is_default=found is None and "baseColorFactor" not in look,
         )
-        return material, self._emission(plain, place)
+        return material, self._emission(fields_json, place)
 
     def _kind(
         self,
-        plain: dict[str, Any],
+        fields_json: dict[str, Any],
         clear: MaterialKind,
         opacity: float,
         metallic: float,
         roughness: float,
     ) -> MaterialKind:
-        word = _object(plain, "extras").get("kind")
+        word = _object(fields_json, "extras").get("kind")
         tagged = next((k for k in MaterialKind if k.value == word), None)
         if tagged is not None:
             return tagged
@@ -82,13 +85,15 @@ class SceneMaterials:
             return clear
         return MaterialKind.MIRROR if metallic > 0.9 and roughness < 0.1 else MaterialKind.OPAQUE
 
-    def _emission(self, plain: dict[str, Any], place: str) -> float | None:
+    def _emission(self, fields_json: dict[str, Any], place: str) -> float | None:
         """Luminance in cd m-2 where KHR_materials_emissive_strength gives it; 0 = of unknown
         strength; None = none."""
-        factor = numbers(self._gltf, plain.get("emissiveFactor", [0] * 3), 3, f"{place}: emission")
+        factor = numbers(
+            self._gltf, fields_json.get("emissiveFactor", [0] * 3), 3, f"{place}: emission"
+        )
         if not (factor > 0).any():
             return None
-        strength = _object(_object(plain, "extensions"), "KHR_materials_emissive_strength")
+        strength = _object(_object(fields_json, "extensions"), "KHR_materials_emissive_strength")
         if "emissiveStrength" not in strength:
             return 0.0
         (value,) = numbers(self._gltf, [strength["emissiveStrength"]], 1, f"{place}: emission")

@@ -29,16 +29,16 @@ def punctual_light(
     lights = _at(_at(gltf.document, "extensions"), "KHR_lights_punctual").get("lights")
     if type(number) is not int or not isinstance(lights, list) or not 0 <= number < len(lights):
         return None
-    plain = lights[number]
-    if not isinstance(plain, dict) or plain.get("type") not in ("point", "spot"):
+    fields_json = lights[number]
+    if not isinstance(fields_json, dict) or fields_json.get("type") not in ("point", "spot"):
         return None
-    (intensity,) = numbers(gltf, [plain.get("intensity", 1)], 1, f"{place}: light intensity")
+    (intensity,) = numbers(gltf, [fields_json.get("intensity", 1)], 1, f"{place}: light intensity")
     colour = np.clip(
-        numbers(gltf, plain.get("color", [1, 1, 1]), 3, f"{place}: light colour"), 0, 1
+        numbers(gltf, fields_json.get("color", [1, 1, 1]), 3, f"{place}: light colour"), 0, 1
     )
     cutoff = math.pi
-    if plain["type"] == "spot":
-        angle = _at(plain, "spot").get("outerConeAngle", math.pi / 4)
+    if fields_json["type"] == "spot":
+        angle = _at(fields_json, "spot").get("outerConeAngle", math.pi / 4)
         cutoff = float(np.clip(numbers(gltf, [angle], 1, f"{place}: cone")[0], 0.01, math.pi))
     solid_angle = 2 * math.pi * (1 - math.cos(cutoff))
     direction = -world_from_node[:3, 2] / max(float(np.linalg.norm(world_from_node[:3, 2])), 1e-12)
@@ -48,7 +48,7 @@ def punctual_light(
         power=max(float(intensity), 0.0) * solid_angle,
         unit=PowerUnit.LUMEN,
         rgb_linear=_triple(colour / max(float(colour.max()), 1e-6)),
-        form=LightForm.SPOT if plain["type"] == "spot" else LightForm.POINT,
+        form=LightForm.SPOT if fields_json["type"] == "spot" else LightForm.POINT,
         direction=_triple(direction),
         cutoff_rad=cutoff,
     )

@@ -38,17 +38,17 @@ MAX_FILE_BYTES: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What lies beside a scene. mapping, rooms: JSON bytes or None. fetch: other files."""
+    """What lies beside a scene."""
 
-    fetch: Fetch = lambda _name: None
-    mapping: bytes | None = None
-    rooms: bytes | None = None
+    fetch: Fetch = lambda _name: None  # any other file by its relative name
+    mapping: bytes | None = None  # JSON, None = no file
+    rooms: bytes | None = None  # JSON, None = no file
 
 
 def read_gltf_file(path: Path, fields: ReadFields) -> House:
     """The House of a .glb or .gltf file with the mapping and room files beside it.
 
-    Raises BadHouse naming file and place; a name that leads out of the file's folder is refused.
+    Raises BadHouse naming file and place; a name that leads out of the file's folder is rejected.
     """
     folder = RootFolder(path.parent)
     data = folder.read(path.name, max_bytes=MAX_FILE_BYTES)
@@ -82,6 +82,7 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
     mapping = Mapping()
     if beside.mapping is not None:
         mapping = mapping_from_json(beside.mapping, f"{stem}.classes.json")
+    # Read what is in the scene, then cut its floors into rooms.
     gltf = gltf_document(data, name, beside.fetch)
     materials = SceneMaterials(gltf, beside.fetch, notes)
     items = list(items_of_scene(gltf, mapping, materials, notes, fields))
@@ -92,6 +93,7 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
     if not rooms:
         hint = f"name a node `floor`, map one in {stem}.classes.json, or give {stem}.rooms.json"
         raise BadHouse(name, "scene", "has no floor", hint=hint)
+    # Sort rooms into levels and items into rooms.
     levels, numbered = levels_of(rooms)
     items = [_placed(item, levels, numbered) for item in items]
     sha256 = keys.sha256(data)

@@ -40,8 +40,8 @@ def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]
 
     Raises BadHouse naming the room that is wrong.
     """
-    plain = json_from_bytes(data, file)
-    rows = plain.get("rooms") if isinstance(plain, dict) else None
+    fields_json = json_from_bytes(data, file)
+    rows = fields_json.get("rooms") if isinstance(fields_json, dict) else None
     if not isinstance(rows, list) or not rows or len(rows) > MAX_ROOMS:
         raise BadHouse(file, "rooms", 'expected {"rooms": [{"polygon": [[x, z], ...]}, ...]}')
     return [_room(row, file, f"rooms[{i}]", items) for i, row in enumerate(rows)]

@@ -15,15 +15,15 @@ Rgb = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class ObjMaterial:
-    """Kd and Ks sRGB-encoded 0..1, Ns, d; map_kd, map_d: picture names as written, "" = none."""
+    """A material of an MTL."""
 
     name: str
-    kd: Rgb = (0.8, 0.8, 0.8)
-    ks: Rgb = (0.0, 0.0, 0.0)
-    ns: float = 0.0
-    d: float = 1.0
-    map_kd: str = ""
-    map_d: str = ""
+    kd: Rgb = (0.8, 0.8, 0.8)  # diffuse, sRGB-encoded
+    ks: Rgb = (0.0, 0.0, 0.0)  # specular, sRGB-encoded
+    ns: float = 0.0  # Phong exponent
+    d: float = 1.0  # opacity
+    map_kd: str = ""  # picture as written, "" = none
+    map_d: str = ""  # picture as written, "" = none
 
 
 def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:

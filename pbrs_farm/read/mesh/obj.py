@@ -21,27 +21,23 @@ DEFAULT_CREASE_RAD = np.radians(45.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """Triangles of one group and one material, in the model's own frame.
-
-    positions (V, 3) float64, faces (F, 3) int32, uvs (V, 2) float64 or None (then the file has
-    none), normals (V, 3) float64 unit (computed with a crease angle where the file has none).
-    """
+    """Triangles of one group and one material, in the model's own frame."""
 
     group: str
     material: str
-    positions: NDArray[np.float64]
-    faces: NDArray[np.int32]
-    uvs: NDArray[np.float64] | None
-    normals: NDArray[np.float64]
+    positions: NDArray[np.float64]  # (V, 3)
+    faces: NDArray[np.int32]  # (F, 3)
+    uvs: NDArray[np.float64] | None  # (V, 2); None = the file has none
+    normals: NDArray[np.float64]  # (V, 3) unit, creased where none are given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjModel:
-    """meshes in the order of the file; mtllibs: names as written; n_dropped: degenerate faces."""
+    """What an OBJ holds."""
 
-    meshes: tuple[Mesh, ...]
-    mtllibs: tuple[str, ...]
-    n_dropped: int = 0
+    meshes: tuple[Mesh, ...]  # in the file's order
+    mtllibs: tuple[str, ...]  # as written
+    n_dropped: int = 0  # faces without area
 
 
 @dataclass(slots=True)

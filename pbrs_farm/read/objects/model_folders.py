@@ -30,21 +30,16 @@ _MAX_CATALOGUE_BYTES: Final = 16_000_000
 
 @dataclass(frozen=True, slots=True)
 class ObjectModel:
-    """One model that can be read. id: unique among those found, fit for a key.
+    """One model that can be read."""
 
-    category: a ShapeNet class or folder's name. path: the model's file, or the library that
-    holds it at entry. root: the folder its textures must lie in. size_m: width, height and depth
-    it is scaled to, or None (as it is).
-    """
-
-    id: str
+    id: str  # unique, fit for a key
     name: str
-    category: str
+    category: str  # ShapeNet class or folder
     nyu40: int
-    path: Path
-    root: Path
-    entry: str = ""
-    size_m: tuple[float, float, float] | None = None
+    path: Path  # the file, or its library
+    root: Path  # where its textures lie
+    entry: str = ""  # its name in a library
+    size_m: tuple[float, float, float] | None = None  # width, height, depth; None = as it is
     attribution: str = ""
 
 
@@ -107,6 +102,7 @@ def _model(file: Path, root: Path) -> ObjectModel:
     """A model file below root: the folders say its category and its name."""
     folders = [part for part in file.relative_to(root).parts[:-1] if part not in _PLAIN_FOLDERS]
     synsets = {row["synset"]: row for row in _synsets()}
+    # A synset among the folders makes it ShapeNet: class, then the model's id.
     synset = next((synsets[f] for f in folders if f in synsets), None)
     if synset is not None:
         after = folders[folders.index(synset["synset"]) + 1 :]
@@ -133,6 +129,7 @@ def _library(path: Path) -> list[ObjectModel]:
             names = set(archive.namelist())
     except (zipfile.BadZipFile, KeyError, OSError) as error:
         raise BadInput(path, "", f"is no furniture library: {error}") from None
+    # Gather the numbered properties of each piece.
     rows: dict[str, dict[str, str]] = {}
     for line in text.splitlines():
         key, equals, value = line.partition("=")

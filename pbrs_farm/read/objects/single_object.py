@@ -52,6 +52,7 @@ def read_object(model: ObjectModel, fields: ReadFields) -> House:
         sha256 = folder.sha256
     if not surfaces:
         raise BadHouse(file, "", "has no triangle")
+    # Centre the model on the origin, at its catalogue's size.
     surfaces = _centred(surfaces, model.size_m)
     points = np.concatenate([s.positions for s in surfaces])
     if not np.isfinite(points).all():
@@ -167,6 +168,7 @@ def _gltf(
 def _centred(surfaces: list[Surface], size_m: tuple[float, float, float] | None) -> list[Surface]:
     """The surfaces moved so that their common box is centred on the origin, and scaled to size."""
     points = np.concatenate([s.positions for s in surfaces]).astype(np.float64)
+    # Scale each axis to the size wanted; a flat axis keeps its extent.
     low, high = points.min(0), points.max(0)
     extent = np.where(high - low > 1e-9, high - low, 1.0)
     scale = np.ones(3) if size_m is None else np.asarray(size_m) / extent

@@ -45,45 +45,42 @@ _KINDS: Final = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Element:
-    """An element of arch.json. points: a wall's two ends, or a slab's outline and its holes.
-
-    depth_m: thickness. height_m: of a wall. holes: (H, 4) along from, up from, along to, up to.
-    """
+    """An element of arch.json."""
 
     kind: str
-    place: str
+    place: str  # for messages
     room_id: str
-    points: tuple[NDArray[np.float64], ...]
-    overrides: tuple[Override, ...]
-    depth_m: float
-    height_m: float = 0.0
-    holes: tuple[tuple[float, float, float, float], ...] = ()
+    points: tuple[NDArray[np.float64], ...]  # a wall's two ends, or a slab's outline and holes
+    overrides: tuple[Override, ...]  # inside and outside of a wall
+    depth_m: float  # thickness
+    height_m: float = 0.0  # of a wall
+    holes: tuple[tuple[float, float, float, float], ...] = ()  # (H, 4): from, up from, to, up to
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arch:
-    """arch.json as read. elements: by the room or ground they belong to, in file order."""
+    """arch.json as read."""
 
-    world_from_house: NDArray[np.float64]
-    elements: dict[str, list[Element]]
+    world_from_house: NDArray[np.float64]  # (4, 4)
+    elements: dict[str, list[Element]]  # by room or ground, in file order
 
 
 def arch_from_json(data: bytes, file: str) -> Arch:
     """The elements of arch.json by room; BadHouse naming the element that is wrong."""
-    plain = json_from_bytes(data, file)
-    if not isinstance(plain, dict):
+    document = json_from_bytes(data, file)
+    if not isinstance(document, dict):
         raise BadHouse(file, "", "expected an object; this is no arch.json")
     reader = JsonReader(file)
-    raw_elements = reader.items(plain, "elements", "")
+    raw_elements = reader.items(document, "elements", "")
     if len(raw_elements) > MAX_ELEMENTS:
         raise BadHouse(file, "elements", f"more than {MAX_ELEMENTS}")
-    defaults = plain.get("defaults")
+    defaults = document.get("defaults")
     found: dict[str, list[Element]] = {}
     for i, raw in enumerate(raw_elements):
         element = _element(reader, raw, f"element {i}", defaults)
         if element is not None:
             found.setdefault(element.room_id, []).append(element)
-    return Arch(world_from_house_of(reader, plain), found)
+    return Arch(world_from_house_of(reader, document), found)
 
 
 def _element(reader: JsonReader, raw: Any, place: str, defaults: Any) -> Element | None:

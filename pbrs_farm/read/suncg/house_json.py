@@ -1,4 +1,4 @@
-"""SUNCG's house.json -> plain records, checked (docs/spec/suncg.md sections 1.1-1.6); no effects."""
+"""SUNCG's house.json -> records, checked (docs/spec/suncg.md sections 1.1-1.6); no effects."""
 
 from __future__ import annotations
 
@@ -32,36 +32,33 @@ class Override:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """A node of house.json that is valid. place: where it stands, for messages.
-
-    house_from_model: (4, 4), identity for rooms and grounds. bbox: (2, 3) or None.
-    """
+    """A node of house.json that is valid."""
 
     id: str
     level_id: str
     kind: str
-    place: str
-    index: int
+    place: str  # where it stands, for messages
+    index: int  # its position in the level
     model_id: str
-    house_from_model: NDArray[np.float64]
-    bbox: NDArray[np.float64] | None
-    overrides: tuple[Override, ...]
-    state: int
-    is_mirrored: bool | None
-    dimensions: tuple[float, float, float]
-    members: tuple[int, ...]
-    types: tuple[str, ...]
-    hidden: frozenset[str]
+    house_from_model: NDArray[np.float64]  # (4, 4), identity for rooms and grounds
+    bbox: NDArray[np.float64] | None  # (2, 3)
+    overrides: tuple[Override, ...]  # by position in the model's MTL
+    state: int  # of a door or curtain, 0 = as modelled
+    is_mirrored: bool | None  # as written; the transform decides
+    dimensions: tuple[float, float, float]  # of a Box, m
+    members: tuple[int, ...]  # positions of a room's nodes
+    types: tuple[str, ...]  # of a room
+    hidden: frozenset[str]  # Floor, Ceiling, Walls
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HouseRecord:
-    """house.json as read. world_from_house: (4, 4), scale and axes. levels: (level id, nodes)."""
+    """house.json as read."""
 
     id: str
     version: str
-    world_from_house: NDArray[np.float64]
-    levels: tuple[tuple[str, tuple[Node, ...]], ...]
+    world_from_house: NDArray[np.float64]  # (4, 4) scale and axes
+    levels: tuple[tuple[str, tuple[Node, ...]], ...]  # (level id, its nodes)
 
 
 def house_record(data: bytes, file: str) -> HouseRecord:
@@ -69,11 +66,11 @@ def house_record(data: bytes, file: str) -> HouseRecord:
 
     Raises BadHouse naming the level and the node where a value does not fit.
     """
-    plain = json_from_bytes(data, file)
-    if not isinstance(plain, dict):
+    document = json_from_bytes(data, file)
+    if not isinstance(document, dict):
         raise BadHouse(file, "", "expected an object; this is no SUNCG house.json")
     reader = JsonReader(file)
-    raw_levels = reader.items(plain, "levels", "")
+    raw_levels = reader.items(document, "levels", "")
     levels: list[tuple[str, tuple[Node, ...]]] = []
     n_nodes = 0
     for i, level in enumerate(raw_levels):
@@ -91,22 +88,22 @@ def house_record(data: bytes, file: str) -> HouseRecord:
             raise BadHouse(file, place, f"more than {MAX_NODES} nodes")
         nodes = [reader.node(raw, level_id, i, j) for j, raw in enumerate(raw_nodes)]
         levels.append((level_id, tuple(n for n in nodes if n is not None)))
-    house_id = plain.get("id")
+    house_id = document.get("id")
     return HouseRecord(
         id=house_id if isinstance(house_id, str) else "",
-        version=str(plain.get("version", ""))[:80],
-        world_from_house=world_from_house_of(reader, plain),
+        version=str(document.get("version", ""))[:80],
+        world_from_house=world_from_house_of(reader, document),
         levels=tuple(levels),
     )
 
 
-def world_from_house_of(reader: JsonReader, plain: dict[str, Any]) -> NDArray[np.float64]:
+def world_from_house_of(reader: JsonReader, document: dict[str, Any]) -> NDArray[np.float64]:
     """(4, 4) metres, y up, z front <- the file's scaleToMeters, up and front."""
-    scale = reader.numbers([plain.get("scaleToMeters", 1)], 1, "scaleToMeters")[0]
+    scale = reader.numbers([document.get("scaleToMeters", 1)], 1, "scaleToMeters")[0]
     if not 1e-6 < scale < 1e6:
         raise BadHouse(reader.file, "scaleToMeters", f"{scale} is no scale")
-    up = reader.numbers(plain.get("up", [0, 1, 0]), 3, "up")
-    front = reader.numbers(plain.get("front", [0, 0, 1]), 3, "front")
+    up = reader.numbers(document.get("up", [0, 1, 0]), 3, "up")
+    front = reader.numbers(document.get("front", [0, 0, 1]), 3, "front")
     norms = np.linalg.norm(up) * np.linalg.norm(front)
     if not 1e-9 < norms < 1e9 or abs(up @ front) > 1e-6 * norms:
         raise BadHouse(reader.file, "up, front", "are not two directions at right angles")
@@ -123,7 +120,7 @@ def _flag(value: Any) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class JsonReader:
-    """Reads values of one file, so that every refusal names it."""
+    """Reads values of one file, so that every rejection names it."""
 
     file: str
 

@@ -42,30 +42,30 @@ _KIND_OF_CLASS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class ModelClass:
-    """What ModelCategoryMapping says of a model. structure: empty_struct_obj is 1."""
+    """What ModelCategoryMapping says of a model."""
 
-    name: str
+    name: str  # fine-grained class
     nyu40: int
     kind: ItemKind
-    structure: bool = False
+    structure: bool = False  # empty_struct_obj is 1
 
 
 @dataclass(frozen=True, slots=True)
 class LampMaterials:
-    """Positions in the model's mtl of the materials that are bulbs and shades."""
+    """Which materials of a lamp are bulbs and shades."""
 
-    bulbs: tuple[int, ...]
-    shades: tuple[int, ...]
+    bulbs: tuple[int, ...]  # positions in the MTL
+    shades: tuple[int, ...]  # positions in the MTL
 
 
 @dataclass(frozen=True, slots=True)
 class Tables:
-    """Every table by model id. lights: in the model's frame. variants: models.csv's variantIds."""
+    """Every table by model id."""
 
     classes: dict[str, ModelClass] = field(default_factory=dict)
-    lights: dict[str, tuple[LightPart, ...]] = field(default_factory=dict)
-    lamps: dict[str, LampMaterials] = field(default_factory=dict)
-    variants: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    lights: dict[str, tuple[LightPart, ...]] = field(default_factory=dict)  # in the model's frame
+    lamps: dict[str, LampMaterials] = field(default_factory=dict)  # bulbs and shades
+    variants: dict[str, tuple[str, ...]] = field(default_factory=dict)  # meshes of a model's states
 
 
 def read_tables(folder: RootFolder, notes: Notes) -> Tables:
@@ -165,12 +165,12 @@ def _lights(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]
         notes.add("missing-table", "metadata/suncgModelLights.json", text)
         return {}
     name, data = found
-    plain = json_from_bytes(data, name)
-    if not isinstance(plain, dict):
+    entry_json = json_from_bytes(data, name)
+    if not isinstance(entry_json, dict):
         raise BadHouse(name, "", "expected an object")
     return {
         model: tuple(_light(light, name, f"{model}[{k}]") for k, light in enumerate(lights))
-        for model, lights in plain.items()
+        for model, lights in entry_json.items()
         if isinstance(lights, list)
     }
 
@@ -182,24 +182,24 @@ _FORMS: Final = {
 }
 
 
-def _light(plain: Any, file: str, place: str) -> LightPart:
-    if not isinstance(plain, dict) or str(plain.get("type")) not in _FORMS:
+def _light(entry_json: Any, file: str, place: str) -> LightPart:
+    if not isinstance(entry_json, dict) or str(entry_json.get("type")) not in _FORMS:
         raise BadHouse(file, place, f"expected one of {', '.join(_FORMS)}")
-    form = _FORMS[plain["type"]]
-    end = plain.get("position2") if form is LightForm.LINE else None
-    direction = plain.get("direction") if form is not LightForm.POINT else None
+    form = _FORMS[entry_json["type"]]
+    end = entry_json.get("position2") if form is LightForm.LINE else None
+    direction = entry_json.get("direction") if form is not LightForm.POINT else None
     return LightPart(
-        position=_triple(plain.get("position"), file, f"{place}.position"),
+        position=_triple(entry_json.get("position"), file, f"{place}.position"),
         radius_m=0.0,
-        power=_number(plain.get("power"), file, f"{place}.power"),
+        power=_number(entry_json.get("power"), file, f"{place}.power"),
         unit=PowerUnit.WATT,
-        rgb_linear=_colour(plain.get("color", "#ffffff"), file, f"{place}.color"),
+        rgb_linear=_colour(entry_json.get("color", "#ffffff"), file, f"{place}.color"),
         form=form,
         direction=(0.0, -1.0, 0.0)
         if direction is None
         else _triple(direction, file, f"{place}.direction"),
-        cutoff_rad=_number(plain.get("cutoffAngle", math.pi), file, f"{place}.cutoffAngle"),
-        dropoff=_number(plain.get("dropoffRate", 0.0), file, f"{place}.dropoffRate"),
+        cutoff_rad=_number(entry_json.get("cutoffAngle", math.pi), file, f"{place}.cutoffAngle"),
+        dropoff=_number(entry_json.get("dropoffRate", 0.0), file, f"{place}.dropoffRate"),
         position_end=None if end is None else _triple(end, file, f"{place}.position2"),
     )
 

@@ -16,10 +16,10 @@ _BYTES_PER_TRIANGLE = 150
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """Meshes with their materials. slots: per mesh its material's position in mtl, -1 = unknown."""
+    """Meshes with their materials."""
 
     meshes: tuple[Mesh, ...]
-    slots: tuple[int, ...]
+    slots: tuple[int, ...]  # per mesh its position in mtl, -1 = unknown
     mtl: tuple[ObjMaterial, ...]
 
     @property

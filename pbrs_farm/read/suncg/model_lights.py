@@ -39,6 +39,7 @@ def placed_light(light: LightPart, world_from_model: NDArray[np.float64]) -> Lig
 
 def separate_bulbs(bulb: Surface) -> tuple[Surface, ...]:
     """The connected parts of a bulb material's surface, one per bulb."""
+    # Weld equal positions, then find the connected parts of the faces.
     _, same = np.unique(bulb.positions, axis=0, return_inverse=True)
     faces = same.reshape(-1)[bulb.faces]
     n = len(bulb.positions)
@@ -68,16 +69,19 @@ def lit(
     """
     if not bulbs:
         return tuple(replace(light, radius_m=_FALLBACK_RADIUS_M) for light in lights)
+    # Centre and mean radius of each bulb.
     bounds = [(surfaces[b].positions.min(0), surfaces[b].positions.max(0)) for b in bulbs]
     centres = np.array([(low + high) / 2 for low, high in bounds], np.float64)
     radii = [float(np.mean(high - low)) / 2 for low, high in bounds]
     if not lights:
+        # Without lights every bulb is one, with an equal share of the assumed power.
         share = 1 / len(bulbs)
         return tuple(
             LightPart(_triple(c), r, ASSUMED_WATT, PowerUnit.WATT, share, emitting=(b,))
             for c, r, b in zip(centres, radii, bulbs, strict=True)
         )
     at = np.array([light.position for light in lights])
+    # Give every bulb to its nearest light; a light left without shares its nearest bulb.
     distance = np.linalg.norm(at[:, None] - centres[None], axis=2)
     light_of_bulb = distance.argmin(0)
     found = []

@@ -42,18 +42,15 @@ GAPS exchanges the materials of -x and +x (docs/spec/suncg.md section 1.5).
 
 @dataclass(frozen=True, slots=True)
 class ReaderContext:
-    """What nodes are built from. house: its id. world_from_house: (4, 4) scale and axes.
+    """What nodes are built from."""
 
-    arch: v2's structure; None where the rooms have meshes (v1).
-    """
-
-    house: str
-    folder: RootFolder
+    house: str  # id
+    folder: RootFolder  # the SUNCG root
     tables: Tables
     materials: ModelMaterials
     models: Models
     notes: Notes
-    world_from_house: NDArray[np.float64]
+    world_from_house: NDArray[np.float64]  # (4, 4) scale and axes
     arch: Arch | None = None
 
 
@@ -70,6 +67,7 @@ def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item
     if known is None and context.tables.classes:
         text = "is not in ModelCategoryMapping.csv; it is otherprop"
         context.notes.add("unmapped-class", f"object/{node.model_id}", text)
+    # Place the meshes; bulbs stay apart, so that lights can own them.
     lamp = _row(context.tables.lamps, variant, node.model_id) or LampMaterials((), ())
     world_from_model = context.world_from_house @ node.house_from_model
     surfaces, bulbs = _surfaces(context, node, model, seen.kind, lamp)
@@ -78,6 +76,7 @@ def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item
             "empty-model", node.place, f"object/{node.model_id} has no area; left out"
         )
         return None
+    # Pair the lights of the table with the bulbs of the mesh.
     lights = _row(context.tables.lights, variant, node.model_id) or ()
     placed_lights: tuple[LightPart, ...] = ()
     if lights or bulbs:
@@ -134,6 +133,7 @@ def _surfaces(
         mtl = model.mtl[slot] if slot >= 0 else None
         override = node.overrides[slot] if 0 <= slot < len(node.overrides) else None
         material = context.materials.material(mtl, override, place=node.place, clear=clear)
+        # Materials that the lamp table names become bulbs and shades.
         is_bulb = slot in lamp.bulbs
         if is_bulb:
             material = replace(material, kind=MaterialKind.BULB)
@@ -194,6 +194,7 @@ def _box_face(
     corners[:, axis] = sign * half[axis]
     corners[:, a] = np.array([-1, 1, 1, -1]) * half[a]
     corners[:, b] = np.array([-1, -1, 1, 1]) * half[b]
+    # Turn the winding so that the face looks outward, also in a mirrored box.
     outward = np.cross(np.eye(3)[a], np.eye(3)[b])[axis] * sign > 0
     is_mirrored = np.linalg.det(world_from_box[:3, :3]) < 0
     faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
@@ -260,6 +261,7 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
         surfaces = [] if hidden in node.hidden else _part(context, node, part)
         if surfaces:
             yield _structure(node, room_id, part, kind, tuple(s for _, s in surfaces))
+    # The inside and outside slabs of one wall share its number, so they are one item.
     walls: dict[str, list[Surface]] = {}
     if "Walls" not in node.hidden:
         for group, surface in room_surfaces(context, node, "w", default_walls=True):

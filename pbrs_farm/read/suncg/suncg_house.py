@@ -122,6 +122,7 @@ def _contents(
     ids: set[str] = set()
     n_faces = 0
     for number, (_, nodes) in enumerate(record.levels):
+        # Make ids unique and check the limits as items come up.
         for node, item in _level_contents(context, number, nodes, rooms):
             unique = _unique(item.id, ids)
             if unique != item.id:
@@ -205,12 +206,14 @@ def _room(context: ReaderContext, node: Node, room_id: str, parts: list[Item]) -
     floor, ceiling, walls = (
         _surfaces(parts, kind) for kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.WALL)
     )
+    # The plan between the walls: of the floor, else of the space the walls enclose.
     polygon = floor_polygon(floor, walls)
     if polygon is None:
         polygon = enclosed_polygon(walls)
     if polygon is None:
         context.notes.add("empty-room", node.place, "has neither floor nor walls; left out")
         return None
+    # Take the heights of floor and ceiling, else of the room's box.
     bounds = np.concatenate([p.bounds for p in parts])
     floor_y, ceiling_y = floor_height(floor), ceiling_height(ceiling)
     low = float(bounds[:, 1].min()) if floor_y is None else floor_y

@@ -29,11 +29,11 @@ _UP: Final = np.array([0.0, 1.0, 0.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _WallFrame:
-    """The upright faces of a wall that look one way, or back. normal: (3,), points: (V, 3) world."""
+    """The upright faces of a wall that look one way, or back."""
 
     level_id: str
-    normal: NDArray[np.float64]
-    points: NDArray[np.float64]
+    normal: NDArray[np.float64]  # (3,) unit
+    points: NDArray[np.float64]  # (V, 3) world
 
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
@@ -52,6 +52,7 @@ def _frames(item: Item) -> list[_WallFrame]:
     """A frame for every direction that an item's larger upright faces have, to a degree."""
     corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in item.surfaces])
     n, area = area_vectors(corners), face_areas(corners)
+    # Group upright faces by the direction they look in, to a degree, either way round.
     upright = (np.abs(n[:, 1]) < 0.01 * (2 * area)) & (area > 0)
     n, area, corners = n[upright], area[upright], corners[upright]
     degree = np.rint(np.degrees(np.arctan2(n[:, 2], n[:, 0]))).astype(int) % 180
@@ -60,6 +61,7 @@ def _frames(item: Item) -> list[_WallFrame]:
         here = degree == d
         if area[here].sum() < _LEAST_SHARE * area.sum():
             continue
+        # Take the direction of the largest face of the group.
         best = n[here][area[here].argmax()] * [1, 0, 1]
         points = np.unique(corners[here].reshape(-1, 3), axis=0)
         found.append(_WallFrame(item.level_id, best / np.linalg.norm(best), points))
@@ -117,11 +119,13 @@ def _wall(
     if abs(frame.normal @ axes[:, 2]) < 0.999:
         return []
     points = frame.points @ axes
+    # Keep the points near the door's own plane.
     beside = (points[:, 2] > low[2] - _NEAR_M) & (points[:, 2] < high[2] + _NEAR_M)
     points = points[beside]
     if not len(points):
         return []
     wall_low, wall_high = points.min(0), points.max(0)
+    # The wall holds the door where both overlap along the wall and upwards.
     overlap = np.minimum(wall_high - low, high - wall_low)[:2]
     return [points] if (overlap > _NEAR_M).all() else []
 
@@ -131,6 +135,7 @@ def _hole(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """(low, high) along and up of the hole that a wall has where low..high stands; None if none."""
     s, y = points[:, 0], points[:, 1]
+    # The rim of a hole lies near the door's outline and not at the wall's ends.
     inner = (s > s.min() + _REACH_M) & (s < s.max() - _REACH_M)
     near = (s > low[0] - _HOLE_MARGIN_M) & (s < high[0] + _HOLE_MARGIN_M)
     near &= (y > low[1] - _HOLE_MARGIN_M) & (y < high[1] + _HOLE_MARGIN_M)

@@ -29,6 +29,7 @@ class CeilingHeights:
         self._wall_height = plan.wall_height
         self._edges: dict[str, tuple[F64, F64]] = {}
         by_level: dict[str, list[tuple[F64, F64]]] = {}
+        # Collect the top edges of all walls of a level: plan segments and heights at their ends.
         for wall in plan.walls:
             if wall.id not in outlines:
                 continue
@@ -50,6 +51,7 @@ class CeilingHeights:
     def heights(self, level: PlanLevel, points: Points2, is_flat: bool) -> F64:
         """(N,) heights over plan points (N, 2)."""
         edges = self._edges.get(level.id)
+        # Below the top level the ceiling is flat, at the level's height.
         if level.index != self._top or edges is None:
             height = level.height if level.id else self._wall_height
             return np.full(len(points), height)
@@ -63,6 +65,7 @@ class CeilingHeights:
         bent = [[self._with_kinks(level, ring, is_flat) for ring in rings] for rings in parts]
         heights = [self.heights(level, np.concatenate(rings), is_flat) for rings in bent]
         every = np.concatenate(heights)
+        # A level ceiling needs no roof.
         if np.ptp(every) < 1e-4:
             return horizontal("ceiling", parts, level.elevation + every[0], material, up=False)
         positions, faces, n = [], [], 0
@@ -92,9 +95,11 @@ class CeilingHeights:
             points.append(a)
             d = b - a
             length = float(np.linalg.norm(d))
+            # Take the walls' corners that lie along this edge of the room.
             t = (corners - a) @ d / max(length**2, 1e-18)
             gap = np.linalg.norm(a + t[:, None] * d - corners, axis=1)
             inside = (gap < NEAR_M) & (t * length > KINK_M) & ((1 - t) * length > KINK_M)
+            # Keep a corner where the ceiling leaves the straight line between the edge's ends.
             ends = self.heights(level, np.stack([a, b]), False)
             last = 0.0
             for where in np.sort(t[inside]):
@@ -113,6 +118,7 @@ def _nearest(point: Points2, segments: F64, tops: F64) -> float:
     # of those equally near, so that no wall ends below the ceiling.
     a, d = segments[:, :2], segments[:, 2:] - segments[:, :2]
     t = ((point - a) * d).sum(1) / np.maximum((d * d).sum(1), 1e-18)
+    # The nearest spot on each edge, and the height of the wall there.
     t = np.clip(t, 0, 1)
     gap = np.linalg.norm(a + t[:, None] * d - point, axis=1)
     heights = tops[:, 0] + t * (tops[:, 1] - tops[:, 0])

@@ -1,6 +1,6 @@
 """A home file's bytes -> its XML tree and the contents it names; no effects.
 
-Nothing in the file is trusted: entity definitions and external entities are refused unexpanded,
+Nothing in the file is trusted: entity definitions and external entities are rejected unexpanded,
 zip entries are bounded (read.resources).
 """
 

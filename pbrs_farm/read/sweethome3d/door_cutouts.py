@@ -31,10 +31,10 @@ class StandingWall:
     """A wall's plan polygon with the heights between which it stands."""
 
     wall: PlanWall
-    polygon: shapely.Geometry
-    low: float
-    high: float
-    board: float
+    polygon: shapely.Geometry  # plan, m
+    low: float  # world y of its foot
+    high: float  # world y of its top
+    board: float  # thickness of its baseboards, m
 
 
 def opening_of(
@@ -57,10 +57,12 @@ def opening_of(
     if span is None:
         materials.notes.add("opening-without-wall", piece.place, "touches no wall: it cuts nothing")
         return None
+    # Bring the outlines into the piece's frame and extrude them through the walls.
     flat = [_local_outline(p, piece.frame, frame) for p in outlines]
     cutter = _extruded(flat, span, frame, material)
     low = np.min([p.min(0) for p in flat], axis=0)
     high = np.max([p.max(0) for p in flat], axis=0)
+    # Give the opening's quad the outlines' box, halfway through the walls.
     middle = (span[0] + span[1]) / 2
     corners = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
     quad = frame.world(np.array([[x, y, middle] for x, y in corners]))
@@ -100,6 +102,7 @@ def _depth_span(
     strip = _rectangle(frame, half_x * 0.98, half_z + REACH_M)
     spans = []
     for standing in walls:
+        # Skip walls above or below the piece, and those its plan rectangle does not touch.
         if standing.high < low_y + 0.01 or standing.low > high_y - 0.01:
             continue
         shared = shapely.intersection(piece, standing.polygon)
@@ -107,10 +110,12 @@ def _depth_span(
         if shared.is_empty or shared.area < 1e-4 * smaller:
             continue
         z = _depths(shared, frame)
+        # Reach through the whole thickness of walls that the piece stands along.
         if _is_along(standing.wall, frame) and door.cuts_both_sides:
             parts = shapely.get_parts(shapely.intersection(strip, standing.polygon))
             near = [p for p in parts if p.intersects(piece)]
             z = np.concatenate([z, *(_depths(p, frame) for p in near)])
+        # Add the baseboard, which stands out from the wall.
         board = standing.board if _is_along(standing.wall, frame) else 0.0
         spans.append((float(z.min()) - board, float(z.max()) + board))
     if not spans:
@@ -153,7 +158,9 @@ def _extruded(
         ).reshape(-1, 3)
         a, b, c = (outline[cap[:, k]] for k in range(3))
         turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        # Turn every cap triangle counter-clockwise.
         cap[turn < 0] = cap[turn < 0][:, [0, 2, 1]]
+        # Join the two caps by two triangles an edge.
         i = np.arange(count, dtype=np.int32)
         j = np.roll(i, -1)
         sides = np.concatenate(

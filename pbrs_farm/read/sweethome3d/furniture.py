@@ -37,11 +37,13 @@ def piece_item(
     model = models.get(piece.model, piece.place, piece.transformations)
     if model is None:
         return None
+    # Fit the model into the piece's box, then stand the box in the house.
     matrix = local_from_model(piece, model)
     points = [m.positions @ matrix[:3, :3].T + matrix[:3, 3] for m in model.meshes]
     frame = frame_of(piece, level, np.concatenate(points) if points else None)
-    pairs = [(m, piece_material(piece, m, model, materials)) for m in model.meshes]
-    shown = [(m, p, at) for (m, p), at in zip(pairs, points, strict=True) if p is not None]
+    # Keep the meshes that the home shows, with their materials.
+    found = [piece_material(piece, mesh, model, materials) for mesh in model.meshes]
+    shown = [(m, p, at) for m, p, at in zip(model.meshes, found, points, strict=True) if p]
     surfaces = [placed_surface(m, p, frame, at, matrix) for m, p, at in shown]
     emitting = [k for k, (_, p, _) in enumerate(shown) if p.emits]
     nyu40, tags = _label(piece, model, materials)
@@ -50,13 +52,8 @@ def piece_item(
         materials.notes.add("empty-model", piece.place, "nothing to see in it: left out")
         return None
     item_id, level_id = ids
-    kind = kind_of(
-        piece.catalogue_id,
-        piece.name,
-        nyu40,
-        is_opening=piece.frame is not None,
-        is_light=piece.tag == "light",
-    )
+    is_opening, is_light = piece.frame is not None, piece.tag == "light"
+    kind = kind_of(piece.catalogue_id, piece.name, nyu40, is_opening=is_opening, is_light=is_light)
     item = Item(
         id=item_id,
         name=piece.name,
@@ -96,6 +93,7 @@ def _room_of(frame: Frame, level_id: str, rooms: list[ReadRoom]) -> str | None:
     for room in rooms:
         if room.level_id != level_id:
             continue
+        # The nearest outline wins, zero inside; of equal ones the later room.
         gap = float(room.outline.distance(point))
         if gap <= nearest:
             best, nearest = room.id, gap

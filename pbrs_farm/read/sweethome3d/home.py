@@ -27,6 +27,7 @@ from pbrs_farm.read.sweethome3d.piece_models import Models
 from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
 from pbrs_farm.read.sweethome3d.wall_solids import wall_items
 
+_NO_ROOMS = "draw rooms (Plan > Create rooms) and save the home again"
 ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
 
 
@@ -49,28 +50,26 @@ def read_home(
     file = PurePath(name).name
     container = open_container(data, file, resources)
     plan = _shown(parse_plan(container.root, file, fields.max_extent_m), fields)
-    materials = HomeMaterials(container.contents, Notes(file, strict=fields.strict))
+    notes = Notes(file, strict=fields.strict)
     if package_note:
-        materials.notes.add("package-version", package, package_note)
-    house_level = _house_levels(plan, materials.notes)
+        notes.add("package-version", package, package_note)
+    materials = HomeMaterials(container.contents, notes)
+    house_level = _house_levels(plan, notes)
     outlines = outlines_of(plan.walls)
     rooms = read_rooms(plan, materials, house_level)
     if not rooms:
-        hint = "draw rooms (Plan > Create rooms) and save the home again"
-        raise BadHouse(file, "", "no rooms", hint=hint)
+        raise BadHouse(file, "", "no rooms", hint=_NO_ROOMS)
     # Walls, floors and ceilings; staircases cut the last two.
     ceilings = CeilingHeights(plan, outlines)
     floor_cuts, ceiling_cuts = staircase_cuts(plan, materials, house_level)
     structure = wall_items(plan, outlines, materials, house_level)
     structure += plane_items(rooms, ceilings, materials, floor_cuts, ceiling_cuts)
     pieces, openings = _furniture(plan, materials, outlines, rooms, house_level, file, fields)
-    items = (*structure, *pieces)
-    if len(items) > MAX_INSTANCES:
-        raise BadHouse(file, "", f"{len(items)} items, at most {MAX_INSTANCES} have instance ids")
-    sha = keys.sha256(data)
+    items = _numbered((*structure, *pieces), file)
+    sha, stem = keys.sha256(data), PurePath(file).stem
     return House(
-        id=keys.house_id(PurePath(file).stem, sha),
-        name=PurePath(plan.name).stem if plan.name else PurePath(file).stem,
+        id=keys.house_id(stem, sha),
+        name=PurePath(plan.name).stem if plan.name else stem,
         source=_source(plan, file, sha, package),
         levels=_levels(plan, house_level),
         rooms=room_nouns(rooms, ceilings),
@@ -79,8 +78,15 @@ def read_home(
         textures=materials.library.textures,
         openings=openings,
         cameras=stored_cameras(plan),
-        notes=materials.notes.all(),
+        notes=notes.all(),
     )
+
+
+def _numbered(items: tuple[Item, ...], file: str) -> tuple[Item, ...]:
+    """The items; BadHouse for more than there are instance ids."""
+    if len(items) > MAX_INSTANCES:
+        raise BadHouse(file, "", f"{len(items)} items, at most {MAX_INSTANCES} have instance ids")
+    return items
 
 
 def _shown(plan: Plan, fields: ReadFields) -> Plan:
@@ -134,6 +140,7 @@ def _furniture(
         if placed is None:
             continue
         item, frame = placed
+        # Stop at the limit of triangles rather than at the end of memory.
         n_faces += item.n_faces
         if n_faces > fields.max_triangles:
             raise BadHouse(
@@ -144,6 +151,7 @@ def _furniture(
         opening = piece_opening(piece, item, frame, walls, materials, cutter_material)
         if opening is not None:
             openings.append(opening)
+    # A home that lost all its models is no home to render.
     missing = materials.notes.count("missing-model")
     if n_pieces and missing and not items:
         raise BadHouse(

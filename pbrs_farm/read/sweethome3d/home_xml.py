@@ -17,26 +17,26 @@ Matrix3 = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A texture on a surface: content name, size of one tile and offsets in metres, angle, scale."""
+    """A texture on a surface, as the home lays it."""
 
-    image: str
+    image: str  # content name
     name: str
-    width: float
-    height: float
-    offset: tuple[float, float] = (0.0, 0.0)
-    angle: float = 0.0
+    width: float  # of one tile, m
+    height: float  # of one tile, m
+    offset: tuple[float, float] = (0.0, 0.0)  # in tiles
+    angle: float = 0.0  # radians
     scale: float = 1.0
-    is_fitting: bool = False
+    is_fitting: bool = False  # one tile fills the surface
 
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """A surface's paint. hidden: drawn not at all. shininess: 0..1, None = as the model has it."""
+    """What covers a surface; nothing given = the default."""
 
-    colour: Rgb | None = None
+    colour: Rgb | None = None  # sRGB-encoded
     picture: Picture | None = None
-    shininess: float | None = None
-    is_hidden: bool = False
+    shininess: float | None = None  # 0..1, None = as the model has it
+    is_hidden: bool = False  # not drawn at all
 
     @property
     def is_empty(self) -> bool:
@@ -46,119 +46,112 @@ class Paint:
 
 @dataclass(frozen=True, slots=True)
 class PlanLevel:
-    """A storey; index: its place among all levels, ordered by elevation.
-
-    reach_down: how far its walls reach below its floor (upper storeys: the floor's thickness).
-    """
+    """A storey; walls of upper storeys reach down by the floor's thickness."""
 
     id: str
     name: str
-    elevation: float
-    floor_thickness: float
-    height: float
+    elevation: float  # of the floor, m
+    floor_thickness: float  # m
+    height: float  # of walls, m
     is_visible: bool
-    index: int
-    reach_down: float = 0.0
+    index: int  # among all levels, by elevation
+    reach_down: float = 0.0  # of walls below the floor, m
 
 
 @dataclass(frozen=True, slots=True)
 class Baseboard:
     """A strip along a wall's foot."""
 
-    is_left: bool
-    thickness: float
-    height: float
+    is_left: bool  # of the wall's two sides
+    thickness: float  # m
+    height: float  # m
     paint: Paint
 
 
 @dataclass(frozen=True, slots=True)
 class PlanWall:
-    """A wall's centre line and paint. height_end: at its end, None = as at its start."""
+    """A wall's centre line and paint."""
 
     id: str
-    level: str
-    start: tuple[float, float]
-    end: tuple[float, float]
+    level: str  # id
+    start: tuple[float, float]  # of the centre line, (x, z) m
+    end: tuple[float, float]  # (x, z) m
     thickness: float
     height: float
-    height_end: float | None
-    arc: float
-    at_start: str
-    at_end: str
-    left: Paint
+    height_end: float | None  # None = as at the start
+    arc: float  # radians the wall spans, 0 = straight
+    at_start: str  # id of the wall it joins there
+    at_end: str  # id of the wall it joins there
+    left: Paint  # walking from start to end
     right: Paint
-    top: Paint
+    top: Paint  # paint of the upper face
     baseboards: tuple[Baseboard, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanRoom:
-    """A room's outline as drawn, (N, 2) metres."""
+    """A room's outline and paint."""
 
-    place: str
+    place: str  # what messages call it
     level: str
     name: str
-    points: Points2
+    points: Points2  # (N, 2) m, as drawn
     has_floor: bool
     has_ceiling: bool
     floor: Paint
     ceiling: Paint
-    is_ceiling_flat: bool
+    is_ceiling_flat: bool  # under sloped walls, too
 
 
 @dataclass(frozen=True, slots=True)
 class PlanLight:
-    """A light source: position as fractions of the lamp's box, colour, diameter as a fraction."""
+    """A light source of a lamp."""
 
-    at: tuple[float, float, float]
-    colour: Rgb
-    diameter: float | None
+    at: tuple[float, float, float]  # fractions from the left front bottom corner
+    colour: Rgb  # sRGB-encoded
+    diameter: float | None  # fraction of the lamp's width
 
 
 @dataclass(frozen=True, slots=True)
 class DoorFrame:
     """How a door or window sits in its wall; fractions of its width, depth and height."""
 
-    cut_out: str
-    wall_width: float
-    wall_left: float
-    wall_height: float
-    wall_top: float
+    cut_out: str  # SVG path in the unit square, y down
+    wall_width: float  # of the opening
+    wall_left: float  # from the box's left
+    wall_height: float  # of the opening
+    wall_top: float  # from the box's top
     cuts_both_sides: bool
 
 
 @dataclass(frozen=True, slots=True)
 class PlanPiece:
-    """A piece of furniture. centre, elevation: of its box's bottom above the level, metres.
+    """A piece of furniture as the home places it."""
 
-    place: what to call it in a message. group: name of the group that holds it. rotation: 9 numbers row by row or None.
-    transformations: (group name, 12 numbers row by row) of movable parts.
-    """
-
-    tag: str
-    place: str
+    tag: str  # XML element
+    place: str  # what messages call it
     level: str
     catalogue_id: str
     name: str
-    model: str
-    centre: tuple[float, float]
-    elevation: float
-    angle: float
-    pitch: float
-    roll: float
-    size: tuple[float, float, float]
+    model: str  # content name
+    centre: tuple[float, float]  # (x, z) m
+    elevation: float  # of the bottom above the level, m
+    angle: float  # about y, radians
+    pitch: float  # about x
+    roll: float  # about z
+    size: tuple[float, float, float]  # width, height, depth, m
     height_in_plan: float | None
     is_mirrored: bool
-    rotation: Matrix3 | None
+    rotation: Matrix3 | None  # of the model in its box
     paint: Paint
-    materials: tuple[tuple[str, Paint], ...]
+    materials: tuple[tuple[str, Paint], ...]  # overrides by the model's name
     transformations: tuple[tuple[str, Matrix3], ...] = ()
     frame: DoorFrame | None = None
     lights: tuple[PlanLight, ...] = ()
-    light_materials: tuple[str, ...] = ()
-    power: float = 0.0
-    staircase_cut_out: str = ""
-    group: str = ""
+    light_materials: tuple[str, ...] = ()  # that emit
+    power: float = 0.0  # 0..1, 0 = off
+    staircase_cut_out: str = ""  # SVG path
+    group: str = ""  # name of the group that holds it
 
 
 @dataclass(frozen=True, slots=True)

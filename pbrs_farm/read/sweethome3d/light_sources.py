@@ -36,8 +36,10 @@ def light_parts(piece: PlanPiece, frame: Frame, emitting: tuple[int, ...]) -> tu
         )
         for s in piece.lights
     ]
+    # A lamp that only has a glowing mesh gets a source in its middle.
     if not sources and emitting:
         sources = [(np.zeros(3), (1.0, 1.0, 1.0), DEFAULT_RADIUS_M)]
+    # Share the lamp's power by the sources' brightness; colours keep their hue at full value.
     strength = [max(colour) for _, colour, _ in sources]
     total = sum(strength)
     parts: list[LightPart] = []

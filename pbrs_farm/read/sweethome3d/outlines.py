@@ -47,6 +47,7 @@ def outlines_of(walls: tuple[PlanWall, ...]) -> dict[str, Outline]:
             if other is None or other_id not in bare or other_id == wall_id:
                 continue
             _join(wall, other, at_start, (left, right), bare, order)
+        # Take the mitred outline where it is a simple polygon.
         mitred = Outline(left, right, outline.along)
         joined[wall_id] = mitred if _is_sound(mitred, outline) else outline
     return joined
@@ -67,6 +68,7 @@ def _unjoined(wall: PlanWall) -> Outline:
     half = wall.thickness / 2
     if abs(wall.arc) > 1e-3 and abs(wall.arc) < 2 * math.pi - 1e-3:
         return _arc(wall, start, end, half)
+    # Offset the centre line by half the thickness to either side.
     along = (end - start) / np.linalg.norm(end - start)
     offset = np.array([along[1], -along[0]]) * half
     line = np.stack([start, end])
@@ -74,8 +76,10 @@ def _unjoined(wall: PlanWall) -> Outline:
 
 
 def _arc(wall: PlanWall, start: Points2, end: Points2, half: float) -> Outline:
+    # Find the circle's centre from the chord and the angle it spans.
     chord = end - start
     centre = (start + end) / 2 + np.array([-chord[1], chord[0]]) / (2 * math.tan(wall.arc / 2))
+    # Walk the arc in equal steps, and put the sides inside and outside of it.
     n = max(2, math.ceil(abs(wall.arc) / ARC_STEP_RAD))
     along = np.linspace(0.0, 1.0, n + 1)
     first = math.atan2(start[1] - centre[1], start[0] - centre[0])
@@ -116,6 +120,7 @@ def _join(
         b = (facing[there], facing[beyond])
         if order[wall.id] > order[other.id]:
             a, b = b, a
+        # Move the corner to the crossing unless the mitre would be too long.
         crossing = _crossing(*a, *b)
         if crossing is None:
             continue

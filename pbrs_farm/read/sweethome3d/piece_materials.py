@@ -35,6 +35,7 @@ def piece_material(
     paint = dict(piece.materials).get(mesh.material, Paint())
     if paint.is_hidden:
         return None
+    # The whole piece's paint covers what no paint of its own has; panes and mirrors stay.
     if paint.is_empty and role not in (PANE, MIRROR):
         paint = Paint(
             piece.paint.colour,
@@ -44,11 +45,13 @@ def piece_material(
     emits = role == LIGHT or mesh.material in piece.light_materials
     loaded, picture = _texture(piece, paint, base, mesh, model, materials)
     diffuse = (1.0, 1.0, 1.0) if loaded else paint.colour or base.kd
+    # The home's shininess replaces the model's highlights.
     specular, shininess = base.ks, base.ns
     if paint.shininess is not None:
         shine = min(max(paint.shininess, 0.0), 1.0)
         specular, shininess = (shine, shine, shine), shine * SHININESS_SCALE
     kind = _kind(piece, role, base, emits=emits, is_textured=loaded is not None)
+    # Glass whose model says opaque lets light pass all the same.
     opacity = base.d
     if kind in (MaterialKind.PANE, MaterialKind.GLASS) and opacity > CLEAR:
         opacity = PANE_OPACITY

@@ -24,13 +24,13 @@ _ROLES = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """meshes in the model's frame; materials by name; folder: of its content, for its pictures."""
+    """A parsed model."""
 
-    meshes: tuple[Mesh, ...]
-    materials: dict[str, ObjMaterial]
-    folder: str
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    meshes: tuple[Mesh, ...]  # in the model's frame
+    materials: dict[str, ObjMaterial]  # by name
+    folder: str  # of its content, for its pictures
+    low: NDArray[np.float64]  # corner of its box
+    high: NDArray[np.float64]  # corner of its box
 
 
 def role_of(group: str) -> str:
@@ -96,6 +96,7 @@ class Models:
 
     def _model(self, parsed: ObjModel, name: str) -> Model:
         folder = posixpath.dirname(name)
+        # Start from the program's own materials; libraries of the model replace them.
         materials = dict(builtin_materials())
         for library in parsed.mtllibs:
             data = self._content(folder, library)
@@ -106,6 +107,7 @@ class Models:
                 continue
             for material in parse_mtl(data):
                 materials[material.name] = material
+        # Note the names that neither of them knows.
         used = {m.material for m in parsed.meshes if m.material}
         unknown = sorted(used - set(materials))
         if unknown:
@@ -131,6 +133,7 @@ def content_name(folder: str, name: str) -> str:
 
 
 def _kind(data: bytes) -> str:
+    # Tell the format by its first bytes.
     head = data[:4096].lstrip()
     if data[:2] == b"PK":
         return "a nested zip"
