@@ -24,3 +24,10 @@ def test_every_verb_shown_exists() -> None:
 def test_every_linked_file_exists() -> None:
     for link in re.findall(r"\]\(([^)#:]+)\)", README):
         assert (Path(__file__).parents[2] / link).exists(), link
+
+
+def test_every_module_the_glossary_names_exists() -> None:
+    root = Path(__file__).parents[2]
+    text = (root / "docs/glossary.md").read_text(encoding="utf-8")
+    for name in re.findall(r"`([a-z0-9_/]+/(?:[a-z0-9_]+\.py)?)`", text):
+        assert (root / "pbrs_farm" / name).exists() or (root / name).exists(), name
