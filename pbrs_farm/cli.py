@@ -19,6 +19,7 @@ import pbrs_farm
 from pbrs_farm.commands.arguments import Handler, warn
 from pbrs_farm.core.errors import PbrsError
 
+# Module of pbrs_farm.commands -> the verbs it adds.
 MODULES: Final = {
     "looking": ("doctor", "homes", "skies", "recipes", "layers"),
     "making": ("demo", "run", "objects", "step"),
@@ -32,7 +33,6 @@ MODULES: Final = {
         "drain", "workers", "recover", "coordinator", "worker",
     ),
 }  # fmt: skip
-"""Module of pbrs_farm.commands -> the verbs it adds."""
 
 _OF_THE_FARM: Final = ("submitting", "steering")  # modules that need celery and redis
 

@@ -22,12 +22,12 @@ _PACKAGES: Final = (
     "OpenImageIO", "shapely",
 )  # fmt: skip
 _GL_PACKAGES: Final = "libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri"
+# Mitsuba's variants -> what to do where one does not work.
 _VARIANTS: Final = {
     "cuda_ad_rgb": "only with an NVIDIA GPU and its driver; not needed",
     "llvm_ad_rgb": "sudo apt-get install -y libllvm19",
     "scalar_rgb": "pip install 'pbrs-farm[transport]'",
 }
-"""Mitsuba's variants -> what to do where one does not work."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from workers.client.farm_client import Farm
 
 Handler = Callable[[argparse.Namespace], int]
+# (name, handler, help) -> the verb's parser.
 Verb = Callable[[str, Handler, str], argparse.ArgumentParser]
-"""(name, handler, help) -> the verb's parser."""
 
+# Help of arguments that name a home, and a view.
 HOME: Final = "file, SUNCG house folder, example home's name, or `builtin`"
 VIEW: Final = "a view's folder: OUT/houses/<house>/views/<view>"
-"""Help of arguments that name a home, and a view."""
 
 
 def warn(text: str) -> None:
@@ -121,6 +121,7 @@ def home_arguments(homes: list[str], houses: str | None) -> list[str]:
     return suncg_list(Path(homes[0]), Path(houses))
 
 
+# Options that are short forms -> the recipe's field.
 _SHORT_FORMS: Final = {
     "noise": "light.noise",
     "time_budget": "light.time_budget_s",
@@ -129,7 +130,6 @@ _SHORT_FORMS: Final = {
     "cameras": "cameras.source",
     "per_sector": "cameras.per_sector",
 }
-"""Options that are short forms -> the recipe's field."""
 
 
 def recipe_of(args: argparse.Namespace) -> Recipe:

@@ -13,32 +13,19 @@ F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
+# (H, W) uint32: instance id of the item seen through each pixel's centre, 0 = nothing.
 ItemBuffer = NDArray[np.uint32]
-"""(H, W) uint32: instance id of the item seen through each pixel's centre, 0 = nothing."""
 
+# (H, W, 3) float32, linear sRGB primaries, W m-2 sr-1; finite and >= 0.
 RadianceImage = NDArray[np.float32]
-"""(H, W, 3) float32, linear sRGB primaries, W m-2 sr-1; finite and >= 0."""
 
-Srgb8Image = NDArray[np.uint8]
-"""(H, W, 3) uint8, sRGB-encoded."""
-
-DepthZ = NDArray[np.float32]
-"""(H, W) float32, metres along the optical axis, 0 = nothing."""
-
-UnitVectors = NDArray[np.float32]
-"""(H, W, 3) float32 unit vectors; (0, 0, 0) = nothing."""
-
-Mask = NDArray[np.bool_]
-"""(H, W) bool."""
-
-Points = NDArray[np.float32]
-"""(N, 3) float32, metres, world frame."""
-
-Points2 = NDArray[np.float64]
-"""(N, 2) float64, metres, plan: columns are world x and world z."""
-
-Matrix4 = NDArray[np.float64]
-"""(4, 4) float64, affine, column vectors: p_a = a_from_b @ p_b."""
+Srgb8Image = NDArray[np.uint8]  # (H, W, 3) uint8, sRGB-encoded
+DepthZ = NDArray[np.float32]  # (H, W) float32, metres along the optical axis, 0 = nothing
+UnitVectors = NDArray[np.float32]  # (H, W, 3) float32 unit vectors; (0, 0, 0) = nothing
+Mask = NDArray[np.bool_]  # (H, W) bool
+Points = NDArray[np.float32]  # (N, 3) float32, metres, world frame
+Points2 = NDArray[np.float64]  # (N, 2) float64, metres, plan: columns are world x and world z
+Matrix4 = NDArray[np.float64]  # (4, 4) float64, affine, column vectors: p_a = a_from_b @ p_b
 
 
 def guard(

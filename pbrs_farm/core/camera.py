@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import Matrix4
 
+# Full horizontal field of view of the published cameras: half-angle 0.5534 rad (docs/spec/suncg.md section 3).
 PAPER_HFOV_RAD = 2 * 0.5534
-"""Full horizontal field of view of the published cameras: half-angle 0.5534 rad (docs/spec/suncg.md section 3)."""
 
 
 @dataclass(frozen=True, slots=True)

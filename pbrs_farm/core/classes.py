@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+# Name of each NYU40 id, 0..40.
 NYU40_NAMES: Final = (
     "none", "wall", "floor", "cabinet", "bed", "chair", "sofa", "table", "door", "window",
     "bookshelf", "picture", "counter", "blinds", "desk", "shelves", "curtain", "dresser", "pillow",
@@ -18,14 +19,14 @@ NYU40_NAMES: Final = (
     "towel", "shower curtain", "box", "whiteboard", "person", "night stand", "toilet", "sink",
     "lamp", "bathtub", "bag", "otherstructure", "otherfurniture", "otherprop",
 )  # fmt: skip
-"""Name of each NYU40 id, 0..40."""
 
+# Name of each NYU13 id, 0..13.
 NYU13_NAMES: Final = (
     "none", "bed", "books", "ceiling", "chair", "floor", "furniture", "objects", "picture", "sofa",
     "table", "television", "wall", "window",
 )  # fmt: skip
-"""Name of each NYU13 id, 0..13."""
 
+# (41,) NYU13 id of each NYU40 id.
 NYU13_FROM_NYU40: Final[NDArray[np.uint8]] = np.array(
     [
         0, 12, 5, 6, 1, 4, 9, 10, 12, 13, 6, 8, 6, 13, 10, 6, 13, 6, 7, 7, 5,
@@ -33,4 +34,3 @@ NYU13_FROM_NYU40: Final[NDArray[np.uint8]] = np.array(
     ],
     np.uint8,
 )  # fmt: skip
-"""(41,) NYU13 id of each NYU40 id."""

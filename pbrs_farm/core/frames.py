@@ -13,13 +13,13 @@ from pbrs_farm.core.arrays import Matrix4
 
 M_FROM_CM = 0.01
 
+# Camera axes x right, y down, z forward  <-  x right, y up, z backward.
 OPENCV_FROM_OPENGL: Matrix4 = np.diag([1.0, -1.0, -1.0, 1.0])
-"""Camera axes x right, y down, z forward  <-  x right, y up, z backward."""
 
+# Published normal axes x right, y forward, z up  <-  OpenGL camera axes (docs/spec/suncg.md section 5).
 PUBLISHED_FROM_OPENGL: NDArray[np.float64] = np.array(
     [[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], np.float64
 )
-"""Published normal axes x right, y forward, z up  <-  OpenGL camera axes (docs/spec/suncg.md section 5)."""
 
 
 def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
@@ -61,8 +61,8 @@ def srgb_from_linear(linear: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.maximum(v, 0) ** (1 / 2.4) - 0.055)
 
 
+# Weights of linear sRGB primaries in luminance (Rec. 709).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float64)
-"""Weights of linear sRGB primaries in luminance (Rec. 709)."""
 
+# Lumen per watt of white light: radiance in W m-2 sr-1 times this is luminance in cd m-2.
 LM_PER_W = 179.0
-"""Lumen per watt of white light: radiance in W m-2 sr-1 times this is luminance in cd m-2."""

@@ -24,8 +24,8 @@ from pbrs_farm.core.errors import BadInput
 RECIPE: Final = "recipe.json"
 MANIFEST: Final = "manifest.jsonl"
 SELECTION: Final = "selection.json"
+# The folders of an output root that hold a folder per house and per object without context.
 FOLDERS: Final = ("houses", "objects")
-"""The folders of an output root that hold a folder per house and per object without context."""
 
 _HOUSE_KEY: Final = re.compile(
     r"(?P<root>houses|objects)/(?P<house>[^/]+)/"
@@ -55,8 +55,8 @@ def house_id(file_stem: str, source_sha256: str) -> str:
     return f"{slug(file_stem)}-{source_sha256[:8]}"
 
 
+# Ids of objects without context begin so; no house's id can (a slug has no underscore).
 OBJECT_PREFIX: Final = "object_"
-"""Ids of objects without context begin so; no house's id can (a slug has no underscore)."""
 
 
 def is_object(house: str) -> bool:

@@ -43,6 +43,7 @@ def _behind_glass(name: str, channels: str, dtype: str, nodata: str = "0") -> La
     return _optional(f"behind_glass_{name}", channels, dtype, unit, nodata, file)
 
 
+# Layers that every view has, and (optional) those written when --layers names them.
 LAYERS: Final[tuple[Layer, ...]] = (
     # The pictures of the four lighting modes, and what two of them are developed from.
     _picture("opengl_dl", "opengl_dl"),
@@ -98,7 +99,6 @@ LAYERS: Final[tuple[Layer, ...]] = (
     _optional("hha", "RGB", "uint8", "disparity, height in cm, angle with gravity (Gupta et al. 2014)"),
     _optional("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it"),
 )  # fmt: skip
-"""Layers that every view has, and (optional) those written when --layers names them."""
 
 LAYER: Final = {layer.name: layer for layer in LAYERS}
 

@@ -15,8 +15,8 @@ from pbrs_farm.core.lighting import Mode
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.images import array_from_png
 
+# The picture of a view is the first of these it has.
 PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
-"""The picture of a view is the first of these it has."""
 
 # Classes of the supercategory "structure"; all others are objects.
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")

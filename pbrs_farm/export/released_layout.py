@@ -14,6 +14,7 @@ import numpy as np
 
 from pbrs_farm.formats.output_folder import ViewEntry
 
+# Stored file -> where the published data has it.
 FILES: Final = {
     "mlt_il_ol.png": "mlt_v2/{house}/{id}_mlt.png",
     "opengl_il.png": "opengl_ver2/{house}/{id}_color.png",
@@ -23,7 +24,6 @@ FILES: Final = {
     "semantic.png": "category_v2/{house}/{id}_category40.png",
     "boundary.png": "boundary_v2/{house}/{id}_instance_boundary.png",
 }
-"""Stored file -> where the published data has it."""
 
 
 def write_released(views: list[ViewEntry], out: Path) -> int:

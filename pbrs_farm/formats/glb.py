@@ -19,6 +19,7 @@ _BIN_CHUNK: Final = 0x004E4942  # "BIN"
 _ARRAY_BUFFER: Final = 34962  # vertices, in OpenGL's numbers
 _ELEMENT_ARRAY_BUFFER: Final = 34963  # indices
 
+# Component type of an accessor -> dtype.
 DTYPES: Final[dict[int, np.dtype[Any]]] = {
     5120: np.dtype("<i1"),
     5121: np.dtype("<u1"),
@@ -27,10 +28,9 @@ DTYPES: Final[dict[int, np.dtype[Any]]] = {
     5125: np.dtype("<u4"),
     5126: np.dtype("<f4"),
 }
-"""Component type of an accessor -> dtype."""
 
+# Type of an accessor -> components per element (matrices are not geometry).
 WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-"""Type of an accessor -> components per element (matrices are not geometry)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,8 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
 
+# The mode whose picture decides for the view in all modes (paper section 3.3).
 SCORED_MODE: Final = Mode.MLT_IL_OL
-"""The mode whose picture decides for the view in all modes (paper section 3.3)."""
 
 
 class PictureQuality(BaseModel):

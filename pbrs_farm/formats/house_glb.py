@@ -17,11 +17,11 @@ from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.serialise import json_from_value
 
+# The only pictures glTF knows; others stay in the file but no material shows them.
 GLTF_IMAGES: Final = ("image/png", "image/jpeg")
-"""The only pictures glTF knows; others stay in the file but no material shows them."""
 
+# (u, v up) times this is (u, v down), one texture higher; and back.
 V_DOWN: Final[NDArray[np.float32]] = np.array([1, -1], np.float32)
-"""(u, v up) times this is (u, v down), one texture higher; and back."""
 
 _PANE_ALPHA: Final = 0.3
 

@@ -17,6 +17,7 @@ from pydantic_core import to_jsonable_python
 
 from pbrs_farm.core.errors import BadHouse
 
+# Shape of an array field by class and field (None = any length).
 SHAPES: Final[dict[tuple[str, str], tuple[int | None, ...]]] = {
     ("Surface", "positions"): (None, 3),
     ("Surface", "faces"): (None, 3),
@@ -31,7 +32,6 @@ SHAPES: Final[dict[tuple[str, str], tuple[int | None, ...]]] = {
     ("StoredCamera", "eye"): (3,),
     ("StoredCamera", "towards"): (3,),
 }
-"""Shape of an array field by class and field (None = any length)."""
 
 
 def json_from_value(value: Any) -> Any:

@@ -16,11 +16,11 @@ e8ecf0 aca474 7c249c aca4dc fc94a4 849414 8cd484 845c7c cc4ca4 5c744c c42c5c
 54e4fc 9c7cfc 2cfcac 2474e4 5c54b4 cc7c14 d4848c c44c14
 """
 
+# (41, 3) sRGB of NYU40 ids 0..40. Structure is muted; each further class, the most frequent first,
+# is the colour farthest in Oklab from those before it, so any two differ by 0.085 at least.
 NYU40_COLOURS: Final[NDArray[np.uint8]] = np.array(
     [list(bytes.fromhex(text)) for text in _NYU40_HEX.split()], np.uint8
 )
-"""(41, 3) sRGB of NYU40 ids 0..40. Structure is muted; each further class, the most frequent first,
-is the colour farthest in Oklab from those before it, so any two differ by 0.085 at least."""
 
 _NEAR_TO_FAR: Final = np.array(
     [[253, 246, 214], [164, 216, 172], [64, 172, 172], [34, 112, 162], [42, 54, 122], [18, 14, 42]],

@@ -53,8 +53,8 @@ STEPS: Final = {
 }  # fmt: skip
 
 
+# Every recipe group that something stored depends on (selection judges, it makes nothing).
 PICTURE_GROUPS: Final = tuple(sorted({g for step in STEPS.values() for g in step.groups}))
-"""Every recipe group that something stored depends on (selection judges, it makes nothing)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,13 +32,13 @@ class Binning(BaseModel):
         return self.colour[0] * self.colour[1] * self.colour[2]
 
 
+# Coarse to fine; each is an exact sum of the bins of the next.
 BINNINGS: Final = tuple(
     Binning(colour=colour, depth=depth)
     for colour, depth in (
         ((2, 2, 2), 8), ((4, 4, 2), 16), ((4, 4, 4), 32), ((8, 8, 4), 64), ((8, 8, 8), 128),
     )
 )  # fmt: skip
-"""Coarse to fine; each is an exact sum of the bins of the next."""
 
 
 class BinningRow(BaseModel):

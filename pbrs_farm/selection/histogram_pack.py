@@ -25,8 +25,8 @@ _TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes")  
 
 _OF_PICTURE: Final = ("brightness", "blown")
 _OF_SCENE: Final = ("surface", "near", "n_objects", "noise", "missing_textures")
+# Columns of HistogramPack.quality: attributes of PictureQuality and SceneQuality.
 QUALITIES: Final = (*_OF_PICTURE, *_OF_SCENE)
-"""Columns of HistogramPack.quality: attributes of PictureQuality and SceneQuality."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

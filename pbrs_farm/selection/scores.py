@@ -19,6 +19,7 @@ from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normal
 from pbrs_farm.selection.reference_set import Reference, check_comparable
 from pbrs_farm.selection.similarity import best_match
 
+# Columns of a score table.
 SCORES: Final[Any] = pa.schema(
     [
         *((name, pa.string()) for name in ("house", "view", "room", "room_type")),
@@ -33,7 +34,6 @@ SCORES: Final[Any] = pa.schema(
         ("source", pa.string()),  # digest of the house's histograms
     ]
 )
-"""Columns of a score table."""
 
 BATCH_VIEWS: Final = 8192  # scored at once: bounds memory, and keeps the search efficient
 

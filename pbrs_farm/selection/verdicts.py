@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.selection.balance import balanced, class_shares
 
+# Why a view is rejected, in the order in which the first is named.
 REASONS: Final = (
     "failed", "unscored", "too-dark", "blown", "one-surface", "inside-object", "too-few-objects",
     "too-noisy", "missing-textures", "unlike-colour", "unlike-depth", "room-cap",
     "class-balance",
 )  # fmt: skip
-"""Why a view is rejected, in the order in which the first is named."""
 
 
 def verdicts(scores: Any, fields: SelectionFields) -> Any:

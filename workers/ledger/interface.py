@@ -25,12 +25,12 @@ FaultClass = Literal[
     "storage", "preempted", "drained", "version", "cancelled",
 ]  # fmt: skip
 
-ALIVE_S: Final = 45.0
-"""A worker whose last heartbeat is no older than this is there."""
+ALIVE_S: Final = 45.0  # a worker whose last heartbeat is no older than this is there
+# Classes of fault that are nobody's: the attempt is given back.
 UNCOUNTED: Final = ("preempted", "storage", "version", "drained")
-"""Classes of fault that are nobody's: the attempt is given back."""
+# Classes of fault that speak against the worker: three in a row and it cools down.
 SUSPECT: Final = ("crash", "resource", "machine", "timeout", "silent")
-"""Classes of fault that speak against the worker: three in a row and it cools down."""
+# A unit's state: name -> the letter it has in the ledger; Lua knows the names as constants.
 STATES: Final = {
     "LOADED": "l",  # entered, its house not admitted
     "READY": "w",  # in the outbox, or waiting for its time
@@ -40,7 +40,6 @@ STATES: Final = {
     "FAILED": "f",  # for good
     "CANCELLED": "x",
 }
-"""A unit's state: name -> the letter it has in the ledger; Lua knows the names as constants."""
 
 
 class LedgerUnavailable(PbrsError, Transient):

@@ -31,5 +31,5 @@ def message_from_line(line: bytes) -> Message:
 
 
 Send = Callable[[Message], None]
+# Runs the task a request line names; its last message, done or fault.
 Handler = Callable[[bytes], Message]
-"""Runs the task a request line names; its last message, done or fault."""

@@ -38,21 +38,19 @@ from pbrs_farm.transport.kernels.device_scene import (
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import PathState
 
+# Guided part of the rays scattered at a vertex. In between it takes the rays that roulette would
+# end, so that daylight, which is not guided, loses little.
 MAX_SHARE, MIN_SHARE = 0.2, 0.1
-"""Guided part of the rays scattered at a vertex. In between it takes the rays that roulette would
-end, so that daylight, which is not guided, loses little."""
 
-CONE_SHARE: Final = 0.3
-"""Of the guided rays, into cones."""
+CONE_SHARE: Final = 0.3  # of the guided rays, into cones
 
-MAX_REFLECTED: Final = 0.5
-"""Of the scattered rays that meet thin glass near a lamp."""
+MAX_REFLECTED: Final = 0.5  # of the scattered rays that meet thin glass near a lamp
 
+# How much longer paths live: 5 where the one lamp that matters is 1 m off, 100 within 22 cm.
 _MAX_BOOST, _BOOST_M2 = 100.0, 5.0
-"""How much longer paths live: 5 where the one lamp that matters is 1 m off, 100 within 22 cm."""
 
+# Guiding has its full share where lamps send a quarter of their light out by their interiors.
 _FULL_GUIDING: Final = 4.0
-"""Guiding has its full share where lamps send a quarter of their light out by their interiors."""
 
 
 class Guiding(NamedTuple):

@@ -16,14 +16,13 @@ from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.scene_tables.material_rows import F0, KD, KIND, SURFACE, TAU
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables, bounding_spheres
 
-REACH_M: Final = 0.6
-"""Faces farther from a bulb are outside its lamp's interior."""
+REACH_M: Final = 0.6  # faces farther from a bulb are outside its lamp's interior
 
+# Of the lamp's flux, per m2: as much light as falls on a surface 40 cm from a bare bulb.
 MIN_EXITANCE: Final = 0.5
-"""Of the lamp's flux, per m2: as much light as falls on a surface 40 cm from a bare bulb."""
 
+# Of what a lamp's targets send out, inside the sphere that is called its interior.
 INTERIOR_SHARE: Final = 0.9
-"""Of what a lamp's targets send out, inside the sphere that is called its interior."""
 
 _MAX_FACES: Final = 1024  # candidates per lamp
 _POINTS: Final = 4  # on either side of a face

@@ -21,8 +21,7 @@ from pbrs_farm.transport.kernels.packets import point
 from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, bounding_spheres
 
-MAX_NEAR: Final = 8
-"""Lamps that are weighted by where they are."""
+MAX_NEAR: Final = 8  # lamps that are weighted by where they are
 
 _MIN_RADIUS_M: Final = 0.03
 _MAX_SIN2: Final = 0.98  # of half a cone's opening; wider, the vertex counts as inside

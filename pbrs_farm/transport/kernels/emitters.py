@@ -34,12 +34,11 @@ from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky, solid_angles
 
-SUN, DOME, FIRST_PORTAL = 0, 1, 2
-"""Outdoor techniques; those from FIRST_PORTAL on are portals."""
+SUN, DOME, FIRST_PORTAL = 0, 1, 2  # outdoor techniques; those from FIRST_PORTAL on are portals
 
+# Of the shadow rays to lamps, those that go by where the lamps are; the others go by the weights
+# of the view alone (walls hide lamps).
 NEARBY_SHARE = 0.5
-"""Of the shadow rays to lamps, those that go by where the lamps are; the others go by the weights
-of the view alone (walls hide lamps)."""
 
 _PORTAL_PACKETS = 3  # corner, first edge, second edge
 
