@@ -26,7 +26,7 @@ from pbrs_farm.commands.arguments import (
 )
 from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.errors import BadInput, MachineFailed
-from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.recipe import recipe_from_json
 
 if TYPE_CHECKING:
     from pbrs_farm.read.source import SourceRef
@@ -195,7 +195,7 @@ def _step(args: argparse.Namespace) -> int:
     if args.step not in STEPS:
         raise BadInput("step", args.step, "no such step", hint=f"of {', '.join(STEPS)}")
     store = store_from_url(args.out, settings_from_environment().store)
-    recipe = Recipe.model_validate_json(store.get("recipe.json"))
+    recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     source = resolve(args.home)
     work = Work(
         store=store, recipe=recipe, house_id=source.house_id, house_cache=HouseCache(), source=source,

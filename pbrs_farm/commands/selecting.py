@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 from pbrs_farm.commands.arguments import Verb, add_set, echo, echo_json
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.recipe import HistogramFields, Recipe, SelectionFields, recipe_from_name
+from pbrs_farm.core.recipe import (
+    HistogramFields,
+    Recipe,
+    SelectionFields,
+    recipe_from_json,
+    recipe_from_name,
+)
 
 if TYPE_CHECKING:
     from pbrs_farm.selection.reference_set import Reference
@@ -90,7 +96,7 @@ def _select(args: argparse.Namespace) -> int:
     if "://" not in args.folder and not Path(args.folder).is_dir():
         raise BadInput(args.folder, "", "no such folder")
     store = store_from_url(args.folder, settings_from_environment().store)
-    recipe = Recipe.model_validate_json(store.get("recipe.json"))
+    recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     fields = _fields(recipe, args)
     # Read the reference, or build it from photographs as the views' recipe says.
     is_file = args.reference.is_file() and args.reference.suffix != ".mat"

@@ -5,7 +5,7 @@ docs/selection.md shows the layouts in which pairs are found, at any depth of a 
 
 from __future__ import annotations
 
-import hashlib
+import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,6 +19,7 @@ from pbrs_farm import images
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular
 from pbrs_farm.selection.depth_photographs import depth_mm_from_units, sun_rgbd_depth
 
 _RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")  # of folders
@@ -141,9 +142,9 @@ def photo_from_pair(pair: Pair, *, depth_scale: float | None, sun_rgbd: bool) ->
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path)
     except OSError as error:
-        raise BadInput(path, "", f"cannot be read: {error.strerror}") from None
+        raise BadInput(path, "", fault_of(error)) from None
 
 
 def _stored_depth(path: Path) -> NDArray[Any]:
@@ -153,8 +154,8 @@ def _stored_depth(path: Path) -> NDArray[Any]:
         layers = images.layers_from_exr(_read(path), str(path))
         return layers.get("Z", next(iter(layers.values())))
     try:
-        return np.asarray(np.load(path, allow_pickle=False))
-    except (OSError, ValueError, EOFError):
+        return np.asarray(np.load(io.BytesIO(_read(path)), allow_pickle=False))
+    except (ValueError, EOFError):
         raise BadInput(path, "", "cannot be read as a numpy array") from None
 
 
@@ -242,8 +243,7 @@ def sha256_of_files(paths: list[Path]) -> str:
     digests = []
     for path in paths:
         try:
-            with path.open("rb") as file:
-                digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+            digests.append(digest_of_regular(path))
         except OSError as error:
-            raise BadInput(path, "", f"cannot be read: {error.strerror}") from None
+            raise BadInput(path, "", fault_of(error)) from None
     return digests[0] if len(digests) == 1 else keys.sha256("".join(digests).encode())

@@ -19,6 +19,7 @@ from pbrs_farm.curate.photographs import (
     photo_from_pair,
     sha256_of_files,
 )
+from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.selection.depth_photographs import registration_border
 from pbrs_farm.selection.histograms import Histogram, histogram
 from pbrs_farm.selection.reference_set import (
@@ -95,8 +96,8 @@ def _counted(
 def read_reference(path: Path) -> Reference:
     """The reference in a file; BadInput naming it when it is missing or none."""
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         hint = "`pbrs-farm reference build` makes one"
-        raise BadInput(path, "", f"cannot be read: {error.strerror}", hint=hint) from None
+        raise BadInput(path, "", fault_of(error), hint=hint) from None
     return reference_from_bytes(data, str(path))

@@ -14,6 +14,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.images import array_from_png
+from pbrs_farm.regular_files import read_regular
 
 # The picture of a view is the first of these it has.
 PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
@@ -73,13 +74,13 @@ def _image(view: ViewEntry, number: int, out: Path) -> dict[str, Any]:
     if picture is not None:
         name = f"images/{view.house.id}/{view.id}.png"
         (out / name).parent.mkdir(parents=True, exist_ok=True)
-        (out / name).write_bytes(picture.read_bytes())
+        (out / name).write_bytes(read_regular(picture))
         image["file_name"] = name
     return image
 
 
 def _annotations(view: ViewEntry) -> Iterator[dict[str, Any]]:
-    instance = array_from_png((view.folder / "instance.png").read_bytes(), str(view.folder))
+    instance = array_from_png(read_regular(view.folder / "instance.png"), str(view.folder))
     for row in view.facts["instances"]:
         if not row["nyu40"]:
             continue  # no category

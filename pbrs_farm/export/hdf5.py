@@ -16,6 +16,7 @@ from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.export.coco import PICTURES
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.images import array_from_png
+from pbrs_farm.regular_files import read_regular
 
 
 def write_hdf5(views: list[ViewEntry], out: Path) -> int:
@@ -47,7 +48,7 @@ def write_hdf5(views: list[ViewEntry], out: Path) -> int:
 
 def _datasets(view: ViewEntry) -> dict[str, NDArray[Any] | str]:
     def png(file: str) -> NDArray[Any]:
-        return array_from_png((view.folder / file).read_bytes(), f"{view.folder}/{file}")
+        return array_from_png(read_regular(view.folder / file), f"{view.folder}/{file}")
 
     data: dict[str, NDArray[Any] | str] = {}
     # The last written is the first of PICTURES.

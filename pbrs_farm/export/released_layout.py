@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.formats.output_folder import ViewEntry
+from pbrs_farm.regular_files import read_regular
 
 # Stored file -> where the published data has it.
 FILES: Final = {
@@ -56,7 +57,7 @@ def _copied(file: Path | None, target: Path) -> int:
     if file is None:
         return 0
     target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(file.read_bytes())
+    target.write_bytes(read_regular(file))
     return 1
 
 

@@ -12,6 +12,7 @@ from typing import Final
 
 from pbrs_farm.core.layers import LAYERS
 from pbrs_farm.formats.output_folder import ViewEntry
+from pbrs_farm.regular_files import read_regular
 
 VIEWS_PER_SHARD: Final = 500
 
@@ -42,7 +43,7 @@ def _add_sample(tar: tarfile.TarFile, view: ViewEntry) -> None:
         if file is not None:
             parts[f"{layer.name}{file.suffix}"] = file
     for part, file in parts.items():
-        data = file.read_bytes()
+        data = read_regular(file)
         # TarInfo's own defaults: time 0, no owner.
         member = tarfile.TarInfo(f"{key}.{part}")
         member.size = len(data)

@@ -13,6 +13,7 @@ from typing import Any
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.regular_files import read_regular
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +105,7 @@ def reasons_of(root: Path) -> dict[tuple[str, str], str]:
     if not path.is_file():
         return {}
     try:
-        rows = [json.loads(line) for line in path.read_bytes().splitlines()]
+        rows = [json.loads(line) for line in read_regular(path).splitlines()]
         return {(row["house"], row["view"]): str(row["reason"]) for row in rows}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput(path, "", f"not the lines of a selection: {error}") from None
@@ -113,7 +114,7 @@ def reasons_of(root: Path) -> dict[tuple[str, str], str]:
 def json_object(path: Path) -> dict[str, Any]:
     """The JSON object in a file; {} if there is no such file; BadInput if it holds something else."""
     try:
-        value = json.loads(path.read_bytes())
+        value = json.loads(read_regular(path))
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:

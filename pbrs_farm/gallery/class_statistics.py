@@ -12,6 +12,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import ViewEntry, json_object, views_of
 from pbrs_farm.images import array_from_png
+from pbrs_farm.regular_files import read_regular
 
 
 class ClassRow(BaseModel):
@@ -89,7 +90,7 @@ def class_statistics(folder: Path) -> ClassStatistics:
 
 def _pixels_of_classes(view: ViewEntry) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     place = f"{view.folder}/semantic.png"
-    ids = array_from_png((view.folder / "semantic.png").read_bytes(), place)
+    ids = array_from_png(read_regular(view.folder / "semantic.png"), place)
     if ids.max(initial=0) >= len(NYU40_NAMES):
         raise BadInput(place, "", f"holds class {ids.max()}, not 0..40")
     return np.bincount(ids.reshape(-1), minlength=256).astype(np.int64)

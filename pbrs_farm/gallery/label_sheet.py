@@ -19,6 +19,7 @@ from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.gallery.contact_sheet import INK, PAPER
 from pbrs_farm.gallery.label_colours import NYU40_COLOURS, semantic_colours
 from pbrs_farm.images import array_from_png
+from pbrs_farm.regular_files import read_regular
 
 _ZOOM: Final = 8  # of the magnified edge
 _ROW_PX: Final = 24  # height of a row of the legend
@@ -71,7 +72,7 @@ def _layer(view: ViewEntry, file: str) -> NDArray[Any]:
     path = view.file(file)
     if path is None:
         raise BadInput(view.folder, file, "is missing")
-    return array_from_png(path.read_bytes(), str(path))
+    return array_from_png(read_regular(path), str(path))
 
 
 def _overlaid(

@@ -15,6 +15,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.gallery import label_colours as colours
+from pbrs_farm.regular_files import read_regular
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,7 @@ def _tile(view: ViewEntry, kind: TileKind, max_edge_px: int) -> Tile:
     if path is None:
         return Tile(kind, None, missing="not rendered")
     try:
-        stored = images.array_from_png(path.read_bytes(), str(path))
+        stored = images.array_from_png(read_regular(path), str(path))
         if kind.is_photo:
             return Tile(kind, images.thumbnail(_photo(stored), max_edge_px=max_edge_px))
         pixels = _COLOURS[kind.layer](stored)

@@ -17,6 +17,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, real_path
 
 if TYPE_CHECKING:
     from pbrs_farm.assets.homes import Package
@@ -60,10 +61,10 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
     elif not path.exists() and not path.suffix and "/" not in word:
         kind = "example"
     elif path.is_dir() or path.name == "house.json":
-        kind, word = "suncg", str((path.parent if path.name == "house.json" else path).resolve())
+        kind, word = "suncg", str(real_path(path.parent if path.name == "house.json" else path))
     else:
         kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
-        word = str(path.resolve())
+        word = str(real_path(path))
     return _reference(kind, word, files or SourceFiles())
 
 
@@ -122,9 +123,11 @@ def _package_digest(package: Package | None) -> str:
 def suncg_list(root: Path, list_file: Path) -> list[str]:
     """The words `ROOT/house/<id>` for every id in a list file, blank and # lines left out."""
     try:
-        lines = list_file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadHouse(list_file, "", f"cannot be read: {error}") from None
+        lines = read_regular(list_file, MAX_TEXT_BYTES).decode("utf-8").splitlines()
+    except OSError as error:
+        raise BadHouse(list_file, "", fault_of(error)) from None
+    except UnicodeDecodeError:
+        raise BadHouse(list_file, "", "cannot be read: is no UTF-8 text") from None
     ids = [line.strip() for line in lines]
     return [str(root / "house" / i) for i in ids if i and not i.startswith("#")]
 
@@ -242,16 +245,11 @@ def _sha256(path: Path, files: SourceFiles) -> str:
     try:
         return files.file_digest(path)
     except OSError as error:
-        raise _unreadable(path, error) from None
+        raise BadHouse(path, "", fault_of(error)) from None
 
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path)
     except OSError as error:
-        raise _unreadable(path, error) from None
-
-
-def _unreadable(path: Path, error: OSError) -> BadHouse:
-    is_missing = isinstance(error, FileNotFoundError)
-    return BadHouse(path, "", "no such file" if is_missing else f"cannot be read: {error.strerror}")
+        raise BadHouse(path, "", fault_of(error)) from None

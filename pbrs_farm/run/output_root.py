@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 
-from pydantic import ValidationError
-
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
-from pbrs_farm.core.recipe import Recipe, differences
+from pbrs_farm.core.recipe import Recipe, differences, recipe_from_json
 from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.formats.serialise import json_bytes
@@ -56,10 +54,7 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
     data = json_bytes(recipe)
     if store.put_if_absent(keys.RECIPE, data):
         return
-    try:
-        held = Recipe.model_validate(json.loads(store.get(keys.RECIPE)))
-    except (ValueError, ValidationError):
-        raise BadRecipe(f"{store.url}: recipe.json is no recipe of this version") from None
+    held = recipe_from_json(store.get(keys.RECIPE), f"{store.url}: recipe.json")
     differing = differences(held, recipe)
     if differing and not update:
         raise BadRecipe(

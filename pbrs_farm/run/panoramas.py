@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pbrs_farm.assets.skies import fetch_skies
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.regular_files import fault_of, read_regular
 
 SUFFIXES = (".exr", ".hdr")
 
@@ -37,4 +38,11 @@ def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.f
         )
     files = {p.name: p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES}
     name = choose_panorama(list(files), house_id, recipe.seed)
-    return name, decode_radiance(files[name].read_bytes(), name)
+    return name, decode_radiance(_bytes(files[name]), name)
+
+
+def _bytes(file: Path) -> bytes:
+    try:
+        return read_regular(file)
+    except OSError as error:
+        raise BadRecipe(f"sky.panoramas: {file} {fault_of(error)}") from None

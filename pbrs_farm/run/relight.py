@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
-from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import RadianceExr, radiance_from_exr
 from pbrs_farm.formats.view_json import lamps_from_view_json
+from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
@@ -58,7 +59,7 @@ def relit(
         layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
         lit = indoor_from_lamps(layers, factors, aovs.indoor.shape)
         aovs = replace(aovs, indoor=lit)
-    tone = Recipe.model_validate_json(_read(root / "recipe.json")).tone
+    tone = recipe_from_json(_read(root / "recipe.json"), str(root / "recipe.json")).tone
     images = develop(aovs, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
     credit = attribution(FolderStore(root), view.resolve().parents[1].name)
     mode = Mode.MLT_IL_OL.value
@@ -105,6 +106,6 @@ def _is_named(row: Mapping[str, Any], word: str) -> bool:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path)
     except OSError as error:
-        raise BadInput(path, "", f"cannot be read: {error.strerror}") from None
+        raise BadInput(path, "", fault_of(error)) from None

@@ -20,6 +20,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.read.source import SourceRef
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.store.interface import Store
@@ -123,9 +124,11 @@ def _extra(name: str, work: Work) -> object:
 def camera_file_text(fields: CameraFields) -> str:
     """The user's camera file; BadInput if it cannot be read."""
     try:
-        return Path(fields.file).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(fields.file or "cameras.file", "", f"cannot be read: {error}") from None
+        return read_regular(Path(fields.file), MAX_TEXT_BYTES).decode("utf-8")
+    except OSError as error:
+        raise BadInput(fields.file or "cameras.file", "", fault_of(error)) from None
+    except UnicodeDecodeError:
+        raise BadInput(fields.file, "", "cannot be read: is no UTF-8 text") from None
 
 
 def required_source(work: Work) -> SourceRef:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed, StoreRefused, StoreUnavailable
+from pbrs_farm.regular_files import MAX_DIGEST_BYTES, read_regular
 from pbrs_farm.store.interface import Head, check_key, check_prefix
 
 T = TypeVar("T")
@@ -74,7 +75,7 @@ class FolderStore:
 
     def get(self, key: str) -> bytes:
         try:
-            return self._path(key).read_bytes()
+            return read_regular(self._path(key), MAX_DIGEST_BYTES)
         except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
             raise ObjectMissing(key, f"no such object in {self.root}") from None
         except OSError as error:

@@ -9,6 +9,7 @@ from pathlib import Path
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.common.mtl_files import read_mtl
 from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.regular_files import digest_of_regular
 
 
 class SourceFiles:
@@ -26,8 +27,7 @@ class SourceFiles:
         """SHA-256 of a file; raises OSError where it cannot be read."""
         key = (path, "")
         if key not in self._digests:
-            with path.open("rb") as file:
-                self._digests[key] = hashlib.file_digest(file, "sha256").hexdigest()
+            self._digests[key] = digest_of_regular(path)
         return self._digests[key]
 
     def digest(self, folder: RootFolder, names: Iterable[str]) -> str:

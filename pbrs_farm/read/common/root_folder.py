@@ -7,6 +7,7 @@ import posixpath
 from pathlib import Path
 
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.regular_files import fault_of, read_regular, real_path
 
 
 class RootFolder:
@@ -18,7 +19,7 @@ class RootFolder:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        self._real = root.resolve()
+        self._real = real_path(root)
         self._read: dict[str, str] = {}
 
     def name_from(self, folder: str, reference: str) -> str:
@@ -34,7 +35,7 @@ class RootFolder:
         try:
             if not path.is_file():
                 return None
-            real = path.resolve()
+            real = real_path(path)
         except OSError:
             return None
         if not real.is_relative_to(self._real):
@@ -62,10 +63,9 @@ class RootFolder:
             if size > max_bytes:
                 text = f"is {size / 1e6:.0f} MB; at most {max_bytes / 1e6:.0f} MB are read"
                 raise BadHouse(self.root, name, text, hint=limit and f"limit: {limit}")
-            with path.open("rb") as file:
-                data = file.read(max_bytes + 1)
+            data = read_regular(path, max_bytes)
         except OSError as error:
-            raise BadHouse(self.root, name, f"cannot be read: {error.strerror}") from None
+            raise BadHouse(self.root, name, fault_of(error)) from None
         self._read[name] = hashlib.sha256(data).hexdigest()
         return data
 

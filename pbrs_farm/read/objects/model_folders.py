@@ -21,6 +21,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.read.common.furniture_classes import nyu40_of
+from pbrs_farm.regular_files import open_regular
 
 OTHERPROP: Final = NYU40_NAMES.index("otherprop")
 _MODEL_SUFFIXES: Final = (".obj", ".glb", ".gltf")
@@ -121,7 +122,7 @@ def _model(file: Path, root: Path) -> ObjectModel:
 def _library(path: Path) -> list[ObjectModel]:
     """The pieces of a Sweet Home 3D library whose model is an OBJ in it."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
             info = archive.getinfo("PluginFurnitureCatalog.properties")
             if info.file_size > _MAX_CATALOGUE_BYTES:
                 raise BadInput(path, info.filename, "the catalogue is too large")

@@ -30,6 +30,7 @@ from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.suncg.model_files import Models
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
+from pbrs_farm.regular_files import open_regular
 
 _MAX_FILE_BYTES: Final = 1_000_000_000
 _MAX_UNPACKED_BYTES: Final = 500_000_000
@@ -108,7 +109,7 @@ def _folder_of(model: ObjectModel) -> Iterator[tuple[RootFolder, str]]:
     with tempfile.TemporaryDirectory(prefix="pbrs-object-") as scratch:
         place = posixpath.dirname(model.entry)
         try:
-            with zipfile.ZipFile(model.path) as archive:
+            with open_regular(model.path) as file, zipfile.ZipFile(file) as archive:
                 members = [i for i in archive.infolist() if posixpath.dirname(i.filename) == place]
                 if sum(i.file_size for i in members) > _MAX_UNPACKED_BYTES:
                     raise BadHouse(model.path, model.entry, "is too large unpacked")

@@ -1,0 +1,68 @@
+"""Opens files that strangers name: regular ones of bounded size, nothing else. Effect: reads files.
+
+The one way in for every file that a user hands over. A device has no end, a pipe may never answer,
+and a file larger than its limit would fill the memory: each is an OSError whose strerror says so.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BufferedReader
+from pathlib import Path
+from typing import Final
+
+MAX_FILE_BYTES: Final = 512 * 2**20
+"""Of a file that is read whole: a home, a scene, a picture."""
+
+MAX_TEXT_BYTES: Final = 64 * 2**20
+"""Of a file that is parsed whole by hand: a list of houses or cameras."""
+
+MAX_DIGEST_BYTES: Final = 4 * 2**30
+"""Of a file that is read in pieces."""
+
+
+@contextmanager
+def open_regular(path: Path, max_bytes: int = MAX_FILE_BYTES) -> Iterator[BufferedReader]:
+    """The file, opened to be read; OSError where it is no regular file or above max_bytes."""
+    # Ask not to wait, so that a pipe without a writer opens, and look at what was opened.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "is no regular file (a device or a pipe)", str(path))
+        if status.st_size > max_bytes:
+            text = f"has {status.st_size / 1e6:.0f} MB, at most {max_bytes / 1e6:.0f} MB are read"
+            raise OSError(errno.EFBIG, text, str(path))
+        yield file
+
+
+def read_regular(path: Path, max_bytes: int = MAX_FILE_BYTES) -> bytes:
+    """The file's bytes; OSError as open_regular, also where the file grows while it is read."""
+    with open_regular(path, max_bytes) as file:
+        data = file.read(max_bytes + 1)
+    if len(data) > max_bytes:
+        raise OSError(errno.EFBIG, f"grew above {max_bytes / 1e6:.0f} MB", str(path))
+    return data
+
+
+def digest_of_regular(path: Path) -> str:
+    """Hex sha256 of the file, read in pieces; OSError as open_regular."""
+    with open_regular(path, MAX_DIGEST_BYTES) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def real_path(path: Path) -> Path:
+    """The absolute path without links; a link that leads to itself is left as it is."""
+    return Path(os.path.realpath(path))
+
+
+def fault_of(error: OSError) -> str:
+    """What is wrong with a file, for a message: "no such file", "cannot be read: ..."."""
+    if isinstance(error, FileNotFoundError):
+        return "no such file"
+    return f"cannot be read: {error.strerror or 'the system gave no reason'}"

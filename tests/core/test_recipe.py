@@ -1,0 +1,58 @@
+"""Every number of a recipe has two ends, and a recipe of before is a recipe still."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, recipe_from_json, recipe_from_name
+
+
+def _numbers(schema: dict[str, Any], place: str, definitions: dict[str, Any]) -> Iterator[Any]:
+    """(place, schema) of every number below a JSON schema."""
+    schema = schema | definitions.get(schema.get("$ref", "").rpartition("/")[2], {})
+    for name, inner in schema.get("properties", {}).items():
+        yield from _numbers(inner, f"{place}.{name}", definitions)
+    for inner in schema.get("prefixItems", []):
+        yield from _numbers(inner, place, definitions)
+    if schema.get("type") in ("integer", "number") and "enum" not in schema:
+        yield place, schema
+
+
+def test_every_number_of_a_recipe_has_a_lower_and_an_upper_bound():
+    schema = Recipe.model_json_schema()
+    found = dict(_numbers(schema, "", schema["$defs"]))
+    assert len(found) > 60
+    for place, number in found.items():
+        assert {"maximum", "exclusiveMaximum"} & set(number), place
+        assert {"minimum", "exclusiveMinimum"} & set(number), place
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ["light.spp=1e12", "light.chains=1000000000", "cameras.n_sectors=1000000000", "seed=1e30",
+     "cameras.score_width_px=1000000", "raster.samples=1000000000", "image.width_px=1e12",
+     "cameras.per_sector=1000000000", "repair.default_wall_rgb=[9,9,9]", "light.max_spp=1e12"],
+)  # fmt: skip
+def test_a_recipe_that_would_never_end_is_refused(setting):
+    path, _, text = setting.partition("=")
+    with pytest.raises(BadRecipe):
+        recipe_from_name("fast", {path: text})
+
+
+def test_a_picture_beyond_memory_is_refused_and_a_large_one_is_not():
+    edge = {"image.width_px": "16384", "image.height_px": "16384"}
+    with pytest.raises(BadRecipe, match="pixels"):
+        recipe_from_name("fast", edge)
+    recipe_from_name("fast", edge | {"image.height_px": "8192"})
+
+
+@pytest.mark.parametrize("name", RECIPE_NAMES)
+def test_a_stored_recipe_reads_back_and_a_damaged_one_names_its_place(name):
+    recipe = recipe_from_name(name)
+    assert recipe_from_json(recipe.model_dump_json().encode(), "here") == recipe
+    with pytest.raises(BadRecipe, match="here"):
+        recipe_from_json(b'{"light": 1}', "here")
