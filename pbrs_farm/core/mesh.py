@@ -68,6 +68,19 @@ def closed_edge_share(places: NDArray[np.floating]) -> float:
     return float(np.mean(n_faces % 2 == 0)) if len(n_faces) else 0.0
 
 
+def edges_are_paired(faces: NDArray[np.integer]) -> bool:
+    """Whether each directed edge of faces (F, 3) has its reverse, as often; True for no face.
+
+    faces: numbers of places, so that corners of one place are equal. Edges that begin and end in
+    one place are none. Such a mesh is closed, and its winding agrees.
+    """
+    start, end = (faces[:, k].astype(np.int64) for k in ([0, 1, 2], [1, 2, 0]))
+    n = int(faces.max(initial=0)) + 1
+    # Number each edge in both directions: what leaves a place must come back to it.
+    there, back = (start * n + end).ravel(), (end * n + start).ravel()
+    return bool(np.array_equal(np.sort(there), np.sort(back)))
+
+
 def distances_to_triangles(points: F64, corners: F64) -> F64:
     """(F,) distance in metres from each point to the triangle (F, 3, 3) of the same row.
 

@@ -10,6 +10,7 @@ from pbrs_farm.core.mesh import (
     area_vectors,
     closed_edge_share,
     distances_to_triangles,
+    edges_are_paired,
     face_areas,
     faces_with_area,
     signed_volume,
@@ -111,3 +112,17 @@ def test_small_triangles_are_as_exact_as_large_ones() -> None:
     large = distances_to_triangles(points, corners)
     small = distances_to_triangles(1e-4 * points, 1e-4 * corners)
     np.testing.assert_allclose(small, 1e-4 * large, rtol=1e-9)
+
+
+def test_edges_are_paired_where_each_is_met_by_its_reverse_as_often() -> None:
+    tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    assert edges_are_paired(tetrahedron)
+    assert edges_are_paired(tetrahedron[:0])
+    assert not edges_are_paired(tetrahedron[1:])
+    assert not edges_are_paired(np.concatenate([tetrahedron[:1, ::-1], tetrahedron[1:]]))
+    # A fan has a rim; closed by the same fan turned round it has none.
+    fan = np.array([[0, k, k + 1] for k in range(1, 6)])
+    assert not edges_are_paired(fan)
+    assert edges_are_paired(np.concatenate([fan, fan[:, ::-1]]))
+    # A face that is a line has the edges of a line, there and back.
+    assert edges_are_paired(np.concatenate([tetrahedron, [[0, 1, 1]]]))

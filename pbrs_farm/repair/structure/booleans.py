@@ -1,6 +1,7 @@
 """Closed solids whose faces remember what they are: patches in, boolean work, patches out.
 
-No effects. The only file that calls manifold3d. Every patch (one surface of one item) is a run
+No effects. The only way into manifold3d, which gets closed meshes alone: some open ones kill the
+process (3.5: fans of an odd number of faces). Every patch (one surface of one item) is a run
 with its own original id and carries texture coordinates and normals as vertex properties, so
 after any union or difference each face still knows its item, surface, material and uv.
 """
@@ -15,7 +16,7 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
-from pbrs_farm.core.mesh import signed_volume
+from pbrs_farm.core.mesh import edges_are_paired, signed_volume
 from pbrs_farm.repair.structure.sliver_removal import without_slivers
 
 F64 = NDArray[np.float64]
@@ -76,6 +77,11 @@ def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | 
 
 def _solid(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold | None:
     vertices, faces, merge_from, merge_to = _welded(patches, weld_m)
+    # Never hand over what is open: manifold3d's own test may crash on it.
+    place = np.arange(len(vertices))
+    place[merge_from] = merge_to
+    if not edges_are_paired(place[faces]):
+        return None
     # Turn an inward mesh round, its normals with it.
     if signed_volume(vertices[faces, :3], vertices[:, :3].mean(0)) < 0:
         faces = faces[:, [0, 2, 1]]
