@@ -35,14 +35,30 @@ MODULES: Final = {
 }  # fmt: skip
 
 _OF_THE_FARM: Final = ("submitting", "steering")  # modules that need celery and redis
+# Modules whose verbs read files of others: the command runs them in a process that may die.
+_OF_STRANGERS: Final = ("making", "explaining", "using", "labelling", "selecting", "submitting")
+
+
+def command() -> int:
+    """Run the command of this process' words, in a child where it reads files of others."""
+    words = sys.argv[1:]
+    if _module_of(words) not in _OF_STRANGERS:
+        return main(words)
+    from pbrs_farm.run.processes.verb_process import run_watched
+
+    return run_watched("pbrs_farm.cli:main", words, warn)
+
+
+def _module_of(words: Sequence[str]) -> str | None:
+    return next((name for name, verbs in MODULES.items() if words[:1] and words[0] in verbs), None)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; the exit code."""
-    # Find the verb's module: no other is imported.
-    words = sys.argv[1:] if argv is None else argv
+    """Run one command in this process; the exit code. Without words: those of this process."""
+    if argv is None:
+        return command()
+    words, module = argv, _module_of(argv)
     verb = words[0] if words else ""
-    module = next((name for name, verbs in MODULES.items() if verb in verbs), None)
     if module in _OF_THE_FARM and not _has_farm():
         warn(f'{verb} needs celery and redis: pip install "pbrs-farm[workers]"')
         return 1

@@ -13,6 +13,7 @@ from pbrs_farm.assets import homes
 from pbrs_farm.assets.debian import cache_folder
 from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve
+from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store.interface import Store
 from workers.job import HouseEntry
 
@@ -31,6 +32,7 @@ def entries_from_arguments(arguments: Sequence[str]) -> list[tuple[HouseEntry, S
     files = SourceFiles()
     for argument in arguments:
         for one in _expanded(argument):
+            doing(one, "read")
             ref = resolve(one, files)
             entry = HouseEntry(
                 house_id=ref.house_id, source=_placed(ref).model_dump_json(), sha256=ref.fingerprint

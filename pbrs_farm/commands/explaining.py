@@ -78,6 +78,7 @@ def _cameras(args: argparse.Namespace) -> int:
     from pbrs_farm.images import png_from_array
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.read.source import resolve
+    from pbrs_farm.run.processes.verb_process import doing
     from pbrs_farm.run.steps import camera_seed, repaired_house
     from pbrs_farm.sample import sample_cameras
     from pbrs_farm.sample.camera_map import camera_map_rgb, camera_map_svg
@@ -86,6 +87,7 @@ def _cameras(args: argparse.Namespace) -> int:
     recipe = recipe_of(args)
     house, _report = repaired_house(resolve(args.home), recipe)
     counter = Caster(geometry_from_house(house)).item_counts
+    doing(args.home, "cameras")
     sampling = sample_cameras(house, recipe.cameras, camera_seed(house.id, recipe), counter)
     document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))
     if args.out is not None:

@@ -23,6 +23,7 @@ from pbrs_farm.run.plan import Wanted
 from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
 from pbrs_farm.run.processes.pool import Pool
 from pbrs_farm.run.processes.task import Event, Setting, Task
+from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store import StoreSettings, store_from_url
 
 Observer = Callable[[Event], None]
@@ -94,6 +95,7 @@ def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
     sources = {s.house_id: s for s in run.sources}
     files = SourceFiles()
     for word in run.homes:
+        doing(word, "read")
         try:
             source = resolve(word, files)
         except PbrsError as error:

@@ -33,6 +33,7 @@ from pbrs_farm.read.source import SourceRef, read_house
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.output_root import attribution
+from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.run.step_cache import (
     Outcome,
     StepOutput,
@@ -93,6 +94,7 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
     from pbrs_farm.repair import RepairReport, repair
 
     # An object without context has no walls to close.
+    doing(source.location, "read")
     house = read_house(source, recipe.read)
     if source.kind == "object":
         return house, RepairReport(house_id=house.id, was_repaired=True)
@@ -100,6 +102,7 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
     def occluder_from(some: House) -> Caster:
         return Caster(geometry_from_house(some))
 
+    doing(source.location, "repair")
     return repair(house, recipe.repair, occluder_from=occluder_from)
 
 
@@ -356,6 +359,7 @@ def _facts_of_view(work: Work) -> dict[str, dict[str, Any]]:
 
 def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
     """Do one step unless its marker says it is done; see step_cache.run_unless_done."""
+    doing(work.source.location if work.source else work.house_id, name)
     return run_unless_done(name, work, _FUNCTIONS[name], attempt=attempt)
 
 

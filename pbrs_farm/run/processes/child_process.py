@@ -20,9 +20,10 @@ from pbrs_farm.run.processes.limits import resident_mb
 
 _PR_SET_PDEATHSIG: Final = 1
 _CLOSE_S: Final = 10.0  # what freeing GL and Mitsuba may take
-# The child sees the modules its parent sees, wherever it was started.
-_BOOT: Final = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+PATH_FROM_PARENT: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+"""Code of a child that sees the modules its parent sees, wherever it was started."""
+
+_BOOT: Final = PATH_FROM_PARENT + (
     "from pbrs_farm.run.processes.task_loop import main; sys.exit(main(sys.argv[2]))"
 )
 
@@ -129,6 +130,15 @@ class ChildProcess:
     def clear_log(self) -> None:
         """Empty its log: the next task's begins."""
         os.truncate(self._log, 0)
+
+
+def ending(code: int) -> str:
+    """How a process ended, in words; code: minus the signal that killed it."""
+    if code == -signal.SIGKILL:
+        return "its process was killed by SIGKILL from outside (out of memory?)"
+    if code < 0:
+        return f"its process was killed by {signal.Signals(-code).name}"
+    return f"its process ended with {code}"
 
 
 def die_with_parent(sign: int = signal.SIGKILL) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from pbrs_farm.run.processes.child_process import Child
+from pbrs_farm.run.processes.child_process import Child, ending
 from pbrs_farm.run.processes.limits import ProcessLimits
 from pbrs_farm.run.processes.message import Message, message_from_line
 
@@ -188,8 +188,5 @@ class RenderProcess:
         code = child.exit_code() or 0
         self.stop()
         seconds = self._clock() - self._begun_at
-        if code == -signal.SIGKILL:
-            text = "its process was killed by SIGKILL from outside (out of memory?)"
-            return Ended(seconds, "resource", text)
-        name = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
-        return Ended(seconds, "crash", f"its process {name}")
+        cause = "resource" if code == -signal.SIGKILL else "crash"
+        return Ended(seconds, cause, ending(code))

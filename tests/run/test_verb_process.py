@@ -1,0 +1,112 @@
+"""A verb's process that is killed costs one line, which names the file and the step."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.cli import MODULES
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.run.processes.verb_process import doing, run_watched
+
+TARGET = "tests.run.dying_verbs:main"
+# Stands where the real library does, and dies as it did of open meshes.
+DYING_LIBRARY = """
+import os, signal
+class Manifold:
+    def reserve_ids(n):
+        return 0
+def Mesh64(*arrays, **more):
+    os.kill(os.getpid(), signal.SIGSEGV)
+"""
+READING = """
+import sys
+sys.path.insert(0, {folder!r})
+sys.argv[1:] = {words!r}
+from pbrs_farm.cli import main
+sys.exit(main())
+"""
+
+
+def test_the_exit_code_and_what_is_printed_are_the_verbs(capfd: pytest.CaptureFixture[str]) -> None:
+    said: list[str] = []
+    assert run_watched(TARGET, ["end", "0"], said.append) == 0
+    assert run_watched(TARGET, ["end", "130"], said.append) == 130
+    assert said == []
+    assert capfd.readouterr().out == "done\ndone\n"
+
+
+@pytest.mark.parametrize("name", ["SIGSEGV", "SIGABRT", "SIGFPE"])
+def test_a_verb_that_is_killed_costs_a_line_with_file_and_step(name: str) -> None:
+    said: list[str] = []
+    assert run_watched(TARGET, ["die", name, "a.glb", "read", "repair"], said.append) == 1
+    assert said == [f"a.glb: repair: its process was killed by {name}"]
+
+
+def test_a_verb_that_is_killed_before_any_file_is_named_by_its_words() -> None:
+    said: list[str] = []
+    assert run_watched(TARGET, ["die", "SIGSEGV"], said.append) == 1
+    assert said == ["die SIGSEGV: its process was killed by SIGSEGV"]
+
+
+def test_a_file_name_of_many_lines_stays_one_short_line() -> None:
+    said: list[str] = []
+    words = ["die", "SIGSEGV", "a\nCLEAN\n" + "b" * 5000, "read"]
+    assert run_watched(TARGET, words, said.append) == 1
+    (line,) = said
+    assert line.startswith("a?CLEAN?bbb")
+    assert "\n" not in line
+    assert len(line) < 400
+
+
+def test_nobody_is_told_where_nobody_watches() -> None:
+    doing("a.glb", "read")
+
+
+def test_ctrl_c_means_afterwards_what_it_did_before() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    run_watched(TARGET, ["end", "0"], print)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("repair builtin", "builtin: repair: "),
+        ("cameras builtin", "builtin: repair: "),
+        ("step house builtin", "builtin: repair: "),
+        ("run builtin", " house: FAILED: "),  # the pool's own line: its render process died
+        ("demo --home builtin", " house: FAILED: "),
+    ],
+)
+def test_no_library_takes_a_verb_that_reads_files_with_it(
+    tmp_path: Path, words: str, line: str
+) -> None:
+    library, out = tmp_path / "libraries", tmp_path / "out"
+    library.mkdir()
+    (library / "manifold3d.py").write_text(DYING_LIBRARY)
+    out.mkdir()
+    if words.startswith("step"):
+        (out / "recipe.json").write_text(Recipe().model_dump_json())
+    asked = words.split() + (["--out", str(out)] if "cameras" not in words else [])
+    done = subprocess.run(
+        [sys.executable, "-c", READING.format(folder=str(library), words=asked)],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    told = [x for x in done.stderr.splitlines() if "killed by SIGSEGV" in x]
+    assert len(told) == 1
+    assert line in told[0]
+
+
+def test_the_table_of_watched_modules_names_modules() -> None:
+    from pbrs_farm.cli import _OF_STRANGERS
+
+    assert set(_OF_STRANGERS) < set(MODULES)
