@@ -34,6 +34,7 @@ from pbrs_farm.read.gltf.node_classes import (
 )
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.gltf.punctual_lights import assumed_light, emitted, punctual_light
+from pbrs_farm.read.gltf.window_glass import PANE_OPACITY, glass_materials
 from pbrs_farm.read.mesh.obj import Mesh
 
 _UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)
@@ -123,31 +124,20 @@ def _item(
     fields: ReadFields,
 ) -> Item | None:
     surfaces: list[Surface] = []
-    lights: list[LightPart] = []
     luminance: dict[int, float] = {}
-    boxes: list[Box | None] = []
     kind = thing.seen.kind
-    clear = MaterialKind.PANE if kind in (ItemKind.WINDOW, ItemKind.DOOR) else MaterialKind.GLASS
-    for part in thing.parts:
-        node = entry(gltf, "nodes", part.index)
-        place = f"nodes[{part.index}]"
-        light = punctual_light(gltf, node, part.world_from_node, place)
-        lights += [light] if light else []
-        if "mesh" not in node:
-            continue
-        if abs(np.linalg.det(part.world_from_node[:3, :3])) < 1e-12:
-            notes.add("flat-node", place, "its scale is 0; left out")
-            continue
-        entry(gltf, "meshes", node["mesh"])
-        if node["mesh"] not in known:
-            known[node["mesh"]] = meshes_of(
-                gltf, node["mesh"], max_triangles=fields.max_model_triangles
-            )
-        meshes = known[node["mesh"]]
-        if meshes:
-            boxes.append(oriented_box([m for _, m in meshes], part.world_from_node))
+    is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
+    clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
+    lights = _lights(gltf, thing)
+    parts = list(_meshes(gltf, thing, notes, known, fields))
+    numbers = [number for _, meshes in parts for number, _ in meshes]
+    glass = glass_materials(gltf, numbers) if is_opening else frozenset()
+    for part, meshes in parts:
         for number, mesh in meshes:
             material, emission = materials.material(number, clear=clear)
+            # Glass by its name alone is a pane, unless the file tags its kind.
+            if number in glass and material.kind is MaterialKind.OPAQUE and not materials.is_tagged(number):  # fmt: skip
+                material = replace(material, kind=clear, opacity=PANE_OPACITY)
             emits = emission is not None and not kind.is_structure
             emits = emits and (emission != 0 or kind is ItemKind.LAMP)
             index = materials.as_bulb(material) if emits else materials.library.index(material)
@@ -161,7 +151,42 @@ def _item(
     if not surfaces and not lights:
         return None
     lights += emitted(surfaces, luminance)
+    boxes = [
+        oriented_box([m for _, m in meshes], part.world_from_node)
+        for part, meshes in parts
+        if meshes
+    ]
     return _finished(thing, surfaces, lights, boxes)
+
+
+def _lights(gltf: Gltf, thing: _Thing) -> list[LightPart]:
+    found = [
+        punctual_light(gltf, entry(gltf, "nodes", p.index), p.world_from_node, f"nodes[{p.index}]")
+        for p in thing.parts
+    ]
+    return [light for light in found if light]
+
+
+def _meshes(
+    gltf: Gltf,
+    thing: _Thing,
+    notes: Notes,
+    known: dict[Any, list[tuple[int | None, Mesh]]],
+    fields: ReadFields,
+) -> Iterator[tuple[Placed, list[tuple[int | None, Mesh]]]]:
+    """(node, its meshes with the numbers of their materials) of every part that has a mesh."""
+    for part in thing.parts:
+        node = entry(gltf, "nodes", part.index)
+        if "mesh" not in node:
+            continue
+        if abs(np.linalg.det(part.world_from_node[:3, :3])) < 1e-12:
+            notes.add("flat-node", f"nodes[{part.index}]", "its scale is 0; left out")
+            continue
+        entry(gltf, "meshes", node["mesh"])
+        if node["mesh"] not in known:
+            most = fields.max_model_triangles
+            known[node["mesh"]] = meshes_of(gltf, node["mesh"], max_triangles=most)
+        yield part, known[node["mesh"]]
 
 
 def _finished(

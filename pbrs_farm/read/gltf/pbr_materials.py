@@ -128,6 +128,12 @@ class SceneMaterials:
         except MissingFile:
             return None
 
+    def is_tagged(self, number: int | None) -> bool:
+        """Whether the material's extras say its kind, as those of house.glb do."""
+        return number is not None and "kind" in _object(
+            entry(self._gltf, "materials", number), "extras"
+        )
+
     def as_bulb(self, material: Material) -> int:
         """The index of the material as one that emits."""
         return self.library.index(replace(material, kind=MaterialKind.BULB))

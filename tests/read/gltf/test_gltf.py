@@ -459,3 +459,30 @@ def test_a_wrong_room_file_is_refused_naming_the_room(rooms: Any, place: str) ->
 def test_a_wrong_mapping_row_is_refused_naming_it() -> None:
     with pytest.raises(BadHouse, match="names no class"):
         read(two_rooms(), mapping=b'{"nodes": {"A": "spaceship"}}')
+
+
+@pytest.mark.parametrize(
+    ("names", "panes"),
+    [
+        (("Glass", "Frame"), {"Glass"}),
+        (("windowGlass.001", "wood"), {"windowGlass.001"}),
+        (("Fensterscheibe Glas", "Fensterrahmen"), {"Fensterscheibe Glas"}),
+        (("Window", "Wood"), {"Window"}),
+        (("window", "glass"), {"glass"}),  # beside a glass "window" names the frame
+        (("glass frame", "plastic"), set()),
+    ],
+)
+def test_an_opaque_material_named_glass_in_a_window_is_a_pane(
+    names: tuple[str, ...], panes: set[str]
+) -> None:
+    s = two_rooms()
+    s.materials += [{"name": n, "pbrMetallicRoughness": {}} for n in names]
+    parts = [s.node(f"part {k}", mesh=s.box([1, 1 + k, 0], [2, 2 + k, 0.05], k)) for k in range(2)]
+    s.node("Window", children=parts)
+    s.node("Table", mesh=s.box([1, 0, 1], [2, 0.7, 2], 0))
+    house = read(s)
+    seen = [house.materials[x.material] for x in item(house, "Window").surfaces]
+    assert {m.name for m in seen if m.kind is MaterialKind.PANE} == panes
+    assert all(m.opacity < 0.5 for m in seen if m.kind is MaterialKind.PANE)
+    (table,) = (house.materials[x.material] for x in item(house, "Table").surfaces)
+    assert table.kind is MaterialKind.OPAQUE
