@@ -81,6 +81,25 @@ def edges_are_paired(faces: NDArray[np.integer]) -> bool:
     return bool(np.array_equal(np.sort(there), np.sort(back)))
 
 
+def clipped_to_box(corners: F64, low: F64, high: F64) -> F64:
+    """(G, 3, 3) what of the triangles (F, 3, 3) lies in the box low..high (3,), fronts kept."""
+    from trimesh.intersections import slice_faces_plane
+
+    # Leave out most of them by their bounds, then cut by one side of the box after the other.
+    meets = (corners.max(1) >= low).all(1) & (corners.min(1) <= high).all(1)
+    corners = corners[meets]
+    for axis, sign in [(axis, sign) for axis in range(3) for sign in (1.0, -1.0)]:
+        if not len(corners):
+            break
+        normal = sign * np.eye(3)[axis]
+        faces = np.arange(3 * len(corners)).reshape(-1, 3)
+        points, faces = slice_faces_plane(
+            corners.reshape(-1, 3), faces, normal, low if sign > 0 else high
+        )[:2]
+        corners = np.asarray(points[faces], np.float64).reshape(-1, 3, 3)
+    return corners
+
+
 def distances_to_triangles(points: F64, corners: F64) -> F64:
     """(F,) distance in metres from each point to the triangle (F, 3, 3) of the same row.
 

@@ -43,11 +43,11 @@ def repair(
     structure = repaired_structure(house, fields.wall_thickness_m)
     house, swallowed = with_structure(house, structure)
 
-    # Give every lamp a bulb, every dark room a light, every dim lamp a translucent shade.
+    # Give every lamp a bulb, every dim lamp a translucent shade, every dark room a light.
     house, sources = with_bulbs(house, fields)
-    house, given = with_room_lighting(house, fallback=fields.fallback_light)
     if occluder_from is not None:
         house, sources = with_shades(house, sources, fields, occluder_from)
+    house, given = with_room_lighting(house, fallback=fields.fallback_light)
 
     # Say which rooms are closed, and let rays look for leaks in them.
     house = replace(house, rooms=_with_enclosure(house.rooms, structure.spaces), is_repaired=True)

@@ -14,6 +14,7 @@ from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.mesh import distances_to_triangles, face_areas, triangle_corners
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.read.mesh.primitives import box
 from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of, with_bulbs
 from pbrs_farm.repair.lamps.room_lighting import with_room_lighting
 from pbrs_farm.repair.lamps.shades import with_shades
@@ -113,6 +114,51 @@ def test_only_the_part_that_encloses_becomes_a_shade() -> None:
     ]
     assert 0.35 < after < 0.4
     assert house.items[0].lights[0].emitting == (1,)
+
+
+def _slab(y0: float, y1: float, half: float = 2.0) -> Item:
+    surface = box(
+        "slab", np.array([0.0, (y0 + y1) / 2, 0.0]), np.array([half, (y1 - y0) / 2, half]), 0
+    )
+    return Item("ceiling", "ceiling", ItemKind.CEILING, "0", (surface,))
+
+
+def _below(lamp: House, *structure: Item) -> House:
+    return lamp.with_items([*lamp.items, *structure])
+
+
+def test_a_cup_that_the_ceiling_closes_keeps_its_light_and_becomes_a_shade() -> None:
+    # Open above: without the ceiling it hangs from, half of its light would leave.
+    cup = _half_ball(0.2)
+    turned = cup.positions * np.float32([1, -1, 1]) + np.float32([0, 0.08, 0])
+    cup = replace(cup, positions=turned, faces=cup.faces[:, ::-1].copy())
+    assert _with_shades(_lamp(cup))[1] > 0.3
+    house, before, after = _with_shades(_below(_lamp(cup), _slab(0.05, 0.2)))
+    assert before < 0.02
+    assert after > 0.2
+    assert house.materials[house.items[0].surfaces[0].material].kind is MaterialKind.SHADE
+
+
+def test_a_bulb_below_a_ceiling_loses_only_what_the_ceiling_absorbs() -> None:
+    _, ratio, _ = _with_shades(_below(_lamp(), _slab(0.035, 0.2)))
+    assert 0.8 < ratio < 0.95
+    far, ratio, _ = _with_shades(_below(_lamp(), _slab(0.6, 0.8)))
+    assert ratio == 1.0
+    assert far.items[0].surfaces[0].name == "bulb"
+
+
+def test_a_bulb_inside_the_ceiling_lights_no_room_and_the_room_gets_a_light() -> None:
+    home = builtin_home()
+    bulb = LightPart((2.0, 2.6, 2.0), 0.03, 0.5, PowerUnit.SWEETHOME3D)
+    buried = Item("buried", "spot", ItemKind.LAMP, "0", (), lights=(bulb,))
+    items = [i for i in home.items if not i.lights and i.kind is not ItemKind.CEILING]
+    slab = Item("c", "c", ItemKind.CEILING, "0", (box("c", np.array([4.5, 2.6, 2.0]), np.array([6.0, 0.1, 4.0]), 0),))  # fmt: skip
+    dark = replace(home, openings=(), items=(*items, slab, buried))
+    house, sources = with_bulbs(dark, FIELDS)
+    house, sources = with_shades(house, sources, FIELDS, EmbreeOccluder)
+    assert sources[0].escape == 0.0
+    house, given_to = with_room_lighting(house, fallback=True)
+    assert given_to == ["0_0", "0_1"]
 
 
 def test_a_room_that_nothing_lights_gets_a_ceiling_light() -> None:

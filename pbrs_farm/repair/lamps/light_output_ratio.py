@@ -1,7 +1,8 @@
 """How much of each source's light leaves its lamp, measured with rays; no effects.
 
 All lamps of a house stand side by side in one scene, far apart, so that one ray caster serves
-them all and no lamp meets another's rays.
+them all and no lamp meets another's rays. With each stands what is near it of walls, floors and
+ceilings: a cup below a ceiling keeps its light though it is open above.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.house import House, Item, MaterialKind, Surface
-from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
+from pbrs_farm.core.mesh import clipped_to_box, face_areas, triangle_corners, unit_normals
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.closed_shells import components
@@ -23,7 +24,13 @@ N_RAYS = 4000  # standard error below 0.8 % of the ratio
 _SEE_THROUGH = frozenset({MaterialKind.GLASS, MaterialKind.PANE, MaterialKind.BULB})
 _SPACING_M = 30.0  # between lamps, so that none meets another's rays
 _REACH_M = 14.0  # a ray that gets this far has left its lamp
-_MAX_LAYERS = 12  # of shade that one ray passes
+_MAX_LAYERS = 12  # of shade that one ray passes, or bounces off the structure
+_AT_LAMP_M = (
+    0.05  # structure this near the lamp's bounds bounces its light, farther off is the room
+)
+_NEAR_M = 0.5  # a bulb that sees structure from behind this near is inside of it
+_BOUNCE = 0.7  # reflectance of structure: a light paint
+_STRUCTURE = -1  # in part_of_face
 
 Part = tuple[int, int, int]  # a connected part of a lamp: item, surface, number of the part
 
@@ -35,8 +42,10 @@ class LampScene:
     house: House
     occluder: Occluder | None  # None where no lamp has a face that stops light
     parts: tuple[Part, ...]
-    part_of_face: NDArray[np.int64]  # (F,) index into parts, of each face of the scene
+    part_of_face: NDArray[np.int64]  # (F,) index into parts, of each face; _STRUCTURE = of none
+    normals: F64  # (F, 3) unit
     offset_of: dict[int, F64]  # item -> (3,) translation of that lamp
+    bounds_of: dict[int, F64]  # item -> (2, 3) bounds of that lamp in the scene
     labels: dict[tuple[int, int], NDArray[np.int64]]  # (item, surface) -> (F,) part of each face
 
 
@@ -56,6 +65,8 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
     parts: list[Part] = []
     numbers: list[NDArray[np.int64]] = []
     offset_of: dict[int, F64] = {}
+    bounds_of: dict[int, F64] = {}
+    structure = _structure_corners(house)
     labels: dict[tuple[int, int], NDArray[np.int64]] = {}
     for n, k in enumerate(lamps):
         item = house.items[k]
@@ -63,6 +74,7 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
         row, column = divmod(n, side)
         cell = np.array([column - side / 2, 0.0, row - side / 2]) * _SPACING_M
         offset_of[k] = cell - np.array(item.lights[0].position)
+        bounds_of[k] = item.bounds + offset_of[k]
         surfaces = []
         for j, s in enumerate(item.surfaces):
             if house.materials[s.material].kind in _SEE_THROUGH or not len(s.faces):
@@ -73,11 +85,35 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
             parts += [(k, j, part) for part in range(int(labels[k, j].max()) + 1)]
             moved = (s.positions.astype(np.float64) + offset_of[k]).astype(np.float32)
             surfaces.append(replace(s, positions=moved))
+        # Add the structure near it.
+        low, high = item.bounds
+        near = clipped_to_box(structure, low - _NEAR_M, high + _NEAR_M)
+        if len(near) and not item.kind.is_structure:
+            numbers.append(np.full(len(near), _STRUCTURE))
+            surfaces.append(_surface_of(near + offset_of[k]))
         items.append(replace(item, surfaces=tuple(surfaces), lights=(), box=None))
     scene = house.with_items(items)
     part_of_face = np.concatenate([np.zeros(0, np.int64), *numbers])
-    occluder = occluder_from(scene) if len(part_of_face) else None
-    return LampScene(house, occluder, tuple(parts), part_of_face, offset_of, labels)
+    if not len(part_of_face):
+        return LampScene(house, None, (), part_of_face, np.zeros((0, 3)), offset_of, bounds_of, labels)  # fmt: skip
+    corners = [triangle_corners(s.positions, s.faces) for _, _, _, s in scene.surfaces()]
+    normals = unit_normals(np.concatenate(corners))
+    occluder = occluder_from(scene)
+    return LampScene(
+        house, occluder, tuple(parts), part_of_face, normals, offset_of, bounds_of, labels
+    )
+
+
+def _structure_corners(house: House) -> F64:
+    """(F, 3, 3) corners of all walls, floors and ceilings."""
+    surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
+    parts = [triangle_corners(s.positions, s.faces) for s in surfaces]
+    return np.concatenate([np.zeros((0, 3, 3)), *parts])
+
+
+def _surface_of(corners: F64) -> Surface:
+    faces = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
+    return Surface("structure", corners.reshape(-1, 3).astype(np.float32), faces, 0)
 
 
 def light_output_of_source(
@@ -93,32 +129,46 @@ def light_output_of_source(
     # Send the rays from the bulb where it stands in the scene.
     origins, directions = diffuse_rays(emitting, N_RAYS, rng)
     origins += scene.offset_of[item]
-    blocked = np.zeros(len(scene.parts))
-    is_shade = np.zeros(len(scene.parts), np.bool_)
+    # The last row of both stands for the structure, which is _STRUCTURE = -1.
+    blocked = np.zeros(len(scene.parts) + 1)
+    is_shade = np.zeros(len(scene.parts) + 1, np.bool_)
     is_shade[list(shades)] = True
 
     # Follow the rays through the shades, layer by layer, until each is stopped or out.
+    if scene.occluder is None:
+        return LightOutput(1.0, blocked[:-1])
     weight = np.full(len(origins), 1.0 / max(len(origins), 1))
     ratio = 0.0
     for _ in range(_MAX_LAYERS):
-        if scene.occluder is None or not len(origins):
+        if not len(origins):
             break
         distance, face = scene.occluder.first_hit(
             origins.astype(np.float32), directions.astype(np.float32), _REACH_M
         )
-        out = face < 0
+        points = origins + directions * np.where(face < 0, 0.0, distance)[:, None]
+        part = np.where(face < 0, _STRUCTURE, scene.part_of_face[face])
+        # Let out what meets nothing, or the front of structure away from the lamp.
+        normals = scene.normals[face]
+        on_structure = (face >= 0) & (part == _STRUCTURE)
+        at_front = on_structure & ((directions * normals).sum(1) < 0)
+        # Most rays meet structure from behind: the bulb is inside of it.
+        if (on_structure & ~at_front).mean() > 0.5 and ratio == 0:
+            return LightOutput(0.0, blocked[:-1])
+        low, high = scene.bounds_of[item]
+        at_lamp = ((points > low - _AT_LAMP_M) & (points < high + _AT_LAMP_M)).all(1)
+        bounced, out = at_front & at_lamp, (face < 0) | (at_front & ~at_lamp)
         ratio += float(weight[out].sum())
         # Charge a stopped ray to its part; let the others through, weakened.
-        part = scene.part_of_face[face[~out]]
         through = is_shade[part]
-        np.add.at(blocked, part[~through], weight[~out][~through])
-        origins = (origins + directions * np.where(out, 0.0, distance)[:, None])[~out][through]
-        directions = directions[~out][through]
-        origins = origins + 1e-4 * directions  # off the face just passed
-        weight = weight[~out][through] * transmission
-    if scene.occluder is None:
-        ratio = 1.0
-    return LightOutput(ratio, blocked)
+        stopped = ~(out | bounced | through)
+        np.add.at(blocked, part[stopped], weight[stopped])
+        # Bounce diffusely what meets the front of structure at the lamp; what meets a back is in it.
+        directions[bounced] = _scattered(normals[bounced], rng)
+        weight = weight * np.where(bounced, _BOUNCE, transmission)
+        going = through | bounced
+        directions, weight = directions[going], weight[going]
+        origins = points[going] + 1e-4 * directions  # off the face just met
+    return LightOutput(ratio, blocked[:-1])
 
 
 def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) -> tuple[F64, F64]:
@@ -131,10 +181,16 @@ def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) 
     u, v = np.sqrt(rng.random(n)), rng.random(n)
     weights = np.stack([1 - u, u * (1 - v), u * v], 1)
     points = np.einsum("nk,nki->ni", weights, corners[chosen])
-    # Choose directions by the cosine: a point on a unit sphere that touches the face.
-    sphere = rng.normal(size=(n, 3))
-    sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
-    directions = sphere + normals[chosen]
-    directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
+    directions = _scattered(normals[chosen], rng)
     step = min(1e-4, 0.01 * float(np.sqrt(areas.sum())))  # off the bulb
     return points + step * normals[chosen], directions
+
+
+def _scattered(normals: F64, rng: np.random.Generator) -> F64:
+    """Unit directions about normals (N, 3) by the cosine: points of a unit sphere on the face."""
+    sphere = rng.normal(size=normals.shape)
+    sphere /= np.maximum(np.linalg.norm(sphere, axis=1, keepdims=True), 1e-12)
+    directions = sphere + normals
+    return np.asarray(
+        directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
+    )

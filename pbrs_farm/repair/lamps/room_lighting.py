@@ -30,6 +30,7 @@ FALLBACK = "fallback"
 _BELOW_CEILING_M = 0.2  # centre of the fallback light
 _RADIUS_M = 0.1
 _POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
+_LEAST_ESCAPE = 0.01  # light output ratio below which a lamp counts as none
 _BY_THE_ROOM_M = 0.6  # an opening nearer than this is in a wall of the room
 
 
@@ -41,7 +42,7 @@ def with_room_lighting(house: House, *, fallback: bool) -> tuple[House, list[str
     rooms, lights, given = [], [], []
     areas = [plan.polygon_of_room(r.polygon) for r in house.rooms]
     glazed = {i.id for i in house.items if _has_pane(i, house.materials)}
-    lamps = [i for i in house.items if any(light.power > 0 for light in i.lights)]
+    lamps = [i for i in house.items if any(_shines(light) for light in i.lights)]
     for room, area in zip(house.rooms, areas, strict=True):
         lit_by = []
         if any(_lights(lamp, room, area) for lamp in lamps):
@@ -70,8 +71,13 @@ def _lights(lamp: Item, room: Room, area: plan.Shape) -> bool:
         room.floor_y - 0.05 <= light.position[1] <= room.ceiling_y + 0.05
         and shapely.contains_xy(area, light.position[0], light.position[2])
         for light in lamp.lights
-        if light.power > 0
+        if _shines(light)
     )
+
+
+def _shines(light: LightPart) -> bool:
+    # A lamp whose light the ceiling or its own body keeps lights no room.
+    return light.power > 0 and (light.escape is None or light.escape >= _LEAST_ESCAPE)
 
 
 def _opens_on(opening: Opening, room: Room, area: plan.Shape, glazed: set[str]) -> bool:
