@@ -20,8 +20,8 @@ def add_verbs(verb: Verb) -> None:
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
 
-    p = verb("classes", _classes, "how often each class is seen, and what has no class")
-    p.add_argument("folder", type=Path)
+    p = verb("classes", _classes, "how often each class is seen, and by which rule")
+    p.add_argument("folder", metavar="FOLDER|HOME", help="an output folder, or a home to read")
     p.add_argument("--json", action="store_true", help="as JSON")
 
     p = verb("label-sheet", _label_sheet, "a view's labels over its picture, an edge magnified")
@@ -41,11 +41,34 @@ def _export(args: argparse.Namespace) -> int:
 def _classes(args: argparse.Namespace) -> int:
     from pbrs_farm.gallery.class_statistics import class_statistics
 
-    statistics = class_statistics(args.folder)
+    if not (Path(args.folder) / "houses").is_dir() and _is_home(args.folder):
+        return _home_classes(args)
+    statistics = class_statistics(Path(args.folder))
     if args.json:
         echo_json(statistics.model_dump(mode="json"))
     else:
         echo(statistics.text())
+    return 0
+
+
+def _is_home(word: str) -> bool:
+    path = Path(word)
+    return not path.is_dir() or (path / "house.json").is_file()
+
+
+def _home_classes(args: argparse.Namespace) -> int:
+    """What a home's pieces are and why, without rendering it."""
+    from pbrs_farm.core.recipe import ReadFields
+    from pbrs_farm.gallery.class_decisions import class_decisions, decisions_text
+    from pbrs_farm.read.source import read_house, resolve
+
+    house = read_house(resolve(args.folder), ReadFields())
+    fields = ("kind", "nyu40", "name", "source_class", "tags")
+    decisions = class_decisions({f: getattr(item, f) for f in fields} for item in house.items)
+    if args.json:
+        echo_json([d.model_dump(mode="json") for d in decisions])
+    else:
+        echo(decisions_text(decisions))
     return 0
 
 

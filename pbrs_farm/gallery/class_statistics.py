@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -11,6 +12,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import ViewEntry, json_object, views_of
+from pbrs_farm.gallery.class_decisions import ClassDecision, class_decisions, decisions_text
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import read_regular
 
@@ -34,6 +36,7 @@ class ClassStatistics(BaseModel):
     classes_per_image: float  # mean, id 0 not counted
     rows: tuple[ClassRow, ...]
     unmapped: tuple[str, ...]  # "house: source class (items)" that became otherprop
+    decisions: tuple[ClassDecision, ...] = ()  # by which rule, over all houses
 
     def text(self) -> str:
         """The statistics as a Markdown table and a list."""
@@ -50,6 +53,9 @@ class ClassStatistics(BaseModel):
         if self.unmapped:
             lines += ["", "Without a class of their own (otherprop):"]
             lines += [f"- {line}" for line in self.unmapped]
+        if self.decisions:
+            lines += ["", "What decided the classes, the least sure first:", ""]
+            lines.append(decisions_text(self.decisions))
         return "\n".join(lines)
 
 
@@ -70,6 +76,10 @@ def class_statistics(folder: Path) -> ClassStatistics:
         for row in view.facts["instances"]:
             instances[int(row["nyu40"])] += 1
     total = pixels.sum()
+    items = {
+        house: json_object(folder / keys.house_key(house, "house.json")).get("items", [])
+        for house in sorted({v.house.id for v in views})
+    }
     return ClassStatistics(
         n_views=len(views),
         classes_per_image=float(images[1:].sum() / len(views)),
@@ -84,7 +94,8 @@ def class_statistics(folder: Path) -> ClassStatistics:
             for i in np.argsort(-pixels, kind="stable")
             if pixels[i]
         ),
-        unmapped=_unmapped(folder, {v.house.id for v in views}),
+        unmapped=_unmapped(items),
+        decisions=class_decisions(item for rows in items.values() for item in rows),
     )
 
 
@@ -96,11 +107,11 @@ def _pixels_of_classes(view: ViewEntry) -> np.ndarray[tuple[int], np.dtype[np.in
     return np.bincount(ids.reshape(-1), minlength=256).astype(np.int64)
 
 
-def _unmapped(folder: Path, houses: set[str]) -> tuple[str, ...]:
+def _unmapped(items: dict[str, list[dict[str, Any]]]) -> tuple[str, ...]:
     lines = []
-    for house in sorted(houses):
+    for house, rows in items.items():
         names: dict[str, int] = {}
-        for item in json_object(folder / keys.house_key(house, "house.json")).get("items", ()):
+        for item in rows:
             if "unmapped" in item.get("tags", ()):
                 name = str(item.get("source_class") or item.get("name") or item.get("id"))
                 names[name] = names.get(name, 0) + 1

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pbrs_farm.cli import main
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
@@ -32,6 +33,8 @@ def finished(root: Path, semantics: list[np.ndarray]) -> Path:
         {"id": "a", "source_class": "eTeks#spaceship", "tags": ["unmapped"]},
         {"id": "b", "source_class": "eTeks#spaceship", "tags": ["unmapped"]},
         {"id": "c", "source_class": "chair", "tags": []},
+        {"id": "d", "name": "Sofa", "nyu40": 6, "tags": ["class:name"]},
+        {"id": "e", "name": "Tray | x", "nyu40": 40, "tags": ["class:size", "unmapped"]},
     ]
     (house / "house.json").write_text(json.dumps({"items": items}))
     return root
@@ -57,8 +60,23 @@ def test_shares_and_counts_are_over_all_pixels_and_images(tmp_path):
 
 def test_items_without_a_class_are_listed_with_their_number(tmp_path):
     stats = class_statistics(finished(tmp_path, [half(1, 5)]))
-    assert stats.unmapped == ("h: eTeks#spaceship (2)",)
+    assert stats.unmapped == ("h: Tray | x (1)", "h: eTeks#spaceship (2)")
     assert "- h: eTeks#spaceship (2)" in stats.text()
+
+
+def test_each_class_is_listed_with_the_rule_that_decided_it(tmp_path):
+    stats = class_statistics(finished(tmp_path, [half(1, 5)]))
+    found = {d.item or d.source_class: (d.rule, d.n_items) for d in stats.decisions}
+    assert found["Sofa"] == ("name", 1)
+    assert found["eTeks#spaceship"] == ("none", 2)
+    assert found["chair"] == ("source", 1)
+    assert "| size | otherprop | 1 | Tray   x |  |" in stats.text()
+    assert "5 items: 2 by none" in stats.text()
+
+
+def test_the_classes_of_a_home_are_listed_without_rendering_it(tmp_path, capsys):
+    assert main(["classes", "builtin"]) == 0
+    assert "by source" in capsys.readouterr().out
 
 
 def test_a_folder_without_labels_and_an_impossible_class_are_told(tmp_path):

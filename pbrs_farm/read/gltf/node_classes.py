@@ -15,7 +15,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.formats.serialise import json_from_bytes
-from pbrs_farm.read.common.furniture_classes import kind_of, nyu40_of, words_of
+from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of, nyu40_of, words_of
 
 OTHERPROP: Final = 40
 _OTHERSTRUCTURE: Final = NYU40_NAMES.index("otherstructure")
@@ -121,7 +121,8 @@ def _tagged(fields_json: dict[str, Any]) -> NodeClass | None:
 
 
 def _guessed(name: str) -> NodeClass | None:
-    nyu40 = nyu40_of("", name)
+    piece = class_of_piece("", name)
+    nyu40 = piece.nyu40
     if nyu40 is None or nyu40 == _OTHERSTRUCTURE:
         for word in ("wall", "ceiling", "floor", "ground", "terrain"):
             if word in words_of(name):
@@ -132,5 +133,5 @@ def _guessed(name: str) -> NodeClass | None:
         return None
     is_lamp = NYU40_NAMES[nyu40] == "lamp"
     is_opening = NYU40_NAMES[nyu40] in ("door", "window")
-    kind = kind_of("", name, nyu40, is_opening=is_opening, is_light=is_lamp)
+    kind = kind_of(piece, nyu40, is_opening=is_opening, is_light=is_lamp)
     return NodeClass(nyu40, kind, is_tagged=False)

@@ -7,7 +7,13 @@ import shapely
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import Item, MaterialKind, Opening
-from pbrs_farm.read.common.furniture_classes import kind_of, nyu40_of
+from pbrs_farm.read.common.furniture_classes import (
+    CLASS_TAG,
+    PieceClass,
+    Place,
+    class_of_piece,
+    kind_of,
+)
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall, opening_of
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
@@ -46,14 +52,15 @@ def piece_item(
     shown = [(m, p, at) for m, p, at in zip(model.meshes, found, points, strict=True) if p]
     surfaces = [placed_surface(m, p, frame, at, matrix) for m, p, at in shown]
     emitting = [k for k, (_, p, _) in enumerate(shown) if p.emits]
-    nyu40, tags = _label(piece, model, materials)
+    by_rule = _piece_class(piece)
+    nyu40, tags = _label(piece, by_rule, model, materials)
     lights = light_parts(piece, frame, tuple(emitting))
     if not surfaces and not lights:
         materials.notes.add("empty-model", piece.place, "nothing to see in it: left out")
         return None
     item_id, level_id = ids
     is_opening, is_light = piece.frame is not None, piece.tag == "light"
-    kind = kind_of(piece.catalogue_id, piece.name, nyu40, is_opening=is_opening, is_light=is_light)
+    kind = kind_of(by_rule, nyu40, is_opening=is_opening, is_light=is_light)
     item = Item(
         id=item_id,
         name=piece.name,
@@ -70,20 +77,32 @@ def piece_item(
     return item, frame
 
 
-def _label(piece: PlanPiece, model: Model, materials: HomeMaterials) -> tuple[int, tuple[str, ...]]:
+def _piece_class(piece: PlanPiece) -> PieceClass:
+    # Openings and lights are what their element says; a tilted piece has no size to check.
+    is_checked = piece.frame is None and piece.tag != "light" and not (piece.pitch or piece.roll)
+    width, depth, height = piece.size
+    place = Place(width, height, depth, piece.elevation) if is_checked else None
+    return class_of_piece(piece.catalogue_id, piece.name, piece.group, place)
+
+
+def _label(
+    piece: PlanPiece, by_rule: PieceClass, model: Model, materials: HomeMaterials
+) -> tuple[int, tuple[str, ...]]:
     tags = ["mirrored"] if piece.is_mirrored else []
-    label = nyu40_of(piece.catalogue_id, piece.name, piece.group)
+    label, rule = by_rule.nyu40, by_rule.tag
     if piece.frame is not None and label not in (DOOR, WINDOW):
         has_pane = any(m.group == PANE for m in model.meshes)
         label = WINDOW if has_pane and piece.elevation > 0.3 else DOOR
+        rule = CLASS_TAG + "element"
     elif piece.tag == "light" and label in (None, 0, OTHERPROP):
-        label = LAMP
+        label, rule = LAMP, CLASS_TAG + "element"
+    tags.append(rule)
     if label is None:
         label = OTHERPROP
         tags.append("unmapped")
-        materials.notes.add(
-            "unmapped-class", piece.place, f"no class for {piece.catalogue_id or piece.name!r}"
-        )
+        what = piece.catalogue_id or repr(piece.name)
+        why = " of its size" if by_rule.rule == "size" else ""
+        materials.notes.add("unmapped-class", piece.place, f"no class{why} for {what}")
     return label, tuple(tags)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.read.common.furniture_classes import kind_of, nyu40_of
+from pbrs_farm.read.common.furniture_classes import Place, class_of_piece, kind_of, nyu40_of, plain
 
 
 @pytest.mark.parametrize(
@@ -55,5 +55,63 @@ def test_an_unknown_thing_has_no_class() -> None:
 def test_persons_plants_and_stairs_are_told_apart(
     catalogue_id: str, name: str, kind: ItemKind
 ) -> None:
-    nyu40 = nyu40_of(catalogue_id, name) or 0
-    assert kind_of(catalogue_id, name, nyu40, is_opening=False, is_light=False) is kind
+    piece = class_of_piece(catalogue_id, name)
+    assert kind_of(piece, piece.nyu40 or 0, is_opening=False, is_light=False) is kind
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("DeskPortrait", "picture"),
+        ("CookingBench", "counter"),
+        ("TVStand2", "cabinet"),
+        ("Schreibtischlampe", "lamp"),
+        ("Esszimmerstuhl", "chair"),
+        ("Table de nuit", "night stand"),
+        ("Lampe de bureau", "lamp"),
+        ("Chaise bureau", "chair"),
+        ("Lámpara de mesa", "lamp"),
+        ("Armadio bianco", "cabinet"),
+        ("Guarda-roupa", "cabinet"),
+        ("Łóżko", "bed"),
+        ("Кресло", "chair"),
+        ("餐桌", "table"),
+        ("Pair of curtains", "curtain"),
+        ("Sleeping bag", "bed"),
+        ("Door frame", "door"),
+        ("Picture frame", "picture"),
+    ],
+)
+def test_a_name_is_read_by_whole_words_in_its_language(name: str, label: str) -> None:
+    assert nyu40_of("", name) == NYU40_NAMES.index(label)
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "label", "rule"),
+    [
+        ("Chair", Place(0.5, 0.9, 0.5), "chair", "name"),
+        ("Chair", Place(3.0, 0.9, 0.5), None, "size"),
+        ("Table", Place(0.6, 0.05, 0.4), None, "size"),
+        ("Bed", Place(0.6, 0.2, 0.3), "bed", "name"),
+        ("Bed", Place(0.6, 0.2, 0.3, bottom=0.8), None, "size"),
+        ("Desk xyzzy", Place(1.4, 0.75, 0.7), "desk", "inner-word"),
+        ("Desk xyzzy", Place(0.2, 0.3, 0.1), None, "size"),
+        ("Xyzzy", Place(1, 1, 1), None, "none"),
+    ],
+)
+def test_size_and_place_refuse_what_the_words_say(
+    name: str, place: Place, label: str | None, rule: str
+) -> None:
+    piece = class_of_piece("", name, "", place)
+    assert (piece.nyu40, piece.rule) == (None if label is None else NYU40_NAMES.index(label), rule)
+
+
+def test_a_catalogue_piece_of_impossible_size_goes_by_its_name() -> None:
+    tray = Place(0.4, 0.03, 0.4)
+    assert class_of_piece("eTeks#squareTable", "Tray", "", tray).rule == "name"
+    assert class_of_piece("eTeks#squareTable", "Table", "", tray).rule == "size"
+    assert class_of_piece("eTeks#squareTable", "Table").rule == "catalogue"
+
+
+def test_accents_and_case_part_no_words() -> None:
+    assert plain("KüchenSchrank TVUnit") == "kuchen schrank tv unit"
