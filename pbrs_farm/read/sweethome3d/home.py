@@ -20,7 +20,7 @@ from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
 from pbrs_farm.read.sweethome3d.furniture import piece_item, piece_opening
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom, plane_items, read_rooms, room_nouns
-from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, level_of
+from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, PlanLevel, level_of
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 from pbrs_farm.read.sweethome3d.parse import parse_plan
 from pbrs_farm.read.sweethome3d.piece_models import Models
@@ -28,6 +28,7 @@ from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
 from pbrs_farm.read.sweethome3d.wall_solids import wall_items
 
 _NO_ROOMS = "draw rooms (Plan > Create rooms) and save the home again"
+SAME_LEVEL_M = 0.1  # levels no farther apart in height are versions of one
 ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
 
 
@@ -90,9 +91,23 @@ def _numbered(items: tuple[Item, ...], file: str) -> tuple[Item, ...]:
 
 
 def _shown(plan: Plan, fields: ReadFields) -> Plan:
-    """The plan with its hidden levels made visible where the recipe says so."""
-    shown = tuple(replace(x, is_visible=x.is_visible or fields.hidden_levels) for x in plan.levels)
-    return replace(plan, levels=shown)
+    """The plan with hidden levels made visible: all if the recipe says so, else those between.
+
+    A level between shown ones was hidden to draw, or to look below it: the rooms under it would
+    have no ceiling. Hidden levels at either end (roofs, foundations) stay hidden, and so do second
+    versions of a shown level at its height.
+    """
+    shown = [x.elevation for x in plan.levels if x.is_visible]
+
+    def is_between(x: PlanLevel) -> bool:
+        apart = all(abs(x.elevation - y) > SAME_LEVEL_M for y in shown)
+        return bool(shown) and min(shown) < x.elevation < max(shown) and apart
+
+    levels = [
+        replace(x, is_visible=x.is_visible or fields.hidden_levels or is_between(x))
+        for x in plan.levels
+    ]
+    return replace(plan, levels=tuple(levels))
 
 
 def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:

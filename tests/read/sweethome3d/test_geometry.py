@@ -156,6 +156,16 @@ def test_hidden_levels_are_left_out_unless_asked_for() -> None:
     assert any(n.kind == "hidden-level" for n in house.notes)
 
 
+def test_a_hidden_level_between_shown_ones_is_read() -> None:
+    levels = "".join(
+        f"<level id='{k}' elevation='{262 * k}' floorThickness='12' height='250' {hidden}/>"
+        for k, hidden in enumerate(["", "visible='false'", "viewable='false'", "", "visible='0'"])
+    )
+    levels += "<level id='5' elevation='1310' floorThickness='12' height='250' visible='false'/>"
+    house = read(levels, room=ROOM.replace("<room ", "<room level='0' "))
+    assert [round(level.elevation, 2) for level in house.levels] == [0.0, 2.62, 5.24, 7.86]
+
+
 def test_floors_look_up_and_ceilings_down_over_the_room_exactly() -> None:
     house = read(WALLS)
     for kind, y, up in ((ItemKind.FLOOR, 0.0, 1.0), (ItemKind.CEILING, 2.5, -1.0)):
