@@ -26,7 +26,7 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
     for home in homes.example_homes():
         rows += _rooms_of(home.name)
-    lamps = [r for r in rows if "lamps" in r["lit_by"] or "fallback" in r["lit_by"]]
+    lamps = [r for r in rows if {"lamps", "fallback", "added"} & set(r["lit_by"])]
     day = [r for r in rows if "windows" in r["lit_by"]]
     figures: dict[str, Any] = {"lux.rooms": len(rows)}
     units = {"lux.rooms": "rooms"}

@@ -206,7 +206,9 @@ class Room:
     has_ceiling: bool = True
     enclosure: Enclosure = Enclosure.UNKNOWN
     enclosure_reason: str = ""
-    lit_by: tuple[str, ...] = ()  # set by repair: some of "lamps", "windows", "fallback"
+    # Set by repair: some of "lamps", "windows", "sky" (no ceiling), "fallback" and "added" (lamps
+    # of repair: where nothing else lights the room, and where people live without a lamp).
+    lit_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,6 +58,9 @@ class RepairFields(_Group):
     remove_persons: bool = True
     remove_plants: bool = True
     fallback_light: bool = Field(True, description="a ceiling light where nothing lights a room")
+    lamp_in_every_room: bool = Field(
+        False, description="a ceiling light in each room where people live that has no lamp"
+    )
     shade_transmission: float = Field(0.4, ge=0, le=1, description="diffuse, of enclosing shades")
     min_escape: float = Field(0.2, ge=0, le=1, description="share of light below which a shade is")
     bulb_radius_m: float = Field(0.0325, gt=0, le=1, description="where the source gives none")
@@ -294,8 +297,8 @@ class Recipe(_Group):
     def digest(self, *groups: str) -> str:
         """Digest of the seed and the named groups; of all fields but the name when none is named.
 
-        light.groups came later: at its default it is left out, so that what was stored before
-        the field existed keeps its digest.
+        A field of _CAME_LATER is left out at its default, so that what was stored before the
+        field existed keeps its digest.
         """
         return self._digest(groups, with_light_groups=self.light.groups != "two")
 
@@ -307,16 +310,27 @@ class Recipe(_Group):
         fields = self.model_dump(mode="json", exclude={"name"})
         if not with_light_groups:
             del fields["light"]["groups"]
+        for group, names in _CAME_LATER.items():
+            defaults = type(getattr(self, group)).model_fields
+            for name in names:
+                if fields[group][name] == defaults[name].default:
+                    del fields[group][name]
         return keys.digest({g: fields[g] for g in ("seed", *groups)} if groups else fields)
 
 
+_CAME_LATER: Mapping[str, tuple[str, ...]] = {"repair": ("lamp_in_every_room",)}
+
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "preview": {
+        "repair": {"lamp_in_every_room": True},
         "cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55},
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 16},
     },
-    "fast": {"cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55}},
+    "fast": {
+        "repair": {"lamp_in_every_room": True},
+        "cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55},
+    },
     "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},
     "released": {
         "cameras": {

@@ -43,11 +43,13 @@ def repair(
     structure = repaired_structure(house, fields.wall_thickness_m)
     house, swallowed = with_structure(house, structure)
 
-    # Give every lamp a bulb, every dim lamp a translucent shade, every dark room a light.
+    # Give every lamp a bulb, every dim lamp a translucent shade, rooms without one a lamp.
     house, sources = with_bulbs(house, fields)
     if occluder_from is not None:
         house, sources = with_shades(house, sources, fields, occluder_from)
-    house, given = with_room_lighting(house, fallback=fields.fallback_light)
+    house, given = with_room_lighting(
+        house, fallback=fields.fallback_light, in_every_room=fields.lamp_in_every_room
+    )
 
     # Say which rooms are closed, and let rays look for leaks in them.
     house = replace(house, rooms=_with_enclosure(house.rooms, structure.spaces), is_repaired=True)
@@ -62,7 +64,8 @@ def repair(
         faces=faces,
         structure=structure.report.model_copy(update={"n_walls_made_white": n_white}),
         sources=tuple(sources),
-        fallback_lights=tuple(given),
+        fallback_lights=given.fallback,
+        added_lamps=given.added,
         rooms=_audit(house.rooms, structure.spaces),
         is_leaking=None if leaks is None else leaks.n_sky > 0,
         leaks=leaks,

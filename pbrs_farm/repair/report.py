@@ -71,7 +71,7 @@ class RoomAudit(_Record):
     room_id: str
     name: str
     floor_area_m2: float
-    lit_by: tuple[str, ...]  # "lamps", "windows", "fallback"
+    lit_by: tuple[str, ...]  # as Room.lit_by
     enclosure: str
     reason: str
     space: tuple[str, ...]  # ids of the rooms it opens into, its own included
@@ -137,7 +137,8 @@ class RepairReport(_Record):
     faces: FacesReport = FacesReport()
     structure: StructureReport = StructureReport()
     sources: tuple[SourceRepair, ...] = ()
-    fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one
+    fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one: nothing lit them
+    added_lamps: tuple[str, ...] = ()  # ids of the rooms that got one: daylight, no lamp
     rooms: tuple[RoomAudit, ...] = ()
     is_leaking: bool | None = None  # None = not measured
     leaks: LeakReport | None = None

@@ -70,6 +70,8 @@ def _lamps(report: RepairReport) -> Iterator[str]:
         yield f"{_n(len(shaded), 'lamp')} kept their light in; what encloses it is a shade now: {_some(shaded)}."  # fmt: skip
     if report.fallback_lights:
         yield f"{_n(len(report.fallback_lights), 'room')} had neither lamp nor window and got a ceiling light: {_some(report.fallback_lights)}."  # fmt: skip
+    if report.added_lamps:
+        yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp; a ceiling light was added for the evening: {_some(report.added_lamps)}."  # fmt: skip
 
 
 def _rooms(report: RepairReport) -> Iterator[str]:

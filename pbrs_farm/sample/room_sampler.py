@@ -65,7 +65,7 @@ class RoomSampler:
         """Why this room is not sampled at all, or ""."""
         room = self.room
         if self.house.is_repaired and not room.lit_by:
-            return "nothing lights it: neither lamp nor window nor fallback light"
+            return "nothing lights it: neither lamp nor window nor sky"
         if shapely.area(paper_rules.room_shape(room)) <= 0:
             return "its polygon has no area"
         if self.fields.preset == "released" and not (room.has_floor and room.has_ceiling):

@@ -62,9 +62,10 @@ def photometric_warnings(room: Room, lux: dict[str, float]) -> list[str]:
     lux: of "outdoor" and "indoor". A group that room.lit_by lacks has no lower bound.
     """
     lines = []
-    has_lamps = "lamps" in room.lit_by or "fallback" in room.lit_by
+    has_lamps = not {"lamps", "fallback", "added"}.isdisjoint(room.lit_by)
+    has_daylight = not {"windows", "sky"}.isdisjoint(room.lit_by)
     for group, is_expected, (low, high) in (
-        ("outdoor", "windows" in room.lit_by, DAYLIGHT_LX),
+        ("outdoor", has_daylight, DAYLIGHT_LX),
         ("indoor", has_lamps, LAMPS_LX),
     ):
         value = lux[group]

@@ -15,8 +15,11 @@ from pbrs_farm.core.mesh import distances_to_triangles, face_areas, triangle_cor
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.read.mesh.primitives import box
+from pbrs_farm.repair import repair, summary_of_report
 from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of, with_bulbs
-from pbrs_farm.repair.lamps.room_lighting import with_room_lighting
+from pbrs_farm.repair.lamps.ceiling_lamp import place_of_lamp
+from pbrs_farm.repair.lamps.lived_in import is_lived_in
+from pbrs_farm.repair.lamps.room_lighting import GivenLights, with_room_lighting
 from pbrs_farm.repair.lamps.shades import with_shades
 from tests.repair.embree import EmbreeOccluder
 
@@ -158,17 +161,17 @@ def test_a_bulb_inside_the_ceiling_lights_no_room_and_the_room_gets_a_light() ->
     house, sources = with_shades(house, sources, FIELDS, EmbreeOccluder)
     assert sources[0].escape == 0.0
     house, given_to = with_room_lighting(house, fallback=True)
-    assert given_to == ["0_0", "0_1"]
+    assert given_to.fallback == ("0_0", "0_1")
 
 
 def test_a_room_that_nothing_lights_gets_a_ceiling_light() -> None:
     home = builtin_home()
     dark = replace(home, openings=(), items=tuple(i for i in home.items if not i.lights))
     house, given_to = with_room_lighting(dark, fallback=True)
-    assert given_to == ["0_0", "0_1"]
+    assert given_to == GivenLights(fallback=("0_0", "0_1"), added=())
     assert {r.lit_by for r in house.rooms} == {("fallback",)}
     lamp = house.items[-1]
-    assert (lamp.id, lamp.nyu40, lamp.tags) == ("fallback_0_1", 35, ("fallback",))
+    assert (lamp.id, lamp.nyu40, lamp.tags) == ("fallback_0_1", 35, ("fallback", "added"))
     assert house.materials[lamp.surfaces[0].material].kind is MaterialKind.BULB
     low, high = lamp.bounds
     assert low[1] > 2.0
@@ -179,5 +182,93 @@ def test_the_fallback_light_can_be_switched_off() -> None:
     home = builtin_home()
     dark = replace(home, openings=(), items=tuple(i for i in home.items if not i.lights))
     house, given_to = with_room_lighting(dark, fallback=False)
-    assert given_to == []
+    assert given_to == GivenLights((), ())
+    assert {r.lit_by for r in house.rooms} == {()}
+
+
+def test_a_room_with_a_window_and_no_lamp_gets_one_where_the_recipe_says_so() -> None:
+    home = builtin_home()
+    day = replace(home, items=tuple(i for i in home.items if not i.lights))
+    kept, report = repair(day, FIELDS)
+    assert {r.lit_by for r in kept.rooms} == {("windows",)}
+    assert report.added_lamps == ()
+    house, report = repair(day, RepairFields(lamp_in_every_room=True))
+    assert report.added_lamps == ("0_0", "0_1")
+    assert {r.lit_by for r in house.rooms} == {("windows", "added")}
+    assert [i.tags for i in house.items if i.lights] == [("added",)] * 2
+    assert "2 rooms where people live had no lamp" in summary_of_report(report)
+
+
+def test_a_room_with_a_lamp_of_its_own_gets_no_other() -> None:
+    home = builtin_home()
+    _, report = repair(home, RepairFields(lamp_in_every_room=True))
+    assert (report.added_lamps, report.fallback_lights) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("name", "types", "lived_in"),
+    [
+        ("Bedroom", (), True),
+        ("", (), True),
+        ("Balcony", (), False),
+        ("Garage 2", (), False),
+        ("Südterrasse", (), True),  # a compound is not taken apart
+        ("Große Terrasse", (), False),
+        ("Jardín", (), False),
+        ("Balcão", (), False),
+        ("Trädgård", (), False),
+        ("балкон", (), False),
+        ("南阳台", (), False),
+        ("발코니", (), False),
+        ("ベランダ", (), False),
+        ("x", ("Balcony",), False),
+        ("x", ("Living_Room", "Balcony"), True),
+        ("Terracotta room", (), True),
+    ],
+)
+def test_people_do_not_live_on_balconies_in_any_language(
+    name: str, types: tuple[str, ...], lived_in: bool
+) -> None:
+    room = replace(builtin_home().rooms[0], name=name, types=types)
+    assert is_lived_in(room, 12.0) is lived_in
+    assert not is_lived_in(room, 1.9)
+
+
+def test_the_added_lamp_hangs_clear_of_what_reaches_the_ceiling() -> None:
+    home = builtin_home()
+    room = home.rooms[0]
+    (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
+    _, _, z = place_of_lamp(home, room)
+    assert (z - z0) == pytest.approx((z1 - z0) / 2, abs=0.1)
+    # A wardrobe to the ceiling over the left half of the room moves the lamp to the right half.
+    middle = (x0 + x1) / 2
+    size = np.array([(middle - x0) / 2, 1.2, (z1 - z0) / 2])
+    wardrobe = box("w", np.array([(x0 + middle) / 2, 1.2, (z0 + z1) / 2]), size, 0)
+    tall = Item("tall", "tall", ItemKind.OBJECT, "0", (wardrobe,))
+    assert place_of_lamp(home.with_items([*home.items, tall]), room)[0] > middle + 0.5
+
+
+def test_the_added_lamp_hangs_below_a_sloped_ceiling_where_it_is_high() -> None:
+    home = builtin_home()
+    room = home.rooms[0]
+    (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
+    quad = np.array([[x0, 0.9, z0], [x1, 2.4, z0], [x1, 2.4, z1], [x0, 0.9, z1]], np.float32)
+    slope = Surface("slope", quad, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 0)
+    roof = Item("roof", "roof", ItemKind.CEILING, "0", (slope,))
+    items = [i for i in home.items if i.kind is not ItemKind.CEILING]
+    x, y, _ = place_of_lamp(home.with_items([*items, roof]), room)
+    height = 0.9 + 1.5 * (x - x0) / (x1 - x0)
+    assert y == pytest.approx(height - 0.2, abs=1e-3)
+    assert y > 1.9
+
+
+def test_a_room_without_a_ceiling_is_lit_by_the_sky_unless_a_storey_is_above() -> None:
+    home = builtin_home()
+    items = tuple(i for i in home.items if not i.lights and i.kind is not ItemKind.CEILING)
+    rooms = tuple(replace(r, has_ceiling=False) for r in home.rooms)
+    bare = replace(home, openings=(), items=items, rooms=rooms)
+    house, _ = with_room_lighting(bare, fallback=True)
+    assert {r.lit_by for r in house.rooms} == {("sky",)}
+    slab = _slab(5.0, 5.2, half=20.0)
+    house, _ = with_room_lighting(bare.with_items([*items, slab]), fallback=True)
     assert {r.lit_by for r in house.rooms} == {()}

@@ -55,6 +55,26 @@ def test_the_name_of_a_recipe_is_no_part_of_its_digest() -> None:
     assert differences(by_name, by_fields) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "digest"),
+    [
+        ("paper", "05f555fb01a6c362e1797daadd7fab0d"),
+        ("released", "8530a88c2f5397ed674b64c5ccee3ae1"),
+    ],
+)
+def test_a_field_that_came_later_changes_no_digest_of_paper_and_released(
+    name: str, digest: str
+) -> None:
+    assert recipe_from_name(name).digest() == digest
+    assert not recipe_from_name(name).repair.lamp_in_every_room
+    for other in ("preview", "fast"):
+        recipe = recipe_from_name(other)
+        assert recipe.repair.lamp_in_every_room
+        off = recipe_from_name(other, {"repair.lamp_in_every_room": "false"})
+        assert recipe.digest("repair") != off.digest("repair")
+        assert off.digest("repair") == recipe_from_name(name).digest("repair")
+
+
 def test_layers_of_lamps_are_stored_anew_and_change_no_picture() -> None:
     two, lamps = (recipe_from_name("fast", {"light.groups": word}) for word in ("two", "lamps"))
     assert lamps.picture_digest("light") == two.picture_digest("light") == two.digest("light")

@@ -1,45 +1,43 @@
-"""What lights each room, and a ceiling light where nothing does; no effects."""
+"""What lights each room, and a ceiling light where nothing does or no lamp is; no effects."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 
-from pbrs_farm.core.house import (
-    House,
-    Item,
-    ItemKind,
-    LightPart,
-    Material,
-    MaterialKind,
-    Opening,
-    Room,
-)
-from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.core.mesh import distances_to_triangles
-from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of
+from pbrs_farm.core.house import House, Item, LightPart, Material, MaterialKind, Opening, Room
+from pbrs_farm.repair.lamps.ceiling_lamp import ADDED, ceiling_lamp, heights_above
+from pbrs_farm.repair.lamps.lived_in import is_lived_in
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import F64
-from pbrs_farm.repair.structure.prisms import polygons_of
 
-LAMP_NYU40 = 35  # class "lamp" of NYU40
 FALLBACK = "fallback"
-_BELOW_CEILING_M = 0.2  # centre of the fallback light
-_RADIUS_M = 0.1
-_POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
 _LEAST_ESCAPE = 0.01  # light output ratio below which a lamp counts as none
 _BY_THE_ROOM_M = 0.6  # an opening nearer than this is in a wall of the room
+_SKY_POINTS = 64  # of a room without a ceiling, looked up from
+_LEAST_SKY = 0.1  # share of them that see no structure above
 
 
-def with_room_lighting(house: House, *, fallback: bool) -> tuple[House, list[str]]:
-    """Room.lit_by of every room; and a light in each that has a floor, a ceiling and no light.
+@dataclass(frozen=True, slots=True)
+class GivenLights:
+    """Ids of the rooms that got a ceiling light."""
 
-    Second: ids of the rooms that got one. fallback False: none does.
+    fallback: tuple[str, ...]  # nothing lit them
+    added: tuple[str, ...]  # they had daylight and no lamp
+
+
+def with_room_lighting(
+    house: House, *, fallback: bool, in_every_room: bool = False
+) -> tuple[House, GivenLights]:
+    """Room.lit_by of every room, and a ceiling light in each that lacks one.
+
+    fallback: in each room that has a floor, a ceiling and no light. in_every_room: in each that
+    people live in and that has no lamp of its own, whatever daylight it has.
     """
-    rooms, lights, given = [], [], []
+    rooms, lights = [], []
+    given: dict[str, list[str]] = {FALLBACK: [], ADDED: []}
     areas = [plan.polygon_of_room(r.polygon) for r in house.rooms]
     glazed = {i.id for i in house.items if _has_pane(i, house.materials)}
     lamps = [i for i in house.items if any(_shines(light) for light in i.lights)]
@@ -49,17 +47,34 @@ def with_room_lighting(house: House, *, fallback: bool) -> tuple[House, list[str
             lit_by.append("lamps")
         if any(_opens_on(o, room, area, glazed) for o in house.openings):
             lit_by.append("windows")
-        # Hang a light where neither lamp nor daylight reaches.
-        if not lit_by and fallback and room.has_floor and room.has_ceiling:
-            lit_by.append(FALLBACK)
-            lights.append(_fallback_light(house, room, area, len(house.materials)))
-            given.append(room.id)
+        if not room.has_ceiling and _sees_sky(house, room, area):
+            lit_by.append("sky")
+        # Hang a light where neither lamp nor daylight reaches, and where people live without one.
+        tag = ""
+        if not lit_by and fallback and room.has_floor and room.has_ceiling and area.area > 0:
+            tag = FALLBACK
+        elif in_every_room and "lamps" not in lit_by and room.has_floor:
+            tag = ADDED if is_lived_in(room, area.area) else ""
+        if tag:
+            lit_by.append(tag)
+            lights.append(ceiling_lamp(house, room, len(house.materials), tag))
+            given[tag].append(room.id)
         rooms.append(replace(room, lit_by=tuple(lit_by)))
     materials = house.materials
     if lights:
         materials = (*materials, Material("fallback_bulb", kind=MaterialKind.BULB))
-    items = (*house.items, *lights)
-    return replace(house, rooms=tuple(rooms), items=items, materials=materials), given
+    lit = replace(house, rooms=tuple(rooms), items=(*house.items, *lights), materials=materials)
+    return lit, GivenLights(tuple(given[FALLBACK]), tuple(given[ADDED]))
+
+
+def _sees_sky(house: House, room: Room, area: plan.Shape) -> bool:
+    """Whether a part of the room has no structure above: it is open to the sky."""
+    low, high = np.array(area.bounds).reshape(2, 2) if area.area > 0 else np.zeros((2, 2))
+    points = low + (high - low) * np.random.default_rng(0).random((4 * _SKY_POINTS, 2))
+    points = points[shapely.contains_xy(area, points[:, 0], points[:, 1])][:_SKY_POINTS]
+    if not len(points):
+        return False
+    return bool(np.isinf(heights_above(house, room, points)).mean() > _LEAST_SKY)
 
 
 def _has_pane(item: Item, materials: Sequence[Material]) -> bool:
@@ -88,43 +103,3 @@ def _opens_on(opening: Opening, room: Room, area: plan.Shape, glazed: set[str]) 
     if not room.floor_y - 0.05 <= middle[1] <= room.ceiling_y + 0.05:
         return False
     return bool(area.distance(shapely.Point(middle[0], middle[2])) < _BY_THE_ROOM_M)
-
-
-def _fallback_light(house: House, room: Room, area: plan.Shape, material: int) -> Item:
-    """A ball below the ceiling, as near the middle of the room as nothing stands in its way."""
-    # Hang it in the middle of the largest circle in the plan.
-    largest = max(polygons_of(area), key=lambda p: p.area)
-    circle = shapely.get_coordinates(shapely.maximum_inscribed_circle(largest, 0.05))
-    x, z = circle[0]
-    centre = np.array([x, room.ceiling_y - _BELOW_CEILING_M, z])
-    radius = _RADIUS_M
-    near = [i for i in house.items if _within(i, centre, 2 * radius)]
-    # Shrink it until it touches nothing.
-    for item in near:
-        free = distances_to_triangles(centre, triangles_of(item)).min()
-        radius = max(min(radius, 0.9 * float(free)), 0.01)
-    light = LightPart(
-        position=(float(centre[0]), float(centre[1]), float(centre[2])),
-        radius_m=radius,
-        power=_POWER,
-        unit=PowerUnit.SWEETHOME3D,
-        emitting=(0,),
-        escape=1.0,
-    )
-    return Item(
-        id=f"{FALLBACK}_{room.id}",
-        name="fallback ceiling light",
-        kind=ItemKind.LAMP,
-        level_id=room.level_id,
-        surfaces=(icosphere("bulb", centre, radius, material),),
-        nyu40=LAMP_NYU40,
-        source_class=FALLBACK,
-        room_id=room.id,
-        lights=(light,),
-        tags=(FALLBACK,),
-    )
-
-
-def _within(item: Item, point: F64, by_m: float) -> bool:
-    low, high = item.bounds
-    return bool(((point > low - by_m) & (point < high + by_m)).all())

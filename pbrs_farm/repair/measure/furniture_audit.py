@@ -85,7 +85,7 @@ def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floa
         # Pass over what touches another item, and our own ceiling lights.
         touched = ~apart.any(1)
         touched[k] = False
-        if touched.any() or (piece.lights and "fallback" in piece.tags):
+        if touched.any() or (piece.lights and "added" in piece.tags):
             continue
         # Measure down to the highest item below.
         below = ~apart[:, [0, 2]].any(1) & (around[:, 1, 1] <= boxes[k, 0, 1])

@@ -1,0 +1,126 @@
+"""The lamp that repair hangs in a room: where, and what it looks like; no effects.
+
+`ceiling_lamp` is the one place that says what an added lamp is: a ball of light. A source whose
+catalogue has pendants can give one of those instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.mesh import distances_to_triangles, triangle_corners
+from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of
+from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.booleans import F64
+from pbrs_farm.repair.structure.prisms import polygons_of
+
+LAMP_NYU40 = 35  # class "lamp" of NYU40
+ADDED = "added"  # tag of every lamp that repair adds
+_BELOW_CEILING_M = 0.2  # centre of the lamp
+_TALL_M = 0.5  # what reaches this near the ceiling takes part of it
+_HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
+_RADIUS_M = 0.1
+_POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
+_ABOVE_FLOOR_M = 0.5  # structure lower than this is the floor
+_GRID_M = 0.25  # of places tried below a sloped ceiling
+
+
+def ceiling_lamp(house: House, room: Room, material: int, tag: str) -> Item:
+    """A ball below the ceiling, in the middle of the largest part of it that is free.
+
+    material: index of its bulb material. tag: why it was added; begins the item's id.
+    """
+    centre = place_of_lamp(house, room)
+    radius = _RADIUS_M
+    near = [i for i in house.items if _within(i, centre, 2 * radius)]
+    # Shrink it until it touches nothing.
+    for item in near:
+        free = distances_to_triangles(centre, triangles_of(item)).min()
+        radius = max(min(radius, 0.9 * float(free)), 0.01)
+    light = LightPart(
+        position=(float(centre[0]), float(centre[1]), float(centre[2])),
+        radius_m=radius,
+        power=_POWER,
+        unit=PowerUnit.SWEETHOME3D,
+        emitting=(0,),
+        escape=1.0,
+    )
+    return Item(
+        id=f"{tag}_{room.id}",
+        name=f"{tag} ceiling light",
+        kind=ItemKind.LAMP,
+        level_id=room.level_id,
+        surfaces=(icosphere("bulb", centre, radius, material),),
+        nyu40=LAMP_NYU40,
+        source_class=tag,
+        room_id=room.id,
+        lights=(light,),
+        tags=tuple(dict.fromkeys((tag, ADDED))),
+    )
+
+
+def place_of_lamp(house: House, room: Room) -> F64:
+    """(3,) middle of the largest circle in the room's ceiling that nothing tall takes part of.
+
+    Below the ceiling that is really there; where that is too low for a head, below its highest
+    place.
+    """
+    # Take what reaches the ceiling out of the room's plan, unless nothing would be left.
+    area = plan.polygon_of_room(room.polygon)
+    free = plan.without(area, *(f for i in house.items if (f := _tall_footprint(i, room))))
+    largest = max(polygons_of(free) or polygons_of(area), key=lambda p: p.area)
+    circle = shapely.get_coordinates(shapely.maximum_inscribed_circle(largest, 0.05))
+    # Measure how high it is there, and look for a higher place if it is low.
+    places = circle[:1]
+    heights = heights_above(house, room, places)
+    if heights[0] < room.floor_y + _HEAD_M + _BELOW_CEILING_M:
+        low, high = np.array(largest.bounds).reshape(2, 2)
+        axes = [np.arange(low[k], high[k], _GRID_M) for k in range(2)]
+        grid = np.stack([g.ravel() for g in np.meshgrid(*axes)], 1)
+        inside = shapely.contains_xy(plan.grown(largest, -_RADIUS_M), grid[:, 0], grid[:, 1])
+        places = np.concatenate([places, grid[inside]])
+        heights = heights_above(house, room, places)
+    best = int(np.argmax(np.minimum(heights, room.ceiling_y)))
+    y = min(float(heights[best]), room.ceiling_y) - _BELOW_CEILING_M
+    return np.array([places[best, 0], y, places[best, 1]])
+
+
+def heights_above(house: House, room: Room, places: F64) -> F64:
+    """(N,) y of the lowest structure above the room's floor at places (N, 2); inf = none."""
+    surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
+    corners = [triangle_corners(s.positions, s.faces) for s in surfaces if len(s.faces)]
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    # Keep those above the room whose bounds meet the places'.
+    least_y = room.floor_y + _ABOVE_FLOOR_M
+    a, b = triangles[:, :, [0, 2]].min(1), triangles[:, :, [0, 2]].max(1)
+    meets = (b >= places.min(0)).all(1) & (a <= places.max(0)).all(1)
+    found = np.full(len(places), np.inf)
+    for p, q, r in triangles[meets & (triangles[:, :, 1].max(1) > least_y)]:
+        # Solve for the place in the triangle's plan; upright ones have none.
+        edges = np.array([q - p, r - p])[:, [0, 2]].T
+        if abs(np.linalg.det(edges)) < 1e-9:
+            continue
+        u, v = np.linalg.solve(edges, (places - p[[0, 2]]).T)
+        y = p[1] + u * (q[1] - p[1]) + v * (r[1] - p[1])
+        covers = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (y > least_y)
+        found = np.where(covers, np.minimum(found, y), found)
+    return found
+
+
+def _tall_footprint(item: Item, room: Room) -> plan.Shape | None:
+    """The plan area of a piece that reaches the ceiling's height in the room; None of others."""
+    if item.kind.is_structure or not item.n_faces:
+        return None
+    low, high = item.bounds[:, 1]
+    if high < room.ceiling_y - _TALL_M or low > room.ceiling_y:
+        return None
+    corners = item.oriented_box.corners[:, [0, 2]]
+    return plan.on_grid(shapely.convex_hull(shapely.MultiPoint(corners)))
+
+
+def _within(item: Item, point: F64, by_m: float) -> bool:
+    low, high = item.bounds
+    return bool(((point > low - by_m) & (point < high + by_m)).all())
