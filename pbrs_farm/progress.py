@@ -20,6 +20,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from pbrs_farm.core.shown_text import printable
 from pbrs_farm.run.processes.task import Event
 
 
@@ -80,7 +81,7 @@ class _PlainLines(ProgressReporter):
         name = _name(event)
         clock = f"[{time.monotonic() - self._started:6.1f} s]"
         if event.kind == "failed":
-            sys.stderr.write(f"{clock} {name} {event.step}: FAILED: {event.message}\n")
+            sys.stderr.write(f"{clock} {name} {event.step}: FAILED: {printable(event.message)}\n")
         elif event.kind in ("done", "kept"):
             # Add the step to its view; say a house's steps at once.
             self._seconds[name] = self._seconds.get(name, 0.0) + event.seconds
@@ -135,7 +136,9 @@ class _Bars(ProgressReporter):
     def __call__(self, event: Event) -> None:
         if event.kind == "failed":
             self._progress.console.print(
-                f"{_name(event)} {event.step}: FAILED: {event.message}", style="red", markup=False
+                f"{_name(event)} {event.step}: FAILED: {printable(event.message)}",
+                style="red",
+                markup=False,
             )
         elif event.kind == "begin":
             note = f"{_name(event)} {event.step}"

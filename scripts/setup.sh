@@ -18,6 +18,9 @@ missing_packages() {
   has_lib 'libGL\.so\.1' || echo libgl1
   has_lib 'libEGL_mesa\.so\.0' || [ -e /proc/driver/nvidia ] || echo libegl-mesa0
   compgen -G '/usr/lib/*/dri/swrast_dri.so' >/dev/null || compgen -G '/usr/lib/*/libgallium*.so' >/dev/null || [ -e /proc/driver/nvidia ] || echo libgl1-mesa-dri
+  # Fonts for names in other scripts on sheets: DejaVu Sans, and Droid Sans Fallback for Chinese, Japanese and Korean.
+  [ -e /usr/share/fonts/truetype/dejavu/DejaVuSans.ttf ] || echo fonts-dejavu-core
+  [ -e /usr/share/fonts/truetype/droid/DroidSansFallbackFull.ttf ] || echo fonts-droid-fallback
   command -v redis-server >/dev/null || echo redis-server
   # Commands that a target of the Makefile wants beside the usual ones; each is its package's name.
   for p in ${PBRS_SETUP_ALSO:-}; do command -v "$p" >/dev/null || echo "$p"; done

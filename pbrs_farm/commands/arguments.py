@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.shown_text import escaped, printable, shown
 
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe import Recipe
@@ -25,22 +26,23 @@ Verb = Callable[[str, Handler, str], argparse.ArgumentParser]
 
 # Help of arguments that name a home, and a view.
 HOME: Final = "file, SUNCG house folder, example home's name, or `builtin`"
+_MAX_LINE: Final = 1500  # characters of a warning: a command that reproduces a fault fits
 VIEW: Final = "a view's folder: OUT/houses/<house>/views/<view>"
 
 
 def warn(text: str) -> None:
     """Write a line to standard error."""
-    sys.stderr.write(f"pbrs-farm: {text}\n")
+    sys.stderr.write(f"pbrs-farm: {shown(text, _MAX_LINE)}\n")
 
 
 def echo(text: str = "") -> None:
-    """Write a line to standard output."""
-    sys.stdout.write(text + "\n")
+    """Write a line, or several, to standard output."""
+    sys.stdout.write(printable(text) + "\n")
 
 
 def echo_json(value: Any) -> None:
     """Write a value as JSON to standard output."""
-    echo(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False))
+    echo(escaped(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False)))
 
 
 def counted(n: int, noun: str) -> str:

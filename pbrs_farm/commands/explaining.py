@@ -15,6 +15,7 @@ from pbrs_farm.commands.arguments import (
     echo_json,
     recipe_of,
 )
+from pbrs_farm.core.shown_text import shown
 
 if TYPE_CHECKING:
     from pbrs_farm.sample import CameraReport
@@ -71,7 +72,6 @@ def _repair(args: argparse.Namespace) -> int:
 
 
 def _cameras(args: argparse.Namespace) -> int:
-    from pbrs_farm.core import keys
     from pbrs_farm.core.house import geometry_from_house
     from pbrs_farm.formats.cameras_json import cameras_document
     from pbrs_farm.formats.serialise import json_bytes
@@ -93,7 +93,7 @@ def _cameras(args: argparse.Namespace) -> int:
     if args.out is not None:
         FolderStore(args.out.parent).put(args.out.name, json_bytes(document))
     if args.map is not None:
-        folder, name = FolderStore(args.map.parent), keys.slug(args.map.stem)
+        folder, name = FolderStore(args.map.parent), args.map.stem
         folder.put(f"{name}.png", png_from_array(camera_map_rgb(house, sampling)))
         folder.put(f"{name}.svg", camera_map_svg(house, sampling).encode())
     if args.json:
@@ -107,7 +107,7 @@ def _echo_report(report: CameraReport) -> None:
     """Print each room and, of each of its sectors, the outcome and the rejections by rule."""
     for room in report.rooms:
         reason = f": no cameras: {room.reason}" if room.reason else ""
-        echo(f"{room.room_id} {room.name}{reason}")
+        echo(f"{room.room_id} {shown(room.name)}{reason}")
         for s in room.sectors:
             rejected = ", ".join(f"{n} {rule}" for rule, n in s.refused.items() if n)
             echo(f"  sector {s.sector}: {_outcome(s)}; {s.n_candidates} candidates: {rejected}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import VIEW, Verb, at_least, echo, echo_json, warn
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.shown_text import shown
 
 if TYPE_CHECKING:
     from pbrs_farm.run.relight import LampFactor
@@ -148,7 +149,7 @@ def _list_lamps(view: Path) -> int:
         # A lamp that brings no light to the view has no layer.
         share = f"{row['share']:.1%}" if row["layer"] else "-"
         place = f"{row['item']:<12} {row['room'] or '-':<8}"
-        echo(f"{row['number']:>4} {share:>6} {row['lm']:>7.0f}  {place} {row['name']}")
+        echo(f"{row['number']:>4} {share:>6} {row['lm']:>7.0f}  {place} {shown(row['name'])}")
     return 0
 
 

@@ -15,17 +15,20 @@ Transient                 a second base; only errors that carry it are worth ano
 
 from __future__ import annotations
 
+from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
+
 
 class PbrsError(Exception):
-    """An error whose text says what, where, and what to do next.
+    """An error whose text says what, where, and what to do next, in one line that can be printed.
 
     hint: what to do next, or "".  command: the shell line that reproduces it, or "".
     """
 
     def __init__(self, message: str, *, hint: str = "", command: str = "") -> None:
+        message = shown(message, MAX_MESSAGE)
         super().__init__(message)
         self.message = message
-        self.hint = hint
+        self.hint = shown(hint, MAX_MESSAGE)
         self.command = command
 
     def __str__(self) -> str:
@@ -61,7 +64,7 @@ class BadInput(PbrsError):
     def __init__(
         self, file: object, place: str, message: str, *, hint: str = "", command: str = ""
     ) -> None:
-        where = f"{file}: {place}" if place else f"{file}"
+        where = shown(file, 2 * MAX_PLACE) + (f": {shown(place, MAX_PLACE)}" if place else "")
         super().__init__(f"{where}: {message}", hint=hint, command=command)
         self.file = str(file)
         self.place = place

@@ -38,7 +38,7 @@ def bundle_from_house(house: House) -> tuple[bytes, bytes]:
     data["format"] = FORMAT
     data["glb_sha256"] = keys.sha256(glb_bytes)
     data["classes"] = {str(i): NYU40_NAMES[i] for i in sorted({x.nyu40 for x in house.items})}
-    return glb_bytes, pretty_json(data).encode()
+    return glb_bytes, pretty_json(data).encode("utf-8", "replace")
 
 
 def _json_of_house(house: House) -> dict[str, Any]:

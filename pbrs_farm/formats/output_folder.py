@@ -13,12 +13,13 @@ from typing import Any
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.regular_files import read_regular
 
 
 @dataclass(frozen=True, slots=True)
 class HouseEntry:
-    """A house of the folder."""
+    """A house of the folder; names and attribution can be shown and drawn as they stand."""
 
     id: str
     name: str
@@ -71,16 +72,18 @@ def _house(folder: Path) -> HouseEntry:
     facts = json_object(folder / "house.json")
     source = facts.get("source") or {}
     rooms = {
-        str(room["id"]): str(room.get("name") or _first(room.get("types")) or f"Room {room['id']}")
+        str(room["id"]): shown(room.get("name") or _first(room.get("types")))
+        or f"Room {room['id']}"
         for room in facts.get("rooms") or ()
         if "id" in room
     }
-    name = str(facts.get("name") or folder.name)
-    return HouseEntry(folder.name, name, str(source.get("attribution") or ""), rooms)
+    name = shown(facts.get("name") or folder.name)
+    credit = shown(source.get("attribution") or "", MAX_MESSAGE)
+    return HouseEntry(folder.name, name, credit, rooms)
 
 
 def _first(words: Any) -> str:
-    return str(words[0]) if words else ""
+    return str(words[0]) if isinstance(words, list) and words else ""
 
 
 def _room_id(view_id: str, facts: dict[str, Any], house: HouseEntry) -> str:

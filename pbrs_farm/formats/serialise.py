@@ -49,7 +49,9 @@ def json_bytes(value: Any) -> bytes:
     """Readable JSON, keys sorted: equal values give equal bytes. value: a model or JSON values."""
     if isinstance(value, BaseModel):
         value = value.model_dump(mode="json")
-    return (json.dumps(value, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode()
+    return (json.dumps(value, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode(
+        "utf-8", "replace"
+    )
 
 
 def pretty_json(value: Any) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import unicodedata
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,9 +12,11 @@ from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.gallery.gallery_page import attributions
 from pbrs_farm.gallery.label_colours import NYU40_COLOURS
+from pbrs_farm.gallery.lettering import draw_line
 from pbrs_farm.gallery.tiles import TILES, Tile, tiles_of
 
 _TILE_PX: Final = 224
@@ -58,7 +59,7 @@ def contact_sheet(folder: Path, *, max_views: int = 12) -> bytes:
         y += height
     y = _draw_legend(draw, y + 10, legend)
     for line in credits:
-        draw.text((_MARGIN_PX, y), line, _FAINT, _font(13))
+        draw_line(draw, (_MARGIN_PX, y), line, fill=_FAINT, size=13)
         y += 22
 
     file = io.BytesIO()
@@ -101,23 +102,11 @@ def _classes(rows: Sequence[Sequence[Tile]]) -> list[int]:
 
 
 def _credits(views: Sequence[ViewEntry]) -> list[str]:
-    lines = attributions(views)
-    return [_drawable(line if len(line) < 260 else line[:257] + "...") for line in lines]
+    return [shown(line, 260) for line in attributions(views)]
 
 
 def _font(size: int) -> _Font:
     return ImageFont.load_default(size)
-
-
-def _drawable(text: str) -> str:
-    """text in the letters Pillow's own font has: accents dropped, what is left unknown as "?"."""
-    dashes = text.translate({0x2013: "-", 0x2014: "-", 0x2019: "'", 0xDF: "ss"})
-    letters = unicodedata.normalize("NFKD", dashes)
-    return (
-        "".join(c for c in letters if not unicodedata.combining(c))
-        .encode("ascii", "replace")
-        .decode()
-    )
 
 
 def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown: int) -> None:
@@ -137,10 +126,10 @@ def _draw_row(
     sheet: Image.Image, draw: ImageDraw.ImageDraw, y: int, view: ViewEntry, tiles: Sequence[Tile]
 ) -> None:
     draw.line([(_MARGIN_PX, y + 2), (sheet.width - _MARGIN_PX, y + 2)], fill=(38, 42, 52), width=1)
-    title = _drawable(view.room_name)
-    draw.text((_MARGIN_PX, y + 9), title, INK, _font(16))
-    after = _MARGIN_PX + draw.textlength(title, _font(16)) + 14
-    draw.text((after, y + 11), _drawable(f"{view.house.name}, view {view.id}"), _FAINT, _font(14))
+    length = draw_line(draw, (_MARGIN_PX, y + 9), view.room_name, fill=INK, size=16)
+    after = _MARGIN_PX + length + 14
+    text = f"{view.house.name}, view {view.id}"
+    draw_line(draw, (after, y + 11), text, fill=_FAINT, size=14)
     for i, tile in enumerate(tiles):
         x = _MARGIN_PX + i * (_TILE_PX + _GAP_PX)
         _draw_tile(sheet, draw, (x, y + 34), tile)

@@ -6,6 +6,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from pbrs_farm.core.shown_text import printable
+
 
 def page(package: str, template: str, **values: Any) -> str:
     """The template file of a package filled with values; only markupsafe.Markup is not escaped.
@@ -18,5 +20,11 @@ def page(package: str, template: str, **values: Any) -> str:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=_finalized,
     )
     return environment.get_template(template).render(values)
+
+
+def _finalized(value: Any) -> Any:
+    """A string without what steers a browser's text: direction overrides, control characters."""
+    return printable(value) if type(value) is str else value

@@ -53,6 +53,8 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
     files: what was looked at before, for many words that share files.
     """
     path = Path(word)
+    if not _is_utf8(word):
+        raise BadHouse(word, "", "the path is no UTF-8", hint="rename the file or its folder")
     kind: Kind
     if word.startswith("{"):
         kind = "object"
@@ -66,6 +68,15 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
         kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
         word = str(real_path(path))
     return _reference(kind, word, files or SourceFiles())
+
+
+def _is_utf8(word: str) -> bool:
+    """Whether a path can be told to others: bytes that are no UTF-8 become lone surrogates."""
+    try:
+        word.encode()
+    except UnicodeEncodeError:
+        return False
+    return "\0" not in word
 
 
 def _reference(kind: Kind, location: str, files: SourceFiles) -> SourceRef:

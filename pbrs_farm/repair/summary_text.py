@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.repair.report import RepairReport
 
 
@@ -18,7 +19,7 @@ def summary_of_report(report: RepairReport) -> str:
         *_leaks(report),
         *_furniture(report),
     ]
-    return "\n".join([f"{report.house_id}:", *(f"- {line}" for line in lines)])
+    return "\n".join([f"{report.house_id}:", *(f"- {shown(line, MAX_MESSAGE)}" for line in lines)])
 
 
 def _structure(report: RepairReport) -> Iterator[str]:
@@ -120,8 +121,10 @@ def _n(count: int, one: str, many: str = "") -> str:
 
 
 def _some(names: list[str] | tuple[str, ...]) -> str:
-    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    return ", ".join(shown(name) for name in names[:5]) + (
+        f" and {len(names) - 5} more" if len(names) > 5 else ""
+    )
 
 
 def _named(name: str) -> str:
-    return f" ({name})" if name else ""
+    return f" ({shown(name)})" if name else ""

@@ -15,6 +15,7 @@ from typing import Any
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve
 from pbrs_farm.run import plan
@@ -99,7 +100,7 @@ def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
         try:
             source = resolve(word, files)
         except PbrsError as error:
-            summary.failures.append((word, str(error), ""))
+            summary.failures.append((shown(word, MAX_PLACE), str(error), ""))
             continue
         sources.setdefault(source.house_id, source)
     return list(sources.values())

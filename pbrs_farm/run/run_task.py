@@ -16,6 +16,7 @@ from dataclasses import asdict
 from typing import Literal
 
 from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.processes.message import Handler, Message, Send
@@ -73,7 +74,7 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
     except PbrsError as error:
         message = str(error)
     except Exception as error:  # noqa: BLE001  any other fault costs this step, not the run
-        message = f"{type(error).__name__}: {error}"
+        message = shown(f"{type(error).__name__}: {error}", MAX_MESSAGE)
         traceback.print_exc()
         sys.stderr.flush()
     else:

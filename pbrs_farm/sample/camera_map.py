@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
+from pbrs_farm.core.shown_text import shown
 from pbrs_farm.sample.drawing import Drawing, Mark
 from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.rejection import Verdict
@@ -62,7 +63,7 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
         x0, z0, x1, z1 = shapely.total_bounds(shapes)
         scale = min(_PX_PER_M, _MAX_PX / max(x1 - x0, z1 - z0, 1e-6))
         panel = _Panel(left - scale * x0, 2 * _MARGIN - scale * z0, scale)
-        marks.append(_text(left, _MARGIN, level.name or f"Level {level.id}", 14.0))
+        marks.append(_text(left, _MARGIN, shown(level.name) or f"Level {level.id}", 14.0))
         marks += _level_marks(house, sampling, level.id, panel)
         left += scale * (x1 - x0) + 2 * _MARGIN
         bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
@@ -88,7 +89,7 @@ class _Panel:
 def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel) -> list[Mark]:
     rooms = {room.id: room for room in house.rooms if room.level_id == level_id}
     marks = [
-        Mark("polygon", tuple(panel(x, z) for x, z in room.polygon), _ROOM, title=room.name)
+        Mark("polygon", tuple(panel(x, z) for x, z in room.polygon), _ROOM, title=shown(room.name))
         for room in rooms.values()
         if len(room.polygon) >= 3
     ]
@@ -104,7 +105,7 @@ def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel)
                     point = panel(eye[0], eye[2])
                     marks.append(Mark("dot", (point,), COLOURS[kind], 1.4, title=kind.label))
     marks += [
-        _text(*panel(*_middle(room.polygon)), f"{room.id} {room.name}", _LETTERS)
+        _text(*panel(*_middle(room.polygon)), f"{room.id} {shown(room.name)}", _LETTERS)
         for room in rooms.values()
         if len(room.polygon)
     ]
@@ -133,7 +134,7 @@ def _footprint(item: Item, panel: _Panel) -> list[Mark]:
     if not isinstance(hull, shapely.Polygon):
         return []
     points = tuple(panel(x, z) for x, z in hull.exterior.coords)
-    return [Mark("polygon", points, _FURNITURE, title=item.name)]
+    return [Mark("polygon", points, _FURNITURE, title=shown(item.name))]
 
 
 def _winner(view: View, panel: _Panel) -> list[Mark]:
@@ -181,7 +182,7 @@ def _notes(sampling: Sampling) -> list[Mark]:
 
 
 def _room_lines(room: RoomReport) -> list[str]:
-    name = f"{room.room_id} {room.name}".strip()
+    name = f"{room.room_id} {shown(room.name)}".strip()
     if room.reason:
         return [f"{name}: no camera: {room.reason}"]
     views = sum(len(s.views) for s in room.sectors)

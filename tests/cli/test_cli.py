@@ -52,7 +52,7 @@ def zipped(path: Path, **entries: str) -> Path:
         (["verify", "{out}"], "no houses here"),
         (["sheet", "{out}"], "{out}"),
         (["select", "{out}", "--reference", "x"], "no such folder"),
-        (["relight", "{out}"], "cannot be read"),
+        (["relight", "{out}"], "no such file"),
         (["step", "paint", "builtin", "--out", "{out}"], "no such step"),
     ],
 )

@@ -17,6 +17,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.gallery import contact_sheet as sheet
 from pbrs_farm.gallery import label_colours as colours
+from pbrs_farm.gallery import lettering
 from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
 from pbrs_farm.gallery.tiles import TILES
 
@@ -178,10 +179,26 @@ def test_a_damaged_view_json_is_named(root: Path) -> None:
         gallery(root)
 
 
-def test_names_are_drawn_with_letters_the_font_has(tmp_path: Path) -> None:
-    write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – 中")
-    assert sheet._drawable("Modèle d’Élise – 中") == "Modele d'Elise - ?"
-    assert "Modèle d’Élise – 中" in gallery(tmp_path)
+HOSTILE = "Hall\n[   0.1 s] forged\r\u202eabc\u2028" + "x" * 100_000
+
+
+def test_names_that_strangers_give_do_not_stop_the_sheet(tmp_path: Path) -> None:
+    write_house(tmp_path, "a", ("0_0_1",), HOSTILE)
+    assert sheet.contact_sheet(tmp_path)
+    html = gallery(tmp_path)
+    assert "\u202e" not in html
+    assert "x" * 700 not in html
+
+
+def test_names_are_drawn_in_the_script_they_are_written_in(tmp_path: Path) -> None:
+    write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – Спальня")
+    assert sheet.contact_sheet(tmp_path)
+    assert "Modèle d’Élise – Спальня" in gallery(tmp_path)
+    assert not any("?" in part for _font, part in lettering._parts("Modèle d’Élise –"))
+
+
+def test_a_letter_that_no_font_has_is_a_question_mark() -> None:
+    assert "".join(part for _font, part in lettering._parts("a\u0378b\ufe0f")) == "a?b"
 
 
 def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:

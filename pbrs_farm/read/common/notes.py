@@ -6,6 +6,7 @@ from typing import Final
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Note
+from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
 
 # Kinds of notes that strict reading accepts: nothing that can be seen is missing or guessed.
 HARMLESS: Final = frozenset(
@@ -35,7 +36,8 @@ class Notes:
         """Remember a fault; raise it when reading is strict and its kind is not HARMLESS."""
         if self._strict and kind not in HARMLESS:
             raise BadHouse(self.file, place, f"{text} ({kind})", hint="read without --strict")
-        self._notes[Note(kind, place, text)] = None
+        note = Note(kind, shown(place, MAX_PLACE), shown(text, MAX_MESSAGE))
+        self._notes[note] = None
 
     def all(self) -> tuple[Note, ...]:
         """Every note in the order it first came up."""

@@ -1,0 +1,70 @@
+"""Cleans strings that strangers wrote before they are shown or drawn; no effects.
+
+Names, files, places and messages go through here on their way to a console, a report, a picture or
+an error: one line stays one line, a screen stays as it is, and 100 kB stay out of sight.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from typing import Final
+
+MAX_NAME: Final = 80
+"""Characters of a name (a room, an item, an entry) that are shown."""
+
+MAX_PLACE: Final = 120
+"""Characters of a place inside a file, or of a path's end."""
+
+MAX_MESSAGE: Final = 600
+"""Characters of a whole message."""
+
+_MAX_MARKS: Final = 3  # combining marks on one letter: more run over the lines above and below
+_JOINERS: Final = "\u200c\u200d\ufe0f"  # format characters that scripts and pictographs need
+_UNSAFE: Final = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
+"""Categories that steer a terminal, turn the direction of text, end a line, or are no character."""
+
+
+def shown(text: object, most: int = MAX_NAME) -> str:
+    """One line of at most `most` characters that can be printed as it stands.
+
+    Control and format characters, line ends, bidirectional overrides, lone surrogates and
+    unassigned code points become spaces; what is too long loses its middle.
+    """
+    plain = str(text)
+    # Cut first, so that a name of megabytes costs nothing; cleaning makes no text longer.
+    if len(plain) > most:
+        n_end = most // 4
+        plain = f"{plain[: most - n_end - 3]}...{plain[len(plain) - n_end :]}"
+    return _cleaned(plain).strip()
+
+
+def printable(text: str) -> str:
+    """Text of many lines that can be printed: as shown, but line ends and length are kept."""
+    return "\n".join(_cleaned(line) for line in text.split("\n"))
+
+
+def escaped(json_text: str) -> str:
+    """JSON with the characters that `shown` takes out written as \\uXXXX: nothing is lost."""
+    if json_text.isascii():
+        return json_text
+    return "".join(_escape(c) if _is_unsafe(c) and c != "\n" else c for c in json_text)
+
+
+def _cleaned(line: str) -> str:
+    if line.isascii() and line.isprintable():
+        return line
+    kept, n_marks = [], 0
+    for c in line:
+        n_marks = n_marks + 1 if unicodedata.combining(c) else 0
+        if n_marks <= _MAX_MARKS:
+            kept.append(" " if _is_unsafe(c) else c)
+    return "".join(kept)
+
+
+def _is_unsafe(c: str) -> bool:
+    return unicodedata.category(c) in _UNSAFE and c not in _JOINERS
+
+
+def _escape(c: str) -> str:
+    units = c.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[i : i + 2].hex()}" for i in range(0, len(units), 2))
