@@ -35,6 +35,7 @@ def main() -> None:
         "houses.leak_max": max(r["n_sky"] for r in real),
         "houses.leak_rays": sum(r["n_rays"] for r in real),
         "houses.closed_share_min": min(r["closed_share"] for r in real),
+        "houses.walls_lost": sum(r["walls_lost"] for r in real),
     }
     units = {
         "houses.worst_s": "s, one core, read + repair + leak meter",
@@ -43,6 +44,7 @@ def main() -> None:
         "houses.leak_max": "rays that reach the sky, of the worst home",
         "houses.leak_rays": "rays over all homes",
         "houses.closed_share_min": "share of the floor area in closed rooms, of the worst home",
+        "houses.walls_lost": "walls of which repair took more than a tenth, all homes",
     }
     write_report("houses", figures, units)
 
@@ -93,6 +95,7 @@ def measure(name: str) -> dict[str, Any]:
         "n_sky": leaks.n_sky if leaks else -1,
         "n_rays": leaks.n_rays if leaks else 0,
         "closed_share": round(leaks.closed_share, 3) if leaks else 0.0,
+        "walls_lost": len(report.structure.walls_lost),
     }
 
 

@@ -68,7 +68,7 @@ def _repair(args: argparse.Namespace) -> int:
         store.put(name, section_svg(before, house, level.id).encode())
     echo(summary_of_report(report))
     echo(f"{args.out}: house.glb house.json repair.json {' '.join(cuts)}")
-    return 1 if report.is_leaking else 0
+    return 1 if report.is_leaking or report.structure.walls_lost else 0
 
 
 def _cameras(args: argparse.Namespace) -> int:

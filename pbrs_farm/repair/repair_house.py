@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from pbrs_farm.core.house import Enclosure, House, Room
+from pbrs_farm.core.house import Enclosure, House, Note, Room
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.cleaning import with_sound_faces, with_white_walls, without_persons_and_plants
 from pbrs_farm.repair.lamps.bulbs import with_bulbs
@@ -18,7 +18,7 @@ from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
 from pbrs_farm.repair.measure.leaks import leaks_of_house
 from pbrs_farm.repair.measure.occluder import Occluder
-from pbrs_farm.repair.report import RepairReport, RoomAudit
+from pbrs_farm.repair.report import RepairReport, RoomAudit, StructureReport
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.watertight import repaired_structure, with_structure
 
@@ -42,6 +42,7 @@ def repair(
     # Make walls, floors and ceilings watertight, with the openings cut.
     structure = repaired_structure(house, fields.wall_thickness_m)
     house, swallowed = with_structure(house, structure)
+    house = replace(house, notes=(*house.notes, *_lost(structure.report)))
 
     # Give every lamp a bulb, every dim lamp a translucent shade, rooms without one a lamp.
     house, sources = with_bulbs(house, fields)
@@ -72,6 +73,14 @@ def repair(
         furniture=furniture_audit(house),
     )
     return house, report
+
+
+def _lost(report: StructureReport) -> list[Note]:
+    # A wall that repair lost is told wherever the house's notes are.
+    return [
+        Note("wall-lost", w.item_id, f"repair left {w.after_m2:.1f} of {w.before_m2:.1f} m2 of it")
+        for w in report.walls_lost
+    ]
 
 
 def _with_enclosure(rooms: Sequence[Room], spaces: Sequence[Space]) -> tuple[Room, ...]:

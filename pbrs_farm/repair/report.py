@@ -28,6 +28,23 @@ class LeftAsIs(_Record):
     reason: str
 
 
+class SideArea(_Record):
+    """A wall seen from the side, openings cut apart, or a floor or ceiling seen from above."""
+
+    item_id: str
+    kind: str  # "wall", "floor", "ceiling", "ground"
+    before_m2: float  # as read, or as thickened
+    after_m2: float
+
+
+class WallLoss(_Record):
+    """A wall of which repair took more than a tenth: a fault of the repair."""
+
+    item_id: str
+    before_m2: float
+    after_m2: float
+
+
 class StructureReport(_Record):
     """What was done to walls, floors, ceilings and openings."""
 
@@ -42,6 +59,8 @@ class StructureReport(_Record):
     n_openings: int = 0
     n_openings_cut: int = 0  # the others touch no wall
     left_as_is: tuple[LeftAsIs, ...] = ()
+    areas: tuple[SideArea, ...] = ()  # of every wall, floor and ceiling
+    walls_lost: tuple[WallLoss, ...] = ()
 
 
 class FacesReport(_Record):

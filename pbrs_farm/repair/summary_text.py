@@ -53,6 +53,11 @@ def _structure(report: RepairReport) -> Iterator[str]:
         yield f"{_n(s.n_stairwells_closed, 'floor or ceiling', 'floors or ceilings')} carried on over stairwells without a room."  # fmt: skip
     if s.n_openings:
         yield f"{s.n_openings_cut} of {_n(s.n_openings, 'opening')} cut through the walls."
+    for wall in s.walls_lost:
+        yield (
+            f"WALL LOST: of wall {wall.item_id} repair left {wall.after_m2:.1f} of "
+            f"{wall.before_m2:.1f} m2."
+        )
     for thing in s.left_as_is:
         yield f"{thing.what} {thing.id} left as it is: {thing.reason}."
 

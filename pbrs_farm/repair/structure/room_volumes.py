@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -21,12 +21,10 @@ from pbrs_farm.repair.structure.booleans import (
 )
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
-from pbrs_farm.repair.structure.slabs import GAP_M, SAME_HEIGHT_M
-from pbrs_farm.repair.structure.walls import Wall
+from pbrs_farm.repair.structure.slabs import SAME_HEIGHT_M
 
 _MARGIN_M = 0.005  # volumes reach this far into what bounds them
 _TOUCH_M = 0.002  # solids that overlap less are left uncut
-_COINCIDE_M = 0.001  # walls nearer than this to a room lie in one plane with its own
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,34 +102,3 @@ def without_volumes(
         # Cut with the volume, its faces tagged as the solid's own.
         cutters += solid_prisms([volume.area], volume.low, volume.high, (tag,) * 3, table)
     return reduced(solid, cutters)
-
-
-def with_own_sides_visible(
-    walls: Sequence[Wall], rooms: Sequence[Room], table: TagTable
-) -> list[Wall]:
-    """The walls, those of other rooms drawn back behind each room's own where the two coincide.
-
-    Where every room brings walls of its own (SUNCG), two rooms' walls lie in one plane: each room
-    then sees its own side. Walls that belong to no room stay as they are.
-    """
-    # Do nothing where walls belong to no room.
-    if all(w.room_id is None for w in walls):
-        return list(walls)
-    areas = [(r, plan.polygon_of_room(r.polygon)) for r in rooms]
-    found = []
-    for wall in walls:
-        cutters = []
-        for room, area in areas:
-            apart = room.floor_y > wall.high_y or room.ceiling_y < wall.bottom_y
-            if (
-                wall.room_id in (None, room.id)
-                or apart
-                or wall.footprint.distance(area) > _COINCIDE_M
-            ):
-                continue
-            # Draw the wall back from the whole height of the other room.
-            low, high = level_plane(room.floor_y - GAP_M), level_plane(room.ceiling_y + GAP_M)
-            polygons = polygons_of(plan.grown(area, _COINCIDE_M))
-            cutters += solid_prisms(polygons, low, high, (wall.tag("hidden"),) * 3, table)
-        found.append(replace(wall, solid=reduced(wall.solid, cutters)))
-    return found

@@ -15,6 +15,7 @@ from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable, patches_from_solid, united
 from pbrs_farm.repair.structure.cut_openings import WallPart, cut_openings, thresholds
 from pbrs_farm.repair.structure.joints import joints_between_walls, joints_with_surface
+from pbrs_farm.repair.structure.own_sides import with_own_sides_visible
 from pbrs_farm.repair.structure.patches import surface_from_patch
 from pbrs_farm.repair.structure.planar_surfaces import (
     Cover,
@@ -23,12 +24,8 @@ from pbrs_farm.repair.structure.planar_surfaces import (
     floors_and_ceilings_from_house,
 )
 from pbrs_farm.repair.structure.reveals import with_metric_uv
-from pbrs_farm.repair.structure.room_volumes import (
-    RoomVolume,
-    volumes_of_rooms,
-    with_own_sides_visible,
-    without_volumes,
-)
+from pbrs_farm.repair.structure.room_volumes import RoomVolume, volumes_of_rooms, without_volumes
+from pbrs_farm.repair.structure.side_areas import lost_walls, side_areas
 from pbrs_farm.repair.structure.slabs import bridged, footprints_of_surfaces, slab, visible_areas
 from pbrs_farm.repair.structure.stairwells import stairwells_of_house
 from pbrs_farm.repair.structure.walls import Wall, walls_from_house
@@ -51,8 +48,7 @@ class Structure:
 def repaired_structure(house: House, thickness_m: float) -> Structure:
     """Thicken what is planar, join, cut, unite. Faces keep item, surface name, material and uv."""
     # Read walls, floors and ceilings; give stairwells without a room the covers they lack.
-    table = TagTable()
-    rooms = plan.union([plan.polygon_of_room(r.polygon) for r in house.rooms])
+    table, rooms = TagTable(), plan.union(plan.polygon_of_room(r.polygon) for r in house.rooms)
     uprights, left = walls_from_house(house, table, rooms, thickness_m)
     walls = [w for w in uprights if not w.is_board]
     horizontal = floors_and_ceilings_from_house(house, table)
@@ -71,15 +67,14 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     for surface, footprint in zip(planar, footprints, strict=True):
         joints += joints_with_surface(surface, footprint, walls, doors, thickness_m, table)
     parts = [WallPart(w, w.solid, is_joint=False) for w in wholes]
-    for w, solid in joints:
-        solid = without_volumes(solid, w.tag("joint"), None, volumes, table)
-        parts.append(WallPart(w, solid, is_joint=True))
+    parts += _parts_of_joints(joints, volumes, table)
 
     # Cut the openings, unite everything, and take the faces back by item.
     cut_parts, plugs, idle = cut_openings(house.openings, parts, table)
     solids = [*cut_parts, *slabs, *(s for found in horizontal.solid.values() for s in found)]
     surfaces = _surfaces(united(solids), table) if solids else {}
     touched = {w.item for w in uprights} | {s.item for s in planar} | set(horizontal.solid)
+    areas = side_areas(house, uprights, wholes, cut_parts[: len(wholes)], surfaces, table)
     report = _counts(walls, planar, set(horizontal.solid)).model_copy(
         update={
             "n_joints_closed": n_gaps,
@@ -87,15 +82,26 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
             "n_openings": len(house.openings),
             "n_openings_cut": len(plugs),
             "left_as_is": _left(house, {**left, **horizontal.left}, idle),
+            "areas": areas,
+            "walls_lost": lost_walls(areas),
         }
     )
+    standing = [w for w in wholes if not w.is_board]  # what is left of the walls closes rooms
     return Structure(
         {i: surfaces.get(i, ()) for i in sorted(touched)},
         plugs,
         report,
-        spaces_of_rooms(house.rooms, found.wells, walls, covers),
-        {r.id: interiors_of_room(r, uprights, planar) for r in lived},
+        spaces_of_rooms(house.rooms, found.wells, standing, covers),
+        {r.id: interiors_of_room(r, wholes, planar) for r in lived},
     )
+
+
+def _parts_of_joints(
+    joints: Sequence[tuple[Wall, Manifold]], volumes: Sequence[RoomVolume], table: TagTable
+) -> list[WallPart]:
+    # Keep joints out of every room.
+    kept = [(w, without_volumes(s, w.tag("joint"), None, volumes, table)) for w, s in joints]
+    return [WallPart(w, solid, is_joint=True) for w, solid in kept]
 
 
 def _counts(
