@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
@@ -64,6 +64,8 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
         kind = "example"
     elif path.is_dir() or path.name == "house.json":
         kind, word = "suncg", str(real_path(path.parent if path.name == "house.json" else path))
+    elif path.suffix.lower() == ".json" and path.is_file():
+        raise BadHouse(path, "", "is no house by itself", hint=_ROOT_HINT)
     else:
         kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
         word = str(real_path(path))
@@ -236,6 +238,8 @@ def _suncg(folder: Path, files: SourceFiles) -> SourceRef:
         raise BadHouse(
             folder, "", "holds no house.json and no home file", hint=_folder_hint(folder)
         )
+    if folder.parent.name != "house":
+        raise BadHouse(folder, "", "does not lie in a folder named house", hint=_ROOT_HINT)
     root = RootFolder(folder.parent.parent)
     return SourceRef(
         kind="suncg",
@@ -246,9 +250,17 @@ def _suncg(folder: Path, files: SourceFiles) -> SourceRef:
     )
 
 
+_ROOT_HINT: Final = (
+    "a SUNCG house is ROOT/house/ID/house.json beside ROOT/room/ID (v1) or ROOT/wall/ID (v2), "
+    "ROOT/object, ROOT/texture and ROOT/metadata; name ROOT/house/ID"
+)
+
+
 def _folder_hint(folder: Path) -> str:
     if (folder / "house").is_dir():
         return "SUNCG's root: name ROOT/house/ID, or ROOT and --houses LIST"
+    if list(folder.glob("*.json")):
+        return _ROOT_HINT
     return "a SUNCG house folder, or .sh3d, .glb files"
 
 

@@ -45,7 +45,7 @@ def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[Hou
         for s in item.surfaces:
             # Keep a colour that the source gives; baseboards and walls share one white material.
             material = materials[s.material]
-            if not material.is_default or material.diffuse == rgb:
+            if not material.is_default or (material.diffuse == rgb and material.texture_id is None):
                 surfaces.append(s)
                 continue
             if s.material not in white:

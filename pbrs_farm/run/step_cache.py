@@ -23,6 +23,7 @@ from pbrs_farm.read.source import SourceRef
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.sample.room_camera import with_names
 from pbrs_farm.store.interface import Store
 
 
@@ -122,9 +123,14 @@ def _extra(name: str, work: Work) -> object:
 
 
 def camera_file_text(fields: CameraFields) -> str:
-    """The user's camera file; BadInput if it cannot be read."""
+    """The user's camera file; of a published one, with its names; BadInput if it cannot be read."""
+    path = Path(fields.file)
+    names = path.with_name("room_camera_name.txt")
     try:
-        return read_regular(Path(fields.file), MAX_TEXT_BYTES).decode("utf-8")
+        text = read_regular(path, MAX_TEXT_BYTES).decode("utf-8")
+        if path.name != "room_camera.txt" or not names.exists():
+            return text
+        return with_names(text, read_regular(names, MAX_TEXT_BYTES).decode("utf-8"), str(names))
     except OSError as error:
         raise BadInput(fields.file or "cameras.file", "", fault_of(error)) from None
     except UnicodeDecodeError:

@@ -26,6 +26,7 @@ class GivenCamera(BaseModel):
     towards: Vector | None = None
     up: Vector = (0.0, 1.0, 0.0)
     world_from_camera: tuple[Row, Row, Row, Row] | None = None
+    room: str | None = None  # id of the room it belongs to; None = where it stands
     hfov_rad: Annotated[float, Field(gt=0, lt=3.1)] = PAPER_HFOV_RAD  # of the picture's width
 
     @model_validator(mode="after")
@@ -57,14 +58,19 @@ class GivenCamera(BaseModel):
 _CAMERAS: TypeAdapter[list[GivenCamera]] = TypeAdapter(list[GivenCamera])
 
 
-def cameras_from_file_text(text: str, file: str, width_px: int, height_px: int) -> list[Camera]:
-    """The cameras of a user's file, in order: a JSON list of GivenCamera, else room_camera.txt.
+def cameras_from_file_text(
+    text: str, file: str, width_px: int, height_px: int
+) -> list[tuple[Camera, str | None]]:
+    """(camera, id of its room if the file says it) of a user's file, in order.
+
+    The file is a JSON list of GivenCamera, else a room_camera.txt.
 
     Raises BadInput with the file and the place.
     """
     # Tell the two formats apart by their first character.
     if not text.lstrip().startswith("["):
-        return [line.camera for line in cameras_from_text(text, file, width_px, height_px)]
+        lines = cameras_from_text(text, file, width_px, height_px)
+        return [(line.camera, line.room_id) for line in lines]
     try:
         given = _CAMERAS.validate_json(text)
     except ValidationError as error:
@@ -72,4 +78,4 @@ def cameras_from_file_text(text: str, file: str, width_px: int, height_px: int) 
         first = error.errors()[0]
         place = "camera " + ".".join(str(part) for part in first["loc"])
         raise BadInput(file, place, first["msg"]) from None
-    return [camera.camera(width_px, height_px) for camera in given]
+    return [(camera.camera(width_px, height_px), camera.room) for camera in given]

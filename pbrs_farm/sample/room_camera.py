@@ -7,27 +7,33 @@ perpendicular again, as every published reader does.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
 
+_NAME: Final = re.compile(r"Room#(.+)_\d+")  # room id, sector
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomCamera:
-    """One line of room_camera.txt: a camera and its score."""
+    """One line of room_camera.txt: a camera, its score and the room that its name says."""
 
     camera: Camera
     score: float
+    room_id: str | None = None  # of Room#<room id>_<sector>
 
 
 def cameras_from_text(text: str, file: str, width_px: int, height_px: int) -> list[RoomCamera]:
     """The cameras of a room_camera.txt, in order, on a grid of that size.
 
-    A line is `vx vy vz tx ty tz ux uy uz xf yf value`; empty lines are passed over. Raises
-    BadInput (file and line) for other lines, numbers that are not finite, and impossible poses.
+    A line is `vx vy vz tx ty tz ux uy uz xf yf value`, and the camera's name where room_camera_name.txt
+    was joined to it; empty lines are passed over. Raises BadInput (file and line) for other lines,
+    numbers that are not finite, and impossible poses.
     """
     cameras = []
     for number, line in enumerate(text.splitlines(), 1):
@@ -36,8 +42,20 @@ def cameras_from_text(text: str, file: str, width_px: int, height_px: int) -> li
     return cameras
 
 
+def with_names(text: str, names: str, file: str) -> str:
+    """The lines of a room_camera.txt, each followed by its line of room_camera_name.txt."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    named = [line.strip() for line in names.splitlines() if line.strip()]
+    if len(lines) != len(named):
+        raise BadInput(file, "", f"{len(named)} names for {len(lines)} cameras")
+    return "".join(f"{line} {name}\n" for line, name in zip(lines, named, strict=True))
+
+
 def _camera(words: list[str], file: str, line: int, width_px: int, height_px: int) -> RoomCamera:
     place = f"line {line}"
+    # Take off the name that with_names put behind the numbers.
+    name = words.pop() if len(words) == 13 else ""
+    room = _NAME.fullmatch(name)
     try:
         numbers = [float(word) for word in words]
     except ValueError:
@@ -57,4 +75,4 @@ def _camera(words: list[str], file: str, line: int, width_px: int, height_px: in
         raise BadInput(file, place, "towards and up are parallel or zero")
     intrinsics = Intrinsics.from_hfov(width_px, height_px, 2 * half_angle)
     x, y, z = (float(u) for u in up)
-    return RoomCamera(Camera.look(intrinsics, eye, towards, (x, y, z)), score)
+    return RoomCamera(Camera.look(intrinsics, eye, towards, (x, y, z)), score, room and room[1])

@@ -40,17 +40,24 @@ def stored_views(
         intrinsics = Intrinsics.from_hfov(*size, stored.hfov_rad)
         towards = stored.towards / np.linalg.norm(stored.towards)
         up = (0.0, 0.0, 1.0) if abs(towards[1]) > 0.9999 else (0.0, 1.0, 0.0)
-        cameras.append(Camera.look(intrinsics, stored.eye, towards, up))
+        cameras.append((Camera.look(intrinsics, stored.eye, towards, up), None))
     if not house.cameras:
         notes.append("the source keeps no camera")
     return views_from_cameras(house, cameras, fields, counter, origin="stored"), tuple(notes)
 
 
 def views_from_cameras(
-    house: House, cameras: Sequence[Camera], fields: CameraFields, counter: Counter, *, origin: str
+    house: House,
+    cameras: Sequence[tuple[Camera, str | None]],
+    fields: CameraFields,
+    counter: Counter,
+    *,
+    origin: str,
 ) -> tuple[View, ...]:
-    """Each camera as a view of the room it stands in, scored like a sampled one.
+    """Each camera as a view of its room, scored like a sampled one.
 
+    cameras: each with the id of the room that its name says, a published one's for instance; where
+    that is None or unknown it is the room the camera stands in.
     Ids are `<room>_<sector>_<k>`, k counting the cameras of a room and sector; the room is "out"
     for a camera in none.
     """
@@ -58,8 +65,9 @@ def views_from_cameras(
     views: list[View] = []
     used: dict[tuple[str, int], int] = {}
     # Name each view by room, sector and a running number.
-    for camera in cameras:
-        room = room_of(house, camera)
+    known = {room.id: room for room in house.rooms}
+    for camera, room_id in cameras:
+        room = known.get(room_id or "") or room_of(house, camera)
         place = (OUTSIDE if room is None else room.id, sector_of(camera, fields.n_sectors))
         k = used[place] = used.get(place, -1) + 1
         views.append(View(keys.view_id(*place, k), *place, camera, origin))

@@ -39,7 +39,7 @@ def released_columns(house: House, room: Room) -> NDArray[np.intp]:
         if item.room_id == room.id
         and not item.kind.is_structure
         and item.kind is not ItemKind.STAIRS
-        and "box" not in item.tags
+        and not {"box", "structure"} & set(item.tags)
     ]
     return np.array(ids, np.intp)
 

@@ -1,6 +1,7 @@
 """Published camera files and a user's own: read and rejected."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from pbrs_farm.core.camera import PAPER_HFOV_RAD
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.sample import room_camera, sample_cameras
 from pbrs_farm.sample.camera_file import cameras_from_file_text
+from pbrs_farm.sample.stored_cameras import views_from_cameras
 from tests.builders import builtin_home
 from tests.sample.rooms import QUICK, counter_of
 
@@ -46,14 +48,15 @@ def test_a_line_that_is_no_camera_is_rejected_with_its_number(line: str, reason:
 
 def test_a_users_file_gives_cameras_by_look_or_by_matrix() -> None:
     text = """[
-      {"eye": [1, 1.5, 2], "towards": [0, 0, -1], "hfov_rad": 1.2},
+      {"eye": [1, 1.5, 2], "towards": [0, 0, -1], "hfov_rad": 1.2, "room": "0_1"},
       {"world_from_camera": [[1,0,0,1],[0,1,0,1.5],[0,0,1,2],[0,0,0,1]]}
     ]"""
-    look, matrix = cameras_from_file_text(text, "cams.json", 320, 240)
+    (look, room), (matrix, no_room) = cameras_from_file_text(text, "cams.json", 320, 240)
     np.testing.assert_allclose(look.world_from_camera, matrix.world_from_camera, atol=1e-12)
     hfov = 2 * math.atan(0.5 * 320 / matrix.intrinsics.fx)
     assert hfov == pytest.approx(PAPER_HFOV_RAD)
-    assert cameras_from_file_text(LINE, "room_camera.txt", 640, 480)[0].eye[0] == 1.5
+    assert cameras_from_file_text(LINE, "room_camera.txt", 640, 480)[0][0].eye[0] == 1.5
+    assert (room, no_room) == ("0_1", None)
 
 
 @pytest.mark.parametrize(
@@ -83,3 +86,25 @@ def test_stored_cameras_become_views_of_the_rooms_they_stand_in() -> None:
         np.testing.assert_allclose(view.camera.eye, stored.eye)
         assert view.score == sum(view.objects.values()) > 0
     assert len({v.id for v in sampling.views}) == 2
+
+
+def test_the_room_of_a_published_camera_is_the_one_its_name_says() -> None:
+    text = room_camera.with_names(f"{LINE}\n\n{LINE}\n", "Room#0_1_2\nRoom#9_9_0\n", "names")
+    given = cameras_from_file_text(text, "room_camera.txt", 640, 480)
+    assert [room for _, room in given] == ["0_1", "9_9"]
+    house = builtin_home()
+    x, _, z = house.rooms[0].polygon.mean(0)[[0, 0, 1]]
+    inside = replace(given[0][0], world_from_camera=moved(given[0][0].world_from_camera, x, z))
+    views = views_from_cameras(
+        house, [(inside, "0_1"), (inside, "9_9")], QUICK, counter_of(house), origin="file"
+    )
+    assert [v.room_id for v in views] == ["0_1", "0_0"]
+    with pytest.raises(BadInput, match="1 names for 2 cameras"):
+        room_camera.with_names(f"{LINE}\n{LINE}\n", "Room#0_1_2\n", "names")
+
+
+def moved(world_from_camera: np.ndarray, x: float, z: float) -> np.ndarray:
+    """The pose with its eye at x, z."""
+    pose = world_from_camera.copy()
+    pose[[0, 2], 3] = x, z
+    return pose

@@ -91,6 +91,7 @@ def test_only_objects_of_the_room_count_and_neither_stairs_nor_boxes() -> None:
         box((0, 0, 0), (1, 1, 1), ItemKind.STAIRS),
         replace(box((0, 0, 0), (1, 1, 1)), tags=("box",)),
         box((0, 0, 0), (1, 1, 1), ItemKind.WINDOW),
+        replace(box((0, 0, 0), (1, 1, 1)), tags=("structure",)),  # a column or partition
     ]
     house = room_house(things, 4, 3)
     assert released_columns(house, house.rooms[0]).tolist() == [1, 5]

@@ -203,7 +203,10 @@ def _elements_of(
 def _material(materials: ModelMaterials, e: Element, position: int) -> int:
     """The material at a position of the element, the first one where there are fewer."""
     override = e.overrides[min(position, len(e.overrides) - 1)] if e.overrides else None
-    material = materials.material(None, override, place=e.place, clear=MaterialKind.GLASS)
+    if e.kind == "Wall":
+        material = materials.wall_material(None, override, place=e.place)
+    else:
+        material = materials.material(None, override, place=e.place, clear=MaterialKind.GLASS)
     return materials.library.index(material)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import posixpath
+from dataclasses import replace
 from typing import Final
 
 from pbrs_farm.core.house import Material, MaterialKind
@@ -15,8 +16,8 @@ from pbrs_farm.read.suncg.house_json import Override
 MAX_TEXTURE_BYTES: Final = 64_000_000
 GREY: Final = (0.8, 0.8, 0.8)
 WHITE: Final = (1.0, 1.0, 1.0)
-DEFAULT_WALLS: Final = ("wallp_1_1", "wallp_1_2")
-"""Textures of walls that nobody painted; the published pictures show them white (docs/spec/suncg.md section 6)."""
+DEFAULT_WALLS: Final = ("wallp_0", "wallp_1_1", "wallp_1_2")
+"""Papers that the published pictures show white, whatever colour they have (docs/spec/suncg.md section 6)."""
 
 
 class ModelMaterials:
@@ -57,12 +58,22 @@ class ModelMaterials:
             alpha_cutout=bool(found and found.has_holes),
         )
 
-    def is_default_wall(self, mtl: ObjMaterial | None) -> bool:
-        """Whether nobody chose how this wall looks: no colour at all, or a default wall texture."""
-        if mtl is None:
-            return True
-        stem = posixpath.splitext(posixpath.basename(mtl.map_kd))[0]
-        return stem in DEFAULT_WALLS or (not mtl.map_kd and mtl.kd == GREY)
+    def wall_material(
+        self, mtl: ObjMaterial | None, override: Override | None, *, place: str
+    ) -> Material:
+        """A wall's material; one that nobody chose is white and marked as default.
+
+        That is no colour at all, or a default paper, whose colour the published pictures ignore.
+        """
+        material = self.material(mtl, override, place=place, clear=MaterialKind.GLASS)
+        picture = mtl.map_kd if mtl is not None else ""
+        is_unpainted = mtl is None or (not picture and mtl.kd == GREY)
+        if override is not None:
+            picture = override.texture or picture
+            is_unpainted &= override.texture is None and override.diffuse is None
+        if posixpath.splitext(posixpath.basename(picture))[0] in DEFAULT_WALLS:
+            return replace(material, diffuse=WHITE, texture_id=None, is_default=True)
+        return replace(material, is_default=is_unpainted)
 
     def _override_texture(self, name: str) -> str:
         png = f"texture/{name}.png"

@@ -22,6 +22,7 @@ from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.suncg.arch_json import Arch, arch_items
 from pbrs_farm.read.suncg.house_json import Node
 from pbrs_farm.read.suncg.metadata import OTHERPROP, LampMaterials, ModelClass, Tables
+from pbrs_farm.read.suncg.mirror_glass import MIRROR, as_mirror, mirror_slot
 from pbrs_farm.read.suncg.model_files import Model, Models
 from pbrs_farm.read.suncg.model_lights import lit, placed_light, separate_bulbs
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
@@ -70,7 +71,7 @@ def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item
     # Place the meshes; bulbs stay apart, so that lights can own them.
     lamp = _row(context.tables.lamps, variant, node.model_id) or LampMaterials((), ())
     world_from_model = context.world_from_house @ node.house_from_model
-    surfaces, bulbs = _surfaces(context, node, model, seen.kind, lamp)
+    surfaces, bulbs = _surfaces(context, node, model, seen, lamp)
     if not surfaces:
         context.notes.add(
             "empty-model", node.place, f"object/{node.model_id} has no area; left out"
@@ -121,18 +122,21 @@ def _object_model(context: ReaderContext, node: Node) -> tuple[str, Model] | Non
 
 
 def _surfaces(
-    context: ReaderContext, node: Node, model: Model, kind: ItemKind, lamp: LampMaterials
+    context: ReaderContext, node: Node, model: Model, seen: ModelClass, lamp: LampMaterials
 ) -> tuple[tuple[Surface, ...], list[int]]:
     """(surfaces in the model's order, the indices of those that are bulbs)."""
     world_from_model = context.world_from_house @ node.house_from_model
-    is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
+    is_opening = seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     surfaces: list[Surface] = []
     bulbs: list[int] = []
+    glass = mirror_slot(model) if seen.nyu40 == MIRROR else None
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         mtl = model.mtl[slot] if slot >= 0 else None
         override = node.overrides[slot] if 0 <= slot < len(node.overrides) else None
         material = context.materials.material(mtl, override, place=node.place, clear=clear)
+        if glass is not None and slot == glass:
+            material = as_mirror(material)
         # Materials that the lamp table names become bulbs and shades.
         is_bulb = slot in lamp.bulbs
         if is_bulb:
@@ -245,10 +249,9 @@ def room_surfaces(
 def _room_material(
     context: ReaderContext, node: Node, mtl: ObjMaterial | None, *, default_walls: bool
 ) -> Material:
-    material = context.materials.material(mtl, None, place=node.place, clear=MaterialKind.GLASS)
-    if default_walls and context.materials.is_default_wall(mtl):
-        material = replace(material, is_default=True)
-    return material
+    if default_walls:
+        return context.materials.wall_material(mtl, None, place=node.place)
+    return context.materials.material(mtl, None, place=node.place, clear=MaterialKind.GLASS)
 
 
 def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Item]:

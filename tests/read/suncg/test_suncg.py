@@ -263,13 +263,14 @@ def test_wall_texture_area_is_surface_area_in_metres(house: House) -> None:
         assert np.abs(a[0] * b[1] - a[1] * b[0]).sum() == pytest.approx(area, rel=1e-4)
 
 
-def test_default_walls_are_marked_and_painted_ones_are_not(house: House) -> None:
+def test_walls_with_a_default_paper_are_white_whatever_their_colour(house: House) -> None:
     inside = look(house, "0_0w2", "WallInside#0_0_2 in")
     outside = look(house, "0_0w2", "WallOutside#0_0_2 out")
     edge = look(house, "0_0w2", "WallInside#0_0_2 edge")
     assert inside.is_default
-    assert not outside.is_default
-    assert outside.diffuse == (0.902, 0.110, 0.322)
+    assert outside.is_default
+    assert outside.diffuse == (1, 1, 1)
+    assert outside.texture_id is None
     assert not edge.is_default
 
 

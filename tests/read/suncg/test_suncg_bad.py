@@ -16,6 +16,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.house_bundle import bundle_from_house
+from pbrs_farm.read.source import resolve
 from pbrs_farm.read.suncg.suncg_house import read_suncg
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import HOUSE
@@ -202,6 +203,19 @@ def test_a_house_without_any_room_is_refused(root: Path) -> None:
 def test_ids_that_are_no_names_are_refused(root: Path, house_id: str) -> None:
     with pytest.raises(BadHouse, match="no house id"):
         read_suncg(root, house_id, ReadFields())
+
+
+def test_a_house_outside_a_root_and_a_json_alone_are_told_what_a_root_looks_like(
+    root: Path, tmp_path: Path
+) -> None:
+    alone = tmp_path / "homes" / HOUSE
+    shutil.copytree(root / "house" / HOUSE, alone)
+    shutil.copy(alone / "house.json", tmp_path / "house_p.json")
+    (tmp_path / "only").mkdir()
+    shutil.copy(alone / "house.json", tmp_path / "only/house_p.json")
+    for word in (alone, alone / "house.json", tmp_path / "house_p.json", tmp_path / "only"):
+        with pytest.raises(BadHouse, match=r"ROOT/house/ID/house\.json beside ROOT/room"):
+            resolve(str(word))
 
 
 def test_a_house_that_is_not_there_is_refused(root: Path) -> None:
