@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -13,6 +13,14 @@ from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group
 from pbrs_farm.core.recipe import ToneFields
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
 from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
+
+_SATURATED: Final = 0.35  # (max - min) / max of an albedo from which it is a colour
+_SAME_HUE_COS: Final = 0.9  # of the angle between two chroma vectors
+_FILLED: Final = 0.5  # share of pixels from which one colour fills a view
+# Of a light, in natural logarithms of linear sRGB: green over the mean of red and blue, and red
+# over blue. Black bodies from 2,300 K on and clear skies lie within.
+_TINT: Final = (-0.1, 0.35)
+_WARMTH: Final = (-0.7, 1.6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +88,9 @@ def white_balance(radiance: RadianceImage, albedo: RadianceImage, strength: floa
 
     The illuminant is radiance over albedo, which is known here: the median of its logarithm over
     pixels that are neither dark nor overexposed. strength: 0 leaves the colour, 1 makes it
-    neutral. Ones when fewer than 16 pixels tell it.
+    neutral. Ones when fewer than 16 pixels tell it. Where one colour fills the view, the light that
+    its walls reflect at each other has that colour, and no camera would take it for a lamp's: the
+    illuminant is then clamped to colours that lamps and skies have.
     """
     # Take pixels between the 10th and the 90th percentile of luminance.
     level = radiance @ LUMINANCE
@@ -91,5 +101,30 @@ def white_balance(radiance: RadianceImage, albedo: RadianceImage, strength: floa
     usable &= (level >= low) & (level <= high)
     # Scale against the illuminant, at constant luminance.
     light = np.exp(np.median(np.log(radiance[usable] / albedo[usable]), axis=0))
+    if _one_colour_fills(albedo[usable]):
+        light = _as_a_lamp_or_sky(light)
     gains = (light / (light @ LUMINANCE)) ** -strength
     return np.asarray(gains / (gains @ LUMINANCE), np.float32)
+
+
+def _one_colour_fills(albedo: F32) -> bool:
+    """Whether most of (N, 3) albedos share one saturated hue."""
+    top = albedo.max(1)
+    chroma = albedo - albedo.mean(1, keepdims=True)
+    is_colour = top - albedo.min(1) > _SATURATED * top
+    hue = chroma / np.maximum(np.linalg.norm(chroma, axis=1, keepdims=True), 1e-9)
+    common = np.median(hue[is_colour], axis=0) if is_colour.any() else np.zeros(3)
+    length = float(np.linalg.norm(common))
+    is_common = is_colour & (hue @ common > _SAME_HUE_COS * length) & (length > 0)
+    return bool(is_common.mean() > _FILLED)
+
+
+def _as_a_lamp_or_sky(light: F32) -> F32:
+    """A light's colour with its tint and warmth clamped to what lamps and skies have."""
+    red, green, blue = np.log(light)
+    mean = (red + green + blue) / 3
+    tint = np.clip(green - (red + blue) / 2, *_TINT)
+    warmth = np.clip(red - blue, *_WARMTH)
+    others = mean - tint / 3  # mean of red and blue
+    logs = [others + warmth / 2, mean + 2 * tint / 3, others - warmth / 2]
+    return np.exp(np.array(logs, np.float32))
