@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.darkness import check_darkness
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
@@ -69,10 +70,10 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
             if constant:
                 tally.notes.append(f"{place} is one colour: {picture[0, 0].tolist()}")
     if view.has("radiance.exr"):
-        _check_radiance(view, tally)
+        _check_radiance(view, arrays["valid"], tally)
 
 
-def _check_radiance(view: StoredView, tally: Tally) -> None:
+def _check_radiance(view: StoredView, valid: NDArray[Any], tally: Tally) -> None:
     """Every group of light is there, finite and not negative."""
     try:
         channels = view.exr("radiance.exr")
@@ -92,6 +93,7 @@ def _check_radiance(view: StoredView, tally: Tally) -> None:
             what = f"{bad} pixels negative or not finite"
             tally.fail("radiance", f"{view.place} {name}", what, max(bad, 1))
     _check_lamps(view, channels, tally)
+    check_darkness(view, channels, valid, tally)
 
 
 def _check_lamps(view: StoredView, channels: dict[str, NDArray[Any]], tally: Tally) -> None:

@@ -147,6 +147,8 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
             "steps_done": summary.n_done, "steps_kept": summary.n_kept,
             "seconds": round(seconds, 1), "peak_mb": round(summary.peak_mb),
             "without_views": [list(pair) for pair in summary.without_views],
+            "left_out": [list(pair) for pair in summary.left_out],
+            "dark": [list(pair) for pair in summary.dark],
             "failures": [dict(zip(("what", "message", "command"), f, strict=True)) for f in summary.failures],
         }  # fmt: skip
         echo(json.dumps(row))
@@ -157,6 +159,10 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         f"{summary.n_kept} already there, {len(summary.failures)} failed; "
         f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
     )
+    for house, reason in summary.left_out:
+        warn(f"{house}: {reason}")
+    for view, reason in summary.dark:
+        warn(f"{view}: dark: {reason}")
     for house, reason in summary.without_views:
         warn(f"{house}: no view: {reason}")
     for what, message, command in summary.failures:

@@ -273,6 +273,9 @@ class SelectionFields(_Group):
     max_near: float = Field(0.30, ge=0, le=1, description="share nearer than near_m: inside it")
     min_objects: int = Field(3, ge=0, le=65_535, description="objects of object_fraction and more")
     max_noise: float = Field(1.0, ge=0, le=1e6, description="relative error of the raw light")
+    min_room_lx: float = Field(
+        0.0, ge=0, description="by all light on a room's floor; views of darker rooms are not made"
+    )
     max_missing_textures: int = Field(3, ge=0, le=1_000_000, description="of the house")
 
 
@@ -318,7 +321,10 @@ class Recipe(_Group):
         return keys.digest({g: fields[g] for g in ("seed", *groups)} if groups else fields)
 
 
-_CAME_LATER: Mapping[str, tuple[str, ...]] = {"repair": ("lamp_in_every_room",)}
+_CAME_LATER: Mapping[str, tuple[str, ...]] = {
+    "repair": ("lamp_in_every_room",),
+    "selection": ("min_room_lx",),
+}
 
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "preview": {
@@ -326,10 +332,12 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55},
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 16},
+        "selection": {"min_room_lx": 1.0},
     },
     "fast": {
         "repair": {"lamp_in_every_room": True},
         "cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55},
+        "selection": {"min_room_lx": 1.0},
     },
     "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},
     "released": {

@@ -21,6 +21,9 @@ def view_description(
 ) -> dict[str, Any]:
     """What view.json says. facts: step -> facts of its marker; "table" of `truth` stands at the top."""
     table = facts.get("truth", {}).get("table", {})
+    light = facts.get("light", {})
+    # The room's warnings, and what is dark of the picture and of the room.
+    warnings = list(dict.fromkeys([*light.get("warnings", []), *light.get("dark", [])]))
     return {
         "house": house_id,
         "view": view.id,
@@ -29,6 +32,7 @@ def view_description(
         "origin": view.origin,
         "score": view.score,
         **table,
+        "warnings": warnings,
         "recipe": recipe_digest,
         "modes": {step: said for step, said in facts.items() if step != "truth"},
         "versions": versions,

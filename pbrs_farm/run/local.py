@@ -59,6 +59,8 @@ class Summary:
     peak_mb: float = 0.0  # of the largest process
     failures: list[tuple[str, str, str]] = field(default_factory=list)  # what, message, command
     without_views: list[tuple[str, str]] = field(default_factory=list)  # house, why it has none
+    left_out: list[tuple[str, str]] = field(default_factory=list)  # house, which views and why
+    dark: list[tuple[str, str]] = field(default_factory=list)  # house/view, how dark it is
 
 
 def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
@@ -120,6 +122,7 @@ class _Schedule:
             Task(s.house_id, plan.house_steps(run.want, s.house_id), s) for s in sources
         )
         self._cameras: dict[str, dict[str, Any]] = {}  # house -> facts of its cameras step
+        self._floor_lux: dict[str, dict[str, Any]] = {}  # house -> room -> lx by group
         self._unlit: set[str] = set()  # houses whose illuminance failed: no light in their views
 
     def drive(self, pool: Pool) -> None:
@@ -154,6 +157,12 @@ class _Schedule:
                 summary.houses.append(event.house_id)
             if event.step == "cameras":
                 self._cameras[event.house_id] = event.facts
+            if event.step == "illuminance":
+                self._floor_lux[event.house_id] = event.facts.get("floor_lux", {})
+            if "dark" in event.facts:
+                summary.dark.append(
+                    (f"{event.house_id}/{event.view_id}", "; ".join(event.facts["dark"]))
+                )
         elif event.kind == "failed":
             what = "/".join(x for x in (event.house_id, event.view_id, event.step) if x)
             summary.failures.append((what, event.message, self._command(event)))
@@ -166,10 +175,16 @@ class _Schedule:
     def _add_views(self, house: str, facts: dict[str, Any]) -> None:
         want, source = self._run.want, self._sources[house]
         rows = [(str(v), str(room), float(score)) for v, room, score in facts["views"]]
+        # Leave out rooms that were measured dark, where the recipe chooses the views.
+        reason, lux = str(facts.get("why_none", "")), self._floor_lux.pop(house, {})
+        if plan.leaves_out_dark_rooms(self._run.recipe, want, house):
+            rows, lines = plan.lit_views(rows, lux, self._run.recipe.selection.min_room_lx)
+            self._summary.left_out += [(house, line) for line in lines]
+            reason = reason or "; ".join(lines)
         views = plan.spread(rows, want.n_views)
         self._summary.n_views += len(views)
         if not views:
-            self._summary.without_views.append((house, str(facts.get("why_none", ""))))
+            self._summary.without_views.append((house, reason))
         # What needs illuminance would fail for the reason that illuminance has told already.
         modes = tuple(m for m in want.modes if not (m.groups and house in self._unlit))
         steps = plan.view_steps(replace(want, modes=modes))

@@ -41,14 +41,14 @@ STEPS: Final = {
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
-        Step("illuminance", 2, ("sky", "emission", "materials"), ("house",), per_view=False),
+        Step("illuminance", 3, ("sky", "emission", "materials"), ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
         Step(
-            "light", 5, ("image", "light", "sky", "emission", "materials"), ("house", "cameras"),
+            "light", 6, ("image", "light", "sky", "emission", "materials"), ("house", "cameras"),
             needs=("illuminance",),
         ),
         Step("develop", 4, ("tone", "light"), ("light",), needs=("light",)),
-        Step("view", 1, ("histogram",), _VIEW_READS, needs=("truth",)),
+        Step("view", 2, ("histogram",), _VIEW_READS, needs=("truth",)),
     )
 }  # fmt: skip
 
@@ -123,6 +123,39 @@ def step_digest(
         dict(sorted(inputs.items())),
         extra,
     )
+
+
+def leaves_out_dark_rooms(recipe: Recipe, want: Wanted, house_id: str) -> bool:
+    """Whether a house's illuminance decides which of its views are made.
+
+    Where light is wanted and the recipe chooses the cameras: a user's own are made whatever they see.
+    """
+    is_chosen = recipe.cameras.source == "sampled" and recipe.selection.min_room_lx > 0
+    return is_chosen and "illuminance" in house_steps(want, house_id)
+
+
+def lit_views(
+    rows: Iterable[tuple[str, str, float]],
+    floor_lux: Mapping[str, Mapping[str, float]],
+    least_lx: float,
+) -> tuple[list[tuple[str, str, float]], list[str]]:
+    """The rows (view id, room id, score) of rooms that are bright enough; why others are left out.
+
+    floor_lux: room id -> lx by light group, of the step illuminance; rooms it lacks are kept.
+    """
+    kept: list[tuple[str, str, float]] = []
+    left_out: dict[str, int] = {}
+    for row in rows:
+        lux = floor_lux.get(row[1])
+        if lux is None or sum(lux.values()) >= least_lx:
+            kept.append(row)
+        else:
+            left_out[row[1]] = left_out.get(row[1], 0) + 1
+    return kept, [
+        f"room {room}: {n} view{'s' * (n != 1)} left out: {sum(floor_lux[room].values()):g} lx on"
+        f" the floor by all light, less than selection.min_room_lx = {least_lx:g}"
+        for room, n in left_out.items()
+    ]
 
 
 def spread(view_rooms: Iterable[tuple[str, str, float]], n_views: int) -> list[str]:

@@ -13,7 +13,7 @@ import sys
 import time
 import traceback
 from dataclasses import asdict
-from typing import Literal
+from typing import Any, Literal
 
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
@@ -80,7 +80,7 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
     else:
         kind: Literal["kept", "done"] = "kept" if outcome.was_done else "done"
         seconds = time.perf_counter() - started
-        facts = outcome.marker.facts if name in ("house", "cameras") else {}
+        facts = _told(name, outcome.marker.facts)
         event = Event(kind, work.house_id, work.view_id, name, seconds, "", facts, peak_mb())
         send(Message("event", body=asdict(event)))
         return True
@@ -89,6 +89,13 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
     failed = Event("failed", work.house_id, work.view_id, name, message=message)
     send(Message("event", body=asdict(failed)))
     return False
+
+
+def _told(step: str, facts: dict[str, Any]) -> dict[str, Any]:
+    """What of a marker's facts the run is told: all of a house's steps, the darkness of a view."""
+    if not plan.STEPS[step].per_view:
+        return facts
+    return {"dark": facts["dark"]} if facts.get("dark") else {}
 
 
 def limit_threads(step: str, n_threads: int) -> None:

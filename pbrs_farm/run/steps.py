@@ -257,6 +257,9 @@ def _facts_of_light(
     work: Work, cached: CachedHouse, view: View, result: LightResult
 ) -> dict[str, Any]:
     """What view.json says of a view's light."""
+    from pbrs_farm.transport.illuminance import darkness_of_room
+    from pbrs_farm.transport.light_result import darkness_of_picture
+
     facts = {
         **result.facts,
         "noise": result.noise,
@@ -272,10 +275,14 @@ def _facts_of_light(
         facts["lamps"] = named
     # Repeat the room's row of illuminance.json.
     room = room_of(cached.house, view)
+    dark = [darkness_of_picture(result)]
     if room is not None:
         lit = _marker_of_house(work, "illuminance").facts
         facts["floor_lux"] = lit["floor_lux"].get(room.id)
         facts["warnings"] = lit["warnings"].get(room.id, [])
+        dark += [darkness_of_room(room, facts["floor_lux"])] if facts["floor_lux"] else []
+    if any(dark):
+        facts["dark"] = [line for line in dark if line]
     if cached.light_scene.n_lamps == 0:
         facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
     return facts

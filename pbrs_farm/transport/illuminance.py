@@ -31,6 +31,8 @@ from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stre
 LAMPS_LX: Final = (30.0, 1000.0)  # expected mean illuminance of a floor by lamps (docs/spec/sky.md)
 DAYLIGHT_LX: Final = (20.0, 5000.0)  # and by daylight; a value outside is a warning
 
+DARK_LX: Final = 1.0  # a room with less by all light is dark: full moonlight is 0.3 lx
+
 _SPP: Final = 32
 _ABOVE_FLOOR_M: Final = 0.05  # above carpets
 _MAX_ATTEMPTS: Final = 200  # at points in a polygon that is thin in its box
@@ -74,7 +76,16 @@ def photometric_warnings(room: Room, lux: dict[str, float]) -> list[str]:
                 f"room {room.id}: {group} light gives {value:g} lx on the floor,"
                 f" expected {low:g} to {high:g}"
             )
-    return lines
+    dark = darkness_of_room(room, lux)
+    return [*lines, dark] if dark else lines
+
+
+def darkness_of_room(room: Room, lux: dict[str, float]) -> str:
+    """A line when all light together leaves the room's floor darker than DARK_LX, else ""."""
+    total = sum(lux.values())
+    if total >= DARK_LX:
+        return ""
+    return f"room {room.id}: {total:.2g} lx on the floor by all light, less than {DARK_LX:g}"
 
 
 def floor_points(room: Room, n: int, seed: int) -> F64:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, RadianceImage, UnitVectors
 from pbrs_farm.core.camera import Camera
-from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
 
 
@@ -44,6 +44,32 @@ class LightResult:
         for group in groups[1:]:
             total = total + self.group(group)
         return total
+
+
+BLACK_CD_M2 = 0.05  # what 1 lx makes of a surface that reflects a sixth
+_TILES = 8  # along each side of the picture
+
+
+def darkness_of_picture(result: LightResult) -> str:
+    """A line when the sum of all light leaves nine tenths of the picture black, else "".
+
+    Judges tiles by their mean, so that neither single fireflies nor noise decide.
+    """
+    level = (result.outdoor + result.indoor) @ LUMINANCE * np.float32(LM_PER_W)
+    is_hit = np.any(result.normal != 0, -1) | (level > 0)
+    tiles = [
+        float(tile[hit].mean())
+        for rows, row_hits in zip(
+            np.array_split(level, _TILES), np.array_split(is_hit, _TILES), strict=True
+        )
+        for tile, hit in zip(
+            np.array_split(rows, _TILES, 1), np.array_split(row_hits, _TILES, 1), strict=True
+        )
+        if hit.any()
+    ]
+    if not tiles or np.quantile(tiles, 0.9) >= BLACK_CD_M2:
+        return ""
+    return f"black: nine tenths of the picture have less than {BLACK_CD_M2:g} cd/m2 by all light"
 
 
 def relative_noise(half_a: NDArray[np.floating], half_b: NDArray[np.floating]) -> float:

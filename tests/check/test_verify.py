@@ -8,7 +8,7 @@ import pytest
 from pbrs_farm.check import verify
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.images import array_from_png, png_from_array
+from pbrs_farm.images import array_from_png, exr_from_layers, png_from_array
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.check.roots import SIZE, changed_pixel, make_root, sign
 
@@ -256,6 +256,32 @@ def test_a_black_picture_by_outdoor_light_is_noted_and_one_by_opengl_fails(root)
     assert certificate.counts["pictures"].failed == 1
     assert any("opengl_dl.png: is one colour" in f for f in certificate.failures)
     assert any("mlt_ol.png is one colour" in n for n in certificate.notes)
+
+
+def test_a_picture_that_all_light_leaves_black_fails_and_a_dark_room_is_noted(root):
+    house = house_of(root)
+    for name, level in (("v0", 0.0), ("v1", 0.01)):
+        view = house / f"views/{name}"
+        planes = {
+            f"{g}.{c}": np.full(SIZE[::-1], level, np.float32)
+            for g in ("outdoor", "indoor", "albedo")
+            for c in "RGB"
+        }
+        (view / "radiance.exr").write_bytes(exr_from_layers(planes))
+        table = json.loads((view / "view.json").read_text()) | {"room": "0_0"}
+        (view / "view.json").write_text(json.dumps(table))
+        (house / f"done/light.{name}.json").write_text(
+            json.dumps({"files": [f"views/{name}/radiance.exr"]})
+        )
+    rows = [{"room": "0_0", "outdoor_lx": 0.0, "indoor_lx": 0.4}]
+    (house / "illuminance.json").write_text(json.dumps({"rooms": rows}))
+    (house / "done/illuminance.json").write_text(json.dumps({"files": ["illuminance.json"]}))
+    sign(root, house)
+    certificate = verify(root, sample=10)
+    count = certificate.counts["black pictures"]
+    assert (count.checked, count.failed) == (2, 1)
+    assert any(f"black pictures: {house.name}/v0: all light" in f for f in certificate.failures)
+    assert any("v1 stands in room 0_0, which has 0.4 lx" in n for n in certificate.notes)
 
 
 def replaced(file: Path, change) -> None:  # type: ignore[no-untyped-def]

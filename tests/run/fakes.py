@@ -28,5 +28,10 @@ def _make(name: str, work: Work) -> StepOutput:
             raise BadHouse("some.sh3d", "wall w3", "is made of cheese")
         if word == "bug":
             raise ZeroDivisionError("a bug")
-    facts = {"views": [["0_0_0", "0_0", 2.0], ["0_0_1", "0_0", 1.0]]} if name == "cameras" else {}
+    if name == "illuminance" and word == "dark":
+        return StepOutput(
+            {f"{name}.txt": b""}, {"floor_lux": {"0_0": {"outdoor": 0.3, "indoor": 0.0}}}
+        )
+    facts: dict[str, object] = {"dark": ["black"]} if name == "light" and word == "black" else {}
+    facts |= {"views": [["0_0_0", "0_0", 2.0], ["0_0_1", "0_0", 1.0]]} if name == "cameras" else {}
     return StepOutput({f"{name}.txt": at.encode()}, facts)

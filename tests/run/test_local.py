@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from pbrs_farm.commands import making
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run import local
@@ -84,6 +86,38 @@ def test_illuminance_is_done_where_light_is_wanted(tmp_path: Path) -> None:
     assert "illuminance" not in markers(tmp_path)
     run(tmp_path, want=wanted(["mlt_ol"], []))
     assert "illuminance" in markers(tmp_path)
+
+
+def test_views_of_a_room_measured_dark_are_left_out_and_told(tmp_path: Path) -> None:
+    summary = run(tmp_path, "dark")
+    assert summary.n_views == 0
+    assert "truth.0_0_0" not in markers(tmp_path)
+    line = "room 0_0: 2 views left out: 0.3 lx on the floor by all light"
+    assert summary.left_out[0][1].startswith(line)
+    assert summary.without_views[0][1].startswith(line)
+
+
+@pytest.mark.parametrize("fields", [{"selection.min_room_lx": "0"}, {"cameras.source": "stored"}])
+def test_views_of_a_dark_room_are_made_where_the_recipe_or_the_user_asks_for_them(
+    tmp_path: Path, fields: dict[str, str]
+) -> None:
+    recipe = recipe_from_name("preview", fields).model_copy(update={"name": "dark"})
+    summary = run_local(Run(["builtin"], str(tmp_path), recipe))
+    assert (summary.n_views, summary.left_out) == (2, [])
+
+
+def test_a_view_that_came_out_black_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    summary = run(tmp_path, "black")
+    assert [(v.split("/")[1], why) for v, why in summary.dark] == [
+        ("0_0_0", "black"),
+        ("0_0_1", "black"),
+    ]
+    making._report(argparse.Namespace(json=False), summary, 1.0)
+    assert "0_0_1: dark: black" in capsys.readouterr().err
+    # A second run finds them done and tells it again.
+    assert len(run(tmp_path, "black").dark) == 2
 
 
 def test_a_bug_is_told_by_its_type_and_the_run_goes_on(tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ class HouseRunner:
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
         """What the markers' names say of a house: see workers.runner.Survey."""
         # Without its cameras nobody knows the views of the house.
-        if not done.issuperset(_HOUSE_STEPS):
+        if not done.issuperset(_steps_before_views(spec, house)):
             return Survey()
         batches = self._batches(spec, house)
         units: dict[str, str] = {}
@@ -96,7 +96,7 @@ class HouseRunner:
         fill_cache(self._store)
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
-            for step in _HOUSE_STEPS:
+            for step in _steps_before_views(spec, request.house):
                 self._step(request, spec, on_step, step, source=source)
         return Result(batches=self._batches(spec, request.house))
 
@@ -129,6 +129,11 @@ class HouseRunner:
         if marker is None:
             return ()
         rows = [(str(v), str(room), float(score)) for v, room, score in marker.facts["views"]]
+        # Leave out dark rooms where the recipe says so, as a run on one machine does.
+        if plan.leaves_out_dark_rooms(spec.recipe, want_of(spec), house):
+            lit = read_marker(self._store, keys.marker_key(house, "illuminance"))
+            lux = lit.facts.get("floor_lux", {}) if lit is not None else {}
+            rows, _left_out = plan.lit_views(rows, lux, spec.recipe.selection.min_room_lx)
         rooms = {view: room for view, room, _score in rows}
         chosen = plan.spread(rows, spec.n_views)
         placed = [(v, rooms[v]) for v in chosen]
@@ -189,6 +194,12 @@ class HouseRunner:
 def want_of(spec: JobSpec) -> Wanted:
     """Modes, layers and number of views of a job, as the plan takes them."""
     return wanted(spec.modes, spec.layers, spec.n_views)
+
+
+def _steps_before_views(spec: JobSpec, house: str) -> tuple[str, ...]:
+    """Steps of the stage geometry: with illuminance where it decides which views are made."""
+    is_measured = plan.leaves_out_dark_rooms(spec.recipe, want_of(spec), house)
+    return (*_HOUSE_STEPS, "illuminance") if is_measured else _HOUSE_STEPS
 
 
 def batch_stages(want: Wanted) -> tuple[str, ...]:
