@@ -24,7 +24,7 @@ def planar_parts(item: Item) -> tuple[Item, ...]:
     """
     if item.kind is not ItemKind.WALL or _is_closed(item.surfaces):
         return (item,)
-    plane_of_face = _planes(item.surfaces)
+    plane_of_face = plane_of_faces(item.surfaces)
     n = int(plane_of_face.max(initial=0)) + 1
     if not 1 < n <= MAX_PLANES:
         return (item,)
@@ -52,7 +52,7 @@ def _is_closed(surfaces: tuple[Surface, ...]) -> bool:
     return closed_edge_share(np.rint(_corners(surfaces) / _WELD_M)) == 1
 
 
-def _planes(surfaces: tuple[Surface, ...]) -> NDArray[np.int64]:
+def plane_of_faces(surfaces: tuple[Surface, ...]) -> NDArray[np.int64]:
     """(F,) number of the plane each face lies in, either side up, in order of first appearance."""
     p = _corners(surfaces)
     n = area_vectors(p)

@@ -19,12 +19,21 @@ from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of, nyu
 
 OTHERPROP: Final = 40
 _OTHERSTRUCTURE: Final = NYU40_NAMES.index("otherstructure")
+_WALL_WORDS: Final = "wall wallpaper wand waende tapete mur muro pared parete parede"
+_CEILING_WORDS: Final = "ceiling zimmerdecke decke plafond techo soffitto teto"
+_FLOOR_WORDS: Final = (
+    "floor flooring boden fussboden parquet parkett laminate laminat linoleum sol suelo pavimento"
+)
+# Word of a name -> kind, the words of walls first ("wall above the floor" is a wall).
 _STRUCTURE_WORDS: Final = {
-    "wall": ItemKind.WALL,
-    "floor": ItemKind.FLOOR,
-    "ceiling": ItemKind.CEILING,
-    "ground": ItemKind.GROUND,
-    "terrain": ItemKind.GROUND,
+    word: kind
+    for kind, words in (
+        (ItemKind.WALL, _WALL_WORDS),
+        (ItemKind.CEILING, _CEILING_WORDS),
+        (ItemKind.FLOOR, _FLOOR_WORDS),
+        (ItemKind.GROUND, "ground terrain"),
+    )
+    for word in words.split()
 }
 _KIND_OF_CLASS: Final[dict[str, ItemKind]] = {
     kind.value: kind for kind in ItemKind if kind.value in NYU40_NAMES and kind.value != "object"
@@ -82,7 +91,7 @@ def _row(row: Any, file: str, pattern: str) -> NodeClass:
 def class_of_node(name: str, extras: Any, mapping: Mapping) -> NodeClass | None:
     """extras' `nyu40` or `class` (and `kind`), else the mapping's row, else the name's words."""
     tagged = _tagged(extras) if isinstance(extras, dict) else None
-    return tagged or mapping.of(name) or _guessed(name)
+    return tagged or mapping.of(name) or class_of_node_name(name)
 
 
 _COLLECTIONS: Final = frozenset(
@@ -120,13 +129,14 @@ def _tagged(fields_json: dict[str, Any]) -> NodeClass | None:
     return NodeClass(nyu40, kind or named, is_tagged=True)
 
 
-def _guessed(name: str) -> NodeClass | None:
+def class_of_node_name(name: str) -> NodeClass | None:
+    """What the words of a node's or a material's name say, if anything."""
     piece = class_of_piece("", name)
     nyu40 = piece.nyu40
     if nyu40 is None or nyu40 == _OTHERSTRUCTURE:
-        for word in ("wall", "ceiling", "floor", "ground", "terrain"):
-            if word in words_of(name):
-                kind = _STRUCTURE_WORDS[word]
+        words = words_of(name)
+        for word, kind in _STRUCTURE_WORDS.items():
+            if word in words:
                 label = 2 if kind is ItemKind.GROUND else NYU40_NAMES.index(kind.value)
                 return NodeClass(label, kind, is_tagged=False)
     if nyu40 is None:

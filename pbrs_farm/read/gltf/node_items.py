@@ -34,6 +34,7 @@ from pbrs_farm.read.gltf.node_classes import (
 )
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.gltf.punctual_lights import assumed_light, emitted, punctual_light
+from pbrs_farm.read.gltf.structure_parts import UNMAPPED, centres_of, structure_parts
 from pbrs_farm.read.gltf.window_glass import PANE_OPACITY, glass_materials
 from pbrs_farm.read.mesh.obj import Mesh
 
@@ -58,6 +59,7 @@ def items_of_scene(
     known: dict[Any, list[tuple[int | None, Mesh]]] = {}
     taken: set[str] = set()
     n_faces = n_items = 0
+    found: list[tuple[_Thing, str, Item]] = []  # with the place that notes name
     for thing in _things(gltf, mapping):
         item = _item(gltf, thing, materials, notes, known, fields)
         if item is None:
@@ -67,17 +69,26 @@ def items_of_scene(
             text = f"stands farther than {fields.max_extent_m:g} m from the origin"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_extent_m")
         n_faces += item.n_faces
-        if n_faces > fields.max_triangles or n_items >= MAX_INSTANCES:
+        if n_faces > fields.max_triangles or len(found) >= MAX_INSTANCES:
             text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_triangles")
-        if "unmapped" in item.tags:
+        found.append((thing, place, item))
+    # Part what shows a room or says by its materials what it is; tags of the file or user hold.
+    centres = centres_of([item for _, _, item in found])
+    for thing, place, item in found:
+        parts = planar_parts(item) if thing.seen.is_tagged else structure_parts(item, centres)
+        if any(UNMAPPED in part.tags for part in parts):
             notes.add("unmapped-class", place, "names no class; it is otherprop")
-        for part in planar_parts(item):
+        if sum(part.n_faces for part in parts) < item.n_faces:
+            notes.add("outer-side", place, "the side around the room it shows is left out")
+        for part in parts:
             unique, k = part.id, 2
             while unique in taken:
                 unique, k = f"{part.id}.{k}", k + 1
             taken.add(unique)
             n_items += 1
+            if n_items > MAX_INSTANCES:
+                raise BadHouse(gltf.file, place, f"more than {MAX_INSTANCES} items")
             yield replace(part, id=unique)
 
 
@@ -195,7 +206,7 @@ def _finished(
     seen = thing.seen
     if lights and not surfaces:
         seen = replace(seen, kind=ItemKind.LAMP, nyu40=35)
-    tags = ["unmapped"] if seen is _UNMAPPED else []
+    tags = [UNMAPPED] if seen is _UNMAPPED else []
     if any(np.linalg.det(p.world_from_node[:3, :3]) < 0 for p in thing.parts):
         tags.append("mirrored")
     item_id, name = thing.extras.get("item"), thing.extras.get("name")

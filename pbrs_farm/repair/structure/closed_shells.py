@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import face_areas, unit_normals
+from pbrs_farm.core.mesh import face_areas, signed_volume, unit_normals
 from pbrs_farm.repair.structure.booleans import (
     F64,
     Patch,
@@ -24,6 +24,7 @@ from pbrs_farm.repair.structure.patches import patch_from_surface
 
 _FLAT_M = 1e-3  # how far corners may lie off the plane of a planar wall
 _WELD_M = 1e-5  # as booleans.py welds
+_THICKER_THAN_WALLS_M = 0.4  # what is thinner and looks inward is a wall wound the wrong way
 
 ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was made of
 
@@ -37,18 +38,29 @@ class FlatPatch:
 
 
 def shells_from_item(item: Item, index: int, table: TagTable) -> list[ClosedShell] | None:
-    """The item as closed solids, one per connected shell; None if any part of it is not closed."""
+    """The item as closed solids, one per connected shell; None if any part of it is none.
+
+    A part that is open is none, nor is one that shows a room from inside: it bounds no block.
+    """
     patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
     if not patches:
         return None
     shells = []
     for part in _split(patches, components(patches)):
-        solid = solid_from_patches(part, table)
+        solid = None if _shows_a_room(part) else solid_from_patches(part, table)
         # Give the whole item up for one open part: it would not be watertight.
         if solid is None:
             return None
         shells.append((solid, part))
     return shells
+
+
+def _shows_a_room(patches: Sequence[Patch]) -> bool:
+    # Twice the volume over the area is a plate's thickness: negative where faces look inward.
+    corners = np.concatenate([p.positions[p.faces] for p in patches])
+    area = float(face_areas(corners).sum())
+    volume = signed_volume(corners, corners.reshape(-1, 3).mean(0))
+    return 2 * volume < -_THICKER_THAN_WALLS_M * area
 
 
 def closed_shells(item: Item, table: TagTable) -> list[Manifold]:

@@ -1,0 +1,174 @@
+"""A mesh that shows a room from inside -> its walls, floors and ceilings as items; no effects.
+
+Modellers draw floor, walls and ceiling as one mesh whose faces look into the room. Taken for a
+solid it is a block that fills the room. Which way faces look is measured by the volume they bound
+about their centre: it is negative where they look inward, also where a doorway leaves them open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.core.mesh import (
+    area_vectors,
+    closed_edge_share,
+    face_areas,
+    signed_volume,
+    triangle_corners,
+)
+from pbrs_farm.read.common.placed_mesh import part_of
+from pbrs_farm.read.common.planar_walls import plane_of_faces
+
+_WELD_M: Final = 1e-4
+_LEAST_HEIGHT_M: Final = 1.8  # of a room
+_LEAST_SIDE_M, _LARGEST_SIDE_M = 0.6, 200.0  # of a room in plan; a larger box is a sky
+_LEAST_BOXY: Final = 0.7  # share of a room's area that is level or upright
+# Twice the volume over the area is the thickness of a plate: a wall has less, a room more.
+_THICKER_THAN_WALLS_M: Final = 0.3
+_THICKER_THAN_BLOCKS_M: Final = 0.5
+_LEVEL: Final = 0.7  # least |y| of the normal of a floor, a ceiling or a roof
+
+# NYU40 class of each kind.
+CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: 1, ItemKind.FLOOR: 2, ItemKind.CEILING: 22}
+
+
+def room_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]:
+    """The walls, floors and ceilings of a room that item shows from inside, a plane each.
+
+    others: (N, 3) centres of other items; a closed block around some of them whose faces look
+    outward is seen from inside, too, and is turned. What of the item is no room comes last; its
+    outer side, which hides the room from outside only, is left out. An item that is no room comes
+    back as it is.
+    """
+    corners = _corners(item.surfaces)
+    if not len(corners):
+        return (item,)
+    # Take the connected shells that look inward, else closed ones that look outward.
+    shell_of_face = _components(corners)
+    shells = [shell_of_face == k for k in range(int(shell_of_face.max()) + 1)]
+    facing = [_facing(corners[faces], others) for faces in shells]
+    sign = min((f for f in facing if f), default=0)
+    rooms = [faces for faces, f in zip(shells, facing, strict=True) if sign and f == sign]
+    # Take sheets that do not touch together.
+    if not rooms and (sign := _facing(corners, others)):
+        rooms = [np.ones(len(corners), np.bool_)]
+    if not rooms:
+        return (item,)
+    shown = np.any(rooms, axis=0)
+    rest = ~shown & ~_encloses(corners, shell_of_face, shown)
+    parts = _parts(_turned(item, shown) if sign > 0 else item, shown)
+    # Leave walls that stand around a room and are nothing else as they are.
+    if sign < 0 and {p.kind for p in parts} == {item.kind}:
+        return (item,)
+    kept = _picked(item, rest)
+    return (*parts, replace(item, surfaces=kept, lights=(), box=None)) if kept else parts
+
+
+def _corners(surfaces: Sequence[Surface]) -> NDArray[np.float64]:
+    found = [triangle_corners(s.positions, s.faces) for s in surfaces]
+    return np.concatenate([np.zeros((0, 3, 3)), *found])
+
+
+def _components(corners: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(F,) number of the connected mesh each face belongs to, corners at one place joined."""
+    keys = np.rint(corners.reshape(-1, 3) / _WELD_M)
+    _, place = np.unique(keys, axis=0, return_inverse=True)
+    faces = place.reshape(-1, 3)
+    rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    n = int(faces.max()) + 1
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
+    label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    return np.asarray(np.unique(label, return_inverse=True)[1], np.int64)
+
+
+def _facing(corners: NDArray[np.float64], others: NDArray[np.float64]) -> int:
+    """-1: the faces show a room from inside; 1: they would if they were turned; 0: no room."""
+    low, high = corners.min((0, 1)), corners.max((0, 1))
+    width = (high - low)[[0, 2]]
+    fits = high[1] - low[1] >= _LEAST_HEIGHT_M and width.min() >= _LEAST_SIDE_M
+    if not fits or width.max() > _LARGEST_SIDE_M:
+        return 0
+    # A room is made of level and upright faces.
+    areas = face_areas(corners)
+    up = np.abs(area_vectors(corners)[:, 1]) / np.maximum(2 * areas, 1e-12)
+    boxy = float(areas[(up > 0.98) | (up < 0.1)].sum() / max(areas.sum(), 1e-12))
+    if boxy < _LEAST_BOXY:
+        return 0
+    thickness_m = 2 * signed_volume(corners, (low + high) / 2) / float(areas.sum())
+    if thickness_m < -_THICKER_THAN_WALLS_M:
+        return -1
+    inside = ((others > low) & (others < high)).all(1)
+    is_closed = closed_edge_share(np.rint(corners / _WELD_M)) == 1
+    return int(thickness_m > _THICKER_THAN_BLOCKS_M and is_closed and bool(inside.any()))
+
+
+def _encloses(
+    corners: NDArray[np.float64], shell_of_face: NDArray[np.int64], shown: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(F,) faces of a shell whose box holds all that is shown: a hollow block's outer side."""
+    low, high = corners[shown].min((0, 1)), corners[shown].max((0, 1))
+    found = np.zeros(len(corners), np.bool_)
+    for shell in np.unique(shell_of_face[~shown]):
+        faces = shell_of_face == shell
+        here = corners[faces]
+        found |= faces & bool((here.min((0, 1)) < low).all() and (here.max((0, 1)) > high).all())
+    return found
+
+
+def _split(item: Item, chosen: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+    return np.split(chosen, np.cumsum([len(s.faces) for s in item.surfaces])[:-1])
+
+
+def _picked(item: Item, chosen: NDArray[np.bool_]) -> tuple[Surface, ...]:
+    """The item's surfaces with the chosen faces alone, empty ones left out."""
+    pairs = zip(item.surfaces, _split(item, chosen), strict=True)
+    return tuple(part_of(s, s.faces[own], s.name) for s, own in pairs if own.any())
+
+
+def _turned(item: Item, outward: NDArray[np.bool_]) -> Item:
+    """The item with some faces turned round; normals with those of surfaces turned as a whole."""
+    surfaces = []
+    for s, own in zip(item.surfaces, _split(item, outward), strict=True):
+        faces = np.where(own[:, None], s.faces[:, [0, 2, 1]], s.faces).astype(np.int32)
+        normals = None if own.any() and not own.all() else s.normals
+        if normals is not None and own.any():
+            normals = -normals
+        surfaces.append(replace(s, faces=faces, normals=normals))
+    return replace(item, surfaces=tuple(surfaces))
+
+
+def _parts(item: Item, shown: NDArray[np.bool_]) -> tuple[Item, ...]:
+    """An item per plane of the faces shown: what looks up is a floor, what looks down a ceiling."""
+    corners = _corners(item.surfaces)
+    plane = plane_of_faces(item.surfaces)
+    normal = area_vectors(corners)
+    found: list[Item] = []
+    for number in dict.fromkeys(plane[shown].tolist()):
+        faces = shown & (plane == number)
+        # Faces of one plane may look both ways; part them.
+        for sign in (1, -1):
+            leading = normal[:, int(np.abs(normal[faces].sum(0)).argmax())]
+            own = faces & (sign * leading > 0)
+            if not own.any():
+                continue
+            total = normal[own].sum(0)
+            up = float(total[1] / max(float(np.linalg.norm(total)), 1e-12))
+            kind = ItemKind.WALL
+            if abs(up) > _LEVEL:
+                kind = ItemKind.FLOOR if up > 0 else ItemKind.CEILING
+            found.append(
+                replace(
+                    item, id=f"{item.id}.{len(found)}", name=f"{item.name} {kind}".strip(),
+                    kind=kind, nyu40=CLASS_OF_STRUCTURE[kind], surfaces=_picked(item, own), lights=(),
+                    box=None, tags=tuple(t for t in item.tags if t != "unmapped"),
+                )
+            )  # fmt: skip
+    return (replace(found[0], lights=item.lights), *found[1:])

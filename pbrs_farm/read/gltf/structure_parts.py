@@ -1,0 +1,78 @@
+"""What one node shows of a room, parted into walls, floors and ceilings, or named by its materials.
+
+No effects. The name of a node often says nothing ("Mesh_12"); those of its materials then do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.read.common.planar_walls import planar_parts
+from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, room_parts
+from pbrs_farm.read.gltf.node_classes import class_of_node_name
+
+_STRUCTURE: Final[tuple[ItemKind, ...]] = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING)
+UNMAPPED: Final = "unmapped"
+"""Tag of an item of which nothing says what it is."""
+
+
+def centres_of(items: Sequence[Item]) -> NDArray[np.float64]:
+    """(N, 3) centres of items that are no part of a room."""
+    found = [i.bounds.mean(0) for i in items if i.n_faces and i.kind not in _STRUCTURE]
+    return np.array(found, np.float64).reshape(-1, 3)
+
+
+def structure_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]:
+    """The items that a node's item is, where it is a wall, floor or ceiling, or is not known.
+
+    others: centres_of all items. A room seen from inside is parted by how its faces look, what is
+    no room by the names of its materials; open walls are parted plane by plane.
+    """
+    is_unknown = UNMAPPED in item.tags
+    if item.kind not in _STRUCTURE and not is_unknown:
+        return (item,)
+    parts = room_parts(item, others)
+    if parts[0] is item and (is_unknown or item.kind is ItemKind.WALL):
+        parts = _by_materials(item)
+    return tuple(p for part in parts for p in planar_parts(part))
+
+
+def _by_materials(item: Item) -> tuple[Item, ...]:
+    kinds = [class_of_node_name(s.name) for s in item.surfaces]
+    # Part what is wall, floor and ceiling; surfaces that say nothing stay with the item.
+    groups: dict[ItemKind | None, list[Surface]] = {}
+    for surface, seen in zip(item.surfaces, kinds, strict=True):
+        kind = seen.kind if seen and seen.kind in _STRUCTURE else None
+        groups.setdefault(None if kind is item.kind else kind, []).append(surface)
+    if set(groups) == {None}:
+        return (_named(item, kinds),)
+    found = [replace(item, surfaces=tuple(groups.pop(None)))] if None in groups else []
+    for kind, surfaces in groups.items():
+        assert kind is not None
+        part = replace(
+            item, id=f"{item.id}.{kind}" if found else item.id, kind=kind,
+            nyu40=CLASS_OF_STRUCTURE[kind], surfaces=tuple(surfaces), box=None,
+            lights=() if found else item.lights, tags=_known(item),
+        )  # fmt: skip
+        found.append(part)
+    return tuple(found)
+
+
+def _named(item: Item, classes: Sequence[object]) -> Item:
+    # An unknown thing is what all of its materials say.
+    one = class_of_node_name(item.surfaces[0].name) if item.surfaces else None
+    if UNMAPPED not in item.tags or one is None or any(c != one for c in classes):
+        return item
+    if one.kind in (ItemKind.LAMP, ItemKind.PERSON, ItemKind.DOOR, ItemKind.WINDOW):
+        return item  # needs more than a class: light, a place in a wall
+    return replace(item, nyu40=one.nyu40, kind=one.kind, tags=_known(item))
+
+
+def _known(item: Item) -> tuple[str, ...]:
+    return tuple(t for t in item.tags if t != UNMAPPED)
