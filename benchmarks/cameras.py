@@ -13,10 +13,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
+from benchmarks import view_content
 from benchmarks.memory import peak_mb
 from benchmarks.report import write_report
 from pbrs_farm.assets import homes
@@ -65,6 +67,7 @@ def main() -> None:
     for name, row in rows.items():
         line = f"{row['seconds']:>7.1f}{row['candidates']:>12}{row['views']:>7}{row['peak_mb']:>9}"
         print(f"{name:<32}{line}")
+    content = _contents([home.name for home in homes.example_homes()])
     figures = {
         "cameras.candidates_per_s": round(per_s, 1),
         "cameras.vs_gl": round(per_s / gl_per_s, 1),
@@ -85,7 +88,22 @@ def main() -> None:
         "cameras.nine_homes_s": "s",
         "cameras.peak_mb": "MB",
     }
+    # The gates are on `photo`; the paper's own numbers stand beside them.
+    for preset, numbers in content.items():
+        prefix = "cameras." if preset == "photo" else f"cameras.{preset}_"
+        figures |= {prefix + name: value for name, value in numbers.items()}
+        units |= {prefix + name: view_content.UNITS[name] for name in numbers}
     write_report("cameras", figures, units)
+
+
+def _contents(names: list[str]) -> dict[str, dict[str, float]]:
+    """Preset -> what its views show over all homes."""
+    found: dict[str, dict[str, float]] = {}
+    for preset in view_content.PRESETS:
+        rows = [_in_a_process("--content", preset, "--home", name) for name in names]
+        found[preset] = view_content.content_figures(rows)
+        print(f"{preset}: {found[preset]}")
+    return found
 
 
 def _repaired(name: str) -> House:
@@ -168,14 +186,18 @@ def _home_in_a_process(name: str) -> dict[str, float]:
     """Sample a home in a fresh process that has no compiled kernel yet."""
     with tempfile.TemporaryDirectory() as empty:
         environment = os.environ | {"HOME": empty, "PBRS_CACHE": str(cache_folder())}
-        done = subprocess.run(
-            [sys.executable, "-m", "benchmarks.cameras", "--home", name],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    row: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+        return _in_a_process("--home", name, env=environment)
+
+
+def _in_a_process(*words: str, env: Mapping[str, str] | None = None) -> dict[str, Any]:
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.cameras", *words],
+        env=env,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return row
 
 
@@ -192,8 +214,11 @@ def _sample_home(name: str) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--home", default="")
-    given = parser.parse_args().home
-    if given:
-        _sample_home(given)
+    parser.add_argument("--content", default="", help="preset whose views of the home are told")
+    given = parser.parse_args()
+    if given.content:
+        print(json.dumps(view_content.measured_home(_repaired(given.home), given.content)))
+    elif given.home:
+        _sample_home(given.home)
     else:
         main()

@@ -86,9 +86,15 @@ def _cameras(args: argparse.Namespace) -> int:
 
     recipe = recipe_of(args)
     house, _report = repaired_house(resolve(args.home), recipe)
-    counter = Caster(geometry_from_house(house)).item_counts
+    caster = Caster(geometry_from_house(house))
     doing(args.home, "cameras")
-    sampling = sample_cameras(house, recipe.cameras, camera_seed(house.id, recipe), counter)
+    sampling = sample_cameras(
+        house,
+        recipe.cameras,
+        camera_seed(house.id, recipe),
+        caster.item_counts,
+        caster.depth_pictures,
+    )
     document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))
     if args.out is not None:
         FolderStore(args.out.parent).put(args.out.name, json_bytes(document))

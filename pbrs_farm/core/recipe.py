@@ -8,278 +8,50 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.recipe_fields import (
+    CameraFields,
+    EmissionFields,
+    FieldGroup,
+    HistogramFields,
+    ImageFields,
+    LightFields,
+    MaterialFields,
+    RasterFields,
+    ReadFields,
+    RepairFields,
+    SelectionFields,
+    SkyFields,
+    ToneFields,
+)
 
-MAX_SAMPLES: Final = 2**20
-"""Of samples, mutations and chains: far above what anyone waits for, far below what never ends."""
-
-MAX_PIXELS: Final = 2**27
-"""Of a picture."""
-
-Share = Annotated[float, Field(ge=0, le=1)]
-
-
-class _Group(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class ReadFields(_Group):
-    """Limits of what is read."""
-
-    max_triangles: int = Field(
-        5_000_000, gt=0, le=50_000_000, description="of a house; more is refused"
-    )
-    max_model_triangles: int = Field(
-        2_000_000, gt=0, le=50_000_000, description="of one model; more is refused"
-    )
-    max_extent_m: float = Field(
-        1_000.0, gt=0, le=100_000.0, description="a piece farther out is refused"
-    )
-    hidden_levels: bool = Field(False, description="Sweet Home 3D: read levels not shown, too")
-    strict: bool = Field(
-        False, description="notes of a source are errors but the harmless kinds, docs/houses.md"
-    )
-
-
-class RepairFields(_Group):
-    """Geometry repair (paper section 3, "Data")."""
-
-    wall_thickness_m: float = Field(
-        0.10, gt=0, le=5, description="of planar walls, paper section 3"
-    )
-    default_wall_rgb: tuple[Share, Share, Share] = Field(
-        (1.0, 1.0, 1.0), description="sRGB of walls without a colour, paper section 3"
-    )
-    remove_persons: bool = True
-    remove_plants: bool = True
-    fallback_light: bool = Field(True, description="a ceiling light where nothing lights a room")
-    lamp_in_every_room: bool = Field(
-        False, description="a ceiling light in each room where people live that has no lamp"
-    )
-    shade_transmission: float = Field(0.4, ge=0, le=1, description="diffuse, of enclosing shades")
-    min_escape: float = Field(0.2, ge=0, le=1, description="share of light below which a shade is")
-    bulb_radius_m: float = Field(0.0325, gt=0, le=1, description="where the source gives none")
+__all__ = [
+    "RECIPE_NAMES",
+    "CameraFields",
+    "EmissionFields",
+    "HistogramFields",
+    "ImageFields",
+    "LightFields",
+    "MaterialFields",
+    "RasterFields",
+    "ReadFields",
+    "Recipe",
+    "RepairFields",
+    "SelectionFields",
+    "SkyFields",
+    "ToneFields",
+    "differences",
+    "recipe_from_json",
+    "recipe_from_name",
+]
 
 
-class CameraFields(_Group):
-    """Camera sampling (paper section 3.1)."""
-
-    preset: Literal["paper", "released"] = "paper"
-    n_sectors: int = Field(6, ge=1, le=360, description="per room, 60 degrees each")
-    cell_m: float = Field(0.25, ge=0.02, le=100, description="edge of the viewpoint grid")
-    height_min_m: float = Field(1.5, gt=0, le=100, description="eye above the floor's surface")
-    height_max_m: float = Field(1.6, gt=0, le=100)
-    tilt_deg: float = Field(11.0, gt=-90, lt=90, description="downwards")
-    tilt_sd_deg: float = Field(
-        0.0,
-        ge=0,
-        le=30,
-        description="of a normal spread about tilt_deg; 0 = fixed, as in the paper",
-    )
-    clearance_m: float = Field(
-        0.10, ge=0, le=10, description="from any obstacle, in three dimensions"
-    )
-    min_objects: int = Field(3, ge=0, le=65_535)
-    min_object_fraction: float = Field(0.01, ge=0, le=1, description="of the picture, per object")
-    max_item_fraction: float = Field(
-        1.0, gt=0, le=1, description="of the picture, of any one object; 1 = off, as in the paper"
-    )
-    max_wall_fraction: float = Field(
-        1.0, gt=0, le=1, description="the same of a wall, floor or ceiling; 1 = off"
-    )
-    hfov_rad: float = Field(2 * 0.5534, gt=0, lt=3.1, description="full horizontal field of view")
-    score_width_px: int = Field(640, gt=0, le=4096)
-    score_height_px: int = Field(480, gt=0, le=4096)
-    coarse_width_px: int = Field(160, gt=0, le=4096)
-    coarse_height_px: int = Field(120, gt=0, le=4096)
-    per_sector: int = Field(1, ge=1, le=1000)
-    source: Literal["sampled", "stored", "file"] = "sampled"
-    file: str = Field("", description="camera file of the user's, for source file")
-    exact: bool = Field(False, description="score every candidate at full size")
-
-
-class ImageFields(_Group):
-    """Size and modes of the pictures."""
-
-    width_px: int = Field(640, gt=0, le=16384)
-    height_px: int = Field(480, gt=0, le=16384)
-
-    @model_validator(mode="after")
-    def _fits_memory(self) -> Self:
-        if self.width_px * self.height_px > MAX_PIXELS:
-            raise ValueError(f"{self.width_px}x{self.height_px} has more than {MAX_PIXELS} pixels")
-        return self
-
-
-class LightFields(_Group):
-    """Light transport (paper section 3.2)."""
-
-    integrator: Literal["path", "metropolis"] = "path"
-    spp: int = Field(64, ge=1, le=MAX_SAMPLES, description="samples per pixel of `path`")
-    direct_spp: int = Field(
-        512, ge=0, le=MAX_SAMPLES, description="direct samples beside Metropolis"
-    )
-    mutations_per_pixel: int = Field(1024, ge=1, le=MAX_SAMPLES)
-    max_depth: int = Field(
-        12, ge=1, le=1024, description="path segments; Russian roulette from rr_depth"
-    )
-    rr_depth: int = Field(
-        1, ge=1, le=1024, description="docs/light.md: measured the best of 1 to 6"
-    )
-    filter: Literal["box", "tent"] = Field("tent", description="of a pixel's samples")
-    pilot_spp: int = Field(
-        4, ge=0, le=4096, description="32x24 pixels per emitter; 0 = uniform choice"
-    )
-    noise: float = Field(
-        0.0,
-        ge=0,
-        le=100,
-        description="relative error that `path` goes on to, in passes of spp; 0 = one pass",
-    )
-    max_spp: int = Field(
-        4096, ge=1, le=MAX_SAMPLES, description="of `path` when it renders to a noise or a time"
-    )
-    time_budget_s: float = Field(
-        0.0,
-        ge=0,
-        le=604_800,
-        description="of a view's light, instead of samples or mutations; 0 = off",
-    )
-    groups: Literal["two", "lamps"] = Field(
-        "two", description="outdoor and indoor; `lamps`: a layer for each lamp, too (`path`)"
-    )
-    chains: int = Field(
-        32768, ge=16, le=MAX_SAMPLES, description="Markov chains of `metropolis`, in parallel"
-    )
-    large_step: float = Field(0.3, gt=0, lt=1, description="chance of a fresh path, Kelemen 2002")
-    tail_pixels: int = Field(
-        1024,
-        ge=0,
-        le=MAX_SAMPLES,
-        description="pixels that a Metropolis path's tail is shown to; 0 = its own alone",
-    )
-    denoise: bool = True
-
-    @model_validator(mode="after")
-    def _noise_is_of_path(self) -> Self:
-        if self.noise > 0 and self.integrator == "metropolis":
-            raise ValueError("noise is reached by `path` alone: give metropolis a time_budget_s")
-        return self
-
-    @model_validator(mode="after")
-    def _lamps_are_of_path(self) -> Self:
-        if self.groups == "lamps" and self.integrator == "metropolis":
-            raise ValueError("groups lamps is of `path` alone: add --set light.integrator=path")
-        return self
-
-
-class SkyFields(_Group):
-    """Outdoor light (docs/spec/sky.md)."""
-
-    kind: Literal["sunsky", "panorama"] = "sunsky"
-    panoramas: str = Field(
-        "", description="folder of latitude-longitude HDR pictures; empty = `pbrs-farm skies`"
-    )
-
-
-class EmissionFields(_Group):
-    """How strong lights are."""
-
-    preset: Literal["photometric", "released"] = "photometric"
-    sky_lx: float = Field(10_000.0, gt=0, le=1e7, description="sky without sun on open ground")
-    sun_lx: float = Field(60_000.0, ge=0, le=1e7, description="the sun's share, at most")
-    lamp_lm: float = Field(1_600.0, gt=0, le=1e7, description="a Sweet Home 3D lamp of power 0.5")
-    lm_per_watt: float = Field(13.0, gt=0, le=1e4, description="SUNCG's watts")
-    compensate_shades: bool = Field(True, description="flux is what leaves the lamp, shade and all")
-    lamp_kelvin_min: float = Field(2700.0, ge=500, le=40_000)
-    lamp_kelvin_max: float = Field(3000.0, ge=500, le=40_000)
-    released_bulb: float = Field(400.0, ge=0, le=1e7)
-    released_shade: float = Field(0.5, ge=0, le=1e7)
-    released_sky: float = Field(75.0, ge=0, le=1e7)
-
-
-class MaterialFields(_Group):
-    """Materials (paper section 3.2; presets in docs/spec/suncg.md section 6)."""
-
-    preset: Literal["physical", "released"] = "physical"
-
-
-class ToneFields(_Group):
-    """Radiance to 8 bits."""
-
-    preset: Literal["photo", "released"] = "photo"
-    key: float = Field(0.18, gt=0, le=1000)
-    white_balance: float = Field(
-        0.7,
-        ge=0,
-        le=1,
-        description="how far the light's colour is turned to white; 1 = all the way",
-    )
-
-
-class RasterFields(_Group):
-    """The OpenGL modes."""
-
-    samples: int = Field(4, ge=1, le=64, description="per pixel, resolved")
-    lights_per_object: int = Field(8, ge=1, le=256, description="best ones, paper section 3.2")
-
-
-class HistogramFields(_Group):
-    """The histograms of a view and its quality numbers, written beside it (paper section 3.3).
-
-    Bins are powers of two, so that every coarser binning is an exact sum of these.
-    """
-
-    colour_space: Literal["rgb", "ycbcr"] = Field("rgb", description="sRGB-encoded; joint bins")
-    colour_bins: Literal[2, 4, 8, 16] = Field(8, description="per channel, three channels jointly")
-    depth_bins: Literal[8, 16, 32, 64, 128, 256] = 128
-    depth_min_m: float = Field(0.0, ge=0, le=1e6, description="nearer counts as the first bin")
-    depth_max_m: float = Field(10.0, gt=0, le=1e6, description="farther counts as the last bin")
-    near_m: float = Field(
-        0.25, gt=0, le=1e6, description="what is nearer counts as touching the camera"
-    )
-    object_fraction: float = Field(0.01, ge=0, le=1, description="of the picture, to be an object")
-
-    @model_validator(mode="after")
-    def _depth_grows(self) -> Self:
-        if self.depth_max_m <= self.depth_min_m:
-            raise ValueError("depth_max_m must be above depth_min_m")
-        return self
-
-
-class SelectionFields(_Group):
-    """Image selection (paper section 3.3) and the thresholds of image quality."""
-
-    min_colour: float = Field(0.70, ge=0, le=1, description="kept when above, paper section 3.3")
-    min_depth: float = Field(0.70, ge=0, le=1, description="kept when above, paper section 3.3")
-    score_mode: Literal["mlt_il_ol", "mlt_ol", "opengl_il", "opengl_dl"] = Field(
-        "mlt_il_ol", description="scored where a view lacks mlt_il_ol"
-    )
-    per_room_cap: int = Field(
-        0, ge=0, le=1_000_000_000, description="best views kept per room; 0 = all"
-    )
-    balance: Literal["none", "classes"] = Field(
-        "none", description="take of the kept views those that balance the classes"
-    )
-    balance_share: float = Field(0.5, gt=0, le=1, description="share of the kept views taken")
-    min_brightness: float = Field(0.06, ge=0, le=1, description="median sRGB luma; too dark below")
-    max_blown: float = Field(0.50, ge=0, le=1, description="share of saturated pixels")
-    max_surface: float = Field(0.85, ge=0, le=1, description="share of the largest instance")
-    max_near: float = Field(0.30, ge=0, le=1, description="share nearer than near_m: inside it")
-    min_objects: int = Field(3, ge=0, le=65_535, description="objects of object_fraction and more")
-    max_noise: float = Field(1.0, ge=0, le=1e6, description="relative error of the raw light")
-    min_room_lx: float = Field(
-        0.0, ge=0, description="by all light on a room's floor; views of darker rooms are not made"
-    )
-    max_missing_textures: int = Field(3, ge=0, le=1_000_000, description="of the house")
-
-
-class Recipe(_Group):
+class Recipe(FieldGroup):
     """The full set of fields one output root is made with."""
 
     name: str = "fast"
@@ -322,21 +94,40 @@ class Recipe(_Group):
 
 
 _CAME_LATER: Mapping[str, tuple[str, ...]] = {
+    "cameras": ("max_opening_fraction", "min_score", "min_room_score", "hfov_spread"),
     "repair": ("lamp_in_every_room",),
     "selection": ("min_room_lx",),
 }
 
+_PHOTO: Mapping[str, Any] = {
+    "preset": "photo",
+    "height_min_m": 1.2,
+    "height_max_m": 1.65,
+    "tilt_deg": 8.0,
+    "tilt_sd_deg": 6.0,
+    "clearance_m": 0.15,
+    "min_objects": 0,
+    "max_item_fraction": 0.5,
+    "max_wall_fraction": 0.7,
+    "max_opening_fraction": 0.35,
+    "min_score": 0.6,
+    "min_room_score": 0.2,
+    "hfov_rad": 1.0472,
+    "hfov_spread": 0.1,
+}
+"""Cameras as people hold them, after NYUv2: docs/cameras.md has the measured numbers."""
+
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "preview": {
         "repair": {"lamp_in_every_room": True},
-        "cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55},
+        "cameras": _PHOTO,
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 16},
         "selection": {"min_room_lx": 1.0},
     },
     "fast": {
         "repair": {"lamp_in_every_room": True},
-        "cameras": {"max_item_fraction": 0.35, "max_wall_fraction": 0.55},
+        "cameras": _PHOTO,
         "selection": {"min_room_lx": 1.0},
     },
     "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},

@@ -118,7 +118,8 @@ def _cameras(work: Work) -> StepOutput:
     if fields.source == "file":
         return _file_cameras(cached, fields)
     # Sampled views and stored ones: the sampler's fields say which. Say why where there are none.
-    views, report = cameras(house, fields, seed=seed, counter=cached.caster.item_counts)
+    caster = cached.caster
+    views, report = cameras(house, fields, seed, caster.item_counts, caster.depth_pictures)
     made = _camera_output(views, report.model_dump(mode="json"))
     return made if views else StepOutput(made.files, {**made.facts, "why_none": why_none(report)})
 

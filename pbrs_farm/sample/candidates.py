@@ -24,13 +24,19 @@ class Candidates:
     towards: NDArray[np.float64]  # (N, 3) unit
     sector: NDArray[np.int32]  # (N,)
     cell: NDArray[np.int32]  # (N, 2) column along x, row along z
+    zoom: NDArray[np.float64]  # (N,) times the focal length
 
     def __len__(self) -> int:
         return len(self.sector)
 
     def cameras(self, which: NDArray[np.intp], intrinsics: Intrinsics) -> list[Camera]:
-        """The candidates numbered by which (M,), as cameras."""
-        return cameras_looking(intrinsics, self.eye[which], self.towards[which])
+        """The candidates numbered by which (M,), as cameras; intrinsics: those of zoom 1."""
+        plain = cameras_looking(intrinsics, self.eye[which], self.towards[which])
+        lenses = {zoom: intrinsics.zoomed(zoom) for zoom in set(self.zoom[which].tolist())}
+        zooms = self.zoom[which].tolist()
+        return [
+            Camera(lenses[zoom], c.world_from_camera) for zoom, c in zip(zooms, plain, strict=True)
+        ]
 
 
 def cameras_looking(
@@ -66,22 +72,25 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
 
     Position uniform in the cell, azimuth uniform in the sector (measured from +x towards +z),
     height uniform between the fields' bounds above the grid's base, a fixed tilt downwards (or a
-    normal one about it, held to two standard deviations, when tilt_sd_deg is above 0).
+    normal one about it, held to two standard deviations, when tilt_sd_deg is above 0). The focal
+    length takes one of five values within hfov_spread of the fields'.
     names: what the randomness is hashed from besides sector and cell.
     """
     n_x, n_z = n_cells(grid, fields.cell_m)
     row, column = np.divmod(np.arange(n_x * n_z, dtype=np.int64), n_x)
     cell = np.stack([column, row], axis=1).astype(np.int32)
     step = 2 * np.pi / fields.n_sectors
-    eyes, directions = [], []
+    eyes, directions, zooms = [], [], []
     for sector in range(fields.n_sectors):
-        # Draw six numbers per cell: x, z, azimuth, height, and two for the tilt.
-        u = uniforms(int(keys.digest(*names, sector)[:16], 16), cell, 6)
+        # Draw seven numbers per cell: x, z, azimuth, height, two for the tilt, one for the lens.
+        u = uniforms(int(keys.digest(*names, sector)[:16], 16), cell, 7)
         x = grid.x_min + (column + u[:, 0]) * fields.cell_m
         z = grid.z_min + (row + u[:, 1]) * fields.cell_m
         height = fields.height_min_m + u[:, 3] * (fields.height_max_m - fields.height_min_m)
         azimuth = (sector + u[:, 2]) * step
         tilt = np.deg2rad(fields.tilt_deg + fields.tilt_sd_deg * _normal(u[:, 4], u[:, 5]))
+        # Few focal lengths: pictures of one are traced together.
+        zooms.append(1 + fields.hfov_spread * (np.floor(5 * u[:, 6]) - 2) / 2)
         eyes.append(np.stack([x, grid.base_y + height, z], axis=1))
         # Look along the azimuth, tilted down.
         directions.append(
@@ -95,6 +104,7 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
         towards=np.concatenate(directions),
         sector=np.repeat(np.arange(fields.n_sectors, dtype=np.int32), len(cell)),
         cell=np.tile(cell, (fields.n_sectors, 1)),
+        zoom=np.concatenate(zooms),
     )
 
 

@@ -14,8 +14,10 @@ class Verdict(IntEnum):
     ENCLOSED = 3  # inside a piece of furniture or a wall
     FILLED_BY_ONE = 4  # one object or wall covers more of the picture than it may
     FEW_OBJECTS = 5  # too few objects cover enough of the picture
-    LOWER_SCORE = 6  # kept every rule; another one of its sector scored higher
-    WINNER = 7
+    WEAK = 6  # preset photo: scores less than the least score
+    TWIN = 7  # preset photo: shows what a better view of the home shows
+    LOWER_SCORE = 8  # kept every rule; another one of its sector scored higher
+    WINNER = 9
 
     @property
     def label(self) -> str:

@@ -11,9 +11,11 @@ from pbrs_farm.core.camera import View
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.eye_probes import Counter
+from pbrs_farm.sample.photo_sampler import PhotoSampler, RoomCandidates, room_report
 from pbrs_farm.sample.report import CameraReport, RoomReport, total_rejected
 from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
 from pbrs_farm.sample.stored_cameras import stored_views
+from pbrs_farm.sample.view_overlap import DepthOf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,17 +28,20 @@ class Sampling:
 
 
 def cameras(
-    house: House, fields: CameraFields, seed: int, counter: Counter
+    house: House, fields: CameraFields, seed: int, counter: Counter, depth_of: DepthOf | None = None
 ) -> tuple[tuple[View, ...], CameraReport]:
     """The views of a house and why every other candidate was rejected; see sample_cameras."""
-    sampling = sample_cameras(house, fields, seed, counter)
+    sampling = sample_cameras(house, fields, seed, counter, depth_of)
     return sampling.views, sampling.report
 
 
-def sample_cameras(house: House, fields: CameraFields, seed: int, counter: Counter) -> Sampling:
+def sample_cameras(
+    house: House, fields: CameraFields, seed: int, counter: Counter, depth_of: DepthOf | None = None
+) -> Sampling:
     """The best view of each sector of each room that something lights (paper section 3.1).
 
-    counter: pixels of each item of this house in each camera, panes included. The same house,
+    counter: pixels of each item of this house in each camera, panes included. depth_of: depth
+    pictures of cameras, which the preset photo asks for (ValueError without). The same house,
     fields and seed give the same views, whatever the counter's speed and the rooms' order.
     Views have the scoring size (640x480) and are in order of rooms and sectors; with the preset
     released in order of falling score, as published. fields.source "stored": see stored_views.
@@ -44,6 +49,11 @@ def sample_cameras(house: House, fields: CameraFields, seed: int, counter: Count
     if fields.source == "stored":
         return _stored(house, fields, counter)
     geometry = geometry_from_house(house)
+    if fields.preset == "photo":
+        if depth_of is None:
+            raise ValueError("the preset photo needs depth_of")
+        photographer = PhotoSampler(house, fields, seed, counter, depth_of, geometry)
+        return _photographed(photographer)
     views: list[View] = []
     rooms: list[RoomReport] = []
     traces: list[RoomTrace] = []
@@ -62,6 +72,29 @@ def sample_cameras(house: House, fields: CameraFields, seed: int, counter: Count
     if fields.preset == "released":
         views.sort(key=lambda view: -view.score)
     return Sampling(tuple(views), _report(fields, views, tuple(rooms)), tuple(traces))
+
+
+def _photographed(sampler: PhotoSampler) -> Sampling:
+    """The views of the preset photo: all rooms' candidates are scored before any is chosen."""
+    house, fields = sampler.house, sampler.fields
+    reports: dict[str, RoomReport] = {}
+    scored: list[RoomCandidates] = []
+    for room in house.rooms:
+        rules = RoomSampler(house, room, fields, sampler.seed, sampler.counter, sampler.geometry)
+        reason = rules.explain_rejection()
+        if reason:
+            reports[room.id] = RoomReport(room_id=room.id, name=room.name, reason=reason)
+        else:
+            scored.append(sampler.room_candidates(room))
+    chosen = sampler.choose(scored)
+    views: list[View] = []
+    for of_room in scored:
+        found, reports[of_room.room.id] = room_report(sampler, of_room, chosen)
+        views += found
+    traces = tuple(RoomTrace(s.room.id, s.candidates, s.verdict) for s in scored)
+    return Sampling(
+        tuple(views), _report(fields, views, tuple(reports[r.id] for r in house.rooms)), traces
+    )
 
 
 def _stored(house: House, fields: CameraFields, counter: Counter) -> Sampling:

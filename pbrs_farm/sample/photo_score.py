@@ -1,0 +1,130 @@
+"""How much a view looks like a photograph that someone would take of a room; no effects.
+
+The paper's score (section 3.1) counts the pixels of all objects, doors and windows among them, and
+is highest close to one. People photograph furniture from across the room. The terms and their
+weights were fitted by eye on the example homes against the class shares of NYUv2's photographs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.classes import NYU13_FROM_NYU40
+from pbrs_farm.core.house import House, Item, ItemKind
+
+BLINDS, CURTAIN, OTHER_STRUCTURE = 13, 16, 38
+DOOR, WINDOW = 8, 9
+
+MOST_FURNITURE: Final = 0.45
+"""More of the picture than this earns nothing more."""
+
+OBJECT_WORTH, MOST_OBJECTS = 0.05, 8
+CLASS_WORTH, MOST_CLASSES = 0.06, 8
+MOST_OPENING, OPENING_COST = 0.10, 1.5
+MOST_OF_ONE, MOST_OF_A_WALL, MOST_FLOOR = 0.30, 0.50, 0.08
+NEAR_M, FAR_M, NEAR_COST, FAR_COST = 1.6, 4.5, 0.5, 0.1
+LEAST_CLASS_SHARE: Final = 0.005
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ItemRoles:
+    """What each instance id of a house is to a photographer; index 0 = nothing.
+
+    furniture, opening, wall, floor: (n_items + 1,) bool. nyu13: (n_items + 1,) int64 class.
+    """
+
+    furniture: NDArray[np.bool_]
+    opening: NDArray[np.bool_]
+    wall: NDArray[np.bool_]
+    floor: NDArray[np.bool_]
+    nyu13: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhotoShares:
+    """What N pictures show, as shares of the picture; each array (N,).
+
+    largest: of the one largest piece of furniture. wall: of the largest wall. n_objects: pieces
+    that cover the least share. n_classes: NYU13 classes seen. median_m: median planar depth.
+    """
+
+    furniture: NDArray[np.float64]
+    opening: NDArray[np.float64]
+    largest: NDArray[np.float64]
+    wall: NDArray[np.float64]
+    floor: NDArray[np.float64]
+    n_objects: NDArray[np.int64]
+    n_classes: NDArray[np.int64]
+    median_m: NDArray[np.float64]
+
+
+def item_roles(house: House) -> ItemRoles:
+    """Roles by kind and class: openings are no furniture, nor are curtains and built-in parts."""
+    items = house.items
+    return ItemRoles(
+        furniture=_flags([_is_furniture(item) for item in items]),
+        opening=_flags([_is_opening(item) for item in items]),
+        wall=_flags([item.kind is ItemKind.WALL for item in items]),
+        floor=_flags([item.kind is ItemKind.FLOOR for item in items]),
+        nyu13=NYU13_FROM_NYU40[np.array([0, *(item.nyu40 for item in items)])].astype(np.int64),
+    )
+
+
+def photo_shares(
+    counts: NDArray[np.uint32], depth_m: NDArray[np.float32], roles: ItemRoles, least: float
+) -> PhotoShares:
+    """What each picture shows.
+
+    counts: (N, n_items + 1) pixels of each instance. depth_m: (N, K) planar depth at K pixels
+    spread over the picture, 0 = nothing. least: the share of the picture that makes an object.
+    """
+    pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
+    share = counts / pixels[:, None]
+    classes = np.zeros((len(counts), 14))
+    for k in range(1, 14):
+        classes[:, k] = share[:, roles.nyu13 == k].sum(1)
+    seen = np.where(depth_m > 0, depth_m, np.nan)
+    median = np.zeros(len(counts))
+    some = np.isfinite(seen).any(1)
+    median[some] = np.nanmedian(seen[some], axis=1)
+    return PhotoShares(
+        furniture=share[:, roles.furniture].sum(1),
+        opening=share[:, roles.opening].sum(1),
+        largest=share[:, roles.furniture].max(1, initial=0),
+        wall=share[:, roles.wall].max(1, initial=0),
+        floor=share[:, roles.floor].sum(1),
+        n_objects=(share[:, roles.furniture] >= least).sum(1),
+        n_classes=(classes >= LEAST_CLASS_SHARE).sum(1),
+        median_m=median,
+    )
+
+
+def photo_score(seen: PhotoShares) -> NDArray[np.float64]:
+    """(N,) score: furniture, things and classes count; doors, close-ups and bare walls cost."""
+    score = np.minimum(seen.furniture, MOST_FURNITURE)
+    score += OBJECT_WORTH * np.minimum(seen.n_objects, MOST_OBJECTS)
+    score += CLASS_WORTH * np.minimum(seen.n_classes, MOST_CLASSES)
+    score += np.minimum(seen.floor, MOST_FLOOR)
+    score -= OPENING_COST * np.maximum(seen.opening - MOST_OPENING, 0)
+    score -= np.maximum(seen.largest - MOST_OF_ONE, 0)
+    score -= np.maximum(seen.wall - MOST_OF_A_WALL, 0)
+    score -= NEAR_COST * np.maximum(NEAR_M - seen.median_m, 0)
+    score -= FAR_COST * np.maximum(seen.median_m - FAR_M, 0)
+    return score
+
+
+def _is_opening(item: Item) -> bool:
+    return item.kind in (ItemKind.DOOR, ItemKind.WINDOW) or item.nyu40 in (DOOR, WINDOW)
+
+
+def _is_furniture(item: Item) -> bool:
+    built_in = item.kind.is_structure or item.kind is ItemKind.STAIRS
+    return not (built_in or _is_opening(item) or item.nyu40 in (BLINDS, CURTAIN, OTHER_STRUCTURE))
+
+
+def _flags(values: list[bool]) -> NDArray[np.bool_]:
+    return np.array([False, *values], np.bool_)

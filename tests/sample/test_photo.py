@@ -1,0 +1,183 @@
+"""The preset `photo`: what its score prefers, and that no two views show the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import House, ItemKind, geometry_from_house
+from pbrs_farm.core.recipe import CameraFields, recipe_from_name
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.photo_sampler import PhotoSampler
+from pbrs_farm.sample.photo_score import PhotoShares, item_roles, photo_score, photo_shares
+from pbrs_farm.sample.rejection import Verdict
+from pbrs_farm.sample.sampler import Sampling
+from pbrs_farm.sample.view_overlap import DEPTH_SIZE, overlap, shared_part
+from tests.sample.rooms import box, furnished, room_house, shell
+
+FIELDS: CameraFields = recipe_from_name("fast").cameras.model_copy(
+    update={
+        "score_width_px": 80, "score_height_px": 60, "coarse_width_px": 40, "coarse_height_px": 30,
+        "cell_m": 0.5,
+    }
+)  # fmt: skip
+
+
+def sampled(house: House, **fields: object) -> Sampling:
+    caster = Caster(geometry_from_house(house))
+    changed = FIELDS.model_copy(update=fields)
+    return sample_cameras(house, changed, 0, caster.item_counts, caster.depth_pictures)
+
+
+def with_classes(house: House) -> House:
+    """The furnished room with the classes its names say."""
+    nyu40 = {"table": 7, "chair": 5, "cupboard": 3, "bed": 4, "wardrobe": 3}
+    kinds = {ItemKind.WALL: 1, ItemKind.FLOOR: 2, ItemKind.CEILING: 22}
+    return house.with_items(
+        [replace(i, nyu40=nyu40.get(i.name, kinds.get(i.kind, 0))) for i in house.items]
+    )
+
+
+def shares(**changes: float) -> PhotoShares:
+    """A good view of one room, but for what is changed."""
+    plain = {
+        "furniture": 0.4, "opening": 0.05, "largest": 0.2, "wall": 0.3, "floor": 0.1,
+        "n_objects": 5, "n_classes": 6, "median_m": 2.5,
+    }  # fmt: skip
+    return PhotoShares(**{k: np.array([v]) for k, v in (plain | changes).items()})
+
+
+@pytest.mark.parametrize(
+    "worse",
+    [
+        {"opening": 0.4}, {"largest": 0.6}, {"wall": 0.8}, {"floor": 0.0}, {"furniture": 0.1},
+        {"n_objects": 2}, {"n_classes": 3}, {"median_m": 0.8}, {"median_m": 6.0},
+    ],
+)  # fmt: skip
+def test_a_view_is_worth_less(worse: dict[str, float]) -> None:
+    assert photo_score(shares(**worse))[0] < photo_score(shares())[0]
+
+
+def test_doors_curtains_and_built_in_parts_are_no_furniture() -> None:
+    names = {"door": 8, "window": 9, "curtain": 16, "blinds": 13, "pillar": 38, "sofa": 6}
+    items = [replace(box((0, 0, 0), (1, 1, 1), name=n), nyu40=c) for n, c in names.items()]
+    roles = item_roles(room_house([*items, *shell(3, 3)], 3, 3))
+    assert np.flatnonzero(roles.furniture).tolist() == [6]
+    assert np.flatnonzero(roles.opening).tolist() == [1, 2]
+
+
+def test_shares_are_those_of_the_pixels() -> None:
+    house = room_house([replace(box((0, 0, 0), (1, 1, 1)), nyu40=5), *shell(3, 3)], 3, 3)
+    counts = np.zeros((1, len(house.items) + 1), np.uint32)
+    counts[0, :5] = 10, 30, 20, 0, 40  # nothing, chair, floor, ceiling, a wall
+    depth = np.array([[0, 1, 2, 3]], np.float32)
+    seen = photo_shares(counts, depth, item_roles(house), 0.01)
+    assert (seen.furniture[0], seen.floor[0], seen.wall[0]) == (0.3, 0.2, 0.4)
+    assert (seen.n_objects[0], seen.n_classes[0], seen.median_m[0]) == (1, 1, 2.0)
+
+
+def test_a_view_shares_all_with_itself_and_nothing_with_its_back() -> None:
+    house = furnished()
+    caster = Caster(geometry_from_house(house))
+    intrinsics = Intrinsics.from_hfov(*DEPTH_SIZE)
+    eye = np.array([2.0, 1.5, 2.5])
+    ahead, back, near = (
+        Camera.look(intrinsics, at, np.array(to))
+        for at, to in (
+            (eye, (0.0, -0.2, 1.0)),
+            (eye, (0.0, -0.2, -1.0)),
+            (eye + np.array([0, -0.1, 0.5]), (0.0, -0.2, 1.0)),
+        )
+    )
+    a, b, c = caster.depth_pictures([ahead, back, near])
+    assert overlap(ahead, a, ahead, a) == 1.0
+    assert overlap(ahead, a, back, b) < 0.02
+    assert shared_part(near, c, ahead, a) > 0.85 > shared_part(ahead, a, near, c)
+
+
+def test_a_point_behind_an_obstacle_is_not_shared() -> None:
+    intrinsics = Intrinsics.from_hfov(*DEPTH_SIZE)
+    camera = Camera.look(intrinsics, np.zeros(3), np.array([0.0, 0.0, -1.0]))
+    far, near = (np.full(DEPTH_SIZE[::-1], z, np.float32) for z in (4.0, 2.0))
+    assert shared_part(camera, far, camera, near) == 0.0
+    assert shared_part(camera, np.zeros_like(far), camera, near) == 0.0
+
+
+def test_depth_pictures_are_the_hit_records_depth() -> None:
+    house = furnished()
+    caster = Caster(geometry_from_house(house))
+    camera = sampled(with_classes(house)).views[0].camera.with_size(*DEPTH_SIZE)
+    assert np.allclose(caster.depth_pictures([camera])[0], caster.hit_record(camera).depth_z)
+
+
+def test_views_of_a_furnished_room_show_furniture_and_no_two_the_same() -> None:
+    house = with_classes(furnished(4.0, 5.0))
+    sampling = sampled(house)
+    assert len(sampling.views) >= 2
+    caster = Caster(geometry_from_house(house))
+    cameras = [view.camera.with_size(*DEPTH_SIZE) for view in sampling.views]
+    depth = caster.depth_pictures(cameras)
+    for i in range(len(cameras)):
+        for j in range(i):
+            assert overlap(cameras[i], depth[i], cameras[j], depth[j]) <= 0.8
+    for view in sampling.views:
+        assert view.score >= FIELDS.min_room_score
+        assert sum(view.objects.values()) > 0.1 * 80 * 60
+
+
+def test_of_views_of_one_spot_one_counts_across_rooms_too() -> None:
+    house = with_classes(furnished())
+    caster = Caster(geometry_from_house(house))
+    sampler = PhotoSampler(
+        house, FIELDS, 0, caster.item_counts, caster.depth_pictures, geometry_from_house(house)
+    )
+    one = sampler.room_candidates(house.rooms[0])
+    twin = replace(one, room=replace(one.room, id="0_1"), verdict=one.verdict.copy())
+    chosen = sampler.choose([one, twin])
+    assert any(chosen.values())
+    for sector in range(FIELDS.n_sectors):
+        both = set(chosen.get(("0_0", sector), [])) & set(chosen.get(("0_1", sector), []))
+        assert not both
+    assert (twin.verdict == Verdict.TWIN).any()
+
+
+def test_an_empty_room_has_its_best_view_alone_and_the_others_are_called_weak() -> None:
+    sampling = sampled(room_house(shell(4, 4), 4, 4), min_room_score=0.05)
+    assert len(sampling.views) == 1
+    assert sampling.report.refused["weak"] > 0
+    assert not sampled(room_house(shell(4, 4), 4, 4), min_room_score=0.5).views
+
+
+def test_a_view_must_show_as_many_objects_as_the_recipe_asks() -> None:
+    report = sampled(room_house(shell(4, 4), 4, 4), min_objects=1).report
+    assert report.n_views == 0
+    assert all("few objects" in s.reason for s in report.rooms[0].sectors)
+
+
+def test_focal_lengths_take_five_values_about_the_fields() -> None:
+    views = sampled(with_classes(furnished(6, 6)), per_sector=4, min_score=0.0).views
+    plain = Intrinsics.from_hfov(80, 60, FIELDS.hfov_rad).fx
+    assert {round(v.camera.intrinsics.fx / plain, 3) for v in views} <= {0.9, 0.95, 1, 1.05, 1.1}
+    assert len({v.camera.intrinsics.fx for v in views}) > 1
+
+
+def test_the_same_house_and_seed_give_the_same_views() -> None:
+    house = with_classes(furnished())
+    a, b = sampled(house).views, sampled(house).views
+    assert [v.id for v in a] == [v.id for v in b]
+    assert all(
+        (x.camera.world_from_camera == y.camera.world_from_camera).all() for x, y in zip(a, b)
+    )
+
+
+@pytest.mark.parametrize("name", ["paper", "released"])
+def test_the_papers_recipes_keep_the_digest_they_had_before_the_preset(name: str) -> None:
+    before = {
+        "paper": "17a8747542bd93162ce2ce591c1437be",
+        "released": "3cb9b128bce13c48429f225ddef11fcd",
+    }
+    assert recipe_from_name(name).digest("cameras") == before[name]
