@@ -169,6 +169,12 @@ class LightFields(FieldGroup):
     denoise: bool = True
 
     @model_validator(mode="after")
+    def _noise_can_be_reached(self) -> Self:
+        if 0 < self.noise < 1e-4:
+            raise ValueError("noise below 0.0001 is never reached; 0 = one pass of spp")
+        return self
+
+    @model_validator(mode="after")
     def _noise_is_of_path(self) -> Self:
         if self.noise > 0 and self.integrator == "metropolis":
             raise ValueError("noise is reached by `path` alone: give metropolis a time_budget_s")
@@ -277,6 +283,9 @@ class SelectionFields(FieldGroup):
     min_objects: int = Field(3, ge=0, le=65_535, description="objects of object_fraction and more")
     max_noise: float = Field(1.0, ge=0, le=1e6, description="relative error of the raw light")
     min_room_lx: float = Field(
-        0.0, ge=0, description="by all light on a room's floor; views of darker rooms are not made"
+        0.0,
+        ge=0,
+        le=1e6,
+        description="by all light on a room's floor; views of darker rooms are not made",
     )
     max_missing_textures: int = Field(3, ge=0, le=1_000_000, description="of the house")

@@ -145,6 +145,8 @@ class FurnitureAudit(_Record):
     overlaps: tuple[Overlap, ...] = ()
     floating: tuple[Floating, ...] = ()  # touch no other item
     duplicates: tuple[tuple[str, str], ...] = ()  # same mesh, same place
+    n_unaudited: int = 0  # pieces beyond those that are audited
+    n_unmeasured: int = 0  # pairs whose boxes meet beyond those that are intersected, at least
 
 
 class RepairReport(_Record):

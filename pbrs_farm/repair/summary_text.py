@@ -93,6 +93,9 @@ def _leaks(report: RepairReport) -> Iterator[str]:
         yield "Leaks were not measured."
         return
     leaks = report.leaks
+    if not leaks.n_rays:
+        yield "Leaks were not measured: no space is closed, so no ray was sent."
+        return
     share = f"{100 * leaks.closed_share:.0f} % of the floor area is in closed rooms"
     if not leaks.n_sky:
         yield f"No light leaks: of {leaks.n_rays} rays none reached the sky; {share}."
@@ -107,6 +110,9 @@ def _leaks(report: RepairReport) -> Iterator[str]:
 
 def _furniture(report: RepairReport) -> Iterator[str]:
     f = report.furniture
+    if f.n_unaudited or f.n_unmeasured:
+        more = f", {_n(f.n_unaudited, 'piece')} not looked at" if f.n_unaudited else ""
+        yield f"Too much furniture stands in one place: the audit is of a part of it{more}."
     if f.overlaps:
         # Name the pair that shares most.
         worst = max(f.overlaps, key=lambda o: o.volume_m3)

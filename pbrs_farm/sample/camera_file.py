@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
@@ -55,6 +55,9 @@ class GivenCamera(BaseModel):
         )
 
 
+MAX_CAMERAS: Final = 10_000
+"""Of one file; each is scored before any view is chosen."""
+
 _CAMERAS: TypeAdapter[list[GivenCamera]] = TypeAdapter(list[GivenCamera])
 
 
@@ -67,8 +70,12 @@ def cameras_from_file_text(
 
     Raises BadInput with the file and the place.
     """
-    # Tell the two formats apart by their first character.
-    if not text.lstrip().startswith("["):
+    # Tell the two formats apart by their first character; count before any camera is built.
+    is_json = text.lstrip().startswith("[")
+    n_cameras = text.count("{") if is_json else text.count("\n")
+    if n_cameras > MAX_CAMERAS:
+        raise BadInput(file, "", f"holds {n_cameras} cameras, at most {MAX_CAMERAS} are read")
+    if not is_json:
         lines = cameras_from_text(text, file, width_px, height_px)
         return [(line.camera, line.room_id) for line in lines]
     try:

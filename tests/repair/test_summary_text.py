@@ -12,7 +12,9 @@ from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.mesh.primitives import box
 from pbrs_farm.repair import RepairReport, repair, section_svg, summary_of_report
+from pbrs_farm.repair.measure import furniture_audit as furniture_audit_module
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
+from pbrs_farm.repair.report import LeakReport
 from pbrs_farm.repair.section_drawing import section_of_items, solid_polygons
 from tests.repair.rooms import covers, house, room, walls_around
 
@@ -52,6 +54,23 @@ def test_a_piece_that_stands_twice_is_a_duplicate() -> None:
     audit = furniture_audit(_furnished(_piece("a", (1, 0.25, 1)), _piece("b", (1, 0.25, 1))))
     assert audit.duplicates == (("a", "b"),)
     assert audit.overlaps[0].share == 1.0
+
+
+def test_a_crowd_is_audited_in_part_and_the_rest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(furniture_audit_module, "_MAX_PIECES", 4)
+    monkeypatch.setattr(furniture_audit_module, "_MAX_PAIRS", 2)
+    crowd = [_piece(f"p{k}", (1 + 0.01 * k, 0.25, 1)) for k in range(9)]
+    audit = furniture_audit(_furnished(*crowd))
+    assert len(audit.overlaps) == 2
+    assert (audit.n_unaudited, audit.n_unmeasured) == (5, 1)
+    text = summary_of_report(RepairReport(house_id="h", furniture=audit))
+    assert "the audit is of a part of it, 5 pieces not looked at." in text
+
+
+def test_leaks_of_no_ray_are_not_measured_rather_than_none() -> None:
+    text = summary_of_report(RepairReport(house_id="h", leaks=LeakReport()))
+    assert "Leaks were not measured" in text
+    assert "No light leaks" not in text
 
 
 def test_the_words_say_what_was_wrong(repaired: tuple[House, RepairReport]) -> None:

@@ -108,3 +108,9 @@ def moved(world_from_camera: np.ndarray, x: float, z: float) -> np.ndarray:
     pose = world_from_camera.copy()
     pose[[0, 2], 3] = x, z
     return pose
+
+
+@pytest.mark.parametrize("text", ["[" + "{}," * 10_001 + "{}]", "1 2 3\n" * 10_001])
+def test_a_file_of_too_many_cameras_is_rejected_before_one_is_built(text: str) -> None:
+    with pytest.raises(BadInput, match="at most 10000 are read"):
+        cameras_from_file_text(text, "mine", 64, 48)

@@ -17,6 +17,7 @@ from pbrs_farm.read.mesh.shading_normals import crease_normals
 from pbrs_farm.read.mesh.triangulate import triangle_corners
 
 DEFAULT_CREASE_RAD = np.radians(45.0)
+_MANY_FACES = 50_000  # of a part, above which repeated faces are looked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,6 +199,8 @@ def _mesh(
     index = indices[corners]
     v = index[:, :, 0]
     keep = face_areas(pools[0][v]) > 0
+    if len(v) > _MANY_FACES:
+        keep &= _first_of_each(v)
     n_dropped = int((~keep).sum())
     index = index[keep]
     if not len(index):
@@ -224,6 +227,17 @@ def _mesh(
         normals / np.where(length > 0, length, 1),
     )
     return mesh, n_dropped
+
+
+def _first_of_each(v: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(F,) bool: no face before has the same corners; all True where most faces are their own.
+
+    A face repeated a million times looks like one and costs any tree of triangles its balance.
+    """
+    _, first = np.unique(v, axis=0, return_index=True)
+    is_first = np.full(len(v), 2 * len(first) > len(v))
+    is_first[first] = True
+    return is_first
 
 
 def _unique_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -17,6 +17,7 @@ from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 MIN_AREA_M2 = 0.01
 SLIVER_M2 = 1e-4
+MAX_CORNERS = 1000  # of a room: what is more is a curve drawn too finely, and costs its square
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +53,7 @@ def _simple(room: PlanRoom, materials: HomeMaterials) -> shapely.Polygon | None:
     if len(room.points) < 3:
         materials.notes.add("degenerate-room", room.place, "fewer than three points: left out")
         return None
-    polygon = shapely.Polygon(room.points)
+    polygon = shapely.Polygon(_coarse(room, materials))
     if not polygon.is_valid:
         parts = _polygons(shapely.make_valid(polygon))
         materials.notes.add(
@@ -64,6 +65,21 @@ def _simple(room: PlanRoom, materials: HomeMaterials) -> shapely.Polygon | None:
         materials.notes.add("degenerate-room", room.place, f"{polygon.area:.4f} m2: left out")
         return None
     return polygon
+
+
+def _coarse(room: PlanRoom, materials: HomeMaterials) -> Points2:
+    """The room's points; of more than MAX_CORNERS those that say most, with a note."""
+    points = np.asarray(room.points, np.float64)
+    if len(points) <= MAX_CORNERS:
+        return points
+    # Leave out what moves the outline by less than a step that grows from a millimetre.
+    line, step = shapely.LineString(points), 0.001
+    while len(points) > MAX_CORNERS:
+        points = shapely.get_coordinates(shapely.simplify(line, step, preserve_topology=False))
+        step *= 2
+    text = f"{len(room.points)} corners, simplified to {len(points)}"
+    materials.notes.add("room-simplified", room.place, text)
+    return points
 
 
 def _polygons(shape: shapely.Geometry) -> list[shapely.Polygon]:

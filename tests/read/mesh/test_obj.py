@@ -154,3 +154,10 @@ def test_the_built_in_materials_carry_their_notice() -> None:
     assert len(table) == 134
     assert table["redwood"].kd == pytest.approx((0.2571, 0.033, 0.0))
     assert "_notice" not in table
+
+
+def test_a_face_repeated_a_hundred_thousand_times_is_read_once() -> None:
+    text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 4\n" + b"f 1 2 3\n" * 100_000
+    model = parse_obj(text, "many.obj")
+    assert sum(len(m.faces) for m in model.meshes) == 2
+    assert model.n_dropped == 99_999

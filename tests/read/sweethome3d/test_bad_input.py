@@ -315,3 +315,17 @@ def test_any_cut_out_path_ends_in_a_house(tokens: list[str]) -> None:
     path = "".join(tokens)
     body = WALLS + DOOR.replace("M0,0 v1 h1 v-1 z", path)
     check(read_home(sh3d(home_xml(body), {"1": BOX_OBJ}), "h.sh3d"))
+
+
+def test_a_room_of_a_hundred_thousand_corners_is_simplified_with_a_note() -> None:
+    n = 99_000
+    angles = np.arange(n) * 2 * np.pi / n
+    corners = "".join(
+        f"<point x='{x:.3f}' y='{y:.3f}'/>"
+        for x, y in zip(300 + 250 * np.cos(angles), 300 + 250 * np.sin(angles), strict=True)
+    )
+    data = sh3d(home_xml(WALLS, room=f"<room name='Round'>{corners}</room>"))
+    house = read_home(data, "round.sh3d", fields=ReadFields())
+    (room,) = house.rooms
+    assert 50 < len(room.polygon) <= 1000
+    assert any(n.kind == "room-simplified" and "99000 corners" in n.text for n in house.notes)
