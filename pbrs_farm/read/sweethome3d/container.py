@@ -1,7 +1,7 @@
 """A home file's bytes -> its XML tree and the contents it names; no effects.
 
 Nothing in the file is trusted: entity definitions and external entities are rejected unexpanded,
-zip entries are bounded (read.resources).
+zip entries are bounded (read.resources), and no class of a Java stream is loaded (java_stream).
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from defusedxml.ElementTree import fromstring
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.common.resources import Layered, Resources, ZipResources
+from pbrs_farm.read.sweethome3d.java_home import RESAVE, root_from_java
 
 MAX_XML_BYTES = 16 * 2**20
 MAX_DEPTH = 200
-_RESAVE = "open it in Sweet Home 3D 5.3 or later and save it again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +38,15 @@ def open_container(data: bytes, file: str, resources: Resources | None) -> Conta
         archive = ZipResources(data, file)
         xml = archive.read("Home.xml")
         if xml is None:
-            what = "holds no Home.xml"
-            if "Home" in archive.names():
-                what += ", only the binary form of older versions"
-            raise BadHouse(file, "", what, hint=_RESAVE)
+            # Old versions, and homes saved without XML, hold the program's serialised objects alone.
+            java = archive.read("Home")
+            if java is None:
+                raise BadHouse(file, "", "holds no Home.xml and no Home", hint=RESAVE)
+            return Container(root_from_java(java, file), Layered(archive, resources))
         return Container(_parsed(xml, file, "Home.xml"), Layered(archive, resources))
     if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return Container(_parsed(data, file, ""), Layered(resources))
-    raise BadHouse(file, "", "neither a .sh3d archive (zip) nor a Home.xml", hint=_RESAVE)
+    raise BadHouse(file, "", "neither a .sh3d archive (zip) nor a Home.xml", hint=RESAVE)
 
 
 def needs_program(data: bytes, file: str) -> bool:
@@ -68,7 +69,7 @@ def _parsed(xml: bytes, file: str, entry: str) -> Element:
         what = type(error).__name__
         raise BadHouse(file, entry, f"XML with entity definitions is refused ({what})") from None
     except ParseError as error:
-        raise BadHouse(file, entry, f"XML is not well-formed: {error}", hint=_RESAVE) from None
+        raise BadHouse(file, entry, f"XML is not well-formed: {error}", hint=RESAVE) from None
     except (ValueError, LookupError, RecursionError) as error:
         raise BadHouse(file, entry, f"XML cannot be read: {error}") from None
     if root.tag != "home":

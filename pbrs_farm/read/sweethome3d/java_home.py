@@ -1,0 +1,263 @@
+"""The serialised entry `Home` of old .sh3d files -> the tree of the Home.xml that says the same.
+
+No effects. The elements are those that parse.py reads; fields that a version of the program did
+not have yet are left out, so that the same defaults hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final
+from urllib.parse import unquote
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.read.sweethome3d.java_stream import JavaObject, JavaStreamError, java_objects
+
+RESAVE: Final = "open it in Sweet Home 3D 5.3 or later and save it again"
+_ALONE: Final = "holds no Home.xml, only the binary form of older versions,"
+_MODEL: Final = "com.eteks.sweethome3d.model."
+_MAX_GROUP_DEPTH: Final = 100
+_UPRIGHT: Final = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+# Fields that are attributes of the same name: numbers, flags, texts.
+_WALL: Final = "xStart yStart xEnd yEnd thickness height heightAtEnd arcExtent"
+_PIECE: Final = (
+    "catalogId name creator x y elevation angle pitch roll width depth height modelMirrored"
+    " doorOrWindow visible shininess staircaseCutOutShape wallWidth wallLeft wallHeight wallTop"
+    " wallCutOutOnBothSides cutOutShape power"
+)
+_ROOM: Final = "name floorVisible ceilingVisible ceilingFlat"
+_LEVEL: Final = "name elevation floorThickness height visible viewable elevationIndex"
+_TEXTURE: Final = "catalogId name width height xOffset yOffset angle scale fittingArea"
+_CAMERA: Final = "name x y z yaw pitch fieldOfView"
+_TAGS: Final = {
+    "HomePieceOfFurniture": "pieceOfFurniture",
+    "HomeDoorOrWindow": "doorOrWindow",
+    "HomeLight": "light",
+    "HomeShelfUnit": "shelfUnit",
+    "HomeFurnitureGroup": "furnitureGroup",
+}
+
+
+def root_from_java(data: bytes, file: str) -> Element:
+    """The element <home> of a serialised Home.
+
+    Raises BadHouse for a damaged stream, or one whose object is no home.
+    """
+    try:
+        found = java_objects(data)
+    except JavaStreamError as error:
+        raise BadHouse(
+            file, "Home", f"{_ALONE} and that is damaged: {error}", hint=RESAVE
+        ) from None
+    home = next((o for o in found if _is(o, "Home")), None)
+    if home is None:
+        raise BadHouse(file, "Home", f"{_ALONE} and that holds no home", hint=RESAVE)
+    return _Converter(home).root()
+
+
+def _is(value: Any, *names: str) -> bool:
+    return isinstance(value, JavaObject) and value.class_name.removeprefix(_MODEL) in names
+
+
+def _objects(value: Any) -> list[Any]:
+    """The elements of a Java list or array."""
+    if isinstance(value, list):
+        return value
+    if not isinstance(value, JavaObject):
+        return []
+    # Lists that wrap another name it: Collections.unmodifiableList, Arrays.asList, singletonList.
+    for name in ("list", "c", "a"):
+        inner = value.fields.get(name)
+        if isinstance(inner, (list, JavaObject)) and inner is not value:
+            return inner if isinstance(inner, list) else inner.written[1:]
+    if "element" in value.fields:
+        return [value.fields["element"]]
+    return [v for v in value.written if not isinstance(v, bytes)]  # bytes: its capacity
+
+
+def _plain(value: Any) -> Any:
+    """A boxed number as a number."""
+    if isinstance(value, JavaObject) and value.class_name.startswith("java.lang."):
+        return value.fields.get("value")
+    return value
+
+
+def _text(value: Any) -> str | None:
+    """As an XML attribute; None = left out. Floats have 32 bits in Java: shortest text of those."""
+    value = _plain(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        with np.errstate(over="ignore"):
+            return str(np.float32(value))
+    return str(value) if isinstance(value, (int, str)) else None
+
+
+def _content_name(value: Any) -> str | None:
+    """The entry that a content's URL names: jar:file:temp!/12/chair.obj -> 12/chair.obj."""
+    url = value.fields.get("url") if isinstance(value, JavaObject) else None
+    file = url.fields.get("file") if isinstance(url, JavaObject) else None
+    return unquote(file.rpartition("!/")[2]) if isinstance(file, str) and "!/" in file else None
+
+
+class _Converter:
+    """Turns the objects of one home into elements."""
+
+    def __init__(self, home: JavaObject) -> None:
+        self._home = home.fields
+        self._ids: dict[int, str] = {}  # of walls and levels, by object
+
+    def root(self) -> Element:
+        """The element <home> with everything in it."""
+        version = _plain(self._home.get("version"))
+        root = Element("home", version=str(version or ""))
+        _put(root, "name", self._home.get("name"))
+        _put(root, "wallHeight", self._home.get("wallHeight"))
+        properties = self._home.get("properties")
+        texts = [t for t in _objects(properties) if isinstance(t, str)]
+        for name, value in zip(texts[::2], texts[1::2], strict=False):
+            SubElement(root, "property", name=name, value=value)
+        for camera in self._all("storedCameras", "Camera", "ObserverCamera"):
+            tag = "observerCamera" if _is(camera, "ObserverCamera") else "camera"
+            _fields(SubElement(root, tag, attribute="storedCamera"), camera, _CAMERA)
+        for level in self._all("levels", "Level"):
+            _fields(SubElement(root, "level", id=self._id(level)), level, _LEVEL)
+        self._furniture(root)
+        for wall in self._all("walls", "Wall"):
+            self._wall(SubElement(root, "wall"), wall)
+        for room in self._all("rooms", "Room"):
+            self._room(SubElement(root, "room"), room)
+        return root
+
+    def _all(self, name: str, *classes: str) -> list[JavaObject]:
+        return [o for o in _objects(self._home.get(name)) if _is(o, *classes)]
+
+    def _id(self, thing: JavaObject) -> str:
+        # Old versions wrote no ids.
+        own = thing.fields.get("id")
+        number = f"java-{len(self._ids)}"
+        return self._ids.setdefault(id(thing), own if isinstance(own, str) else number)
+
+    def _refer(self, element: Element, name: str, thing: Any) -> None:
+        if isinstance(thing, JavaObject):
+            element.set(name, self._id(thing))
+
+    def _furniture(self, root: Element) -> None:
+        # Versions with groups write the whole furniture apart, for older ones to read the rest.
+        names = ("furnitureWithGroups", "furnitureWithDoorsAndWindows", "furniture")
+        lists = (self._home.get(n) for n in names)
+        pieces = next((x for x in lists if x is not None), None)
+        stack = [(piece, root, 0) for piece in reversed(_objects(pieces))]
+        seen: set[int] = set()
+        while stack:
+            piece, parent, depth = stack.pop()
+            tag = next((t for name, t in _TAGS.items() if _is(piece, name)), None)
+            if tag is None or id(piece) in seen or depth > _MAX_GROUP_DEPTH:
+                continue
+            seen.add(id(piece))
+            element = SubElement(parent, tag)
+            if tag == "furnitureGroup":
+                _fields(element, piece, "name visible")
+                self._refer(element, "level", piece.fields.get("level"))
+                members = _objects(piece.fields.get("furniture"))
+                stack += [(member, element, depth + 1) for member in reversed(members)]
+            else:
+                self._piece(element, piece)
+
+    def _piece(self, element: Element, piece: JavaObject) -> None:
+        _fields(element, piece, _PIECE)
+        f = piece.fields
+        self._refer(element, "level", f.get("level"))
+        _put(element, "model", _content_name(f.get("model")))
+        in_plan = f.get("heightInPlan")
+        if in_plan and in_plan != f.get("height"):
+            _put(element, "heightInPlan", in_plan)
+        if f.get("modelRotation") != _UPRIGHT:
+            _numbers(element, "modelRotation", f.get("modelRotation"))
+        _colours(element, piece, "color")
+        _texture(element, None, f.get("texture"))
+        for material in _objects(f.get("modelMaterials")):
+            if _is(material, "HomeMaterial"):
+                inner = SubElement(element, "material")
+                _fields(inner, material, "name key shininess")
+                _colours(inner, material, "color")
+                _texture(inner, None, material.fields.get("texture"))
+        for moved in _objects(f.get("modelTransformations")):
+            if _is(moved, "Transformation"):
+                inner = SubElement(element, "transformation")
+                _fields(inner, moved, "name")
+                _numbers(inner, "matrix", moved.fields.get("matrix"))
+        for source in _objects(f.get("lightSources")):
+            if _is(source, "LightSource"):
+                inner = SubElement(element, "lightSource")
+                _fields(inner, source, "x y z diameter")
+                _colours(inner, source, "color")
+        for name in _objects(f.get("lightSourceMaterialNames")):
+            _put(SubElement(element, "lightSourceMaterial"), "name", name)
+
+    def _wall(self, element: Element, wall: JavaObject) -> None:
+        element.set("id", self._id(wall))
+        _fields(element, wall, _WALL)
+        f = wall.fields
+        for name in ("wallAtStart", "wallAtEnd", "level"):
+            self._refer(element, name, f.get(name))
+        _colours(element, wall, "leftSideColor rightSideColor topColor")
+        for side in ("leftSide", "rightSide"):
+            _put(element, f"{side}Shininess", f.get(f"{side}Shininess") or None)
+            _texture(element, f"{side}Texture", f.get(f"{side}Texture"))
+            board = f.get(f"{side}Baseboard")
+            if isinstance(board, JavaObject) and _is(board, "Baseboard"):
+                inner = SubElement(element, "baseboard", attribute=f"{side}Baseboard")
+                _fields(inner, board, "thickness height")
+                _colours(inner, board, "color")
+                _texture(inner, None, board.fields.get("texture"))
+
+    def _room(self, element: Element, room: JavaObject) -> None:
+        _fields(element, room, _ROOM)
+        self._refer(element, "level", room.fields.get("level"))
+        _colours(element, room, "floorColor ceilingColor")
+        for part in ("floor", "ceiling"):
+            _put(element, f"{part}Shininess", room.fields.get(f"{part}Shininess") or None)
+            _texture(element, f"{part}Texture", room.fields.get(f"{part}Texture"))
+        for point in _objects(room.fields.get("points")):
+            if isinstance(point, list) and len(point) == 2:
+                inner = SubElement(element, "point")
+                _put(inner, "x", point[0])
+                _put(inner, "y", point[1])
+
+
+def _put(element: Element, name: str, value: Any) -> None:
+    text = _text(value)
+    if text is not None:
+        element.set(name, text)
+
+
+def _fields(element: Element, thing: JavaObject, names: str) -> None:
+    for name in names.split():
+        _put(element, name, thing.fields.get(name))
+
+
+def _colours(element: Element, thing: JavaObject, names: str) -> None:
+    for name in names.split():
+        value = _plain(thing.fields.get(name))
+        if isinstance(value, int):
+            element.set(name, f"{value & 0xFFFFFFFF:08X}")
+
+
+def _numbers(element: Element, name: str, rows: Any) -> None:
+    flat = [v for row in _objects(rows) for v in (row if isinstance(row, list) else [row])]
+    texts: Iterable[str | None] = map(_text, flat)
+    if flat:
+        element.set(name, " ".join(t for t in texts if t is not None))
+
+
+def _texture(element: Element, attribute: str | None, texture: Any) -> None:
+    if not _is(texture, "HomeTexture"):
+        return
+    inner = SubElement(element, "texture")
+    _put(inner, "attribute", attribute)
+    _fields(inner, texture, _TEXTURE)
+    _put(inner, "image", _content_name(texture.fields.get("image")))
