@@ -28,6 +28,8 @@ def main() -> None:
     )
     rows = [_measured(name) for name in [*names, SUNCG]]
     real, suncg = rows[:-1], rows[-1]
+    print(f"{'home':<34}{'views':>6}{'dark':>6}  left out")
+    lit = [_lit(name) for name in names]
     figures = {
         "houses.worst_s": max(r["seconds"] for r in real),
         "houses.worst_mb": max(r["mb"] for r in real),
@@ -35,6 +37,8 @@ def main() -> None:
         "houses.leak_max": max(r["n_sky"] for r in real),
         "houses.leak_rays": sum(r["n_rays"] for r in real),
         "houses.closed_share_min": min(r["closed_share"] for r in real),
+        "houses.views_lit": sum(r["views"] for r in lit),
+        "houses.dark_views": sum(len(r["dark"]) for r in lit),
         "houses.walls_lost": sum(r["walls_lost"] for r in real),
     }
     units = {
@@ -44,18 +48,30 @@ def main() -> None:
         "houses.leak_max": "rays that reach the sky, of the worst home",
         "houses.leak_rays": "rays over all homes",
         "houses.closed_share_min": "share of the floor area in closed rooms, of the worst home",
+        "houses.views_lit": "views of a preview run's choice that were looked at for light",
+        "houses.dark_views": "of them black, or in a room below 1 lx by all light",
         "houses.walls_lost": "walls of which repair took more than a tenth, all homes",
     }
     write_report("houses", figures, units)
 
 
-def _measured(name: str) -> dict[str, Any]:
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.houses", name], capture_output=True, text=True
-    )
+def _in_a_process(module: str, name: str) -> dict[str, Any]:
+    done = subprocess.run([sys.executable, "-m", module, name], capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f"{name}: {done.stderr.strip().splitlines()[-1:]}")
     row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return row
+
+
+def _lit(name: str) -> dict[str, Any]:
+    row = _in_a_process("benchmarks.house_light", name)
+    print(f"{name:<34}{row['views']:>6}{len(row['dark']):>6}  {'; '.join(row['left_out'])}")
+    print(*(f"  {line}\n" for line in row["dark"]), sep="", end="", flush=True)
+    return row
+
+
+def _measured(name: str) -> dict[str, Any]:
+    row = _in_a_process("benchmarks.houses", name)
     print(
         f"{name:<34}{row['read_s']:>8.2f}{row['repair_s']:>9.2f}{row['seconds']:>7.2f}{row['mb']:>6}"
         f"{row['triangles']:>11}{row['n_sky']:>7}{row['closed_share']:>8.2f}",
