@@ -35,7 +35,7 @@ from pbrs_farm.read.gltf.node_classes import (
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.gltf.punctual_lights import assumed_light, emitted, punctual_light
 from pbrs_farm.read.gltf.structure_parts import UNMAPPED, centres_of, structure_parts
-from pbrs_farm.read.gltf.window_glass import PANE_OPACITY, glass_materials
+from pbrs_farm.read.gltf.window_glass import PANE_OPACITY, glass_materials, names_glass
 from pbrs_farm.read.mesh.obj import Mesh
 
 _UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)
@@ -144,10 +144,13 @@ def _item(
     numbers = [number for _, meshes in parts for number, _ in meshes]
     glass = glass_materials(gltf, numbers) if is_opening else frozenset()
     for part, meshes in parts:
+        part_name = str(entry(gltf, "nodes", part.index).get("name", ""))
+        is_glass = is_opening and part.path != thing.root.path and names_glass(part_name)
         for number, mesh in meshes:
             material, emission = materials.material(number, clear=clear)
             # Glass by its name alone is a pane, unless the file tags its kind.
-            if number in glass and material.kind is MaterialKind.OPAQUE and not materials.is_tagged(number):  # fmt: skip
+            named = (number in glass or is_glass) and not materials.is_tagged(number)
+            if named and material.kind is MaterialKind.OPAQUE:
                 material = replace(material, kind=clear, opacity=PANE_OPACITY)
             emits = emission is not None and not kind.is_structure
             emits = emits and (emission != 0 or kind is ItemKind.LAMP)

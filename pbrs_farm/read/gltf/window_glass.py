@@ -39,6 +39,12 @@ def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]
     return frozenset(n for n, w in words.items() if w & _WINDOW and not w & _FRAME)
 
 
+def names_glass(name: str) -> bool:
+    """Whether the name of a part of a window or door says that the part is glass."""
+    words = words_of_name(name)
+    return bool(words & _GLASS) and not words & _FRAME
+
+
 def words_of_name(name: str) -> frozenset[str]:
     """Lower-case words of a name without accents; camelCase and digits part words."""
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)

@@ -486,3 +486,13 @@ def test_an_opaque_material_named_glass_in_a_window_is_a_pane(
     assert all(m.opacity < 0.5 for m in seen if m.kind is MaterialKind.PANE)
     (table,) = (house.materials[x.material] for x in item(house, "Table").surfaces)
     assert table.kind is MaterialKind.OPAQUE
+
+
+def test_a_part_named_glass_of_a_window_is_a_pane_whatever_its_material() -> None:
+    s = two_rooms()
+    pane = s.node("Glass", mesh=s.box([1, 1, 0], [2, 2, 0.02]))
+    frame = s.node("Glass frame", mesh=s.box([1, 0.9, 0], [2, 1, 0.05]))
+    s.node("Window", children=[pane, frame])
+    house = read(s)
+    kinds = [house.materials[x.material].kind for x in item(house, "Window").surfaces]
+    assert kinds == [MaterialKind.PANE, MaterialKind.OPAQUE]
