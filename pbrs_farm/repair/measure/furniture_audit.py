@@ -107,6 +107,6 @@ def _duplicates(pieces: Sequence[Item], boxes: F64) -> Iterator[tuple[str, str]]
         # Compare places first: few pieces share one, and of those class and mesh size.
         apart = np.abs(boxes[i + 1 :] - boxes[i]).max((1, 2))
         for j in i + 1 + np.flatnonzero(apart < _SAME_M):
-            b = pieces[j]
+            b = pieces[int(j)]
             if (a.source_class, a.n_faces) == (b.source_class, b.n_faces):
                 yield a.id, b.id
