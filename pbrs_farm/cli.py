@@ -67,6 +67,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not hasattr(args, "handler"):
         parser.print_help()
         return 2
+    return _handled(args)
+
+
+def _handled(args: argparse.Namespace) -> int:
+    """Run the verb's handler and turn what it raises into an exit code."""
     try:
         return int(args.handler(args))
     except PbrsError as error:
@@ -85,6 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def build_parser(module: str | None = None) -> argparse.ArgumentParser:
     """The verbs of one module, or all of them; the farm's where celery and redis are installed."""
+    # Every verb takes --debug, before or after its own options.
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument("--debug", action="store_true", help="show tracebacks")
     parser = argparse.ArgumentParser(
@@ -96,9 +102,7 @@ def build_parser(module: str | None = None) -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(title="verbs", metavar="VERB")
 
     def verb(name: str, handler: Handler, text: str) -> argparse.ArgumentParser:
-        sub: argparse.ArgumentParser = verbs.add_parser(
-            name, help=text, description=text, parents=[common]
-        )
+        sub = verbs.add_parser(name, help=text, description=text, parents=[common])
         sub.set_defaults(handler=handler)
         return sub
 

@@ -43,6 +43,7 @@ class Finding:
 
 def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
     """Every part, in the order a house meets it."""
+    # What to install where a library is missing.
     oidn, oiio = "pip install 'pbrs-farm[transport]'", "pip install OpenImageIO"
     return [
         _python(),
@@ -74,6 +75,7 @@ def _packages() -> Finding:
             found.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             missing.append(package)
+    # The extras gl and transport install all of them.
     if missing:
         text = "not installed: " + ", ".join(missing)
         return Finding("packages", "missing", text, "pip install -e '.[gl,transport]'", True)
@@ -156,6 +158,7 @@ def check_variant(name: str) -> str:
     """Mitsuba's variant of that name traces a ray."""
     from pbrs_farm.raycast import variant
 
+    # Dr.Jit would load an old LLVM and crash.
     if name.startswith("llvm") and not variant.find_llvm():
         raise SystemExit("no LLVM of version 17 or later")
     variant.choose_variant()
@@ -179,6 +182,7 @@ def check_denoiser(_argument: str) -> str:
     from pbrs_farm.transport.develop.denoiser import denoise_radiance
 
     grey = np.full((32, 32, 3), 0.5, np.float32)
+    # The denoiser's guides: a grey albedo, a floor's normal.
     normal = np.broadcast_to(np.array([0, 1, 0], np.float32), grey.shape).copy()
     mean = float(denoise_radiance(grey, grey, normal).mean())
     if abs(mean - 0.5) >= 0.05:
@@ -192,6 +196,7 @@ def check_pictures(_argument: str) -> str:
 
     from pbrs_farm.images import array_from_png, png_from_array
 
+    # Every value of a byte, in the 16 bits that depth has.
     pixels = np.arange(256, dtype=np.uint16).reshape(16, 16)
     if not np.array_equal(array_from_png(png_from_array(pixels)), pixels):
         raise SystemExit("a PNG reads back as other pixels")
@@ -211,6 +216,7 @@ def check_store(url: str) -> str:
     from pbrs_farm.store import store_from_url
 
     store = store_from_url(url, settings_from_environment().store)
+    # Write, read back, remove: what a worker does with every file.
     store.put("doctor/probe.txt", b"ok")
     if store.get("doctor/probe.txt") != b"ok":
         raise SystemExit("an object reads back as other bytes")

@@ -22,7 +22,7 @@ from typing import Final
 
 from pbrs_farm.core.errors import MachineFailed
 
-APT_TIMEOUT_S: Final = 600
+APT_TIMEOUT_S: Final = 600  # of one download
 
 
 def cache_folder() -> Path:
@@ -33,12 +33,12 @@ def cache_folder() -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Deb:
-    """A downloaded package. sha256: of the .deb."""
+    """A downloaded package."""
 
     name: str
     version: str
-    path: Path
-    sha256: str
+    path: Path  # of the .deb
+    sha256: str  # of the .deb
 
     def members(self, wanted: Callable[[str], bool]) -> dict[str, bytes]:
         """Path in the package -> bytes of every wanted file; MachineFailed if it is damaged."""
@@ -57,6 +57,7 @@ class Deb:
 
 def cached_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb | None:
     """The package if it was fetched before, the tested version if there is a choice; else None."""
+    # The tested version goes last, where it is taken.
     debs = sorted((folder or cache_folder()).glob(f"{package}_*.deb"))
     debs.sort(key=lambda p: version_of(p) == tested_version)
     return _deb(package, debs[-1]) if debs else None
@@ -69,13 +70,11 @@ def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -
     """
     folder = folder or cache_folder()
     try:
-        return cached_deb(package, tested_version, folder) or _download_into(
-            package, tested_version, folder
-        )
+        held = cached_deb(package, tested_version, folder)
+        return held or _download_into(package, tested_version, folder)
     except OSError as error:
-        raise MachineFailed(
-            f"{folder}: {error.strerror or error}", hint="set PBRS_CACHE to a folder of yours"
-        ) from None
+        hint = "set PBRS_CACHE to a folder of yours"
+        raise MachineFailed(f"{folder}: {error.strerror or error}", hint=hint) from None
 
 
 def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
@@ -85,6 +84,7 @@ def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
             f"no apt-get here to fetch {package}",
             hint=f"put Debian's {package}_{tested_version}_all.deb into {folder}",
         )
+    # Download beside the cache, then move: a package is there whole or not at all.
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         _download(package, Path(scratch))
         debs = sorted(Path(scratch).glob(f"{package}_*.deb"))
@@ -106,18 +106,22 @@ def _download(package: str, scratch: Path) -> None:
     try:
         done = subprocess.run(
             ["apt-get", "download", package],
-            cwd=scratch,
-            capture_output=True,
-            text=True,
-            timeout=APT_TIMEOUT_S,
-            check=False,
-        )
+            cwd=scratch, capture_output=True, text=True, timeout=APT_TIMEOUT_S, check=False,
+        )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:
         raise MachineFailed(f"apt-get download {package}: {error}", hint=_HINT) from None
     if done.returncode != 0:
+        # apt says what went wrong in lines that begin with E:.
         lines = [x for x in (done.stderr + done.stdout).splitlines() if x.startswith("E:")]
         reason = lines[0] if lines else f"exit status {done.returncode}"
         raise MachineFailed(f"apt-get download {package}: {reason}", hint=_HINT)
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file of the cache so that it is there whole or not at all."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as scratch:
+        scratch.write(data)
+    Path(scratch.name).replace(path)
 
 
 def version_of(deb: Path) -> str:
@@ -141,6 +145,7 @@ def _ar_members(data: bytes) -> list[tuple[str, bytes]]:
         raise ValueError("not a Debian package")
     members, at = [], 8
     while at + 60 <= len(data):
+        # A member's header has 60 bytes: name in 16, size at 48; contents begin at even places.
         name = data[at : at + 16].decode("ascii", "replace").strip().rstrip("/")
         size = int(data[at + 48 : at + 58])
         members.append((name, data[at + 60 : at + 60 + size]))
@@ -153,6 +158,7 @@ def _plain_tar(name: str, content: bytes, deb: Path) -> bytes:
         return lzma.decompress(content)
     if name.endswith((".tar", ".gz")):
         return gzip.decompress(content) if name.endswith(".gz") else content
+    # Leave zstd to Debian's own tool.
     if shutil.which("dpkg-deb") is None:
         raise ValueError(f"{name}: dpkg-deb is needed to unpack it")
     done = subprocess.run(

@@ -5,26 +5,25 @@ Effects: those of debian.py, and the unpacked jar in the cache folder.
 
 from __future__ import annotations
 
-import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from pbrs_farm.assets.debian import Deb, cached_deb, fetched_deb
+from pbrs_farm.assets.debian import Deb, cached_deb, fetched_deb, write_whole
 from pbrs_farm.core.errors import BadInput
 
 PACKAGE: Final = "sweethome3d"
 TESTED_VERSION: Final = "7.0.2+dfsg-3"
-JAR: Final = "usr/share/sweethome3d/sweethome3d.jar"
-EXAMPLES: Final = "com/eteks/sweethome3d/io/resources/examples"
+JAR: Final = "usr/share/sweethome3d/sweethome3d.jar"  # in the package
+EXAMPLES: Final = "com/eteks/sweethome3d/io/resources/examples"  # in the jar
 
 
 @dataclass(frozen=True, slots=True)
 class ExampleHome:
-    """A home drawn by E. and V. Puybaret / eTeks (CC-BY 3.0). name: to ask for it by."""
+    """A home drawn by E. and V. Puybaret / eTeks (CC-BY 3.0)."""
 
-    name: str
+    name: str  # to ask for it by
     n_rooms: int
     n_levels: int
 
@@ -49,12 +48,12 @@ def example_homes() -> tuple[ExampleHome, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Package:
-    """A fetched package. deb_sha256: of the .deb. note: what is odd about it, or ""."""
+    """A fetched package."""
 
     version: str
     deb_sha256: str
-    jar: Path
-    note: str = ""
+    jar: Path  # unpacked, in the cache
+    note: str = ""  # what is odd about it
 
     @property
     def label(self) -> str:
@@ -112,13 +111,11 @@ def fetch(cache: Path | None = None) -> Package:
 def _unpacked(deb: Deb) -> Package:
     jar = deb.path.parent / f"{PACKAGE}-{deb.sha256[:16]}.jar"
     if not jar.exists():
-        # Unpack the jar under its package's hash, written whole or not at all.
+        # Unpack the jar under its package's hash.
         files = deb.members(lambda name: name == JAR)
         if JAR not in files:
             raise deb.damaged(f"holds no {JAR}")
-        with tempfile.NamedTemporaryFile(dir=deb.path.parent, delete=False) as scratch:
-            scratch.write(files[JAR])
-        Path(scratch.name).replace(jar)
+        write_whole(jar, files[JAR])
     note = ""
     if deb.version != TESTED_VERSION:
         note = f"{PACKAGE} {deb.version} is not the tested version {TESTED_VERSION}"

@@ -5,11 +5,10 @@ Effects: those of debian.py, and EXR files in the cache folder.
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import Final
 
-from pbrs_farm.assets.debian import cache_folder, fetched_deb
+from pbrs_farm.assets.debian import cache_folder, fetched_deb, write_whole
 
 PACKAGE: Final = "blender-data"
 TESTED_VERSION: Final = "3.4.1+dfsg-2"
@@ -32,7 +31,5 @@ def fetch_skies(cache: Path | None = None) -> Path:
         raise deb.damaged(f"holds no {', '.join(sorted(wanted))}")
     folder.mkdir(parents=True, exist_ok=True)
     for path, data in files.items():
-        with tempfile.NamedTemporaryFile(dir=folder, delete=False) as scratch:
-            scratch.write(data)
-        Path(scratch.name).replace(folder / Path(path).name)
+        write_whole(folder / Path(path).name, data)
     return folder

@@ -134,16 +134,24 @@ _SHORT_FORMS: Final = {
 }
 
 
+def fields_set(
+    pairs: list[str], expected: str, prefixes: tuple[str, ...] = ("",)
+) -> dict[str, str]:
+    """The arguments of --set as path -> text; raises BadInput for one without "=" or prefix."""
+    overrides = {}
+    for pair in pairs:
+        path, equals, text = pair.partition("=")
+        if not equals or not path.startswith(prefixes):
+            raise BadInput("--set", pair, f"expected {expected}")
+        overrides[path] = text
+    return overrides
+
+
 def recipe_of(args: argparse.Namespace) -> Recipe:
     """The recipe that a command's options name; raises BadRecipe."""
     from pbrs_farm.core.recipe import recipe_from_name
 
-    overrides: dict[str, str] = {}
-    for pair in args.set:
-        path, equals, text = pair.partition("=")
-        if not equals:
-            raise BadInput("--set", pair, "expected group.field=value")
-        overrides[path] = text
+    overrides = fields_set(args.set, "group.field=value")
     # Let the options that are short forms of fields win over --set.
     if args.size is not None:
         width, _, height = args.size.partition("x")
@@ -155,6 +163,7 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
     if args.strict:
         overrides["read.strict"] = "true"
     if getattr(args, "camera_file", None):
+        # A recipe's fields are JSON: quote the path.
         overrides |= {"cameras.source": "file", "cameras.file": json.dumps(str(args.camera_file))}
     if getattr(args, "exact", False):
         overrides["cameras.exact"] = "true"
@@ -174,6 +183,7 @@ def farm_of(args: argparse.Namespace) -> Farm:
 
     config = config_from_environment()
     if args.store:
+        # A store without a scheme is a folder.
         url = args.store if "://" in args.store else Path(args.store).absolute().as_uri()
         config = replace(config, store_url=url)
     return Farm(config)

@@ -18,8 +18,10 @@ from pbrs_farm.commands.arguments import (
 from pbrs_farm.core.shown_text import shown
 
 if TYPE_CHECKING:
+    from pbrs_farm.core.house import House
     from pbrs_farm.sample import CameraReport
     from pbrs_farm.sample.report import SectorReport
+    from pbrs_farm.sample.sampler import Sampling
 
 
 def add_verbs(verb: Verb) -> None:
@@ -58,14 +60,14 @@ def _repair(args: argparse.Namespace) -> int:
     # Write the repaired house and what was done to it.
     store = FolderStore(args.out)
     glb, description = bundle_from_house(house)
-    store.put("house.glb", glb)
-    store.put("house.json", description)
-    store.put("repair.json", json_bytes(report))
+    files = {"house.glb": glb, "house.json": description, "repair.json": json_bytes(report)}
+    for name, data in files.items():
+        store.put(name, data)
     # Draw each level's walls before and after.
     before = read_house(source, recipe.read)
-    cuts = [f"cut_{level.id}.svg" for level in house.levels]
-    for level, name in zip(house.levels, cuts, strict=True):
-        store.put(name, section_svg(before, house, level.id).encode())
+    cuts = {f"cut_{level.id}.svg": section_svg(before, house, level.id) for level in house.levels}
+    for name, svg in cuts.items():
+        store.put(name, svg.encode())
     echo(summary_of_report(report))
     echo(f"{args.out}: house.glb house.json repair.json {' '.join(cuts)}")
     return 1 if report.is_leaking or report.structure.walls_lost else 0
@@ -75,38 +77,42 @@ def _cameras(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house import geometry_from_house
     from pbrs_farm.formats.cameras_json import cameras_document
     from pbrs_farm.formats.serialise import json_bytes
-    from pbrs_farm.images import png_from_array
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.read.source import resolve
     from pbrs_farm.run.processes.verb_process import doing
     from pbrs_farm.run.steps import camera_seed, repaired_house
     from pbrs_farm.sample import sample_cameras
-    from pbrs_farm.sample.camera_map import camera_map_rgb, camera_map_svg
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_of(args)
     house, _report = repaired_house(resolve(args.home), recipe)
+    # Score candidates by the items that rays from them meet.
     caster = Caster(geometry_from_house(house))
     doing(args.home, "cameras")
-    sampling = sample_cameras(
-        house,
-        recipe.cameras,
-        camera_seed(house.id, recipe),
-        caster.item_counts,
-        caster.depth_pictures,
-    )
+    counters = caster.item_counts, caster.depth_pictures
+    seed = camera_seed(house.id, recipe)
+    sampling = sample_cameras(house, recipe.cameras, seed, *counters)
     document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))
     if args.out is not None:
         FolderStore(args.out.parent).put(args.out.name, json_bytes(document))
     if args.map is not None:
-        folder, name = FolderStore(args.map.parent), args.map.stem
-        folder.put(f"{name}.png", png_from_array(camera_map_rgb(house, sampling)))
-        folder.put(f"{name}.svg", camera_map_svg(house, sampling).encode())
+        _write_map(args.map, house, sampling)
     if args.json:
         echo_json(document)
     else:
         _echo_report(sampling.report)
     return 0
+
+
+def _write_map(path: Path, house: House, sampling: Sampling) -> None:
+    """Write the floor plan with the candidates as PNG and as SVG."""
+    from pbrs_farm.images import png_from_array
+    from pbrs_farm.sample.camera_map import camera_map_rgb, camera_map_svg
+    from pbrs_farm.store.folder import FolderStore
+
+    folder, name = FolderStore(path.parent), path.stem
+    folder.put(f"{name}.png", png_from_array(camera_map_rgb(house, sampling)))
+    folder.put(f"{name}.svg", camera_map_svg(house, sampling).encode())
 
 
 def _echo_report(report: CameraReport) -> None:

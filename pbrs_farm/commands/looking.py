@@ -55,6 +55,7 @@ def _homes(args: argparse.Namespace) -> int:
     if args.json:
         echo_json([asdict(row) for row in rows])
         return 0
+    # Listing fetches nothing: the list of homes is part of the program.
     package = homes.cached()
     for row in rows:
         echo(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
@@ -79,6 +80,7 @@ def _skies(_args: argparse.Namespace) -> int:
 def _recipes(args: argparse.Namespace) -> int:
     recipe = recipe_from_name(args.name)
     echo(f"# recipe {args.name}; --set group.field=value overrides any field")
+    # Print the recipe as --set takes it, group by group.
     for group, info in Recipe.model_fields.items():
         value = getattr(recipe, group)
         # Fields of the recipe itself, like the seed, stand alone.

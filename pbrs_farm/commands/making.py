@@ -30,6 +30,7 @@ from pbrs_farm.core.recipe import recipe_from_json
 
 if TYPE_CHECKING:
     from pbrs_farm.read.source import SourceRef
+    from pbrs_farm.run.local import Run
 
 
 def add_verbs(verb: Verb) -> None:
@@ -100,13 +101,28 @@ def _run_homes(
 ) -> int:
     """Run the plan on homes and on sources that are known already; the exit code."""
     from pbrs_farm.progress import progress_reporter
-    from pbrs_farm.run.local import Run, run_local
-    from pbrs_farm.run.plan import wanted
-    from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.run.local import run_local
 
     at_least("--jobs", args.jobs, 1)
     at_least("--views", args.views, 0)
-    run = Run(
+    run = _described(args, homes, sources)
+    # Run it, reporting progress as standard output suits.
+    _warn_of_slowness()
+    started = time.monotonic()
+    n_homes = len(homes) + len(sources)
+    with progress_reporter(n_homes, args.views, as_json=args.json) as report:
+        summary = run_local(run, report)
+    _report(args, summary, time.monotonic() - started)
+    return 1 if summary.failures or summary.n_views == 0 else 0
+
+
+def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[SourceRef]) -> Run:
+    """The run that the options describe."""
+    from pbrs_farm.run.local import Run
+    from pbrs_farm.run.plan import wanted
+    from pbrs_farm.settings import settings_from_environment
+
+    return Run(
         homes=homes,
         store_url=args.out,
         recipe=recipe_of(args),
@@ -118,14 +134,6 @@ def _run_homes(
         store=settings_from_environment().store,
         sources=sources,
     )
-    # Run it, reporting progress as standard output suits.
-    _warn_of_slowness()
-    started = time.monotonic()
-    n_homes = len(homes) + len(sources)
-    with progress_reporter(n_homes, args.views, as_json=args.json) as report:
-        summary = run_local(run, report)
-    _report(args, summary, time.monotonic() - started)
-    return 1 if summary.failures or summary.n_views == 0 else 0
 
 
 def _warn_of_slowness() -> None:
@@ -140,18 +148,8 @@ def _warn_of_slowness() -> None:
 
 
 def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
-    # For machines: one line of JSON.
     if args.json:
-        row = {
-            "event": "summary", "houses": summary.houses, "views": summary.n_views,
-            "steps_done": summary.n_done, "steps_kept": summary.n_kept,
-            "seconds": round(seconds, 1), "peak_mb": round(summary.peak_mb),
-            "without_views": [list(pair) for pair in summary.without_views],
-            "left_out": [list(pair) for pair in summary.left_out],
-            "dark": [list(pair) for pair in summary.dark],
-            "failures": [dict(zip(("what", "message", "command"), f, strict=True)) for f in summary.failures],
-        }  # fmt: skip
-        echo(json.dumps(row))
+        echo(_summary_line(summary, seconds))
         return
     echo(
         f"{counted(len(summary.houses), 'house')}, {counted(summary.n_views, 'view')}: "
@@ -169,6 +167,20 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         text = message if message.startswith(what) else f"{what}: {message}"
         # A step that failed has printed its message when it happened.
         warn(f"{what} failed; reproduce: {command}" if command else text)
+
+
+def _summary_line(summary: Any, seconds: float) -> str:
+    """The run's outcome as one line of JSON."""
+    failures = [dict(zip(("what", "message", "command"), f, strict=True)) for f in summary.failures]
+    row = {
+        "event": "summary", "houses": summary.houses, "views": summary.n_views,
+        "steps_done": summary.n_done, "steps_kept": summary.n_kept,
+        "seconds": round(seconds, 1), "peak_mb": round(summary.peak_mb),
+        "without_views": [list(pair) for pair in summary.without_views],
+        "left_out": [list(pair) for pair in summary.left_out],
+        "dark": [list(pair) for pair in summary.dark], "failures": failures,
+    }  # fmt: skip
+    return json.dumps(row)
 
 
 def _demo(args: argparse.Namespace) -> int:
@@ -203,10 +215,12 @@ def _step(args: argparse.Namespace) -> int:
     store = store_from_url(args.out, settings_from_environment().store)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     source = resolve(args.home)
+    # One process, one house: the cache keeps it for all steps.
     work = Work(
         store=store, recipe=recipe, house_id=source.house_id, house_cache=HouseCache(), source=source,
         view_id=args.view, layers=tuple(args.layers),
     )  # fmt: skip
+    # Make first what the step needs of its house, where it is missing.
     for name in needed_of_house(args.step, source.house_id):
         run_step(name, replace(work, view_id=None))
     outcome = run_step(args.step, work)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import Verb, add_set, echo, echo_json
+from pbrs_farm.commands.arguments import Verb, add_set, echo, echo_json, fields_set
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import (
@@ -18,6 +18,7 @@ from pbrs_farm.core.recipe import (
 )
 
 if TYPE_CHECKING:
+    from pbrs_farm.curate.selection_summary import SelectionSummary
     from pbrs_farm.selection.reference_set import Reference
 
 
@@ -55,21 +56,16 @@ def _add_photographs(p: argparse.ArgumentParser) -> None:
 
 
 def _overrides(arguments: list[str]) -> dict[str, str]:
-    pairs = {}
-    for pair in arguments:
-        name, equals, text = pair.partition("=")
-        if not equals or not name.startswith(("histogram.", "selection.")):
-            raise BadInput("--set", pair, "expected histogram.FIELD=value or selection.FIELD=value")
-        pairs[name] = text
-    return pairs
+    expected = "histogram.FIELD=value or selection.FIELD=value"
+    return fields_set(arguments, expected, ("histogram.", "selection."))
 
 
 def _built(
-    args: argparse.Namespace, histogram: HistogramFields, selection: SelectionFields
+    args: argparse.Namespace, source: Path, histogram: HistogramFields, selection: SelectionFields
 ) -> Reference:
+    """The reference of photographs, read as the options say."""
     from pbrs_farm.curate.reference_build import PhotoOptions, build_reference
 
-    source = args.source if hasattr(args, "source") else args.reference
     options = PhotoOptions(args.depth_scale, args.sun_rgbd, not args.no_crop)
     return build_reference(source, histogram, selection, options)
 
@@ -80,7 +76,7 @@ def _reference(args: argparse.Namespace) -> int:
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_from_name("fast", _overrides(args.set))
-    reference = _built(args, recipe.histogram, recipe.selection)
+    reference = _built(args, args.source, recipe.histogram, recipe.selection)
     FolderStore(args.out.parent).put(args.out.name, bytes_from_reference(reference))
     echo(table_text(reference.facts.table, reference.facts.binning))
     echo(f"{args.out}: {len(reference.facts.ids)} photographs")
@@ -99,11 +95,10 @@ def _select(args: argparse.Namespace) -> int:
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     fields = _fields(recipe, args)
     # Read the reference, or build it from photographs as the views' recipe says.
-    is_file = args.reference.is_file() and args.reference.suffix != ".mat"
-    reference = (
-        read_reference(args.reference) if is_file else _built(args, recipe.histogram, fields)
-    )
-    summary = select(store, reference, fields, reference_name=str(args.reference), run=args.run)
+    path = args.reference
+    is_file = path.is_file() and path.suffix != ".mat"
+    reference = read_reference(path) if is_file else _built(args, path, recipe.histogram, fields)
+    summary = select(store, reference, fields, reference_name=str(path), run=args.run)
     # Write the page from the run as it is stored now.
     if args.report:
         from pbrs_farm.curate.selection_report import selection_report
@@ -113,11 +108,16 @@ def _select(args: argparse.Namespace) -> int:
     if args.json:
         echo_json(summary.model_dump(mode="json"))
         return 0
+    _echo_summary(summary)
+    echo(keys.selection_key(args.run, "html" if args.report else "parquet"))
+    return 0
+
+
+def _echo_summary(summary: SelectionSummary) -> None:
+    """Print how many views are kept, and how many each reason rejects."""
     echo(f"{summary.kept} of {summary.views} views kept, {summary.scored} scored")
     for reason, n in summary.reasons.items():
         echo(f"  {n:>6}  {reason}")
-    echo(keys.selection_key(args.run, "html" if args.report else "parquet"))
-    return 0
 
 
 def _fields(recipe: Recipe, args: argparse.Namespace) -> SelectionFields:

@@ -43,6 +43,7 @@ def add_verbs(verb: Verb) -> None:
     p = farm_verb("retry", _retry, "fresh attempts for failed tasks (all, unless named)")
     p.add_argument("tasks", nargs="*", metavar="TASK")
     _add_job(p, flag=True)
+    # Verbs that change a job's state take the job alone.
     for name, text in _STEERING.items():
         p = farm_verb(name, _steer, text)
         p.set_defaults(what=name)
@@ -53,6 +54,7 @@ def add_verbs(verb: Verb) -> None:
     farm_verb("workers", _workers, "the farm's workers")
     p = farm_verb("recover", _recover, "rebuild the ledger of a job from storage")
     p.add_argument("job")
+    # The two services of the farm.
     verb("coordinator", _coordinator, "lead the farm, or stand by")
     p = verb("worker", _worker, "work for the farm until asked to leave")
     p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")

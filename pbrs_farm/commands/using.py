@@ -13,6 +13,7 @@ from pbrs_farm.core.shown_text import shown
 
 if TYPE_CHECKING:
     from pbrs_farm.run.relight import LampFactor
+    from pbrs_farm.transport.validation.claims import Claim
 
 
 def add_verbs(verb: Verb) -> None:
@@ -103,8 +104,7 @@ def _verify_light(args: argparse.Namespace) -> int:
     for claim in light_claims(variant):
         claims.append(claim)
         if not args.json:
-            verdict = "ok" if claim.passed else "FAIL"
-            echo(f"{verdict:<5}{claim.text:<63}{claim.measured:<48}{claim.expected}")
+            echo(_claim_row(claim))
     n_failed = sum(not claim.passed for claim in claims)
     if args.json:
         rows = [asdict(claim) for claim in claims]
@@ -113,7 +113,13 @@ def _verify_light(args: argparse.Namespace) -> int:
         seconds = sum(claim.seconds for claim in claims)
         failed = f"{n_failed} FAILED" if n_failed else "all hold"
         echo(f"{len(claims)} claims in {variant}, {failed}, {seconds:.0f} s")
+    # A claim that fails is the verb's failure.
     return 1 if n_failed else 0
+
+
+def _claim_row(claim: Claim) -> str:
+    verdict = "ok" if claim.passed else "FAIL"
+    return f"{verdict:<5}{claim.text:<63}{claim.measured:<48}{claim.expected}"
 
 
 def _relight(args: argparse.Namespace) -> int:
@@ -134,6 +140,7 @@ def _relight(args: argparse.Namespace) -> int:
     factors = {"indoor": args.indoor, "outdoor": args.outdoor}
     png = relit(args.view, **factors, denoise=not args.no_denoise, lamps=lamps)
     FolderStore(out.parent).put(out.name, png)
+    # A factor of a lamp that the view does not see changes nothing: say so.
     for row in unlit_lamps(args.view, lamps) if lamps else ():
         warn(f"lamp {row['number']} ({row['item']}) brings no light to this view")
     echo(str(out))

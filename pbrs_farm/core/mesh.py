@@ -50,6 +50,7 @@ def signed_volume(corners: F64, origin: F64) -> float:
 
     origin: (3,) a point near the mesh, so that rounding stays small.
     """
+    # Sum the signed tetrahedra between the origin and each face.
     a, b, c = np.moveaxis(corners - origin, 1, 0)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
@@ -62,8 +63,10 @@ def closed_edge_share(places: NDArray[np.floating]) -> float:
     """
     from trimesh.geometry import faces_to_edges
 
+    # Number the places, so that seams of texture and normals do not open the mesh.
     _, vertex = np.unique(places.reshape(-1, 3), axis=0, return_inverse=True)
     edges = np.sort(faces_to_edges(vertex.reshape(-1, 3)), axis=1)
+    # Count the faces of each edge, leaving out edges of no length.
     _, n_faces = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
     return float(np.mean(n_faces % 2 == 0)) if len(n_faces) else 0.0
 

@@ -47,6 +47,7 @@ def _view_from_json(row: dict[str, Any]) -> View:
     pose = np.array(row["world_from_camera_opengl"], np.float64)
     if pose.shape != (4, 4):
         raise ValueError(f"a pose has (4, 4) numbers, got {pose.shape}")
+    # Objects are by instance id, which JSON turned into text.
     return View(
         id=row["id"],
         room_id=row["room"],

@@ -46,12 +46,13 @@ class GlbWriter:
     """Collects buffer views and accessors, then gives the GLB's bytes. State: what was added."""
 
     def __init__(self) -> None:
-        self._binary = bytearray()
-        self._views: list[dict[str, int]] = []
-        self._accessors: list[dict[str, Any]] = []
+        self._binary = bytearray()  # the one buffer
+        self._views: list[dict[str, int]] = []  # parts of it
+        self._accessors: list[dict[str, Any]] = []  # a view each, with type and count
 
     def add_bytes(self, data: bytes, *, target: int | None = None) -> int:
         """Index of a new buffer view that holds data."""
+        # Begin every view at a multiple of four bytes, as accessors of floats need it.
         view = {"buffer": 0, "byteOffset": len(self._binary), "byteLength": len(data)}
         if target is not None:
             view["target"] = target
@@ -117,6 +118,15 @@ def gltf_from_glb(data: bytes, file: str) -> Gltf:
         raise BadHouse(file, "", f"is glTF {version}; only glTF 2.0 is read")
     if length > len(data):
         raise BadHouse(file, "", f"is cut short: {len(data)} of {length} bytes")
+    chunks = _chunks(data, length, file)
+    document = json_from_bytes(chunks.get(_JSON_CHUNK, b""), file)
+    if not isinstance(document, dict):
+        raise BadHouse(file, "", "the JSON chunk is no object")
+    binary = chunks.get(_BIN_CHUNK)
+    return Gltf(document, () if binary is None else (binary,), file)
+
+
+def _chunks(data: bytes, length: int, file: str) -> dict[int, bytes]:
     # Chunks: length, kind, bytes; the first of each kind counts.
     chunks: dict[int, bytes] = {}
     at = 12
@@ -126,11 +136,7 @@ def gltf_from_glb(data: bytes, file: str) -> Gltf:
             raise BadHouse(file, f"byte {at}", "chunk reaches past the end")
         chunks.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
-    document = json_from_bytes(chunks.get(_JSON_CHUNK, b""), file)
-    if not isinstance(document, dict):
-        raise BadHouse(file, "", "the JSON chunk is no object")
-    binary = chunks.get(_BIN_CHUNK)
-    return Gltf(document, () if binary is None else (binary,), file)
+    return chunks
 
 
 def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
@@ -168,11 +174,9 @@ def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
 
     Raises BadHouse for an accessor that is damaged or not of geometry.
     """
-    place = f"accessors[{index}]"
-    accessor = entry(gltf, "accessors", index)
-    dtype, width = DTYPES.get(_hashable(accessor.get("componentType"))), WIDTHS.get(
-        _hashable(accessor.get("type"))
-    )  # fmt: skip
+    place, accessor = f"accessors[{index}]", entry(gltf, "accessors", index)
+    dtype = DTYPES.get(_hashable(accessor.get("componentType")))
+    width = WIDTHS.get(_hashable(accessor.get("type")))
     if dtype is None or width is None or "sparse" in accessor:
         raise BadHouse(gltf.file, place, "is sparse or of a type that no mesh uses")
     n = count(gltf, accessor, "count", place)

@@ -21,38 +21,32 @@ SCORED_MODE: Final = Mode.MLT_IL_OL
 
 
 class PictureQuality(BaseModel):
-    """Of one lighting mode. brightness: median sRGB luma, 0..1. blown: share with a channel >= 254."""
+    """Of one lighting mode."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    brightness: float
-    blown: float
+    brightness: float  # median sRGB luma, 0..1
+    blown: float  # share of pixels with a channel >= 254
 
 
 class SceneQuality(BaseModel):
-    """Of a view, whatever its light. All shares are of the picture.
-
-    surface: share of the largest instance. near: share nearer than near_m (a camera inside an
-    object sees little else). n_objects: objects (no walls, floors, ceilings) of object_fraction.
-    noise: relative error of the raw light, None where none was traced. missing_textures: of the
-    house. classes: NYU40 id (1..40) -> its share.
-    """
+    """Of a view, whatever its light. All shares are of the picture."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    surface: float
-    near: float
-    n_objects: int
-    noise: float | None = None
-    missing_textures: int = 0
-    classes: dict[int, float] = {}
+    surface: float  # share of the largest instance
+    near: float  # share nearer than near_m: a camera inside an object sees little else
+    n_objects: int  # of object_fraction or more; walls, floors and ceilings apart
+    noise: float | None = None  # relative error of the raw light, None where none was traced
+    missing_textures: int = 0  # of the house
+    classes: dict[int, float] = {}  # NYU40 id (1..40) -> its share
 
 
 class SparseCounts(BaseModel):
-    """Counts of the bins that are not empty; bins ascend. size: number of all bins."""
+    """Counts of the bins that are not empty."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    size: int
-    bins: tuple[int, ...]
-    counts: tuple[int, ...]
+    size: int  # number of all bins
+    bins: tuple[int, ...]  # ascending
+    counts: tuple[int, ...]  # of each of them
 
     @model_validator(mode="after")
     def _fits(self) -> SparseCounts:
@@ -68,9 +62,8 @@ class SparseCounts(BaseModel):
     def of(counts: NDArray[np.uint32]) -> SparseCounts:
         """The bins of counts that are not empty."""
         bins = np.nonzero(counts)[0]
-        return SparseCounts(
-            size=len(counts), bins=tuple(bins.tolist()), counts=tuple(counts[bins].tolist())
-        )
+        filled = tuple(counts[bins].tolist())
+        return SparseCounts(size=len(counts), bins=tuple(bins.tolist()), counts=filled)
 
     def dense(self) -> NDArray[np.uint32]:
         """(size,) uint32."""
@@ -80,11 +73,7 @@ class SparseCounts(BaseModel):
 
 
 class ViewRecord(BaseModel):
-    """A view as selection sees it. room_type: the room's name or type, for the report.
-
-    colour, picture: by lighting mode. Only SCORED_MODE where the view has it, else every mode it
-    has, so that `--score-mode` can choose.
-    """
+    """A view as selection sees it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     format: Literal["pbrs_farm histogram 1"] = "pbrs_farm histogram 1"
@@ -92,14 +81,16 @@ class ViewRecord(BaseModel):
     house: str
     view: str
     room: str
-    room_type: str
+    room_type: str  # the room's name or type, for the report
     depth: SparseCounts
+    # Only SCORED_MODE where the view has it, else every mode it has, for `--score-mode` to choose.
     colour: dict[Mode, SparseCounts]
     picture: dict[Mode, PictureQuality]
     scene: SceneQuality
 
     @model_validator(mode="after")
     def _fits(self) -> ViewRecord:
+        # Colour bins are a cube of bins per channel.
         sizes = {c.size for c in self.colour.values()} - {self.settings.colour_bins**3}
         if sizes or self.depth.size != self.settings.depth_bins:
             raise ValueError("the histograms do not have the bins that settings say")

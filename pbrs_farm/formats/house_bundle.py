@@ -102,6 +102,7 @@ def _dicts(data: dict[str, Any], key: str) -> list[dict[str, Any]]:
 
 
 def _item_with_arrays(gltf: glb.Gltf, item: dict[str, Any], index: int) -> dict[str, Any]:
+    # Nodes stand in the order of the items, primitives in that of the surfaces.
     node = glb.entry(gltf, "nodes", index)
     mesh = glb.entry(gltf, "meshes", node["mesh"]) if "mesh" in node else {}
     primitives = iter(_dicts(mesh, "primitives") if mesh else [])
@@ -137,8 +138,7 @@ def _arrays_of_primitive(gltf: glb.Gltf, primitive: dict[str, Any], place: str) 
         arrays["normals"] = glb.accessor_array(gltf, attributes["NORMAL"])
     if "TEXCOORD_0" in attributes:
         # glTF measures v downwards.
-        uvs = glb.accessor_array(gltf, attributes["TEXCOORD_0"])
-        arrays["uvs"] = uvs * V_DOWN
+        arrays["uvs"] = glb.accessor_array(gltf, attributes["TEXCOORD_0"]) * V_DOWN
     n = len(arrays["positions"])
     if "indices" in primitive:
         numbers = glb.accessor_array(gltf, primitive["indices"])
@@ -151,6 +151,7 @@ def _arrays_of_primitive(gltf: glb.Gltf, primitive: dict[str, Any], place: str) 
 
 
 def _textures_with_data(gltf: glb.Gltf, textures: list[dict[str, Any]]) -> dict[str, Any]:
+    # The file lists a buffer view a texture, also of pictures that glTF does not know.
     extras = gltf.document.get("extras")
     views = extras.get("textures") if isinstance(extras, dict) else None
     if not isinstance(views, list) or len(views) != len(textures):

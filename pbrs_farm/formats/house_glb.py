@@ -23,7 +23,7 @@ GLTF_IMAGES: Final = ("image/png", "image/jpeg")
 # (u, v up) times this is (u, v down), one texture higher; and back.
 V_DOWN: Final[NDArray[np.float32]] = np.array([1, -1], np.float32)
 
-_PANE_ALPHA: Final = 0.3
+_PANE_ALPHA: Final = 0.3  # of glass whose source says opaque
 
 
 def glb_from_house(house: House) -> bytes:
@@ -42,13 +42,13 @@ def glb_from_house(house: House) -> bytes:
             meshes.append({"name": item.name or item.id, "primitives": primitives})
         nodes.append(node)
     images, kept = _write_textures(writer, house)
+    # glTF allows no empty list of nodes.
+    scene = {"name": house.name} | ({"nodes": list(range(len(nodes)))} if nodes else {})
     return writer.glb(
         {
             "asset": _asset(house),
             "scene": 0,
-            "scenes": [{"name": house.name, "nodes": list(range(len(nodes)))}]
-            if nodes
-            else [{"name": house.name}],
+            "scenes": [scene],
             "nodes": nodes,
             "meshes": meshes,
             "materials": [_gltf_material(m, images) for m in house.materials],
@@ -67,6 +67,7 @@ def _asset(house: House) -> dict[str, Any]:
         "generator": "pbrs_farm",
         "extras": json_from_value(source),
     }
+    # Carry the credit that the source asks for, or name its author and licence.
     line = source.attribution or ", ".join(x for x in (source.author, source.licence) if x)
     return asset | {"copyright": line} if line else asset
 
@@ -101,6 +102,7 @@ def _primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> d
     primitive: dict[str, Any] = {"attributes": attributes, "material": int(s.material)}
     if len(s.faces):
         return primitive | {"indices": writer.add_faces(s.faces), "mode": 4}
+    # Keep vertices without faces as points.
     return primitive | {"mode": 0}
 
 
@@ -148,6 +150,7 @@ def _linear(rgb: tuple[float, float, float]) -> list[float]:
 
 
 def _alpha(material: Material) -> tuple[float, str]:
+    # glTF's alpha modes: BLEND lets light through, MASK cuts out, OPAQUE ignores alpha.
     alpha = float(np.clip(material.opacity, 0, 1))
     # Glass is blended even where its source says opaque.
     if material.kind in (MaterialKind.GLASS, MaterialKind.PANE):

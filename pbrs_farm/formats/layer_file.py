@@ -19,6 +19,7 @@ def layer_bytes(name: str, array: NDArray[Any], attribution: str = "") -> bytes:
     layer = LAYER[name]
     if layer.file.endswith(".png"):
         return png_from_array(array, attribution=attribution)
+    # An EXR keeps each channel as a plane by its name: Z, or R, G and B.
     channels = layer.channels.split()
     planes = [array] if len(channels) == 1 else list(np.moveaxis(array, -1, 0))
     named = zip(channels, planes, strict=True)

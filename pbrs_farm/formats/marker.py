@@ -24,20 +24,16 @@ class StoredFile(BaseModel):
 
 
 class Marker(BaseModel):
-    """What a step was done with and what it wrote; itself written last and if-absent.
-
-    digest: of ids, recipe fields the step uses, the step's version and its inputs' digests.
-    facts: what later steps or view.json need to know; equal for equal inputs, no clock.
-    seconds, worker, attempt, finished_utc: the only clocks in the whole output.
-    """
+    """What a step was done with and what it wrote; itself written last and if-absent."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     step: str
     house_id: str
     view_id: str | None = None
-    digest: str
+    digest: str  # of ids, the recipe's fields in use, the step's version, its inputs' digests
     files: tuple[StoredFile, ...] = ()
-    facts: dict[str, Any] = {}
+    facts: dict[str, Any] = {}  # for later steps and view.json; equal for equal inputs
+    # The only clocks in the whole output:
     seconds: float = 0.0
     worker: str = ""
     attempt: int = 1

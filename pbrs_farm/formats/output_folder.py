@@ -51,9 +51,8 @@ def views_of(root: Path) -> tuple[ViewEntry, ...]:
     """
     roots = [root / name for name in keys.FOLDERS if (root / name).is_dir()]
     if not roots:
-        raise BadInput(
-            root, "", "not an output folder of pbrs-farm: it has no houses", hint="see --out"
-        )
+        text = "not an output folder of pbrs-farm: it has no houses"
+        raise BadInput(root, "", text, hint="see --out")
     folders = [folder for below in roots for folder in sorted(below.iterdir())]
     return tuple(view for folder in folders for view in _views(folder))
 
@@ -108,6 +107,7 @@ def reasons_of(root: Path) -> dict[tuple[str, str], str]:
     if not path.is_file():
         return {}
     try:
+        # A line per view, an empty reason where it is kept.
         rows = [json.loads(line) for line in read_regular(path).splitlines()]
         return {(row["house"], row["view"]): str(row["reason"]) for row in rows}
     except (OSError, ValueError, KeyError, TypeError) as error:

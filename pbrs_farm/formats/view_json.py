@@ -49,9 +49,7 @@ def lamps_from_view_json(data: bytes, place: object) -> list[dict[str, Any]]:
     try:
         rows: list[dict[str, Any]] = json.loads(data)["modes"]["light"]["lamps"]
     except (ValueError, KeyError, TypeError):
-        hint = (
-            "render it with them: pbrs-farm run HOME --out OUT --groups lamps, and --update if"
-            " OUT is the same"
-        )
+        command = "pbrs-farm run HOME --out OUT --groups lamps"
+        hint = f"render it with them: {command}, and --update if OUT is the same"
         raise BadInput(place, "", "was stored without the light of each lamp", hint=hint) from None
     return rows

@@ -33,8 +33,9 @@ class Caster:
     """
 
     def __init__(self, geometry: Geometry, *, variant: str | None = None) -> None:
-        self.geometry = geometry
+        self.geometry = geometry  # world frame, metres
         self.variant = choose_variant() if variant is None else variant
+        # Ids run from 1: the largest is the number of items.
         self.n_items = int(geometry.face_item.max()) if len(geometry.face_item) else 0
         self._tracer = _tracer(self.variant, geometry, _hittable(geometry))
         self._without: tuple[bytes, RayTracer | None] = (b"", None)  # skipped faces, their tracer
@@ -53,6 +54,7 @@ class Caster:
         face = _faces(self._tracer, camera)
         if not len(self.geometry.face_item):
             return np.zeros(face.shape, np.uint32)
+        # Read the item of each face; a ray that misses sees item 0.
         return np.where(face >= 0, self.geometry.face_item[face], np.uint32(0))
 
     def item_counts(self, cameras: Sequence[Camera]) -> NDArray[np.uint32]:
@@ -65,6 +67,7 @@ class Caster:
         if self._tracer is None or not cameras:
             counts = np.zeros((len(cameras), self.n_items + 1), np.uint32)
             for row, camera in enumerate(cameras):
+                # Without a face every ray misses.
                 counts[row, 0] = camera.intrinsics.width_px * camera.intrinsics.height_px
             return counts
         return self._tracer.counts(cameras, self.geometry.face_item, self.n_items + 1)
@@ -97,6 +100,7 @@ class Caster:
         n = len(origins)
         if self._tracer is None or n == 0:
             return np.full(n, np.inf, np.float32), np.full(n, -1, np.int32)
+        # Trace in float32, as Mitsuba's single-precision variants do.
         rays = np.asarray(origins, np.float32), np.asarray(directions, np.float32)
         reach = np.broadcast_to(np.asarray(max_distance, np.float32), (n,))
         return self._tracer.first_hit(*rays, reach)
@@ -119,6 +123,7 @@ def _tracer(variant: str, geometry: Geometry, keep: Bools) -> RayTracer | None:
         return None
     # Collapse a face that must not be hit to a point, so that all others keep their number.
     faces = np.where(keep[:, None], geometry.faces, geometry.faces[np.argmax(keep), :1])
+    # Put what is not finite at the origin: Embree refuses such bounds.
     positions = np.where(np.isfinite(geometry.positions), geometry.positions, np.float32(0))
     build = ScalarTracer if variant.startswith("scalar") else JitTracer
     return build(variant, positions, faces)

@@ -49,6 +49,7 @@ class ScalarTracer:
         counts = np.zeros((len(cameras), n_labels), np.uint32)
         for row, camera in enumerate(cameras):
             face = self.faces_of_camera(camera)
+            # Count a label per pixel; label 0 takes the rays that miss.
             label = np.where(face >= 0, face_label[face], np.uint32(0))
             counts[row] = np.bincount(label.ravel(), minlength=n_labels)
         return counts

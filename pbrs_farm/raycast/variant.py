@@ -17,18 +17,31 @@ from pbrs_farm.core.errors import MachineFailed
 
 MIN_LLVM: Final = 17  # older ones (14 to 16) crash inside Dr.Jit's first compilation
 _LIBRARY_PLACES: Final = (
+    # Debian and Ubuntu: the library itself, and a version's own folder.
     "/usr/lib/*-linux-gnu/libLLVM*.so*",
     "/usr/lib/llvm-*/lib/libLLVM*.so*",
+    # Fedora and Arch; built by hand.
     "/usr/lib64/libLLVM*.so*",
     "/usr/lib/libLLVM*.so*",
     "/usr/local/lib/libLLVM*.so*",
+    # Homebrew on Apple silicon and on Intel.
     "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
     "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
 )
 
 
+def _module(name: str) -> Any:
+    """Mitsuba or Dr.Jit, imported by name; raises MachineFailed where it is not installed."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        hint = "pip install 'pbrs-farm[transport]'"
+        raise MachineFailed(f"Mitsuba cannot be imported: {error}", hint=hint) from error
+
+
 def llvm_version(library: Path) -> tuple[int, ...]:
     """Version of a libLLVM by its real file name (libLLVM.so.19.1, libLLVM-14.0.6.so.1); () unknown."""
+    # Resolve links first: libLLVM.so alone names no version.
     match = re.search(r"LLVM(?:-|\.so\.|\.)(\d+(?:\.\d+)*)", library.resolve().name)
     return tuple(int(n) for n in match.group(1).split(".")) if match else ()
 
@@ -40,6 +53,7 @@ def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
     found: dict[Path, tuple[int, ...]] = {}
     for pattern in patterns:
         for path in Path("/").glob(pattern.lstrip("/")):
+            # A link and its target are one library.
             version = llvm_version(path)
             if version:
                 found[path.resolve()] = version
@@ -72,12 +86,7 @@ def choose_variant() -> str:
     library = find_llvm()
     if library is not None:
         os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
-    try:
-        dr = importlib.import_module("drjit")
-    except ImportError as error:
-        raise MachineFailed(
-            f"Mitsuba cannot be imported: {error}", hint="pip install 'pbrs-farm[transport]'"
-        ) from error
+    dr = _module("drjit")
     # Prefer the GPU, then LLVM, then Mitsuba without Dr.Jit's arrays.
     if dr.has_backend(dr.JitBackend.CUDA) and works("cuda_ad_rgb"):
         return "cuda_ad_rgb"
@@ -91,12 +100,7 @@ def choose_variant() -> str:
 def mitsuba(variant: str | None = None) -> Any:
     """The mitsuba module with the variant set; the chosen one when None. Raises MachineFailed."""
     name = choose_variant() if variant is None else variant
-    try:
-        module = importlib.import_module("mitsuba")
-    except ImportError as error:
-        raise MachineFailed(
-            f"Mitsuba cannot be imported: {error}", hint="pip install 'pbrs-farm[transport]'"
-        ) from error
+    module = _module("mitsuba")
     if module.variant() != name:
         module.set_variant(name)
     return module
@@ -119,6 +123,7 @@ def works(variant: str) -> bool:
     """The variant traces a ray on this machine."""
     try:
         mi = mitsuba(variant)
+        # Aim at the middle of a square 1 m away.
         scene = mi.load_dict({"type": "scene", "shape": {"type": "rectangle"}})
         ray = mi.Ray3f(mi.Point3f(0, 0, 1), mi.Vector3f(0, 0, -1))
         t = scene.ray_intersect_preliminary(ray).t

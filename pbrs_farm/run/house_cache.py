@@ -85,6 +85,7 @@ class CachedHouse:
         from pbrs_farm.run.panoramas import panorama_for_house
         from pbrs_farm.transport.scene_tables.sky import sky_for_house
 
+        # Choose the panorama by the house's id, so that all its views have one sky.
         panorama = panorama_for_house(self.recipe, self.house_id)
         return sky_for_house(self.recipe, self.house_id, panorama=panorama)
 

@@ -26,10 +26,12 @@ def attribution(store: Store, house_id: str) -> str:
 
 def finish_house(store: Store, house_id: str) -> int:
     """Write the house's manifest if it changed; the number of objects in it."""
+    # A manifest lists what the markers say, not what lies in the folder.
     found = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
     markers = [marker for marker in found if marker is not None]
     data = manifest_from_markers(markers, attribution(store, house_id))
     key = keys.house_key(house_id, keys.MANIFEST)
+    # Leave an equal file alone: its date tells when the house last changed.
     if store.head(key) is None or store.get(key) != data:
         store.put(key, data)
     return data.count(b"\n")
@@ -37,6 +39,7 @@ def finish_house(store: Store, house_id: str) -> int:
 
 def merge_manifests(store: Store, house_ids: list[str]) -> None:
     """Write the root's manifest.jsonl from those of the houses that have one."""
+    # A house that failed before its first marker has none.
     parts = []
     for house_id in sorted(house_ids):
         key = keys.house_key(house_id, keys.MANIFEST)

@@ -36,6 +36,7 @@ def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.f
             f"sky.panoramas: {folder} is no folder of panoramas",
             hint="`pbrs-farm skies` fetches four; or --set sky.kind=sunsky",
         )
+    # Choose by name and house, not by the folder's order: each machine takes the same.
     files = {p.name: p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES}
     name = choose_panorama(list(files), house_id, recipe.seed)
     return name, decode_radiance(_bytes(files[name]), name)

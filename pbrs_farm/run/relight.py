@@ -48,22 +48,21 @@ def relit(
     word that names a lamp counts; indoor multiplies all of them. Raises BadInput when a file is
     missing, when the view has no light by lamp or none of a name.
     """
+    # OUT of OUT/houses/<house>/views/<view>.
     root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
-    file = view / RADIANCE_EXR
-    radiance = radiance_from_exr(_read(file), str(file))
+    radiance = radiance_from_exr(_read(view / RADIANCE_EXR), str(view / RADIANCE_EXR))
     aovs = linear_aovs(radiance)
     # Sum indoor light anew from the lamps' own layers.
     if lamps:
         rows = lamps_of_view(view)
         factors = lamp_factors(rows, lamps)
         layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
-        lit = indoor_from_lamps(layers, factors, aovs.indoor.shape)
-        aovs = replace(aovs, indoor=lit)
+        aovs = replace(aovs, indoor=indoor_from_lamps(layers, factors, aovs.indoor.shape))
+    # Develop it as the run would have, with the recipe's tone.
     tone = recipe_from_json(_read(root / "recipe.json"), str(root / "recipe.json")).tone
     images = develop(aovs, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
     credit = attribution(FolderStore(root), view.resolve().parents[1].name)
-    mode = Mode.MLT_IL_OL.value
-    return layer_bytes(mode, images[mode].rgb_srgb8, credit)
+    return layer_bytes(Mode.MLT_IL_OL.value, images[Mode.MLT_IL_OL.value].rgb_srgb8, credit)
 
 
 def lamps_of_view(view: Path) -> list[dict[str, Any]]:
@@ -80,12 +79,9 @@ def lamp_factors(
         named = [int(row["number"]) for row in rows if _is_named(row, asked.word)]
         if not named:
             exist = ", ".join(f"{row['number']} {row['item']} ({row['name']})" for row in rows)
-            raise BadInput(
-                "--lamp",
-                asked.word,
-                "no such lamp",
-                hint=f"of {exist}" if exist else "there is none",
-            )
+            hint = f"of {exist}" if exist else "there is none"
+            raise BadInput("--lamp", asked.word, "no such lamp", hint=hint)
+        # Let the last word that names a lamp count.
         factors |= {number: np.array(asked.rgb, np.float32) for number in named}
     return factors
 

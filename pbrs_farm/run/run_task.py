@@ -21,7 +21,7 @@ from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.processes.message import Handler, Message, Send
 from pbrs_farm.run.processes.task import Event, Setting, Task, task_from_line
-from pbrs_farm.run.step_cache import Work
+from pbrs_farm.run.step_cache import Outcome, Work
 from pbrs_farm.store import store_from_url
 
 # Steps that start Dr.Jit, whose number of threads is fixed from then on.
@@ -64,6 +64,7 @@ def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Task) 
 
 
 def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
+    # Import the function that runs a step: tests name their own.
     module, _, function = setting.runner.partition(":")
     run_step = getattr(importlib.import_module(module), function)
     limit_threads(name, setting.n_threads)
@@ -78,11 +79,8 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
         traceback.print_exc()
         sys.stderr.flush()
     else:
-        kind: Literal["kept", "done"] = "kept" if outcome.was_done else "done"
         seconds = time.perf_counter() - started
-        facts = _told(name, outcome.marker.facts)
-        event = Event(kind, work.house_id, work.view_id, name, seconds, "", facts, peak_mb())
-        send(Message("event", body=asdict(event)))
+        send(Message("event", body=asdict(_event_of_outcome(work, name, outcome, seconds))))
         return True
     if setting.debug:
         message += "\n" + traceback.format_exc()
@@ -98,6 +96,12 @@ def _told(step: str, facts: dict[str, Any]) -> dict[str, Any]:
     return {"dark": facts["dark"]} if facts.get("dark") else {}
 
 
+def _event_of_outcome(work: Work, name: str, outcome: Outcome, seconds: float) -> Event:
+    facts = _told(name, outcome.marker.facts)
+    kind: Literal["kept", "done"] = "kept" if outcome.was_done else "done"
+    return Event(kind, work.house_id, work.view_id, name, seconds, "", facts, peak_mb())
+
+
 def limit_threads(step: str, n_threads: int) -> None:
     """Give Dr.Jit its share of the cores before a step first uses it."""
     if n_threads < (os.cpu_count() or 1) and step in _DRJIT_STEPS:
@@ -108,4 +112,4 @@ def limit_threads(step: str, n_threads: int) -> None:
 
 def peak_mb() -> float:
     """Largest resident memory of this process so far, MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000  # Linux counts in KiB

@@ -47,6 +47,7 @@ from pbrs_farm.run.view_histogram import view_histogram
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
     from pbrs_farm.sample import CameraReport
+    from pbrs_farm.selection.view_record import Place
     from pbrs_farm.transport.light_result import LightResult
 
 
@@ -80,12 +81,8 @@ def _house(work: Work) -> StepOutput:
         raise BadInput(source.location, repaired.id, f"expected house {work.house_id}")
     glb, description = bundle_from_house(repaired)
     files = {"house.glb": glb, "house.json": description, "repair.json": json_bytes(report)}
-    facts = {
-        "rooms": len(repaired.rooms),
-        "items": len(repaired.items),
-        "notes": len(repaired.notes),
-    }
-    return StepOutput(files, facts)
+    counts = {name: len(getattr(repaired, name)) for name in ("rooms", "items", "notes")}
+    return StepOutput(files, counts)
 
 
 def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
@@ -113,6 +110,7 @@ def _cameras(work: Work) -> StepOutput:
     cached = _cached_house(work)
     house, fields = cached.house, work.recipe.cameras
     seed = camera_seed(work.house_id, work.recipe)
+    # Objects and files bring their cameras: nothing is searched.
     if keys.is_object(work.house_id):
         return _object_cameras(work, house, seed)
     if fields.source == "file":
@@ -132,6 +130,7 @@ def why_none(report: CameraReport) -> str:
         f"{room.room_id}: {room.reason or (room.sectors[0].reason if room.sectors else 'no sector')}"
         for room in report.rooms
     ]
+    # Name three rooms: a house of a hundred has one reason, mostly.
     more = f" and {len(reasons) - 3} more rooms" if len(reasons) > 3 else ""
     return "; ".join(reasons[:3]) + more
 
@@ -181,6 +180,7 @@ def _truth(work: Work) -> StepOutput:
     view, camera = _view_at_size(work, cached)
     caster, house = cached.caster, cached.house
     hit = caster.hit_record(camera)
+    # Derive the layers that every view has, and the table of what is seen.
     arrays = truth.layers_from_hit(hit, house, camera)
     table = truth.view_table(hit.item, house, camera)
     room = room_of(house, view)
@@ -188,16 +188,12 @@ def _truth(work: Work) -> StepOutput:
         table["layout"] = truth.layout_table(room, camera, hit.depth_z)
     # Add the layers that were asked for; those behind glass cast once more without it.
     if work.layers:
-        label_inputs = truth.LabelInputs(
-            hit,
-            house,
-            cached.geometry,
-            camera,
-            lambda skip: caster.hit_record(camera, skip_faces=skip),
-            cached.textures,
-            keys.seed(work.house_id, view.id, "truth", work.recipe.seed),
-        )
-        arrays |= truth.optional_layers(work.layers, label_inputs)
+        seed = keys.seed(work.house_id, view.id, "truth", work.recipe.seed)
+        inputs = truth.LabelInputs(
+            hit, house, cached.geometry, camera,
+            lambda skip: caster.hit_record(camera, skip_faces=skip), cached.textures, seed,
+        )  # fmt: skip
+        arrays |= truth.optional_layers(work.layers, inputs)
         table |= truth.optional_tables(work.layers, house)
     credit = house.source.attribution
     files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
@@ -208,6 +204,7 @@ def _opengl(work: Work, mode: str) -> StepOutput:
     cached = _cached_house(work)
     _view, camera = _view_at_size(work, cached)
     rasterizer = cached.rasterizer
+    # Light by three fixed lights (OpenGL-DL) or by the lamps (OpenGL-IL).
     draw = rasterizer.render_dl if mode == "opengl_dl" else rasterizer.render_il
     rgb = draw(camera)
     if keys.is_object(work.house_id):
@@ -240,13 +237,9 @@ def _light(work: Work) -> StepOutput:
     seed = keys.seed(work.house_id, view.id, "light", digest)
     result = cached.light_scene.render(camera, view.room_id, work.recipe.light, seed)
     # Name the images as the file does; of an object, pixels that miss it are 0.
-    images = {
-        "outdoor": result.outdoor,
-        "indoor": result.indoor,
-        "albedo": result.albedo,
-        "normal": result.normal,
-        **{layer_name(number): image for number, image in result.lamps.items()},
-    }
+    images = {name: getattr(result, name) for name in ("outdoor", "indoor", "albedo", "normal")}
+    images |= {layer_name(number): image for number, image in result.lamps.items()}
+    # Blacken what no ray hits: an object has no surroundings.
     if keys.is_object(work.house_id):
         missed = _missed(cached, camera)
         images = {name: np.where(missed, np.float32(0), image) for name, image in images.items()}
@@ -261,19 +254,16 @@ def _facts_of_light(
     from pbrs_farm.transport.illuminance import darkness_of_room
     from pbrs_farm.transport.light_result import darkness_of_picture
 
-    facts = {
-        **result.facts,
-        "noise": result.noise,
-        **({"spp": result.spp} if result.spp else {}),
-        "n_nonfinite": result.n_nonfinite,
-        "variant": cached.light_scene.variant,
-        "sky": cached.sky.facts(),
-    }
+    facts = {**result.facts, "noise": result.noise}
+    if result.spp:  # Metropolis counts mutations instead
+        facts["spp"] = result.spp
+    facts |= {"n_nonfinite": result.n_nonfinite, "variant": cached.light_scene.variant}
+    facts["sky"] = cached.sky.facts()
     # The transport knows a lamp's item, the house its name.
+    items = cached.house.items
     if "lamps" in facts:
-        items = cached.house.items
-        named = [{**row, "name": items[row["instance"] - 1].name} for row in facts["lamps"]]
-        facts["lamps"] = named
+        rows = facts["lamps"]
+        facts["lamps"] = [row | {"name": items[row["instance"] - 1].name} for row in rows]
     # Repeat the room's row of illuminance.json.
     room = room_of(cached.house, view)
     dark = [darkness_of_picture(result)]
@@ -294,9 +284,9 @@ def _illuminance(work: Work) -> StepOutput:
     from pbrs_farm.transport.illuminance import illuminance_record
 
     cached = _cached_house(work)
-    lux = cached.light_scene.floor_lux(
-        cached.house, seed=keys.seed(work.house_id, "floor_lux", work.recipe.seed)
-    )
+    seed = keys.seed(work.house_id, "floor_lux", work.recipe.seed)
+    lux = cached.light_scene.floor_lux(cached.house, seed=seed)
+    # Give the views of a room its row through the marker's facts.
     record = illuminance_record(cached.house, lux)
     warnings = {row["room"]: row["warnings"] for row in record["rooms"] if row["warnings"]}
     return StepOutput(
@@ -314,14 +304,10 @@ def _develop(work: Work) -> StepOutput:
     aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
     denoise = work.recipe.light.denoise
     images = develop(aovs, work.recipe.tone, denoise=denoise)
+    # Write a PNG a mode; its exposure and white balance become facts.
     credit = attribution(work.store, work.house_id)
-    return StepOutput(
-        {
-            LAYER[mode].file: layer_bytes(mode, made.rgb_srgb8, credit)
-            for mode, made in images.items()
-        },
-        {"denoised": denoise} | {mode: made.facts() for mode, made in images.items()},
-    )
+    files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}
+    return StepOutput(files, {"denoised": denoise} | {m: i.facts() for m, i in images.items()})
 
 
 def _view(work: Work) -> StepOutput:
@@ -329,12 +315,9 @@ def _view(work: Work) -> StepOutput:
     cached = _cached_house(work)
     view = cached.view(work.view_id or "", work.inputs["cameras"])
     facts = _facts_of_view(work)
+    digest = work.recipe.digest(*plan.PICTURE_GROUPS)
     description = view_description(
-        view,
-        work.house_id,
-        facts,
-        recipe_digest=work.recipe.digest(*plan.PICTURE_GROUPS),
-        versions=versions(),
+        view, work.house_id, facts, recipe_digest=digest, versions=versions()
     )
     files = {"view.json": view_json(description)}
     # Without any picture there is nothing to select by.
@@ -342,12 +325,10 @@ def _view(work: Work) -> StepOutput:
     if rendered:
         house = cached.house
         room = room_of(house, view)
-        place = {
-            "house": work.house_id,
-            "view": view.id,
-            "room": view.room_id,
-            "room_type": room.name if room is not None else "",
-        }
+        name = room.name if room is not None else ""
+        place: Place = {
+            "house": work.house_id, "view": view.id, "room": view.room_id, "room_type": name,
+        }  # fmt: skip
         files["histogram.json"] = view_histogram(
             work.store, place, rendered, description, house.notes, work.recipe.histogram
         )

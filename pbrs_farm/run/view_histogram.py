@@ -16,6 +16,7 @@ from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.formats.histogram_json import SCORED_MODE
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.selection import scene_quality, view_record
+from pbrs_farm.selection.view_record import Place
 from pbrs_farm.store.interface import Store
 
 _MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})
@@ -23,7 +24,7 @@ _MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})
 
 def view_histogram(
     store: Store,
-    place: Mapping[str, str],
+    place: Place,
     modes: Iterable[Mode],
     view_json: Mapping[str, Any],
     notes: Iterable[Note],
@@ -42,10 +43,12 @@ def view_histogram(
         return layer_from_bytes(layer, store.get(key), key)
 
     wanted = set(modes)
+    # Open one picture where one decides.
     wanted = {SCORED_MODE} if SCORED_MODE in wanted else wanted
     depth = picture("depth")
     if depth.ndim != 2 or depth.dtype != np.uint16:
         raise BadInput(keys.view_key(place["house"], place["view"], "depth.png"), "", "no depth")
+    # Measure what depth and labels tell of the view.
     scene = scene_quality(
         depth,
         view_json.get("instances", ()),
@@ -53,23 +56,13 @@ def view_histogram(
         noise=_noise(view_json),
         missing_textures=sum(note.kind in _MISSING_TEXTURE for note in notes),
     )
-    record = view_record(
-        {
-            "house": place["house"],
-            "view": place["view"],
-            "room": place["room"],
-            "room_type": place["room_type"],
-        },
-        {mode: picture(mode.value) for mode in sorted(wanted)},
-        depth,
-        scene,
-        settings,
-    )
-    return record.json_bytes()
+    pictures = {mode: picture(mode.value) for mode in sorted(wanted)}
+    return view_record(place, pictures, depth, scene, settings).json_bytes()
 
 
 def _noise(view_json: Mapping[str, Any]) -> float | None:
     light = (view_json.get("modes") or {}).get("light") or {}
+    # Path tracing has a number per light group and of their sum.
     noise = light.get("noise")
     if isinstance(noise, Mapping):
         noise = noise.get("sum")

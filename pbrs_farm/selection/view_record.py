@@ -15,9 +15,12 @@ from pbrs_farm.formats.histogram_json import SCORED_MODE, SceneQuality, SparseCo
 from pbrs_farm.selection.histograms import colour_counts, depth_counts
 from pbrs_farm.selection.quality import picture_quality
 
+# Where a view was taken: ids of house, view and room, and the room's name.
+Place = Mapping[Literal["house", "view", "room", "room_type"], str]
+
 
 def view_record(
-    place: Mapping[Literal["house", "view", "room", "room_type"], str],
+    place: Place,
     pictures: Mapping[Mode, Srgb8Image],
     depth_mm: NDArray[np.integer],
     scene: SceneQuality,

@@ -74,6 +74,7 @@ class Store(Protocol):
 def check_key(key: str) -> str:
     """key itself; raises StoreFailed when it could name anything outside the store."""
     segments = key.split("/")
+    # Refuse empty segments, "." and "..", as well as names too long for S3 or a disk.
     if not key or len(key) > _MAX_KEY or any(not _is_segment(s) for s in segments):
         raise StoreFailed(repr(key[:120]), "not a valid key: relative, no '..', no leading dot")
     return key

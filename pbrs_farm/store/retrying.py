@@ -10,7 +10,7 @@ from typing import TypeVar
 from pbrs_farm.core.errors import StoreUnavailable
 from pbrs_farm.store.interface import Head, Store
 
-T = TypeVar("T")
+T = TypeVar("T")  # what the call gives
 
 
 def retried(
@@ -51,7 +51,7 @@ class RetryingStore:
         self, store: Store, timeout_s: float, on_wait: Callable[[str], None] = lambda _reason: None
     ) -> None:
         self._store = store
-        self._timeout_s = timeout_s
+        self._timeout_s = timeout_s  # of one call, its tries and pauses together
         self._on_wait = on_wait
 
     @property
@@ -80,9 +80,5 @@ class RetryingStore:
     def _call(self, act: Callable[[], T]) -> T:
         # Never pause for less than half: many renderers wait for the same store.
         return retried(
-            lambda _n: act(),
-            self._timeout_s,
-            jitter=(0.5, 1.0),
-            max_pause_s=10.0,
-            on_wait=self._on_wait,
-        )
+            lambda _n: act(), self._timeout_s, jitter=(0.5, 1.0), max_pause_s=10.0, on_wait=self._on_wait
+        )  # fmt: skip

@@ -33,7 +33,7 @@ DAYLIGHT_LX: Final = (20.0, 5000.0)  # and by daylight; a value outside is a war
 
 DARK_LX: Final = 1.0  # a room with less by all light is dark: full moonlight is 0.3 lx
 
-_SPP: Final = 32
+_SPP: Final = 32  # paths a point
 _ABOVE_FLOOR_M: Final = 0.05  # above carpets
 _MAX_ATTEMPTS: Final = 200  # at points in a polygon that is thin in its box
 
@@ -72,10 +72,8 @@ def photometric_warnings(room: Room, lux: dict[str, float]) -> list[str]:
     ):
         value = lux[group]
         if (is_expected and value < low) or value > high:
-            lines.append(
-                f"room {room.id}: {group} light gives {value:g} lx on the floor,"
-                f" expected {low:g} to {high:g}"
-            )
+            what = f"room {room.id}: {group} light gives {value:g} lx on the floor"
+            lines.append(f"{what}, expected {low:g} to {high:g}")
     dark = darkness_of_room(room, lux)
     return [*lines, dark] if dark else lines
 
@@ -109,6 +107,7 @@ def illuminance_lx(
 ) -> tuple[float, float]:
     """(outdoor, indoor) mean illuminance in lx of level surfaces at points (N, 3), facing up."""
     up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
+    # A white matte surface reflects E / pi: times pi and lm/W it is illuminance.
     radiance = radiosity(scene, emitters, points, up, _SPP, seed)
     lumens = [float((v @ LUMINANCE).mean()) * LM_PER_W * math.pi for v in radiance]
     return lumens[0], lumens[1]

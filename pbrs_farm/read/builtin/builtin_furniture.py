@@ -21,22 +21,23 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Boxes of one material: low and high corner of each in the piece's frame."""
+    """Boxes of one material."""
 
     material: str
-    boxes: tuple[tuple[Triple, Triple], ...]
+    boxes: tuple[tuple[Triple, Triple], ...]  # low and high corner in the piece's frame
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A thing to place: class, parts, and turned profiles (material, profile, axis point)."""
+    """A thing to place."""
 
     name: str
     nyu40: int
     parts: tuple[Part, ...] = ()
+    # Turned profiles: material, (radius, height) from the bottom, a point of the axis.
     turned: tuple[tuple[str, tuple[tuple[float, float], ...], Triple], ...] = ()
     kind: ItemKind = ItemKind.OBJECT
-    bulb: tuple[Triple, float, bool] | None = None
+    bulb: tuple[Triple, float, bool] | None = None  # its place, radius, whether it is a sphere
 
 
 def legs(w: float, d: float, h: float, t: float = 0.05) -> tuple[tuple[Triple, Triple], ...]:
@@ -61,6 +62,7 @@ def place(
     for material, profile, axis in piece.turned:
         centre = turn @ np.asarray(axis) + origin
         surfaces.append(lathe(material, np.asarray(profile), centre, materials[material]))
+    # Put the bulb in, as a sphere that emits or as a light alone.
     lights: tuple[LightPart, ...] = ()
     if piece.bulb is not None:
         local, radius, is_modelled = piece.bulb

@@ -33,9 +33,9 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
 from pbrs_farm.read.mesh.primitives import box, wall_prism
 
-VERSION = "1"
+VERSION = "1"  # part of the home's fingerprint: raise it with any change
 WALL_HEIGHT_M = 2.5
-OUTER_M, INNER_M = 0.2, 0.1
+OUTER_M, INNER_M = 0.2, 0.1  # thickness of the walls
 
 # Inner faces of the rooms: x0, z0, x1, z1.
 LIVING = (0.0, 0.0, 5.0, 4.0)
@@ -45,11 +45,8 @@ BEDROOM = (5.0 + INNER_M, 0.0, 9.0, 4.0)
 def builtin_home() -> House:
     """The built-in home, unrepaired; the same on every call."""
     library, index = _materials()
-    walls = _walls(index)
     openings, joinery = _openings(index)
-    planes = _planes(index)
-    pieces = _furniture(index)
-    items = (*walls, *planes, *joinery, *pieces)
+    items = (*_walls(index), *_planes(index), *joinery, *_furniture(index))
     sha = keys.sha256(f"builtin home {VERSION}".encode())
     return House(
         id=keys.house_id("builtin", sha),
@@ -158,6 +155,7 @@ def _walls(index: dict[str, int]) -> tuple[Item, ...]:
 def _planes(index: dict[str, int]) -> list[Item]:
     items = []
     for room_id, rect, floor in (("0_0", LIVING, "floor_planks"), ("0_1", BEDROOM, "carpet")):
+        # A floor and a ceiling of the room's outline (NYU40 2 and 22).
         polygons = [[_rectangle(rect)]]
         for kind, nyu40, y, material, up in (
             (ItemKind.FLOOR, 2, 0.0, floor, True),
@@ -186,6 +184,7 @@ def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
         centre = np.array([x, (y0 + y1) / 2, z])
         half = np.array([width / 2, (y1 - y0) / 2, 0.16])
         cutter = box("cutter", centre, half, index["wall_default"], axes=axes)
+        # The hole's rectangle, halfway through the wall.
         corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
         quad = centre + (corners * half) @ axes.T
         openings.append(

@@ -13,8 +13,8 @@ from typing import Protocol
 
 from pbrs_farm.core.errors import BadHouse
 
-MAX_ENTRY_BYTES = 256 * 2**20
-MAX_TOTAL_BYTES = 2 * 2**30
+MAX_ENTRY_BYTES = 256 * 2**20  # unpacked
+MAX_TOTAL_BYTES = 2 * 2**30  # unpacked, of a whole archive
 MAX_ENTRIES = 50_000
 
 
@@ -39,9 +39,8 @@ class ZipResources:
             self._zip = zipfile.ZipFile(io.BytesIO(data))
             entries = self._zip.infolist()
         except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, EOFError) as error:
-            raise BadHouse(
-                file, "", f"damaged zip archive: {error}", hint="copy or save the file again"
-            ) from None
+            text, hint = f"damaged zip archive: {error}", "copy or save the file again"
+            raise BadHouse(file, "", text, hint=hint) from None
         if len(entries) > MAX_ENTRIES:
             raise BadHouse(file, "", f"{len(entries)} zip entries, at most {MAX_ENTRIES} are read")
         for entry in entries:
@@ -58,29 +57,26 @@ class ZipResources:
         if name.startswith("/") or ".." in name.replace("\\", "/").split("/"):
             raise BadHouse(self._file, place, "its name leaves the archive")
         if entry.file_size > MAX_ENTRY_BYTES:
-            raise BadHouse(
-                self._file, place, f"unpacks to {entry.file_size} bytes, at most {MAX_ENTRY_BYTES}"
-            )
+            text = f"unpacks to {entry.file_size} bytes, at most {MAX_ENTRY_BYTES}"
+            raise BadHouse(self._file, place, text)
 
     def read(self, name: str) -> bytes | None:
         """The entry's bytes, or None if there is none; BadHouse if it is damaged."""
         entry = self._entries.get(name)
         if entry is None:
             return None
+        place = f"entry {name[:80]!r}"
         try:
             with self._zip.open(entry) as stream:
+                # Read one byte more than announced: a bomb is longer than it says.
                 data = stream.read(entry.file_size + 1)
         except (
             zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError,
             NotImplementedError, RuntimeError,
         ) as error:  # fmt: skip
-            raise BadHouse(
-                self._file, f"entry {name[:80]!r}", f"cannot be unpacked: {error}"
-            ) from None
+            raise BadHouse(self._file, place, f"cannot be unpacked: {error}") from None
         if len(data) > entry.file_size:
-            raise BadHouse(
-                self._file, f"entry {name[:80]!r}", "unpacks to more than its directory says"
-            )
+            raise BadHouse(self._file, place, "unpacks to more than its directory says")
         return data
 
     def names(self) -> tuple[str, ...]:

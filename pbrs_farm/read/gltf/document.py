@@ -22,23 +22,15 @@ from pbrs_farm.formats.serialise import json_from_bytes
 # A relative name -> the bytes of that file beside the scene, or None if there is none.
 Fetch = Callable[[str], bytes | None]
 
-MAX_NODES: Final = 200_000
-MAX_DEPTH: Final = 200
+MAX_NODES: Final = 200_000  # of the scene; a node may stand in it more than once
+MAX_DEPTH: Final = 200  # levels of the node tree
 
 # Extensions that a file may require.
-UNDERSTOOD: Final = frozenset(
-    {
-        "KHR_lights_punctual",
-        "KHR_materials_emissive_strength",
-        "KHR_materials_ior",
-        "KHR_materials_specular",
-        "KHR_materials_transmission",
-        "KHR_materials_unlit",
-        "KHR_mesh_quantization",
-        "KHR_texture_transform",
-        "EXT_texture_webp",
-    }
-)
+UNDERSTOOD: Final = frozenset({
+    "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior",
+    "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
+    "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp",
+})  # fmt: skip
 
 
 class MissingFile(BadHouse):
@@ -67,12 +59,12 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
     required = gltf.document.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else []:
         if name not in UNDERSTOOD:
-            raise BadHouse(
-                file,
-                "extensionsRequired",
+            text, hint = (
                 f"{str(name)[:60]!r} is not understood",
-                hint="export again without mesh compression",
+                "export again without mesh compression",
             )
+            raise BadHouse(file, "extensionsRequired", text, hint=hint)
+    # Load what the accessors read from.
     buffers = gltf.document.get("buffers", [])
     if not isinstance(buffers, list):
         raise BadHouse(file, "buffers", "expected a list")
@@ -81,6 +73,7 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
 
 
 def _parsed(data: bytes, file: str) -> Gltf:
+    # Tell the two forms by their content, whatever the file is called.
     if data[:4] == b"glTF":
         return gltf_from_glb(data, file)
     document = json_from_bytes(data, file)
@@ -103,6 +96,7 @@ def _buffer(gltf: Gltf, index: int, fetch: Fetch) -> bytes:
     buffer = entry(gltf, "buffers", index)
     if "uri" in buffer:
         return uri_bytes(gltf, buffer["uri"], f"buffers[{index}]", fetch)
+    # Only the first buffer of a .glb may leave out its uri: it is the binary chunk.
     if index or not gltf.buffers:
         raise BadHouse(gltf.file, f"buffers[{index}]", "has no bytes")
     return gltf.buffers[0]
@@ -140,8 +134,7 @@ def image_bytes(gltf: Gltf, index: Any, fetch: Fetch) -> bytes:
 def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
     """Every node of the default scene, parents before children.
 
-    Raises BadHouse for a node that is its own ancestor, a transform that is not affine, or
-    more nodes than MAX_NODES.
+    Raises BadHouse for a node that is its own ancestor or not affine, or for too many of them.
     """
     scene = gltf.document.get("scene", 0)
     roots = _indices(gltf, entry(gltf, "scenes", scene), f"scenes[{scene}]", "nodes")
@@ -149,16 +142,14 @@ def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
     stack = [Placed(i, (i,), np.eye(4)) for i in reversed(roots)]
     n = 0
     while stack:
-        top = stack.pop()
-        n += 1
+        top, n = stack.pop(), n + 1
         if n > MAX_NODES or len(top.path) > MAX_DEPTH:
             text = f"more than {MAX_NODES} nodes or {MAX_DEPTH} levels"
             raise BadHouse(gltf.file, f"nodes[{top.index}]", text)
         node = entry(gltf, "nodes", top.index)
         world = top.world_from_node @ _parent_from_node(gltf, node, top.index)
         yield Placed(top.index, top.path, world)
-        children = _indices(gltf, node, f"nodes[{top.index}]", "children")
-        for child in reversed(children):
+        for child in reversed(_indices(gltf, node, f"nodes[{top.index}]", "children")):
             if child in top.path:
                 raise BadHouse(gltf.file, f"nodes[{child}]", "is its own ancestor")
             stack.append(Placed(child, (*top.path, child), world))
@@ -174,6 +165,7 @@ def _indices(gltf: Gltf, holder: dict[str, Any], place: str, key: str) -> list[i
 def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> NDArray[np.float64]:
     place = f"nodes[{index}]"
     if "matrix" in node:
+        # glTF writes matrices column by column.
         m = numbers(gltf, node["matrix"], 16, f"{place}.matrix").reshape(4, 4).T
         if not np.allclose(m[3], [0, 0, 0, 1], atol=1e-6):
             raise BadHouse(gltf.file, f"{place}.matrix", "is not affine (column-major)")

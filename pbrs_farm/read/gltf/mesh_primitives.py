@@ -12,7 +12,7 @@ from pbrs_farm.formats.glb import Gltf, accessor_array, entry
 from pbrs_farm.read.gltf.document import numbers
 from pbrs_farm.read.mesh.obj import Mesh
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
 
 
 def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int | None, Mesh]]:
@@ -21,8 +21,7 @@ def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int |
     Raises BadHouse for arrays that do not fit each other, numbers that are not finite, faces out
     of range, or more than max_triangles.
     """
-    mesh = entry(gltf, "meshes", index)
-    primitives = mesh.get("primitives")
+    primitives = entry(gltf, "meshes", index).get("primitives")
     if not isinstance(primitives, list) or not all(isinstance(p, dict) for p in primitives):
         raise BadHouse(gltf.file, f"meshes[{index}].primitives", "expected a list of objects")
     found: list[tuple[int | None, Mesh]] = []
@@ -32,13 +31,12 @@ def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int |
         if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
             continue  # points and lines have no surface
         triangles = _mesh(gltf, primitive, place)
-        if triangles is None:
-            continue
-        n_triangles += len(triangles.faces)
+        if triangles is not None:
+            n_triangles += len(triangles.faces)
+            found.append((primitive.get("material"), triangles))
         if n_triangles > max_triangles:
             text = f"more than {max_triangles} triangles"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_model_triangles")
-        found.append((primitive.get("material"), triangles))
     return found
 
 
@@ -50,6 +48,7 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     faces = _faces(gltf, primitive, len(positions), place)
     if not len(faces):
         return None
+    # Take the texture coordinates that the base colour's picture uses.
     look = _texture_info(gltf, primitive.get("material"))
     texcoord = look.get("texCoord", 0)
     uvs = None
@@ -59,6 +58,7 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     normals = np.zeros_like(positions)  # zero: flat, as glTF asks where there are none
     if "NORMAL" in attributes:
         normals = _floats(gltf, attributes["NORMAL"], 3, f"{place}.NORMAL")
+    # One value per vertex, or none.
     for array in (uvs, normals):
         if array is not None and len(array) != len(positions):
             raise BadHouse(gltf.file, place, "has attributes of different lengths")
@@ -71,6 +71,7 @@ def _floats(gltf: Gltf, accessor: Any, width: int, place: str) -> NDArray[np.flo
         raise BadHouse(gltf.file, place, f"expected {width} components, got {raw.shape[1]}")
     values = raw.astype(np.float64)
     if raw.dtype.kind in "iu" and entry(gltf, "accessors", accessor).get("normalized") is True:
+        # Normalised integers are fractions of their type's range (glTF 2.0, section 3.6.2.2).
         values = np.maximum(values / np.iinfo(raw.dtype).max, -1.0)
     if not (np.abs(values) < 1e9).all():
         raise BadHouse(gltf.file, place, "holds a number that is not finite")
@@ -86,12 +87,14 @@ def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> NDArray
         if len(order) and order.max() >= n:
             raise BadHouse(gltf.file, place, "a face names a vertex that does not exist")
     else:
+        # Without indices the vertices are taken as they come.
         order = np.arange(n)
     mode = primitive.get("mode", _TRIANGLES)
     if mode == _TRIANGLES:
         if len(order) % 3:
             raise BadHouse(gltf.file, place, f"{len(order)} corners are no triangles")
         return order.reshape(-1, 3).astype(np.int32)
+    # Number the triangles of a fan or a strip; a strip turns every second one over.
     k = np.arange(max(len(order) - 2, 0))
     if mode == _FAN:
         corners = np.stack([order[np.zeros_like(k)], order[k + 1], order[k + 2]], 1)
@@ -122,5 +125,6 @@ def _transformed(
     scale = numbers(gltf, turn.get("scale", [1, 1]), 2, f"{place}: texture scale")
     (angle,) = numbers(gltf, [turn.get("rotation", 0)], 1, f"{place}: texture rotation")
     c, s = np.cos(angle), np.sin(angle)
+    # Rotate about uv (0, 0), where the picture is top left.
     rotation = np.array([[c, s], [-s, c]])
     return np.asarray((uvs * scale) @ rotation.T + offset)

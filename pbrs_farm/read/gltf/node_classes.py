@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import chain
 from typing import Any, Final
 
 from pbrs_farm.core.classes import NYU40_NAMES
@@ -17,7 +18,7 @@ from pbrs_farm.core.house import ItemKind
 from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of, nyu40_of, words_of
 
-OTHERPROP: Final = 40
+OTHERPROP: Final = 40  # NYU40: a thing of no class
 _OTHERSTRUCTURE: Final = NYU40_NAMES.index("otherstructure")
 _WALL_WORDS: Final = "wall wallpaper wand waende tapete mur muro pared parete parede"
 _CEILING_WORDS: Final = "ceiling zimmerdecke decke plafond techo soffitto teto"
@@ -35,9 +36,11 @@ _STRUCTURE_WORDS: Final = {
     )
     for word in words.split()
 }
+# Classes that are kinds of their own: wall, floor, door, lamp ...
 _KIND_OF_CLASS: Final[dict[str, ItemKind]] = {
     kind.value: kind for kind in ItemKind if kind.value in NYU40_NAMES and kind.value != "object"
 }
+# Class names without spaces and dashes -> NYU40 id.
 _IDS: Final = {re.sub(r"[ _-]", "", name): i for i, name in enumerate(NYU40_NAMES)} | {
     "refridgerator": NYU40_NAMES.index("refrigerator"),
     "void": 0,
@@ -46,11 +49,11 @@ _IDS: Final = {re.sub(r"[ _-]", "", name): i for i, name in enumerate(NYU40_NAME
 
 @dataclass(frozen=True, slots=True)
 class NodeClass:
-    """Class and kind of an item. is_tagged: said by extras or the mapping, not guessed."""
+    """Class and kind of an item."""
 
     nyu40: int
     kind: ItemKind
-    is_tagged: bool
+    is_tagged: bool  # said by extras or the mapping, not guessed
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +64,9 @@ class Mapping:
 
     def of(self, name: str) -> NodeClass | None:
         """The class of a node's name: exact rows first, then patterns, in order."""
-        for pattern, found in self.rows:
-            if pattern == name:
-                return found
-        for pattern, found in self.rows:
-            if fnmatchcase(name, pattern):
-                return found
-        return None
+        exact = (found for pattern, found in self.rows if pattern == name)
+        alike = (found for pattern, found in self.rows if fnmatchcase(name, pattern))
+        return next(chain(exact, alike), None)
 
 
 def mapping_from_json(data: bytes, file: str) -> Mapping:
@@ -94,6 +93,7 @@ def class_of_node(name: str, extras: Any, mapping: Mapping) -> NodeClass | None:
     return tagged or mapping.of(name) or class_of_node_name(name)
 
 
+# Words of nodes that only group others.
 _COLLECTIONS: Final = frozenset(
     ("furniture", "group", "collection", "scene", "room", "level", "storey", "set")
 )
@@ -106,6 +106,7 @@ def collection_of(name: str, seen: NodeClass) -> NodeClass | None:
     no class that members would share, nyu40 0.
     """
     words = words_of(name)
+    # words_of gives singulars beside plurals.
     plurals = {w[:-1] for w in words if w.endswith("s") and w[:-1] in words}
     if words & _COLLECTIONS or seen.kind in (ItemKind.FLOOR, ItemKind.GROUND):
         return NodeClass(0, ItemKind.OBJECT, is_tagged=False)
@@ -115,12 +116,14 @@ def collection_of(name: str, seen: NodeClass) -> NodeClass | None:
 
 
 def _tagged(fields_json: dict[str, Any]) -> NodeClass | None:
+    # Read the kind if one is named, and the class by number or by name.
     kind_word = str(fields_json.get("kind", "")).lower()
     kind = next((k for k in ItemKind if k.value == kind_word), None)
     nyu40 = fields_json.get("nyu40", fields_json.get("class"))
     if isinstance(nyu40, str):
         word = re.sub(r"[ _-]", "", nyu40.lower())
         nyu40 = int(word) if word.isascii() and word.isdigit() and len(word) < 3 else _IDS.get(word)
+        # Kinds without a class of their own: a plant is otherprop, the others floor.
         if nyu40 is None and word in ("ground", "plant", "stairs"):
             return NodeClass(OTHERPROP if word == "plant" else 2, ItemKind(word), is_tagged=True)
     if type(nyu40) is not int or not 0 <= nyu40 < len(NYU40_NAMES):
@@ -134,13 +137,16 @@ def class_of_node_name(name: str) -> NodeClass | None:
     piece = class_of_piece("", name)
     nyu40 = piece.nyu40
     if nyu40 is None or nyu40 == _OTHERSTRUCTURE:
+        # Look for structure where the name says nothing more special.
         words = words_of(name)
         for word, kind in _STRUCTURE_WORDS.items():
             if word in words:
+                # The ground outside is labelled floor (2).
                 label = 2 if kind is ItemKind.GROUND else NYU40_NAMES.index(kind.value)
                 return NodeClass(label, kind, is_tagged=False)
     if nyu40 is None:
         return None
+    # A name tells openings and lamps only by their class.
     is_lamp = NYU40_NAMES[nyu40] == "lamp"
     is_opening = NYU40_NAMES[nyu40] in ("door", "window")
     kind = kind_of(piece, nyu40, is_opening=is_opening, is_light=is_lamp)

@@ -38,26 +38,26 @@ from pbrs_farm.read.gltf.structure_parts import UNMAPPED, centres_of, structure_
 from pbrs_farm.read.gltf.window_glass import PANE_OPACITY, glass_materials, names_glass
 from pbrs_farm.read.mesh.obj import Mesh
 
-_UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)
+_UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)  # what no name tells
 
 
 @dataclass(slots=True)
 class _Thing:
     """An item while its nodes are gathered."""
 
-    root: Placed
+    root: Placed  # the node that says what it is
     name: str
     seen: NodeClass
-    extras: dict[str, Any]
-    parts: list[Placed] = field(default_factory=list)
+    extras: dict[str, Any]  # the root's
+    parts: list[Placed] = field(default_factory=list)  # the root and what it owns below
 
 
 def items_of_scene(
     gltf: Gltf, mapping: Mapping, materials: SceneMaterials, notes: Notes, fields: ReadFields
 ) -> Iterator[Item]:
     """The items of the scene, not yet on a level."""
-    known: dict[Any, list[tuple[int | None, Mesh]]] = {}
-    taken: set[str] = set()
+    known: dict[Any, list[tuple[int | None, Mesh]]] = {}  # mesh number -> what is in it
+    taken: set[str] = set()  # ids
     n_faces = n_items = 0
     found: list[tuple[_Thing, str, Item]] = []  # with the place that notes name
     for thing in _things(gltf, mapping):
@@ -65,6 +65,7 @@ def items_of_scene(
         if item is None:
             continue
         place = f"nodes[{thing.root.index}] ({thing.name[:60]})"
+        # Bound the extent, the triangles and the items.
         if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
             text = f"stands farther than {fields.max_extent_m:g} m from the origin"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_extent_m")
@@ -81,6 +82,7 @@ def items_of_scene(
             notes.add("unmapped-class", place, "names no class; it is otherprop")
         if sum(part.n_faces for part in parts) < item.n_faces:
             notes.add("outer-side", place, "the side around the room it shows is left out")
+        # Give each part an id of its own: names need not differ in glTF.
         for part in parts:
             unique, k = part.id, 2
             while unique in taken:
@@ -99,6 +101,7 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
     class is known, and below it those that are tagged. Members of a collection ("Chairs") that
     have no class of their own have the collection's.
     """
+    # By path from the root: the item a node belongs to, and the class its members inherit.
     owner: dict[tuple[int, ...], _Thing] = {}
     members: dict[tuple[int, ...], NodeClass] = {}
     found: list[_Thing] = []
@@ -108,15 +111,18 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
         extras = fields_json["extras"] if isinstance(fields_json.get("extras"), dict) else {}
         above = owner.get(node.path[:-1])
         seen = class_of_node(name, extras, mapping) or members.get(node.path[:-1])
+        # A group whose name means several things is no item.
         if seen and not seen.is_tagged and "mesh" not in fields_json:
             grouped = collection_of(name, seen)
             if grouped is not None:
                 seen = None
                 if grouped.nyu40 and above is None:
                     members[node.path] = grouped
+        # Leave out empty nodes without a class: they only hold others.
         extensions = fields_json.get("extensions")
         has_light = isinstance(extensions, dict) and "KHR_lights_punctual" in extensions
         has_part = "mesh" in fields_json or has_light
+        # Begin an item at the outermost node of a class, and at tagged ones below it.
         if (seen and (above is None or seen.is_tagged)) or (above is None and has_part):
             above = _Thing(node, name, seen or _UNMAPPED, extras)
             found.append(above)
@@ -138,6 +144,7 @@ def _item(
     luminance: dict[int, float] = {}
     kind = thing.seen.kind
     is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
+    # What lets light through is a pane in an opening, glass elsewhere.
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     lights = _lights(gltf, thing)
     parts = list(_meshes(gltf, thing, notes, known, fields))
@@ -152,6 +159,7 @@ def _item(
             named = (number in glass or is_glass) and not materials.is_tagged(number)
             if named and material.kind is MaterialKind.OPAQUE:
                 material = replace(material, kind=clear, opacity=PANE_OPACITY)
+            # Emission of unknown strength counts for lamps only: screens and stickers glow, too.
             emits = emission is not None and not kind.is_structure
             emits = emits and (emission != 0 or kind is ItemKind.LAMP)
             index = materials.as_bulb(material) if emits else materials.library.index(material)
@@ -208,6 +216,7 @@ def _finished(
 ) -> Item:
     seen = thing.seen
     if lights and not surfaces:
+        # A light without a shape is a lamp (NYU40 35).
         seen = replace(seen, kind=ItemKind.LAMP, nyu40=35)
     tags = [UNMAPPED] if seen is _UNMAPPED else []
     if any(np.linalg.det(p.world_from_node[:3, :3]) < 0 for p in thing.parts):
@@ -239,5 +248,6 @@ def _across_last(box: Box) -> Box:
     order = np.array([wide, 3 - wide - thin, thin])
     axes = box.axes[:, order]
     if np.linalg.det(axes) < 0:
+        # Keep the axes right-handed.
         axes = axes * np.array([-1.0, 1.0, 1.0])
     return Box(box.centre, box.half[order], axes)

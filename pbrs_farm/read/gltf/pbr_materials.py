@@ -17,7 +17,7 @@ from pbrs_farm.read.gltf.document import Fetch, MissingFile, image_bytes, number
 # Reflectance of a dielectric at normal incidence, linear (glTF 2.0, appendix B).
 F0: Final = 0.04
 
-MAX_SHININESS: Final = 10_000.0
+MAX_SHININESS: Final = 10_000.0  # Phong exponent; above it a lobe is a mirror's
 
 
 class SceneMaterials:
@@ -79,6 +79,7 @@ class SceneMaterials:
     ) -> MaterialKind:
         word = _object(fields_json, "extras").get("kind")
         tagged = next((k for k in MaterialKind if k.value == word), None)
+        # What extras say goes first, then opacity, then the factors.
         if tagged is not None:
             return tagged
         if opacity < 1:
@@ -96,6 +97,7 @@ class SceneMaterials:
         strength = _object(_object(fields_json, "extensions"), "KHR_materials_emissive_strength")
         if "emissiveStrength" not in strength:
             return 0.0
+        # Take luminance for the strength: its Rec. 709 weights.
         (value,) = numbers(self._gltf, [strength["emissiveStrength"]], 1, f"{place}: emission")
         return float(max(value, 0.0) * (factor @ [0.2126, 0.7152, 0.0722]))
 
@@ -107,6 +109,7 @@ class SceneMaterials:
         if not isinstance(info, dict):
             return None
         texture = entry(self._gltf, "textures", info.get("index"))
+        # Prefer the WebP picture: the other is a fallback for readers without it.
         webp = _object(_object(texture, "extensions"), "EXT_texture_webp")
         source = webp.get("source", texture.get("source"))
         if type(source) is not int:

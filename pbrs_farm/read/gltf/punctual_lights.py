@@ -18,13 +18,14 @@ from pbrs_farm.read.gltf.document import numbers
 # Flux of a lamp whose strength the scene does not tell: a 60 W incandescent bulb's.
 ASSUMED_LM: Final = 800.0
 
-_RADIUS_M: Final = 0.0325
+_RADIUS_M: Final = 0.0325  # of the bulb that stands for a point: 65 mm across
 
 
 def punctual_light(
     gltf: Gltf, node: dict[str, Any], world_from_node: NDArray[np.float64], place: str
 ) -> LightPart | None:
     """The point or spot light of a node; None if it has none, or a directional one (the sun)."""
+    # A node names its light by number; the lights stand at the file's top.
     number = _at(_at(node, "extensions"), "KHR_lights_punctual").get("light")
     lights = _at(_at(gltf.document, "extensions"), "KHR_lights_punctual").get("lights")
     if type(number) is not int or not isinstance(lights, list) or not 0 <= number < len(lights):
@@ -36,10 +37,12 @@ def punctual_light(
     colour = np.clip(
         numbers(gltf, fields_json.get("color", [1, 1, 1]), 3, f"{place}: light colour"), 0, 1
     )
+    # A point light shines everywhere, a spot within its outer cone.
     cutoff = math.pi
     if fields_json["type"] == "spot":
         angle = _at(fields_json, "spot").get("outerConeAngle", math.pi / 4)
         cutoff = float(np.clip(numbers(gltf, [angle], 1, f"{place}: cone")[0], 0.01, math.pi))
+    # Candela times the cone's solid angle are lumens; a light looks along -z.
     solid_angle = 2 * math.pi * (1 - math.cos(cutoff))
     direction = -world_from_node[:3, 2] / max(float(np.linalg.norm(world_from_node[:3, 2])), 1e-12)
     return LightPart(
@@ -59,6 +62,7 @@ def emitted(surfaces: Sequence[Surface], luminance: dict[int, float]) -> tuple[L
 
     Surfaces of unknown strength share ASSUMED_LM by their area.
     """
+    # Share the assumed flux by area where no strength is told.
     area = {k: _area(surfaces[k]) for k in luminance}
     unknown = sum(area[k] for k, value in luminance.items() if value == 0)
     found = []

@@ -7,6 +7,7 @@ No effects. The file is JSON: {"rooms": [{"polygon": [[x, z], ...], "floor_y": 0
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -24,13 +25,13 @@ from pbrs_farm.read.common.room_floors import (
     polygon_of,
 )
 
-MIN_ROOM_M2: Final = 1.0
+MIN_ROOM_M2: Final = 1.0  # smaller pieces of floor are gaps under doors and walls
 MIN_ROOM_WIDTH_M: Final = 0.5
 MAX_ROOMS: Final = 1000
-_STOREY_M: Final = 2.5
-_SAME_LEVEL_M: Final = 0.5
-_SLACK_M: Final = 0.3
-_EDGE_M: Final = 0.1
+_STOREY_M: Final = 2.5  # height of a room that nothing tells the height of
+_SAME_LEVEL_M: Final = 0.5  # floors nearer in height than this are one level
+_SLACK_M: Final = 0.3  # a thing may stand so far outside its room's polygon or height
+_EDGE_M: Final = 0.1  # walls may stand so far beside the floor
 # A ceiling that covers less of a room than this share is the next room's.
 _NEXT_ROOM: Final = 0.05
 
@@ -48,6 +49,7 @@ def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]
 
 
 def _room(row: Any, file: str, place: str, items: Sequence[Item]) -> Room:
+    # Read the polygon: plan points in metres.
     corners = row.get("polygon") if isinstance(row, dict) else None
     try:
         plan = np.array(corners, np.float64)
@@ -62,14 +64,9 @@ def _room(row: Any, file: str, place: str, items: Sequence[Item]) -> Room:
     if polygon is None:
         raise BadHouse(file, f"{place}.polygon", "crosses itself or has no area")
     given = {k: _height(row, k, file, place) for k in ("floor_y", "ceiling_y")}
-    types = row.get("types")
-    return _with_heights(
-        polygon,
-        str(row.get("name", ""))[:60],
-        tuple(str(t)[:60] for t in types) if isinstance(types, list) else (),
-        given,
-        items,
-    )
+    name, types = str(row.get("name", ""))[:60], row.get("types")
+    words = tuple(str(t)[:60] for t in types) if isinstance(types, list) else ()
+    return _with_heights(polygon, name, words, given, items)
 
 
 def _height(row: dict[str, Any], key: str, file: str, place: str) -> float | None:
@@ -89,6 +86,7 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
         height = floor_height(item.surfaces) if item.kind is ItemKind.FLOOR else None
         if height is None or len(found) >= MAX_ROOMS:
             continue
+        # Let walls part the floor where they stand 1 m above it.
         standing = [w for w in walls if w.positions[:, 1].max() > height + 1.0]
         standing = [w for w in standing if w.positions[:, 1].min() < height + 1.0]
         low, high = item.bounds[:, [0, 2]]
@@ -109,16 +107,19 @@ def _with_heights(
     items: Sequence[Item],
 ) -> Room:
     """The room with heights of the floor and ceiling that lie over its polygon."""
+    # Take the floor's height as given, as the floor below has it, or 0.
     floors = _over(items, ItemKind.FLOOR, polygon)
     floor_y = given["floor_y"]
     low = floor_height(floors) if floor_y is None else floor_y
     low = 0.0 if low is None else low
+    # Leave out ceilings that belong to the next room.
     above = [s for s in _over(items, ItemKind.CEILING, polygon) if s.positions[:, 1].min() > low]
     shares = [coverage(s, polygon) for s in above]
     above = [s for s, share in zip(above, shares, strict=True) if share > _NEXT_ROOM]
     ceiling = ceiling_height(above)
     if ceiling is None and above:
         ceiling = min(float(s.positions[:, 1].min()) for s in above)  # planar, looking up
+    # Without a ceiling the room is as high as its walls, or a storey.
     walls = [float(s.positions[:, 1].max()) for s in _over(items, ItemKind.WALL, polygon, _EDGE_M)]
     nominal = max((y for y in walls if low + 1.0 < y < low + 10.0), default=low + _STOREY_M)
     high = given["ceiling_y"] or ceiling or nominal
@@ -157,29 +158,21 @@ def _within(
 
 def levels_of(rooms: Sequence[Room]) -> tuple[tuple[Level, ...], tuple[Room, ...]]:
     """(levels by floor height, from below; the rooms with their ids `<level>_<room>`)."""
+    # Floors within half a metre are one level.
     heights: list[float] = []
     for y in sorted(r.floor_y for r in rooms):
         if not heights or y > heights[-1] + _SAME_LEVEL_M:
             heights.append(y)
+    # Number the rooms of each level from 0.
     numbered: list[Room] = []
     count = [0] * len(heights)
     for room in rooms:
         level = int(np.searchsorted(heights, room.floor_y, "right")) - 1
         room_id = f"{level}_{count[level]}"
         count[level] += 1
-        numbered.append(
-            Room(
-                room_id,
-                room.name or f"Room {room_id}",
-                str(level),
-                room.polygon,
-                room.floor_y,
-                room.ceiling_y,
-                room.types,
-                room.has_floor,
-                room.has_ceiling,
-            )
-        )
+        name = room.name or f"Room {room_id}"
+        numbered.append(replace(room, id=room_id, name=name, level_id=str(level)))
+    # A level is as high as its rooms are in the middle.
     levels = []
     for k, height in enumerate(heights):
         here = [r.ceiling_y - r.floor_y for r in numbered if r.level_id == str(k)]
@@ -203,6 +196,7 @@ def room_at(rooms: Sequence[Room], point: NDArray[np.float64]) -> str | None:
     if not here:
         return None
     place: Any = shapely.Point(x, z)
+    # Measure to each room's polygon: 0 inside it.
     distance = [float(shapely.Polygon(r.polygon).distance(place)) for r in here]
     nearest = int(np.argmin(distance))
     return here[nearest].id if distance[nearest] <= _SLACK_M else None

@@ -29,6 +29,7 @@ def triangulated(rings: Sequence[Points2]) -> tuple[Points2, NDArray[np.int32]]:
     ends = np.cumsum([len(r) for r in rings]).astype(np.uint32)
     faces = np.asarray(mapbox_earcut.triangulate_float64(points, ends), np.int32).reshape(-1, 3)
     a, b, c = (points[faces[:, k]] for k in range(3))
+    # Turn all triangles one way round and drop those without area.
     turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     faces[turn < 0] = faces[turn < 0][:, [0, 2, 1]]
     return points, faces[turn != 0]
@@ -41,6 +42,7 @@ def horizontal(
 
     uv = plan (x, -z) in metres for a floor, (x, z) for a ceiling, so that neither is mirrored.
     """
+    # Cut each polygon and number its corners after those before it.
     points: list[Points2] = []
     faces: list[NDArray[np.int32]] = []
     n = 0

@@ -52,17 +52,20 @@ def _append_material(fields: dict[str, object] | None, materials: list[ObjMateri
 def _read_line(key: str, words: list[str], raw: str, fields: dict[str, object]) -> None:
     if key in ("kd", "ks"):
         rgb = [_number(w) for w in words[:3]]
+        # One number means a grey.
         if len(rgb) == 1:
             rgb *= 3
         if len(rgb) == 3 and all(v is not None for v in rgb):
             fields[key] = _rgb([v or 0.0 for v in rgb])
     elif key in ("ns", "d", "tr"):
+        # Take the last word: "d -halo 0.5" has an option before it.
         value = _number(words[-1]) if words else None
         if value is not None:
             if key == "ns":
                 fields["ns"] = max(0.0, value)
             else:
                 d = value if key == "d" else 1.0 - value
+                # The first of d and Tr counts; Tr is one less opacity.
                 fields.setdefault("d", float(np.clip(d, 0, 1)))
     elif key in ("map_kd", "map_d") and words:
         fields[key] = _picture_name(words, raw)
@@ -82,6 +85,7 @@ _OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu
 
 
 def _picture_name(words: list[str], raw: str) -> str:
+    # Pass over options and their numbers: what is left is the name, blanks included.
     at = 0
     while at < len(words) and words[at].lower() in _OPTIONS:
         most = _OPTIONS[words[at].lower()]
@@ -100,6 +104,7 @@ def builtin_materials() -> dict[str, ObjMaterial]:
     text = files("pbrs_farm.read.mesh").joinpath("java3d-materials.json").read_text("utf-8")
     table = {}
     for name, m in json.loads(text).items():
+        # Names that begin so are remarks about the table.
         if name.startswith("_"):
             continue
         table[name] = ObjMaterial(

@@ -109,6 +109,7 @@ def _statements(data: bytes) -> _Statements:
             # Negative indices count back from the lines so far.
             sizes = (len(found.vertices), len(found.uvs), len(found.normals))
             part.seen.append(sizes if b"-" in rest else (0, 0, 0))
+        # A tab after a keyword: begin anew with blanks, which is faster than to split by both.
         elif b"\t" in key:
             return _statements(data.replace(b"\t", b" "))
         elif key in (b"g", b"o"):
@@ -136,7 +137,9 @@ def _text(rest: bytes) -> str:
 def _numbers(lines: list[bytes], n: int, file: str, what: str) -> NDArray[np.float64]:
     if not lines:
         return np.zeros((0, n))
+    # Parse all lines at once where each has as many numbers; else pad or cut them.
     tokens = b" ".join(lines).split()
+    # Colours after a position, or a third texture coordinate, are cut off below.
     per_line = len(tokens) // len(lines)
     if len(tokens) != per_line * len(lines) or per_line < n:
         rows = [(line.split() + [b"0"] * n)[:n] for line in lines]
@@ -157,6 +160,7 @@ def _numbers(lines: list[bytes], n: int, file: str, what: str) -> NDArray[np.flo
 
 def _indices(part: _Part, pools: tuple[NDArray[np.float64], ...], file: str) -> NDArray[np.int64]:
     # (n corners, 3) vertex, uv and normal index from 0; -1 = none.
+    # Parse all corners at once where they have one form: v, v/vt, v//vn or v/vt/vn.
     joined = b" ".join(part.lines).replace(b"//", b"/0/")
     tokens = joined.split()
     slashes = {t.count(b"/") for t in tokens}
@@ -173,17 +177,18 @@ def _indices(part: _Part, pools: tuple[NDArray[np.float64], ...], file: str) -> 
     indices = np.zeros((len(tokens), 3), np.int64)
     indices[:, :columns] = given
     if (given < 0).any():
+        # Count negative indices back from what was there when the face was written.
         per_line = [len(x.split()) for x in part.lines]
         seen = np.repeat(np.asarray(part.seen, np.int64).reshape(-1, 3), per_line, axis=0)
         indices = np.where(indices < 0, indices + seen + 1, indices)
+    # Refuse a vertex that does not exist; without a texture or normal one can go on.
     for k, what in enumerate(("vertex", "texture", "normal")):
         low, high = int(indices[:, k].min()), int(indices[:, k].max())
         if low < (1 if k == 0 else 0) or high > len(pools[k]):
             if k == 0:
                 bad = low if low < 1 else high
-                raise BadHouse(
-                    file, "an `f` line", f"{what} {bad} of {len(pools[k])} does not exist"
-                )
+                text = f"{what} {bad} of {len(pools[k])} does not exist"
+                raise BadHouse(file, "an `f` line", text)
             indices[(indices[:, k] > len(pools[k])) | (indices[:, k] < 0), k] = 0
     return indices - 1
 
@@ -194,6 +199,7 @@ def _mesh(
     sizes = np.array([len(x.split()) for x in part.lines], np.int64)
     if not sizes.sum():
         return None, len(sizes)
+    # Triangulate, and drop triangles without area.
     indices = _indices(part, pools, file)
     corners = triangle_corners(pools[0][indices[:, 0]], sizes)
     index = indices[corners]
@@ -206,6 +212,7 @@ def _mesh(
     if not len(index):
         return None, n_dropped
     points = pools[0]
+    # Use texture coordinates and normals where every corner has them.
     has_uvs = bool((index[:, :, 1] >= 0).all())
     if (index[:, :, 2] >= 0).all():
         normal_pool, normal_index = pools[2], index[:, :, 2]
@@ -215,6 +222,7 @@ def _mesh(
     keys = np.stack(
         [index[:, :, 0], index[:, :, 1] if has_uvs else 0 * normal_index, normal_index], -1
     )
+    # Make a vertex of each different (position, uv, normal).
     unique, faces = _unique_rows(keys.reshape(-1, 3))
     normals = normal_pool[unique[:, 2]]
     length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -242,6 +250,7 @@ def _first_of_each(v: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 def _unique_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     # The distinct rows, in sorted order, and for each row its place among them.
+    # Code a row as one number where that fits into 64 bits: sorting is faster.
     spans = rows.max(0) + 1
     if float(spans[0]) * float(spans[1]) * float(spans[2]) > 2.0**62:
         unique, inverse = np.unique(rows, axis=0, return_inverse=True)

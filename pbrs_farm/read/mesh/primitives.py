@@ -5,6 +5,7 @@ Every solid's faces are counter-clockwise seen from outside. Texture coordinates
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,7 @@ _QUAD = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 def quads_surface(name: str, quads: F64, material: int) -> Surface:
     """A surface of (N, 4, 3) planar quads, corners counter-clockwise, uv in metres from corner 0."""
     quads = np.asarray(quads, np.float64).reshape(-1, 4, 3)
+    # Lay u along the first edge, v at right angles to it in the quad's plane.
     u = quads[:, 1] - quads[:, 0]
     u = u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-12)
     normal = np.cross(u, quads[:, 3] - quads[:, 0])
@@ -63,10 +65,13 @@ def lathe(name: str, profile: F64, centre: F64, material: int, *, n: int = 16) -
     """
     angles = 2 * np.pi * np.arange(n + 1) / n
     around = np.stack([np.cos(angles), np.zeros(n + 1), -np.sin(angles)], -1)
+    # Close the ring exactly.
     around[-1] = around[0]
     positions, normals, faces, uvs = [], [], [], []
+    # Turn each stretch of the profile into a ring of quads, or of triangles at the axis.
     for k, ((r0, y0), (r1, y1)) in enumerate(pairwise(profile)):
         ring = [around * r + [0, y, 0] + centre for r, y in ((r0, y0), (r1, y1))]
+        # Stand the normal on the stretch.
         slope = around * (y1 - y0) + np.array([0, r0 - r1, 0])
         slope = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-12)
         base = k * 2 * (n + 1)
@@ -96,11 +101,10 @@ def sphere(name: str, centre: F64, radius: float, material: int, *, n: int = 16)
     profile = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
     profile[[0, -1], 0] = 0.0
     surface = lathe(name, profile, centre, material, n=n)
+    # Replace the stretches' normals by those of the sphere.
     outward = surface.positions - np.asarray(centre, np.float32)
     outward = outward / np.linalg.norm(outward, axis=1, keepdims=True)
-    return Surface(
-        name, surface.positions, surface.faces, material, surface.uvs, outward.astype(np.float32)
-    )
+    return replace(surface, normals=outward.astype(np.float32))
 
 
 def wall_prism(
@@ -116,13 +120,13 @@ def wall_prism(
     """A wall as a closed solid: surfaces left, right, top, bottom, start, end.
 
     left, right: (N, 2) plan points from the wall's start to its end. *_top_y: (N,) heights.
-    materials: of the left side, the right side, and the rest (with the top, unless top is
-    given). u runs to the right of who
-    looks at the side, v is the height above the wall's bottom.
+    materials: of the left side, the right side, and the rest (with the top, unless top is given).
+    u runs to the right of who looks at the side, v is the height above the wall's bottom.
     """
     left_low, right_low = _lifted(left, bottom_y), _lifted(right, bottom_y)
     left_high, right_high = _lifted(left, left_top_y), _lifted(right, right_top_y)
     rest = materials[2]
+    # Close the two ends.
     start = np.stack([left_low[0], right_low[0], right_high[0], left_high[0]])
     end = np.stack([right_low[-1], left_low[-1], left_high[-1], right_high[-1]])
     return (
@@ -148,9 +152,9 @@ def _strip(near: F64, far: F64) -> F64:
 
 def _side(name: str, low: F64, high: F64, material: int) -> Surface:
     surface = quads_surface(name, _strip(low, high), material)
+    # Measure u along the side in plan, v from the wall's bottom.
     steps = np.linalg.norm(np.diff(low[:, [0, 2]], axis=0), axis=1)
     u = np.concatenate([[0.0], np.cumsum(steps)])
     corner_u = np.stack([u[:-1], u[1:], u[1:], u[:-1]], 1).ravel()
     corner_v = surface.positions[:, 1] - low[0, 1]
-    uvs = np.stack([corner_u, corner_v], -1).astype(np.float32)
-    return Surface(name, surface.positions, surface.faces, material, uvs)
+    return replace(surface, uvs=np.stack([corner_u, corner_v], -1).astype(np.float32))

@@ -20,15 +20,10 @@ def crease_normals(
     their angle at the vertex. Vertices at equal positions count as one.
     """
     unit = unit_normals(points[faces])
-    n_faces = len(faces)
     if crease_rad <= 0:
-        return unit, np.repeat(np.arange(n_faces), 3).reshape(-1, 3)
-    _, welded = np.unique(points[faces.ravel()], axis=0, return_inverse=True)
-    welded = welded.reshape(-1, 3)
-    first, second = _smooth_links(welded, unit, np.cos(crease_rad))
-    n = 3 * n_faces
-    links = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(n, n))
-    n_normals, label = connected_components(links, directed=False)
+        return unit, np.repeat(np.arange(len(faces)), 3).reshape(-1, 3)
+    n_normals, label = _normal_of_corner(points, faces, unit, np.cos(crease_rad))
+    # Sum the faces' normals at each corner by their angle there, then make them unit vectors.
     angles = _corner_angles(points, faces)
     normals = np.zeros((n_normals, 3))
     for k in range(3):
@@ -38,11 +33,25 @@ def crease_normals(
     return normals, label.reshape(-1, 3).astype(np.int64)
 
 
+def _normal_of_corner(
+    points: NDArray[np.float64], faces: NDArray[np.int64], unit: NDArray[np.float64], min_cos: float
+) -> tuple[int, NDArray[np.int32]]:
+    # How many normals there are, and which each of the 3 F corners has.
+    _, welded = np.unique(points[faces.ravel()], axis=0, return_inverse=True)
+    first, second = _smooth_links(welded.reshape(-1, 3), unit, min_cos)
+    # Corners that smooth edges join, directly or through others, share one normal.
+    shape = (faces.size, faces.size)
+    links = coo_array((np.ones(len(first), np.int8), (first, second)), shape=shape)
+    n_normals, label = connected_components(links, directed=False)
+    return n_normals, label
+
+
 def _corner_angles(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
     # (F, 3) radians.
     corners = points[faces]
     forward = np.roll(corners, -1, axis=1) - corners
     backward = np.roll(corners, 1, axis=1) - corners
+    # The arctangent keeps its precision for very sharp and very blunt corners.
     cross = np.linalg.norm(np.cross(forward, backward), axis=-1)
     return np.asarray(np.arctan2(cross, (forward * backward).sum(-1)))
 
@@ -51,23 +60,17 @@ def _smooth_links(
     welded: NDArray[np.int64], unit: NDArray[np.float64], min_cos: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     # Pairs of corner numbers (3 face + k) at the ends of edges that two faces share smoothly.
-    n_faces = len(welded)
-    corner = np.arange(3 * n_faces).reshape(-1, 3)
-    low_corner = corner.ravel()
-    high_corner = np.roll(corner, -1, axis=1).ravel()
+    corner = np.arange(welded.size).reshape(-1, 3)
+    start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
+    # Turn every edge from its lower vertex to its higher one: both faces then name it alike.
     a, b = welded.ravel(), np.roll(welded, -1, axis=1).ravel()
-    swap = a > b
-    low_corner, high_corner = (
-        np.where(swap, high_corner, low_corner),
-        np.where(swap, low_corner, high_corner),
-    )
+    low, high = np.where(a > b, end, start), np.where(a > b, start, end)
     key = np.minimum(a, b) * (int(welded.max(initial=0)) + 1) + np.maximum(a, b)
+    # Sort the edges, so that those of one pair of vertices are neighbours.
     order = np.argsort(key, kind="stable")
     same = key[order[:-1]] == key[order[1:]]
     one, other = order[:-1][same], order[1:][same]
+    # Keep the pairs whose faces turn by less than the crease; edge k is of face k // 3.
     is_smooth = (unit[one // 3] * unit[other // 3]).sum(1) >= min_cos
     one, other = one[is_smooth], other[is_smooth]
-    return (
-        np.concatenate([low_corner[one], high_corner[one]]),
-        np.concatenate([low_corner[other], high_corner[other]]),
-    )
+    return np.concatenate([low[one], high[one]]), np.concatenate([low[other], high[other]])

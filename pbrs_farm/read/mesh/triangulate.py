@@ -26,14 +26,9 @@ def triangle_corners(positions: NDArray[np.float64], sizes: NDArray[np.int64]) -
             continue
         which = np.flatnonzero(sizes == n)
         corners = starts[which][:, None] + np.arange(n)
-        fans = np.stack(
-            [
-                np.broadcast_to(corners[:, :1], (len(which), n - 2)),
-                corners[:, 1:-1],
-                corners[:, 2:],
-            ],
-            -1,
-        )
+        # Cut all convex polygons of one size at once, as fans about their first corner.
+        first = np.broadcast_to(corners[:, :1], (len(which), n - 2))
+        fans = np.stack([first, corners[:, 1:-1], corners[:, 2:]], -1)
         if n == 3:
             triangles.append(fans.reshape(-1, 3))
             owners.append(which)
@@ -41,17 +36,20 @@ def triangle_corners(positions: NDArray[np.float64], sizes: NDArray[np.int64]) -
         is_convex = _convex(positions[corners]) | (n > MAX_EAR_CUT)
         triangles.append(fans[is_convex].reshape(-1, 3))
         owners.append(np.repeat(which[is_convex], n - 2))
+        # Cut the ears off the others, one by one.
         for polygon in np.flatnonzero(~is_convex):
             cut = _ear_cut(positions[corners[polygon]])
             triangles.append(corners[polygon][cut])
             owners.append(np.full(len(cut), which[polygon]))
     if not triangles:
         return np.zeros((0, 3), np.int64)
+    # Put the triangles into the order of their polygons.
     order = np.argsort(np.concatenate(owners), kind="stable")
     return np.concatenate(triangles)[order]
 
 
 def _newell(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
+    # Newell's normal: also of polygons that are neither convex nor quite flat.
     following = np.roll(polygons, -1, axis=1)
     return np.asarray(np.cross(polygons, following).sum(1))
 
@@ -68,6 +66,7 @@ def _convex(polygons: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _ear_cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
     # (T, 3) corners of one polygon; a fan where ear cutting finds nothing.
     n = len(polygon)
+    # Flatten along the axis that the polygon faces most.
     normal = _newell(polygon[None] - polygon[0])[0]
     drop = int(np.abs(normal).argmax())
     flat = np.ascontiguousarray(np.delete(polygon, drop, axis=1), np.float64)
@@ -76,6 +75,7 @@ def _ear_cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
     ).reshape(-1, 3)
     if not len(cut):
         return np.stack([np.zeros(n - 2, np.int64), np.arange(1, n - 1), np.arange(2, n)], -1)
+    # Turn over what dropping that axis has mirrored.
     against = area_vectors(polygon[cut]) @ normal < 0
     cut[against] = cut[against][:, [0, 2, 1]]
     return cut

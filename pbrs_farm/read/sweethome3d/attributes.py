@@ -14,12 +14,12 @@ Rgb = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Attributes:
-    """One element's attributes. place: what to call the element in a message."""
+    """One element's attributes."""
 
     file: str
-    place: str
+    place: str  # what to call the element in a message
     element: Element
-    max_extent_m: float
+    max_extent_m: float  # bound of lengths and coordinates
 
     def fail(self, message: str) -> BadHouse:
         """The error that names this element."""
@@ -71,10 +71,8 @@ class Attributes:
             return None
         value *= M_FROM_CM
         if abs(value) > self.max_extent_m:
-            raise self.fail(
-                f"{name} is {value:.0f} m, farther than {self.max_extent_m:.0f} m "
-                "(recipe field read.max_extent_m)"
-            )
+            limit = f"{self.max_extent_m:.0f} m (recipe field read.max_extent_m)"
+            raise self.fail(f"{name} is {value:.0f} m, farther than {limit}")
         return value
 
     def length(self, name: str, default_m: float | None = None) -> float:
@@ -98,6 +96,7 @@ class Attributes:
             values = tuple(float(w) for w in text.split())
         except ValueError:
             values = ()
+        # NaN fails the comparison, too.
         if len(values) != count or not all(abs(v) <= 1e6 for v in values):
             raise self.fail(f"{name} must be {count} finite numbers")
         return values
@@ -113,5 +112,6 @@ class Attributes:
             raise self.fail(f"{name}='{text[:40]}' is not a colour AARRGGBB") from None
         if not 0 <= value <= 0xFFFFFFFF:
             raise self.fail(f"{name}='{text[:40]}' is not a colour AARRGGBB")
+        # The program keeps colours as Java does: alpha, red, green, blue from the top byte.
         r, g, b = ((value >> shift & 255) / 255 for shift in (16, 8, 0))
         return value >> 24, (r, g, b)

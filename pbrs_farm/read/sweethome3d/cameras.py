@@ -15,12 +15,8 @@ def stored_cameras(plan: Plan) -> tuple[StoredCamera, ...]:
     cameras = []
     for c in plan.cameras:
         x, y, z = c.at
-        towards = np.array(
-            [
-                -math.sin(c.yaw) * math.cos(c.pitch),
-                -math.sin(c.pitch),
-                math.cos(c.yaw) * math.cos(c.pitch),
-            ]
-        )
+        # Yaw turns from +y of the plan, which is +z of the world; pitch is positive downwards.
+        level, down = math.cos(c.pitch), math.sin(c.pitch)
+        towards = np.array([-math.sin(c.yaw) * level, -down, math.cos(c.yaw) * level])
         cameras.append(StoredCamera(c.name, np.array([x, z, y]), towards, c.hfov))
     return tuple(cameras)

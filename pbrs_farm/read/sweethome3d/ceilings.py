@@ -16,8 +16,8 @@ from pbrs_farm.read.sweethome3d.roofs import roof_over
 from pbrs_farm.read.sweethome3d.wall_solids import top_heights
 
 F64 = NDArray[np.float64]
-KINK_M = 0.01
-TIE_M = 1e-3
+KINK_M = 0.01  # smaller bends of a ceiling are left out
+TIE_M = 1e-3  # walls are equally near within this
 NEAR_M = 0.10  # A wall's corner this near to a room's edge can bend the ceiling there
 
 
@@ -27,26 +27,22 @@ class CeilingHeights:
     def __init__(self, plan: Plan, outlines: dict[str, Outline]) -> None:
         self._top = max((x.index for x in plan.levels), default=0)
         self._wall_height = plan.wall_height
-        self._edges: dict[str, tuple[F64, F64]] = {}
         by_level: dict[str, list[tuple[F64, F64]]] = {}
         # Collect the top edges of all walls of a level: plan segments and heights at their ends.
         for wall in plan.walls:
             if wall.id not in outlines:
                 continue
-            outline = outlines[wall.id]
-            around = outline.polygon
+            outline, around = outlines[wall.id], outlines[wall.id].polygon
             along = np.concatenate([outline.along, outline.along[::-1]])
             tops = top_heights(wall, around, along)
             a, b = np.arange(len(around)), np.roll(np.arange(len(around)), -1)
             segments = np.concatenate([around[a], around[b]], 1)
-            by_level.setdefault(level_of(plan, wall.level).id, []).append(
-                (segments, np.stack([tops[a], tops[b]], 1))
-            )
-        for level_id, parts in by_level.items():
-            self._edges[level_id] = (
-                np.concatenate([p[0] for p in parts]),
-                np.concatenate([p[1] for p in parts]),
-            )
+            edges = (segments, np.stack([tops[a], tops[b]], 1))
+            by_level.setdefault(level_of(plan, wall.level).id, []).append(edges)
+        self._edges = {
+            level_id: (np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts]))
+            for level_id, parts in by_level.items()
+        }
 
     def heights(self, level: PlanLevel, points: Points2, is_flat: bool) -> F64:
         """(N,) heights over plan points (N, 2)."""
@@ -68,21 +64,16 @@ class CeilingHeights:
         # A level ceiling needs no roof.
         if np.ptp(every) < 1e-4:
             return horizontal("ceiling", parts, level.elevation + every[0], material, up=False)
+        # Span a roof over each polygon, and number its corners after those before it.
         positions, faces, n = [], [], 0
         for rings, tops in zip(bent, heights, strict=True):
-            roof = roof_over(rings, tops)
-            plan = roof.points
-            positions.append(np.stack([plan[:, 0], level.elevation + roof.heights, plan[:, 1]], -1))
-            faces.append(roof.faces + n)
+            plan, y, triangles = roof_over(rings, tops)
+            positions.append(np.stack([plan[:, 0], level.elevation + y, plan[:, 1]], -1))
+            faces.append(triangles + n)
             n += len(plan)
-        world = np.concatenate(positions)
-        return Surface(
-            "ceiling",
-            world.astype(np.float32),
-            np.concatenate(faces).astype(np.int32),
-            material,
-            world[:, [0, 2]].astype(np.float32),
-        )
+        world = np.concatenate(positions).astype(np.float32)
+        numbers = np.concatenate(faces).astype(np.int32)
+        return Surface("ceiling", world, numbers, material, world[:, [0, 2]])
 
     def _with_kinks(self, level: PlanLevel, ring: Points2, is_flat: bool) -> Points2:
         # The ring with the points where the walls' tops beside one of its edges bend.

@@ -18,7 +18,7 @@ from pbrs_farm.read.common.resources import Layered, Resources, ZipResources
 from pbrs_farm.read.sweethome3d.java_home import RESAVE, root_from_java
 
 MAX_XML_BYTES = 16 * 2**20
-MAX_DEPTH = 200
+MAX_DEPTH = 200  # nested elements
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +54,7 @@ def needs_program(data: bytes, file: str) -> bool:
     try:
         root = open_container(data, file, None).root
         held = ZipResources(data, file).names() if data.startswith(b"PK") else ()
+        # Models and pictures are all that a home names.
         named = {e.get(key) for e in root.iter() for key in ("model", "image")}
         return not {posixpath.normpath(name) for name in named if name} <= set(held)
     except BadHouse:
@@ -80,6 +81,7 @@ def _parsed(xml: bytes, file: str, entry: str) -> Element:
 
 
 def _depth(root: Element) -> int:
+    # Go down level by level: no recursion that a deep file could exhaust.
     depth, level = 0, [root]
     while level and depth <= MAX_DEPTH:
         depth, level = depth + 1, [child for element in level for child in element]

@@ -90,6 +90,7 @@ def _label(
 ) -> tuple[int, tuple[str, ...]]:
     tags = ["mirrored"] if piece.is_mirrored else []
     label, rule = by_rule.nyu40, by_rule.tag
+    # A door or window of unknown class: one with a pane above the floor is a window.
     if piece.frame is not None and label not in (DOOR, WINDOW):
         has_pane = any(m.group == PANE for m in model.meshes)
         label = WINDOW if has_pane and piece.elevation > 0.3 else DOOR

@@ -35,6 +35,7 @@ class HomeMaterials:
 
     def painted(self, paint: Paint, name: str, place: str) -> int:
         """Index of the material that the paint of a wall or a room makes."""
+        # A picture that can be used goes before the colour.
         loaded = None
         if paint.picture is not None:
             loaded = self.texture(paint.picture.image, place)

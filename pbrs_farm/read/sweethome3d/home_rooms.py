@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -15,8 +15,8 @@ from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, PlanLevel, PlanRoom, level_of
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
-MIN_AREA_M2 = 0.01
-SLIVER_M2 = 1e-4
+MIN_AREA_M2 = 0.01  # smaller rooms are left out
+SLIVER_M2 = 1e-4  # smaller pieces come of rounding
 MAX_CORNERS = 1000  # of a room: what is more is a curve drawn too finely, and costs its square
 
 
@@ -92,24 +92,16 @@ def room_nouns(rooms: list[ReadRoom], ceilings: CeilingHeights) -> tuple[Room, .
     for k, room in enumerate(rooms):
         taken = [r.outline for r in _later(rooms, k)]
         rest = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
-        outline = room.outline
-        if len(rest) == 1 and not rest[0].interiors:
-            outline = rest[0]
+        outline = rest[0] if len(rest) == 1 and not rest[0].interiors else room.outline
         polygon = counter_clockwise(_ring(outline.exterior))
+        # The room is as high as its ceiling is anywhere.
         height = float(np.max(ceilings.heights(room.level, polygon, room.plan.is_ceiling_flat)))
-        nouns.append(
-            Room(
-                id=room.id,
-                name=room.plan.name,
-                level_id=room.level_id,
-                polygon=polygon,
-                floor_y=room.level.elevation,
-                ceiling_y=room.level.elevation + height,
-                types=(room.plan.name,) if room.plan.name else (),
-                has_floor=room.plan.has_floor,
-                has_ceiling=room.plan.has_ceiling,
-            )
-        )
+        nouns.append(Room(
+            id=room.id, name=room.plan.name, level_id=room.level_id, polygon=polygon,
+            floor_y=room.level.elevation, ceiling_y=room.level.elevation + height,
+            types=(room.plan.name,) if room.plan.name else (),
+            has_floor=room.plan.has_floor, has_ceiling=room.plan.has_ceiling,
+        ))  # fmt: skip
     return tuple(nouns)
 
 
@@ -132,16 +124,20 @@ def plane_items(
     for k, room in enumerate(rooms):
         later = _later(rooms, k)
         if room.plan.has_floor:
-            taken: list[shapely.Geometry] = [r.outline for r in later if r.plan.has_floor]
-            taken.append(floor_cuts.get(room.level_id, shapely.Polygon()))
-            parts = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
-            items += _floor(room, parts, materials)
+            floors = [r.outline for r in later if r.plan.has_floor]
+            items += _floor(room, _left_of(room, floors, floor_cuts), materials)
         if room.plan.has_ceiling:
-            taken = [r.outline for r in later if r.plan.has_ceiling]
-            taken.append(ceiling_cuts.get(room.level_id, shapely.Polygon()))
-            parts = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
-            items += _ceiling(room, parts, ceilings, materials)
+            covers = [r.outline for r in later if r.plan.has_ceiling]
+            items += _ceiling(room, _left_of(room, covers, ceiling_cuts), ceilings, materials)
     return items
+
+
+def _left_of(
+    room: ReadRoom, later: list[shapely.Polygon], cuts: dict[str, shapely.Geometry]
+) -> list[shapely.Polygon]:
+    # What later rooms and the level's staircases leave of the room's outline.
+    taken = [*later, cuts.get(room.level_id, shapely.Polygon())]
+    return _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
 
 
 def _floor(room: ReadRoom, parts: list[shapely.Polygon], materials: HomeMaterials) -> list[Item]:
@@ -183,7 +179,7 @@ def _textured(surface: Surface, paint: Paint) -> Surface:
     if paint.picture is None or surface.uvs is None:
         return surface
     uvs = picture_uvs(surface.uvs.astype(np.float64), paint.picture).astype(np.float32)
-    return Surface(surface.name, surface.positions, surface.faces, surface.material, uvs)
+    return replace(surface, uvs=uvs)
 
 
 def _rings(polygon: shapely.Polygon) -> list[Points2]:

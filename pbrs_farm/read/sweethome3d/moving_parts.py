@@ -10,12 +10,14 @@ import re
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.read.mesh.obj import Mesh
 
 _JOINT = re.compile(r"(?:^|_)((?:hinge|rail)_\d+|unique_rail)(?:_|$)")
 
-Transformations = tuple[tuple[str, tuple[float, ...]], ...]
+_FIXED = ("sweethome3d_hinge_", "sweethome3d_rail_", "sweethome3d_unique")
+Transformations = tuple[tuple[str, tuple[float, ...]], ...]  # (name, 12 numbers)
 
 
 def joint_of(name: str) -> str:
@@ -32,25 +34,26 @@ def moved(meshes: tuple[Mesh, ...], transformations: Transformations) -> tuple[M
 
 def _moved(mesh: Mesh, by_joint: dict[str, tuple[float, ...]]) -> Mesh:
     for word in mesh.group.split():
-        is_fixed = word.startswith(
-            ("sweethome3d_hinge_", "sweethome3d_rail_", "sweethome3d_unique")
-        )
+        # The hinge or rail itself stays where it is.
+        is_fixed = word.startswith(_FIXED)
         joint = "" if is_fixed else joint_of(word)
         if joint == "" and word.startswith("sweethome3d_") and "_on_rail" in word:
             joint = "unique_rail"
         if joint not in by_joint:
             continue
-        matrix = np.array(by_joint[joint]).reshape(3, 4)
-        linear = matrix[:, :3]
-        if abs(np.linalg.det(linear)) < 1e-9:
-            return mesh
-        normals = mesh.normals @ np.linalg.inv(linear)
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        faces = mesh.faces if np.linalg.det(linear) > 0 else mesh.faces[:, [0, 2, 1]]
-        return replace(
-            mesh,
-            positions=mesh.positions @ linear.T + matrix[:, 3],
-            normals=normals / np.where(length > 0, length, 1),
-            faces=faces,
-        )
+        return _transformed(mesh, np.array(by_joint[joint]).reshape(3, 4))
     return mesh
+
+
+def _transformed(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
+    """The mesh moved by a 3 x 4 matrix; as it is where the matrix flattens it."""
+    linear = matrix[:, :3]
+    if abs(np.linalg.det(linear)) < 1e-9:
+        return mesh
+    # Normals take the inverse transpose; a mirror turns the faces over.
+    normals = mesh.normals @ np.linalg.inv(linear)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(length > 0, length, 1)
+    faces = mesh.faces if np.linalg.det(linear) > 0 else mesh.faces[:, [0, 2, 1]]
+    positions = mesh.positions @ linear.T + matrix[:, 3]
+    return replace(mesh, positions=positions, normals=normals, faces=faces)

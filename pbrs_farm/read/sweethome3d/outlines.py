@@ -14,9 +14,9 @@ import shapely
 from pbrs_farm.core.arrays import Points2
 from pbrs_farm.read.sweethome3d.home_xml import PlanWall
 
-ARC_STEP_RAD = math.radians(5.0)
-MITRE_LIMIT = 2.0
-MIN_LENGTH_M = 1e-4
+ARC_STEP_RAD = math.radians(5.0)  # of the straight pieces of an arc
+MITRE_LIMIT = 2.0  # of the corner from the bare one, in thicknesses
+MIN_LENGTH_M = 1e-4  # of a wall, and of its thickness
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,15 +116,11 @@ def _join(
         (sides[1], mine.right, theirs.left if swapped else theirs.right),
     )
     for target, line, facing in pairs:
-        a = (line[here], line[inner])
-        b = (facing[there], facing[beyond])
-        if order[wall.id] > order[other.id]:
-            a, b = b, a
+        # Cross the earlier wall's line with the later one's: both walls get the same bits.
+        a, b = (line[here], line[inner]), (facing[there], facing[beyond])
+        crossing = _crossing(*b, *a) if order[wall.id] > order[other.id] else _crossing(*a, *b)
         # Move the corner to the crossing unless the mitre would be too long.
-        crossing = _crossing(*a, *b)
-        if crossing is None:
-            continue
-        if math.dist(crossing, line[here]) < limit:
+        if crossing is not None and math.dist(crossing, line[here]) < limit:
             target[here] = crossing
 
 

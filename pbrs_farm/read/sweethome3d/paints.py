@@ -24,6 +24,7 @@ def piece_paint(a: Attributes) -> Paint:
     """The paint that overrides a whole piece, or one of its materials."""
     paint = _paint(a, "color", "", "shininess")
     alpha = a.argb("color")
+    # A material of alpha 0 is how the program hides a part.
     is_hidden = a.element.tag == "material" and alpha is not None and alpha[0] == 0
     return Paint(paint.colour, paint.picture, paint.shininess, is_hidden)
 
@@ -32,12 +33,12 @@ def _paint(a: Attributes, colour: str, texture: str | None, shininess: str | Non
     argb = a.argb(colour)
     picture = None
     if texture is not None:
+        # A texture of a wall or room names its side, a piece's need not; the last one counts.
         for element in a.element.findall("texture"):
             if not texture or element.get("attribute") == texture:
                 picture = picture_of(a, element)
-    return Paint(
-        None if argb is None else argb[1], picture, a.optional(shininess) if shininess else None
-    )
+    shine = a.optional(shininess) if shininess else None
+    return Paint(None if argb is None else argb[1], picture, shine)
 
 
 def picture_of(parent: Attributes, element: Element) -> Picture:

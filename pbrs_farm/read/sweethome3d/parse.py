@@ -23,12 +23,13 @@ MAX_WALLS = 10_000
 MAX_ROOMS = 5_000
 MAX_ROOM_POINTS = 100_000
 _PIECES = frozenset({"pieceOfFurniture", "doorOrWindow", "light", "shelfUnit"})
-FALLBACK_HEIGHT_M = 2.5
+FALLBACK_HEIGHT_M = 2.5  # of walls and levels that tell none
 
 
 def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
     """Read every element the pipeline uses; BadHouse names the element that is wrong."""
     home = Attributes(file, "home", root, max_extent_m)
+    # Bound the work before any element is read.
     for tag, most in (("wall", MAX_WALLS), ("room", MAX_ROOMS), ("room/point", MAX_ROOM_POINTS)):
         if len(root.findall(tag)) > most:
             raise BadHouse(file, "", f"more than {most} <{tag}> elements")
@@ -88,6 +89,7 @@ def _furniture(root: Element, file: str) -> Iterator[tuple[Element, str, str]]:
 
 
 def _levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
+    # Sort by height, then by the order that the program keeps for levels of one height.
     found = [
         (a.metres("elevation", 0.0), a.number("elevationIndex", 0.0), k)
         for k, a in enumerate(elements)
@@ -97,18 +99,12 @@ def _levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
     for index, (elevation, _, k) in enumerate(sorted(found)):
         a = elements[k]
         thickness = a.length("floorThickness", 0.12)
-        levels.append(
-            PlanLevel(
-                id=a.text("id"),
-                name=a.text("name"),
-                elevation=elevation,
-                floor_thickness=thickness,
-                height=a.length("height", FALLBACK_HEIGHT_M),
-                is_visible=a.flag("visible", True) and a.flag("viewable", True),
-                index=index,
-                reach_down=thickness if elevation > lowest else 0.0,
-            )
-        )
+        levels.append(PlanLevel(
+            id=a.text("id"), name=a.text("name"), elevation=elevation, floor_thickness=thickness,
+            height=a.length("height", FALLBACK_HEIGHT_M),
+            is_visible=a.flag("visible", True) and a.flag("viewable", True),
+            index=index, reach_down=thickness if elevation > lowest else 0.0,
+        ))  # fmt: skip
     return tuple(levels)
 
 

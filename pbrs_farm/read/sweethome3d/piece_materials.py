@@ -12,7 +12,7 @@ from pbrs_farm.read.sweethome3d.home_materials import SHININESS_SCALE, HomeMater
 from pbrs_farm.read.sweethome3d.home_xml import Paint, Picture, PlanPiece
 from pbrs_farm.read.sweethome3d.piece_models import LIGHT, MIRROR, PANE, Model, content_name
 
-PANE_OPACITY = 0.2
+PANE_OPACITY = 0.2  # of panes and glass whose model says opaque
 CLEAR = 0.95  # Opacity below which a material counts as glass
 
 
@@ -98,6 +98,7 @@ def _texture(
         return None, None
     place = f"material {base.name}"
     loaded = materials.texture(content_name(model.folder, base.map_kd), place)
+    # Opacity is read from the colour map's alpha alone.
     if base.map_d and base.map_d != base.map_kd:
         text = f"{base.map_d[:80]!r} is not the colour map's alpha"
         materials.notes.add("unused-opacity-map", place, text)

@@ -15,6 +15,7 @@ from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.moving_parts import Transformations, moved
 
 PANE, MIRROR, LIGHT = "pane", "mirror", "light"
+# Beginning of a group's name -> what the program makes of it.
 _ROLES = (
     ("sweethome3d_window_pane", PANE),
     ("sweethome3d_window_mirror", MIRROR),
@@ -67,53 +68,43 @@ class Models:
         return self._models[key]
 
     def _load(self, name: str, place: str) -> ObjModel | None:
+        note, what = self._materials.notes.add, f"{name[:120]!r}"
         data = self._materials.contents.read(name)
         if data is None:
-            self._materials.notes.add(
-                "missing-model", place, f"no content {name[:120]!r}: left out"
-            )
+            note("missing-model", place, f"no content {what}: left out")
             return None
         kind = _kind(data)
         if kind != "obj":
-            self._materials.notes.add(
-                "unsupported-model", place, f"{name[:120]!r} is {kind}, only OBJ is read: left out"
-            )
+            note("unsupported-model", place, f"{what} is {kind}, only OBJ is read: left out")
             return None
+        # A model of too many triangles ends the reading; a damaged one is left out.
         try:
             parsed = parse_obj(data, name, max_triangles=self._max_triangles)
         except BadHouse as error:
             if "at most" in error.message:
                 raise BadHouse(self._file, place, error.message) from None
-            self._materials.notes.add("unreadable-model", place, f"{error.message}: left out")
+            note("unreadable-model", place, f"{error.message}: left out")
             return None
         if parsed.n_dropped:
-            self._materials.notes.add(
-                "degenerate-faces",
-                f"model {name}",
-                f"{parsed.n_dropped} faces without area dropped",
-            )
+            text = f"{parsed.n_dropped} faces without area dropped"
+            note("degenerate-faces", f"model {name}", text)
         return parsed
 
     def _model(self, parsed: ObjModel, name: str) -> Model:
-        folder = posixpath.dirname(name)
+        folder, note = posixpath.dirname(name), self._materials.notes.add
         # Start from the program's own materials; libraries of the model replace them.
         materials = dict(builtin_materials())
         for library in parsed.mtllibs:
             data = self._content(folder, library)
             if data is None:
-                self._materials.notes.add(
-                    "missing-materials", f"model {name}", f"no {library[:80]!r}"
-                )
+                note("missing-materials", f"model {name}", f"no {library[:80]!r}")
                 continue
-            for material in parse_mtl(data):
-                materials[material.name] = material
+            materials |= {material.name: material for material in parse_mtl(data)}
         # Note the names that neither of them knows.
         used = {m.material for m in parsed.meshes if m.material}
         unknown = sorted(used - set(materials))
         if unknown:
-            self._materials.notes.add(
-                "unknown-material", f"model {name}", f"no material {', '.join(unknown)[:120]}"
-            )
+            note("unknown-material", f"model {name}", f"no material {', '.join(unknown)[:120]}")
         meshes = _merged(parsed.meshes)
         corners = [m.positions for m in meshes] or [np.zeros((1, 3))]
         points = np.concatenate(corners)
@@ -156,19 +147,15 @@ def _merged(meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
         grouped.setdefault(key, []).append(mesh)
     merged = []
     for (role, _, has_uvs), parts in grouped.items():
+        # Number each part's vertices after those of the parts before it.
         first = np.cumsum([0, *(len(p.positions) for p in parts[:-1])])
-        merged.append(
-            replace(
-                parts[0],
-                group=role,
-                positions=np.concatenate([p.positions for p in parts]),
-                faces=np.concatenate(
-                    [p.faces + n for p, n in zip(parts, first, strict=True)]
-                ).astype(np.int32),
-                uvs=np.concatenate([p.uvs for p in parts if p.uvs is not None])
-                if has_uvs
-                else None,
-                normals=np.concatenate([p.normals for p in parts]),
-            )
-        )
+        faces = np.concatenate([p.faces + n for p, n in zip(parts, first, strict=True)])
+        uvs = [p.uvs for p in parts if p.uvs is not None]
+        merged.append(replace(
+            parts[0], group=role,
+            positions=np.concatenate([p.positions for p in parts]),
+            faces=faces.astype(np.int32),
+            uvs=np.concatenate(uvs) if has_uvs else None,
+            normals=np.concatenate([p.normals for p in parts]),
+        ))  # fmt: skip
     return tuple(merged)

@@ -16,21 +16,17 @@ from pbrs_farm.read.sweethome3d.piece_models import Model
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 F64 = NDArray[np.float64]
-_FLAT = 1e-9
+_FLAT = 1e-9  # an extent below it has no scale
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A piece's own frame: origin in its box's middle, x right, y up, z to its front, metres.
-
-    axes: (3, 3), columns are the frame's unit axes in the world. half: half extents of its box.
-    mirror: -1 if the model is mirrored along x, else 1.
-    """
+    """A piece's own frame: origin in its box's middle, x right, y up, z to its front, metres."""
 
     origin: F64
-    axes: F64
-    half: F64
-    mirror: float
+    axes: F64  # (3, 3), columns are the frame's unit axes in the world
+    half: F64  # half extents of its box
+    mirror: float  # -1 if the model is mirrored along x, else 1
 
     @property
     def box(self) -> Box:
@@ -46,8 +42,10 @@ def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None
     """Where a piece stands. local_height: (N, 3) its local points, to measure a tilted height."""
     width, depth, height = piece.size
     half = np.array([width, height, depth]) / 2
+    # Pitch, then roll, then turn about the vertical; the program's angles run clockwise.
     tilt = _rotation_z(-piece.roll) @ _rotation_x(-piece.pitch)
     axes = rotation_y(-piece.angle) @ tilt
+    # A tilted piece stands as high as it reaches once tilted.
     in_plan = height
     if piece.pitch or piece.roll:
         if local_height is not None and len(local_height):
@@ -63,6 +61,7 @@ def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None
 def local_from_model(piece: PlanPiece, model: Model) -> F64:
     """(4, 4) from the model's frame to the piece's: centred, turned, scaled to the piece's size."""
     turn = np.eye(3) if piece.rotation is None else np.array(piece.rotation).reshape(3, 3)
+    # Turn the model about its middle and measure it anew.
     centre = (model.low + model.high) / 2
     if piece.rotation is None:
         low, high = model.low - centre, model.high - centre
@@ -72,9 +71,9 @@ def local_from_model(piece: PlanPiece, model: Model) -> F64:
         high = np.max([p.max(0) for p in points], axis=0)
     extent = high - low
     width, depth, height = piece.size
-    scale = np.where(
-        extent > _FLAT, np.array([width, height, depth]) / np.maximum(extent, _FLAT), 1
-    )
+    # Scale it to the piece's size; what is flat along an axis stays so.
+    wanted = np.array([width, height, depth])
+    scale = np.where(extent > _FLAT, wanted / np.maximum(extent, _FLAT), 1)
     scale[0] *= -1.0 if piece.is_mirrored else 1.0
     matrix = np.eye(4)
     matrix[:3, :3] = scale[:, None] * turn
@@ -86,14 +85,12 @@ def placed_surface(
     mesh: Mesh, painted: PieceMaterial, frame: Frame, local: F64, matrix: F64
 ) -> Surface:
     """One mesh of a piece in the world. local: (V, 3) its points in the piece's frame."""
-    linear = frame.axes @ matrix[:3, :3]
-    inverse = _inverse_transpose(linear)
-    normals = mesh.normals @ inverse.T
+    normals = mesh.normals @ _inverse_transpose(frame.axes @ matrix[:3, :3]).T
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(length > 0, length, 1)
-    faces = mesh.faces
-    if np.linalg.det(matrix[:3, :3]) < 0:
-        faces = faces[:, [0, 2, 1]]
+    # A mirrored model's faces would look inwards.
+    is_mirrored = np.linalg.det(matrix[:3, :3]) < 0
+    faces = mesh.faces[:, [0, 2, 1]] if is_mirrored else mesh.faces
     uvs = mesh.uvs
     if painted.picture is not None:
         uvs = _projected(local, normals @ frame.axes, frame.half, painted.picture)

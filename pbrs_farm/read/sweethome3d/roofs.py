@@ -14,8 +14,8 @@ from pbrs_farm.core.arrays import Points2
 from pbrs_farm.read.mesh.horizontal_polygons import triangulated
 
 F64 = NDArray[np.float64]
-FIT_M = 0.02
-SLIVER_M2 = 1e-6
+FIT_M = 0.02  # how far a roof may lie above a given height
+SLIVER_M2 = 1e-6  # pieces of less area are left out
 
 
 class Roof(NamedTuple):
@@ -43,6 +43,7 @@ def roof_over(rings: Sequence[Points2], heights: F64) -> Roof:
 
 def _cloth(points: Points2, heights: F64) -> NDArray[np.int64] | None:
     # Triangles of the upper side of the convex hull of the points in space.
+    # Add a point far below: the faces without it are the upper side.
     n = len(points)
     below = [*points.mean(0), heights.min() - 10.0 * float(np.ptp(points) + np.ptp(heights))]
     try:
@@ -65,11 +66,14 @@ def _spanned(
     worst = 0.0
     for face in cloth:
         corners = points[face]
+        # Fit the plane height = a x + b z + c through the triangle's corners.
         plane = np.linalg.solve(np.column_stack([corners, np.ones(3)]), heights[face])
         triangle = shapely.Polygon(corners)
+        # Measure how far it lies above the heights given there.
         on_it = shapely.intersects_xy(triangle.buffer(1e-9), points)
         over = points[on_it] @ plane[:2] + plane[2] - heights[on_it]
         worst = max(worst, float(over.max(initial=0.0)))
+        # Keep the part of it inside the outline.
         for part in shapely.get_parts(shapely.intersection(triangle, outline)):
             if part.geom_type != "Polygon" or part.area < SLIVER_M2:
                 continue

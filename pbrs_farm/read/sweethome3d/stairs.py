@@ -10,7 +10,7 @@ from pbrs_farm.read.sweethome3d.home_xml import Plan, PlanPiece, level_of
 from pbrs_farm.read.sweethome3d.placement import Frame, frame_of
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
-TOLERANCE_M = 0.01
+TOLERANCE_M = 0.01  # of heights that meet
 
 Cuts = dict[str, shapely.Geometry]
 
@@ -32,6 +32,7 @@ def staircase_cuts(
         own = level_of(plan, piece.level)
         if not own.is_visible:
             continue
+        # Cut the floors that it leads up to, and the ceilings it passes.
         hole = _hole(piece, frame_of(piece, own), materials)
         if hole is None:
             continue

@@ -15,14 +15,16 @@ from svgelements import Arc, Close, CubicBezier, Line, Move, Path, QuadraticBezi
 
 from pbrs_farm.core.arrays import Points2
 
-MAX_TEXT: Final = 100_000
+MAX_TEXT: Final = 100_000  # characters
 MAX_POINTS: Final = 20_000
 MAX_CLOSES: Final = 1_000  # The library looks back for the start of a sub-path at every close
 
 MAX_COORDINATE: Final = 1e6
-CURVE_STEPS: Final = 16
+CURVE_STEPS: Final = 16  # straight pieces of a curve
 ARC_STEP_RAD: Final = math.radians(7.5)
 
+# Kind of a curve, its control point that T or S reflects, and of which one of the curve before.
+_SMOOTH: Final = ((QuadraticBezier, "control", "control"), (CubicBezier, "control1", "control2"))
 # The library passes over letters it does not know: only these make a path.
 _PATH: Final = re.compile(r"[\s,]*[Mm][MmLlHhVvCcSsQqTtAaZzEe0-9.,+\-\s]*")
 _TRAILING_POINT: Final = re.compile(r"(?<=\d)\.(?!\d)")  # "1." is SVG, but not the library's
@@ -66,10 +68,7 @@ def _segments(text: str) -> list[Any]:
         raise ValueError(f"no path: {error or 'a command lacks numbers'}") from None
     # Reflect the control point of T at curves of its own kind only, as of S (SVG 1.1, 8.3.7).
     for before, segment in pairwise(segments):
-        for kind, control, last in (
-            (QuadraticBezier, "control", "control"),
-            (CubicBezier, "control1", "control2"),
-        ):
+        for kind, control, last in _SMOOTH:
             if isinstance(segment, kind) and segment.smooth:
                 is_same = isinstance(before, kind)
                 point = getattr(before, last) if is_same else segment.start

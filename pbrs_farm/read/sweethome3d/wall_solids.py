@@ -46,9 +46,8 @@ def wall_items(
         level_id = house_level[level.id]
         items.append(_wall_item(wall, outline, level, materials, level_id))
         for board in wall.baseboards:
-            item = _baseboard_item(
-                wall, board, (outline, widened[wall.id]), level, materials, level_id
-            )
+            sides = (outline, widened[wall.id])
+            item = _baseboard_item(wall, board, sides, level, materials, level_id)
             if item is not None:
                 items.append(item)
     return items
@@ -77,6 +76,7 @@ def _wall_item(
         materials.painted(wall.right, "wall", f"{place} right"),
         materials.painted(wall.right if wall.left.is_empty else wall.left, "wall", place),
     )
+    # Let the wall reach down through the floor slab it stands on.
     foot = level.elevation - level.reach_down
     left_top = level.elevation + top_heights(wall, outline.left, outline.along)
     right_top = level.elevation + top_heights(wall, outline.right, outline.along)
@@ -112,9 +112,11 @@ def _baseboard_item(
     side = "left" if board.is_left else "right"
     line, front = (o.left if board.is_left else o.right for o in outlines)
     back = line - SUNK_M * (_outward(line) if board.is_left else -_outward(line))
+    # End the board below the lowest top of the wall.
     height = min(board.height, float(top_heights(wall, line, outlines[0].along).min()))
     if height <= 1e-3:
         return None
+    # A board without paint of its own has its side's.
     paint = board.paint
     if paint.is_empty:
         paint = wall.left if board.is_left else wall.right
@@ -146,6 +148,7 @@ def _outward(line: F64) -> F64:
     step = step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
     normal = np.stack([step[:, 1], -step[:, 0]], -1)
     mean = np.concatenate([normal[:1], normal[:-1] + normal[1:], normal[-1:]])
+    # Lengthen the mitre, so that the offset lines keep their distance.
     mean[1:-1] /= np.maximum((mean[1:-1] * normal[1:]).sum(1, keepdims=True), 1e-6)
     return np.asarray(mean)
 
@@ -155,6 +158,7 @@ def _textured(surface: Surface, paint: Paint, floor_y: float) -> Surface:
     if picture is None or surface.uvs is None:
         return surface
     metres = surface.uvs.astype(np.float64)
+    # Measure v from the level's floor: textures of neighbouring walls meet.
     metres[:, 1] = surface.positions[:, 1] - floor_y
     return replace(surface, uvs=picture_uvs(metres, picture).astype(np.float32))
 
@@ -162,6 +166,7 @@ def _textured(surface: Surface, paint: Paint, floor_y: float) -> Surface:
 def picture_uvs(metres: F64, picture: Picture) -> F64:
     """(N, 2) texture coordinates of points given in metres along a surface (right, up)."""
     c, s = np.cos(picture.angle), np.sin(picture.angle)
+    # Turn, scale to the picture's size, then move by its offset.
     turned = metres @ np.array([[c, -s], [s, c]])
     size = np.array([picture.width, picture.height]) * picture.scale
     return np.asarray(turned / size - np.array(picture.offset))

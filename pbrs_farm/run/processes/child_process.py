@@ -18,7 +18,7 @@ from typing import Final, Protocol
 
 from pbrs_farm.run.processes.limits import resident_mb
 
-_PR_SET_PDEATHSIG: Final = 1
+_PR_SET_PDEATHSIG: Final = 1  # of linux/prctl.h
 _CLOSE_S: Final = 10.0  # what freeing GL and Mitsuba may take
 PATH_FROM_PARENT: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
 """Code of a child that sees the modules its parent sees, wherever it was started."""
@@ -48,7 +48,7 @@ class ChildProcess:
 
     def __init__(self, target: str, log: Path) -> None:
         self._log = log
-        self._buffer = b""
+        self._buffer = b""  # received, up to no line's end yet
         # A session of its own: Ctrl-C does not reach it, and its children die with it.
         command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
         with log.open("ab") as file:
@@ -145,5 +145,6 @@ def die_with_parent(sign: int = signal.SIGKILL) -> None:
     """Ask Linux to send us the signal when the thread that started us ends."""
     parent = os.getppid()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(sign), 0, 0, 0)
+    # The parent may have ended before prctl.
     if os.getppid() != parent:
         os.kill(os.getpid(), sign)

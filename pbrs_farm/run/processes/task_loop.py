@@ -29,6 +29,7 @@ def main(target: str) -> int:
     def send(message: Message) -> None:
         replies.write(message.line())
 
+    # Make the handler once: what it keeps between tasks lives in it.
     module, _, function = target.partition(":")
     try:
         handle = getattr(import_module(module), function)(send)

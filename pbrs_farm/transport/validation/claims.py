@@ -31,8 +31,8 @@ from pbrs_farm.transport.validation.statistics import blocks, z_scores
 _SIGMAS: Final = 5.0
 # Standard errors allowed of the worst of 16 blocks, four pooled runs: fails once in 20,000.
 _BLOCK_SIGMAS: Final = 5.0
-_MEASURING_SEEDS: Final = range(12)
-_LM_PER_W: Final = 179
+_MEASURING_SEEDS: Final = range(12)  # of the twelve runs
+_LM_PER_W: Final = 179  # luminous efficacy of the lamps' white
 # Fields of both integrators: no pilot and no denoiser, so that nothing but the estimator is tested.
 _PATH: Final = LightFields(filter="box", pilot_spp=0, denoise=False)
 _CHAINS: Final = LightFields(
@@ -45,7 +45,7 @@ _CHAINS: Final = LightFields(
 )
 # Half of the mutations, for the rooms in which every path is lit.
 _FEW_CHAINS: Final = _CHAINS.model_copy(update={"mutations_per_pixel": 64})
-_SKY_OF_ONE: Final = (1.0, 1.0, 1.0)
+_SKY_OF_ONE: Final = (1.0, 1.0, 1.0)  # radiance of a sky that is white and even
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,17 +117,15 @@ def _floor(variant: str) -> Claim:
     (result,) = _rendered(variant, (house, camera), dark_sky(), _spp(1024), 1)
     # Expect I cos / d^2 at 1 m beside the foot point, 1 m below: I / (4 pi) / 2^1.5.
     lux = 1000 / (4 * math.pi) / 2**1.5
+    measured = float((result.indoor @ LUMINANCE).mean()) * math.pi / 0.5 * _LM_PER_W
     return _near(
-        "a bulb of 1,000 lm lights a floor by distance and cosine",
-        float((result.indoor @ LUMINANCE).mean()) * math.pi / 0.5 * _LM_PER_W,
-        lux,
-        0.01,
-        "lx",
+        "a bulb of 1,000 lm lights a floor by distance and cosine", measured, lux, 0.01, "lx"
     )
 
 
 def _open_ground(variant: str) -> Claim:
     ground = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
+    # Nothing stands on the ground: every direction of the upper half sees the sky.
     house = rooms.house([ground], [rooms.matte("ground", 0.2)], size=(2.0, 2.5, 2.0))
     sky = sunsky(Recipe(), elevation_rad=math.radians(40), azimuth_rad=0.5)
     lux = LightScene.load(house, {}, Recipe(), sky, variant=variant).floor_lux(house)["0_0"]
@@ -212,6 +210,7 @@ def _groups_sum(variant: str) -> Claim:
 
 
 def _doubled_emitters(variant: str) -> Claim:
+    # Double the sky and the bulb: powers of two keep every bit of the mantissa.
     (one,) = _rendered(variant, _window(), uniform_sky((1, 1, 1)), _spp(16), 1)
     (two,) = _rendered(
         variant, rooms.window_room(0.7, lumen=1600), uniform_sky((2, 2, 2)), _spp(16), 1
@@ -227,6 +226,7 @@ def _doubled_emitters(variant: str) -> Claim:
 
 
 def _sealed_room(variant: str) -> Claim:
+    # Close all six sides: no light may leak in at edges and corners.
     room = rooms.house(rooms.shell((4, 2.5, 4), 0), [rooms.matte("wall", 0.9)])
     camera = rooms.camera((0.5, 1.5, 0.5), (3.9, 0.2, 3.9))
     (result,) = _rendered(variant, (room, camera), _sun(), _spp(64), 1)
@@ -245,6 +245,7 @@ def _window_pane(variant: str) -> Claim:
 
 
 def _repeats(variant: str) -> Claim:
+    # Render twice with one seed, then with another.
     a, b, c = _rendered(variant, _window(), _sun(), _spp(16), 7, 7, 8)
     off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
     differs = bool((a.indoor != c.indoor).any())

@@ -64,27 +64,18 @@ def sphere(centre: Triple, radius: float, material: int, *, n: int = 24) -> Surf
     # Place the vertices by polar angle and azimuth.
     theta = np.linspace(0, np.pi, n // 2 + 1)
     phi = np.linspace(0, 2 * np.pi, n + 1)
-    way = np.stack(
-        [
-            np.sin(theta)[:, None] * np.cos(phi),
-            np.broadcast_to(np.cos(theta)[:, None], (len(theta), len(phi))),
-            np.sin(theta)[:, None] * np.sin(phi),
-        ],
-        -1,
-    ).reshape(-1, 3)
+    around, height = np.sin(theta)[:, None], np.cos(theta)[:, None]
+    level = np.broadcast_to(height, (len(theta), len(phi)))
+    way = np.stack([around * np.cos(phi), level, around * np.sin(phi)], -1).reshape(-1, 3)
     # Cut each quad into two triangles, one at the poles.
     faces = []
     for i in range(n // 2):
         for j in range(n):
             a, b = i * (n + 1) + j, (i + 1) * (n + 1) + j
             faces += [(a, a + 1, b + 1)] * (i > 0) + [(a, b + 1, b)] * (i < n // 2 - 1)
-    return Surface(
-        "sphere",
-        (np.array(centre) + radius * way).astype(np.float32),
-        np.array(faces, np.int32),
-        material,
-        normals=way.astype(np.float32),
-    )
+    positions = (np.array(centre) + radius * way).astype(np.float32)
+    triangles, normals = np.array(faces, np.int32), way.astype(np.float32)
+    return Surface("sphere", positions, triangles, material, normals=normals)
 
 
 def panel(
@@ -143,8 +134,13 @@ def house(
 ) -> House:
     """A house of one item with those surfaces, and lamps."""
     x, _y, z = size
-    room = Room(
-        "0_0", "room", "0", np.array([[0, 0], [x, 0], [x, z], [0, z]], np.float64), 0.0, size[1]
+    floor = np.array([[0, 0], [x, 0], [x, z], [0, z]], np.float64)
+    room = Room("0_0", "room", "0", floor, 0.0, size[1])
+    # Openings matter by their quads alone: nothing is cut here.
+    cutter = box((0, 0, 0), (1, 1, 1), 0)
+    windows = (
+        Opening(f"o{k}", "0", None, True, cutter, q, np.array([0, 0, 1.0]))
+        for k, q in enumerate(openings)
     )
     walls = Item("walls", "walls", ItemKind.WALL, "0", tuple(surfaces), room_id="0_0")
     return House(
@@ -156,12 +152,7 @@ def house(
         items=(walls, *lamps),
         materials=tuple(materials),
         textures={},
-        openings=tuple(
-            Opening(
-                f"o{k}", "0", None, True, box((0, 0, 0), (1, 1, 1), 0), q, np.array([0, 0, 1.0])
-            )
-            for k, q in enumerate(openings)
-        ),
+        openings=tuple(windows),
         is_repaired=True,
     )
 
@@ -186,13 +177,11 @@ def window_room(
     surfaces += panel((0, 0, -0.1), (4.0, 2.5, 0.0), opening, 0)
     surfaces.append(box((1.5, 0.6, 2.2), (2.5, 0.65, 2.9), 0, "table"))
     x0, y0, x1, y1 = opening
-    rectangle = np.array(
-        [[x0, y0, -0.05], [x1, y0, -0.05], [x1, y1, -0.05], [x0, y1, -0.05]], np.float64
-    )
+    # Its rectangle stands halfway through the wall, as a portal and as the pane.
+    corners = [(x0, y0, -0.05), (x1, y0, -0.05), (x1, y1, -0.05), (x0, y1, -0.05)]
+    rectangle = np.array(corners, np.float64)
     if pane:
-        surfaces.append(
-            quad([(float(c[0]), float(c[1]), float(c[2])) for c in rectangle], 2, "pane")
-        )
+        surfaces.append(quad(corners, 2, "pane"))
     lamps = [bulb((2.0, 2.2, 2.0), 1, lumen)] if lumen > 0 else []
     view = camera((0.4, 1.5, 3.7), (2.6, 0.8, 0.6))
     return house(surfaces, materials, lamps=lamps, openings=[rectangle]), view
@@ -204,6 +193,7 @@ def furnace(albedo: float) -> tuple[House, Camera]:
     Luminance is the same everywhere: 1 + albedo + albedo^2 + ..., one term a path segment.
     """
     walls = box((0, 0, 0), (4, 2.5, 4), 0)
+    # Give the lamp the flux that makes its radiance 1 W m-2 sr-1: 179 lm/W x pi x area.
     area = 2 * (4 * 2.5 + 4 * 2.5 + 4 * 4)
     part = LightPart(
         (0, 0, 0), 1, 179 * math.pi * area, PowerUnit.LUMEN, rgb_linear=(1, 0.5, 0.2), emitting=(0,)
@@ -222,17 +212,12 @@ def door_ajar(gap: float = 0.06) -> tuple[House, Camera]:
     """
     size = (4.0, 2.5, 8.2)
     surfaces = shell(size, 0)
+    # Part the rooms by a wall 10 cm thick, and let the door leave the gap free.
     doorway = (1.5, 0.0, 2.4, 2.05)
     surfaces += panel((0.0, 0.0, 4.05), (4.0, 2.5, 4.15), doorway, 0)
     surfaces.append(box((1.5 + gap, 0.0, 4.08), (2.4, 2.05, 4.12), 1, "door"))
     surfaces.append(box((2.6, 0.0, 1.2), (3.4, 0.5, 2.2), 2, "block"))
-    materials = [
-        matte("wall", 0.75),
-        matte("door", 0.5, 0.35, 0.2),
-        matte("block", 0.2, 0.3, 0.7),
-        BULB,
-    ]
-    lamp = bulb((3.2, 1.2, 6.5), 3, 1600.0)
-    return house(surfaces, materials, lamps=[lamp], size=size), camera(
-        (0.6, 1.5, 0.5), (2.4, 0.9, 4.0)
-    )
+    materials = [matte("wall", 0.75), matte("door", 0.5, 0.35, 0.2), matte("block", 0.2, 0.3, 0.7)]
+    materials.append(BULB)
+    view = camera((0.6, 1.5, 0.5), (2.4, 0.9, 4.0))
+    return house(surfaces, materials, lamps=[bulb((3.2, 1.2, 6.5), 3, 1600.0)], size=size), view

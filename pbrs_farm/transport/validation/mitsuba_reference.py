@@ -41,7 +41,7 @@ class ReferenceScene:
         self._variant = variant
         self._tables = tables
         self._sky = sky
-        self._scenes: dict[Group, Any] = {}
+        self._scenes: dict[Group, Any] = {}  # made at the first use of each group
 
     def render(self, camera: Camera, group: Group, fields: LightFields, seed: int) -> F32:
         """(H, W, 3) radiance of one group; fields.spp, max_depth and rr_depth count."""
@@ -119,20 +119,11 @@ def _bsdf(row: F32) -> dict[str, Any]:
             "nested": {"type": "conductor", "material": "none", "specular_reflectance": rgb(row[F0])},
         }  # fmt: skip
     if int(row[KIND]) == GLASS:
-        return {
-            "type": "thindielectric",
-            "int_ior": 1.5,
-            "ext_ior": 1.0,
-            "specular_transmittance": rgb(row[TAU]),
-        }
+        pane = {"type": "thindielectric", "int_ior": 1.5, "ext_ior": 1.0}
+        return pane | {"specular_transmittance": rgb(row[TAU])}
     if row[ALPHA] > 0:
-        nested = {
-            "type": "roughplastic",
-            "diffuse_reflectance": rgb(row[KD]),
-            "alpha": float(row[ALPHA]),
-            "nonlinear": False,
-        }
-        return {"type": "twosided", "nested": nested}
+        coat = {"type": "roughplastic", "alpha": float(row[ALPHA]), "nonlinear": False}
+        return {"type": "twosided", "nested": coat | {"diffuse_reflectance": rgb(row[KD])}}
     return {"type": "twosided", "nested": {"type": "diffuse", "reflectance": rgb(row[KD])}}
 
 
@@ -155,6 +146,11 @@ def _sensor(mi: Any, camera: Camera, fields: LightFields) -> dict[str, Any]:
     eye = [float(v) for v in camera.eye]
     target = [float(v) for v in camera.eye + camera.towards]
     up = [float(v) for v in camera.world_from_camera[:3, 1]]
+    film = {
+        "type": "hdrfilm", "width": i.width_px, "height": i.height_px,
+        "rfilter": {"type": fields.filter}, "pixel_format": "rgb",
+    }  # fmt: skip
+    # Mitsuba takes the principal point as an offset from the middle, in picture widths and heights.
     return {
         "type": "perspective",
         "fov": math.degrees(2 * math.atan(0.5 * i.width_px / i.fx)),
@@ -165,11 +161,5 @@ def _sensor(mi: Any, camera: Camera, fields: LightFields) -> dict[str, Any]:
         "principal_point_offset_y": -(i.cy / i.height_px - 0.5),
         "to_world": mi.ScalarTransform4f().look_at(eye, target, up),
         "sampler": {"type": "independent"},
-        "film": {
-            "type": "hdrfilm",
-            "width": i.width_px,
-            "height": i.height_px,
-            "rfilter": {"type": fields.filter},
-            "pixel_format": "rgb",
-        },
+        "film": film,
     }
