@@ -76,13 +76,6 @@ def jpeg_from_array(array: NDArray[np.uint8], quality: int = 85) -> bytes:
     return _encoded(array, spec, ".jpg")
 
 
-def thumbnail_jpeg(
-    array: NDArray[np.uint8], *, max_edge_px: int = 320, nearest: bool = False
-) -> bytes:
-    """JPEG bytes of array, (H, W) or (H, W, 3) uint8, made no larger than max_edge_px."""
-    return jpeg_from_array(thumbnail(array, max_edge_px=max_edge_px, nearest=nearest), 82)
-
-
 def thumbnail(
     array: NDArray[np.uint8], *, max_edge_px: int, nearest: bool = False
 ) -> NDArray[np.uint8]:

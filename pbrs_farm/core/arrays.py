@@ -1,9 +1,8 @@
-"""Named array types and their guards: shape, dtype, unit, special values; no effects."""
+"""Named array types: shape, dtype, unit, special values; no effects."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,21 +25,6 @@ Mask = NDArray[np.bool_]  # (H, W) bool
 Points = NDArray[np.float32]  # (N, 3) float32, metres, world frame
 Points2 = NDArray[np.float64]  # (N, 2) float64, metres, plan: columns are world x and world z
 Matrix4 = NDArray[np.float64]  # (4, 4) float64, affine, column vectors: p_a = a_from_b @ p_b
-
-
-def guard(
-    array: NDArray[Any], name: str, shape: tuple[int | None, ...], dtype: type[np.generic]
-) -> NDArray[Any]:
-    """Return array, or raise ValueError if its shape (None = any length) or dtype is not as said."""
-    fits = array.ndim == len(shape) and all(
-        want is None or want == got for want, got in zip(shape, array.shape, strict=True)
-    )
-    if not fits or array.dtype != dtype:
-        wanted = ", ".join("any" if n is None else str(n) for n in shape)
-        raise ValueError(
-            f"{name}: expected ({wanted}) {np.dtype(dtype)}, got {array.shape} {array.dtype}"
-        )
-    return array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

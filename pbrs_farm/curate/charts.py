@@ -121,8 +121,8 @@ def joint(
         opacity = 0.15 + 0.85 * np.log1p(cells[i, j]) / top
         at = (i / n, j / n, (i + 1) / n, (j + 1) / n)
         frame.box(at, "kept" if inside else "rejected", f"opacity:{opacity:.2f}")
-    frame.line([(limits[0], 0), (limits[0], 1)], "limit")
-    frame.line([(0, limits[1]), (1, limits[1])], "limit")
+    for ends in ([(limits[0], 0), (limits[0], 1)], [(0, limits[1]), (1, limits[1])]):
+        frame.line(ends, "limit")
     # Write the vertical axis's title upwards.
     y = frame.height / 2 - 20
     turned = f"rotate(-90 12 {y})"

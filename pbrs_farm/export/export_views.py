@@ -40,6 +40,7 @@ def export(folder: Path, out: Path, form: str, *, selection: str | None = None) 
     """
     if form not in FORMS:
         raise BadInput("--to", form, "no such form", hint=f"of {', '.join(FORMS)}")
+    # A view is finished when its labels are there.
     views = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
     # Leave out views that the selection does not keep.
     if selection is not None:
@@ -56,6 +57,7 @@ def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
     if not file.is_file():
         raise BadInput(file, "", "no such selection", hint="pbrs-farm select makes one")
     try:
+        # A line per view says whether it is kept.
         rows = [json.loads(line) for line in file.read_text("utf-8").splitlines()]
         return {(row["house"], row["view"]) for row in rows if row["kept"]}
     except (ValueError, KeyError, TypeError) as error:

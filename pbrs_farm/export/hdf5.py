@@ -27,11 +27,7 @@ def write_hdf5(views: list[ViewEntry], out: Path) -> int:
     camera axes, category_id_segmaps uint8, instance_segmaps uint16, and as JSON text
     instance_attribute_maps and campose (K and the OpenGL pose). Raises MachineFailed without h5py.
     """
-    try:
-        import h5py
-    except ImportError:
-        hint = "pip install 'pbrs-farm[selection]'"
-        raise MachineFailed("writing HDF5 needs h5py", hint=hint) from None
+    h5py = _h5py()
     index = []
     for number, view in enumerate(views):
         with h5py.File(out / f"{number}.hdf5", "w") as file:
@@ -42,8 +38,18 @@ def write_hdf5(views: list[ViewEntry], out: Path) -> int:
                     file.create_dataset(name, data=value, compression="gzip")
         row = {"file": f"{number}.hdf5", "house": view.house.id, "view": view.id}
         index.append(json.dumps(row))
+    # Say which view each file holds.
     (out / "index.jsonl").write_text("\n".join(index) + "\n")
     return len(views) + 1
+
+
+def _h5py() -> Any:
+    try:
+        import h5py
+    except ImportError:
+        hint = "pip install 'pbrs-farm[selection]'"
+        raise MachineFailed("writing HDF5 needs h5py", hint=hint) from None
+    return h5py
 
 
 def _datasets(view: ViewEntry) -> dict[str, NDArray[Any] | str]:
@@ -55,13 +61,9 @@ def _datasets(view: ViewEntry) -> dict[str, NDArray[Any] | str]:
     for mode in reversed(PICTURES):
         if view.file(f"{mode}.png"):
             data[str(mode)] = data["colors"] = png(f"{mode}.png")
-    valid = png("valid.png") > 0
-    published = png("normal.png") * np.float32(2 / 65535) - np.float32(1)
-    # Published axes are x right, y forward, z up; OpenGL's are x right, y up, z backward.
-    opengl = np.stack([published[..., 0], published[..., 2], -published[..., 1]], axis=-1)
     # Labels keep their numbers; depth is in metres, nothing is 0.
     data["depth"] = png("depth.png").astype(np.float32) / np.float32(1000)
-    data["normals"] = np.where(valid[..., None], (opengl + 1) / 2, 0).astype(np.float32)
+    data["normals"] = _blenderproc_normals(png("normal.png"), png("valid.png") > 0)
     data["category_id_segmaps"] = png("semantic.png")
     data["instance_segmaps"] = png("instance.png")
     rows = view.facts["instances"]
@@ -70,3 +72,11 @@ def _datasets(view: ViewEntry) -> dict[str, NDArray[Any] | str]:
     pose = view.facts["world_from_camera_opengl"]
     data["campose"] = json.dumps({"cam_K": view.facts["K"], "cam2world_matrix": pose})
     return data
+
+
+def _blenderproc_normals(png: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray[np.float32]:
+    # Published axes are x right, y forward, z up; OpenGL's are x right, y up, z backward.
+    published = png * np.float32(2 / 65535) - np.float32(1)
+    opengl = np.stack([published[..., 0], published[..., 2], -published[..., 1]], axis=-1)
+    # Bring -1..1 to 0..1, and what is nothing to 0.
+    return np.where(valid[..., None], (opengl + 1) / 2, 0).astype(np.float32)

@@ -42,15 +42,18 @@ def write_released(views: list[ViewEntry], out: Path) -> int:
             for stored, published in FILES.items():
                 n_files += _copied(view.file(stored), out / published.format(**place))
             good.append("{house}/{id}\n".format(**place))
-        # A line of the camera file for each view, in the same order.
-        folder = out / "camera_v2" / house
-        folder.mkdir(parents=True)
-        (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in own))
-        names = "".join(f"Room#{v.room_id}_{v.facts.get('sector', 0)}\n" for v in own)
-        (folder / "room_camera_name.txt").write_text(names)
-        n_files += 2
+        n_files += _write_cameras(out / "camera_v2" / house, own)
     (out / "data_goodlist_v2.txt").write_text("".join(good))
     return n_files + 1
+
+
+def _write_cameras(folder: Path, views: list[ViewEntry]) -> int:
+    # A line of both camera files for each view, in the order of the views' numbers.
+    folder.mkdir(parents=True)
+    (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views))
+    names = "".join(f"Room#{v.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
+    (folder / "room_camera_name.txt").write_text(names)
+    return 2
 
 
 def _copied(file: Path | None, target: Path) -> int:

@@ -96,8 +96,7 @@ def _refuse_constant(name: str) -> float:
 def value_from_json(hint: Any, data: Any, file: str, place: str) -> Any:
     """The value of type hint that JSON values say; arrays and bytes among them pass through.
 
-    Raises BadHouse naming file and place where they do not fit the type. Keys that the type
-    does not know are ignored; missing fields take the type's default.
+    Unknown keys are ignored, missing fields take their defaults; what does not fit is BadHouse.
     """
     origin = typing.get_origin(hint)
     if origin is np.ndarray:

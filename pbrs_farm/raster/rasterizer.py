@@ -91,11 +91,8 @@ class Rasterizer:
         self._light_bytes = 4 * (4 + LIGHT_FLOATS * n_lights)
         # Upload the textures in use; a material without one samples a white texel.
         used = {m.texture_id for m in house.materials}
-        uploaded = {
-            name: texture_from_pixels(gl, pixels)
-            for name, pixels in sorted(textures.items())
-            if name in used
-        }
+        wanted = ((name, pixels) for name, pixels in sorted(textures.items()) if name in used)
+        uploaded = {name: texture_from_pixels(gl, pixels) for name, pixels in wanted}
         white = texture_from_pixels(gl, np.full((1, 1, 3), 255, np.uint8))
         self._textures = [uploaded.get(m.texture_id or "", white) for m in house.materials]
 
@@ -189,10 +186,8 @@ class Rasterizer:
         # Draw opaque surfaces into the depth texture and count the samples that pass.
         program, vao = self._program("depth", 0)
         _set(program, clip_from_world=clip)
-        is_solid = (
-            self._kind[self._mesh.draw_material[draws]]
-            & (Feature.TRANSPARENT | Feature.ALPHA_CUTOUT)
-        ) == 0
+        see_through = Feature.TRANSPARENT | Feature.ALPHA_CUTOUT
+        is_solid = (self._kind[self._mesh.draw_material[draws]] & see_through) == 0
         target.begin_depth_prepass()
         for draw in draws[is_solid]:
             with self._queries[draw]:

@@ -82,8 +82,7 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
         seconds = time.perf_counter() - started
         send(Message("event", body=asdict(_event_of_outcome(work, name, outcome, seconds))))
         return True
-    if setting.debug:
-        message += "\n" + traceback.format_exc()
+    message += "\n" + traceback.format_exc() if setting.debug else ""
     failed = Event("failed", work.house_id, work.view_id, name, message=message)
     send(Message("event", body=asdict(failed)))
     return False

@@ -258,7 +258,7 @@ def _facts_of_light(
     if result.spp:  # Metropolis counts mutations instead
         facts["spp"] = result.spp
     facts |= {"n_nonfinite": result.n_nonfinite, "variant": cached.light_scene.variant}
-    facts["sky"] = cached.sky.facts()
+    facts |= {"sky": cached.sky.facts()}
     # The transport knows a lamp's item, the house its name.
     items = cached.house.items
     if "lamps" in facts:

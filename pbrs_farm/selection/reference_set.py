@@ -169,9 +169,6 @@ def check_comparable(reference: Reference, settings: HistogramFields, name: str)
     if settings.depth_bins % facts.binning.depth:
         differing.append(f"depth bins: {facts.binning.depth} there, {settings.depth_bins} here")
     if differing:
-        raise BadInput(
-            name,
-            "settings",
-            f"built with other settings than the views: {'; '.join(differing)}",
-            hint="build the reference with the views' --set histogram...",
-        )
+        text = f"built with other settings than the views: {'; '.join(differing)}"
+        hint = "build the reference with the views' --set histogram..."
+        raise BadInput(name, "settings", text, hint=hint)

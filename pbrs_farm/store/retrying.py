@@ -26,8 +26,7 @@ def retried(
     Pauses grow exponentially to max_pause_s, each times a random factor of the range jitter.
     """
     # Try until it works, fails otherwise, or the next pause would end too late.
-    deadline = time.monotonic() + timeout_s
-    n_tries = 0
+    deadline, n_tries = time.monotonic() + timeout_s, 0
     while True:
         try:
             return call(n_tries)

@@ -40,9 +40,8 @@ def estimate(spec: JobSpec, n_slots: int) -> dict[str, float | int | str]:
     # geometry and reduce a house, then each stage of each batch.
     n_tasks = 2 * spec.n_houses + n_batches * len(spec.batch_stages)
     has_light = "light" in spec.batch_stages
-    seconds = spec.n_houses * _HOUSE_S + n_views * (
-        _LABELS_S + (spec.seconds_per_view if has_light else 0.0)
-    )
+    seconds_per_view = _LABELS_S + (spec.seconds_per_view if has_light else 0.0)
+    seconds = spec.n_houses * _HOUSE_S + n_views * seconds_per_view
     n_pixels = spec.recipe.image.width_px * spec.recipe.image.height_px
     per_pixel = _BYTES_PER_PIXEL["labels"] + (_BYTES_PER_PIXEL["light"] if has_light else 0.0)
     return {

@@ -49,8 +49,7 @@ class Placed:
 def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
     """The document and every buffer of a .glb or .gltf.
 
-    Raises BadHouse for a file that is damaged, requires an extension that is not understood, or
-    names a buffer that does not exist.
+    Raises BadHouse for a damaged file, an extension not understood, a buffer that is missing.
     """
     gltf = _parsed(data, file)
     if not isinstance(gltf.document.get("asset"), dict):
@@ -165,8 +164,7 @@ def _indices(gltf: Gltf, holder: dict[str, Any], place: str, key: str) -> list[i
 def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> NDArray[np.float64]:
     place = f"nodes[{index}]"
     if "matrix" in node:
-        # glTF writes matrices column by column.
-        m = numbers(gltf, node["matrix"], 16, f"{place}.matrix").reshape(4, 4).T
+        m = numbers(gltf, node["matrix"], 16, f"{place}.matrix").reshape(4, 4).T  # column by column
         if not np.allclose(m[3], [0, 0, 0, 1], atol=1e-6):
             raise BadHouse(gltf.file, f"{place}.matrix", "is not affine (column-major)")
         return np.asarray(m)

@@ -18,8 +18,7 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
 def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int | None, Mesh]]:
     """(material number or None, mesh) of every primitive of meshes[index] that has triangles.
 
-    Raises BadHouse for arrays that do not fit each other, numbers that are not finite, faces out
-    of range, or more than max_triangles.
+    Raises BadHouse for damaged arrays and for more than max_triangles.
     """
     primitives = entry(gltf, "meshes", index).get("primitives")
     if not isinstance(primitives, list) or not all(isinstance(p, dict) for p in primitives):
@@ -50,10 +49,9 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
         return None
     # Take the texture coordinates that the base colour's picture uses.
     look = _texture_info(gltf, primitive.get("material"))
-    texcoord = look.get("texCoord", 0)
-    uvs = None
-    if f"TEXCOORD_{texcoord}" in attributes:
-        uvs = _floats(gltf, attributes[f"TEXCOORD_{texcoord}"], 2, f"{place}.TEXCOORD")
+    name, uvs = f"TEXCOORD_{look.get('texCoord', 0)}", None
+    if name in attributes:
+        uvs = _floats(gltf, attributes[name], 2, f"{place}.TEXCOORD")
         uvs = _transformed(gltf, uvs, look, place) * [1, -1] + [0, 1]  # v up
     normals = np.zeros_like(positions)  # zero: flat, as glTF asks where there are none
     if "NORMAL" in attributes:
@@ -87,8 +85,7 @@ def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> NDArray
         if len(order) and order.max() >= n:
             raise BadHouse(gltf.file, place, "a face names a vertex that does not exist")
     else:
-        # Without indices the vertices are taken as they come.
-        order = np.arange(n)
+        order = np.arange(n)  # the vertices as they come
     mode = primitive.get("mode", _TRIANGLES)
     if mode == _TRIANGLES:
         if len(order) % 3:
@@ -96,11 +93,9 @@ def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> NDArray
         return order.reshape(-1, 3).astype(np.int32)
     # Number the triangles of a fan or a strip; a strip turns every second one over.
     k = np.arange(max(len(order) - 2, 0))
-    if mode == _FAN:
-        corners = np.stack([order[np.zeros_like(k)], order[k + 1], order[k + 2]], 1)
-    else:
-        odd = k % 2
-        corners = np.stack([order[k], order[k + 1 + odd], order[k + 2 - odd]], 1)
+    odd = k % 2
+    fan, strip = (np.zeros_like(k), k + 1, k + 2), (k, k + 1 + odd, k + 2 - odd)
+    corners = np.stack([order[i] for i in (fan if mode == _FAN else strip)], 1)
     return corners.reshape(-1, 3).astype(np.int32)
 
 

@@ -29,17 +29,16 @@ def main(target: str) -> int:
     def send(message: Message) -> None:
         replies.write(message.line())
 
-    # Make the handler once: what it keeps between tasks lives in it.
-    module, _, function = target.partition(":")
     try:
+        # Make the handler once: what it keeps between tasks lives in it.
+        module, _, function = target.partition(":")
         handle = getattr(import_module(module), function)(send)
     except Exception as error:  # noqa: BLE001 - the parent learns why
         traceback.print_exc()
         send(Message("fault", f"{type(error).__name__}: {error}"))
         return 1
     send(Message("ready"))
-    # Ends when the parent closes the pipe.
-    for line in requests:
+    for line in requests:  # until the parent closes the pipe
         send(handle(line))
     return 0
 

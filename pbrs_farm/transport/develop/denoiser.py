@@ -36,15 +36,10 @@ def denoise_radiance(
     try:
         import pyoidn
     except ImportError as error:
-        raise MachineFailed(
-            f"the denoiser cannot be loaded: {error}", hint="pip install 'pbrs-farm[transport]'"
-        ) from error
-    clean = pyoidn.denoise(
-        np.ascontiguousarray(radiance, np.float32),
-        np.ascontiguousarray(albedo, np.float32),
-        np.ascontiguousarray(normal, np.float32),
-        hdr=True,
-        clean_aux=True,
-    )
+        hint = "pip install 'pbrs-farm[transport]'"
+        raise MachineFailed(f"the denoiser cannot be loaded: {error}", hint=hint) from error
+    # Albedo and normals are means of many rays: they need no denoising before they guide.
+    images = (np.ascontiguousarray(a, np.float32) for a in (radiance, albedo, normal))
+    clean = pyoidn.denoise(*images, hdr=True, clean_aux=True)
     # Remove what the network may invent: negative and non-finite values.
     return np.maximum(np.nan_to_num(np.asarray(clean, np.float32), posinf=0.0), 0.0)
