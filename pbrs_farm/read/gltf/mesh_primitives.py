@@ -67,7 +67,9 @@ def _floats(gltf: Gltf, accessor: Any, width: int, place: str) -> NDArray[np.flo
     raw = accessor_array(gltf, accessor)
     if raw.shape[1] != width:
         raise BadHouse(gltf.file, place, f"expected {width} components, got {raw.shape[1]}")
-    values = raw.astype(np.float64)
+    # A signalling NaN sets a flag in the cast; what is not finite is refused below.
+    with np.errstate(invalid="ignore"):
+        values = raw.astype(np.float64)
     if raw.dtype.kind in "iu" and entry(gltf, "accessors", accessor).get("normalized") is True:
         # Normalised integers are fractions of their type's range (glTF 2.0, section 3.6.2.2).
         values = np.maximum(values / np.iinfo(raw.dtype).max, -1.0)

@@ -409,6 +409,14 @@ def test_a_damaged_scene_is_refused_naming_the_place(edit: Any, place: str) -> N
     assert caught.value.file == "scene.glb"
 
 
+def test_a_signalling_nan_is_a_number_that_is_not_finite() -> None:
+    scene = two_rooms()
+    scene.node("Chair", mesh=scene.box([1.375, 0, 1], [2, 1, 2]))
+    data = scene.glb().replace(np.float32(1.375).tobytes(), b"\x01\x00\x80\x7f")
+    with pytest.raises(BadHouse, match="not finite"):
+        read_gltf(data, "scene.glb", fields=ReadFields())
+
+
 def test_faces_out_of_range_and_too_many_triangles_are_refused() -> None:
     def far(s: Scene) -> None:
         faces = np.array([[0, 1, 99]], np.int32)
