@@ -241,10 +241,9 @@ def _encoded(array: NDArray[Any], spec: Any, suffix: str) -> bytes:
         written = output.open(str(path), spec) and output.write_image(pixels)
         closed = output.close()
         if not (written and closed):
-            raise MachineFailed(
-                f"OpenImageIO cannot write {suffix}: {output.geterror()}",
-                hint=f"is there room in {path.parent}?",
-            )
+            text = f"OpenImageIO cannot write {suffix}: {output.geterror()}"
+            hint = f"is there room in {path.parent}?"
+            raise MachineFailed(text, hint=hint)
         return path.read_bytes()
 
 

@@ -22,10 +22,10 @@ DEFAULT_REDIS: Final = "redis://127.0.0.1:6379/0"
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the environment says. redis_url: of the farm's broker and ledger."""
+    """What the environment says."""
 
     store: StoreSettings = field(default_factory=StoreSettings)
-    redis_url: Secret = field(default_factory=lambda: Secret(DEFAULT_REDIS))
+    redis_url: Secret = field(default_factory=lambda: Secret(DEFAULT_REDIS))  # broker and ledger
 
 
 def settings_from_environment(environment: Mapping[str, str] | None = None) -> Settings:

@@ -99,10 +99,8 @@ class FarmConfig:
         _check(self, _PREFIX)
         unknown = sorted(set(self.queues) - set(QUEUES))
         if unknown:
-            known = f"of {', '.join(QUEUES)}"
-            raise BadInput(
-                "environment", f"{_PREFIX}QUEUES", f"no queue {unknown[0]!r}", hint=known
-            )
+            hint = f"of {', '.join(QUEUES)}"
+            raise BadInput("environment", f"{_PREFIX}QUEUES", f"no queue {unknown[0]!r}", hint=hint)
 
     @property
     def preemption_file(self) -> Path:

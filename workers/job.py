@@ -12,15 +12,12 @@ from workers.ids import GL, LIGHT
 
 
 class HouseEntry(BaseModel):
-    """A house of a job. source: JSON the runner understands; it travels to the geometry task only.
-
-    sha256: of the source, so that a house that changed since submission is noticed.
-    """
+    """A house of a job."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     house_id: str
-    source: str = ""
-    sha256: str = ""
+    source: str = ""  # JSON the runner understands; it travels to the geometry task only
+    sha256: str = ""  # of the source: a house that changed since submission is noticed
 
 
 class JobRules(BaseModel):

@@ -80,10 +80,8 @@ def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -
 def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
     folder.mkdir(parents=True, exist_ok=True)
     if shutil.which("apt-get") is None:
-        raise MachineFailed(
-            f"no apt-get here to fetch {package}",
-            hint=f"put Debian's {package}_{tested_version}_all.deb into {folder}",
-        )
+        hint = f"put Debian's {package}_{tested_version}_all.deb into {folder}"
+        raise MachineFailed(f"no apt-get here to fetch {package}", hint=hint)
     # Download beside the cache, then move: a package is there whole or not at all.
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         _download(package, Path(scratch))

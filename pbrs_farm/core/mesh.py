@@ -106,8 +106,7 @@ def clipped_to_box(corners: F64, low: F64, high: F64) -> F64:
 def distances_to_triangles(points: F64, corners: F64) -> F64:
     """(F,) distance in metres from each point to the triangle (F, 3, 3) of the same row.
 
-    points: (F, 3), or (3,) for one point and all triangles. A triangle without area is the
-    segment it covers.
+    points: (F, 3), or (3,) for all triangles. A triangle without area is the segment it covers.
     """
     # Put the components first and the point at the origin: corner k is from_point[k], (3, F).
     from_point = np.ascontiguousarray(np.moveaxis(corners - points[..., None, :], 0, -1))

@@ -21,8 +21,7 @@ def write_webdataset(views: list[ViewEntry], out: Path) -> int:
     """shard-<6 digits>.tar of VIEWS_PER_SHARD views each; the number of files.
 
     A sample's key is <house>__<view>; its parts are json (view.json) and every layer the view has,
-    by name: "mlt_il_ol.png", "depth.png", "behind_glass_depth.png", "radiance.exr". No clock, no
-    owner.
+    by name: "mlt_il_ol.png", "depth.png", "radiance.exr". No clock, no owner.
     """
     n_shards = 0
     for start in range(0, len(views), VIEWS_PER_SHARD):

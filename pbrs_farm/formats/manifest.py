@@ -14,8 +14,7 @@ from pbrs_farm.formats.marker import Marker
 def manifest_from_markers(markers: Iterable[Marker], attribution: str) -> bytes:
     """The manifest of a house from the markers of its steps, sorted by key.
 
-    A line is an object: key, bytes, sha256, step, digest and, where its source asks for one, the
-    attribution.
+    A line is an object: key, bytes, sha256, step, digest and, where one is due, the attribution.
     """
     credit = {"attribution": attribution} if attribution else {}
     rows: list[dict[str, str | int]] = [

@@ -1,7 +1,6 @@
 """radiance.exr: the linear images of a view's light, written by `light`, read by `develop` and relight.
 
-Pure. Channels are `<image>.<channel>`: outdoor, indoor, albedo and lamp<N> have R, G, B, normal
-has X, Y, Z.
+Pure. Channels are `<image>.<channel>`: R, G, B of outdoor, indoor, albedo, lamp<N>; X, Y, Z of normal.
 """
 
 from __future__ import annotations

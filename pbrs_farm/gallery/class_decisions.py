@@ -20,10 +20,10 @@ _STRUCTURE: Final = frozenset({"wall", "floor", "ceiling", "ground"})  # kinds, 
 
 
 class ClassDecision(BaseModel):
-    """What one rule made of all items of one name. rule: of _RULES, or size or none."""
+    """What one rule made of all items of one name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    rule: str
+    rule: str  # of _RULES, or size or none
     name: str  # NYU40
     item: str  # the item's name
     source_class: str

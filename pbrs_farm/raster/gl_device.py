@@ -30,10 +30,9 @@ def open_context() -> Any:
         settings: Any = {"backend": "egl"}
         context = moderngl.create_context(require=330, standalone=True, **settings)
     except Exception as error:  # glcontext raises bare Exception
-        raise MachineFailed(
-            f"no headless OpenGL 3.3 on this machine: {error}",
-            hint="apt-get install libegl1 libgl1-mesa-dri, or a GPU driver with EGL",
-        ) from error
+        text = f"no headless OpenGL 3.3 on this machine: {error}"
+        hint = "apt-get install libegl1 libgl1-mesa-dri, or a GPU driver with EGL"
+        raise MachineFailed(text, hint=hint) from error
     context.enable(moderngl.DEPTH_TEST)
     return context
 

@@ -51,8 +51,7 @@ def merge_manifests(store: Store, house_ids: list[str]) -> None:
 def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
     """One output root holds one recipe: write recipe.json, or refuse another with what differs.
 
-    update: replace the root's recipe; steps that use the changed fields will run again.
-    Raises BadRecipe.
+    update: replace it; steps that use the changed fields will run again. Raises BadRecipe.
     """
     data = json_bytes(recipe)
     if store.put_if_absent(keys.RECIPE, data):
@@ -60,9 +59,7 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
     held = recipe_from_json(store.get(keys.RECIPE), f"{store.url}: recipe.json")
     differing = differences(held, recipe)
     if differing and not update:
-        raise BadRecipe(
-            f"{store.url} holds another recipe: {'; '.join(differing)}",
-            hint="--update renders again what differs, or choose another output",
-        )
+        hint = "--update renders again what differs, or choose another output"
+        raise BadRecipe(f"{store.url} holds another recipe: {'; '.join(differing)}", hint=hint)
     if differing:
         store.put(keys.RECIPE, data)

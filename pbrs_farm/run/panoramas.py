@@ -1,7 +1,4 @@
-"""The panorama of a house: a file of the recipe's folder, chosen by the house's id.
-
-Effects: reads files.
-"""
+"""The panorama of a house: a file of the recipe's folder, by the house's id. Effects: reads files."""
 
 from __future__ import annotations
 
@@ -32,10 +29,8 @@ def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.f
 
     folder = Path(recipe.sky.panoramas) if recipe.sky.panoramas else fetch_skies()
     if not folder.is_dir():
-        raise BadRecipe(
-            f"sky.panoramas: {folder} is no folder of panoramas",
-            hint="`pbrs-farm skies` fetches four; or --set sky.kind=sunsky",
-        )
+        hint = "`pbrs-farm skies` fetches four; or --set sky.kind=sunsky"
+        raise BadRecipe(f"sky.panoramas: {folder} is no folder of panoramas", hint=hint)
     # Choose by name and house, not by the folder's order: each machine takes the same.
     files = {p.name: p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES}
     name = choose_panorama(list(files), house_id, recipe.seed)

@@ -59,8 +59,7 @@ def pack_house(
     """The pack of a house's records, by view id.
 
     failed: view id -> why it cannot be read; such views are kept and marked. A view without
-    SCORED_MODE is taken at score_mode; without that too it is "unscored". Raises ValueError for a
-    record of other settings.
+    SCORED_MODE is taken at score_mode, else "unscored". A record of other settings is a ValueError.
     """
     rows = sorted(records, key=lambda r: r.view)
     if any(r.settings != settings for r in rows):

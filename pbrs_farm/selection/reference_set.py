@@ -1,7 +1,6 @@
 """The photographs that views are compared with, as histograms: a small file that can be shared.
 
-No effects: bytes in, bytes out. The file is an .npz (numpy reads it) whose bytes depend on its
-content alone.
+No effects: bytes in, bytes out. The file is an .npz whose bytes depend on its content alone.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Histogram intersection, and the exact best match of many histograms against a set; no effects.
 
 For histograms that sum to 1, the sum of bin-wise minima is 1 - L1 / 2: the best match is the
-nearest neighbour under L1, which faiss finds exactly and fast; numpy does the same where faiss is
-not installed.
+nearest neighbour under L1, which faiss finds exactly and fast; without faiss numpy does.
 """
 
 from __future__ import annotations

@@ -78,9 +78,8 @@ class S3Store:
             import obstore
             from obstore.store import S3Store as Client
         except ImportError:
-            raise MachineFailed(
-                "s3:// needs the package obstore", hint='pip install "pbrs-farm[s3]"'
-            ) from None
+            hint = 'pip install "pbrs-farm[s3]"'
+            raise MachineFailed("s3:// needs the package obstore", hint=hint) from None
         self._bucket = bucket
         self._prefix = prefix.strip("/")
         self._retry_timeout_s = settings.retry_timeout_s

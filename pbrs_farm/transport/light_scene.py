@@ -110,13 +110,9 @@ class LightScene:
         """The number of lamps; RenderFailed when the kernel cannot count a sum for each of them."""
         i = camera.intrinsics
         if i.width_px * i.height_px * self.n_lamps * 3 >= MAX_SUMS:
-            raise RenderFailed(
-                f"{i.width_px}x{i.height_px} pixels are too many for {self.n_lamps} lamps each",
-                view=room_id,
-                mode="light",
-                seed=seed,
-                hint="a smaller picture, or --groups two",
-            )
+            text = f"{i.width_px}x{i.height_px} pixels are too many for {self.n_lamps} lamps each"
+            hint = "a smaller picture, or --groups two"
+            raise RenderFailed(text, view=room_id, mode="light", seed=seed, hint=hint)
         return self.n_lamps
 
     def _path_sums(
@@ -211,8 +207,7 @@ class LightScene:
     def floor_lux(self, house: House, *, seed: int = 0) -> dict[str, dict[str, float]]:
         """Room id -> mean illuminance of its floor in lx by "outdoor" and "indoor" light.
 
-        256 points 5 cm above the floor, 32 paths each, with the furniture in place. {} for scalar
-        variants.
+        256 points 5 cm above the floor, 32 paths each, furniture in place. {} for scalar variants.
         """
         if self.variant.startswith("scalar"):
             return {}
@@ -255,10 +250,9 @@ class LightScene:
         from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
 
         if fields.groups == "lamps":
-            raise MachineFailed(
-                f"light by lamp needs LLVM or CUDA, this is {self.variant}",
-                hint="sudo apt-get install -y libllvm19, or --groups two",
-            )
+            text = f"light by lamp needs LLVM or CUDA, this is {self.variant}"
+            hint = "sudo apt-get install -y libllvm19, or --groups two"
+            raise MachineFailed(text, hint=hint)
         # Render two half buffers of each group, with seeds of their own, for the noise estimate.
         scene = ReferenceScene(self.tables, self.sky, self.variant)
         half = fields.model_copy(update={"spp": max(fields.spp // 2, 1)})

@@ -126,9 +126,8 @@ class Farm:
         """The ledger's view of a job; BadInput for an unknown one."""
         view = self.ledger.view(check_job_id(job))
         if view is None:
-            raise BadInput(
-                job, "", "not in the ledger", hint="`recover` rebuilds a job from storage"
-            )
+            hint = "`recover` rebuilds a job from storage"
+            raise BadInput(job, "", "not in the ledger", hint=hint)
         return view
 
     def status(self, job: str) -> dict[str, Any]:

@@ -43,8 +43,7 @@ Send = Callable[[Iterable[tuple[str, str, str, str]]], None]
 class Coordinator:
     """Leads the farm, or stands by until the leader is gone.
 
-    send: puts messages on queues, each (queue, job, task, recipe digest). clock: seconds that only
-    grow.
+    send: puts messages on queues, each (queue, job, task, recipe digest). clock: monotonic, s.
     """
 
     def __init__(

@@ -127,10 +127,7 @@ def durations(view: JobView, stage: str) -> dict[int, float]:
 
 
 def quantile_s(counts: Mapping[int, float], share: float) -> float:
-    """Seconds below which `share` of tasks ended, from a histogram over powers of two (upper ends).
-
-    0 when nothing ended yet.
-    """
+    """Seconds below which `share` of tasks ended, by a histogram over powers of two; 0 = none ended."""
     wanted = share * sum(counts.values())
     seen = 0.0
     for power in sorted(counts):

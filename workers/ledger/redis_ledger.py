@@ -353,9 +353,8 @@ class RedisLedger:
         except redis.exceptions.NoPermissionError as error:
             raise LedgerUnavailable(f"{self._where} denies: {error}") from error
         except (redis.ConnectionError, redis.TimeoutError) as error:
-            raise LedgerUnavailable(
-                f"no Redis at {self._where}: {error}", hint="is it running? PBRS_REDIS_URL names it"
-            ) from error
+            hint = "is it running? PBRS_REDIS_URL names it"
+            raise LedgerUnavailable(f"no Redis at {self._where}: {error}", hint=hint) from error
         except redis.exceptions.OutOfMemoryError as error:
             raise LedgerUnavailable(
                 f"{self._where} is out of memory: {error}", hint="raise maxmemory"

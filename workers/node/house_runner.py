@@ -186,9 +186,8 @@ class HouseRunner:
         try:
             return JobSpec.model_validate_json(self._store.get(job_key(job)))
         except ObjectMissing:
-            raise BadHouse(
-                job_key(job), "", "no such job in this store", hint="does PBRS_STORE differ?"
-            ) from None
+            hint = "does PBRS_STORE differ?"
+            raise BadHouse(job_key(job), "", "no such job in this store", hint=hint) from None
 
 
 def want_of(spec: JobSpec) -> Wanted:

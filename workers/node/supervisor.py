@@ -69,10 +69,9 @@ def check_machine(config: FarmConfig) -> None:
         raise MachineFailed("no store", hint="PBRS_STORE=file:///folder or s3://bucket/prefix")
     free_mb = shutil.disk_usage(config.scratch).free / 2**20
     if free_mb < config.min_free_mb:
-        raise MachineFailed(
-            f"{config.scratch}: {free_mb:.0f} MB free, {config.min_free_mb} wanted",
-            hint="PBRS_FARM_SCRATCH names another folder",
-        )
+        text = f"{config.scratch}: {free_mb:.0f} MB free, {config.min_free_mb} wanted"
+        hint = "PBRS_FARM_SCRATCH names another folder"
+        raise MachineFailed(text, hint=hint)
 
 
 def sweep(config: FarmConfig) -> None:

@@ -11,10 +11,10 @@ from pbrs_farm.read.common.textures import texture_from_bytes
 
 
 class LoadedTexture(NamedTuple):
-    """A texture that decodes; has_holes: its alpha falls below one half somewhere."""
+    """A texture that decodes."""
 
     texture: Texture
-    has_holes: bool
+    has_holes: bool  # its alpha falls below one half somewhere
 
 
 class MaterialLibrary:

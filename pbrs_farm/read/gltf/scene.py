@@ -1,8 +1,7 @@
 """A furnished scene as glTF 2.0 (.glb, .gltf) -> House.
 
 Items are nodes whose extras, mapping row or name tell their class. Effect: read_gltf_file reads
-the file and what lies beside it: `<stem>.classes.json` (gltf_classes) and `<stem>.rooms.json`
-(gltf_rooms), both optional.
+the file and what may lie beside it: `<stem>.classes.json` and `<stem>.rooms.json`.
 """
 
 from __future__ import annotations

@@ -60,8 +60,7 @@ def box(name: str, centre: F64, half: F64, material: int, *, axes: F64 | None = 
 def lathe(name: str, profile: F64, centre: F64, material: int, *, n: int = 16) -> Surface:
     """The (radius, height) profile (P, 2), bottom to top, turned about the vertical through centre.
 
-    Smooth normals across the turn, none along the profile's kinks; closed if it starts and ends
-    on the axis. centre: (3,).
+    Normals are smooth around the turn, not along the profile; closed if both ends are on the axis.
     """
     angles = 2 * np.pi * np.arange(n + 1) / n
     around = np.stack([np.cos(angles), np.zeros(n + 1), -np.sin(angles)], -1)

@@ -64,9 +64,8 @@ def pick_models(
 ) -> list[ObjectModel]:
     """count models at random (all when there are fewer) of the named categories (all when none).
 
-    A category is a ShapeNet class or synset id, a folder's name or an NYU40 class. The choice
-    depends on seed and ids alone: more models do not reorder the others. Raises BadInput for a
-    category no model has.
+    A category is a ShapeNet class or synset id, a folder's name or an NYU40 class; BadInput where
+    no model has it. The choice depends on seed and ids alone: more models do not reorder the others.
     """
     wanted = [c.strip().lower() for c in categories if c.strip()]
     for category in wanted:

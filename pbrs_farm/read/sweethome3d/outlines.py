@@ -21,11 +21,11 @@ MIN_LENGTH_M = 1e-4  # of a wall, and of its thickness
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """left, right: (N, 2) plan points from the wall's start to its end; along: (N,) 0..1."""
+    """A wall's two sides in plan, from its start to its end."""
 
-    left: Points2
-    right: Points2
-    along: np.ndarray[tuple[int], np.dtype[np.float64]]
+    left: Points2  # (N, 2)
+    right: Points2  # (N, 2)
+    along: np.ndarray[tuple[int], np.dtype[np.float64]]  # (N,) 0 at the start, 1 at the end
 
     @property
     def polygon(self) -> Points2:

@@ -33,8 +33,7 @@ _TRAILING_POINT: Final = re.compile(r"(?<=\d)\.(?!\d)")  # "1." is SVG, but not 
 def polygons_from_path(text: str) -> tuple[Points2, ...]:
     """The path's closed sub-paths as (N, 2) polygons, N >= 3.
 
-    Raises ValueError for what is no path, coordinates that are not finite or larger than 1e6, or
-    one that is too long.
+    Raises ValueError for what is no path or too long, and for coordinates beyond MAX_COORDINATE.
     """
     segments = _segments(text)
     # Bound the number of points before any is computed.

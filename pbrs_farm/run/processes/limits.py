@@ -20,18 +20,15 @@ _SHARE_OF_MACHINE: Final = 0.9
 
 @dataclass(frozen=True, slots=True)
 class ProcessLimits:
-    """When a render process is killed, and when it is replaced between two tasks.
+    """When a render process is killed, and when it is replaced between two tasks."""
 
-    start_s: until it is ready. step_s: for one step. silence_s: without a message and without a
-    line in its log. Time in which storage does not answer counts for neither.
-    """
-
-    start_s: float = 300.0
-    step_s: float = math.inf
-    silence_s: float = 1800.0
+    start_s: float = 300.0  # until it is ready
+    # Time in which storage does not answer counts for neither of these two:
+    step_s: float = math.inf  # for one step
+    silence_s: float = 1800.0  # without a message and without a line in its log
     memory_mb: float = math.inf  # resident, MiB
     recycle_mb: float = math.inf  # resident between two tasks, MiB
-    recycle_tasks: int = 2000
+    recycle_tasks: int = 2000  # tasks after which a process is replaced
 
 
 def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:

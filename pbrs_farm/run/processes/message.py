@@ -14,11 +14,11 @@ Kind = Literal["ready", "step", "waiting", "event", "done", "fault"]
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One line from a render process. body: JSON values whose meaning its parent knows."""
+    """One line from a render process."""
 
     kind: Kind
     text: str = ""
-    body: dict[str, Any] = field(default_factory=dict)
+    body: dict[str, Any] = field(default_factory=dict)  # JSON values that its parent understands
 
     def line(self) -> bytes:
         """The message as message_from_line reads it."""

@@ -23,7 +23,7 @@ REPORTED: Final = "reported"
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How a task ended. body: of the process's own last message.
+    """How a task ended.
 
     cause: "" when it was done; "reported" when the process itself says what went wrong; "crash" when
     it died; "resource" when it held too much memory or was killed from outside; "machine" when it did
@@ -33,7 +33,7 @@ class Ended:
     seconds: float
     cause: str = ""
     text: str = ""
-    body: dict[str, Any] = field(default_factory=dict)
+    body: dict[str, Any] = field(default_factory=dict)  # of the process's own last message
 
 
 class RenderProcess:

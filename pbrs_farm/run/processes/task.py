@@ -41,11 +41,9 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened to a step.
+    """Something that happened to a step, or the end of a task."""
 
-    kind: "begin", "done" (made now), "kept" (was there already), "failed", or "end" of a task.
-    """
-
+    # done: made now; kept: was there already; end: of a task.
     kind: Literal["begin", "done", "kept", "failed", "end"]
     house_id: str
     view_id: str | None

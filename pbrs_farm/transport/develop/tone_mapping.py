@@ -41,8 +41,7 @@ def tone(
 def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
     """The factor that brings an image's log-average luminance to the key; 1 for a black one.
 
-    For `photo` luminance is clamped to the 98th percentile (above it are windows and bulbs) and
-    to a thousandth of it.
+    For `photo` luminance is clamped to 0.001..1 of its 98th percentile (windows and bulbs are above).
     """
     rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
     if fields.preset == "released":

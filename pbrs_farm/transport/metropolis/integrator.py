@@ -110,8 +110,7 @@ def metropolis(
 ) -> Estimate:
     """Light of paths of min_segments or more (3: all but direct light) of one group.
 
-    fields.mutations_per_pixel counts unless deadline (time.monotonic()) is given: then mutations
-    go on until it has passed.
+    deadline: mutate until this time.monotonic(), instead of fields.mutations_per_pixel times.
     """
     shape = (camera.intrinsics.height_px, camera.intrinsics.width_px)
     black = np.zeros((*shape, 3), np.float32)
@@ -223,8 +222,7 @@ def pixel_importance(
 
     Without it chains go where the picture is bright; with it every pixel gets its share (Veach's
     two stages, 1997). From N paths, their pixels and luminances: means over tiles of about
-    _PATHS_PER_TILE, blended between tiles, held above a part of the mean. Any positive values are
-    unbiased.
+    _PATHS_PER_TILE, blended between tiles, held above a part of the mean. Any positive ones are unbiased.
     """
     height, width = shape
     side = max(int(np.sqrt(_PATHS_PER_TILE * height * width / len(pixels))), 1)

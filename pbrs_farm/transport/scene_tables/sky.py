@@ -88,10 +88,8 @@ def choose_panorama(names: list[str], house_id: str, seed: int) -> str:
     """
     skies = sorted(n for n in names if not any(word in n.lower() for word in NO_SKIES))
     if not skies:
-        raise BadRecipe(
-            "sky.panoramas: no outdoor panorama in the folder",
-            hint="latitude-longitude .exr or .hdr files; `blender-data` has some",
-        )
+        hint = "latitude-longitude .exr or .hdr files; `blender-data` has some"
+        raise BadRecipe("sky.panoramas: no outdoor panorama in the folder", hint=hint)
     return skies[keys.seed("panorama", house_id, seed) % len(skies)]
 
 
@@ -104,10 +102,8 @@ def sky_for_house(
     """
     if recipe.sky.kind == "panorama":
         if panorama is None:
-            raise BadRecipe(
-                "sky.kind is panorama and no panorama is given",
-                hint="--set sky.panoramas=FOLDER, or --set sky.kind=sunsky",
-            )
+            hint = "--set sky.panoramas=FOLDER, or --set sky.kind=sunsky"
+            raise BadRecipe("sky.kind is panorama and no panorama is given", hint=hint)
         rotation = _uniform(house_id, recipe.seed, "rotation") * 2 * math.pi
         return sky_from_panorama(panorama[0], panorama[1], recipe, rotation_rad=rotation)
     # Draw the sun's place by seeds of the house.

@@ -65,10 +65,9 @@ def light_claims(variant: str) -> Iterator[Claim]:
     Raises MachineFailed in a scalar variant: our kernels do not run there.
     """
     if variant.startswith("scalar"):
-        raise MachineFailed(
-            "the light's kernels need LLVM or CUDA, nothing to prove in scalar_rgb",
-            hint="sudo apt-get install -y libllvm19",
-        )
+        text = "the light's kernels need LLVM or CUDA, nothing to prove in scalar_rgb"
+        hint = "sudo apt-get install -y libllvm19"
+        raise MachineFailed(text, hint=hint)
     for measure in _CLAIMS:
         began = time.perf_counter()
         claim = measure(variant)
