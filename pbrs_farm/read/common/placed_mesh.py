@@ -12,7 +12,7 @@ from pbrs_farm.core.house import Box, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.read.mesh.obj import Mesh
 
-_MIN_AREA_M2 = 0.5e-12
+_MIN_AREA_M2 = 0.5e-12  # below it float32 cannot tell a triangle from a line
 
 
 def placed(
@@ -26,6 +26,7 @@ def placed(
     faces = mesh.faces
     if np.linalg.det(world_from_model[:3, :3]) < 0:
         faces = faces[:, ::-1]
+    # Measure what float32 has left of them.
     faces = faces[face_areas(triangle_corners(world, faces)) > _MIN_AREA_M2]
     if not len(faces):
         return None

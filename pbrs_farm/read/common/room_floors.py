@@ -19,10 +19,10 @@ from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 # A floor of more triangles is taken by its convex hull, so that time stays bounded.
 MAX_OUTLINE_FACES: Final = 20_000
 
-_SAME_HEIGHT_M: Final = 0.02
-_CRACK_M: Final = 1e-4
-_SLACK_M: Final = 0.002
-_TRACE_M: Final = 0.005
+_SAME_HEIGHT_M: Final = 0.02  # of faces that are one floor
+_CRACK_M: Final = 1e-4  # between triangles that should touch
+_SLACK_M: Final = 0.002  # of an outline's corners
+_TRACE_M: Final = 0.005  # half the width of the strip that a planar wall cuts
 
 
 def floor_height(surfaces: Sequence[Surface]) -> float | None:
@@ -55,6 +55,7 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> NDArray
 
 def coverage(surface: Surface, polygon: NDArray[np.float64]) -> float:
     """Share of a plan polygon (N, 2) that lies under or over the surface's level faces."""
+    # A planar ceiling may look either way.
     both = np.concatenate([_facing([surface], 1), _facing([surface], -1)])
     area: Any = shapely.Polygon(polygon)
     return float(shapely.area(shapely.intersection(_outline(both), area)) / max(area.area, 1e-9))

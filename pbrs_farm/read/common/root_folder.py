@@ -20,7 +20,7 @@ class RootFolder:
     def __init__(self, root: Path) -> None:
         self.root = root
         self._real = real_path(root)
-        self._read: dict[str, str] = {}
+        self._read: dict[str, str] = {}  # name -> sha256
 
     def name_from(self, folder: str, reference: str) -> str:
         """The name below root that a reference inside folder means; BadHouse if it leads out."""
@@ -38,6 +38,7 @@ class RootFolder:
             real = real_path(path)
         except OSError:
             return None
+        # Follow links first: where the file really lies decides.
         if not real.is_relative_to(self._real):
             raise BadHouse(self.root, name, "is a link that leads out of the folder")
         return real

@@ -25,8 +25,8 @@ from pbrs_farm.regular_files import open_regular
 
 OTHERPROP: Final = NYU40_NAMES.index("otherprop")
 _MODEL_SUFFIXES: Final = (".obj", ".glb", ".gltf")
-_PLAIN_FOLDERS: Final = ("models", "")
-_MAX_CATALOGUE_BYTES: Final = 16_000_000
+_PLAIN_FOLDERS: Final = ("models", "")  # ShapeNet's, that say nothing
+_MAX_CATALOGUE_BYTES: Final = 16_000_000  # unpacked
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +72,7 @@ def pick_models(
         if not any(_is_of(model, category) for model in models):
             raise BadInput("models", category, "no model of this category")
     chosen = [m for m in models if not wanted or any(_is_of(m, c) for c in wanted)]
+    # Sort by a hash of seed and id: a random order that each model has by itself.
     chosen.sort(key=lambda m: hashlib.sha256(f"{seed}/{m.id}".encode()).digest())
     return chosen[:count]
 
@@ -112,6 +113,7 @@ def _model(file: Path, root: Path) -> ObjectModel:
             _id(synset["synset"], name), name, synset["name"], nyu40, file, root,
             attribution="ShapeNet",
         )  # fmt: skip
+    # Elsewhere the first folder is the category, and the rest is the name.
     category = folders[0] if folders else root.name
     label = nyu40_of("", category) or nyu40_of("", file.stem) or OTHERPROP
     name = "/".join([*folders[1:], file.stem])
@@ -135,9 +137,8 @@ def _library(path: Path) -> list[ObjectModel]:
         key, equals, value = line.partition("=")
         name, hash_mark, number = key.strip().partition("#")
         if equals and hash_mark and number.isdigit():
-            rows.setdefault(number, {})[name] = (
-                value.strip().encode("latin-1").decode("unicode_escape", "replace")
-            )
+            text = value.strip().encode("latin-1").decode("unicode_escape", "replace")
+            rows.setdefault(number, {})[name] = text
     return [m for row in rows.values() if (m := _piece(path, row, names)) is not None]
 
 
@@ -145,6 +146,7 @@ def _piece(path: Path, row: dict[str, str], names: set[str]) -> ObjectModel | No
     entry = row.get("model", "").lstrip("/")
     if entry not in names or not entry.lower().endswith(".obj"):
         return None
+    # Sizes are in centimetres; a piece without them is no piece of furniture.
     try:
         width, height, depth = (float(row[key]) * 0.01 for key in ("width", "height", "depth"))
     except (KeyError, ValueError):

@@ -9,6 +9,7 @@ import tempfile
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -110,6 +111,7 @@ def _folder_of(model: ObjectModel) -> Iterator[tuple[RootFolder, str]]:
         place = posixpath.dirname(model.entry)
         try:
             with open_regular(model.path) as file, zipfile.ZipFile(file) as archive:
+                # Unpack the model's folder alone: its materials and pictures lie beside it.
                 members = [i for i in archive.infolist() if posixpath.dirname(i.filename) == place]
                 if sum(i.file_size for i in members) > _MAX_UNPACKED_BYTES:
                     raise BadHouse(model.path, model.entry, "is too large unpacked")
@@ -131,9 +133,8 @@ def _obj(
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         mtl = model.mtl[slot] if slot >= 0 else None
         material = materials.material(mtl, None, place=name, clear=MaterialKind.GLASS)
-        surface = placed(
-            mesh, np.eye(4), name=mesh.material, material=materials.library.index(material)
-        )
+        index = materials.library.index(material)
+        surface = placed(mesh, np.eye(4), name=mesh.material, material=index)
         if surface is not None:
             surfaces.append(surface)
     return surfaces, materials.library
@@ -179,7 +180,7 @@ def _centred(surfaces: list[Surface], size_m: tuple[float, float, float] | None)
 def _moved(surface: Surface, origin: NDArray[np.float64], scale: NDArray[np.float64]) -> Surface:
     normals = surface.normals
     if normals is not None:
-        turned = normals / scale
+        turned = normals / scale  # by the inverse transpose
         normals = (turned / np.linalg.norm(turned, axis=1, keepdims=True)).astype(np.float32)
     positions = ((surface.positions - origin) * scale).astype(np.float32)
-    return Surface(surface.name, positions, surface.faces, surface.material, surface.uvs, normals)
+    return replace(surface, positions=positions, normals=normals)
