@@ -16,14 +16,9 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Final
 
-MAX_FILE_BYTES: Final = 512 * 2**20
-"""Of a file that is read whole: a home, a scene, a picture."""
-
-MAX_TEXT_BYTES: Final = 64 * 2**20
-"""Of a file that is parsed whole by hand: a list of houses or cameras."""
-
-MAX_DIGEST_BYTES: Final = 4 * 2**30
-"""Of a file that is read in pieces."""
+MAX_FILE_BYTES: Final = 512 * 2**20  # of a file that is read whole: a home, a scene, a picture
+MAX_TEXT_BYTES: Final = 64 * 2**20  # of one that is parsed by hand: a list of houses or cameras
+MAX_DIGEST_BYTES: Final = 4 * 2**30  # of one that is read in pieces
 
 
 @contextmanager
@@ -44,7 +39,12 @@ def open_regular(path: Path, max_bytes: int = MAX_FILE_BYTES) -> Iterator[Buffer
 def read_regular(path: Path, max_bytes: int = MAX_FILE_BYTES) -> bytes:
     """The file's bytes; OSError as open_regular, also where the file grows while it is read."""
     with open_regular(path, max_bytes) as file:
-        data = file.read(max_bytes + 1)
+        # Ask for what there is, since a read sets aside all the memory it may need.
+        size = os.fstat(file.fileno()).st_size
+        data = file.read(size + 1)
+        # The byte too many says that the file grows.
+        if size < len(data) <= max_bytes:
+            data += file.read(max_bytes + 1 - len(data))
     if len(data) > max_bytes:
         raise OSError(errno.EFBIG, f"grew above {max_bytes / 1e6:.0f} MB", str(path))
     return data
