@@ -16,6 +16,15 @@ class Count(BaseModel):
     ties: int = 0  # right by another of two right answers
 
 
+class Coincidence(BaseModel):
+    """Surfaces of two items of a house in one place, within 0.1 mm: either is a right answer."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    house: str
+    items: tuple[str, str]  # ids, in order; twice the same for an item's own surfaces
+    pixels: int  # where the stored one is the other than the one that a ray met here
+
+
 class Certificate(BaseModel):
     """The outcome of verify."""
 
@@ -27,6 +36,7 @@ class Certificate(BaseModel):
     counts: dict[str, Count]  # check -> its count
     failures: tuple[str, ...]  # "check: place: what", at most MAX_LISTED per check
     notes: tuple[str, ...] = ()  # what is odd but no failure
+    coincident: tuple[Coincidence, ...] = ()  # most pixels first
 
     @property
     def is_clean(self) -> bool:
@@ -44,11 +54,24 @@ class Certificate(BaseModel):
             f"{name:<22}{c.checked:>12}{c.failed:>9}{c.ties:>9}" for name, c in self.counts.items()
         ]
         lines += [f"note: {note}" for note in self.notes]
+        lines += self._coincidences()
         lines += list(self.failures)
         if self.n_views == 0:
             lines.append("nothing to verify: no finished view in this folder")
         lines.append("CLEAN" if self.is_clean else "NOT CLEAN")
         return "\n".join(lines)
+
+    def _coincidences(self) -> list[str]:
+        if not self.coincident:
+            return []
+        n = sum(c.pixels for c in self.coincident)
+        lines = [f"note: {n} pixels show surfaces that coincide within 0.1 mm, no failure:"]
+        lines += [
+            f"  {c.house}: {' and '.join(c.items)}: {c.pixels}"
+            for c in self.coincident[:MAX_LISTED]
+        ]
+        more = len(self.coincident) - MAX_LISTED
+        return [*lines, f"  and {more} more pairs"] if more > 0 else lines
 
 
 class Tally:
@@ -58,12 +81,18 @@ class Tally:
         self._counts: dict[str, list[int]] = {}  # check -> [checked, failed, ties]
         self._listed: dict[str, list[str]] = {}  # check -> lines of failures
         self.notes: list[str] = []
+        self._coincident: dict[tuple[str, str, str], int] = {}  # house and two items -> pixels
 
     def add(self, check: str, checked: int, *, ties: int = 0) -> None:
         """checked more things were looked at, of which ties are ties."""
         row = self._counts.setdefault(check, [0, 0, 0])
         row[0] += int(checked)
         row[2] += int(ties)
+
+    def coincide(self, house: str, items: tuple[str, str]) -> None:
+        """One more pixel of a house shows either of two coincident surfaces of these items."""
+        a, b = sorted(items)
+        self._coincident[house, a, b] = self._coincident.get((house, a, b), 0) + 1
 
     def fail(self, check: str, place: str, what: str, n_failed: int = 1) -> None:
         """n_failed of the things already added failed at place."""
@@ -99,4 +128,10 @@ class Tally:
             },
             failures=tuple(line for lines in self._listed.values() for line in lines),
             notes=tuple(self.notes),
+            coincident=tuple(
+                Coincidence(house=house, items=(a, b), pixels=n)
+                for (house, a, b), n in sorted(
+                    self._coincident.items(), key=lambda row: (-row[1], row[0])
+                )
+            ),
         )

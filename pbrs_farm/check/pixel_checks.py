@@ -3,7 +3,8 @@
 A ray that grazes an edge, or meets two surfaces in the same place, has more than one right
 answer. Where the centre's answer does not explain what is stored, the triangles next to it (rays
 0.02 px away) and those of the stored instance at the same depth are tried. If one of them
-explains every layer at once the pixel is a tie, which is counted; otherwise it failed.
+explains every layer at once the pixel is a tie, which is counted; otherwise it failed. A tie of
+two parallel surfaces within 0.1 mm is the source's own: a window frame in the plane of its wall.
 """
 
 from __future__ import annotations
@@ -33,9 +34,10 @@ ROUNDING_MM = 0.505  # of depth stored in whole mm
 RAY_ERROR_MM = 2e-4
 MAX_RAY_ERROR_MM = 5.0
 NORMAL_TOLERANCE_DEG = 0.02
-TIE_DEPTH_M = 1e-4  # two surfaces closer than this may both be hit
+TIE_DEPTH_M = 1e-4  # two surfaces closer than this, across them, may both be hit
 METRES = 2e-4  # tolerance of depths and positions stored as floats
 
+_PARALLEL = 0.999  # least cosine between the normals of coincident surfaces
 _JITTER_PX = 0.02  # from the pixel's centre to the neighbouring rays
 _JITTER = _JITTER_PX * np.array(
     [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]], np.float64
@@ -54,6 +56,8 @@ class Verdict:
     right: dict[str, Bools]  # check -> (N,) what is stored is right
     tied: Bools  # (N,) right by another triangle than the one that the centre's ray hit
     face: Faces  # (N,) that triangle, -1 = nothing
+    coincident: Bools  # (N,) tied, and the two triangles fill one place
+    first: Faces  # (N,) the triangle that the centre's ray hit, -1 = nothing
 
 
 def judge(
@@ -67,7 +71,8 @@ def judge(
     # Explain what is stored by the triangle that the centre's ray hits.
     _, rays = scene
     origin, directions = view.rays(rows, columns)
-    face = rays.first(origin, directions)
+    first = rays.first(origin, directions)
+    face = first.copy()
     right = _explained(view, labels, face, directions, scene)
     tied = np.zeros(len(rows), bool)
 
@@ -91,7 +96,29 @@ def judge(
         for name in right:
             right[name][open_[better]] = trial[name][better]
     tied[open_] = best == 0
-    return Verdict(right, tied, face)
+    coincident = tied & _fill_one_place(first, face, tied, origin, directions, scene)
+    return Verdict(right, tied, face, coincident, first)
+
+
+def _fill_one_place(
+    first: Faces,
+    other: Faces,
+    chosen: Bools,
+    origin: Floats,
+    directions: Floats,
+    scene: tuple[Triangles, Rays],
+) -> Bools:
+    """(N,) of the chosen pixels, those whose ray pierces two parallel triangles in one place."""
+    triangles, rays = scene
+    found = np.zeros(len(first), bool)
+    both = chosen & (first >= 0) & (other >= 0) & (first != other)
+    for k in np.nonzero(both)[0]:
+        pair, ray = np.array([first[k], other[k]]), directions[k]
+        normals = rays.normal(pair, np.stack([ray, ray]))
+        t = _pierced(triangles, pair, origin, ray)
+        if np.isfinite(t).all() and abs(normals[0] @ normals[1]) >= _PARALLEL:
+            found[k] = abs(t[0] - t[1]) * abs(normals[0] @ ray) <= TIE_DEPTH_M
+    return found
 
 
 def _explained(
@@ -167,12 +194,14 @@ def _coincident(
     triangles, rays = scene
     found = np.full(len(face), -1, np.int64)
     first = rays.distance(face, origin, directions)
+    # Measure gaps across the surface: a slanting ray is longer between the two.
+    across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
     for instance in np.unique(labels["instance"]):
         # Look for a triangle of that instance at the depth of the first hit.
         own = np.nonzero(triangles.instance == instance)[0]
         for pixel in np.nonzero(labels["instance"] == instance)[0]:
             t = _pierced(triangles, own, origin, directions[pixel])
-            gap = np.abs(t - first[pixel])
+            gap = np.abs(t - first[pixel]) * across[pixel]
             if len(own) and gap.min() <= TIE_DEPTH_M:
                 found[pixel] = own[gap.argmin()]
     return found

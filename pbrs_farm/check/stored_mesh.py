@@ -32,6 +32,7 @@ class Triangles:
     material: NDArray[np.int64]  # (F,) index of the GLB's materials
     nyu40: dict[int, int]  # instance id -> class as the GLB says
     see_through: NDArray[np.bool_]  # (F,) glass and panes
+    item: dict[int, str]  # instance id -> id of the item
 
 
 def triangles_from_glb(data: bytes) -> Triangles:
@@ -68,11 +69,13 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
     faces = [np.zeros((0, 3), np.int64)]
     owners: list[tuple[int, int, int]] = []  # instance, material, number of faces
     nyu40: dict[int, int] = {}
+    item: dict[int, str] = {}
     n_vertices = 0
     # Join the primitives of all nodes: those of this package carry no transform.
     for node in document.get("nodes", []):
         instance = int(node["extras"]["instance"])
         nyu40[instance] = int(node["extras"]["nyu40"])
+        item[instance] = str(node["extras"].get("item", instance))
         mesh = document["meshes"][node["mesh"]] if "mesh" in node else {"primitives": []}
         for primitive in mesh["primitives"]:
             if primitive.get("mode", 4) != 4:
@@ -96,4 +99,5 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         material,
         nyu40,
         clear[material] if len(material) else np.zeros(0, bool),
+        item,
     )

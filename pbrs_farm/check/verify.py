@@ -119,8 +119,14 @@ def _check_rays(
         labels = {name: arrays[file][rows, columns] for name, file in present.items()}
         labels = {k: a.astype(np.int64) if a.dtype.kind == "u" else a for k, a in labels.items()}
         verdict = judge(view, labels, rows, columns, scene)
+        # Coincident surfaces of the source are a class of their own, told by pairs of items.
+        item, instance = scene[0].item, scene[0].instance
+        for k in np.nonzero(verdict.coincident)[0]:
+            pair = instance[verdict.first[k]], instance[verdict.face[k]]
+            tally.coincide(view.place.partition("/")[0], (item[int(pair[0])], item[int(pair[1])]))
+        ties = int((verdict.tied & ~verdict.coincident).sum())
         for check, right in verdict.right.items():
-            tally.add(f"{prefix}{check}", len(rows), ties=int(verdict.tied.sum()))
+            tally.add(f"{prefix}{check}", len(rows), ties=ties)
             # Name each wrong pixel.
             for k in np.nonzero(~right)[0]:
                 tally.fail(f"{prefix}{check}", view.place, f"row {rows[k]}, column {columns[k]}")

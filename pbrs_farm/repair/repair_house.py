@@ -20,6 +20,7 @@ from pbrs_farm.repair.measure.leaks import leaks_of_house
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.report import RepairReport, RoomAudit, StructureReport
 from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.flush_frames import with_frames_apart
 from pbrs_farm.repair.structure.watertight import repaired_structure, with_structure
 
 
@@ -43,6 +44,7 @@ def repair(
     structure = repaired_structure(house, fields.wall_thickness_m)
     house, swallowed = with_structure(house, structure)
     house = replace(house, notes=(*house.notes, *_lost(structure.report)))
+    house, n_apart = with_frames_apart(house)
 
     # Give every lamp a bulb, every dim lamp a translucent shade, rooms without one a lamp.
     house, sources = with_bulbs(house, fields)
@@ -63,7 +65,9 @@ def repair(
         house_id=house.id,
         removed=(*removed, *swallowed),
         faces=faces,
-        structure=structure.report.model_copy(update={"n_walls_made_white": n_white}),
+        structure=structure.report.model_copy(
+            update={"n_walls_made_white": n_white, "n_frames_moved": n_apart}
+        ),
         sources=tuple(sources),
         fallback_lights=given.fallback,
         added_lamps=given.added,

@@ -58,6 +58,7 @@ class StructureReport(_Record):
     n_stairwells_closed: int = 0  # floors and ceilings over stairwells that no room covers
     n_openings: int = 0
     n_openings_cut: int = 0  # the others touch no wall
+    n_frames_moved: int = 0  # doors and windows that lay in the faces of their walls
     left_as_is: tuple[LeftAsIs, ...] = ()
     areas: tuple[SideArea, ...] = ()  # of every wall, floor and ceiling
     walls_lost: tuple[WallLoss, ...] = ()

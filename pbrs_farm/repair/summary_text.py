@@ -53,6 +53,8 @@ def _structure(report: RepairReport) -> Iterator[str]:
         yield f"{_n(s.n_stairwells_closed, 'floor or ceiling', 'floors or ceilings')} carried on over stairwells without a room."  # fmt: skip
     if s.n_openings:
         yield f"{s.n_openings_cut} of {_n(s.n_openings, 'opening')} cut through the walls."
+    if s.n_frames_moved:
+        yield f"{_n(s.n_frames_moved, 'door or window', 'doors and windows')} lay in the faces of walls: moved 0.5 mm out."
     for wall in s.walls_lost:
         yield (
             f"WALL LOST: of wall {wall.item_id} repair left {wall.after_m2:.1f} of "

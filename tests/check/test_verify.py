@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from pbrs_farm.check import verify
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import House, ItemKind, Surface
 from pbrs_farm.images import array_from_png, exr_from_layers, png_from_array
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.check.roots import SIZE, changed_pixel, make_root, sign
@@ -304,3 +306,56 @@ def test_normals_in_another_frame_do_not_fit_the_depth(root):
     replaced(view / "normal.png", lambda normal: np.ascontiguousarray(normal[..., [0, 2, 1]]))
     sign(root, house_of(root))
     assert verify(root, sample=0).counts["depth on planes"].failed > 1000
+
+
+def with_frame_in_wall(by_m: float) -> House:
+    """The small home with a sheet before every wall's larger faces, by_m off their plane."""
+    home = builtin_home()
+    frames = []
+    for item in home.items:
+        if item.kind is not ItemKind.WALL:
+            continue
+        surfaces = []
+        for s in item.surfaces:
+            corners = s.positions[s.faces].astype(np.float64)
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+            upright = np.abs(normals[:, 1]) < 0.1
+            # Smaller triangles about the same middle, each in the plane of its own.
+            middle = corners.mean(1, keepdims=True)
+            small = (middle + 0.8 * (corners - middle) + by_m * normals[:, None])[upright]
+            faces = np.arange(3 * len(small)).reshape(-1, 3).astype(np.int32)
+            surfaces.append(
+                Surface("frame", small.reshape(-1, 3).astype(np.float32), faces, s.material)
+            )
+        frame = replace(item, id=f"frame_{item.id}", name="frame", kind=ItemKind.WINDOW, nyu40=9, surfaces=tuple(surfaces), tags=())  # fmt: skip
+        frames.append(frame)
+    return home.with_items([*frames, *home.items])
+
+
+@pytest.mark.parametrize("by_m", [0.0, 2e-5])
+def test_coincident_surfaces_of_the_source_are_told_by_pairs_and_no_failure(tmp_path, by_m):
+    make_root(tmp_path, with_frame_in_wall(by_m), with_optional=True)
+    certificate = verify(tmp_path, all_pixels=True)
+    assert certificate.is_clean, certificate.text()
+    if by_m == 0.0:
+        n = sum(c.pixels for c in certificate.coincident)
+        assert n > 0.0002 * certificate.counts["ray: instance"].checked
+        assert certificate.counts["ray: instance"].ties <= 5
+        pair = certificate.coincident[0]
+        assert pair.items[0].startswith("frame_")
+        assert f"{pair.items[0]} and {pair.items[1]}: {pair.pixels}" in certificate.text()
+
+
+def test_a_wrong_item_on_a_surface_of_its_own_still_fails(root):
+    changed_pixel(house_of(root) / "views/v0/instance.png", 48, 64, 1)
+    sign(root, house_of(root))
+    assert not verify(root, all_pixels=True).is_clean
+    assert verify(root, all_pixels=True).coincident == ()
+
+
+def test_surfaces_half_a_millimetre_apart_do_not_coincide(tmp_path):
+    make_root(tmp_path, with_frame_in_wall(5e-4))
+    certificate = verify(tmp_path, all_pixels=True)
+    assert certificate.is_clean, certificate.text()
+    assert certificate.coincident == ()

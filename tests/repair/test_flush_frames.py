@@ -1,0 +1,61 @@
+"""Frames that lie in the faces of their walls are moved half a millimetre apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import House, Item, ItemKind, Opening
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.read.mesh.primitives import box
+from pbrs_farm.repair import repair, summary_of_report
+from pbrs_farm.repair.structure.flush_frames import MOVED_M, with_frames_apart
+from tests.repair.rooms import WALL, covers, house, room, walls_around
+
+RECT = (0.0, 0.0, 4.0, 3.0)
+
+
+def with_window(depth_m: float, *, hole_m: float = 0.5) -> House:
+    """A room with a window of 1.2 x 1.2 m in its wall w0 (0.2 m thick, below z = 0)."""
+    r = room("0_0", RECT)
+    centre = np.array([2.0, 1.4, -0.1])
+    frame = box("frame", centre, np.array([0.6, 0.6, depth_m / 2]), WALL)
+    item = Item("window", "window", ItemKind.WINDOW, "0", (frame,), nyu40=9)
+    cutter = box("cutter", centre, np.array([hole_m, hole_m, 0.3]), 0)
+    h = hole_m
+    quad = centre + np.array([[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]])
+    opening = Opening("o", "0", "window", True, cutter, quad, np.array([0, 0, 1.0]))
+    source = house([*walls_around(RECT), *covers(r), item], [r])
+    return replace(source, openings=(opening,))
+
+
+def test_a_frame_as_thick_as_its_wall_is_moved_out_on_both_sides() -> None:
+    after, report = repair(with_window(0.2), RepairFields())
+    low, high = next(i for i in after.items if i.id == "window").bounds
+    assert high[2] == pytest.approx(MOVED_M, abs=1e-6)
+    assert low[2] == pytest.approx(-0.2 - MOVED_M, abs=1e-6)
+    assert (high - low)[:2] == pytest.approx([1.2, 1.2], abs=1e-6)
+    assert report.structure.n_frames_moved == 1
+    assert "1 door or window lay in the faces of walls" in summary_of_report(report)
+
+
+@pytest.mark.parametrize("depth_m", [0.1, 0.1996, 0.21])
+def test_a_frame_inside_or_before_its_wall_stays(depth_m: float) -> None:
+    source = with_window(depth_m)
+    after, report = repair(source, RepairFields())
+    window = next(i for i in after.items if i.id == "window")
+    assert window.surfaces[0].positions.tolist() == source.items[-1].surfaces[0].positions.tolist()
+    assert report.structure.n_frames_moved == 0
+
+
+def test_a_frame_that_fills_its_hole_shares_no_face_with_the_wall() -> None:
+    _, report = repair(with_window(0.2, hole_m=0.6), RepairFields())
+    assert report.structure.n_frames_moved == 0
+
+
+def test_moving_apart_twice_is_moving_once() -> None:
+    once, n = with_frames_apart(with_window(0.2))
+    assert n == 1
+    assert with_frames_apart(once)[1] == 0
