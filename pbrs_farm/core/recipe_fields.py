@@ -16,6 +16,8 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class FieldGroup(BaseModel):
+    """The fields of one stage; unknown ones are errors."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
@@ -164,7 +166,7 @@ class LightFields(FieldGroup):
         1024,
         ge=0,
         le=MAX_SAMPLES,
-        description="pixels that a Metropolis path's tail is shown to; 0 = its own alone",
+        description="pixels that a Metropolis path's suffix is shown to; 0 = its own alone",
     )
     denoise: bool = True
 

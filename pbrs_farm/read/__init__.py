@@ -1,0 +1,1 @@
+"""Readers: bytes of a home, a scene or a model -> House, a folder per format."""

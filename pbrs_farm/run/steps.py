@@ -236,7 +236,7 @@ def _light(work: Work) -> StepOutput:
     digest = work.recipe.picture_digest(*plan.STEPS["light"].groups)
     seed = keys.seed(work.house_id, view.id, "light", digest)
     result = cached.light_scene.render(camera, view.room_id, work.recipe.light, seed)
-    # Name the images as the file does; of an object, pixels that miss it are 0.
+    # Name the images as the file does.
     images = {name: getattr(result, name) for name in ("outdoor", "indoor", "albedo", "normal")}
     images |= {layer_name(number): image for number, image in result.lamps.items()}
     # Blacken what no ray hits: an object has no surroundings.

@@ -15,15 +15,18 @@ from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance
 from pbrs_farm.transport.kernels.packets import colour, point, vector
 from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.scene_tables.material_rows import GLASS, MATERIAL_FLOATS, MIRROR, NULL
-from pbrs_farm.transport.scene_tables.scene_tables import FACE_FLOATS, SceneTables
+from pbrs_farm.transport.scene_tables.scene_tables import (
+    BACK_PDF,
+    FACE_FLOATS,
+    FRONT_PDF,
+    TARGET_EMITTER,
+    SceneTables,
+)
 
 _RAY_OFFSET = 2e-5  # of a point's largest coordinate plus 1 m
 _MAX_TRANSPARENT = 16  # surfaces that a shadow ray passes
 _FACE_PACKETS = FACE_FLOATS // 4
 _MATERIAL_PACKETS = MATERIAL_FLOATS // 4
-
-# Columns of a face's row that the tables leave free for guiding.
-_FRONT_PDF, _BACK_PDF, _TARGET_EMITTER = 19, 23, 27
 
 
 class SurfaceInteraction(NamedTuple):
@@ -123,10 +126,10 @@ class DeviceScene:
         if not len(faces):
             return
         at = device_array(mi.UInt32, faces) * FACE_FLOATS
-        for column, values in ((_FRONT_PDF, front), (_BACK_PDF, back)):
+        for column, values in ((FRONT_PDF, front), (BACK_PDF, back)):
             dr.scatter(self._rows, device_array(mi.Float, values), at + column)
         bits = dr.reinterpret_array(mi.Float, device_array(mi.UInt32, lamps))
-        dr.scatter(self._rows, bits, at + _TARGET_EMITTER)
+        dr.scatter(self._rows, bits, at + TARGET_EMITTER)
         dr.eval(self._rows)
 
     def _packet(self, face: Any, k: int, active: Any) -> Any:

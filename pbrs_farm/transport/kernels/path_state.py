@@ -155,7 +155,7 @@ def camera_path(camera: DeviceCamera, x: Any, y: Any) -> PathState:
 
 
 def surface_path(vertex: Vertex, d: Any, pdf: Any) -> PathState:
-    """The path that leaves a white_vertex in direction d, drawn with a pdf."""
+    """The path that leaves a vertex in direction d, drawn with a pdf."""
     assert vertex.near is not None
     origin = offset_ray_origin(vertex.si.p, vertex.si.ng)
     return _first_ray(origin, d, mi.UInt32(1), vertex.near.reference, mi.Float(pdf))

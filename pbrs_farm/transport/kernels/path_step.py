@@ -278,6 +278,7 @@ def _direct_light(
         pdf = dr.select(is_independent, view_independent_pdf(si.bsdf, si.ng, sample.d), pdf)
         lit = dr.select(is_independent, (side > 0) | (dr.max(si.bsdf.tau) > 0), lit)
     lit = lit & sample.valid & (sample.pdf > 0)
+    # Weigh by the balance heuristic; the sample's own pdf cancels with the estimator's.
     weight = 1 / (sample.pdf + dr.select(is_alone, 0, pdf))
 
     # Aim again from the offset origin: a lamp near by must not shadow itself.

@@ -27,7 +27,8 @@ from pbrs_farm.transport.scene_tables.material_rows import (
 FACE_FLOATS: Final = 28  # columns of a face's row: seven packets of four, gathered together
 ORIGIN, EDGE1, EDGE2 = slice(0, 3), slice(4, 7), slice(8, 11)  # first corner, edges to the others
 UV0, DUV1, DUV2 = [3, 7], [11, 12], [13, 14]  # uv of the first corner, steps to the others
-NORMALS = slice(16, 19), slice(20, 23), slice(24, 27)  # of the corners; 15, 19, 23, 27 are free
+NORMALS = slice(16, 19), slice(20, 23), slice(24, 27)  # of the corners
+FRONT_PDF, BACK_PDF, TARGET_EMITTER = 19, 23, 27  # filled by guiding; column 15 is free
 NO_LAMP: Final = 0xFFFF  # upper half of a face's tag that does not emit
 
 
