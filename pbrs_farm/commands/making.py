@@ -157,6 +157,8 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         f"{summary.n_kept} already there, {len(summary.failures)} failed; "
         f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
     )
+    for house, reason in summary.leaks:
+        warn(f"{house}: LIGHT LEAKS IN: {reason}; see repair.json, or `pbrs-farm repair`")
     for house, reason in summary.left_out:
         warn(f"{house}: {reason}")
     for view, reason in summary.dark:
@@ -167,6 +169,13 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         text = message if message.startswith(what) else f"{what}: {message}"
         # A step that failed has printed its message when it happened.
         warn(f"{what} failed; reproduce: {command}" if command else text)
+    # End with what was lost or guessed while the houses were read.
+    if summary.notes:
+        kinds = ", ".join(f"{n} {kind}" for kind, n in summary.notes.most_common(8))
+        echo(
+            f"{counted(summary.notes.total(), 'note')} ({kinds}): `notes` in"
+            f" {args.out}/houses/<house>/house.json"
+        )
 
 
 def _summary_line(summary: Any, seconds: float) -> str:
@@ -179,6 +188,7 @@ def _summary_line(summary: Any, seconds: float) -> str:
         "without_views": [list(pair) for pair in summary.without_views],
         "left_out": [list(pair) for pair in summary.left_out],
         "dark": [list(pair) for pair in summary.dark], "failures": failures,
+        "leaks": [list(pair) for pair in summary.leaks], "notes": dict(summary.notes),
     }  # fmt: skip
     return json.dumps(row)
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from pbrs_farm.core import keys
@@ -16,12 +17,16 @@ from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.companion_files import SourceFiles
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, real_path
 
 if TYPE_CHECKING:
     from pbrs_farm.assets.homes import Package
     from pbrs_farm.read.objects.model_folders import ObjectModel
+
+_MODEL_SUFFIXES: Final = (".obj", ".sh3f", ".mtl", ".fbx", ".dae", ".3ds", ".ply", ".stl")
+_FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip of a unit
 
 Kind = Literal["builtin", "example", "sweethome3d", "suncg", "gltf", "object"]
 
@@ -66,6 +71,9 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
         kind, word = "suncg", str(real_path(path.parent if path.name == "house.json" else path))
     elif path.suffix.lower() == ".json" and path.is_file():
         raise BadHouse(path, "", "is no house by itself", hint=_ROOT_HINT)
+    elif path.suffix.lower() in _MODEL_SUFFIXES:
+        hint = f"`pbrs-farm objects {word} --out DIR` renders single models"
+        raise BadHouse(word, "", "is a model or a library of models, no home", hint=hint)
     else:
         kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
         word = str(real_path(path))
@@ -146,11 +154,30 @@ def suncg_list(root: Path, list_file: Path) -> list[str]:
 
 
 def read_house(source: SourceRef, fields: ReadFields) -> House:
-    """The house as its source gives it, unrepaired.
+    """The house as its source gives it, unrepaired; what stands far away is a note.
 
     Raises BadHouse with the place, also where a file of the source has changed since it was named.
     """
     _check_unchanged(source)
+    return _with_far_noted(_house_of(source, fields), fields)
+
+
+def _with_far_noted(house: House, fields: ReadFields) -> House:
+    """The house with a note for each item that stands far from every room."""
+    if not house.rooms:
+        return house
+    notes = Notes(house.source.file, strict=fields.strict)
+    plans = np.concatenate([room.polygon for room in house.rooms])
+    low, high = plans.min(0), plans.max(0)
+    for item in house.items:
+        bounds = item.bounds[:, [0, 2]]
+        away = float(np.maximum(bounds[0] - high, low - bounds[1]).max())
+        if away > _FAR_M:
+            notes.add("far-away", item.id, f"{item.name!r} stands {away:.0f} m from the rooms")
+    return replace(house, notes=(*house.notes, *notes.all())) if notes.all() else house
+
+
+def _house_of(source: SourceRef, fields: ReadFields) -> House:
     path = Path(source.location)
     if source.kind == "object":
         return _read_object(source, fields)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -60,6 +60,8 @@ class Summary:
     failures: list[tuple[str, str, str]] = field(default_factory=list)  # what, message, command
     without_views: list[tuple[str, str]] = field(default_factory=list)  # house, why it has none
     left_out: list[tuple[str, str]] = field(default_factory=list)  # house, which views and why
+    leaks: list[tuple[str, str]] = field(default_factory=list)  # house, rays that reached the sky
+    notes: Counter[str] = field(default_factory=Counter)  # of the houses, by kind
     dark: list[tuple[str, str]] = field(default_factory=list)  # house/view, how dark it is
 
 
@@ -155,6 +157,11 @@ class _Schedule:
             summary.n_kept += event.kind == "kept"
             if event.step == "house":
                 summary.houses.append(event.house_id)
+                summary.notes.update(event.facts.get("note_kinds", {}))
+                if "leaks" in event.facts:
+                    n_sky, n_rays = event.facts["leaks"]
+                    line = f"{n_sky} of {n_rays} rays from closed rooms reached the sky"
+                    summary.leaks.append((event.house_id, line))
             if event.step == "cameras":
                 self._cameras[event.house_id] = event.facts
             if event.step == "illuminance":

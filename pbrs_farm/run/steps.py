@@ -6,6 +6,7 @@ Effects: reads the store; run/step_cache.py writes what a step gives, and its ma
 from __future__ import annotations
 
 import platform
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Final
@@ -81,8 +82,13 @@ def _house(work: Work) -> StepOutput:
         raise BadInput(source.location, repaired.id, f"expected house {work.house_id}")
     glb, description = bundle_from_house(repaired)
     files = {"house.glb": glb, "house.json": description, "repair.json": json_bytes(report)}
-    counts = {name: len(getattr(repaired, name)) for name in ("rooms", "items", "notes")}
-    return StepOutput(files, counts)
+    facts: dict[str, Any] = {
+        name: len(getattr(repaired, name)) for name in ("rooms", "items", "notes")
+    }
+    facts["note_kinds"] = dict(Counter(note.kind for note in repaired.notes))
+    if report.leaks is not None and report.leaks.n_sky:
+        facts["leaks"] = [report.leaks.n_sky, report.leaks.n_rays]
+    return StepOutput(files, facts)
 
 
 def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:

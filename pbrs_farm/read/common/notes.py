@@ -15,6 +15,7 @@ HARMLESS: Final = frozenset(
         "hidden-level",  # left out as the home's author chose (read.hidden_levels)
         "degenerate-faces",  # faces without area, which nobody could see
         "unknown-material",  # the surface has its format's default colour
+        "unknown-type",  # a node that is no room, object, box or ground
         "unused-opacity-map",  # the colour map's own alpha is used
         "package-version",  # of the example homes, another than the tested one
     }

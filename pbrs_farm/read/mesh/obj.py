@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.mesh import face_areas
+from pbrs_farm.core.shown_text import shown
 from pbrs_farm.read.mesh.shading_normals import crease_normals
 from pbrs_farm.read.mesh.triangulate import triangle_corners
 
@@ -38,7 +39,8 @@ class ObjModel:
 
     meshes: tuple[Mesh, ...]  # in the file's order
     mtllibs: tuple[str, ...]  # as written
-    n_dropped: int = 0  # faces without area
+    n_dropped: int = 0  # faces without area, and repeated ones of a huge mesh
+    is_cut: bool = False  # ends within a line, or with vertices that no face uses
 
 
 @dataclass(slots=True)
@@ -89,7 +91,14 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
         raise _too_many(file, n_triangles, b"", max_triangles)
     built = [_mesh(p, pools, file) for p in parts]
     meshes = tuple(mesh for mesh, _ in built if mesh is not None)
-    return ObjModel(meshes, tuple(found.libraries), sum(dropped for _, dropped in built))
+    n_dropped = sum(dropped for _, dropped in built)
+    return ObjModel(meshes, tuple(found.libraries), n_dropped, _is_cut(data))
+
+
+def _is_cut(data: bytes) -> bool:
+    """Whether the last statement is no whole line, or a vertex of a face that never came."""
+    last = data.rstrip(b" \t\r\n").rpartition(b"\n")[2].lstrip()
+    return last[:1] == b"v" or (last[:1] in b"fgu" and not data.endswith((b"\n", b"\r")))
 
 
 def _statements(data: bytes) -> _Statements:
@@ -149,13 +158,28 @@ def _numbers(lines: list[bytes], n: int, file: str, what: str) -> NDArray[np.flo
         per_line = n
     try:
         values = np.array(tokens).astype(np.float64)
-    except ValueError as error:
-        raise BadHouse(file, f"a `{what}` line", f"not a number: {error}") from None
+    except ValueError:
+        raise BadHouse(file, *_word_at_fault(lines, what, float)) from None
     numbers = values.reshape(len(lines), per_line)[:, :n]
     if not np.isfinite(numbers).all():
         row = int(np.flatnonzero(~np.isfinite(numbers).all(1))[0])
         raise BadHouse(file, f"`{what}` line {row + 1}", "a coordinate is not a finite number")
     return numbers
+
+
+def _word_at_fault(lines: list[bytes], what: str, kind: type[int] | type[float]) -> tuple[str, str]:
+    """(place, text) of the first word of an OBJ's lines of one kind that is no number."""
+    for number, line in enumerate(lines, start=1):
+        for word in line.split():
+            try:
+                fits = abs(kind(word)) < 2**63 or kind is float
+            except ValueError:
+                fits = False
+            if not fits:
+                text = shown(word.decode("utf-8", "replace"), 40)
+                name = "an index" if kind is int else "a number"
+                return f"`{what}` line {number}", f"{text!r} is not {name}"
+    return f"a `{what}` line", "a word is no number"
 
 
 def _indices(part: _Part, pools: tuple[NDArray[np.float64], ...], file: str) -> NDArray[np.int64]:
@@ -172,8 +196,9 @@ def _indices(part: _Part, pools: tuple[NDArray[np.float64], ...], file: str) -> 
         flat = [c or b"0" for t in tokens for c in [*t.split(b"/"), b"0", b"0"][:3]]
     try:
         given = np.array(flat).astype(np.int64).reshape(len(tokens), columns)
-    except (ValueError, OverflowError) as error:
-        raise BadHouse(file, "an `f` line", f"not an index: {error}") from None
+    except (ValueError, OverflowError):
+        lines = [line.replace(b"/", b" ") for line in part.lines]
+        raise BadHouse(file, *_word_at_fault(lines, "f", int)) from None
     indices = np.zeros((len(tokens), 3), np.int64)
     indices[:, :columns] = given
     if (given < 0).any():

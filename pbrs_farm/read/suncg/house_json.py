@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.serialise import json_from_bytes
 
 NODE_TYPES: Final = ("Room", "Object", "Ground", "Box")
@@ -59,6 +60,7 @@ class HouseRecord:
     version: str
     world_from_house: NDArray[np.float64]  # (4, 4) scale and axes
     levels: tuple[tuple[str, tuple[Node, ...]], ...]  # (level id, its nodes)
+    unknown: tuple[tuple[str, str], ...] = ()  # (place, type) of valid nodes of no known type
 
 
 def house_record(data: bytes, file: str) -> HouseRecord:
@@ -72,6 +74,7 @@ def house_record(data: bytes, file: str) -> HouseRecord:
     reader = JsonReader(file)
     raw_levels = reader.items(document, "levels", "")
     levels: list[tuple[str, tuple[Node, ...]]] = []
+    unknown: list[tuple[str, str]] = []
     n_nodes = 0
     for i, level in enumerate(raw_levels):
         place = f"level {i}"
@@ -88,12 +91,18 @@ def house_record(data: bytes, file: str) -> HouseRecord:
             raise BadHouse(file, place, f"more than {MAX_NODES} nodes")
         nodes = [reader.node(raw, level_id, i, j) for j, raw in enumerate(raw_nodes)]
         levels.append((level_id, tuple(n for n in nodes if n is not None)))
+        unknown += [
+            (f"level {i} node {j}", shown(raw.get("type")))
+            for j, raw in enumerate(raw_nodes)
+            if raw.get("type") not in NODE_TYPES and _flag(raw.get("valid", 1))
+        ]
     house_id = document.get("id")
     return HouseRecord(
         id=house_id if isinstance(house_id, str) else "",
         version=str(document.get("version", ""))[:80],
         world_from_house=world_from_house_of(reader, document),
         levels=tuple(levels),
+        unknown=tuple(unknown),
     )
 
 

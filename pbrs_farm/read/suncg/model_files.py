@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.mtl_files import read_mtl
 from pbrs_farm.read.common.notes import Notes
@@ -26,6 +27,10 @@ class Model:
     def n_faces(self) -> int:
         """Triangles over all meshes."""
         return sum(len(m.faces) for m in self.meshes)
+
+
+class DamagedModel(BadHouse):
+    """An OBJ of the library that cannot be read; one that an object places is left out."""
 
 
 class Models:
@@ -52,7 +57,16 @@ class Models:
         )
         if data is None:
             return None
-        meshes = parse_obj(data, obj_name, max_triangles=self._max_triangles).meshes
+        try:
+            parsed = parse_obj(data, obj_name, max_triangles=self._max_triangles)
+        except BadHouse as error:
+            if error.hint:  # a limit of the recipe: the house is refused
+                raise
+            raise DamagedModel(obj_name, "", error.message.removeprefix(f"{obj_name}: ")) from None
+        meshes = parsed.meshes
+        if parsed.is_cut:
+            text = "ends within a line, or with vertices of no face: cut short? The rest is kept"
+            self._notes.add("cut-short", obj_name, text)
         mtl = self._mtl(mtl_name)
         names = {m.name: i for i, m in reversed(list(enumerate(mtl)))}
         for name in {m.material: None for m in meshes}:
@@ -65,4 +79,6 @@ class Models:
         materials = read_mtl(self._folder, name)
         if materials is None:
             self._notes.add("missing-materials", name, "does not exist; the model is grey")
+        elif not materials:
+            self._notes.add("missing-materials", name, "holds no material; the model is grey")
         return materials or ()

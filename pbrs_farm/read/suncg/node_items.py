@@ -23,7 +23,7 @@ from pbrs_farm.read.suncg.arch_json import Arch, arch_items
 from pbrs_farm.read.suncg.house_json import Node
 from pbrs_farm.read.suncg.metadata import OTHERPROP, LampMaterials, ModelClass, Tables
 from pbrs_farm.read.suncg.mirror_glass import MIRROR, as_mirror, mirror_slot
-from pbrs_farm.read.suncg.model_files import Model, Models
+from pbrs_farm.read.suncg.model_files import DamagedModel, Model, Models
 from pbrs_farm.read.suncg.model_lights import lit, placed_light, separate_bulbs
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
 
@@ -57,7 +57,12 @@ class ReaderContext:
 
 def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item | None:
     """An Object node; None (with a note) where its model is missing or has no area."""
-    found = _object_model(context, node)
+    try:
+        found = _object_model(context, node)
+    except DamagedModel as error:
+        # A library is shared by many houses: one damaged model costs its objects only.
+        context.notes.add("unreadable-model", node.place, f"{error.message}; left out")
+        return None
     if found is None:
         text = f"object/{node.model_id} does not exist; left out"
         context.notes.add("missing-model", node.place, text)

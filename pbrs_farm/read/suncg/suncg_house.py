@@ -64,6 +64,8 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     notes = Notes(file, strict=fields.strict)
     if record.id and record.id != house_id:
         notes.add("id-differs", "id", f"house.json calls itself {record.id[:64]!r}")
+    for place, kind in record.unknown:
+        notes.add("unknown-type", place, f"a node of the type {kind!r}; left out")
     arch = _arch(folder, house_id, record)
     context = ReaderContext(
         house=house_id,

@@ -208,6 +208,7 @@ def test_missing_things_are_notes_and_the_rest_goes_on(house: House) -> None:
     assert notes == {
         ("missing-texture", "texture/gone.jpg"),
         ("unreadable-texture", "texture/broken.jpg"),
+        ("unknown-type", "a"),
         ("missing-model", "object/nobody_has_this"),
         ("room-in-room", "lists"),
     }
