@@ -79,3 +79,11 @@ def test_a_single_model_names_the_verb_objects(name, tmp_path):
     (tmp_path / name).write_bytes(b"v 0 0 0\n")
     with pytest.raises(BadHouse, match="pbrs-farm objects"):
         resolve(str(tmp_path / name))
+
+
+def test_a_single_glb_without_a_floor_names_the_verb_objects(tmp_path):
+    scene = {"asset": {"version": "2.0"}, "scene": 0, "nodes": [{"name": "chair"}]}
+    scene["scenes"] = [{"nodes": [0]}]
+    (tmp_path / "chair.gltf").write_text(json.dumps(scene))
+    with pytest.raises(BadHouse, match="pbrs-farm objects"):
+        read_house(resolve(str(tmp_path / "chair.gltf")), ReadFields())

@@ -91,6 +91,7 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
         rooms = rooms_from_json(beside.rooms, f"{stem}.rooms.json", items)
     if not rooms:
         hint = f"name a node `floor`, map one in {stem}.classes.json, or give {stem}.rooms.json"
+        hint += "; `pbrs-farm objects` renders single models"
         raise BadHouse(name, "scene", "has no floor", hint=hint)
     # Sort rooms into levels and items into rooms.
     levels, numbered = levels_of(rooms)
