@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks.report import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
-MARKERS = "not slow and not gpu and not infra"
+MARKERS = "not slow and not gpu and not chaos and not infra"
 PRAGMAS = ("noqa", "type:", "fmt:", "pragma:")
 UNITS = {
     "house.lines": "lines of .py of pbrs_farm and workers",

@@ -110,7 +110,7 @@ _PHOTO: Mapping[str, Any] = {
     "max_item_fraction": 0.5,
     "max_wall_fraction": 0.7,
     "max_opening_fraction": 0.35,
-    "min_score": 0.6,
+    "min_score": 0.8,
     "min_room_score": 0.2,
     "hfov_rad": 1.0472,
     "hfov_spread": 0.1,
