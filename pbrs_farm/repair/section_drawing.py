@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
-from pbrs_farm.repair.structure.booleans import F64
 
 _GAP_M = 1.0  # between the two panels
 _TEXT_M = 0.25  # height of letters

@@ -9,12 +9,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Surface
-
-F64 = NDArray[np.float64]
 
 # Corner i of a box has the sign of bit k of i along axis k; quads seen from outside.
 _BOX_QUADS = np.array(

@@ -12,6 +12,7 @@ import numpy as np
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.core.mesh import area_vectors, triangle_corners
 from pbrs_farm.read.suncg.model_files import Model
 
 MIRROR: Final = NYU40_NAMES.index("mirror")
@@ -32,8 +33,7 @@ def mirror_slot(model: Model) -> int | None:
     across = 0 if extent[0] < extent[2] else 2
     areas: dict[int, list[float]] = {}  # slot: all of its area, what lies flat
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
-        a, b, c = (mesh.positions[mesh.faces[:, k]] for k in range(3))
-        normals = np.cross(b - a, c - a)
+        normals = area_vectors(triangle_corners(mesh.positions, mesh.faces))
         area = np.linalg.norm(normals, axis=1)
         flat = np.abs(normals[:, across]) >= _FLAT_COS * area
         found = areas.setdefault(slot, [0.0, 0.0])

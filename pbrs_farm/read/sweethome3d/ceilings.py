@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Surface
 from pbrs_farm.read.mesh.horizontal_polygons import horizontal
 from pbrs_farm.read.sweethome3d.home_xml import Plan, PlanLevel, level_of
@@ -15,7 +14,6 @@ from pbrs_farm.read.sweethome3d.outlines import Outline
 from pbrs_farm.read.sweethome3d.roofs import roof_over
 from pbrs_farm.read.sweethome3d.wall_solids import top_heights
 
-F64 = NDArray[np.float64]
 KINK_M = 0.01  # smaller bends of a ceiling are left out
 TIE_M = 1e-3  # walls are equally near within this
 NEAR_M = 0.10  # A wall's corner this near to a room's edge can bend the ceiling there

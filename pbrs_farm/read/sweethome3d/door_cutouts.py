@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import mapbox_earcut
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Opening, Surface
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
@@ -19,7 +18,6 @@ from pbrs_farm.read.sweethome3d.parse_pieces import FULL_CUT_OUT
 from pbrs_farm.read.sweethome3d.placement import Frame
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
-F64 = NDArray[np.float64]
 MARGIN_M = 0.005
 REACH_M = 1.0
 MIN_HALF_M = 5e-4

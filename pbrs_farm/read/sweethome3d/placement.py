@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Surface
 from pbrs_farm.read.mesh.obj import Mesh
@@ -15,7 +15,6 @@ from pbrs_farm.read.sweethome3d.piece_materials import PieceMaterial
 from pbrs_farm.read.sweethome3d.piece_models import Model
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
-F64 = NDArray[np.float64]
 _FLAT = 1e-9  # an extent below it has no scale
 
 

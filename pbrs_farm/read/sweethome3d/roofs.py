@@ -10,10 +10,9 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.read.mesh.horizontal_polygons import triangulated
 
-F64 = NDArray[np.float64]
 FIT_M = 0.02  # how far a roof may lie above a given height
 SLIVER_M2 = 1e-6  # pieces of less area are left out
 

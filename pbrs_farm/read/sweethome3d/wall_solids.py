@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.read.mesh.primitives import wall_prism
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
@@ -21,7 +21,6 @@ from pbrs_farm.read.sweethome3d.home_xml import (
 )
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 
-F64 = NDArray[np.float64]
 SUNK_M = 0.002  # How deep a baseboard's back stands in its wall, so that the two share no plane
 
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.mesh import distances_to_triangles, triangle_corners
 from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.prisms import polygons_of
 
 LAMP_NYU40 = 35  # class "lamp" of NYU40

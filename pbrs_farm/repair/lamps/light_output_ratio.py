@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, MaterialKind, Surface
 from pbrs_farm.core.mesh import clipped_to_box, face_areas, triangle_corners, unit_normals
 from pbrs_farm.repair.measure.occluder import Occluder
-from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.closed_shells import components
 from pbrs_farm.repair.structure.patches import patch_from_surface
 

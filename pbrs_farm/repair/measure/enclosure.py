@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.planar_surfaces import Cover
 from pbrs_farm.repair.structure.prisms import polygons_of
 from pbrs_farm.repair.structure.slabs import GAP_M

@@ -8,9 +8,10 @@ from itertools import islice
 import numpy as np
 from manifold3d import Manifold
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.repair.report import Floating, FurnitureAudit, Overlap
-from pbrs_farm.repair.structure.booleans import F64, TagTable, common, united
+from pbrs_farm.repair.structure.booleans import TagTable, common, united
 from pbrs_farm.repair.structure.closed_shells import closed_shells
 
 _TOUCH_M = 0.02  # boxes nearer than this touch

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, Surface, geometry_from_house
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.repair.measure.enclosure import Space
@@ -19,7 +20,6 @@ from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.measure.room_edges import RoomInterior
 from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import F64
 from pbrs_farm.repair.structure.plan_geometry import Shape
 from pbrs_farm.repair.structure.prisms import Plane, lifted, polygons_of
 

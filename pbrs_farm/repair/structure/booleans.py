@@ -16,10 +16,9 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.mesh import edges_are_paired, signed_volume
 from pbrs_farm.repair.structure.sliver_removal import without_slivers
-
-F64 = NDArray[np.float64]
 
 _WELD_M = 1e-5  # corners nearer than this become one where exact ones do not close
 _NUMBER_OF_PROPERTIES = 8  # x y z, u v, nx ny nz

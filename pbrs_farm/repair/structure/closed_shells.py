@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import face_areas, signed_volume, unit_normals
 from pbrs_farm.repair.structure.booleans import (
-    F64,
     Patch,
     TagTable,
     faces_of_patches,

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.mesh import area_vectors, triangle_corners, unit_normals
-from pbrs_farm.repair.structure.booleans import F64
 
 MOVED_M = 5e-4
 """How far a frame is moved out of its wall's face."""

@@ -14,9 +14,10 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import F64, TagTable, reduced
+from pbrs_farm.repair.structure.booleans import TagTable, reduced
 from pbrs_farm.repair.structure.prisms import level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall

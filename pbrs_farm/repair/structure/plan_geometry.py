@@ -12,8 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from pbrs_farm.core.arrays import Points2
-from pbrs_farm.repair.structure.booleans import F64
+from pbrs_farm.core.arrays import F64, Points2
 
 Shape = BaseGeometry
 """A plan area: a polygon, several, or none."""

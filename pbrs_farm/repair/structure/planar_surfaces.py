@@ -10,10 +10,11 @@ import shapely
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import F64, Patch, Tag, TagTable, bounds
+from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, bounds
 from pbrs_farm.repair.structure.closed_shells import shells_from_item
 from pbrs_farm.repair.structure.prisms import (
     Plane,

@@ -11,8 +11,9 @@ import shapely
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import F64, Patch, Tag, TagTable, solid_from_patches
+from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, solid_from_patches
 
 UvMap = Callable[[F64], F64]
 """Texture coordinates (N, 2) of positions (N, 3)."""

@@ -9,16 +9,10 @@ import numpy as np
 import shapely
 from manifold3d import Manifold
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import (
-    F64,
-    Tag,
-    TagTable,
-    bounds,
-    overlap_of_bounds,
-    reduced,
-)
+from pbrs_farm.repair.structure.booleans import Tag, TagTable, bounds, overlap_of_bounds, reduced
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.slabs import SAME_HEIGHT_M

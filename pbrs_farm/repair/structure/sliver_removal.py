@@ -13,9 +13,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.mesh import face_areas
 
-F64 = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver
