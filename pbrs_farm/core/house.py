@@ -79,6 +79,9 @@ class Material:
     opacity: float = 1.0  # d, 0..1
     texture_id: str | None = None  # key into House.textures
     alpha_cutout: bool = False  # texture alpha < 0.5 is a hole
+    roughness: float | None = None  # glTF's, 0..1 (GGX alpha is its square); None = by shininess
+    roughness_texture_id: str | None = None  # green times roughness, as glTF's
+    normal_texture_id: str | None = None  # tangent space, x along u, y along v, as glTF's
     is_default: bool = False  # the source names no colour: repair paints such walls white
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.house import House, Item, ItemKind, Opening
+from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import RepairFields
-from pbrs_farm.read.mesh.primitives import box
 from pbrs_farm.repair import repair, summary_of_report
 from pbrs_farm.repair.structure.flush_frames import MOVED_M, with_frames_apart
 from tests.repair.rooms import WALL, covers, house, room, walls_around

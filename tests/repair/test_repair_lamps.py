@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Material, MaterialKind, Surface
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.mesh import distances_to_triangles, face_areas, triangle_corners
+from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.read.mesh.primitives import box
 from pbrs_farm.repair import repair, summary_of_report
 from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of, with_bulbs
 from pbrs_farm.repair.lamps.ceiling_lamp import place_of_lamp

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Surface
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.read.mesh.primitives import box_quads, lathe, quads_surface, sphere
+from pbrs_farm.core.primitives import box_quads, lathe, quads_surface, sphere
 
 Triple = tuple[float, float, float]
 

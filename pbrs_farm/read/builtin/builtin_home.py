@@ -26,12 +26,12 @@ from pbrs_farm.core.house import (
     Source,
     StoredCamera,
 )
+from pbrs_farm.core.primitives import box, wall_prism
 from pbrs_farm.read.builtin import builtin_furniture as furniture
 from pbrs_farm.read.builtin.generated_textures import checks, planks, png_from_srgb8, stripes
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
-from pbrs_farm.read.mesh.primitives import box, wall_prism
 
 VERSION = "1"  # part of the home's fingerprint: raise it with any change
 WALL_HEIGHT_M = 2.5

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
-from pbrs_farm.read.mesh.primitives import box
+from pbrs_farm.core.primitives import box
 
 _HOLE_MARGIN_M: Final = 0.10
 _OVERLAP_M: Final = 0.002

@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind, Surface
-from pbrs_farm.read.mesh.primitives import wall_prism
+from pbrs_farm.core.primitives import wall_prism
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import (
     Baseboard,

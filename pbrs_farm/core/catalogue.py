@@ -1,0 +1,96 @@
+"""Furniture, things and surface pictures to dress a home with: Catalogue > Piece, Shape, Picture; no effects.
+
+A shape stands in the piece's own frame: metres, the middle of its base at the origin, x to its
+right, y up, its front towards +z. What hangs on a wall has its back at z = 0 and grows to +z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import ItemKind, LightPart, Material, Note, Surface, Texture
+
+
+class Place(StrEnum):
+    """Where a piece belongs."""
+
+    FLOOR = "floor"
+    SURFACE = "surface"  # on furniture
+    WALL = "wall"
+    CEILING = "ceiling"
+    OPENING = "opening"  # doors and windows
+    KITCHEN = "kitchen"  # part of a kitchen run
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One thing of a catalogue, as its entry describes it; its shape is loaded when it is used."""
+
+    id: str  # unique in the catalogue: `<library>#<its id there>`, `generated#<family>`
+    name: str
+    group: str  # what it is: "chair", "table_lamp", "book"; docs/dress.md lists all
+    place: Place
+    nyu40: int
+    size: tuple[float, float, float]  # width, depth, height in metres
+    kind: ItemKind = ItemKind.OBJECT
+    library: str = ""
+    creator: str = ""
+    licence: str = ""  # "CC0", "CC-BY 3.0"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """The mesh of a piece in its own frame; Surface.material is an index into materials."""
+
+    surfaces: tuple[Surface, ...]
+    materials: tuple[Material, ...]
+    textures: Mapping[str, Texture] = field(default_factory=dict)  # by Material.texture_id
+    lights: tuple[LightPart, ...] = ()  # positions in the piece's frame
+
+    @property
+    def bounds(self) -> F64:
+        """(2, 3) minimum and maximum in the piece's frame, metres."""
+        points = np.concatenate([s.positions for s in self.surfaces]).astype(np.float64)
+        return np.array([points.min(0), points.max(0)])
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A photographed surface that repeats: wood, cloth, tiles."""
+
+    texture: Texture
+    group: str  # "wood", "cloth", "leather", "marble", "tiles", ...
+    size: tuple[float, float]  # width and height of one repeat in metres
+    creator: str = ""
+    licence: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Catalogue:
+    """Every piece and picture there is to dress with."""
+
+    pieces: tuple[Piece, ...]
+    load: Callable[[Piece], Shape | None]  # None where a model cannot be used
+    digest: str  # of everything that shapes come from
+    pictures: tuple[Picture, ...] = ()
+    notes: tuple[Note, ...] = ()
+    _shapes: dict[str, Shape | None] = field(default_factory=dict, init=False, repr=False)
+
+    def of(self, *groups: str) -> tuple[Piece, ...]:
+        """The pieces of these groups, in the catalogue's order."""
+        return tuple(p for p in self.pieces if p.group in groups)
+
+    def shape(self, piece: Piece) -> Shape | None:
+        """The piece's shape, loaded once; None where its model cannot be used."""
+        if piece.id not in self._shapes:
+            self._shapes[piece.id] = self.load(piece)
+        return self._shapes[piece.id]
+
+
+EMPTY = Catalogue((), lambda _piece: None, "empty")
+"""Nothing to dress with but what is generated."""

@@ -1,0 +1,1 @@
+"""Stage: House -> House that looks lived in; pure in (House, Catalogue, fields)."""

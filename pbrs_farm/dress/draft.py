@@ -1,0 +1,135 @@
+"""A house while it is dressed: what was added, changed and refused; state: the draft itself."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Piece, Shape
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import House, Item, LightPart, Material, Note, Surface, Texture
+
+ADDED_TAG = "dressed:"  # before the id of the piece that an item was made from
+CHANGED_TAG = "changed:"  # before the part of the dressing that changed an item of the source
+
+
+class Draft:
+    """The house being dressed. Items keep their order; what is added comes after them."""
+
+    def __init__(self, house: House, seed: int) -> None:
+        self.source = house
+        self.seed = seed
+        self.items: list[Item] = list(house.items)
+        self.materials: list[Material] = list(house.materials)
+        self.textures: dict[str, Texture] = dict(house.textures)
+        self.notes: list[Note] = []
+        self.done: Counter[str] = Counter()  # what was added or changed, by part and group
+        self.refused: Counter[str] = Counter()  # `<part>: <reason>` of what was not
+        self.used: dict[str, Piece] = {}  # pieces of the catalogue in the house, by id
+        self._number = {m: i for i, m in reversed(list(enumerate(self.materials)))}
+
+    def rng(self, *words: str | int) -> np.random.Generator:
+        """A random stream of its own for each (house, seed, words): parts do not disturb another."""
+        return np.random.default_rng(keys.seed(self.source.id, "dress", self.seed, *words))
+
+    def material(self, material: Material, textures: Iterable[Texture] = ()) -> int:
+        """The number of a material, the same for equal ones; textures: those that it names."""
+        self.textures.update((t.id, t) for t in textures)
+        if material not in self._number:
+            self._number[material] = len(self.materials)
+            self.materials.append(material)
+        return self._number[material]
+
+    def placed(
+        self, piece: Piece, shape: Shape, at: F64, turn_rad: float, *,
+        item_id: str, room_id: str | None, level_id: str, scale: F64 | float = 1.0,
+        tags: tuple[str, ...] = (),
+    ) -> Item:  # fmt: skip
+        """The piece as an item of this house, not added yet.
+
+        at: (3,) metres, where the middle of its base comes to stand. turn_rad: about +y.
+        scale: of its own axes, (3,) or one for all.
+        """
+        turn, factor = rotation_y(turn_rad), np.broadcast_to(np.asarray(scale, np.float64), 3)
+
+        def moved(points: F64) -> F64:
+            return np.asarray((points * factor) @ turn.T + at)
+
+        # Move surfaces and lights; normals go by the inverse of the scale.
+        normal_matrix = turn / factor
+        surfaces = tuple(
+            self._placed_surface(s, shape, moved, normal_matrix) for s in shape.surfaces
+        )
+        lights = tuple(_moved_light(light, moved, turn) for light in shape.lights)
+        return Item(
+            id=item_id, name=piece.name, kind=piece.kind, level_id=level_id, surfaces=surfaces,
+            nyu40=piece.nyu40, source_class=piece.id, room_id=room_id, lights=lights,
+            tags=(f"{ADDED_TAG}{piece.id}", f"seed:{self.seed}", *tags),
+        )  # fmt: skip
+
+    def add(self, item: Item, part: str, piece: Piece | None = None) -> None:
+        """Add an item; part: which part of the dressing it belongs to, for the report."""
+        self.items.append(item)
+        if piece is not None:
+            self.used[piece.id] = piece
+            self.done[f"{part}: {piece.group}"] += 1
+
+    def change(self, index: int, item: Item, part: str) -> None:
+        """Put a changed item in the place of items[index]."""
+        tag = f"{CHANGED_TAG}{part}"
+        self.items[index] = item if tag in item.tags else replace(item, tags=(*item.tags, tag))
+
+    def house(self) -> House:
+        """The house as dressed so far, without the materials and textures that nothing uses."""
+        used = sorted({s.material for item in self.items for s in item.surfaces})
+        number = {old: new for new, old in enumerate(used)}
+        items = tuple(
+            replace(i, surfaces=tuple(replace(s, material=number[s.material]) for s in i.surfaces))
+            for i in self.items
+        )
+        materials = tuple(self.materials[m] for m in used)
+        named = {
+            name
+            for m in materials
+            for name in (m.texture_id, m.roughness_texture_id, m.normal_texture_id)
+        }
+        # Openings name no material that is drawn: their cutters are never rendered.
+        openings = tuple(
+            replace(o, cutter=replace(o.cutter, material=0)) for o in self.source.openings
+        )
+        return replace(
+            self.source, items=items, materials=materials, openings=openings,
+            textures={i: t for i, t in self.textures.items() if i in named},
+            notes=(*self.source.notes, *self.notes),
+        )  # fmt: skip
+
+    def _placed_surface(
+        self, surface: Surface, shape: Shape, moved: Callable[[F64], F64], normal_matrix: F64
+    ) -> Surface:
+        material = shape.materials[surface.material]
+        names = (material.texture_id, material.roughness_texture_id, material.normal_texture_id)
+        number = self.material(
+            material, [shape.textures[n] for n in names if n and n in shape.textures]
+        )
+        positions = moved(surface.positions.astype(np.float64)).astype(np.float32)
+        normals = surface.normals
+        if normals is not None:
+            n = normals.astype(np.float64) @ normal_matrix.T
+            n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
+            normals = n.astype(np.float32)
+        return replace(surface, positions=positions, normals=normals, material=number)
+
+
+def _moved_light(light: LightPart, moved: Callable[[F64], F64], turn: F64) -> LightPart:
+    def point(p: tuple[float, float, float]) -> tuple[float, float, float]:
+        x, y, z = (float(c) for c in moved(np.asarray(p, np.float64)))
+        return (x, y, z)
+
+    x, y, z = (float(c) for c in turn @ np.asarray(light.direction))
+    end = point(light.position_end) if light.position_end is not None else None
+    return replace(light, position=point(light.position), direction=(x, y, z), position_end=end)
