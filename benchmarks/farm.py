@@ -35,7 +35,7 @@ from workers.client.farm_client import Farm, completed, new_spec
 from workers.config import FarmConfig
 from workers.ids import job_key
 from workers.job import HouseEntry, lines_from_houses
-from workers.ledger.interface import HouseState
+from workers.ledger.task_ledger import HouseState
 
 FULL = os.environ.get("FULL") == "1"
 N_TASKS = 410_000 if FULL else 100_000

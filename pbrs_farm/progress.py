@@ -21,7 +21,7 @@ from rich.progress import (
 )
 
 from pbrs_farm.core.shown_text import printable
-from pbrs_farm.run.processes.task import Event
+from pbrs_farm.run.processes.render_task import Event
 
 
 class ProgressReporter(ABC):

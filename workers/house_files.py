@@ -14,7 +14,7 @@ from pbrs_farm.assets.debian import cache_folder
 from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve
 from pbrs_farm.run.processes.verb_process import doing
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 from workers.job import HouseEntry
 
 # Where sources lie in the store.

@@ -20,8 +20,8 @@ from pbrs_farm.core.shown_text import shown
 if TYPE_CHECKING:
     from pbrs_farm.core.house import House
     from pbrs_farm.sample import CameraReport
-    from pbrs_farm.sample.report import SectorReport
-    from pbrs_farm.sample.sampler import Sampling
+    from pbrs_farm.sample.camera_report import SectorReport
+    from pbrs_farm.sample.house_sampler import Sampling
 
 
 def add_verbs(verb: Verb) -> None:

@@ -35,7 +35,7 @@ from pbrs_farm.gallery.label_colours import depth_colours
 from pbrs_farm.gallery.templates import page
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.reference_set import Reference
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 
 MAX_ROWS: Final = 40  # of a table of houses or room types
 _SHOWN_COLOURS: Final = 26  # fullest colour bins of a histogram

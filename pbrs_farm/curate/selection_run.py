@@ -33,7 +33,7 @@ from pbrs_farm.selection.histogram_pack import (
 from pbrs_farm.selection.reference_set import Reference, check_comparable
 from pbrs_farm.selection.scores import SCORES, Scorer, merged
 from pbrs_farm.selection.verdicts import verdicts
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 
 _METADATA: Final = b"pbrs_farm"  # of the Parquet file: reference and mode of its scores
 

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pbrs_farm.core.errors import StoreFailed
 from pbrs_farm.formats.serialise import json_bytes
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 
 
 class StoredFile(BaseModel):

@@ -259,7 +259,7 @@ def _check_unchanged(source: SourceRef) -> None:
 
 
 def _suncg(folder: Path, files: SourceFiles) -> SourceRef:
-    from pbrs_farm.read.suncg.companion_files import suncg_companions
+    from pbrs_farm.read.suncg.suncg_companions import suncg_companions
 
     if not (folder / "house.json").exists():
         raise BadHouse(

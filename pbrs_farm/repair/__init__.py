@@ -2,7 +2,7 @@
 
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.repair_house import repair
-from pbrs_farm.repair.report import RepairReport
+from pbrs_farm.repair.repair_report import RepairReport
 from pbrs_farm.repair.section_drawing import section_svg
 from pbrs_farm.repair.summary_text import summary_of_report
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import RepairFields
-from pbrs_farm.repair.report import FacesReport, Removed
+from pbrs_farm.repair.repair_report import FacesReport, Removed
 from pbrs_farm.repair.structure.walls import BASEBOARD
 
 _MIN_AREA_M2 = 1e-12  # as booleans.py drops: float32 holds no smaller face

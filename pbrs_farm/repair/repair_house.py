@@ -18,7 +18,7 @@ from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
 from pbrs_farm.repair.measure.leaks import leaks_of_house
 from pbrs_farm.repair.measure.occluder import Occluder
-from pbrs_farm.repair.report import RepairReport, RoomAudit, StructureReport
+from pbrs_farm.repair.repair_report import RepairReport, RoomAudit, StructureReport
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.flush_frames import with_frames_apart
 from pbrs_farm.repair.structure.watertight import repaired_structure, with_structure

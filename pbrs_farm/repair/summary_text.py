@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
-from pbrs_farm.repair.report import RepairReport
+from pbrs_farm.repair.repair_report import RepairReport
 
 
 def summary_of_report(report: RepairReport) -> str:

@@ -18,7 +18,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Geometry, House, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import views_from_json
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 
 if TYPE_CHECKING:
     from pbrs_farm.raster import Rasterizer

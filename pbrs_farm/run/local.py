@@ -23,7 +23,7 @@ from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
 from pbrs_farm.run.plan import Wanted
 from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
 from pbrs_farm.run.processes.pool import Pool
-from pbrs_farm.run.processes.task import Event, Setting, Task
+from pbrs_farm.run.processes.render_task import Event, Setting, Task
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store import StoreSettings, store_from_url
 

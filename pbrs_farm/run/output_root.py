@@ -10,7 +10,7 @@ from pbrs_farm.core.recipe import Recipe, differences, recipe_from_json
 from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.formats.serialise import json_bytes
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 
 
 def attribution(store: Store, house_id: str) -> str:

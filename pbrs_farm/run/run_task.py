@@ -20,7 +20,7 @@ from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.processes.message import Handler, Message, Send
-from pbrs_farm.run.processes.task import Event, Setting, Task, task_from_line
+from pbrs_farm.run.processes.render_task import Event, Setting, Task, task_from_line
 from pbrs_farm.run.step_cache import Outcome, Work
 from pbrs_farm.store import store_from_url
 

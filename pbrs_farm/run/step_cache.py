@@ -24,7 +24,7 @@ from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.sample.room_camera import with_names
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from pbrs_farm.formats.histogram_json import SCORED_MODE
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.selection import scene_quality, view_record
 from pbrs_farm.selection.view_record import Place
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 
 _MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})
 

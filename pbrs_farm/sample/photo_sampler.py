@@ -19,12 +19,12 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.sample.camera_report import RoomReport, SectorReport
 from pbrs_farm.sample.candidates import Candidates, grid_candidates
 from pbrs_farm.sample.eye_probes import Counter, counted
 from pbrs_farm.sample.paper_rules import rejections, room_grid
 from pbrs_farm.sample.photo_score import PhotoShares, item_roles, photo_score, photo_shares
 from pbrs_farm.sample.rejection import REJECTIONS, Verdict
-from pbrs_farm.sample.report import RoomReport, SectorReport
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE, DepthOf, overlap
 
 MOST_OVERLAP: Final = 0.8

@@ -17,10 +17,10 @@ from pbrs_farm.core.camera import Intrinsics, View
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import paper_rules, released_rules
+from pbrs_farm.sample.camera_report import RoomReport, SectorReport
 from pbrs_farm.sample.candidates import Candidates, Grid, grid_candidates, n_cells
 from pbrs_farm.sample.eye_probes import Counter, counted
 from pbrs_farm.sample.rejection import REJECTIONS, Verdict
-from pbrs_farm.sample.report import RoomReport, SectorReport
 from pbrs_farm.sample.sector_choice import (
     COARSE_MARGIN_PX,
     COARSE_SLACK,

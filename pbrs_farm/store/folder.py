@@ -12,7 +12,7 @@ from typing import Final, TypeVar
 
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed, StoreRefused, StoreUnavailable
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, read_regular
-from pbrs_farm.store.interface import Head, check_key, check_prefix
+from pbrs_farm.store.object_store import Head, check_key, check_prefix
 
 T = TypeVar("T")
 TEMPORARY: Final = ".incomplete"  # folder of unfinished files

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 from pbrs_farm.core.errors import StoreUnavailable
-from pbrs_farm.store.interface import Head, Store
+from pbrs_farm.store.object_store import Head, Store
 
 T = TypeVar("T")  # what the call gives
 

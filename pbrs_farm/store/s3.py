@@ -19,7 +19,7 @@ from pbrs_farm.core.errors import (
     StoreRefused,
     StoreUnavailable,
 )
-from pbrs_farm.store.interface import Head, check_key, check_prefix, content_type
+from pbrs_farm.store.object_store import Head, check_key, check_prefix, content_type
 from pbrs_farm.store.retrying import retried
 from pbrs_farm.store.secret import Secret
 

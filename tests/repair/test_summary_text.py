@@ -14,7 +14,7 @@ from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair import RepairReport, repair, section_svg, summary_of_report
 from pbrs_farm.repair.measure import furniture_audit as furniture_audit_module
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
-from pbrs_farm.repair.report import LeakReport
+from pbrs_farm.repair.repair_report import LeakReport
 from pbrs_farm.repair.section_drawing import section_of_items, solid_polygons
 from tests.repair.rooms import covers, house, room, walls_around
 

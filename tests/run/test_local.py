@@ -15,7 +15,7 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run import local
 from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.plan import wanted
-from pbrs_farm.run.processes.task import Setting
+from pbrs_farm.run.processes.render_task import Setting
 
 FAKE = "tests.run.fakes:run_step"
 N_STEPS = 3 + 2 * 6

@@ -12,10 +12,10 @@ from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.photo_sampler import PhotoSampler
 from pbrs_farm.sample.photo_score import PhotoShares, item_roles, photo_score, photo_shares
 from pbrs_farm.sample.rejection import Verdict
-from pbrs_farm.sample.sampler import Sampling
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE, overlap, shared_part
 from tests.sample.rooms import box, furnished, room_house, shell
 

@@ -11,7 +11,7 @@ import pytest
 from pbrs_farm.core.errors import BadInput, StoreFailed, StoreUnavailable
 from pbrs_farm.store import MemoryStore, StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.store.interface import content_type
+from pbrs_farm.store.object_store import content_type
 from pbrs_farm.store.s3 import S3Settings, _ForkGuard
 from pbrs_farm.store.secret import Secret
 

@@ -9,8 +9,8 @@ from tests.workers.conftest import spec
 from workers.config import FarmConfig
 from workers.ids import STAGES
 from workers.job import HouseEntry, JobSpec
-from workers.ledger.interface import Claim, Fault, FaultClass, Finished
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import Claim, Fault, FaultClass, Finished
 
 ROOM = dict.fromkeys(STAGES, 100)
 BATCHES = (("a", "b"), ("c",))

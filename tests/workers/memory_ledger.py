@@ -7,12 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from workers.job import HouseEntry, JobSpec
-from workers.ledger.interface import Claim, Fault, Finished, HouseState, JobView, LedgerUnavailable
+from workers.ledger.task_ledger import (
+    Claim,
+    Fault,
+    Finished,
+    HouseState,
+    JobView,
+    LedgerUnavailable,
+)
 
 
 @dataclass
 class MemoryLedger:
-    """Implements workers.ledger.interface.Ledger for tasks a test puts into it."""
+    """Implements workers.ledger.task_ledger.Ledger for tasks a test puts into it."""
 
     ready: list[str] = field(default_factory=list)
     queued: list[str] = field(default_factory=list)
@@ -139,7 +146,7 @@ class MemoryLedger:
 
 @dataclass
 class MemoryRegistry:
-    """Implements workers.ledger.interface.WorkerRegistry."""
+    """Implements workers.ledger.task_ledger.WorkerRegistry."""
 
     n_slots: dict[str, int] = field(default_factory=dict)
     refusals: list[str] = field(default_factory=list)

@@ -12,8 +12,8 @@ from tests.workers.conftest import spec
 from tests.workers.drive import BATCHES, ROOM, drive, with_config
 from workers.config import FarmConfig
 from workers.job import HouseEntry
-from workers.ledger.interface import HouseState, LedgerUnavailable
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import HouseState, LedgerUnavailable
 from workers.ledger.worker_registry import Registry
 
 
@@ -392,7 +392,7 @@ def test_a_partial_reduction_does_not_end_the_job(ledger: RedisLedger) -> None:
 
 
 def test_an_affine_task_is_offered_and_its_message_finds_it_done(ledger: RedisLedger) -> None:
-    from workers.ledger.interface import Finished
+    from workers.ledger.task_ledger import Finished
 
     d = drive(ledger, 1)
     d.run(d.dispatch()[0])

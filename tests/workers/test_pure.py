@@ -30,7 +30,7 @@ from workers.coordinator.progress_rates import Rates, quantile_s, stage_views
 from workers.house_files import entries_from_arguments, is_left_in_place
 from workers.ids import check_job_id, job_key, queue_of, stages_of_queue, task_from_text
 from workers.job import HouseEntry
-from workers.ledger.interface import JobView
+from workers.ledger.task_ledger import JobView
 from workers.node.faults import class_of, fingerprint, without_numbers
 from workers.node.house_runner import HouseRunner, steps_of_stage
 from workers.node.view_batches import batches_from_views

@@ -16,7 +16,7 @@ from tests.run.fake_child import FakeChild, FakeClock
 from tests.workers.memory_ledger import MemoryLedger, MemoryRegistry
 from workers.config import FarmConfig, Limits
 from workers.ids import failed_key, log_key, task_from_text
-from workers.ledger.interface import Claim, LedgerUnavailable
+from workers.ledger.task_ledger import Claim, LedgerUnavailable
 from workers.node.slot import Slot
 
 JOB = "0" * 12

@@ -7,8 +7,8 @@ from typing import Any
 
 from pbrs_farm.core.errors import BadInput
 from workers.ids import WHOLE, TaskId, queue_of, task_from_text
-from workers.ledger.interface import ALIVE_S, STATES, JobView
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import ALIVE_S, STATES, JobView
 from workers.ledger.worker_registry import Registry
 
 _TEXTS = {letter: name.lower() for name, letter in STATES.items()} | {

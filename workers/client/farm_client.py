@@ -24,8 +24,8 @@ from workers.client.explain import explain
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
 from workers.ids import check_job_id, failed_key, job_key, log_key, task_from_text
-from workers.ledger.interface import ALIVE_S, JobView
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import ALIVE_S, JobView
 from workers.ledger.worker_registry import Registry
 
 if TYPE_CHECKING:

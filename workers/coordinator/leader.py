@@ -21,8 +21,8 @@ from pbrs_farm.core.errors import PbrsError
 from workers.config import FarmConfig, config_from_environment
 from workers.coordinator.progress_rates import Rates
 from workers.ids import STAGES, queue_of, task_from_text
-from workers.ledger.interface import JobView, Ledger, LedgerUnavailable, WorkerRegistry
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import JobView, Ledger, LedgerUnavailable, WorkerRegistry
 from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
 from workers.logs import log_to_stderr

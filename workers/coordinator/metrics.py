@@ -19,8 +19,8 @@ from prometheus_client.core import (
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import durations
 from workers.ids import QUEUES, STAGES
-from workers.ledger.interface import ALIVE_S, STATES, JobView, LedgerUnavailable
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import ALIVE_S, STATES, JobView, LedgerUnavailable
 from workers.ledger.worker_registry import Registry
 
 

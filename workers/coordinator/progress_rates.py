@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, STAGES
-from workers.ledger.interface import JobView
+from workers.ledger.task_ledger import JobView
 
 _TAU_S: Final = 120.0  # of the exponential average
 _LEAST_RATE: Final = 1e-6  # tasks per second below which there is no time left to tell

@@ -13,11 +13,11 @@ from itertools import islice
 from typing import Final
 
 from pbrs_farm.core import keys
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 from workers.ids import GEOMETRY, REDUCE
 from workers.job import HouseEntry, JobSpec
-from workers.ledger.interface import HouseState
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import HouseState
 from workers.runner import StepRunner
 
 _THREADS: Final = 16  # storage answers slowly but many at once

@@ -18,7 +18,7 @@ from redis.retry import Retry
 import pbrs_farm
 from workers.config import FarmConfig, shown_url
 from workers.ids import LEASES, LIGHT_GPU, STAGES
-from workers.ledger.interface import (
+from workers.ledger.task_ledger import (
     ALIVE_S,
     STATES,
     SUSPECT,
@@ -86,7 +86,7 @@ def lua_constants() -> str:
 
 
 class RedisLedger:
-    """Implements workers.ledger.interface.Ledger; one per process, safe after a fork.
+    """Implements workers.ledger.task_ledger.Ledger; one per process, safe after a fork.
 
     client: a redis-py client that decodes its answers; made from the configuration by default.
     """

@@ -10,14 +10,14 @@ from collections.abc import Mapping
 
 import pbrs_farm
 from workers.ids import QUEUES, stages_of_queue
-from workers.ledger.interface import ALIVE_S, WorkerView
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import ALIVE_S, WorkerView
 
 _GONE_S = 3600.0  # a worker not seen for so long is forgotten
 
 
 class Registry:
-    """Implements workers.ledger.interface.WorkerRegistry on the ledger's Redis."""
+    """Implements workers.ledger.task_ledger.WorkerRegistry on the ledger's Redis."""
 
     def __init__(self, ledger: RedisLedger) -> None:
         self._ledger = ledger

@@ -14,7 +14,7 @@ from pbrs_farm.core.errors import (
     StoreRefused,
     Transient,
 )
-from workers.ledger.interface import FaultClass
+from workers.ledger.task_ledger import FaultClass
 
 # Hex addresses, digests and ids, then any number.
 _NUMBERS: Final = re.compile(r"0x[0-9a-f]+|[0-9a-f]{8,}|\d+(\.\d+)?")

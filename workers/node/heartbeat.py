@@ -10,8 +10,8 @@ from celery import bootsteps
 from celery.worker import state
 
 from workers.config import config_from_environment
-from workers.ledger.interface import LedgerUnavailable
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import LedgerUnavailable
 from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
 

@@ -15,7 +15,7 @@ from typing import IO, Any
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing
 from pbrs_farm.formats.manifest import lines_by_house
-from pbrs_farm.store.interface import Store
+from pbrs_farm.store.object_store import Store
 from workers.ids import job_key
 from workers.job import JobSpec, houses_from_lines
 from workers.runner import OnText

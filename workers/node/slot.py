@@ -24,7 +24,7 @@ from pbrs_farm.run.processes.render_process import REPORTED, Ended, RenderProces
 from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig
 from workers.ids import GEOMETRY, WHOLE, TaskId, failed_key, log_key, task_from_text
-from workers.ledger.interface import (
+from workers.ledger.task_ledger import (
     UNCOUNTED,
     Claim,
     Fault,

@@ -21,8 +21,8 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.gltf.document import Fetch, gltf_document
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
-from pbrs_farm.read.gltf.node_items import items_of_scene
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
+from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.gltf.scene_rooms import (
     level_of,
     levels_of,

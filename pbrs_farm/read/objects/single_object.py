@@ -26,8 +26,8 @@ from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document
 from pbrs_farm.read.gltf.node_classes import Mapping
-from pbrs_farm.read.gltf.node_items import items_of_scene
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
+from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.suncg.model_files import Models
 from pbrs_farm.read.suncg.model_materials import ModelMaterials

@@ -22,7 +22,6 @@ from pbrs_farm.read.common.room_floors import (
 )
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.suncg.arch_json import Arch, arch_from_json, arch_openings
-from pbrs_farm.read.suncg.companion_files import MAX_HOUSE_BYTES, arch_file
 from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
 from pbrs_farm.read.suncg.metadata import read_tables
 from pbrs_farm.read.suncg.model_files import Models
@@ -34,6 +33,7 @@ from pbrs_farm.read.suncg.node_items import (
     object_item,
     room_items,
 )
+from pbrs_farm.read.suncg.suncg_companions import MAX_HOUSE_BYTES, arch_file
 from pbrs_farm.read.suncg.wall_holes import openings
 
 _HOUSE_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_\-]{0,63}")

@@ -15,7 +15,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import area_vectors, distances_to_triangles, triangle_corners
 from pbrs_farm.core.recipe import RepairFields
-from pbrs_farm.repair.report import SourceRepair
+from pbrs_farm.repair.repair_report import SourceRepair
 
 Faces = NDArray[np.int64]
 

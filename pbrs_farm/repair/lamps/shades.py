@@ -20,7 +20,7 @@ from pbrs_farm.repair.lamps.light_output_ratio import (
     light_output_of_source,
 )
 from pbrs_farm.repair.measure.occluder import Occluder
-from pbrs_farm.repair.report import SourceRepair
+from pbrs_farm.repair.repair_report import SourceRepair
 
 _MOST_SHADES = 16  # of one lamp
 _LEAST_BLOCKED = 0.02  # share of the light that makes a part worth opening

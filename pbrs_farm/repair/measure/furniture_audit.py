@@ -10,7 +10,7 @@ from manifold3d import Manifold
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
-from pbrs_farm.repair.report import Floating, FurnitureAudit, Overlap
+from pbrs_farm.repair.repair_report import Floating, FurnitureAudit, Overlap
 from pbrs_farm.repair.structure.booleans import TagTable, common, united
 from pbrs_farm.repair.structure.closed_shells import closed_shells
 

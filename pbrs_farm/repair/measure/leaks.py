@@ -18,7 +18,7 @@ from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.measure.room_edges import RoomInterior
-from pbrs_farm.repair.report import Leak, LeakReport, SpaceLeaks
+from pbrs_farm.repair.repair_report import Leak, LeakReport, SpaceLeaks
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.plan_geometry import Shape
 from pbrs_farm.repair.structure.prisms import Plane, lifted, polygons_of

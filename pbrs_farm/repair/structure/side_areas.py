@@ -13,7 +13,7 @@ import shapely
 from manifold3d import Manifold
 
 from pbrs_farm.core.house import House, Item, ItemKind, Opening, Surface
-from pbrs_farm.repair.report import SideArea, WallLoss
+from pbrs_farm.repair.repair_report import SideArea, WallLoss
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.cut_openings import WallPart, cut_openings

@@ -10,7 +10,7 @@ from manifold3d import Manifold
 from pbrs_farm.core.house import House, Item, Surface
 from pbrs_farm.repair.measure.enclosure import Space, spaces_of_rooms
 from pbrs_farm.repair.measure.room_edges import RoomInterior, interiors_of_room
-from pbrs_farm.repair.report import LeftAsIs, Removed, StructureReport
+from pbrs_farm.repair.repair_report import LeftAsIs, Removed, StructureReport
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable, patches_from_solid, united
 from pbrs_farm.repair.structure.cut_openings import WallPart, cut_openings, thresholds

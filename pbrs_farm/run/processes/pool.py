@@ -18,7 +18,7 @@ from pbrs_farm.run.processes.child_process import ChildProcess
 from pbrs_farm.run.processes.limits import ProcessLimits
 from pbrs_farm.run.processes.message import Message
 from pbrs_farm.run.processes.render_process import CHECK_EVERY_S, Ended, RenderProcess
-from pbrs_farm.run.processes.task import Event, Setting, Task, line_from_task
+from pbrs_farm.run.processes.render_task import Event, Setting, Task, line_from_task
 
 _HANDLER: Final = "pbrs_farm.run.run_task:make_handler"
 

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator
 
 from pbrs_farm.core.errors import ObjectMissing
-from pbrs_farm.store.interface import Head, check_key, check_prefix
+from pbrs_farm.store.object_store import Head, check_key, check_prefix
 
 
 class MemoryStore:
