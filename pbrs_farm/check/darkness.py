@@ -38,8 +38,8 @@ def check_darkness(
         for plane, share in zip(planes, 2 * _LUMINANCE, strict=True):
             level += _LM_PER_W * share * np.nan_to_num(plane)
         what = f"all light together leaves nine tenths of it below {_BLACK_CD_M2:g} cd/m2"
-        lit = _ninth_tenth(level, valid > 0) >= _BLACK_CD_M2
-        tally.expect("black pictures", view.place, lit, what)
+        is_bright = _ninth_tenth(level, valid > 0) >= _BLACK_CD_M2
+        tally.expect("black pictures", view.place, is_bright, what)
     room = str(view.table.get("room", ""))
     lux = _lux_of_rooms(view.folder.parent.parent / "illuminance.json").get(room)
     if lux is not None and lux < _DARK_LX:

@@ -274,9 +274,9 @@ def _facts_of_light(
     room = room_of(cached.house, view)
     dark = [darkness_of_picture(result)]
     if room is not None:
-        lit = _marker_of_house(work, "illuminance").facts
-        facts["floor_lux"] = lit["floor_lux"].get(room.id)
-        facts["warnings"] = lit["warnings"].get(room.id, [])
+        illuminance = _marker_of_house(work, "illuminance").facts
+        facts["floor_lux"] = illuminance["floor_lux"].get(room.id)
+        facts["warnings"] = illuminance["warnings"].get(room.id, [])
         dark += [darkness_of_room(room, facts["floor_lux"])] if facts["floor_lux"] else []
     if any(dark):
         facts["dark"] = [line for line in dark if line]

@@ -37,7 +37,7 @@ def object_views(
     diagonal = float(np.linalg.norm(bounds[1] - bounds[0]))
     if not np.isfinite(diagonal) or diagonal <= 0:
         raise ValueError(f"bounds: expected a finite box with an extent, got {bounds.tolist()}")
-    vertices = icosphere(2)
+    vertices = icosphere_vertices(2)
     rng = np.random.default_rng(int(keys.digest(seed, *names)[:16], 16))
     views = []
     for k in range(n_views):
@@ -53,7 +53,7 @@ def object_views(
     return tuple(views)
 
 
-def icosphere(n_subdivisions: int) -> NDArray[np.float64]:
+def icosphere_vertices(n_subdivisions: int) -> NDArray[np.float64]:
     """(10 * 4^n + 2, 3) unit vertices of the icosahedron, each edge halved n times.
 
     Two of the icosahedron's vertices are the poles (0, 1, 0) and (0, -1, 0).

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.camera import Intrinsics
-from pbrs_farm.sample.object_cameras import icosphere, object_views
+from pbrs_farm.sample.object_cameras import icosphere_vertices, object_views
 
 BOX = np.array([[-1.0, 0.0, 2.0], [1.0, 2.0, 3.0]])
 INTRINSICS = Intrinsics.from_hfov(64, 48)
 
 
 def test_the_twice_subdivided_icosahedron_has_162_vertices_on_the_unit_sphere() -> None:
-    vertices = icosphere(2)
+    vertices = icosphere_vertices(2)
     assert vertices.shape == (162, 3)
     np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1)
     gaps = np.linalg.norm(vertices[:, None] - vertices[None], axis=2) + 9 * np.eye(162)
@@ -25,7 +25,7 @@ def test_the_twice_subdivided_icosahedron_has_162_vertices_on_the_unit_sphere() 
 def test_each_camera_stands_on_a_vertex_at_the_papers_distance_and_looks_at_the_centre() -> None:
     views = object_views(BOX, INTRINSICS, 0, ("chair",), 200)
     centre, diagonal = BOX.mean(0), np.linalg.norm(BOX[1] - BOX[0])
-    vertices = icosphere(2)
+    vertices = icosphere_vertices(2)
     distances = []
     for view in views:
         offset = view.camera.eye - centre
@@ -46,7 +46,7 @@ def test_each_camera_stands_on_a_vertex_at_the_papers_distance_and_looks_at_the_
 
 def test_the_views_over_the_poles_have_a_fixed_up_vector() -> None:
     views = object_views(BOX, INTRINSICS, 0, ("chair",), 2000)
-    vertices = icosphere(2)
+    vertices = icosphere_vertices(2)
     polar = [v for v in views if abs(vertices[v.sector][1]) > 0.9999]
     assert polar
     for view in polar:

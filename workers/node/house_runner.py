@@ -131,8 +131,8 @@ class HouseRunner:
         rows = [(str(v), str(room), float(score)) for v, room, score in marker.facts["views"]]
         # Leave out dark rooms where the recipe says so, as a run on one machine does.
         if plan.leaves_out_dark_rooms(spec.recipe, want_of(spec), house):
-            lit = read_marker(self._store, keys.marker_key(house, "illuminance"))
-            lux = lit.facts.get("floor_lux", {}) if lit is not None else {}
+            illuminance = read_marker(self._store, keys.marker_key(house, "illuminance"))
+            lux = illuminance.facts.get("floor_lux", {}) if illuminance is not None else {}
             rows, _left_out = plan.lit_views(rows, lux, spec.recipe.selection.min_room_lx)
         rooms = {view: room for view, room, _score in rows}
         chosen = plan.spread(rows, spec.n_views)

@@ -58,7 +58,7 @@ def separate_bulbs(bulb: Surface) -> tuple[Surface, ...]:
     )
 
 
-def lit(
+def with_emitting_bulbs(
     lights: Sequence[LightPart], surfaces: Sequence[Surface], bulbs: Sequence[int]
 ) -> tuple[LightPart, ...]:
     """lights with the bulbs (indices into surfaces) that emit each.

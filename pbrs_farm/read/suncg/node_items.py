@@ -24,7 +24,7 @@ from pbrs_farm.read.suncg.house_json import Node
 from pbrs_farm.read.suncg.metadata import OTHERPROP, LampMaterials, ModelClass, Tables
 from pbrs_farm.read.suncg.mirror_glass import MIRROR, as_mirror, mirror_slot
 from pbrs_farm.read.suncg.model_files import DamagedModel, Model, Models
-from pbrs_farm.read.suncg.model_lights import lit, placed_light, separate_bulbs
+from pbrs_farm.read.suncg.model_lights import placed_light, separate_bulbs, with_emitting_bulbs
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
 
 _T = TypeVar("_T")
@@ -87,7 +87,7 @@ def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item
     placed_lights: tuple[LightPart, ...] = ()
     if lights or bulbs:
         in_world = [placed_light(light, world_from_model) for light in lights]
-        placed_lights = lit(in_world, surfaces, bulbs)
+        placed_lights = with_emitting_bulbs(in_world, surfaces, bulbs)
     return Item(
         id=node.id,
         name=seen.name.replace("_", " ") or node.model_id,

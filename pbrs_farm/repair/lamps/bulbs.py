@@ -26,46 +26,46 @@ _N_MOVES = 400  # random places tried
 
 def with_bulbs(house: House, fields: RepairFields) -> tuple[House, list[SourceRepair]]:
     """Every light source of every lamp with an emitting surface, and what was done for each."""
-    palette = _Palette(house.materials)
+    materials = _BulbMaterials(house.materials)
     items = []
     sources: list[SourceRepair] = []
     for item in house.items:
         if item.lights:
-            item, done = _with_bulbs(item, palette, fields)
+            item, done = _with_bulbs(item, materials, fields)
             sources += done
         items.append(item)
-    return replace(house, items=tuple(items), materials=tuple(palette.materials)), sources
+    return replace(house, items=tuple(items), materials=tuple(materials.all)), sources
 
 
-class _Palette:
+class _BulbMaterials:
     """The house's materials, with bulb materials added as they are asked for."""
 
     def __init__(self, materials: tuple[Material, ...]) -> None:
-        self.materials = list(materials)
+        self.all = list(materials)
         self._bulbs: dict[tuple[float, float, float], int] = {}  # colour -> material
         self._emitting: dict[int, int] = {}  # material as read -> its bulb
 
     def bulb(self, rgb_linear: tuple[float, float, float]) -> int:
         """Index of a bulb material for light of that colour."""
         if rgb_linear not in self._bulbs:
-            self._bulbs[rgb_linear] = len(self.materials)
+            self._bulbs[rgb_linear] = len(self.all)
             name = f"bulb_{len(self._bulbs)}"
-            self.materials.append(Material(name, kind=MaterialKind.BULB))
+            self.all.append(Material(name, kind=MaterialKind.BULB))
         return self._bulbs[rgb_linear]
 
     def emitting(self, material: int) -> int:
         """Index of the material as a bulb, with its own colour."""
-        if self.materials[material].kind is MaterialKind.BULB:
+        if self.all[material].kind is MaterialKind.BULB:
             return material
         if material not in self._emitting:
-            self._emitting[material] = len(self.materials)
-            old = self.materials[material]
-            self.materials.append(replace(old, name=f"{old.name}_bulb", kind=MaterialKind.BULB))
+            self._emitting[material] = len(self.all)
+            old = self.all[material]
+            self.all.append(replace(old, name=f"{old.name}_bulb", kind=MaterialKind.BULB))
         return self._emitting[material]
 
 
 def _with_bulbs(
-    item: Item, palette: _Palette, fields: RepairFields
+    item: Item, materials: _BulbMaterials, fields: RepairFields
 ) -> tuple[Item, list[SourceRepair]]:
     surfaces = list(item.surfaces)
     corners = triangles_of(item)
@@ -77,13 +77,15 @@ def _with_bulbs(
         if emitting:
             # Let the surfaces that the source names shine.
             for k in emitting:
-                surfaces[k] = replace(surfaces[k], material=palette.emitting(surfaces[k].material))
+                surfaces[k] = replace(
+                    surfaces[k], material=materials.emitting(surfaces[k].material)
+                )
         else:
             # Set a sphere where none shines; later bulbs must not touch it.
             centre, radius = _fitting_sphere(np.array(light.position), given, corners)
             moved = float(np.linalg.norm(centre - np.array(light.position)))
             emitting = (len(surfaces),)
-            surfaces.append(icosphere("bulb", centre, radius, palette.bulb(light.rgb_linear)))
+            surfaces.append(icosphere("bulb", centre, radius, materials.bulb(light.rgb_linear)))
             light = replace(light, position=_triple(centre), radius_m=radius)
             bulb = triangle_corners(surfaces[-1].positions, surfaces[-1].faces)
             corners = np.concatenate([corners, bulb])

@@ -18,7 +18,7 @@ from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of
 
 LAMP_NYU40 = 35  # class "lamp" of NYU40
-ADDED = "added"  # tag of every lamp that repair adds
+ADDED_LAMP = "added"  # tag of every lamp that repair adds
 _BELOW_CEILING_M = 0.2  # centre of the lamp
 _TALL_M = 0.5  # what reaches this near the ceiling takes part of it
 _HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
@@ -58,7 +58,7 @@ def ceiling_lamp(house: House, room: Room, material: int, tag: str) -> Item:
         source_class=tag,
         room_id=room.id,
         lights=(light,),
-        tags=tuple(dict.fromkeys((tag, ADDED))),
+        tags=tuple(dict.fromkeys((tag, ADDED_LAMP))),
     )
 
 

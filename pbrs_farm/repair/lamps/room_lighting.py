@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.house import House, Item, LightPart, Material, MaterialKind, Opening, Room
-from pbrs_farm.repair.lamps.ceiling_lamp import ADDED, ceiling_lamp, heights_above
+from pbrs_farm.repair.lamps.ceiling_lamp import ADDED_LAMP, ceiling_lamp, heights_above
 from pbrs_farm.repair.lamps.lived_in import is_lived_in
 from pbrs_farm.repair.structure import plan_geometry as plan
 
@@ -37,7 +37,7 @@ def with_room_lighting(
     people live in and that has no lamp of its own, whatever daylight it has.
     """
     rooms, lights = [], []
-    given: dict[str, list[str]] = {FALLBACK: [], ADDED: []}
+    given: dict[str, list[str]] = {FALLBACK: [], ADDED_LAMP: []}
     areas = [plan.polygon_of_room(r.polygon) for r in house.rooms]
     glazed = {i.id for i in house.items if _has_pane(i, house.materials)}
     lamps = [i for i in house.items if any(_shines(light) for light in i.lights)]
@@ -54,7 +54,7 @@ def with_room_lighting(
         if not lit_by and fallback and room.has_floor and room.has_ceiling and area.area > 0:
             tag = FALLBACK
         elif in_every_room and "lamps" not in lit_by and room.has_floor:
-            tag = ADDED if is_lived_in(room, area.area) else ""
+            tag = ADDED_LAMP if is_lived_in(room, area.area) else ""
         if tag:
             lit_by.append(tag)
             lights.append(ceiling_lamp(house, room, len(house.materials), tag))
@@ -63,8 +63,8 @@ def with_room_lighting(
     materials = house.materials
     if lights:
         materials = (*materials, Material("fallback_bulb", kind=MaterialKind.BULB))
-    lit = replace(house, rooms=tuple(rooms), items=(*house.items, *lights), materials=materials)
-    return lit, GivenLights(tuple(given[FALLBACK]), tuple(given[ADDED]))
+    lighted = replace(house, rooms=tuple(rooms), items=(*house.items, *lights), materials=materials)
+    return lighted, GivenLights(tuple(given[FALLBACK]), tuple(given[ADDED_LAMP]))
 
 
 def _sees_sky(house: House, room: Room, area: plan.Shape) -> bool:

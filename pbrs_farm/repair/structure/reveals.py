@@ -10,7 +10,7 @@ from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure.booleans import Patch
 
 REVEAL = "reveal"
-ADDED = frozenset({REVEAL, "joint", "hidden", "back", "rim"})
+ADDED_SURFACES = frozenset({REVEAL, "joint", "hidden", "back", "rim"})
 """Names of the surfaces repair adds to structure items."""
 
 
@@ -19,7 +19,7 @@ def with_metric_uv(patch: Patch) -> Patch:
 
     v is the height on upright faces, world z on the others; u runs across it in the face's plane.
     """
-    if patch.tag.surface not in ADDED:
+    if patch.tag.surface not in ADDED_SURFACES:
         return patch
     # Span each face's plane by u across and v up (or along z where it lies flat).
     corners = patch.positions[patch.faces]

@@ -10,9 +10,9 @@ and not on d:
     target  at a point y on a guiding target                   share (1 - CONE_SHARE) p(y) r^2 / cos
 
 The path's throughput is divided by their sum, the balance heuristic in one-sample form (Veach
-1997, section 9.2.4). The third pdf is known only where the ray ends: `mis_weight` applies it there.
-A ray aimed at a target that meets another face brings nothing. Cones also catch what reaches a bulb
-by a reflection in a lamp's glass cover.
+1997, section 9.2.4). The third pdf is known only where the ray ends: `guided_mis_weight` applies
+it there. A ray aimed at a target that meets another face brings nothing. Cones also catch what
+reaches a bulb by a reflection in a lamp's glass cover.
 """
 
 from __future__ import annotations
@@ -134,11 +134,11 @@ def target_technique_share(guiding: Guiding) -> Any:
     return guiding.share * (1 - guiding.cone_share) / total
 
 
-def mis_weight(
+def guided_mis_weight(
     emitters: Emitters,
     path: PathState,
     si: SurfaceInteraction,
-    only: Any,
+    counted: Any,
     reflected: Any,
     rough: Any,
 ) -> Any:
@@ -148,7 +148,9 @@ def mis_weight(
     """
     # Compute the pdf with which the third technique would have aimed here.
     ref, d = path.reference, path.d
-    _importance, guided = emitters.nearby.importance(si.target_emitter, ref.p, ref.n, only, rough)
+    _importance, guided = emitters.nearby.importance(
+        si.target_emitter, ref.p, ref.n, counted, rough
+    )
     cos = dr.maximum(dr.abs(dr.dot(si.ng, d)), 1e-6)
     begin = offset_ray_origin(ref.p, dr.select(dr.dot(ref.n, d) > 0, ref.n, -ref.n))
     pdf = guided * si.target_pdf * dr.squared_norm(si.p - begin) / cos

@@ -144,9 +144,9 @@ def _exitance(
     points = np.tile(points, (2, 1, 1)).reshape(-1, 3)
     normals = np.stack([normal, -normal])[:, None].repeat(_POINTS, 1).reshape(-1, 3)
     # Trace the light of the face's own lamp to them; reflect it, and let it through.
-    only = np.tile(lamps, 2 * _POINTS)
+    own_lamps = np.tile(lamps, 2 * _POINTS)
     _outdoor, indoor = radiosity(
-        scene, emitters, points, normals, _SPP, seed, lamps=only, max_depth=_DEPTH
+        scene, emitters, points, normals, _SPP, seed, lamps=own_lamps, max_depth=_DEPTH
     )
     irradiance = np.pi * (indoor @ LUMINANCE).reshape(2, _POINTS, len(faces)).mean(1)
     rows = tables.material_rows[tables.face_tags[faces] & 0xFFFF]

@@ -90,16 +90,16 @@ class NearbyLampSampler:
         self._chosen, self._counts = device_array(mi.UInt32, chosen), device_array(mi.Float, counts)
         self._strengths = _rows(rows)
 
-    def at_vertex(self, p: Any, n: Any, only: Any, active: Any) -> NearbyLamps:
-        """The lamps from p on a surface of normal n. only: the one lamp that counts, or -1."""
+    def at_vertex(self, p: Any, n: Any, counted: Any, active: Any) -> NearbyLamps:
+        """The lamps from p on a surface of normal n. counted: the one lamp that counts, or -1."""
         lamps, importances, guided = [], [], []
         total, guided_total = mi.Float(0), mi.Float(0)
         for k in range(MAX_NEAR):
             lamp = dr.gather(mi.UInt32, self._chosen, mi.UInt32(k))
             counts = dr.gather(mi.Float, self._counts, mi.UInt32(k))
-            lamp = dr.select(only >= 0, mi.UInt32(only), lamp)
-            counts = dr.select(only >= 0, 1.0 if k == 0 else 0.0, counts)
-            importance, aimed = self.importance(lamp, p, n, only, active)
+            lamp = dr.select(counted >= 0, mi.UInt32(counted), lamp)
+            counts = dr.select(counted >= 0, 1.0 if k == 0 else 0.0, counts)
+            importance, aimed = self.importance(lamp, p, n, counted, active)
             lamps.append(lamp)
             importances.append(counts * importance)
             guided.append(counts * aimed)
@@ -109,12 +109,12 @@ class NearbyLampSampler:
         cones = self._cones(p, lamps, guided, active)
         return NearbyLamps(reference, lamps, importances, guided, cones)
 
-    def importance(self, lamp: Any, p: Any, n: Any, only: Any, active: Any) -> tuple[Any, Any]:
+    def importance(self, lamp: Any, p: Any, n: Any, counted: Any, active: Any) -> tuple[Any, Any]:
         """(importance, guided importance) of one lamp as in NearbyLamps; 0 for the weak ones."""
         sphere = dr.gather(mi.Vector4f, self._spheres, lamp, active)
         row = dr.gather(mi.Vector4f, self._strengths, lamp, active)
-        alone = dr.select(mi.UInt32(only) == lamp, mi.Float(1), 0)
-        weight = dr.select(only >= 0, alone, row[0])
+        alone = dr.select(mi.UInt32(counted) == lamp, mi.Float(1), 0)
+        weight = dr.select(counted >= 0, alone, row[0])
         # Weigh by 1 / distance^2, held at the sphere's radius, and by the part in front.
         to = point(sphere) - p
         d = dr.sqrt(dr.maximum(dr.squared_norm(to), dr.square(sphere[3])))

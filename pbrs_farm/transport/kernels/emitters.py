@@ -65,7 +65,7 @@ class DirectionSample(NamedTuple):
 class Emitters:
     """The lamps and the sky of a scene on the device, with the weights of one view.
 
-    Every method takes only: the one lamp or outdoor technique that counts, lane by lane, or -1
+    Every method takes counted: the one lamp or outdoor technique that counts, lane by lane, or -1
     (the pilot asks for one at a time).
     """
 
@@ -103,7 +103,7 @@ class Emitters:
         self.nearby.set_targets(targets)
 
     def sample_lamp(
-        self, scene: DeviceScene, near: NearbyLamps, u: Any, uv: Any, only: Any, active: Any
+        self, scene: DeviceScene, near: NearbyLamps, u: Any, uv: Any, counted: Any, active: Any
     ) -> DirectionSample:
         """A point on a lamp: of those nearby with chance NEARBY_SHARE, else by weight alone."""
         # Choose a lamp both ways, and take one.
@@ -117,7 +117,7 @@ class Emitters:
             near.lamps, near.importances, near.reference.total, rest
         )
         lamp, u = dr.select(is_near, near_lamp, lamp), dr.select(is_near, near_v, v)
-        lamp = dr.select(only >= 0, mi.UInt32(only), lamp)
+        lamp = dr.select(counted >= 0, mi.UInt32(counted), lamp)
         # Choose a triangle of it by area, and a point on that.
         first = dr.gather(mi.UInt32, self._lamp_first, lamp, active)
         count = dr.gather(mi.UInt32, self._lamp_first, lamp + 1, active) - first
@@ -130,38 +130,52 @@ class Emitters:
         d = to / distance
         cos = dr.abs(dr.dot(n, d))
         valid = active & (distance > 1e-5) & (cos > 1e-5)
-        radiance, pdf = self._eval_lamp(lamp, near.reference, distance, cos, only, valid)
+        radiance, pdf = self._eval_lamp(lamp, near.reference, distance, cos, counted, valid)
         return DirectionSample(d, distance, radiance, pdf, valid, lamp)
 
     def eval_lamp(
-        self, lamp: Any, reference: ReferencePoint, distance: Any, cos: Any, only: Any, active: Any
+        self,
+        lamp: Any,
+        reference: ReferencePoint,
+        distance: Any,
+        cos: Any,
+        counted: Any,
+        active: Any,
     ) -> tuple[Any, Any]:
         """(radiance, pdf of sample_lamp) of a lamp that a ray from the reference point meets."""
         active = active & (lamp != NO_LAMP)
-        radiance, pdf = self._eval_lamp(lamp, reference, distance, dr.abs(cos), only, active)
+        radiance, pdf = self._eval_lamp(lamp, reference, distance, dr.abs(cos), counted, active)
         return dr.select(active, radiance, 0), pdf
 
     def _eval_lamp(
-        self, lamp: Any, reference: ReferencePoint, distance: Any, cos: Any, only: Any, active: Any
+        self,
+        lamp: Any,
+        reference: ReferencePoint,
+        distance: Any,
+        cos: Any,
+        counted: Any,
+        active: Any,
     ) -> tuple[Any, Any]:
         row = dr.gather(mi.Vector4f, self._lamp_rows, lamp, active)  # r g b area
         # Blend the chances of both ways to choose the lamp, per area, then per solid angle.
         weight = dr.gather(mi.Float, self._lamp_weights, lamp, active)
-        importance, _guided = self.nearby.importance(lamp, reference.p, reference.n, only, active)
+        importance, _guided = self.nearby.importance(
+            lamp, reference.p, reference.n, counted, active
+        )
         nearby = importance / dr.maximum(reference.total, 1e-30)
         weight = dr.lerp(weight, nearby, _nearby_share(reference))
-        weight = dr.select(only >= 0, 1, weight)
+        weight = dr.select(counted >= 0, 1, weight)
         pdf = weight * dr.square(distance) / dr.maximum(row[3] * cos, 1e-12)
-        counts = (only < 0) | (mi.UInt32(only) == lamp)
+        counts = (counted < 0) | (mi.UInt32(counted) == lamp)
         return dr.select(counts, colour(row), 0), pdf
 
-    def sample_outdoor(self, p: Any, u: Any, uv: Any, only: Any, active: Any) -> DirectionSample:
+    def sample_outdoor(self, p: Any, u: Any, uv: Any, counted: Any, active: Any) -> DirectionSample:
         """A direction in which outdoor light may come to p."""
         active = active & self.has_sky
         technique, u = sample_alias_table(
             self._outdoor_alias, mi.UInt32(0), self._n_outdoor, u, active
         )
-        technique = dr.select(only >= 0, mi.UInt32(only), technique)
+        technique = dr.select(counted >= 0, mi.UInt32(counted), technique)
         is_sun = technique == SUN
         # Draw a direction by every technique, and take one.
         texel, _u = sample_alias_table(self._dome_alias, mi.UInt32(0), self._n_texels, u, active)
@@ -170,28 +184,28 @@ class Emitters:
         to_portal = self._portal_direction(p, technique, uv, active)
         d = dr.select(is_sun, to_sun, dr.select(technique == DOME, to_dome, to_portal))
         # The sun and the dome are two emitters, each with a pdf of its own.
-        sun, sun_pdf = self.eval_sun(d, only)
-        dome, dome_pdf = self.eval_dome(p, d, only, active)
+        sun, sun_pdf = self.eval_sun(d, counted)
+        dome, dome_pdf = self.eval_dome(p, d, counted, active)
         radiance, pdf = dr.select(is_sun, sun, dome), dr.select(is_sun, sun_pdf, dome_pdf)
         return DirectionSample(d, mi.Float(dr.inf), radiance, pdf, active)
 
-    def eval_sun(self, d: Any, only: Any) -> tuple[Any, Any]:
+    def eval_sun(self, d: Any, counted: Any) -> tuple[Any, Any]:
         """(radiance of the sun's disc in direction d, pdf of sampling it)."""
         inside = dr.dot(d, self._sun_frame.n) >= self._sun_cos - 1e-7
-        weight = dr.select(only >= 0, 1, self._sun_weight)
-        counts = (only < 0) | (only == SUN)
+        weight = dr.select(counted >= 0, 1, self._sun_weight)
+        counts = (counted < 0) | (counted == SUN)
         return dr.select(inside & counts, self._sun_rgb, 0), weight * self._sun_pdf
 
-    def eval_dome(self, p: Any, d: Any, only: Any, active: Any) -> tuple[Any, Any]:
+    def eval_dome(self, p: Any, d: Any, counted: Any, active: Any) -> tuple[Any, Any]:
         """(radiance of the dome in direction d, pdf of sampling d from p, sun not counted)."""
         radiance, texel_pdf = self._dome_row(d, active)
-        free = only < 0
-        pdf = dr.select(free, self._dome_weight, dr.select(only == DOME, 1, 0)) * texel_pdf
+        free = counted < 0
+        pdf = dr.select(free, self._dome_weight, dr.select(counted == DOME, 1, 0)) * texel_pdf
         for k in range(MAX_PORTALS):
             weight = dr.gather(mi.Float, self._portal_weights, mi.UInt32(k))
-            weight = dr.select(free, weight, dr.select(only == FIRST_PORTAL + k, 1, 0))
+            weight = dr.select(free, weight, dr.select(counted == FIRST_PORTAL + k, 1, 0))
             pdf += weight * self._portal_pdf(k, p, d)
-        return dr.select(only == SUN, 0, radiance), pdf
+        return dr.select(counted == SUN, 0, radiance), pdf
 
     def _portal_direction(self, p: Any, technique: Any, uv: Any, active: Any) -> Any:
         is_portal = active & (technique >= FIRST_PORTAL)

@@ -16,8 +16,8 @@ import mitsuba as mi
 from pbrs_farm.transport.guiding.guided_rays import (
     Guiding,
     cone_technique_pdf,
+    guided_mis_weight,
     guiding_at,
-    mis_weight,
     reflection_probability,
     sample_guided,
     survival_boost,
@@ -119,8 +119,8 @@ def advance(
 
     # Weigh what a guided ray has met; add the light of an emitter there.
     if near is not None:
-        only, ends = context.emitter_filter.indoor, missed | lobe.reflected
-        weight = mis_weight(context.emitters, path, si, only, ends, vertex.is_rough)
+        counted, ends = context.emitter_filter.indoor, missed | lobe.reflected
+        weight = guided_mis_weight(context.emitters, path, si, counted, ends, vertex.is_rough)
         path = replace(path, beta=path.beta * weight)
     emitted_outdoor, emitted_indoor = _emitted_light(context, path, si, missed)
 
@@ -165,11 +165,11 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     wi = frame.to_local(-path.d)
     wi.z = dr.maximum(wi.z, 1e-4)
 
-    # Weigh the lamps; a thin surface is lit from both sides.
-    near, only = None, context.emitter_filter.indoor
-    if only is not None:
+    # Weigh the lamps; a thin surface is contributes from both sides.
+    near, counted = None, context.emitter_filter.indoor
+    if counted is not None:
         normal = dr.select(dr.max(si.bsdf.tau) > 0, 0, si.ng)
-        near = context.emitters.nearby.at_vertex(si.p, normal, only, is_solid)
+        near = context.emitters.nearby.at_vertex(si.p, normal, counted, is_solid)
     is_rough = is_solid & ~is_glass & ~is_mirror
     return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near)
 
@@ -203,7 +203,7 @@ def _emitted_light(
     context: PathContext, path: PathState, si: SurfaceInteraction, missed: Any
 ) -> tuple[Any, Any]:
     """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled."""
-    emitters, only = context.emitters, context.emitter_filter
+    emitters, emitter_filter = context.emitters, context.emitter_filter
     by_scatter = path.bsdf_pdf > 0
 
     def balanced(pdf: Any) -> Any:
@@ -211,22 +211,24 @@ def _emitted_light(
 
     # Leave out what the camera sees directly where one emitter is asked for: it needs no choice.
     counts = mi.Bool(by_scatter)
-    for asked in only:
+    for asked in emitter_filter:
         counts |= False if asked is None else asked == ALL_EMITTERS
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
-    if only.outdoor is not None:
-        sun, sun_pdf = emitters.eval_sun(path.d, only.outdoor)
-        dome, dome_pdf = emitters.eval_dome(path.reference.p, path.d, only.outdoor, missed)
+    if emitter_filter.outdoor is not None:
+        sun, sun_pdf = emitters.eval_sun(path.d, emitter_filter.outdoor)
+        dome, dome_pdf = emitters.eval_dome(
+            path.reference.p, path.d, emitter_filter.outdoor, missed
+        )
         # Where a portal is asked for, count only what is drawn through it.
-        is_asked = (only.outdoor > NO_EMITTERS) & (only.outdoor < FIRST_PORTAL)
+        is_asked = (emitter_filter.outdoor > NO_EMITTERS) & (emitter_filter.outdoor < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & is_asked
         sky = sun * balanced(sun_pdf) + dome * balanced(dome_pdf)
         outdoor = dr.select(sees_sky, path.beta * sky, 0)
-    if only.indoor is not None:
-        shines = si.valid & counts & (only.indoor > NO_EMITTERS) & (si.emitter != NO_LAMP)
+    if emitter_filter.indoor is not None:
+        shines = si.valid & counts & (emitter_filter.indoor > NO_EMITTERS) & (si.emitter != NO_LAMP)
         distance, cos = dr.norm(si.p - path.reference.p), dr.dot(path.d, si.ng)
         radiance, lamp_pdf = emitters.eval_lamp(
-            si.emitter, path.reference, distance, cos, only.indoor, shines
+            si.emitter, path.reference, distance, cos, emitter_filter.indoor, shines
         )
         indoor = dr.select(shines, path.beta * radiance * balanced(lamp_pdf), 0)
     return outdoor, indoor
@@ -236,18 +238,20 @@ def sample_direct_light(
     context: PathContext, sampler: Sampler, vertex: Vertex, strategy: Strategy, active: Any
 ) -> tuple[DirectLightSample, DirectLightSample]:
     """(outdoor, indoor) light scattered back along the path, one shadow ray each."""
-    emitters, only, dim = context.emitters, context.emitter_filter, vertex.dim
+    emitters, emitter_filter, dim = context.emitters, context.emitter_filter, vertex.dim
     outdoor = indoor = None
-    if only.outdoor is not None:
+    if emitter_filter.outdoor is not None:
         u, uv = sampler.get_1d(dim + _OUT), sampler.get_2d(dim + _OUT_UV)
-        is_asked = active & (only.outdoor > NO_EMITTERS)
-        outdoor = emitters.sample_outdoor(vertex.si.p, u, uv, only.outdoor, is_asked)
-    if only.indoor is not None and vertex.near is not None:
+        is_asked = active & (emitter_filter.outdoor > NO_EMITTERS)
+        outdoor = emitters.sample_outdoor(vertex.si.p, u, uv, emitter_filter.outdoor, is_asked)
+    if emitter_filter.indoor is not None and vertex.near is not None:
         u, uv = sampler.get_1d(dim + _LAMP), sampler.get_2d(dim + _LAMP_UV)
-        is_asked = active & (only.indoor > NO_EMITTERS)
-        indoor = emitters.sample_lamp(context.scene, vertex.near, u, uv, only.indoor, is_asked)
+        is_asked = active & (emitter_filter.indoor > NO_EMITTERS)
+        indoor = emitters.sample_lamp(
+            context.scene, vertex.near, u, uv, emitter_filter.indoor, is_asked
+        )
     # A portal asked for alone has no light of scattered rays to be weighted against.
-    is_alone = False if only.outdoor is None else only.outdoor >= FIRST_PORTAL
+    is_alone = False if emitter_filter.outdoor is None else emitter_filter.outdoor >= FIRST_PORTAL
     return (
         _direct_light(context.scene, vertex, strategy, outdoor, is_alone),
         _direct_light(context.scene, vertex, strategy, indoor, is_alone),
@@ -272,12 +276,12 @@ def _direct_light(
     # Refuse light through the face where the shading normal says that it does not pass.
     side = dr.dot(si.ng, sample.d)
     is_consistent = side * wo.z > 0
-    lit = is_consistent & (dr.max(value) > 0)
+    contributes = is_consistent & (dr.max(value) > 0)
     if is_independent is not False:
-        # Ask for what could be lit from some wi, whatever this wi is.
+        # Ask for what could contribute from some wi, whatever this wi is.
         pdf = dr.select(is_independent, view_independent_pdf(si.bsdf, si.ng, sample.d), pdf)
-        lit = dr.select(is_independent, (side > 0) | (dr.max(si.bsdf.tau) > 0), lit)
-    lit = lit & sample.valid & (sample.pdf > 0)
+        contributes = dr.select(is_independent, (side > 0) | (dr.max(si.bsdf.tau) > 0), contributes)
+    contributes = contributes & sample.valid & (sample.pdf > 0)
     # Weigh by the balance heuristic; the sample's own pdf cancels with the estimator's.
     weight = 1 / (sample.pdf + dr.select(is_alone, 0, pdf))
 
@@ -288,9 +292,9 @@ def _direct_light(
     is_finite = sample.distance < dr.inf
     d = dr.select(is_finite, to / distance, sample.d)
     reach = dr.select(is_finite, distance * (1 - 1e-4), dr.inf)
-    clear = scene.transmittance(begin, d, reach, lit)
-    incident = dr.select(lit, sample.radiance * clear * weight, 0)
-    light = dr.select(lit & is_consistent, value * incident, 0)
+    clear = scene.transmittance(begin, d, reach, contributes)
+    incident = dr.select(contributes, sample.radiance * clear * weight, 0)
+    light = dr.select(contributes & is_consistent, value * incident, 0)
     return DirectLightSample(light, sample.d, incident, sample.emitter)
 
 

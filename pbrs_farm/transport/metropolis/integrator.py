@@ -157,9 +157,9 @@ def _path_context(
     """
     every = dr.opaque(mi.Int32, ALL_EMITTERS)
     is_indoor = group is Group.INDOOR
-    only = EmitterFilter(every, None) if is_indoor else EmitterFilter(None, every)
+    emitter_filter = EmitterFilter(every, None) if is_indoor else EmitterFilter(None, every)
     late = fields.model_copy(update={"rr_depth": max(fields.rr_depth, _MIN_RR_DEPTH)})
-    return PathContext(scene, emitters, device_fields(late), only)
+    return PathContext(scene, emitters, device_fields(late), emitter_filter)
 
 
 def _run(

@@ -195,10 +195,10 @@ def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> Claim:
 def _groups_sum(variant: str) -> Claim:
     # Keep the bulb's geometry in the room without lamp light: the paths must be the same.
     dim = rooms.window_room(0.7, lumen=1e-30)
-    lit = _window()
-    (both,) = _rendered(variant, lit, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
+    room = _window()
+    (both,) = _rendered(variant, room, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
     (day,) = _rendered(variant, dim, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
-    (night,) = _rendered(variant, lit, dark_sky(), _spp(16), 1)
+    (night,) = _rendered(variant, room, dark_sky(), _spp(16), 1)
     off = float(np.abs(both.mode(Mode.MLT_IL_OL) - (day.outdoor + night.indoor)).max())
     return Claim(
         "sky alone + lamps alone = both in one trace, to the bit",
