@@ -82,7 +82,14 @@ class Material:
     roughness: float | None = None  # glTF's, 0..1 (GGX alpha is its square); None = by shininess
     roughness_texture_id: str | None = None  # green times roughness, as glTF's
     normal_texture_id: str | None = None  # tangent space, x along u, y along v, as glTF's
+    normal_scale: float = 1.0  # times x and y of the normal map, as glTF's
     is_default: bool = False  # the source names no colour: repair paints such walls white
+
+    @property
+    def texture_ids(self) -> tuple[str, ...]:
+        """Its colour picture, roughness map and normal map, those that it has."""
+        named = (self.texture_id, self.roughness_texture_id, self.normal_texture_id)
+        return tuple(name for name in named if name)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -268,7 +275,7 @@ class House:
     rooms: tuple[Room, ...]
     items: tuple[Item, ...]  # the instance id of items[i] is i + 1
     materials: tuple[Material, ...]
-    textures: dict[str, Texture]  # by Material.texture_id
+    textures: dict[str, Texture]  # by Material.texture_ids
     openings: tuple[Opening, ...] = ()
     cameras: tuple[StoredCamera, ...] = ()
     notes: tuple[Note, ...] = ()

@@ -93,11 +93,7 @@ class Draft:
             for i in self.items
         )
         materials = tuple(self.materials[m] for m in used)
-        named = {
-            name
-            for m in materials
-            for name in (m.texture_id, m.roughness_texture_id, m.normal_texture_id)
-        }
+        named = {name for m in materials for name in m.texture_ids}
         # Openings name no material that is drawn: their cutters are never rendered.
         openings = tuple(
             replace(o, cutter=replace(o.cutter, material=0)) for o in self.source.openings
@@ -112,10 +108,8 @@ class Draft:
         self, surface: Surface, shape: Shape, moved: Callable[[F64], F64], normal_matrix: F64
     ) -> Surface:
         material = shape.materials[surface.material]
-        names = (material.texture_id, material.roughness_texture_id, material.normal_texture_id)
-        number = self.material(
-            material, [shape.textures[n] for n in names if n and n in shape.textures]
-        )
+        names = material.texture_ids
+        number = self.material(material, [shape.textures[n] for n in names if n in shape.textures])
         positions = moved(surface.positions.astype(np.float64)).astype(np.float32)
         normals = surface.normals
         if normals is not None:

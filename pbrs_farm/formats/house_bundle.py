@@ -14,7 +14,7 @@ import numpy as np
 from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, Item
+from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_glb import V_DOWN, glb_from_house
 from pbrs_farm.formats.serialise import (
@@ -25,6 +25,15 @@ from pbrs_farm.formats.serialise import (
 )
 
 FORMAT: Final = "pbrs_farm house 1"
+
+# Fields that came after houses were stored, and what leaving them out means: a house that uses
+# none has the bytes it always had.
+_LATER_FIELDS: Final = {
+    "roughness": None,
+    "roughness_texture_id": None,
+    "normal_texture_id": None,
+    "normal_scale": 1.0,
+}
 
 
 def bundle_from_house(house: House) -> tuple[bytes, bytes]:
@@ -46,14 +55,20 @@ def _json_of_house(house: House) -> dict[str, Any]:
     data: dict[str, Any] = {
         name: json_from_value(getattr(house, name))
         for name in House.__slots__
-        if name not in ("items", "textures")
+        if name not in ("items", "textures", "materials")
     }
+    data["materials"] = [_json_of_material(m) for m in house.materials]
     data["items"] = [_json_of_item(item, i + 1) for i, item in enumerate(house.items)]
     data["textures"] = [
         {"key": key, "id": t.id, "name": t.name, "media_type": t.media_type}
         for key, t in house.textures.items()
     ]
     return data
+
+
+def _json_of_material(material: Material) -> dict[str, Any]:
+    values: dict[str, Any] = json_from_value(material)
+    return {k: v for k, v in values.items() if k not in _LATER_FIELDS or v != _LATER_FIELDS[k]}
 
 
 def _json_of_item(item: Item, instance: int) -> dict[str, Any]:

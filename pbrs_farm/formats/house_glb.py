@@ -123,16 +123,15 @@ def _write_textures(
 
 def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
     alpha, mode = _alpha(material)
-    # glTF knows metal and roughness: a mirror is smooth metal, all else as rough as its Phong lobe.
-    shininess = max(material.shininess, 0.0)
-    is_mirror = material.kind is MaterialKind.MIRROR
     look: dict[str, Any] = {
         "baseColorFactor": [*_linear(material.diffuse), alpha],
-        "metallicFactor": 1.0 if is_mirror else 0.0,
-        "roughnessFactor": 0.0 if is_mirror else (2.0 / (shininess + 2.0)) ** 0.25,
+        "metallicFactor": 1.0 if material.kind is MaterialKind.MIRROR else 0.0,
+        "roughnessFactor": _roughness(material),
     }
     if material.texture_id in images:
         look["baseColorTexture"] = {"index": images[material.texture_id]}
+    if material.roughness_texture_id in images:
+        look["metallicRoughnessTexture"] = {"index": images[material.roughness_texture_id]}
     gltf_material: dict[str, Any] = {
         "name": material.name,
         "pbrMetallicRoughness": look,
@@ -140,9 +139,24 @@ def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]
         "alphaMode": mode,
         "extras": {"kind": material.kind.value},
     }
+    if material.normal_texture_id in images:
+        normal_map: dict[str, Any] = {"index": images[material.normal_texture_id]}
+        scale = float(material.normal_scale)
+        gltf_material["normalTexture"] = normal_map | ({"scale": scale} if scale != 1 else {})
     if material.kind is MaterialKind.BULB:
         gltf_material["emissiveFactor"] = _linear(material.diffuse)
     return gltf_material
+
+
+def _roughness(material: Material) -> float:
+    # A mirror is smooth metal; all else is as rough as its source says, or as its Phong lobe.
+    if material.kind is MaterialKind.MIRROR:
+        return 0.0
+    if material.roughness is not None:
+        return float(np.clip(material.roughness, 0, 1))
+    if material.roughness_texture_id is not None:
+        return 1.0
+    return float((2.0 / (max(material.shininess, 0.0) + 2.0)) ** 0.25)
 
 
 def _linear(rgb: tuple[float, float, float]) -> list[float]:

@@ -106,6 +106,37 @@ def test_the_glb_names_class_room_and_instance_of_every_item() -> None:
     assert "baseColorTexture" not in materials[3]["pbrMetallicRoughness"]  # a GIF
 
 
+def with_maps(house: House) -> House:
+    """The house with roughness and maps on its first material."""
+    picture = next(iter(house.textures))
+    mapped = replace(
+        house.materials[0],
+        roughness=0.25,
+        roughness_texture_id=picture,
+        normal_texture_id=picture,
+        normal_scale=0.5,
+    )
+    return replace(house, materials=(mapped, *house.materials[1:]))
+
+
+def test_roughness_and_maps_read_back_and_stand_where_gltf_viewers_look() -> None:
+    house = with_maps(full_house())
+    glb_data, json_data = bundle_from_house(house)
+    assert_same(house, house_from_bundle(glb_data, json_data))
+    material = glb.gltf_from_glb(glb_data, "x").document["materials"][0]
+    look = material["pbrMetallicRoughness"]
+    assert (look["roughnessFactor"], look["metallicFactor"]) == (0.25, 0.0)
+    assert look["metallicRoughnessTexture"] == look["baseColorTexture"] == {"index": 0}
+    assert material["normalTexture"] == {"index": 0, "scale": 0.5}
+
+
+def test_a_house_without_maps_has_the_bytes_it_had_before_there_were_any() -> None:
+    text = bundle_from_house(full_house())[1].decode()
+    assert "roughness" not in text
+    assert "normal_texture_id" not in text
+    assert "normal_scale" not in text
+
+
 def test_house_json_is_readable_and_says_everything_but_arrays() -> None:
     text = bundle_from_house(full_house())[1].decode()
     plain = json.loads(text)

@@ -36,7 +36,7 @@ class MaterialLibrary:
     @property
     def textures(self) -> dict[str, Texture]:
         """Every texture a material names, by id."""
-        used = {m.texture_id for m in self._materials}
+        used = {name for m in self._materials for name in m.texture_ids}
         found = (loaded.texture for loaded in self._loaded.values() if loaded is not None)
         return {t.id: t for t in found if t.id in used}
 
