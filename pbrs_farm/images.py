@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
 
-MAX_PIXELS: Final = 16384 * 16384  # larger pictures are rejected before their pixels are read
+MAX_FILE_PIXELS: Final = 16384 * 16384  # larger pictures are rejected before their pixels are read
 
 _FIXED_DATE: Final = "2000:01:01 00:00:00"  # of EXR files: equal images, equal bytes
 
@@ -260,7 +260,7 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
             raise BadInput(name, "", _reason(oiio.geterror(), path))
         try:
             spec = source.spec()
-            if spec.width * spec.height > MAX_PIXELS:
+            if spec.width * spec.height > MAX_FILE_PIXELS:
                 raise BadInput(name, "", f"{spec.width}x{spec.height} pixels are too many")
             pixels = source.read_image(0, 0, 0, spec.nchannels, kind)
             fault = source.geterror()  # a truncated file gives pixels and a fault

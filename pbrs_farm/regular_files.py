@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Final
 
 MAX_FILE_BYTES: Final = 512 * 2**20  # of a file that is read whole: a home, a scene, a picture
+MAX_SCENE_BYTES: Final = 1_000_000_000  # of a scene or model with the files beside it
 MAX_TEXT_BYTES: Final = 64 * 2**20  # of one that is parsed by hand: a list of houses or cameras
 MAX_DIGEST_BYTES: Final = 4 * 2**30  # of one that is read in pieces
 

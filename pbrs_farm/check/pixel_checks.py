@@ -50,7 +50,7 @@ def labels_at(labels: Labels, index: NDArray[np.int64]) -> Labels:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Verdict:
+class PixelChecks:
     """What is right at N pixels."""
 
     right: dict[str, Bools]  # check -> (N,) what is stored is right
@@ -66,7 +66,7 @@ def judge(
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
     scene: tuple[Triangles, Rays],
-) -> Verdict:
+) -> PixelChecks:
     """Compare labels at pixels (rows, columns) with rays through the scene."""
     # Explain what is stored by the triangle that the centre's ray hits.
     _, rays = scene
@@ -97,7 +97,7 @@ def judge(
             right[name][open_[better]] = trial[name][better]
     tied[open_] = best == 0
     coincident = tied & _fill_one_place(first, face, tied, origin, directions, scene)
-    return Verdict(right, tied, face, coincident, first)
+    return PixelChecks(right, tied, face, coincident, first)
 
 
 def _fill_one_place(

@@ -13,7 +13,7 @@ from pbrs_farm.core.shown_text import shown
 
 if TYPE_CHECKING:
     from pbrs_farm.run.relight import LampFactor
-    from pbrs_farm.transport.validation.claims import Claim
+    from pbrs_farm.transport.validation.claims import LightClaim
 
 
 def add_verbs(verb: Verb) -> None:
@@ -117,7 +117,7 @@ def _verify_light(args: argparse.Namespace) -> int:
     return 1 if n_failed else 0
 
 
-def _claim_row(claim: Claim) -> str:
+def _claim_row(claim: LightClaim) -> str:
     verdict = "ok" if claim.passed else "FAIL"
     return f"{verdict:<5}{claim.text:<63}{claim.measured:<48}{claim.expected}"
 

@@ -20,6 +20,9 @@ NYU40_NAMES: Final = (
     "lamp", "bathtub", "bag", "otherstructure", "otherfurniture", "otherprop",
 )  # fmt: skip
 
+# Ids that readers give by rule; "otherprop" is a thing of no class.
+DOOR, WINDOW, LAMP, OTHERPROP = map(NYU40_NAMES.index, ("door", "window", "lamp", "otherprop"))
+
 # Name of each NYU13 id, 0..13.
 NYU13_NAMES: Final = (
     "none", "bed", "books", "ceiling", "chair", "floor", "furniture", "objects", "picture", "sofa",

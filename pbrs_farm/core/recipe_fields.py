@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 MAX_SAMPLES: Final = 2**20
 """Of samples, mutations and chains: far above what anyone waits for, far below what never ends."""
 
-MAX_PIXELS: Final = 2**27
+MAX_VIEW_PIXELS: Final = 2**27
 """Of a picture."""
 
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -116,8 +116,10 @@ class ImageFields(FieldGroup):
 
     @model_validator(mode="after")
     def _fits_memory(self) -> Self:
-        if self.width_px * self.height_px > MAX_PIXELS:
-            raise ValueError(f"{self.width_px}x{self.height_px} has more than {MAX_PIXELS} pixels")
+        if self.width_px * self.height_px > MAX_VIEW_PIXELS:
+            raise ValueError(
+                f"{self.width_px}x{self.height_px} has more than {MAX_VIEW_PIXELS} pixels"
+            )
         return self
 
 

@@ -17,7 +17,7 @@ _TENTHS: Final = ("0", "0.2", "0.4", "0.6", "0.8", "1")
 _PERCENT: Final = ("0 %", "20 %", "40 %", "60 %", "80 %", "100 %")
 
 
-class Drawing:
+class SvgPicture:
     """An SVG picture of width x height pixels; the label is for readers that cannot see it."""
 
     def __init__(self, width: float, height: float, label: str) -> None:
@@ -37,7 +37,7 @@ class Drawing:
         return Markup(ET.tostring(self._svg, encoding="unicode", short_empty_elements=False))
 
 
-class Frame(Drawing):
+class PlotArea(SvgPicture):
     """A drawing with a plot area whose positions are shares 0..1 of both axes, upwards."""
 
     def x(self, share: float) -> float:
@@ -94,7 +94,7 @@ def distribution(
     whole, _ = np.histogram(scores, edges)
     good, _ = np.histogram(scores[kept], edges)
     top = 4 * max(-(-int(whole.max(initial=0)) // 4), 1)  # four whole steps of the axis
-    frame = Frame(460, 260, f"Distribution of the {title} of all scored views")
+    frame = PlotArea(460, 260, f"Distribution of the {title} of all scored views")
     frame.axes(title, _TENTHS, [f"{top * k // 4:,}" for k in range(5)])
     for k in range(50):
         # Stack the rejected part on the kept part, with a gap between bars.
@@ -111,7 +111,7 @@ def joint(
     """Colour score against depth score: a cell is darker the more views it holds (log scale)."""
     n = 50
     cells, _, _ = np.histogram2d(colour, depth, bins=n, range=[[0, 1], [0, 1]])
-    frame = Frame(460, 400, "Colour score against depth score")
+    frame = PlotArea(460, 400, "Colour score against depth score")
     frame.axes("colour score", _TENTHS, _TENTHS)
     top = np.log1p(cells.max(initial=0)) or 1.0
     frame.box((limits[0], limits[1], 1, 1), "zone")  # where views are kept
@@ -137,7 +137,7 @@ def yields(
 
     paper: (threshold, share) of the paper's own pictures, drawn as a ring.
     """
-    frame = Frame(460, 400, "Yield as a function of the threshold")
+    frame = PlotArea(460, 400, "Yield as a function of the threshold")
     frame.axes("threshold for both scores", _TENTHS, _PERCENT)
     for _name, css, shares in curves:
         frame.line([(k / (len(shares) - 1), v) for k, v in enumerate(shares)], f"curve {css}")
@@ -163,7 +163,7 @@ def mirrored(
     colours: of each bin; the page's own where None.
     """
     width, half = 260, 44  # pixels; the axis lies at half
-    drawing = Drawing(width, 2 * half, label)
+    drawing = SvgPicture(width, 2 * half, label)
     top = max(float(above.max(initial=0)), float(below.max(initial=0)), 1e-9)
     step = width / max(len(above), 1)  # pixels from bar to bar
     bar = f"{max(step - 0.6, 0.6):.1f}"

@@ -25,8 +25,8 @@ from pbrs_farm.curate.selection_run import house_pack, verdict_table
 from pbrs_farm.curate.selection_summary import (
     PAPER_KEPT,
     PAPER_VIEWS,
+    KeptCount,
     SelectionSummary,
-    Tally,
     summary_of,
     yield_curve,
 )
@@ -109,7 +109,7 @@ def _charts(scored: Any, summary: SelectionSummary, fields: SelectionFields) -> 
     }
 
 
-def _tally_table(tallies: Sequence[Tally]) -> dict[str, Any]:
+def _tally_table(tallies: Sequence[KeptCount]) -> dict[str, Any]:
     """shown: the MAX_ROWS largest tallies; rest: the sum of the others; most: views of the largest."""
     ordered = sorted(tallies, key=lambda t: (-t.views, t.name))
     rest = ordered[MAX_ROWS:]

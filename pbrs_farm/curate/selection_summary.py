@@ -20,7 +20,7 @@ PAPER_VIEWS: Final = 779_342
 PAPER_KEPT: Final = 568_793
 
 
-class Tally(BaseModel):
+class KeptCount(BaseModel):
     """Views of one house or room type, and how many of them are kept."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -56,8 +56,8 @@ class SelectionSummary(BaseModel):
     colour_quartiles: tuple[float, ...]  # with minimum and maximum; empty without scores
     depth_quartiles: tuple[float, ...]
     yield_both: tuple[float, ...]  # share with both scores above each of THRESHOLDS
-    houses: tuple[Tally, ...]
-    room_types: tuple[Tally, ...]
+    houses: tuple[KeptCount, ...]
+    room_types: tuple[KeptCount, ...]
     n_scored_houses: int = 0  # houses scored in this very run; not stored
 
 
@@ -110,9 +110,9 @@ def _quartiles(scores: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, ..
     return tuple(round(float(q), 6) for q in np.percentile(scores, (0, 25, 50, 75, 100)))
 
 
-def _tallies(judged: Any, column: str) -> tuple[Tally, ...]:
+def _tallies(judged: Any, column: str) -> tuple[KeptCount, ...]:
     groups = judged.group_by(column).aggregate([("kept", "count"), ("kept", "sum")])
     rows = sorted(groups.to_pylist(), key=lambda r: str(r[column]))
     return tuple(
-        Tally(name=r[column] or "", views=r["kept_count"], kept=r["kept_sum"]) for r in rows
+        KeptCount(name=r[column] or "", views=r["kept_count"], kept=r["kept_sum"]) for r in rows
     )

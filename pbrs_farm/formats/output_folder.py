@@ -18,7 +18,7 @@ from pbrs_farm.regular_files import read_regular
 
 
 @dataclass(frozen=True, slots=True)
-class HouseEntry:
+class OutputHouse:
     """A house of the folder; names and attribution can be shown and drawn as they stand."""
 
     id: str
@@ -31,7 +31,7 @@ class HouseEntry:
 class ViewEntry:
     """A view of the folder."""
 
-    house: HouseEntry
+    house: OutputHouse
     id: str
     room_id: str
     room_name: str
@@ -67,7 +67,7 @@ def _views(folder: Path) -> Iterator[ViewEntry]:
         yield ViewEntry(house, view.name, room, house.rooms.get(room, room), view, facts)
 
 
-def _house(folder: Path) -> HouseEntry:
+def _house(folder: Path) -> OutputHouse:
     facts = json_object(folder / "house.json")
     source = facts.get("source") or {}
     rooms = {
@@ -78,14 +78,14 @@ def _house(folder: Path) -> HouseEntry:
     }
     name = shown(facts.get("name") or folder.name)
     credit = shown(source.get("attribution") or "", MAX_MESSAGE)
-    return HouseEntry(folder.name, name, credit, rooms)
+    return OutputHouse(folder.name, name, credit, rooms)
 
 
 def _first(words: Any) -> str:
     return str(words[0]) if isinstance(words, list) and words else ""
 
 
-def _room_id(view_id: str, facts: dict[str, Any], house: HouseEntry) -> str:
+def _room_id(view_id: str, facts: dict[str, Any], house: OutputHouse) -> str:
     room = facts.get("room") or facts.get("room_id") or ""
     room = room.get("id", "") if isinstance(room, dict) else room
     if room:

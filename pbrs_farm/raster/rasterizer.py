@@ -35,7 +35,7 @@ from pbrs_farm.raster.shader_features import (
 )
 from pbrs_farm.raster.shader_programs import buffer_program, surface_program
 from pbrs_farm.raster.uniform_blocks import (
-    MATERIAL_FLOATS,
+    BLOCK_FLOATS,
     aligned_rows,
     light_blocks,
     material_blocks,
@@ -211,7 +211,7 @@ class Rasterizer:
     def _bind(self, mode: str, draw: int) -> None:
         material = int(self._mesh.draw_material[draw])
         self._materials.bind_to_uniform_block(
-            0, offset=material * self._material_step, size=4 * MATERIAL_FLOATS
+            0, offset=material * self._material_step, size=4 * BLOCK_FLOATS
         )
         if mode == "il":
             offset = int(self._mesh.draw_item[draw]) * self._light_step

@@ -14,7 +14,7 @@ from pbrs_farm.raster.light_choice import SOFTENING_M
 DL_SCALE = 2 / 3  # a white wall that faces the headlight (0.5) and the key light (1) is just white
 IL_WHITE = 8.0  # w of OpenGL-IL's tone curve x (1 + x / w^2) / (1 + x) (Reinhard et al. 2002)
 IL_HEADLIGHT = 0.06  # faint headlight of OpenGL-IL: what no lamp reaches is dim, not black
-PANE_OPACITY = 0.08  # most that a window pane hides of what is behind it
+MAX_PANE_OPACITY = 0.08  # most that a window pane hides of what is behind it
 PANE_MIRROR = 0.5  # share of the sky's colour in a pane's reflection
 GLASS_MIRROR = 0.7  # and in that of other glass
 
@@ -31,7 +31,7 @@ def surface_program(context: Any, features: Iterable[str], n_lights: int, n_samp
         "DL_SCALE": DL_SCALE,
         "WHITE": IL_WHITE,
         "IL_HEADLIGHT": IL_HEADLIGHT,
-        "PANE_OPACITY": PANE_OPACITY,
+        "PANE_OPACITY": MAX_PANE_OPACITY,
         "PANE_MIRROR": PANE_MIRROR,
         "GLASS_MIRROR": GLASS_MIRROR,
     }

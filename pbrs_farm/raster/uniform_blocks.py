@@ -9,7 +9,7 @@ from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.raster.light_choice import LIGHT_FLOATS, best_lights, light_table
 
-MATERIAL_FLOATS = 16  # four vec4, as surface.frag.glsl declares them
+BLOCK_FLOATS = 16  # four vec4, as surface.frag.glsl declares them
 _HEADER_FLOATS = 4  # before the lights: their number, transmission, 0, 0
 LAMP_TRANSMISSION = 0.1  # share of light that passes through a lamp's own parts: shades look lit
 
@@ -19,7 +19,7 @@ _EMISSION = {MaterialKind.BULB: 1.0, MaterialKind.SHADE: 0.5}
 def material_blocks(house: House) -> F32:
     """(n_materials, 16) the Material block of each material."""
     rows = [_material_block(m) for m in house.materials]
-    return np.array(rows, np.float32).reshape(-1, MATERIAL_FLOATS)
+    return np.array(rows, np.float32).reshape(-1, BLOCK_FLOATS)
 
 
 def _material_block(material: Material) -> list[float]:

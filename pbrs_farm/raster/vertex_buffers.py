@@ -13,7 +13,7 @@ from pbrs_farm.core.mesh import triangle_corners, unit_normals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mesh:
+class DrawMesh:
     """All triangles of a house for OpenGL; a draw is those of one item with one material."""
 
     vertices: F32  # (V, 8) position (world, m), normal (unit), uv (v up)
@@ -31,7 +31,7 @@ class Mesh:
         return len(self.draw_first)
 
 
-def mesh_from_house(house: House) -> Mesh:
+def mesh_from_house(house: House) -> DrawMesh:
     """The mesh of every surface of house, panes included; non-finite triangles are dropped."""
     vertices: list[F32] = []
     indices: list[NDArray[np.uint32]] = []
@@ -58,7 +58,7 @@ def mesh_from_house(house: House) -> Mesh:
 
     table = np.array(rows, np.int64).reshape(-1, 4)
     box = np.array(boxes, np.float64).reshape(-1, 2, 3)
-    return Mesh(
+    return DrawMesh(
         np.concatenate([np.zeros((0, 8), np.float32), *vertices]),
         np.concatenate([np.zeros((0, 3), np.uint32), *indices]),
         *table.T, *np.moveaxis(box, 1, 0),

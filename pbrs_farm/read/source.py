@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _MODEL_SUFFIXES: Final = (".obj", ".sh3f", ".mtl", ".fbx", ".dae", ".3ds", ".ply", ".stl")
 _FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip of a unit
 
-Kind = Literal["builtin", "example", "sweethome3d", "suncg", "gltf", "object"]
+SourceKind = Literal["builtin", "example", "sweethome3d", "suncg", "gltf", "object"]
 
 
 class SourceRef(BaseModel):
@@ -40,7 +40,7 @@ class SourceRef(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    kind: Kind
+    kind: SourceKind
     location: str
     house_id: str
     sha256: str
@@ -60,7 +60,7 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
     path = Path(word)
     if not _is_utf8(word):
         raise BadHouse(word, "", "the path is no UTF-8", hint="rename the file or its folder")
-    kind: Kind
+    kind: SourceKind
     if word.startswith("{"):
         kind = "object"
     elif word == "builtin":
@@ -89,7 +89,7 @@ def _is_utf8(word: str) -> bool:
     return "\0" not in word
 
 
-def _reference(kind: Kind, location: str, files: SourceFiles) -> SourceRef:
+def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef:
     """The source at a location of a known kind, with the digests of its files."""
     if kind == "builtin":
         from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -118,7 +118,7 @@ def _reference(kind: Kind, location: str, files: SourceFiles) -> SourceRef:
     )
 
 
-def _companions(kind: Kind, path: Path, data: bytes, files: SourceFiles) -> str:
+def _companions(kind: SourceKind, path: Path, data: bytes, files: SourceFiles) -> str:
     """Digest of what a scene or a home reads beside its own file."""
     if kind == "gltf":
         from pbrs_farm.read.gltf.document import files_of_gltf

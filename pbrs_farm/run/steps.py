@@ -48,7 +48,7 @@ from pbrs_farm.run.view_histogram import view_histogram
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
     from pbrs_farm.sample import CameraReport
-    from pbrs_farm.selection.view_record import Place
+    from pbrs_farm.selection.view_record import ViewPlace
     from pbrs_farm.transport.light_result import LightResult
 
 
@@ -332,7 +332,7 @@ def _view(work: Work) -> StepOutput:
         house = cached.house
         room = room_of(house, view)
         name = room.name if room is not None else ""
-        place: Place = {
+        place: ViewPlace = {
             "house": work.house_id, "view": view.id, "room": view.room_id, "room_type": name,
         }  # fmt: skip
         files["histogram.json"] = view_histogram(

@@ -16,7 +16,7 @@ from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.formats.histogram_json import SCORED_MODE
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.selection import scene_quality, view_record
-from pbrs_farm.selection.view_record import Place
+from pbrs_farm.selection.view_record import ViewPlace
 from pbrs_farm.store.object_store import Store
 
 _MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})
@@ -24,7 +24,7 @@ _MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})
 
 def view_histogram(
     store: Store,
-    place: Place,
+    place: ViewPlace,
     modes: Iterable[Mode],
     view_json: Mapping[str, Any],
     notes: Iterable[Note],

@@ -7,7 +7,7 @@ weak, or shows what a better view of the home shows already.
 
 from __future__ import annotations
 
-from collections import Counter as Tally
+import collections
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -176,7 +176,7 @@ class PhotoSampler:
 def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) -> SectorReport:
     """How many candidates of a sector each rule rejected, and its view."""
     verdict = scored.verdict[scored.candidates.sector == sector]
-    tally = Tally(verdict.tolist())
+    tally = collections.Counter(verdict.tolist())
     refused = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
     ranked = scored.ranked(sector)
     most = ", ".join(

@@ -5,7 +5,7 @@ No effects of its own: pictures come from the counter it is given.
 
 from __future__ import annotations
 
-from collections import Counter as Tally
+import collections
 from dataclasses import dataclass
 
 import numpy as np
@@ -232,7 +232,7 @@ class RoomSampler:
     def _report(
         self, sector: int, verdict: NDArray[np.uint8], full: FullScores, views: list[View]
     ) -> SectorReport:
-        tally = Tally(verdict.tolist())
+        tally = collections.Counter(verdict.tolist())
         ranking = full.ranking
         rejected = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
         return SectorReport(

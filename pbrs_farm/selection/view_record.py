@@ -16,11 +16,11 @@ from pbrs_farm.selection.histograms import colour_counts, depth_counts
 from pbrs_farm.selection.quality import picture_quality
 
 # Where a view was taken: ids of house, view and room, and the room's name.
-Place = Mapping[Literal["house", "view", "room", "room_type"], str]
+ViewPlace = Mapping[Literal["house", "view", "room", "room_type"], str]
 
 
 def view_record(
-    place: Place,
+    place: ViewPlace,
     pictures: Mapping[Mode, Srgb8Image],
     depth_mm: NDArray[np.integer],
     scene: SceneQuality,

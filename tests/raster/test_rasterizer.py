@@ -9,7 +9,7 @@ from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.recipe import RasterFields
 from pbrs_farm.raster import Rasterizer
 from pbrs_farm.raster import gl_device as device
-from pbrs_farm.raster.shader_programs import DL_SCALE, PANE_OPACITY
+from pbrs_farm.raster.shader_programs import DL_SCALE, MAX_PANE_OPACITY
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.raster.raster_scenes import camera, house, item, square
@@ -99,7 +99,7 @@ def test_a_window_pane_lets_nearly_everything_through():
     with Rasterizer(house((wall, item(square(-2.0, 1))), (RED, pane)), {}) as glazed:
         picture = glazed.render_dl(camera())
     red = picture[12, 16, 0] / without[12, 16, 0]
-    assert 1 - 2 * PANE_OPACITY < red <= 1
+    assert 1 - 2 * MAX_PANE_OPACITY < red <= 1
     assert picture[12, 16, 1] < 100
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from pbrs_farm.run.processes.message import Kind, Message
+from pbrs_farm.run.processes.message import Message, MessageKind
 
 
 @dataclass
@@ -34,7 +34,7 @@ class FakeChild:
     was_closed: bool = False
 
     def at(
-        self, seconds: float, what: Kind | Callable[[], None], text: str = "", **body: Any
+        self, seconds: float, what: MessageKind | Callable[[], None], text: str = "", **body: Any
     ) -> None:
         """Say something, or have something happen, at that time of the clock."""
         self.script.append((seconds, Message(what, text, body) if isinstance(what, str) else what))

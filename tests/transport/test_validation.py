@@ -16,7 +16,7 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.validation import claims
-from pbrs_farm.transport.validation.claims import Claim, light_claims
+from pbrs_farm.transport.validation.claims import LightClaim, light_claims
 from pbrs_farm.transport.validation.statistics import z_scores
 
 VARIANT = choose_variant()
@@ -68,7 +68,7 @@ FAULTS = [
 @needs_kernels
 @pytest.mark.parametrize(("prove", "fault"), FAULTS)
 def test_a_claim_holds_and_fails_on_a_renderer_that_is_wrong(
-    prove: Callable[[str], Claim],
+    prove: Callable[[str], LightClaim],
     fault: Callable[[LightResult], LightResult],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -98,9 +98,9 @@ def test_a_scalar_variant_is_told_that_there_is_nothing_to_prove() -> None:
 def test_the_exit_code_says_whether_all_claims_hold(
     passed: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def found(_variant: str) -> Iterator[Claim]:
-        yield Claim("one", "1", "1", True, 0.5)
-        yield Claim("two", "2", "2", passed, 0.5)
+    def found(_variant: str) -> Iterator[LightClaim]:
+        yield LightClaim("one", "1", "1", True, 0.5)
+        yield LightClaim("two", "2", "2", passed, 0.5)
 
     monkeypatch.setattr(claims, "light_claims", found)
     assert main(["verify", "--light", "--json"]) == (0 if passed else 1)

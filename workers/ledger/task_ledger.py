@@ -16,7 +16,7 @@ from pbrs_farm.core.errors import PbrsError, Transient
 if TYPE_CHECKING:
     from workers.job import HouseEntry, JobSpec
 
-Verdict = Literal[
+ClaimAnswer = Literal[
     "run", "done", "failed", "leased", "early", "cancelled", "paused", "held", "version", "recipe",
     "draining", "blocked", "elsewhere", "unknown",
 ]  # fmt: skip
@@ -50,7 +50,7 @@ class LedgerUnavailable(PbrsError, Transient):
 class Claim:
     """The answer to a claim."""
 
-    verdict: Verdict
+    verdict: ClaimAnswer
     detail: str = ""  # the attempt's number for "run", otherwise the reason
     inputs: str = ""  # the house's source for geometry, its batches of views for what follows
     token: str = ""  # fences off whoever lost the lease

@@ -28,7 +28,7 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class BuiltinPiece:
     """A thing to place."""
 
     name: str
@@ -53,7 +53,12 @@ def slab(w: float, d: float, y0: float, y1: float) -> tuple[Triple, Triple]:
 
 
 def place(
-    piece: Piece, item_id: str, room_id: str, at: Triple, turn_deg: float, materials: dict[str, int]
+    piece: BuiltinPiece,
+    item_id: str,
+    room_id: str,
+    at: Triple,
+    turn_deg: float,
+    materials: dict[str, int],
 ) -> Item:
     """The piece as an item, turned about +y and moved to at (3,)."""
     turn = rotation_y(np.radians(turn_deg))
@@ -104,7 +109,7 @@ def _oriented_box(item: Item, turn: NDArray[np.float64], origin: NDArray[np.floa
     return Box(turn @ ((low + high) / 2) + origin, (high - low) / 2, turn)
 
 
-SOFA = Piece(
+SOFA = BuiltinPiece(
     "sofa",
     6,
     (
@@ -113,7 +118,7 @@ SOFA = Piece(
         Part("wood_dark", legs(1.9, 0.75, 0.1)),
     ),
 )  # fmt: skip
-ARMCHAIR = Piece(
+ARMCHAIR = BuiltinPiece(
     "armchair",
     5,
     (
@@ -121,12 +126,12 @@ ARMCHAIR = Piece(
         Part("wood_dark", legs(0.7, 0.7, 0.12)),
     ),
 )  # fmt: skip
-COFFEE_TABLE = Piece(
+COFFEE_TABLE = BuiltinPiece(
     "coffee table",
     7,
     (Part("wood", (slab(1.0, 0.55, 0.37, 0.41),)), Part("wood_dark", legs(0.92, 0.47, 0.37))),
 )
-BOWL = Piece(
+BOWL = BuiltinPiece(
     "bowl",
     40,
     turned=(
@@ -137,7 +142,7 @@ BOWL = Piece(
         ),
     ),
 )
-TV_BENCH = Piece(
+TV_BENCH = BuiltinPiece(
     "tv bench",
     3,
     (
@@ -145,17 +150,17 @@ TV_BENCH = Piece(
         Part("white", (((-0.72, 0.1, 0.2), (-0.02, 0.41, 0.215)), ((0.02, 0.1, 0.2), (0.72, 0.41, 0.215)))),
     ),
 )  # fmt: skip
-TV = Piece(
+TV = BuiltinPiece(
     "tv",
     25,
     (Part("black", (slab(1.05, 0.05, 0.06, 0.66), slab(0.4, 0.18, 0.0, 0.02), slab(0.06, 0.04, 0.02, 0.06))),),
 )  # fmt: skip
-DINING_TABLE = Piece(
+DINING_TABLE = BuiltinPiece(
     "dining table",
     7,
     (Part("wood", (slab(1.2, 0.8, 0.71, 0.75),)), Part("wood", legs(1.12, 0.72, 0.71, 0.06))),
 )
-CHAIR = Piece(
+CHAIR = BuiltinPiece(
     "chair",
     5,
     (
@@ -164,7 +169,7 @@ CHAIR = Piece(
                       ((-0.17, 0.7, -0.2), (0.17, 0.88, -0.18)))),
     ),
 )  # fmt: skip
-BOOKSHELF = Piece(
+BOOKSHELF = BuiltinPiece(
     "bookshelf",
     10,
     (
@@ -175,7 +180,7 @@ BOOKSHELF = Piece(
         Part("cloth_navy", tuple(((-0.1 + 0.06 * k, 1.155, -0.1), (-0.05 + 0.06 * k, 1.38 + 0.02 * (k % 2), 0.09)) for k in range(7))),
     ),
 )  # fmt: skip
-FLOOR_LAMP = Piece(
+FLOOR_LAMP = BuiltinPiece(
     "floor lamp",
     35,
     turned=(
@@ -185,7 +190,7 @@ FLOOR_LAMP = Piece(
     kind=ItemKind.LAMP,
     bulb=((0.0, 1.42, 0.0), 0.035, True),
 )  # fmt: skip
-PENDANT = Piece(
+PENDANT = BuiltinPiece(
     "pendant lamp",
     35,
     turned=(
@@ -196,13 +201,13 @@ PENDANT = Piece(
     kind=ItemKind.LAMP,
     bulb=((0.0, 0.1, 0.0), 0.04, False),
 )
-RUG = Piece("rug", 20, (Part("rug", (slab(2.2, 1.5, 0.002, 0.012),)),))
-PICTURE = Piece(
+RUG = BuiltinPiece("rug", 20, (Part("rug", (slab(2.2, 1.5, 0.002, 0.012),)),))
+PICTURE = BuiltinPiece(
     "picture",
     11,
     (Part("wood_dark", (slab(0.9, 0.03, 0.0, 0.6),)), Part("picture", (((-0.41, 0.04, 0.015), (0.41, 0.56, 0.017)),))),
 )  # fmt: skip
-PLANT = Piece(
+PLANT = BuiltinPiece(
     "plant",
     40,
     (Part("leaf", tuple(((-0.02 + 0.05 * c, 0.3, -0.02 + 0.05 * s), (0.02 + 0.09 * c, 0.75, 0.02 + 0.09 * s))
@@ -210,7 +215,7 @@ PLANT = Piece(
     turned=(("clay", ((0.0, 0.0), (0.12, 0.0), (0.16, 0.3), (0.0, 0.3)), (0, 0, 0)),),
     kind=ItemKind.PLANT,
 )  # fmt: skip
-BED = Piece(
+BED = BuiltinPiece(
     "bed",
     4,
     (
@@ -219,13 +224,13 @@ BED = Piece(
         Part("cloth_blue", (((-0.74, 0.5, -0.35), (0.74, 0.54, 0.98)),)),
     ),
 )  # fmt: skip
-PILLOW = Piece("pillow", 18, (Part("white", (slab(0.55, 0.38, 0.0, 0.11),)),))
-NIGHT_STAND = Piece(
+PILLOW = BuiltinPiece("pillow", 18, (Part("white", (slab(0.55, 0.38, 0.0, 0.11),)),))
+NIGHT_STAND = BuiltinPiece(
     "night stand",
     32,
     (Part("wood", (slab(0.42, 0.38, 0.0, 0.5),)), Part("wood_dark", (((-0.18, 0.28, 0.19), (0.18, 0.46, 0.2)),))),
 )  # fmt: skip
-WARDROBE = Piece(
+WARDROBE = BuiltinPiece(
     "wardrobe",
     3,
     (
@@ -233,12 +238,12 @@ WARDROBE = Piece(
         Part("wood", (((-0.59, 0.06, 0.3), (-0.01, 2.0, 0.315)), ((0.01, 0.06, 0.3), (0.59, 2.0, 0.315)))),
     ),
 )  # fmt: skip
-DESK = Piece(
+DESK = BuiltinPiece(
     "desk",
     14,
     (Part("wood", (slab(1.2, 0.6, 0.7, 0.74),)), Part("white", legs(1.16, 0.56, 0.7)), Part("white", (((0.2, 0.5, -0.25), (0.55, 0.7, 0.28)),))),
 )  # fmt: skip
-MIRROR = Piece(
+MIRROR = BuiltinPiece(
     "mirror",
     19,
     (Part("wood_dark", (slab(0.6, 0.03, 0.0, 1.1),)), Part("mirror", (((-0.27, 0.03, 0.015), (0.27, 1.07, 0.018)),))),

@@ -207,7 +207,7 @@ def _frame(
     )
 
 
-def _door_piece(w: float, h: float) -> furniture.Piece:
+def _door_piece(w: float, h: float) -> furniture.BuiltinPiece:
     leaf = ((-w / 2 + 0.05, 0.0, -0.02), (w / 2 - 0.05, h - 0.05, 0.02))
     knobs = (((w / 2 - 0.16, 0.98, -0.07), (w / 2 - 0.1, 1.02, 0.07)),)
     parts = (
@@ -215,10 +215,10 @@ def _door_piece(w: float, h: float) -> furniture.Piece:
         furniture.Part("wood", (leaf,)),
         furniture.Part("metal", knobs),
     )
-    return furniture.Piece("door", 8, parts, kind=ItemKind.DOOR)
+    return furniture.BuiltinPiece("door", 8, parts, kind=ItemKind.DOOR)
 
 
-def _window_piece(w: float, h: float) -> furniture.Piece:
+def _window_piece(w: float, h: float) -> furniture.BuiltinPiece:
     sill = ((-w / 2 + 0.05, 0.0, -0.05), (w / 2 - 0.05, 0.05, 0.05))
     mullion = ((-0.025, 0.05, -0.03), (0.025, h - 0.05, 0.03))
     panes = (
@@ -229,12 +229,12 @@ def _window_piece(w: float, h: float) -> furniture.Piece:
         furniture.Part("white", (*_frame(w, h, 0.05, 0.05), sill, mullion)),
         furniture.Part("pane", panes),
     )
-    return furniture.Piece("window", 9, parts, kind=ItemKind.WINDOW)
+    return furniture.BuiltinPiece("window", 9, parts, kind=ItemKind.WINDOW)
 
 
 def _furniture(index: dict[str, int]) -> list[Item]:
     f = furniture
-    places: tuple[tuple[furniture.Piece, str, furniture.Triple, float], ...] = (
+    places: tuple[tuple[furniture.BuiltinPiece, str, furniture.Triple, float], ...] = (
         (f.RUG, "0_0", (1.8, 0.0, 1.9), 0),
         (f.SOFA, "0_0", (1.8, 0.0, 0.65), 0),
         (f.COFFEE_TABLE, "0_0", (1.8, 0.0, 1.9), 0),

@@ -71,7 +71,7 @@ _STANDING: Final = frozenset({"bathtub", "bed", "chair", "desk", "sofa", "table"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PieceSize:
     """How large a piece is and how high it stands, in metres."""
 
     width: float
@@ -179,7 +179,7 @@ def _known(phrase: str) -> tuple[str, bool] | None:
     return None
 
 
-def _fits(label: str, place: Place | None) -> bool:
+def _fits(label: str, place: PieceSize | None) -> bool:
     if place is None or label not in _SIZES:
         return True
     long_min, long_max, height_min, height_max = _SIZES[label]
@@ -191,7 +191,7 @@ def _fits(label: str, place: Place | None) -> bool:
     return long_min <= side <= long_max and height_min <= place.height <= height_max
 
 
-def _by_words(name: str, place: Place | None, rule: str) -> PieceClass:
+def _by_words(name: str, place: PieceSize | None, rule: str) -> PieceClass:
     # The class of the first candidate that fits the piece; "size" if only misfits are known.
     refused = False
     for label, is_noun in _candidates(name):
@@ -205,7 +205,7 @@ def _by_words(name: str, place: Place | None, rule: str) -> PieceClass:
 
 
 def class_of_piece(
-    catalogue_id: str, name: str, group: str = "", place: Place | None = None
+    catalogue_id: str, name: str, group: str = "", place: PieceSize | None = None
 ) -> PieceClass:
     """The class by catalogue id, else by whole words of the name, of the group, of the id.
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.textures import texture_from_bytes
+
+PANE_OPACITY: Final = 0.2  # of panes and glass whose source says opaque
 
 
 class LoadedTexture(NamedTuple):

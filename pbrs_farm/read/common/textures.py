@@ -12,7 +12,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.house import Texture
 
 MAX_EDGE_PX: Final = 16384
-MAX_PIXELS: Final = 64_000_000
+MAX_TEXTURE_PIXELS: Final = 64_000_000
 _KEPT: Final = {"PNG": "image/png", "JPEG": "image/jpeg", "MPO": "image/jpeg"}
 _TRIED: Final = ("PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP")
 _HOLE_BELOW: Final = 128
@@ -40,7 +40,7 @@ def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
 
 def _texture(picture: Image.Image, data: bytes, name: str) -> tuple[Texture, bool]:
     width, height = picture.size
-    if max(width, height) > MAX_EDGE_PX or width * height > MAX_PIXELS:
+    if max(width, height) > MAX_EDGE_PX or width * height > MAX_TEXTURE_PIXELS:
         raise ValueError(f"the picture is too large: {width} x {height}")
     # Decode in full, a JPEG at an eighth: a header alone proves nothing.
     media_type = _KEPT.get(picture.format or "")

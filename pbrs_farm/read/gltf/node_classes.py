@@ -12,13 +12,12 @@ from fnmatch import fnmatchcase
 from itertools import chain
 from typing import Any, Final
 
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of, nyu40_of, words_of
 
-OTHERPROP: Final = 40  # NYU40: a thing of no class
 _OTHERSTRUCTURE: Final = NYU40_NAMES.index("otherstructure")
 _WALL_WORDS: Final = "wall wallpaper wand waende tapete mur muro pared parete parede"
 _CEILING_WORDS: Final = "ceiling zimmerdecke decke plafond techo soffitto teto"

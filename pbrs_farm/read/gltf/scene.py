@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +30,7 @@ from pbrs_farm.read.gltf.scene_rooms import (
     rooms_from_json,
 )
 from pbrs_farm.read.suncg.wall_holes import openings
-
-MAX_FILE_BYTES: Final = 1_000_000_000
+from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,14 +48,14 @@ def read_gltf_file(path: Path, fields: ReadFields) -> House:
     Raises BadHouse naming file and place; a name that leads out of the file's folder is rejected.
     """
     folder = RootFolder(path.parent)
-    data = folder.read(path.name, max_bytes=MAX_FILE_BYTES)
+    data = folder.read(path.name, max_bytes=MAX_SCENE_BYTES)
     if data is None:
         raise BadHouse(path, "", "no such file")
     mapping, rooms = side_files(path)
     beside = Beside(
-        fetch=lambda name: folder.read(name, max_bytes=MAX_FILE_BYTES),
-        mapping=folder.read(mapping, max_bytes=MAX_FILE_BYTES),
-        rooms=folder.read(rooms, max_bytes=MAX_FILE_BYTES),
+        fetch=lambda name: folder.read(name, max_bytes=MAX_SCENE_BYTES),
+        mapping=folder.read(mapping, max_bytes=MAX_SCENE_BYTES),
+        rooms=folder.read(rooms, max_bytes=MAX_SCENE_BYTES),
     )
     house = read_gltf(data, path.name, fields=fields, beside=beside)
     if folder.n_read > 1:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import (
     MAX_INSTANCES,
@@ -20,22 +21,17 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.read.common.material_library import PANE_OPACITY
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import oriented_box, placed
 from pbrs_farm.read.common.planar_walls import planar_parts
 from pbrs_farm.read.gltf.document import Placed, placed_nodes
 from pbrs_farm.read.gltf.mesh_primitives import meshes_of
-from pbrs_farm.read.gltf.node_classes import (
-    OTHERPROP,
-    Mapping,
-    NodeClass,
-    class_of_node,
-    collection_of,
-)
+from pbrs_farm.read.gltf.node_classes import Mapping, NodeClass, class_of_node, collection_of
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.gltf.punctual_lights import assumed_light, emitted, punctual_light
 from pbrs_farm.read.gltf.structure_parts import UNMAPPED, centres_of, structure_parts
-from pbrs_farm.read.gltf.window_glass import PANE_OPACITY, glass_materials, names_glass
+from pbrs_farm.read.gltf.window_glass import glass_materials, names_glass
 from pbrs_farm.read.mesh.obj import Mesh
 
 _UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)  # what no name tells

@@ -9,8 +9,6 @@ from typing import Any, Final
 
 from pbrs_farm.formats.glb import Gltf, entry
 
-PANE_OPACITY: Final = 0.2  # of glass whose material says opaque
-
 # Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
 _GLASS: Final = frozenset(
     ("glass", "glazing", "pane", "windowpane", "windowglass", "glas", "scheibe", "verglasung",

@@ -15,7 +15,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.mesh import face_areas
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.read.mesh.shading_normals import crease_normals
-from pbrs_farm.read.mesh.triangulate import triangle_corners
+from pbrs_farm.read.mesh.triangulate import triangulated_corners
 
 DEFAULT_CREASE_RAD = np.radians(45.0)
 _MANY_FACES = 50_000  # of a part, above which repeated faces are looked for
@@ -226,7 +226,7 @@ def _mesh(
         return None, len(sizes)
     # Triangulate, and drop triangles without area.
     indices = _indices(part, pools, file)
-    corners = triangle_corners(pools[0][indices[:, 0]], sizes)
+    corners = triangulated_corners(pools[0][indices[:, 0]], sizes)
     index = indices[corners]
     v = index[:, :, 0]
     keep = face_areas(pools[0][v]) > 0

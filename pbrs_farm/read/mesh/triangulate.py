@@ -12,7 +12,9 @@ from pbrs_farm.core.mesh import area_vectors
 MAX_EAR_CUT = 5_000
 
 
-def triangle_corners(positions: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+def triangulated_corners(
+    positions: NDArray[np.float64], sizes: NDArray[np.int64]
+) -> NDArray[np.int64]:
     """(T, 3) corner numbers of the triangles that polygons are cut into, in the polygons' order.
 
     positions: (C, 3) the polygons' corners one after the other; sizes: (P,) corners of each.

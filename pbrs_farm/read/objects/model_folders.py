@@ -18,12 +18,11 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.read.common.furniture_classes import nyu40_of
 from pbrs_farm.regular_files import open_regular
 
-OTHERPROP: Final = NYU40_NAMES.index("otherprop")
 _MODEL_SUFFIXES: Final = (".obj", ".glb", ".gltf")
 _PLAIN_FOLDERS: Final = ("models", "")  # ShapeNet's, that say nothing
 _MAX_CATALOGUE_BYTES: Final = 16_000_000  # unpacked

@@ -31,9 +31,8 @@ from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.suncg.model_files import Models
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
-from pbrs_farm.regular_files import open_regular
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, open_regular
 
-_MAX_FILE_BYTES: Final = 1_000_000_000
 _MAX_UNPACKED_BYTES: Final = 500_000_000
 
 
@@ -94,7 +93,7 @@ def object_companions(model: ObjectModel, files: SourceFiles) -> Iterator[str]:
             library = material_library(folder, name)
             yield from (library, *files.pictures(folder, library))
         else:
-            data = folder.read(name, max_bytes=_MAX_FILE_BYTES) or b""
+            data = folder.read(name, max_bytes=MAX_SCENE_BYTES) or b""
             for reference in files_of_gltf(data, name):
                 yield folder.name_from(posixpath.dirname(name), reference)
     except BadHouse:
@@ -142,7 +141,7 @@ def _obj(
 
 def material_library(folder: RootFolder, name: str) -> str:
     """The first mtllib of an OBJ as a name below the folder; `<stem>.mtl` where it has none."""
-    data = folder.read(name, max_bytes=_MAX_FILE_BYTES) or b""
+    data = folder.read(name, max_bytes=MAX_SCENE_BYTES) or b""
     reference = posixpath.splitext(posixpath.basename(name))[0] + ".mtl"
     at = data.find(b"mtllib ")
     if at >= 0:
@@ -153,13 +152,13 @@ def material_library(folder: RootFolder, name: str) -> str:
 def _gltf(
     folder: RootFolder, name: str, notes: Notes, fields: ReadFields
 ) -> tuple[list[Surface], MaterialLibrary]:
-    data = folder.read(name, max_bytes=_MAX_FILE_BYTES)
+    data = folder.read(name, max_bytes=MAX_SCENE_BYTES)
     if data is None:
         raise BadHouse(folder.root, name, "no such file")
 
     def fetch(reference: str) -> bytes | None:
         inside = folder.name_from(posixpath.dirname(name), reference)
-        return folder.read(inside, max_bytes=_MAX_FILE_BYTES)
+        return folder.read(inside, max_bytes=MAX_SCENE_BYTES)
 
     gltf = gltf_document(data, name, fetch)
     materials = SceneMaterials(gltf, fetch, notes)

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import ItemKind, LightPart
@@ -26,7 +26,6 @@ CLASS_TABLES: Final = ("ModelCategoryMappingNewActive.csv", "ModelCategoryMappin
 VARIANT_TABLE: Final = "models.csv"
 LAMP_TABLE: Final = "light_geometry_compact.txt"
 LIGHT_TABLE: Final = "suncgModelLights.json"
-OTHERPROP: Final = 40
 _MAX_TABLE_BYTES: Final = 32_000_000
 _NYU40_IDS: Final = {name.replace(" ", "_"): i for i, name in enumerate(NYU40_NAMES)} | {
     "void": 0,

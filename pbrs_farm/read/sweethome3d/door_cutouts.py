@@ -15,7 +15,7 @@ from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import DoorFrame, PlanPiece, PlanWall
 from pbrs_farm.read.sweethome3d.parse_pieces import FULL_CUT_OUT
-from pbrs_farm.read.sweethome3d.placement import Frame
+from pbrs_farm.read.sweethome3d.placement import PieceFrame
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
 MARGIN_M = 0.005
@@ -37,7 +37,7 @@ class StandingWall:
 
 def opening_of(
     piece: PlanPiece,
-    frame: Frame,
+    frame: PieceFrame,
     walls: list[StandingWall],
     materials: HomeMaterials,
     ids: tuple[str, str, str],
@@ -80,7 +80,7 @@ def _outlines(piece: PlanPiece, door: DoorFrame, materials: HomeMaterials) -> tu
     return kept or polygons_from_path(FULL_CUT_OUT)
 
 
-def _local_outline(outline: Points2, door: DoorFrame, frame: Frame) -> Points2:
+def _local_outline(outline: Points2, door: DoorFrame, frame: PieceFrame) -> Points2:
     # From the unit square (y down from the top) to the piece's frame, counter-clockwise.
     x = door.wall_left + outline[:, 0] * door.wall_width
     y = door.wall_top + outline[:, 1] * door.wall_height
@@ -89,7 +89,7 @@ def _local_outline(outline: Points2, door: DoorFrame, frame: Frame) -> Points2:
 
 
 def _depth_span(
-    frame: Frame, door: DoorFrame, walls: list[StandingWall]
+    frame: PieceFrame, door: DoorFrame, walls: list[StandingWall]
 ) -> tuple[float, float] | None:
     # The range along the piece's depth in which the walls it stands in lie.
     half_x, half_y, half_z = frame.half
@@ -121,7 +121,7 @@ def _depth_span(
     return min(s[0] for s in spans) - MARGIN_M, max(s[1] for s in spans) + MARGIN_M
 
 
-def _is_along(wall: PlanWall, frame: Frame) -> bool:
+def _is_along(wall: PlanWall, frame: PieceFrame) -> bool:
     if abs(wall.arc) > 1e-3:
         return True
     direction = np.array(wall.end) - np.array(wall.start)
@@ -130,20 +130,20 @@ def _is_along(wall: PlanWall, frame: Frame) -> bool:
     return abs(float(direction @ across)) < PARALLEL_SINE * max(float(np.linalg.norm(across)), 1e-6)
 
 
-def _rectangle(frame: Frame, half_x: float, half_z: float) -> shapely.Polygon:
+def _rectangle(frame: PieceFrame, half_x: float, half_z: float) -> shapely.Polygon:
     local = np.array(
         [[-half_x, 0, -half_z], [half_x, 0, -half_z], [half_x, 0, half_z], [-half_x, 0, half_z]]
     )
     return shapely.Polygon(frame.world(local)[:, [0, 2]])
 
 
-def _depths(shape: shapely.Geometry, frame: Frame) -> F64:
+def _depths(shape: shapely.Geometry, frame: PieceFrame) -> F64:
     plan = shapely.get_coordinates(shape)
     return np.asarray((plan - frame.origin[[0, 2]]) @ frame.axes[[0, 2], 2])
 
 
 def _extruded(
-    outlines: list[Points2], span: tuple[float, float], frame: Frame, material: int
+    outlines: list[Points2], span: tuple[float, float], frame: PieceFrame, material: int
 ) -> Surface:
     # A closed prism along the piece's depth for each outline (counter-clockwise).
     positions, faces, n = [], [], 0

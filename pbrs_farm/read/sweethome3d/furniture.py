@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import DOOR, LAMP, OTHERPROP, WINDOW
 from pbrs_farm.core.house import Item, MaterialKind, Opening
 from pbrs_farm.read.common.furniture_classes import (
     CLASS_TAG,
     PieceClass,
-    Place,
+    PieceSize,
     class_of_piece,
     kind_of,
 )
@@ -20,22 +20,25 @@ from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
 from pbrs_farm.read.sweethome3d.home_xml import PlanLevel, PlanPiece
 from pbrs_farm.read.sweethome3d.light_sources import light_parts
 from pbrs_farm.read.sweethome3d.piece_materials import piece_material
-from pbrs_farm.read.sweethome3d.piece_models import PANE, Model, Models
-from pbrs_farm.read.sweethome3d.placement import Frame, frame_of, local_from_model, placed_surface
+from pbrs_farm.read.sweethome3d.piece_models import PANE, PieceModel, PieceModels
+from pbrs_farm.read.sweethome3d.placement import (
+    PieceFrame,
+    frame_of,
+    local_from_model,
+    placed_surface,
+)
 
-DOOR, WINDOW = NYU40_NAMES.index("door"), NYU40_NAMES.index("window")
-LAMP, OTHERPROP = NYU40_NAMES.index("lamp"), NYU40_NAMES.index("otherprop")
 NEAR_M = 0.5  # A piece outside every room belongs to a room no farther than this
 
 
 def piece_item(
     piece: PlanPiece,
     level: PlanLevel,
-    models: Models,
+    models: PieceModels,
     materials: HomeMaterials,
     ids: tuple[str, str],
     rooms: list[ReadRoom],
-) -> tuple[Item, Frame] | None:
+) -> tuple[Item, PieceFrame] | None:
     """The placed item and its frame, or None (with a note) if there is no model to place.
 
     ids: of the item, of its level.
@@ -81,12 +84,12 @@ def _piece_class(piece: PlanPiece) -> PieceClass:
     # Openings and lights are what their element says; a tilted piece has no size to check.
     is_checked = piece.frame is None and piece.tag != "light" and not (piece.pitch or piece.roll)
     width, depth, height = piece.size
-    place = Place(width, height, depth, piece.elevation) if is_checked else None
+    place = PieceSize(width, height, depth, piece.elevation) if is_checked else None
     return class_of_piece(piece.catalogue_id, piece.name, piece.group, place)
 
 
 def _label(
-    piece: PlanPiece, by_rule: PieceClass, model: Model, materials: HomeMaterials
+    piece: PlanPiece, by_rule: PieceClass, model: PieceModel, materials: HomeMaterials
 ) -> tuple[int, tuple[str, ...]]:
     tags = ["mirrored"] if piece.is_mirrored else []
     label, rule = by_rule.nyu40, by_rule.tag
@@ -107,7 +110,7 @@ def _label(
     return label, tuple(tags)
 
 
-def _room_of(frame: Frame, level_id: str, rooms: list[ReadRoom]) -> str | None:
+def _room_of(frame: PieceFrame, level_id: str, rooms: list[ReadRoom]) -> str | None:
     point = shapely.Point(frame.origin[[0, 2]])
     best, nearest = None, NEAR_M
     for room in rooms:
@@ -123,7 +126,7 @@ def _room_of(frame: Frame, level_id: str, rooms: list[ReadRoom]) -> str | None:
 def piece_opening(
     piece: PlanPiece,
     item: Item,
-    frame: Frame,
+    frame: PieceFrame,
     walls: list[StandingWall],
     materials: HomeMaterials,
     material: int,

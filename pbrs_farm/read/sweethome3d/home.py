@@ -23,7 +23,7 @@ from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom, plane_items, read_ro
 from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, PlanLevel, level_of
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 from pbrs_farm.read.sweethome3d.parse import parse_plan
-from pbrs_farm.read.sweethome3d.piece_models import Models
+from pbrs_farm.read.sweethome3d.piece_models import PieceModels
 from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
 from pbrs_farm.read.sweethome3d.wall_solids import wall_items
 
@@ -139,7 +139,7 @@ def _furniture(
     file: str,
     fields: ReadFields,
 ) -> tuple[list[Item], tuple[Opening, ...]]:
-    models = Models(materials, file, fields.max_model_triangles)
+    models = PieceModels(materials, file, fields.max_model_triangles)
     walls = _standing_walls(plan, outlines)
     cutter_material = materials.painted(Paint(), "cut", "")
     items: list[Item] = []

@@ -16,7 +16,7 @@ Matrix3 = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class PlanPicture:
     """A texture on a surface, as the home lays it."""
 
     image: str  # content name
@@ -34,7 +34,7 @@ class Paint:
     """What covers a surface; nothing given = the default."""
 
     colour: Rgb | None = None  # sRGB-encoded
-    picture: Picture | None = None
+    picture: PlanPicture | None = None
     shininess: float | None = None  # 0..1, None = as the model has it
     is_hidden: bool = False  # not drawn at all
 

@@ -8,12 +8,14 @@ from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import LightPart
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.read.sweethome3d.home_xml import PlanPiece
-from pbrs_farm.read.sweethome3d.placement import Frame
+from pbrs_farm.read.sweethome3d.placement import PieceFrame
 
 DEFAULT_RADIUS_M = 0.0325
 
 
-def light_parts(piece: PlanPiece, frame: Frame, emitting: tuple[int, ...]) -> tuple[LightPart, ...]:
+def light_parts(
+    piece: PlanPiece, frame: PieceFrame, emitting: tuple[int, ...]
+) -> tuple[LightPart, ...]:
     """One part per light source; none where the lamp is switched off.
 
     emitting: the item's surfaces that glow; they belong to the first source. A lamp whose model

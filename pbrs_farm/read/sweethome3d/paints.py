@@ -5,7 +5,7 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from pbrs_farm.read.sweethome3d.attributes import Attributes
-from pbrs_farm.read.sweethome3d.home_xml import Baseboard, Paint, Picture
+from pbrs_farm.read.sweethome3d.home_xml import Baseboard, Paint, PlanPicture
 
 
 def wall_paint(a: Attributes, side: str) -> Paint:
@@ -41,13 +41,13 @@ def _paint(a: Attributes, colour: str, texture: str | None, shininess: str | Non
     return Paint(None if argb is None else argb[1], picture, shine)
 
 
-def picture_of(parent: Attributes, element: Element) -> Picture:
+def picture_of(parent: Attributes, element: Element) -> PlanPicture:
     """A <texture> element; sizes that make no sense count as one metre."""
     name = element.get("name", "")
     a = Attributes(parent.file, f"{parent.place} texture '{name}'", element, parent.max_extent_m)
     width, height = a.metres("width", 1.0), a.metres("height", 1.0)
     scale = a.number("scale", 1.0)
-    return Picture(
+    return PlanPicture(
         image=a.text("image"),
         name=name,
         width=width if width > 1e-4 else 1.0,

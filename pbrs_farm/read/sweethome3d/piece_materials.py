@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pbrs_farm.core.house import Material, MaterialKind
-from pbrs_farm.read.common.material_library import LoadedTexture
+from pbrs_farm.read.common.material_library import PANE_OPACITY, LoadedTexture
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.home_materials import SHININESS_SCALE, HomeMaterials
-from pbrs_farm.read.sweethome3d.home_xml import Paint, Picture, PlanPiece
-from pbrs_farm.read.sweethome3d.piece_models import LIGHT, MIRROR, PANE, Model, content_name
+from pbrs_farm.read.sweethome3d.home_xml import Paint, PlanPicture, PlanPiece
+from pbrs_farm.read.sweethome3d.piece_models import LIGHT, MIRROR, PANE, PieceModel, content_name
 
-PANE_OPACITY = 0.2  # of panes and glass whose model says opaque
 CLEAR = 0.95  # Opacity below which a material counts as glass
 
 
@@ -22,12 +21,12 @@ class PieceMaterial:
 
     name: str  # the surface's: role and material
     material: int  # index in the library
-    picture: Picture | None  # how the home lays a texture of its own; None: by the model's uv
+    picture: PlanPicture | None  # how the home lays a texture of its own; None: by the model's uv
     emits: bool
 
 
 def piece_material(
-    piece: PlanPiece, mesh: Mesh, model: Model, materials: HomeMaterials
+    piece: PlanPiece, mesh: Mesh, model: PieceModel, materials: HomeMaterials
 ) -> PieceMaterial | None:
     """The material of one mesh, or None if the home makes it invisible."""
     base = model.materials.get(mesh.material) or ObjMaterial(mesh.material or "default")
@@ -87,9 +86,9 @@ def _texture(
     paint: Paint,
     base: ObjMaterial,
     mesh: Mesh,
-    model: Model,
+    model: PieceModel,
     materials: HomeMaterials,
-) -> tuple[LoadedTexture | None, Picture | None]:
+) -> tuple[LoadedTexture | None, PlanPicture | None]:
     """The mesh's texture, and how the home lays it (None: by the model's uv)."""
     if paint.picture is not None:
         loaded = materials.texture(paint.picture.image, piece.place)

@@ -24,7 +24,7 @@ _ROLES = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Model:
+class PieceModel:
     """A parsed model."""
 
     meshes: tuple[Mesh, ...]  # in the model's frame
@@ -43,7 +43,7 @@ def role_of(group: str) -> str:
     return ""
 
 
-class Models:
+class PieceModels:
     """Parsed models by content name; notes what cannot be read."""
 
     def __init__(self, materials: HomeMaterials, file: str, max_triangles: int) -> None:
@@ -51,9 +51,11 @@ class Models:
         self._file = file
         self._max_triangles = max_triangles
         self._parsed: dict[str, ObjModel | None] = {}
-        self._models: dict[tuple[str, Transformations], Model] = {}
+        self._models: dict[tuple[str, Transformations], PieceModel] = {}
 
-    def get(self, name: str, place: str, transformations: Transformations = ()) -> Model | None:
+    def get(
+        self, name: str, place: str, transformations: Transformations = ()
+    ) -> PieceModel | None:
         """The model, its parts moved, or None (with a note) if it is missing or cannot be read."""
         if name not in self._parsed:
             self._parsed[name] = self._load(name, place)
@@ -90,7 +92,7 @@ class Models:
             note("degenerate-faces", f"model {name}", text)
         return parsed
 
-    def _model(self, parsed: ObjModel, name: str) -> Model:
+    def _model(self, parsed: ObjModel, name: str) -> PieceModel:
         folder, note = posixpath.dirname(name), self._materials.notes.add
         # Start from the program's own materials; libraries of the model replace them.
         materials = dict(builtin_materials())
@@ -108,7 +110,7 @@ class Models:
         meshes = _merged(parsed.meshes)
         corners = [m.positions for m in meshes] or [np.zeros((1, 3))]
         points = np.concatenate(corners)
-        return Model(meshes, materials, folder, points.min(0), points.max(0))
+        return PieceModel(meshes, materials, folder, points.min(0), points.max(0))
 
     def _content(self, folder: str, name: str) -> bytes | None:
         return self._materials.contents.read(content_name(folder, name))

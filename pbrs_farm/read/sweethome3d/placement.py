@@ -10,16 +10,16 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Surface
 from pbrs_farm.read.mesh.obj import Mesh
-from pbrs_farm.read.sweethome3d.home_xml import Picture, PlanLevel, PlanPiece
+from pbrs_farm.read.sweethome3d.home_xml import PlanLevel, PlanPicture, PlanPiece
 from pbrs_farm.read.sweethome3d.piece_materials import PieceMaterial
-from pbrs_farm.read.sweethome3d.piece_models import Model
+from pbrs_farm.read.sweethome3d.piece_models import PieceModel
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 _FLAT = 1e-9  # an extent below it has no scale
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class PieceFrame:
     """A piece's own frame: origin in its box's middle, x right, y up, z to its front, metres."""
 
     origin: F64
@@ -37,7 +37,7 @@ class Frame:
         return np.asarray(local @ self.axes.T + self.origin)
 
 
-def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None) -> Frame:
+def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None) -> PieceFrame:
     """Where a piece stands. local_height: (N, 3) its local points, to measure a tilted height."""
     width, depth, height = piece.size
     half = np.array([width, height, depth]) / 2
@@ -54,10 +54,10 @@ def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None
             in_plan = piece.height_in_plan
     x, z = piece.centre
     origin = np.array([x, level.elevation + piece.elevation + in_plan / 2, z])
-    return Frame(origin, axes, half, -1.0 if piece.is_mirrored else 1.0)
+    return PieceFrame(origin, axes, half, -1.0 if piece.is_mirrored else 1.0)
 
 
-def local_from_model(piece: PlanPiece, model: Model) -> F64:
+def local_from_model(piece: PlanPiece, model: PieceModel) -> F64:
     """(4, 4) from the model's frame to the piece's: centred, turned, scaled to the piece's size."""
     turn = np.eye(3) if piece.rotation is None else np.array(piece.rotation).reshape(3, 3)
     # Turn the model about its middle and measure it anew.
@@ -81,7 +81,7 @@ def local_from_model(piece: PlanPiece, model: Model) -> F64:
 
 
 def placed_surface(
-    mesh: Mesh, painted: PieceMaterial, frame: Frame, local: F64, matrix: F64
+    mesh: Mesh, painted: PieceMaterial, frame: PieceFrame, local: F64, matrix: F64
 ) -> Surface:
     """One mesh of a piece in the world. local: (V, 3) its points in the piece's frame."""
     normals = mesh.normals @ _inverse_transpose(frame.axes @ matrix[:3, :3]).T
@@ -110,7 +110,7 @@ def _inverse_transpose(linear: F64) -> F64:
     return cofactors * (-1.0 if np.linalg.det(linear) < 0 else 1.0)
 
 
-def _projected(local: F64, normals: F64, half: F64, picture: Picture) -> F64:
+def _projected(local: F64, normals: F64, half: F64, picture: PlanPicture) -> F64:
     # Metres right and up on the side of the box that each vertex's normal faces.
     p = local + half
     axis = np.abs(normals).argmax(1)

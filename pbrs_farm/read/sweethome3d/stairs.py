@@ -7,7 +7,7 @@ import shapely
 
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import Plan, PlanPiece, level_of
-from pbrs_farm.read.sweethome3d.placement import Frame, frame_of
+from pbrs_farm.read.sweethome3d.placement import PieceFrame, frame_of
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
 TOLERANCE_M = 0.01  # of heights that meet
@@ -54,7 +54,7 @@ def _joined(cuts: dict[str, list[shapely.Geometry]]) -> Cuts:
     return {level: shapely.union_all(holes) for level, holes in cuts.items()}
 
 
-def _hole(piece: PlanPiece, frame: Frame, materials: HomeMaterials) -> shapely.Geometry | None:
+def _hole(piece: PlanPiece, frame: PieceFrame, materials: HomeMaterials) -> shapely.Geometry | None:
     # The cut-out shape is drawn in the unit square, x to the right, y to the front.
     try:
         outlines = polygons_from_path(piece.staircase_cut_out)

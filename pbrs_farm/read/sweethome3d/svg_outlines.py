@@ -21,7 +21,7 @@ MAX_CLOSES: Final = 1_000  # The library looks back for the start of a sub-path 
 
 MAX_COORDINATE: Final = 1e6
 CURVE_STEPS: Final = 16  # straight pieces of a curve
-ARC_STEP_RAD: Final = math.radians(7.5)
+SVG_ARC_STEP_RAD: Final = math.radians(7.5)
 
 # Kind of a curve, its control point that T or S reflects, and of which one of the curve before.
 _SMOOTH: Final = ((QuadraticBezier, "control", "control"), (CubicBezier, "control1", "control2"))
@@ -78,7 +78,7 @@ def _segments(text: str) -> list[Any]:
 def _n_steps(segment: Any) -> int:
     """Points that a segment adds: of arcs by their angle, of curves a fixed number."""
     if isinstance(segment, Arc):
-        return max(1, math.ceil(abs(float(segment.sweep)) / ARC_STEP_RAD))
+        return max(1, math.ceil(abs(float(segment.sweep)) / SVG_ARC_STEP_RAD))
     return 1 if isinstance(segment, Move | Line | Close) else CURVE_STEPS
 
 

@@ -13,9 +13,9 @@ from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_xml import (
     Baseboard,
     Paint,
-    Picture,
     Plan,
     PlanLevel,
+    PlanPicture,
     PlanWall,
     level_of,
 )
@@ -162,7 +162,7 @@ def _textured(surface: Surface, paint: Paint, floor_y: float) -> Surface:
     return replace(surface, uvs=picture_uvs(metres, picture).astype(np.float32))
 
 
-def picture_uvs(metres: F64, picture: Picture) -> F64:
+def picture_uvs(metres: F64, picture: PlanPicture) -> F64:
     """(N, 2) texture coordinates of points given in metres along a surface (right, up)."""
     c, s = np.cos(picture.angle), np.sin(picture.angle)
     # Turn, scale to the picture's size, then move by its offset.

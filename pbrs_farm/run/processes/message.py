@@ -9,14 +9,14 @@ from typing import Any, Literal
 
 # ready: it may be given a task. step: a step begins. waiting: storage does not answer.
 # event: something else its parent wants to know. done, fault: the end of the task.
-Kind = Literal["ready", "step", "waiting", "event", "done", "fault"]
+MessageKind = Literal["ready", "step", "waiting", "event", "done", "fault"]
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
     """One line from a render process."""
 
-    kind: Kind
+    kind: MessageKind
     text: str = ""
     body: dict[str, Any] = field(default_factory=dict)  # JSON values that its parent understands
 

@@ -49,7 +49,7 @@ _SKY_OF_ONE: Final = (1.0, 1.0, 1.0)  # radiance of a sky that is white and even
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class LightClaim:
     """A statement about light, what was measured, and whether it holds."""
 
     text: str
@@ -59,7 +59,7 @@ class Claim:
     seconds: float = 0.0  # that the measurement took
 
 
-def light_claims(variant: str) -> Iterator[Claim]:
+def light_claims(variant: str) -> Iterator[LightClaim]:
     """Every claim, measured one after the other in a Mitsuba variant, in a minute on two cores.
 
     Raises MachineFailed in a scalar variant: our kernels do not run there.
@@ -88,8 +88,8 @@ def _spp(n: int, **more: object) -> LightFields:
 # Claims with a closed form
 
 
-def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], Claim]:
-    def measure(variant: str) -> Claim:
+def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], LightClaim]:
+    def measure(variant: str) -> LightClaim:
         results = _rendered(variant, rooms.furnace(albedo), dark_sky(), fields, *_MEASURING_SEEDS)
         # Compare with the geometric series, cut off at the longest path.
         means = [float((r.indoor @ LUMINANCE).mean()) for r in results]
@@ -97,7 +97,7 @@ def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], C
         error = max(float(np.std(means, ddof=1)) / math.sqrt(len(means)), 5e-4 * expected)
         is_near = abs(float(np.mean(means)) - expected) <= _SIGMAS * error
         is_precise = error < 0.01 * expected
-        return Claim(
+        return LightClaim(
             f"furnace room, {name}: the geometric series, albedo {albedo:g}",
             f"{np.mean(means):.5f}",
             f"{expected:.5f} +- {_SIGMAS * error:.5f}",
@@ -107,7 +107,7 @@ def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], C
     return measure
 
 
-def _floor(variant: str) -> Claim:
+def _floor(variant: str) -> LightClaim:
     ground = rooms.quad([(-50, 0, -50), (-50, 0, 50), (50, 0, 50), (50, 0, -50)], 0)
     house = rooms.house(
         [ground], [rooms.matte("floor", 0.5), rooms.BULB], lamps=[rooms.bulb((0, 1, 0), 1, 1000.0)]
@@ -122,7 +122,7 @@ def _floor(variant: str) -> Claim:
     )
 
 
-def _open_ground(variant: str) -> Claim:
+def _open_ground(variant: str) -> LightClaim:
     ground = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
     # Nothing stands on the ground: every direction of the upper half sees the sky.
     house = rooms.house([ground], [rooms.matte("ground", 0.2)], size=(2.0, 2.5, 2.0))
@@ -132,8 +132,8 @@ def _open_ground(variant: str) -> Claim:
     return _near(text, lux["outdoor"], sky.sky_lx + sky.sun_lx, 0.02, "lx")
 
 
-def _near(text: str, measured: float, expected: float, tolerance: float, unit: str) -> Claim:
-    return Claim(
+def _near(text: str, measured: float, expected: float, tolerance: float, unit: str) -> LightClaim:
+    return LightClaim(
         text,
         f"{measured:.6g} {unit}",
         f"{expected:.6g} {unit} +- {tolerance:.0%}",
@@ -154,8 +154,8 @@ def _sun() -> Sky:
 
 def _metropolis_is_path(
     name: str, room: Callable[[], tuple[House, Camera]], sky: Callable[[], Sky]
-) -> Callable[[str], Claim]:
-    def measure(variant: str) -> Claim:
+) -> Callable[[str], LightClaim]:
+    def measure(variant: str) -> LightClaim:
         path = _spp(256, pilot_spp=4)
         a = _rendered(variant, room(), sky(), _CHAINS, 50, 51, 52, 53)
         b = _rendered(variant, room(), sky(), path, 10, 11, 12, 13)
@@ -164,7 +164,7 @@ def _metropolis_is_path(
     return measure
 
 
-def _direct_and_indirect(variant: str) -> Claim:
+def _direct_and_indirect(variant: str) -> LightClaim:
     # Render with separate direct light, and all light by chains.
     whole = _CHAINS.model_copy(update={"direct_spp": 0, "mutations_per_pixel": 256})
     a = _rendered(variant, _window(), _sun(), _CHAINS, 20, 21, 22, 23)
@@ -172,7 +172,7 @@ def _direct_and_indirect(variant: str) -> Claim:
     return _one_mean("direct by path + the rest by chains = all light by chains", a, b)
 
 
-def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> Claim:
+def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> LightClaim:
     """That two lists of independent renders have one mean, block by block, in each group."""
     worst, n = 0.0, 0
     for group in Group:
@@ -184,7 +184,7 @@ def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> Claim:
         if lit.any():
             z = z_scores([v[lit] for v in x], [v[lit] for v in y])
             worst, n = max(worst, float(np.abs(z).max())), n + z.size
-    return Claim(
+    return LightClaim(
         text, f"worst |z| {worst:.2f} of {n} blocks", f"< {_BLOCK_SIGMAS:g}", worst < _BLOCK_SIGMAS
     )
 
@@ -192,7 +192,7 @@ def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> Claim:
 # Claims that hold to the bit
 
 
-def _groups_sum(variant: str) -> Claim:
+def _groups_sum(variant: str) -> LightClaim:
     # Keep the bulb's geometry in the room without lamp light: the paths must be the same.
     dim = rooms.window_room(0.7, lumen=1e-30)
     room = _window()
@@ -200,7 +200,7 @@ def _groups_sum(variant: str) -> Claim:
     (day,) = _rendered(variant, dim, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
     (night,) = _rendered(variant, room, dark_sky(), _spp(16), 1)
     off = float(np.abs(both.mode(Mode.MLT_IL_OL) - (day.outdoor + night.indoor)).max())
-    return Claim(
+    return LightClaim(
         "sky alone + lamps alone = both in one trace, to the bit",
         f"largest difference {off:g}",
         "0",
@@ -208,7 +208,7 @@ def _groups_sum(variant: str) -> Claim:
     )
 
 
-def _doubled_emitters(variant: str) -> Claim:
+def _doubled_emitters(variant: str) -> LightClaim:
     # Double the sky and the bulb: powers of two keep every bit of the mantissa.
     (one,) = _rendered(variant, _window(), uniform_sky((1, 1, 1)), _spp(16), 1)
     (two,) = _rendered(
@@ -216,7 +216,7 @@ def _doubled_emitters(variant: str) -> Claim:
     )
     a, b = one.mode(Mode.MLT_IL_OL), two.mode(Mode.MLT_IL_OL)
     off = float(np.abs(b - 2 * a).max())
-    return Claim(
+    return LightClaim(
         "emitters x 2 = radiance x 2, to the bit",
         f"mean x {b.mean() / a.mean():.7f}, largest difference {off:g}",
         "x 2, 0",
@@ -224,31 +224,31 @@ def _doubled_emitters(variant: str) -> Claim:
     )
 
 
-def _sealed_room(variant: str) -> Claim:
+def _sealed_room(variant: str) -> LightClaim:
     # Close all six sides: no light may leak in at edges and corners.
     room = rooms.house(rooms.shell((4, 2.5, 4), 0), [rooms.matte("wall", 0.9)])
     camera = rooms.camera((0.5, 1.5, 0.5), (3.9, 0.2, 3.9))
     (result,) = _rendered(variant, (room, camera), _sun(), _spp(64), 1)
     top = float(max(result.outdoor.max(), result.indoor.max()))
-    return Claim("a sealed room under a bright sky is black", f"max {top:g}", "0", top == 0)
+    return LightClaim("a sealed room under a bright sky is black", f"max {top:g}", "0", top == 0)
 
 
-def _window_pane(variant: str) -> Claim:
+def _window_pane(variant: str) -> LightClaim:
     glazed = rooms.window_room(0.7, lumen=800, pane=True)
     (a,) = _rendered(variant, _window(), _sun(), _spp(16), 1)
     (b,) = _rendered(variant, glazed, _sun(), _spp(16), 1)
     off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
-    return Claim(
+    return LightClaim(
         "a pane in the window changes no bit", f"largest difference {off:g}", "0", off == 0
     )
 
 
-def _repeats(variant: str) -> Claim:
+def _repeats(variant: str) -> LightClaim:
     # Render twice with one seed, then with another.
     a, b, c = _rendered(variant, _window(), _sun(), _spp(16), 7, 7, 8)
     off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
     differs = bool((a.indoor != c.indoor).any())
-    return Claim(
+    return LightClaim(
         "path: the same seed gives the same bits, another does not",
         f"largest difference {off:g}, other seed {'differs' if differs else 'is the same'}",
         "0, differs",
@@ -256,13 +256,13 @@ def _repeats(variant: str) -> Claim:
     )
 
 
-def _nonfinite(variant: str) -> Claim:
+def _nonfinite(variant: str) -> LightClaim:
     # Hang a lamp of infinite power beside the window: every path that meets it is not finite.
     room = rooms.window_room(0.7, lumen=math.inf)
     (path,) = _rendered(variant, room, _sun(), _spp(16), 1)
     finite = bool(np.isfinite(path.outdoor).all() and np.isfinite(path.indoor).all())
     n_paths = 16 * path.outdoor.shape[0] * path.outdoor.shape[1]
-    return Claim(
+    return LightClaim(
         "what is not finite is left out and counted",
         f"{path.n_nonfinite} of {n_paths} paths, picture {'finite' if finite else 'not finite'}",
         "> 0, finite",
@@ -270,7 +270,7 @@ def _nonfinite(variant: str) -> Claim:
     )
 
 
-_CLAIMS: Final[tuple[Callable[[str], Claim], ...]] = (
+_CLAIMS: Final[tuple[Callable[[str], LightClaim], ...]] = (
     *(_furnace(_spp(128), "path", albedo) for albedo in (0.0, 0.3, 0.8)),
     *(_furnace(_FEW_CHAINS, "Metropolis", albedo) for albedo in (0.3, 0.8)),
     _floor,

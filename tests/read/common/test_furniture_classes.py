@@ -6,7 +6,13 @@ import pytest
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.read.common.furniture_classes import Place, class_of_piece, kind_of, nyu40_of, plain
+from pbrs_farm.read.common.furniture_classes import (
+    PieceSize,
+    class_of_piece,
+    kind_of,
+    nyu40_of,
+    plain,
+)
 
 
 @pytest.mark.parametrize(
@@ -89,25 +95,25 @@ def test_a_name_is_read_by_whole_words_in_its_language(name: str, label: str) ->
 @pytest.mark.parametrize(
     ("name", "place", "label", "rule"),
     [
-        ("Chair", Place(0.5, 0.9, 0.5), "chair", "name"),
-        ("Chair", Place(3.0, 0.9, 0.5), None, "size"),
-        ("Table", Place(0.6, 0.05, 0.4), None, "size"),
-        ("Bed", Place(0.6, 0.2, 0.3), "bed", "name"),
-        ("Bed", Place(0.6, 0.2, 0.3, bottom=0.8), None, "size"),
-        ("Desk xyzzy", Place(1.4, 0.75, 0.7), "desk", "inner-word"),
-        ("Desk xyzzy", Place(0.2, 0.3, 0.1), None, "size"),
-        ("Xyzzy", Place(1, 1, 1), None, "none"),
+        ("Chair", PieceSize(0.5, 0.9, 0.5), "chair", "name"),
+        ("Chair", PieceSize(3.0, 0.9, 0.5), None, "size"),
+        ("Table", PieceSize(0.6, 0.05, 0.4), None, "size"),
+        ("Bed", PieceSize(0.6, 0.2, 0.3), "bed", "name"),
+        ("Bed", PieceSize(0.6, 0.2, 0.3, bottom=0.8), None, "size"),
+        ("Desk xyzzy", PieceSize(1.4, 0.75, 0.7), "desk", "inner-word"),
+        ("Desk xyzzy", PieceSize(0.2, 0.3, 0.1), None, "size"),
+        ("Xyzzy", PieceSize(1, 1, 1), None, "none"),
     ],
 )
 def test_size_and_place_refuse_what_the_words_say(
-    name: str, place: Place, label: str | None, rule: str
+    name: str, place: PieceSize, label: str | None, rule: str
 ) -> None:
     piece = class_of_piece("", name, "", place)
     assert (piece.nyu40, piece.rule) == (None if label is None else NYU40_NAMES.index(label), rule)
 
 
 def test_a_catalogue_piece_of_impossible_size_goes_by_its_name() -> None:
-    tray = Place(0.4, 0.03, 0.4)
+    tray = PieceSize(0.4, 0.03, 0.4)
     assert class_of_piece("eTeks#squareTable", "Tray", "", tray).rule == "name"
     assert class_of_piece("eTeks#squareTable", "Table", "", tray).rule == "size"
     assert class_of_piece("eTeks#squareTable", "Table").rule == "catalogue"

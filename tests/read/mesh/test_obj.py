@@ -11,7 +11,7 @@ import trimesh
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.mesh.mtl import builtin_materials, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
-from pbrs_farm.read.mesh.triangulate import triangle_corners
+from pbrs_farm.read.mesh.triangulate import triangulated_corners
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -59,7 +59,7 @@ def test_polygons_keep_their_order_and_winding_whatever_their_size() -> None:
     angles = 2 * np.pi * np.arange(7) / 7
     ring = np.stack([np.cos(angles), np.sin(angles), 0 * angles], -1)
     positions = np.concatenate([ring[:3], ring[:5], ring, ring[:4]])
-    corners = triangle_corners(positions, np.array([3, 5, 7, 4]))
+    corners = triangulated_corners(positions, np.array([3, 5, 7, 4]))
     assert corners[:, 0].tolist() == [0, 3, 3, 3, 8, 8, 8, 8, 8, 15, 15]
     a, b, c = (positions[corners[:, k]] for k in range(3))
     assert (np.cross(b - a, c - a)[:, 2] > 0).all()
