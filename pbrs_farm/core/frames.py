@@ -27,14 +27,6 @@ def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
     return world_from_camera @ OPENCV_FROM_OPENGL
 
 
-def published_normal_from_world(
-    normal_world: NDArray[np.floating], world_from_camera: Matrix4
-) -> NDArray[np.float64]:
-    """(..., 3) normals in the published camera frame (x right, y forward, z up) from world normals."""
-    published_from_world = PUBLISHED_FROM_OPENGL @ world_from_camera[:3, :3].T
-    return np.asarray(normal_world, np.float64) @ published_from_world.T
-
-
 def rotation_y(angle_rad: float) -> NDArray[np.float64]:
     """(3, 3) right-handed rotation about +y."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)

@@ -76,22 +76,6 @@ def select(
     return _write(store, run, scores, fields, facts, reference, n_scored_houses=len(todo))
 
 
-def judge_again(
-    store: Store, reference: Reference, fields: SelectionFields, *, run: str = "default"
-) -> SelectionSummary:
-    """New verdicts at other thresholds from the stored scores of a run; nothing else is read.
-
-    Raises BadInput when there is no such run, or when it has scores of another reference or mode.
-    """
-    table = verdict_table(store, run)
-    facts = {"reference": reference.digest, "score_mode": fields.score_mode}
-    if _facts(table) != facts:
-        what = "scored with another reference or --score-mode"
-        raise BadInput(keys.selection_key(run, "parquet"), "", what)
-    scores = table.select(SCORES.names).cast(SCORES)
-    return _write(store, run, scores, fields, facts, reference, n_scored_houses=0)
-
-
 def verdict_table(store: Store, run: str = "default") -> Any:
     """The stored table of a run (scores.SCORES and the columns of verdicts); BadInput if none."""
     table = _stored_run(store, run)

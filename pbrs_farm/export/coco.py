@@ -104,11 +104,3 @@ def run_lengths(mask: NDArray[np.bool_]) -> dict[str, list[int]]:
     changes = np.nonzero(np.diff(flat, prepend=False))[0]
     counts = np.diff(np.concatenate([[0], changes, [flat.size]]))
     return {"size": [int(n) for n in mask.shape], "counts": [int(n) for n in counts]}
-
-
-def mask_from_run_lengths(runs: dict[str, list[int]]) -> NDArray[np.bool_]:
-    """The mask (H, W) that run_lengths wrote."""
-    height, width = runs["size"]
-    # Runs alternate between zeros and ones.
-    values = np.arange(len(runs["counts"])) % 2 == 1
-    return np.repeat(values, runs["counts"]).reshape(width, height).T

@@ -54,21 +54,14 @@ def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
 
 
 class RenderTarget:
-    """A framebuffer: colour in half floats, multisampled, resolved on read; or depth and ids.
+    """A framebuffer of colour in half floats, multisampled, resolved on read.
 
-    prepass_depth: for colour, the depth texture that a first pass over the house fills.
+    prepass_depth: the depth texture that a first pass over the house fills.
     """
 
-    def __init__(self, context: Any, size: tuple[int, int], kind: str, samples: int) -> None:
+    def __init__(self, context: Any, size: tuple[int, int], samples: int) -> None:
         self._context, self._size = context, size
-        self.prepass_depth: Any = None
-        # For ids, keep depth_z and the instance id of each pixel's centre: one sample, no blending.
-        if kind == "ids":
-            planes = [context.renderbuffer(size, 1, dtype=t) for t in ("f4", "u4")]
-            self._drawn = context.framebuffer(planes, context.depth_renderbuffer(size))
-            self._resolved = self._drawn
-            return
-        # For colour, draw into several samples a pixel and resolve into a second framebuffer.
+        # Draw into several samples a pixel and resolve into a second framebuffer.
         plane = context.renderbuffer(size, 4, dtype="f2", samples=samples)
         depth = context.depth_renderbuffer(size, samples=samples)
         self._drawn = context.framebuffer([plane], depth)
@@ -86,14 +79,11 @@ class RenderTarget:
         self._drawn.use()
         self._drawn.clear(*colour, depth=1.0)
 
-    def read(self, dtype: str, attachment: int, channels: int) -> NDArray[Any]:
-        """(H, W, channels), row 0 = top."""
-        if self._resolved is not self._drawn:
-            self._context.copy_framebuffer(self._resolved, self._drawn)
-        raw = self._resolved.read(
-            components=channels, attachment=attachment, dtype=dtype, alignment=1
-        )
-        pixels = np.frombuffer(raw, np.dtype(dtype)).reshape(*self._size[::-1], channels)
+    def read(self) -> NDArray[np.float16]:
+        """(H, W, 3) float16 linear colour, row 0 = top."""
+        self._context.copy_framebuffer(self._resolved, self._drawn)
+        raw = self._resolved.read(components=3, dtype="f2", alignment=1)
+        pixels = np.frombuffer(raw, np.float16).reshape(*self._size[::-1], 3)
         return np.ascontiguousarray(pixels[::-1])
 
 

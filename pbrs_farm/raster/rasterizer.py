@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64, DepthZ, ItemBuffer, Srgb8Image
+from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House
@@ -33,7 +33,7 @@ from pbrs_farm.raster.shader_features import (
     features_of_material,
     light_features,
 )
-from pbrs_farm.raster.shader_programs import buffer_program, surface_program
+from pbrs_farm.raster.shader_programs import depth_program, surface_program
 from pbrs_farm.raster.uniform_blocks import (
     BLOCK_FLOATS,
     aligned_rows,
@@ -72,7 +72,7 @@ class Rasterizer:
         self._light_features = light_features(house)
         self._programs: dict[tuple[str, int], tuple[Any, Any]] = {}  # (mode, kind) -> program, VAO
         self._queries = [self._context.query(samples=True) for _ in range(self._mesh.n_draws)]
-        self._targets: dict[tuple[int, int, str], RenderTarget] = {}  # (width, height, kind)
+        self._targets: dict[tuple[int, int], RenderTarget] = {}  # (width, height, kind)
         self._upload(house, textures, n_lights)
 
     def _upload(
@@ -126,27 +126,9 @@ class Rasterizer:
         """(H, W, 3) OpenGL-IL: the lamps' lights, the best of them for each object, no shadows."""
         return self._render(camera, "il")
 
-    def depth_and_items(self, camera: Camera) -> tuple[DepthZ, ItemBuffer]:
-        """(H, W) depth_z in metres and (H, W) instance ids at pixel centres; 0 = nothing.
-
-        Panes and glass are solid here, as in the hit record.
-        """
-        with self._context:
-            target = self._target(camera, "ids")
-            clip = clip_from_world(camera, far_plane(camera, *self._boxes))
-            target.begin((0.0, 0.0, 0.0, 0.0))
-            # Write the instance id of each draw as a uniform.
-            program, vao = self._program("ids", 0)
-            _set(program, clip_from_world=clip)
-            for draw in self._front_to_back(camera, clip):
-                program["item"] = int(self._mesh.draw_item[draw])
-                self._draw(vao, draw)
-            depth_z, item = target.read("f4", 0, 1), target.read("u4", 1, 1)
-        return depth_z[..., 0], item[..., 0]
-
     def _render(self, camera: Camera, mode: str) -> Srgb8Image:
         with self._context:
-            target = self._target(camera, "colour")
+            target = self._target(camera)
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))
             order = self._front_to_back(camera, clip)
             if mode == "il":
@@ -163,7 +145,7 @@ class Rasterizer:
                     self._draw(self._program(mode, int(number))[1], int(draw))
             if (kind & Feature.TRANSPARENT).any():
                 self._blend_transparent(mode, order[(kind & Feature.TRANSPARENT) > 0], camera)
-            return srgb8_from_half(target.read("f2", 0, 3))
+            return srgb8_from_half(target.read())
 
     @property
     def _boxes(self) -> tuple[F64, F64]:
@@ -257,10 +239,10 @@ class Rasterizer:
         indices.release()
 
     def _program(self, mode: str, kind: int) -> tuple[Any, Any]:
-        """Program and vertex array of a mode ("dl", "il", "ids", "depth") for feature bits kind."""
+        """Program and vertex array of a mode ("dl", "il", "depth") for feature bits kind."""
         if (mode, kind) not in self._programs:
-            if mode in ("ids", "depth"):
-                program = buffer_program(self._context, mode)
+            if mode == "depth":
+                program = depth_program(self._context)
             else:
                 features = [f"MODE_{mode.upper()}", *feature_names(kind)]
                 features += self._light_features if mode == "il" else []
@@ -285,13 +267,11 @@ class Rasterizer:
             program, [(self._vertices, layout, *[n for n in names if n])], indices
         )
 
-    def _target(self, camera: Camera, kind: str) -> RenderTarget:
-        i = camera.intrinsics
-        key = (i.width_px, i.height_px, kind)
-        if key not in self._targets:
-            size = (i.width_px, i.height_px)
-            self._targets[key] = RenderTarget(self._context, size, kind, self._samples)
-        return self._targets[key]
+    def _target(self, camera: Camera) -> RenderTarget:
+        size = (camera.intrinsics.width_px, camera.intrinsics.height_px)
+        if size not in self._targets:
+            self._targets[size] = RenderTarget(self._context, size, self._samples)
+        return self._targets[size]
 
 
 def _set(program: Any, **values: Any) -> None:

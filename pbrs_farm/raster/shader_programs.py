@@ -43,11 +43,11 @@ def surface_program(context: Any, features: Iterable[str], n_lights: int, n_samp
     )
 
 
-def buffer_program(context: Any, name: str) -> Any:
-    """Program "ids" (depth_z and instance id at pixel centres) or "depth" (depth alone)."""
+def depth_program(context: Any) -> Any:
+    """Program that writes depth alone."""
     return context.program(
         vertex_shader=_VERSION + _source("surface.vert.glsl"),
-        fragment_shader=_VERSION + _source(f"{name}.frag.glsl"),
+        fragment_shader=_VERSION + _source("depth.frag.glsl"),
     )
 
 

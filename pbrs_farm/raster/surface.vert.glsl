@@ -7,12 +7,10 @@ uniform mat4 clip_from_world;
 out vec3 position;
 out vec3 normal;
 out vec2 uv;
-out float depth_z;
 
 void main() {
     position = in_position;
     normal = in_normal;
     uv = in_uv;
     gl_Position = clip_from_world * vec4(in_position, 1.0);
-    depth_z = gl_Position.w;
 }

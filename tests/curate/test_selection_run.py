@@ -118,25 +118,8 @@ def test_a_house_that_is_gone_leaves_the_table(store: MemoryStore) -> None:
     assert {x["house"] for x in rows(store)} == {"a"}
 
 
-def test_other_thresholds_read_the_run_alone(store: MemoryStore) -> None:
+def test_another_reference_is_scored_anew(store: MemoryStore) -> None:
     selecting.select(store, reference(), LOW)
-    for key in [k for k in store.list("") if not k.startswith("selection/default")]:
-        store.delete(key)
-    high = selecting.judge_again(store, reference(), SelectionFields(min_colour=1.0))
-    assert (high.kept, high.views) == (0, 7)
-    assert high.reasons["unlike-colour"] == 7
-    low = selecting.judge_again(store, reference(), SelectionFields(min_colour=0, min_depth=0))
-    assert low.kept == 7
-
-
-def test_another_reference_is_scored_anew_and_rejected_for_judging_again(
-    store: MemoryStore,
-) -> None:
-    selecting.select(store, reference(), LOW)
-    with pytest.raises(BadInput, match="another reference"):
-        selecting.judge_again(store, reference(seed=3), LOW)
-    with pytest.raises(BadInput, match="no such run"):
-        selecting.judge_again(store, reference(), LOW, run="other")
     assert selecting.select(store, reference(seed=3), LOW).n_scored_houses == 2
 
 

@@ -7,10 +7,17 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.coco import mask_from_run_lengths, run_lengths
+from pbrs_farm.export.coco import run_lengths
 from pbrs_farm.export.export_views import export
 from pbrs_farm.images import array_from_png, png_from_array
 from tests.check.roots import SIZE, make_root
+
+
+def mask_from_run_lengths(runs: dict[str, list[int]]) -> np.ndarray:
+    """The mask (H, W) of COCO's uncompressed run lengths, read as its documentation says."""
+    height, width = runs["size"]
+    values = np.arange(len(runs["counts"])) % 2 == 1  # runs alternate, zeros first
+    return np.repeat(values, runs["counts"]).reshape(width, height).T
 
 
 @pytest.fixture(scope="module")

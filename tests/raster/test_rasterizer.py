@@ -1,10 +1,20 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.frames import srgb_from_linear
-from pbrs_farm.core.house import LightPart, Material, MaterialKind, Surface, geometry_from_house
+from pbrs_farm.core.house import (
+    House,
+    LightPart,
+    Material,
+    MaterialKind,
+    Surface,
+    geometry_from_house,
+)
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.recipe import RasterFields
 from pbrs_farm.raster import Rasterizer
@@ -23,27 +33,38 @@ def byte(linear: float) -> float:
     return float(255 * srgb_from_linear(np.array(min(linear, 1.0))))
 
 
-def test_depth_and_items_agree_with_the_hit_record():
-    home = builtin_home()
-    stored = home.cameras[0]
-    view = Camera.look(Intrinsics.from_hfov(320, 240), stored.eye, stored.towards)
-    hit = Caster(geometry_from_house(home)).hit_record(view)
-    with Rasterizer(home, {}) as raster:
-        depth_z, items = raster.depth_and_items(view)
-    same = items == hit.item
-    assert same.mean() > 0.9995
-    assert np.quantile(np.abs(depth_z - hit.depth_z)[same], 0.999) < 1e-4
-    assert np.median(np.abs(depth_z - hit.depth_z)[same]) < 1e-5
+def items_drawn(home: House, view: Camera) -> np.ndarray:
+    """(H, W) the instance id that most of a pixel's samples show, told by pictures.
+
+    Each picture paints every item red, green or blue, by one digit of its number in base three.
+    """
+    paints = tuple(Material(f"paint {k}", diffuse=tuple(np.eye(3)[k])) for k in range(3))
+    drawn = np.zeros((view.intrinsics.height_px, view.intrinsics.width_px), np.int64)
+    for digit in range(1 + int(np.log(len(home.items)) / np.log(3))):
+        items = tuple(
+            replace(i, surfaces=tuple(replace(s, material=k // 3**digit % 3) for s in i.surfaces))
+            for k, i in enumerate(home.items, start=1)
+        )
+        with Rasterizer(replace(home, items=items, materials=paints), {}) as raster:
+            drawn += 3**digit * raster.render_dl(view).argmax(axis=2)
+    return drawn
 
 
-def test_an_off_centre_principal_point_moves_the_grid_with_the_rays():
+@pytest.mark.parametrize(
+    "intrinsics",
+    [Intrinsics.from_hfov(320, 240), Intrinsics(161, 90, 140.0, 120.0, 60.25, 50.5)],
+    ids=["centred", "off-centre principal point"],
+)
+def test_a_picture_shows_the_items_of_the_hit_record(intrinsics: Intrinsics) -> None:
     home = builtin_home()
     stored = home.cameras[0]
-    view = Camera.look(Intrinsics(161, 90, 140.0, 120.0, 60.25, 50.5), stored.eye, stored.towards)
-    hit = Caster(geometry_from_house(home)).hit_record(view)
-    with Rasterizer(home, {}) as raster:
-        _, items = raster.depth_and_items(view)
-    assert (items == hit.item).mean() > 0.999
+    view = Camera.look(intrinsics, stored.eye, stored.towards)
+    hit = Caster(geometry_from_house(home)).hit_record(view).item
+    drawn = items_drawn(home, view)
+    assert (drawn == hit)[hit > 0].mean() > 0.98
+    # Away from edges only a rug's rim of a few millimetres differs.
+    inside = (minimum_filter(hit, 3) == maximum_filter(hit, 3)) & (hit > 0)
+    assert (drawn == hit)[inside].mean() > 0.9999
 
 
 def test_a_white_wall_under_directional_light_has_the_brightness_of_the_closed_form():
@@ -137,12 +158,9 @@ def test_a_house_without_lamps_is_dim_but_not_black():
     assert 30 < picture.mean() < 120
 
 
-def test_a_house_without_triangles_shows_the_sky_and_holds_no_item():
+def test_a_house_without_triangles_shows_the_sky():
     with Rasterizer(house((), ()), {}) as raster:
-        depth_z, items = raster.depth_and_items(camera())
         picture = raster.render_dl(camera())
-    assert not depth_z.any()
-    assert not items.any()
     assert (picture == picture[0, 0]).all()
 
 
@@ -176,8 +194,6 @@ def test_triangles_that_are_not_finite_or_without_area_are_drawn_as_if_not_there
     for surface in (Surface("good", good.positions, good.faces, 0), bad):
         with Rasterizer(house((item(surface),), (WHITE,)), {}) as raster:
             pictures.append(raster.render_dl(camera()))
-            _, items = raster.depth_and_items(camera())
-            assert (items == 1).all()
     assert (pictures[0] == pictures[1]).all()
 
 

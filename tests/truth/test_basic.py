@@ -4,7 +4,7 @@ import pytest
 from pbrs_farm import truth
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.frames import published_normal_from_world
+from pbrs_farm.core.frames import PUBLISHED_FROM_OPENGL
 from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.raycast.caster import Caster
@@ -95,5 +95,5 @@ def test_layers_have_the_shape_and_type_of_the_table_and_agree_with_each_other()
     length = np.linalg.norm(normal, axis=-1)
     assert np.abs(length[layers["valid"] > 0] - 1).max() < 1e-4
     _, rays = view.rays()
-    towards = published_normal_from_world(rays, view.world_from_camera)
+    towards = rays @ (PUBLISHED_FROM_OPENGL @ view.world_from_camera[:3, :3].T).T
     assert (np.einsum("hwi,hwi->hw", normal, towards)[layers["valid"] > 0] < 1e-4).all()
