@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict
 
+from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
+
 MAX_LISTED = 20  # failures of one check that are listed by place; all are counted
 
 
@@ -91,7 +93,7 @@ class Tally:
 
     def coincide(self, house: str, items: tuple[str, str]) -> None:
         """One more pixel of a house shows either of two coincident surfaces of these items."""
-        a, b = sorted(items)
+        a, b = sorted(shown(item) for item in items)
         self._coincident[house, a, b] = self._coincident.get((house, a, b), 0) + 1
 
     def fail(self, check: str, place: str, what: str, n_failed: int = 1) -> None:
@@ -99,7 +101,11 @@ class Tally:
         self._counts.setdefault(check, [0, 0, 0])[1] += int(n_failed)
         listed = self._listed.setdefault(check, [])
         if len(listed) < MAX_LISTED:
-            listed.append(f"{check}: {place}: {what}")
+            listed.append(f"{check}: {shown(place, MAX_PLACE)}: {shown(what, MAX_MESSAGE)}")
+
+    def note(self, text: str) -> None:
+        """Something is odd, but no failure."""
+        self.notes.append(shown(text, MAX_MESSAGE))
 
     def expect(self, check: str, place: str, holds: bool, what: str) -> bool:
         """One thing was looked at; it fails with what unless it holds."""

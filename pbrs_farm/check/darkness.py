@@ -5,7 +5,6 @@ Effects: reads files.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.stored_file import stored_object
 from pbrs_farm.check.stored_view import StoredView
 
 _LM_PER_W = 179.0  # of white: radiance in W m-2 sr-1 to cd m-2
@@ -44,7 +44,7 @@ def check_darkness(
     lux = _lux_of_rooms(view.folder.parent.parent / "illuminance.json").get(room)
     if lux is not None and lux < _DARK_LX:
         text = f"stands in room {room}, which has {lux:.2g} lx by all light"
-        tally.notes.append(f"{view.place} {text}")
+        tally.note(f"{view.place} {text}")
 
 
 def _ninth_tenth(level: NDArray[Any], valid: NDArray[Any]) -> float:
@@ -60,7 +60,7 @@ def _ninth_tenth(level: NDArray[Any], valid: NDArray[Any]) -> float:
 def _lux_of_rooms(file: Path) -> dict[str, float]:
     """Room id -> lx on its floor by all light; {} where illuminance.json is not there or damaged."""
     try:
-        rows = json.loads(file.read_bytes())["rooms"]
+        rows = stored_object(file)["rooms"]
         return {str(r["room"]): float(r["outdoor_lx"]) + float(r["indoor_lx"]) for r in rows}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError):
         return {}

@@ -5,12 +5,17 @@ Effects: reads files.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from pathlib import Path
 from typing import Any
 
 from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.stored_file import (
+    BadFile,
+    object_from_json,
+    stored_bytes,
+    stored_digest,
+    stored_object,
+)
 
 
 def check_files(root: Path, house: Path, tally: Tally) -> None:
@@ -33,7 +38,12 @@ def check_root_manifest(root: Path, houses: list[Path], tally: Tally) -> None:
     if not merged.is_file():
         return
     files = [h / "manifest.jsonl" for h in houses]
-    same = merged.read_bytes() == b"".join(f.read_bytes() for f in files if f.is_file())
+    try:
+        parts = [stored_bytes(f) for f in files if f.is_file()]
+        same = stored_bytes(merged) == b"".join(parts)
+    except BadFile as error:
+        tally.expect("files", "manifest.jsonl", False, str(error))
+        return
     tally.expect("files", "manifest.jsonl", same, "differs from the houses'")
 
 
@@ -41,9 +51,14 @@ def _manifest(file: Path, house: str, tally: Tally) -> dict[str, dict[str, Any]]
     if not tally.expect("files", house, file.is_file(), "has no manifest.jsonl"):
         return {}
     rows: dict[str, dict[str, Any]] = {}
-    for number, line in enumerate(file.read_text("utf-8").splitlines(), start=1):
+    try:
+        lines = stored_bytes(file).splitlines()
+    except BadFile as error:
+        tally.expect("files", f"{house}/manifest.jsonl", False, str(error))
+        return {}
+    for number, line in enumerate(lines, start=1):
         try:
-            row = json.loads(line)
+            row = object_from_json(line)
             key = str(row["key"])
             # A key that leads out of the root is no row either.
             if not {"bytes", "sha256"} <= row.keys() or ".." in key.split("/") or key[:1] == "/":
@@ -60,9 +75,13 @@ def _check_row(root: Path, key: str, row: dict[str, Any], tally: Tally) -> None:
     file = root / key
     if not tally.expect("files", key, file.is_file(), "is missing"):
         return
-    data = file.read_bytes()
-    tally.expect("files", key, len(data) == row["bytes"], f"{len(data)} bytes, not {row['bytes']}")
-    digest = hashlib.sha256(data).hexdigest()
+    try:
+        digest = stored_digest(file)
+    except BadFile as error:
+        tally.expect("files", key, False, str(error))
+        return
+    n_bytes = file.stat().st_size
+    tally.expect("files", key, n_bytes == row["bytes"], f"{n_bytes} bytes, not {row['bytes']}")
     tally.expect("hashes", key, digest == row["sha256"], "content differs from its sha256")
 
 
@@ -70,7 +89,7 @@ def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -
     for file in sorted(house.glob("done/*.json")):
         place = f"{house.name}/done/{file.name}"
         try:
-            stored = json.loads(file.read_bytes())["files"]
+            stored = stored_object(file)["files"]
             pairs = [(str(s["key"]), s["sha256"], s["n_bytes"]) for s in stored]
         except (ValueError, KeyError, TypeError):
             tally.expect("markers", place, False, "is no marker")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 _DTYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # glTF component types
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}  # components of an element
 _SEE_THROUGH = ("glass", "pane")  # kinds of material
+_MAX_ELEMENTS = 50_000_000  # vertices, triangles: nodes may show one mesh many times
 
 
 class BadGlb(ValueError):
@@ -70,7 +71,7 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
     owners: list[tuple[int, int, int]] = []  # instance, material, number of faces
     nyu40: dict[int, int] = {}
     item: dict[int, str] = {}
-    n_vertices = 0
+    n_vertices = n_faces = 0
     # Join the primitives of all nodes: those of this package carry no transform.
     for node in document.get("nodes", []):
         instance = int(node["extras"]["instance"])
@@ -86,6 +87,9 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
             faces.append(corners.astype(np.int64) + n_vertices)
             owners.append((instance, int(primitive["material"]), len(corners)))
             n_vertices += len(points)
+            n_faces += len(corners)
+            if max(n_vertices, n_faces) > _MAX_ELEMENTS:
+                raise ValueError(f"more than {_MAX_ELEMENTS} vertices or triangles")
 
     # Repeat each primitive's instance and material for its faces.
     table = np.array(owners, np.int64).reshape(-1, 3)

@@ -5,7 +5,6 @@ Effects: reads files. Knows nothing of the House or the Camera that made them.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.check.stored_file import BadFile, stored_bytes, stored_object
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import array_from_png, layers_from_exr
 
 
@@ -55,11 +56,17 @@ class StoredView:
 
     def png(self, file: str) -> NDArray[Any]:
         """Pixels of a PNG; BadInput if it cannot be read."""
-        return array_from_png((self.folder / file).read_bytes(), f"{self.place}/{file}")
+        return array_from_png(self._bytes(file), f"{self.place}/{file}")
 
     def exr(self, file: str) -> dict[str, NDArray[np.float32]]:
         """Channels of an EXR; BadInput if it cannot be read."""
-        return layers_from_exr((self.folder / file).read_bytes(), f"{self.place}/{file}")
+        return layers_from_exr(self._bytes(file), f"{self.place}/{file}")
+
+    def _bytes(self, file: str) -> bytes:
+        try:
+            return stored_bytes(self.folder / file)
+        except BadFile as error:
+            raise BadInput(f"{self.place}/{file}", "", str(error)) from None
 
     def rays(
         self, rows: NDArray[Any], columns: NDArray[Any]
@@ -71,15 +78,12 @@ class StoredView:
         return self.world_from_camera[:3, 3], camera @ self.world_from_camera[:3, :3].T
 
 
-def views_of_house(house: Path) -> list[StoredView]:
-    """Every view of a house folder that has a readable view.json, by name.
-
-    Raises ValueError naming a view.json that is no JSON object.
-    """
-    views = []
+def views_of_house(house: Path) -> tuple[list[StoredView], dict[Path, str]]:
+    """Every view of a house folder that has a readable view.json, by name; the others' faults."""
+    views, faults = [], {}
     for file in sorted(house.glob("views/*/view.json")):
-        table = json.loads(file.read_bytes())
-        if not isinstance(table, dict):
-            raise ValueError(f"{file}: not an object")
-        views.append(StoredView(file.parent, table))
-    return views
+        try:
+            views.append(StoredView(file.parent, stored_object(file)))
+        except BadFile as error:
+            faults[file] = str(error)
+    return views, faults

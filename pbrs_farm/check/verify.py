@@ -20,6 +20,7 @@ from pbrs_farm.check.file_checks import check_files, check_root_manifest
 from pbrs_farm.check.pixel_checks import RAY_LAYERS, judge
 from pbrs_farm.check.plane_checks import check_planes
 from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
+from pbrs_farm.check.stored_file import BadFile, stored_bytes
 from pbrs_farm.check.stored_mesh import BadGlb, Triangles, triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView, views_of_house
 from pbrs_farm.check.view_checks import check_consistency, check_pictures, read_labels
@@ -60,12 +61,14 @@ def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False)
 
 
 def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
+    views, faults = views_of_house(house)
+    for file, fault in faults.items():
+        place = f"{house.name}/{file.parent.name}/view.json"
+        tally.expect("layers", place, False, fault)
     try:
-        views = views_of_house(house)
-        triangles = triangles_from_glb((house / "house.glb").read_bytes())
-    except (OSError, ValueError) as error:
-        what = f"house.glb {error}" if isinstance(error, BadGlb) else str(error)
-        tally.expect("layers", house.name, False, what)
+        triangles = triangles_from_glb(stored_bytes(house / "house.glb"))
+    except (BadFile, BadGlb) as error:
+        tally.expect("layers", house.name, False, f"house.glb {error}")
         return 0
     opaque = Rays(triangles, ~triangles.see_through)
     scenes = Scenes((triangles, Rays(triangles)), (triangles, opaque))
@@ -75,7 +78,9 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
         try:
             arrays = _check_view(view, scenes, n_pixels, tally)
         except (KeyError, TypeError, ValueError, IndexError, np.linalg.LinAlgError) as error:
-            what = f"{type(error).__name__}: {error}"
+            what = (
+                f"{error} is missing" if isinstance(error, KeyError) else f"does not fit: {error}"
+            )
             tally.expect("layers", f"{view.place}/view.json", False, what)
             continue
         if arrays is not None:

@@ -68,7 +68,7 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
             place = f"{view.place}/{layer.file}"
             tally.expect("pictures", place, not constant or may_be, "is one colour")
             if constant:
-                tally.notes.append(f"{place} is one colour: {picture[0, 0].tolist()}")
+                tally.note(f"{place} is one colour: {picture[0, 0].tolist()}")
     if view.has("radiance.exr"):
         _check_radiance(view, arrays["valid"], tally)
 

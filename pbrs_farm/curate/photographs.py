@@ -19,7 +19,13 @@ from pbrs_farm import images
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import BadInput, MachineFailed
-from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular
+from pbrs_farm.regular_files import (
+    MAX_DIGEST_BYTES,
+    digest_of_regular,
+    fault_of,
+    open_regular,
+    read_regular,
+)
 from pbrs_farm.selection.depth_photographs import depth_mm_from_units, sun_rgbd_depth
 
 _RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")  # of folders
@@ -181,6 +187,12 @@ class NyuMat:
             raise MachineFailed("h5py is needed for .mat files", hint="pip install h5py") from None
         self.path = path
         try:
+            # Refuse a pipe or a device before a library waits for it.
+            with open_regular(path, MAX_DIGEST_BYTES):
+                pass
+        except OSError as error:
+            raise BadInput(path, "", fault_of(error)) from None
+        try:
             self._file = h5py.File(path, "r")
         except OSError as error:
             raise BadInput(path, "", self._open_fault(str(error))) from None
@@ -191,10 +203,8 @@ class NyuMat:
             raise
 
     def _open_fault(self, text: str) -> str:
-        if not self.path.is_file():
-            return "no such file"
         # Tell the usual mistakes apart by the first bytes.
-        with self.path.open("rb") as file:
+        with open_regular(self.path, MAX_DIGEST_BYTES) as file:
             start = file.read(10)
         if start.startswith(b"MATLAB 5.0"):
             return "a MATLAB 5 file; nyu_depth_v2_labeled.mat is of version 7.3"

@@ -20,6 +20,7 @@ from pbrs_farm.export.hdf5 import write_hdf5
 from pbrs_farm.export.released_layout import write_released
 from pbrs_farm.export.webdataset import write_webdataset
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
+from pbrs_farm.regular_files import fault_of, read_regular
 
 Writer = Callable[[list[ViewEntry], Path], int]  # (views, new folder) -> files written
 
@@ -58,10 +59,12 @@ def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
         raise BadInput(file, "", "no such selection", hint="pbrs-farm select makes one")
     try:
         # A line per view says whether it is kept.
-        rows = [json.loads(line) for line in file.read_text("utf-8").splitlines()]
+        rows = [json.loads(line) for line in read_regular(file).splitlines()]
         return {(row["house"], row["view"]) for row in rows if row["kept"]}
-    except (ValueError, KeyError, TypeError) as error:
-        raise BadInput(file, "", f"not a selection: {error}") from None
+    except OSError as error:
+        raise BadInput(file, "", fault_of(error)) from None
+    except (ValueError, KeyError, TypeError):
+        raise BadInput(file, "", "not a selection", hint="pbrs-farm select makes one") from None
 
 
 @contextmanager

@@ -14,7 +14,8 @@ from typing import Any
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
-from pbrs_farm.regular_files import read_regular
+from pbrs_farm.formats.serialise import json_fault
+from pbrs_farm.regular_files import fault_of, read_regular
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +111,10 @@ def reasons_of(root: Path) -> dict[tuple[str, str], str]:
         # A line per view, an empty reason where it is kept.
         rows = [json.loads(line) for line in read_regular(path).splitlines()]
         return {(row["house"], row["view"]): str(row["reason"]) for row in rows}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BadInput(path, "", f"not the lines of a selection: {error}") from None
+    except OSError as error:
+        raise BadInput(path, "", fault_of(error)) from None
+    except (ValueError, RecursionError, KeyError, TypeError):
+        raise BadInput(path, "", "not the lines of a selection") from None
 
 
 def json_object(path: Path) -> dict[str, Any]:
@@ -120,8 +123,10 @@ def json_object(path: Path) -> dict[str, Any]:
         value = json.loads(read_regular(path))
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError) as error:
-        raise BadInput(path, "", f"cannot be read as JSON: {error}") from None
+    except OSError as error:
+        raise BadInput(path, "", fault_of(error)) from None
+    except (ValueError, RecursionError) as error:
+        raise BadInput(path, *json_fault(error)) from None
     if not isinstance(value, dict):
         raise BadInput(path, "", "expected a JSON object")
     return value

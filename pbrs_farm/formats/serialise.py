@@ -80,17 +80,30 @@ def json_from_bytes(data: bytes, file: str) -> Any:
     """The JSON value in data; BadHouse for text that is no JSON, NaN, or absurdly deep nesting."""
     try:
         return json.loads(data, parse_constant=_refuse_constant)
-    except RecursionError:
-        raise BadHouse(file, "", "nested too deeply") from None
-    except json.JSONDecodeError as error:
-        place = f"line {error.lineno} column {error.colno}"
-        raise BadHouse(file, place, f"no valid JSON: {error.msg}") from None
-    except ValueError as error:
-        raise BadHouse(file, "", f"no valid JSON: {error}") from None
+    except (ValueError, RecursionError) as error:
+        place, fault = json_fault(error)
+        raise BadHouse(file, place, fault) from None
+
+
+def json_fault(error: Exception) -> tuple[str, str]:
+    """(place, what is wrong) of what json.loads raises, in words that say nothing of Python."""
+    if isinstance(error, RecursionError):
+        return "", "nested too deeply"
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno} column {error.colno}", f"no valid JSON: {error.msg}"
+    if isinstance(error, UnicodeDecodeError):
+        return f"byte {error.start}", "no valid JSON: the text is not UTF-8"
+    if isinstance(error, _NoNumberError):
+        return "", f"no valid JSON: {error}"
+    return "", "no valid JSON: a number has too many digits"
+
+
+class _NoNumberError(ValueError):
+    """NaN or an infinity where JSON knows none."""
 
 
 def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is not a number")
+    raise _NoNumberError(f"{name} is not a number")
 
 
 def value_from_json(hint: Any, data: Any, file: str, place: str) -> Any:

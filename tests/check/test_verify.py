@@ -1,4 +1,5 @@
 import json
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -73,6 +74,11 @@ def test_one_changed_pixel_is_caught_by_its_hash_without_looking_at_pixels(root)
     certificate = verify(root, sample=0)
     assert certificate.counts["hashes"].failed == 1
     assert "views/v0/depth.png" in certificate.failures[0]
+
+
+def _sparse(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(5 * 2**30)
 
 
 def edit_table(root: Path, change) -> None:  # type: ignore[no-untyped-def]
@@ -159,6 +165,44 @@ def test_damaged_view_json_and_glb_are_failures_not_tracebacks(root):
     assert "layers" in failed(root, all_pixels=False)
     (house_of(root) / "house.glb").write_bytes(b"glTF")
     assert "layers" in failed(root, all_pixels=False)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, lambda p: p.symlink_to("/dev/zero"), _sparse])
+@pytest.mark.parametrize(
+    ("file", "check"),
+    [
+        ("house.glb", "layers"),
+        ("views/v0/view.json", "layers"),
+        ("views/v0/depth.png", "layers"),
+        ("done/house.json", "markers"),
+        ("manifest.jsonl", "files"),
+    ],
+)
+def test_pipes_devices_and_giants_in_a_root_are_failures_that_cost_nothing(root, file, check, make):
+    path = house_of(root) / file
+    path.unlink()
+    make(path)
+    assert check in failed(root, all_pixels=False)
+
+
+def test_a_pipe_for_the_lux_of_rooms_is_as_none(root):
+    os.mkfifo(house_of(root) / "illuminance.json")
+    assert not failed(root, all_pixels=False)
+
+
+def test_one_damaged_view_json_costs_its_own_view_alone(root):
+    (house_of(root) / "views/v0/view.json").write_text("[" * 100_000)
+    certificate = verify(root, sample=10)
+    assert certificate.n_views == 1
+    assert any("view.json: is no JSON" in line for line in certificate.failures)
+    assert certificate.counts["ray: depth"].checked == 10
+
+
+def test_a_newline_in_a_stored_name_forges_no_line_of_the_certificate(root):
+    manifest = house_of(root) / "manifest.jsonl"
+    row = json.dumps({"key": "houses/x\nCLEAN", "bytes": 1, "sha256": ""})
+    manifest.write_text(manifest.read_text() + row + "\n")
+    assert "\nCLEAN" not in verify(root, sample=1).text()
 
 
 def test_markers_that_disagree_with_the_manifest_are_caught(root):

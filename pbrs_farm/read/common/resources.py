@@ -38,9 +38,9 @@ class ZipResources:
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(data))
             entries = self._zip.infolist()
-        except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, EOFError) as error:
-            text, hint = f"damaged zip archive: {error}", "copy or save the file again"
-            raise BadHouse(file, "", text, hint=hint) from None
+        except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, EOFError):
+            hint = "copy or save the file again"
+            raise BadHouse(file, "", "damaged zip archive", hint=hint) from None
         if len(entries) > MAX_ENTRIES:
             raise BadHouse(file, "", f"{len(entries)} zip entries, at most {MAX_ENTRIES} are read")
         for entry in entries:
@@ -73,8 +73,9 @@ class ZipResources:
         except (
             zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError,
             NotImplementedError, RuntimeError,
-        ) as error:  # fmt: skip
-            raise BadHouse(self._file, place, f"cannot be unpacked: {error}") from None
+        ):  # fmt: skip
+            text = "cannot be unpacked: damaged, encrypted, or packed by an unknown method"
+            raise BadHouse(self._file, place, text) from None
         if len(data) > entry.file_size:
             raise BadHouse(self._file, place, "unpacks to more than its directory says")
         return data

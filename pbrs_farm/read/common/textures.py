@@ -34,8 +34,8 @@ def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
         raise ValueError("the picture is too large") from None
     except UnidentifiedImageError:
         raise ValueError("is no picture of a known kind") from None
-    except (OSError, SyntaxError, EOFError, IndexError, KeyError, TypeError) as error:
-        raise ValueError(f"the picture cannot be decoded: {error}") from None
+    except (OSError, SyntaxError, EOFError, IndexError, KeyError, TypeError):
+        raise ValueError("the picture cannot be decoded: damaged or cut short") from None
 
 
 def _texture(picture: Image.Image, data: bytes, name: str) -> tuple[Texture, bool]:

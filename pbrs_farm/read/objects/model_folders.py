@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -21,7 +22,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.read.common.furniture_classes import nyu40_of
-from pbrs_farm.regular_files import open_regular
+from pbrs_farm.regular_files import fault_of, open_regular
 
 _MODEL_SUFFIXES: Final = (".obj", ".glb", ".gltf")
 _PLAIN_FOLDERS: Final = ("models", "")  # ShapeNet's, that say nothing
@@ -128,8 +129,13 @@ def _library(path: Path) -> list[ObjectModel]:
                 raise BadInput(path, info.filename, "the catalogue is too large")
             text = archive.read(info).decode("latin-1")
             names = set(archive.namelist())
-    except (zipfile.BadZipFile, KeyError, OSError) as error:
-        raise BadInput(path, "", f"is no furniture library: {error}") from None
+    except OSError as error:
+        raise BadInput(path, "", fault_of(error)) from None
+    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError):
+        raise BadInput(path, "", "is no furniture library: a damaged zip archive") from None
+    except KeyError:
+        text = "is no furniture library: no PluginFurnitureCatalog.properties in it"
+        raise BadInput(path, "", text) from None
     # Gather the numbered properties of each piece.
     rows: dict[str, dict[str, str]] = {}
     for line in text.splitlines():

@@ -7,6 +7,7 @@ from __future__ import annotations
 import posixpath
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -31,7 +32,7 @@ from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.suncg.model_files import Models
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, open_regular
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, open_regular
 
 _MAX_UNPACKED_BYTES: Final = 500_000_000
 
@@ -116,8 +117,10 @@ def _folder_of(model: ObjectModel) -> Iterator[tuple[RootFolder, str]]:
                     raise BadHouse(model.path, model.entry, "is too large unpacked")
                 for member in members:
                     archive.extract(member, scratch)
-        except (zipfile.BadZipFile, OSError, RuntimeError) as error:
-            raise BadHouse(model.path, model.entry, f"cannot be unpacked: {error}") from None
+        except OSError as error:
+            raise BadHouse(model.path, model.entry, fault_of(error)) from None
+        except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError):
+            raise BadHouse(model.path, model.entry, "cannot be unpacked: damaged") from None
         yield RootFolder(Path(scratch)), model.entry
 
 

@@ -95,8 +95,10 @@ def _rows(name: str, data: bytes) -> list[dict[str, str]]:
     try:
         text = data.decode("utf-8-sig")
         rows = list(csv.DictReader(io.StringIO(text)))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise BadHouse(name, "", f"no valid table: {error}") from None
+    except UnicodeDecodeError as error:
+        raise BadHouse(name, f"byte {error.start}", "no valid table: not UTF-8") from None
+    except csv.Error:
+        raise BadHouse(name, "", "no valid table: a damaged row") from None
     return [{k: v for k, v in row.items() if isinstance(v, str)} for row in rows]
 
 

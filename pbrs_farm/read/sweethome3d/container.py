@@ -71,8 +71,9 @@ def _parsed(xml: bytes, file: str, entry: str) -> Element:
         raise BadHouse(file, entry, f"XML with entity definitions is refused ({what})") from None
     except ParseError as error:
         raise BadHouse(file, entry, f"XML is not well-formed: {error}", hint=RESAVE) from None
-    except (ValueError, LookupError, RecursionError) as error:
-        raise BadHouse(file, entry, f"XML cannot be read: {error}") from None
+    except (ValueError, LookupError, RecursionError):
+        text = "XML cannot be read: unknown encoding, or nested too deeply"
+        raise BadHouse(file, entry, text, hint=RESAVE) from None
     if root.tag != "home":
         raise BadHouse(file, entry, f"the root element is <{root.tag[:40]}>, not <home>")
     if _depth(root) > MAX_DEPTH:

@@ -63,8 +63,8 @@ def _segments(text: str) -> list[Any]:
         raise ValueError("no path: it starts with M and holds SVG's commands and numbers")
     try:
         segments = list(Path(_TRAILING_POINT.sub("", text)))
-    except (ValueError, ArithmeticError, IndexError, TypeError) as error:
-        raise ValueError(f"no path: {error or 'a command lacks numbers'}") from None
+    except (ValueError, ArithmeticError, IndexError, TypeError):
+        raise ValueError("no path: a command lacks numbers") from None
     # Reflect the control point of T at curves of its own kind only, as of S (SVG 1.1, 8.3.7).
     for before, segment in pairwise(segments):
         for kind, control, last in _SMOOTH:

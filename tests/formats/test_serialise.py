@@ -1,0 +1,28 @@
+"""What a file of JSON is refused with: our words, never Python's."""
+
+import pytest
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.formats.serialise import json_from_bytes
+
+PYTHONS_WORDS = ("literal", "codec", "integer string", "maximum recursion", "Traceback", "0x")
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b'{"a": ' + b"9" * 5000 + b"}", "a number has too many digits"),
+        (b'{"a": "\xff"}', "not UTF-8"),
+        (b"[" * 100_000, "nested too deeply"),
+        (b'{"a": NaN}', "NaN is not a number"),
+        (b'{"a" 1}', "line 1 column 6"),
+        (b"", "no valid JSON"),
+    ],
+)
+def test_what_is_no_json_is_refused_in_words_that_say_nothing_of_python(data, said):
+    with pytest.raises(BadHouse) as caught:
+        json_from_bytes(data, "a.arch.json")
+    text = str(caught.value)
+    assert "a.arch.json" in text
+    assert said in text
+    assert not any(words in text for words in PYTHONS_WORDS)
