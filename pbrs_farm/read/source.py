@@ -127,7 +127,7 @@ def _companions(kind: SourceKind, path: Path, data: bytes, files: SourceFiles) -
         names = [*side_files(path), *files_of_gltf(data, path.name)]
         return files.digest(RootFolder(path.parent), names)
     from pbrs_farm.assets import homes
-    from pbrs_farm.read.sweethome3d.container import needs_program
+    from pbrs_farm.read.sweethome3d.home_file.container import needs_program
 
     return _package_digest(homes.cached()) if needs_program(data, path.name) else ""
 

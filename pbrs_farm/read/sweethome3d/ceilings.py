@@ -9,7 +9,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Surface
 from pbrs_farm.read.mesh.horizontal_polygons import horizontal
-from pbrs_farm.read.sweethome3d.home_xml import Plan, PlanLevel, level_of
+from pbrs_farm.read.sweethome3d.home_file.home_xml import Plan, PlanLevel, level_of
 from pbrs_farm.read.sweethome3d.outlines import Outline
 from pbrs_farm.read.sweethome3d.roofs import roof_over
 from pbrs_farm.read.sweethome3d.wall_solids import top_heights

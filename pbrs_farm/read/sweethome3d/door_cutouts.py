@@ -12,9 +12,9 @@ import shapely
 from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Opening, Surface
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise
+from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, PlanPiece, PlanWall
+from pbrs_farm.read.sweethome3d.home_file.parse_pieces import FULL_CUT_OUT
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
-from pbrs_farm.read.sweethome3d.home_xml import DoorFrame, PlanPiece, PlanWall
-from pbrs_farm.read.sweethome3d.parse_pieces import FULL_CUT_OUT
 from pbrs_farm.read.sweethome3d.placement import PieceFrame
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 

@@ -11,8 +11,8 @@ from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
 from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
+from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, Plan, PlanLevel, PlanRoom, level_of
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
-from pbrs_farm.read.sweethome3d.home_xml import Paint, Plan, PlanLevel, PlanRoom, level_of
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 MIN_AREA_M2 = 0.01  # smaller rooms are left out

@@ -7,7 +7,7 @@ import numpy as np
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import LightPart
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.read.sweethome3d.home_xml import PlanPiece
+from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanPiece
 from pbrs_farm.read.sweethome3d.placement import PieceFrame
 
 DEFAULT_RADIUS_M = 0.0325

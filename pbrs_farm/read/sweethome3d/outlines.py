@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import Points2
-from pbrs_farm.read.sweethome3d.home_xml import PlanWall
+from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanWall
 
 ARC_STEP_RAD = math.radians(5.0)  # of the straight pieces of an arc
 MITRE_LIMIT = 2.0  # of the corner from the bare one, in thicknesses

@@ -8,8 +8,8 @@ from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.read.common.material_library import PANE_OPACITY, LoadedTexture
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, PlanPicture, PlanPiece
 from pbrs_farm.read.sweethome3d.home_materials import SHININESS_SCALE, HomeMaterials
-from pbrs_farm.read.sweethome3d.home_xml import Paint, PlanPicture, PlanPiece
 from pbrs_farm.read.sweethome3d.piece_models import LIGHT, MIRROR, PANE, PieceModel, content_name
 
 CLEAR = 0.95  # Opacity below which a material counts as glass

@@ -10,7 +10,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Surface
 from pbrs_farm.read.mesh.obj import Mesh
-from pbrs_farm.read.sweethome3d.home_xml import PlanLevel, PlanPicture, PlanPiece
+from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPicture, PlanPiece
 from pbrs_farm.read.sweethome3d.piece_materials import PieceMaterial
 from pbrs_farm.read.sweethome3d.piece_models import PieceModel
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs

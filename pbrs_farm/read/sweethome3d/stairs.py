@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from pbrs_farm.read.sweethome3d.home_file.home_xml import Plan, PlanPiece, level_of
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
-from pbrs_farm.read.sweethome3d.home_xml import Plan, PlanPiece, level_of
 from pbrs_farm.read.sweethome3d.placement import PieceFrame, frame_of
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 

@@ -9,8 +9,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.primitives import wall_prism
-from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
-from pbrs_farm.read.sweethome3d.home_xml import (
+from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     Baseboard,
     Paint,
     Plan,
@@ -19,6 +18,7 @@ from pbrs_farm.read.sweethome3d.home_xml import (
     PlanWall,
     level_of,
 )
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 
 SUNK_M = 0.002  # How deep a baseboard's back stands in its wall, so that the two share no plane

@@ -14,7 +14,11 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.sweethome3d.java_stream import JavaObject, JavaStreamError, java_objects
+from pbrs_farm.read.sweethome3d.home_file.java_stream import (
+    JavaObject,
+    JavaStreamError,
+    java_objects,
+)
 
 RESAVE: Final = "open it in Sweet Home 3D 5.3 or later and save it again"
 _ALONE: Final = "holds no Home.xml, only the binary form of older versions,"

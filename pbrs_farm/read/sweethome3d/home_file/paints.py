@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element
 
-from pbrs_farm.read.sweethome3d.attributes import Attributes
-from pbrs_farm.read.sweethome3d.home_xml import Baseboard, Paint, PlanPicture
+from pbrs_farm.read.sweethome3d.home_file.attributes import Attributes
+from pbrs_farm.read.sweethome3d.home_file.home_xml import Baseboard, Paint, PlanPicture
 
 
 def wall_paint(a: Attributes, side: str) -> Paint:

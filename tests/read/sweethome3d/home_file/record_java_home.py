@@ -1,7 +1,7 @@
 """Records java_home.bin: the entry `Home` that Sweet Home 3D itself writes of JAVA_HOME_XML.
 
 Run by hand, with a JDK and the example homes' package: `python -m
-tests.read.sweethome3d.record_java_home`. Effects: runs javac and java, writes java_home.bin.
+tests.read.sweethome3d.home_file.record_java_home`. Effects: runs javac and java, writes java_home.bin.
 """
 
 from __future__ import annotations

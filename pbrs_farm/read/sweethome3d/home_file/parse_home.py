@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.sweethome3d.attributes import Attributes
-from pbrs_farm.read.sweethome3d.home_xml import (
+from pbrs_farm.read.sweethome3d.home_file.attributes import Attributes
+from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     Plan,
     PlanCamera,
     PlanLevel,
@@ -15,8 +15,8 @@ from pbrs_farm.read.sweethome3d.home_xml import (
     PlanWall,
     as_points,
 )
-from pbrs_farm.read.sweethome3d.paints import baseboard_of, room_paint, wall_paint
-from pbrs_farm.read.sweethome3d.parse_pieces import parse_piece
+from pbrs_farm.read.sweethome3d.home_file.paints import baseboard_of, room_paint, wall_paint
+from pbrs_farm.read.sweethome3d.home_file.parse_pieces import parse_piece
 
 MAX_PIECES = 20_000
 MAX_WALLS = 10_000

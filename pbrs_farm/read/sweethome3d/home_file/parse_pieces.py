@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pbrs_farm.read.sweethome3d.attributes import Attributes
-from pbrs_farm.read.sweethome3d.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
-from pbrs_farm.read.sweethome3d.paints import piece_paint
+from pbrs_farm.read.sweethome3d.home_file.attributes import Attributes
+from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
+from pbrs_farm.read.sweethome3d.home_file.paints import piece_paint
 
 FULL_CUT_OUT = "M0,0 v1 h1 v-1 z"  # the unit square: the whole opening
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pbrs_farm.core.house import StoredCamera
-from pbrs_farm.read.sweethome3d.home_xml import Plan
+from pbrs_farm.read.sweethome3d.home_file.home_xml import Plan
 
 
 def stored_cameras(plan: Plan) -> tuple[StoredCamera, ...]:

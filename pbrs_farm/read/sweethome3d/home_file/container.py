@@ -15,7 +15,7 @@ from defusedxml.ElementTree import fromstring
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.common.resources import Layered, Resources, ZipResources
-from pbrs_farm.read.sweethome3d.java_home import RESAVE, root_from_java
+from pbrs_farm.read.sweethome3d.home_file.java_home import RESAVE, root_from_java
 
 MAX_XML_BYTES = 16 * 2**20
 MAX_DEPTH = 200  # nested elements
