@@ -12,7 +12,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.house import House, Item, LightPart, Material, Note, Surface, Texture
+from pbrs_farm.core.house import Box, House, Item, LightPart, Material, Note, Surface, Texture
 
 ADDED_TAG = "dressed:"  # before the id of the piece that an item was made from
 CHANGED_TAG = "changed:"  # before the part of the dressing that changed an item of the source
@@ -70,6 +70,7 @@ class Draft:
             id=item_id, name=piece.name, kind=piece.kind, level_id=level_id, surfaces=surfaces,
             nyu40=piece.nyu40, source_class=piece.id, room_id=room_id, lights=lights,
             tags=(f"{ADDED_TAG}{piece.id}", f"seed:{self.seed}", *tags),
+            box=_placed_box(shape, turn, factor, at),
         )  # fmt: skip
 
     def add(self, item: Item, part: str, piece: Piece | None = None) -> None:
@@ -117,6 +118,14 @@ class Draft:
             n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
             normals = n.astype(np.float32)
         return replace(surface, positions=positions, normals=normals, material=number)
+
+
+def _placed_box(shape: Shape, turn: F64, factor: F64, at: F64) -> Box | None:
+    # The shape's own box, turned with it: its third axis points to the front.
+    if not any(len(s.positions) for s in shape.surfaces):
+        return None
+    low, high = shape.bounds * factor
+    return Box(turn @ ((low + high) / 2) + at, (high - low) / 2, turn)
 
 
 def _moved_light(light: LightPart, moved: Callable[[F64], F64], turn: F64) -> LightPart:

@@ -1,0 +1,265 @@
+"""The surfaces of a piece of furniture that things can stand on, and how much is free above them.
+
+Works on raw meshes: open, thin, wound either way. Nothing is decided by boxes; no effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from shapely import MultiPoint, Polygon, contains_xy, minimum_rotated_rectangle
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.house import Item, ItemKind, Room
+from pbrs_farm.core.mesh import face_areas, unit_normals
+from pbrs_farm.dress.supports.plan_grid import CellHits, PlanGrid, cells_over, covered
+from pbrs_farm.dress.supports.scene_triangles import SceneTriangles
+
+CELL_M = 0.01
+LEAST_AREA_M2 = 0.02
+LEAST_FREE_M = 0.12
+MOST_FREE_M = 3.0  # what is higher above a support is nobody's business
+_LEAST_NORMAL_Y = 0.95
+_FLAT_M = 0.001  # heights of one support differ by less
+_BORDER = 5  # cells of the grid around a support
+_NEAR_M = 0.003  # a face this near to the support's height lies on it
+_OPEN_SHARE = 0.5  # of a side's length
+_OUT_OF_REACH_M = 2.35  # above the floor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Support:
+    """A flat surface that things can stand on. Its grid's +z points to the side it is used from."""
+
+    item: int  # index of the furniture
+    room_id: str
+    height: float  # world y of its highest point
+    above_floor: float  # metres
+    grid: PlanGrid
+    mask: Bools  # (rows, columns) the support is there and free
+    clear: F64  # (rows, columns) free height above, metres; 0 = something stands there
+    open_sides: tuple[bool, bool, bool, bool]  # right (+x), front (+z), left, back
+    is_covered: bool  # a shelf: something is above most of it
+
+    @property
+    def area(self) -> float:
+        """Free area in square metres."""
+        return float(self.mask.sum()) * self.grid.cell_m**2
+
+
+def supports_of_item(scene: SceneTriangles, index: int, room: Room) -> list[Support]:
+    """The supports of items[index] that lie in the room, from low to high."""
+    item, corners = scene.items[index], scene.of_item(index)
+    level = np.abs(unit_normals(corners)[:, 1]) > _LEAST_NORMAL_Y
+    groups = _levels(corners[level], room)
+    if not groups:
+        return []
+    plan = corners.reshape(-1, 3)[:, [0, 2]]
+    grid = PlanGrid.around(plan, plan_turn(item, corners.reshape(-1, 3)), CELL_M, _BORDER * CELL_M)
+    # See everything around from above once, for all its levels.
+    around = surroundings(scene, index, grid, float(groups[0][..., 1].max()))
+    centres = grid.centres()
+    indoors = contains_xy(Polygon(room.polygon), centres[..., 0], centres[..., 1])
+    found = []
+    for group in groups:
+        mask = covered(grid, group) & indoors & ~around.solid
+        found += _supports_at(around, mask, float(group[..., 1].max()), room)
+    return found
+
+
+def plan_turn(item: Item, points: F64) -> float:
+    """Angle about +y of the item's own axes: of its box, else of the least box around its plan.
+
+    points: (N, 3) its vertices, for where there is no box.
+    """
+    if item.box is not None:
+        axes = item.box.axes
+        return float(np.arctan2(-axes[2, 0], axes[0, 0]))
+    outline = minimum_rotated_rectangle(MultiPoint(points[:, [0, 2]]))
+    if not isinstance(outline, Polygon):
+        return 0.0
+    edge = np.diff(np.asarray(outline.exterior.coords)[:2], axis=0)[0]
+    return float(np.arctan2(-edge[1], edge[0]))
+
+
+def _levels(faces: F64, room: Room) -> list[F64]:
+    # Groups of flat faces whose heights agree, with enough area together, within reach.
+    low, high = faces[..., 1].min(1), faces[..., 1].max(1)
+    top = min(_OUT_OF_REACH_M, room.ceiling_y - room.floor_y - LEAST_FREE_M) + room.floor_y
+    flat = (high - low < _FLAT_M) & (low > room.floor_y + 0.04) & (high < top)
+    faces, high = faces[flat], high[flat]
+    order = np.argsort(high, kind="stable")
+    faces, high = faces[order], high[order]
+    groups, start = [], 0
+    for k in range(1, len(high) + 1):
+        if k == len(high) or high[k] - high[start] > _FLAT_M:
+            group = faces[start:k]
+            if float(face_areas(group).sum()) >= LEAST_AREA_M2:
+                groups.append(group)
+            start = k
+    return groups
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """All faces over a grid, as heights in its cells, and where walls are."""
+
+    index: int  # of the furniture itself
+    grid: PlanGrid
+    hits: CellHits
+    is_own: Bools  # (N,) of the hits: a face of the furniture itself
+    solid: Bools  # (rows, columns) inside a wall
+
+    def clearance(self, height: float) -> F64:
+        """(rows, columns) metres that are free above height, at most MOST_FREE_M.
+
+        The furniture's own faces at that height are the support and no obstacle.
+        """
+        hits = self.hits
+        # Let every face that rises above the support lower what is free in its cells.
+        stands = hits.high > height + np.where(self.is_own, _NEAR_M, -_NEAR_M)
+        clear = np.full(self.grid.shape, MOST_FREE_M)
+        free = np.maximum(hits.low[stands] - height, 0.0)
+        np.minimum.at(clear, (hits.row[stands], hits.column[stands]), free)
+        clear[self.solid] = 0.0
+        return clear
+
+
+def surroundings(scene: SceneTriangles, index: int, grid: PlanGrid, low_y: float) -> Surroundings:
+    """What stands over a grid from low_y upwards; index: the furniture itself, -1 = none."""
+    ends = grid.plan_of(np.array([0, grid.shape[1]] * 2), np.repeat([0, grid.shape[0]], 2))
+    low = np.array([ends[:, 0].min(), low_y - _NEAR_M, ends[:, 1].min()])
+    high = np.array([ends[:, 0].max(), low_y + MOST_FREE_M, ends[:, 1].max()])
+    corners, owner = scene.in_box(low, high)
+    hits = cells_over(grid, corners, touched=True)
+    # A wall is solid: its level faces say where, though they lie far below.
+    solid = np.zeros(grid.shape, np.bool_)
+    for wall in scene.items_in(low, high):
+        if scene.items[wall].kind is ItemKind.WALL:
+            corners = scene.of_item(wall)
+            level = np.abs(unit_normals(corners)[:, 1]) > 0.5
+            solid |= covered(grid, corners[level])
+    return Surroundings(index, grid, hits, owner[hits.triangle] == index, solid)
+
+
+def _supports_at(around: Surroundings, mask: Bools, height: float, room: Room) -> list[Support]:
+    least = LEAST_AREA_M2 / CELL_M**2
+    if mask.sum() < least:
+        return []
+    clear = np.minimum(around.clearance(height), max(room.ceiling_y - height, 0.0))
+    free = mask & (clear >= LEAST_FREE_M)
+
+    # Take each connected part that can be reached from a side.
+    parts, n = ndimage.label(free)
+    parts = np.asarray(parts)
+    found = []
+    for k, at in enumerate(ndimage.find_objects(parts, n), start=1):
+        if np.count_nonzero(np.equal(parts[at], k)) < least:
+            continue
+        around_it = tuple(
+            slice(max(s.start - _BORDER, 0), min(s.stop + _BORDER, size))
+            for s, size in zip(at, parts.shape, strict=True)
+        )
+        part, air = np.asarray(parts[around_it] == k), clear[around_it]
+        sides = _open_sides(part, air)
+        # Leave out the inside of closed bodies: nothing leads there but from above.
+        if not any(sides) and np.median(air[part]) < room.ceiling_y - height - 0.01:
+            continue
+        found.append(
+            turned_to_front(
+                Support(
+                    around.index, room.id, height, height - room.floor_y,
+                    around.grid.cropped(around_it), part, air, sides,
+                    bool(np.mean(air[part] < 0.6) > 0.5),
+                ),
+                room,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
+    """Whether nothing stands beyond the part's right, front, left and back edge."""
+    blocked = clear < LEAST_FREE_M
+    sides = []
+    for axis, step in ((1, 1), (0, 1), (1, -1), (0, -1)):
+        # Look at the cells just beyond the outermost ones of each row or column.
+        beyond = [_shifted(blocked, axis, -step * k) for k in (1, 2, 3)]
+        ahead = beyond[0] | beyond[1] | beyond[2]
+        order = part if step > 0 else np.flip(part, axis)
+        last = order.shape[axis] - 1 - np.argmax(np.flip(order, axis), axis)
+        last = last if step > 0 else order.shape[axis] - 1 - last
+        lines = np.flatnonzero(part.any(axis))
+        at = last[lines]
+        edge = ahead[lines, at] if axis == 1 else ahead[at, lines]
+        sides.append(bool(np.mean(~edge) > _OPEN_SHARE))
+    return (sides[0], sides[1], sides[2], sides[3])
+
+
+def _shifted(mask: Bools, axis: int, by: int) -> Bools:
+    moved = np.roll(mask, by, axis)
+    edge: list[slice] = [slice(None), slice(None)]
+    edge[axis] = slice(0, by) if by > 0 else slice(by, None)
+    moved[tuple(edge)] = False
+    return moved
+
+
+def turned_to_front(support: Support, room: Room) -> Support:
+    """The support with its grid turned by quarters, so that +z is the side it is used from.
+
+    That is the front of its furniture where open; else the open side with most room before it.
+    """
+    quarter = _front_quarter(support, room)
+    if quarter == 0:
+        return support
+    return _turned(support, quarter)
+
+
+def _front_quarter(support: Support, room: Room) -> int:
+    # 0 = +z, 1 = +x, 2 = -z, 3 = -x, as quarters of a turn about +y.
+    right, front, left, back = support.open_sides
+    is_open = {0: front, 1: right, 2: back, 3: left}
+    reach = {q: _way_to_wall(support, q, room) for q in is_open}
+    # A top that is open all around faces the room; a shelf faces where it is open.
+    if is_open[0] and reach[0] > 0.25:
+        return 0
+    choices = [q for q in is_open if is_open[q]] or list(is_open)
+    return max(choices, key=lambda q: (round(reach[q], 2), -q))
+
+
+def _way_to_wall(support: Support, quarter: int, room: Room) -> float:
+    # How far one can go from the support's middle beyond its edge before the room ends, metres.
+    grid, (rows, columns) = support.grid, np.nonzero(support.mask)
+    middle = grid.plan_of(columns.mean() + 0.5, rows.mean() + 0.5)
+    ahead = grid.plan_of(np.sin(quarter * np.pi / 2), np.cos(quarter * np.pi / 2)) - grid.origin
+    ahead = ahead / np.linalg.norm(ahead)
+    half = [np.ptp(rows) / 2, np.ptp(columns) / 2][quarter % 2] * grid.cell_m
+    steps = half + np.arange(0.05, 2.0, 0.05)
+    places = middle + steps[:, None] * ahead
+    outside = ~contains_xy(Polygon(room.polygon), places[:, 0], places[:, 1])
+    return float(steps[np.argmax(outside)] - half) if outside.any() else 2.0
+
+
+def _turned(support: Support, quarter: int) -> Support:
+    # Turn the axes by quarters; the cells stay where they are in the world.
+    grid, (rows, columns) = support.grid, support.grid.shape
+    corner = {1: (0, rows), 2: (columns, rows), 3: (columns, 0)}[quarter]
+    shape = (columns, rows) if quarter % 2 else (rows, columns)
+    turned = PlanGrid(
+        grid.plan_of(*corner), grid.turn_rad + quarter * np.pi / 2, grid.cell_m, shape
+    )
+
+    def cells(values: NDArray[np.generic]) -> NDArray[np.generic]:
+        return np.ascontiguousarray(np.rot90(values, -quarter))
+
+    sides = support.open_sides
+    return Support(
+        support.item, support.room_id, support.height, support.above_floor, turned,
+        np.asarray(cells(support.mask), np.bool_), np.asarray(cells(support.clear), np.float64),
+        (sides[(0 - quarter) % 4], sides[(1 - quarter) % 4], sides[(2 - quarter) % 4],
+         sides[(3 - quarter) % 4]),
+        support.is_covered,
+    )  # fmt: skip

@@ -1,0 +1,44 @@
+"""The triangles of a house by item, found again by place; state: what was asked for is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, I32
+from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import triangle_corners
+
+
+class SceneTriangles:
+    """Corners of the items' faces in double precision, and which items meet a box."""
+
+    def __init__(self, items: Sequence[Item]) -> None:
+        self.items = tuple(items)
+        bounds = [item.bounds for item in self.items]
+        self.bounds: F64 = np.array(bounds) if bounds else np.zeros((0, 2, 3))
+        self._corners: dict[int, F64] = {}
+
+    def of_item(self, index: int) -> F64:
+        """(F, 3, 3) corners of the faces of items[index] that have finite corners, metres."""
+        if index not in self._corners:
+            parts = [triangle_corners(s.positions, s.faces) for s in self.items[index].surfaces]
+            corners = np.concatenate([np.zeros((0, 3, 3)), *parts])
+            self._corners[index] = corners[np.isfinite(corners).all((1, 2))]
+        return self._corners[index]
+
+    def items_in(self, low: F64, high: F64) -> list[int]:
+        """Indices of the items whose bounds meet the box low..high (3,)."""
+        meets = np.all((self.bounds[:, 1] >= low) & (self.bounds[:, 0] <= high), axis=1)
+        return [int(i) for i in np.flatnonzero(meets)]
+
+    def in_box(self, low: F64, high: F64) -> tuple[F64, I32]:
+        """(T, 3, 3) faces whose bounds meet the box low..high, and (T,) the item of each."""
+        parts, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int32)]
+        for index in self.items_in(low, high):
+            corners = self.of_item(index)
+            meets = ((corners.max(1) >= low) & (corners.min(1) <= high)).all(1)
+            parts.append(corners[meets])
+            owners.append(np.full(int(meets.sum()), index, np.int32))
+        return np.concatenate(parts), np.concatenate(owners)

@@ -1,0 +1,89 @@
+"""What things can stand on is found in raw meshes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import Item
+from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, Support, supports_of_item
+from pbrs_farm.dress.supports.plan_grid import cells_over, covered
+from tests.dress.furniture import boards, bookcase, room, solid, thin_table
+
+
+def _supports(*items: Item, index: int = 0) -> list[Support]:
+    return supports_of_item(SceneTriangles(items), index, room())
+
+
+def test_a_solid_boxs_top_is_its_only_support() -> None:
+    (support,) = _supports(solid("box", [1, 0, 1], [2, 0.7, 1.5]))
+    assert support.height == pytest.approx(0.7)
+    assert support.area == pytest.approx(0.5, rel=0.05)
+    assert not support.is_covered
+
+
+def test_a_bookcases_inner_shelves_are_supports_open_to_the_front_alone() -> None:
+    supports = _supports(bookcase(n_shelves=4))
+    assert [round(s.above_floor, 2) for s in supports] == [0.12, 0.59, 1.06, 1.53, 2.0]
+    for shelf in supports[:-1]:
+        assert shelf.open_sides == (False, True, False, False)
+        assert shelf.is_covered
+        # 96 cm between the sides, 29 cm before the back.
+        assert shelf.area == pytest.approx(0.96 * 0.29, rel=0.1)
+        assert np.median(shelf.clear[shelf.mask]) == pytest.approx(0.45, abs=0.002)
+
+
+def test_a_thin_top_that_faces_downwards_is_a_support() -> None:
+    (support,) = _supports(thin_table())
+    assert support.area == pytest.approx(0.96, rel=0.05)
+
+
+def test_what_stands_on_a_table_takes_its_place() -> None:
+    table, tv = (
+        solid("table", [1, 0, 1], [2, 0.7, 1.5]),
+        solid("tv", [1.2, 0.7, 1.1], [1.5, 1, 1.3]),
+    )
+    (support,) = _supports(table, tv)
+    assert support.area == pytest.approx(0.5 - 0.3 * 0.2, rel=0.1)
+    x, z = np.moveaxis(support.grid.centres(), -1, 0)
+    assert not support.mask[(x > 1.2) & (x < 1.5) & (z > 1.1) & (z < 1.3)].any()
+
+
+def test_the_inside_of_a_closed_cabinet_is_no_support() -> None:
+    walls = [
+        ([1, 0, 1], [1.02, 1.8, 1.5]), ([1.98, 0, 1], [2, 1.8, 1.5]),
+        ([1.02, 0, 1], [1.98, 1.8, 1.02]), ([1.02, 0, 1.48], [1.98, 1.8, 1.5]),
+        ([1, 0.05, 1], [2, 0.1, 1.5]), ([1, 1.8, 1], [2, 1.82, 1.5]),
+    ]  # fmt: skip
+    heights = [s.height for s in _supports(boards("cabinet", walls, 3))]
+    assert heights == pytest.approx([1.82])
+
+
+def test_a_turned_table_has_its_own_axes() -> None:
+    table = solid("table", [1, 0, 1], [2, 0.7, 1.5])
+    turn = np.radians(30)
+    c, s = np.cos(turn), np.sin(turn)
+    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    middle = np.array([1.5, 0, 1.25])
+    surface = table.surfaces[0]
+    positions = (surface.positions - middle) @ rotation.T + middle
+    turned = replace(table, surfaces=(replace(surface, positions=positions.astype(np.float32)),))
+    (support,) = _supports(turned)
+    assert support.area == pytest.approx(0.5, rel=0.05)
+    assert support.grid.turn_rad % (np.pi / 2) == pytest.approx(turn, abs=1e-4)
+
+
+def test_a_support_outside_the_room_is_left_out() -> None:
+    assert not _supports(solid("box", [5, 0, 1], [6, 0.7, 1.5]))
+
+
+def test_touched_cells_include_those_of_upright_faces() -> None:
+    grid = PlanGrid(np.zeros(2), 0.0, 0.1, (10, 10))
+    upright = np.array([[[0.05, 0, 0.55], [0.95, 0, 0.55], [0.05, 1, 0.55]]])
+    assert covered(grid, upright, touched=True)[5].all()
+    assert not covered(grid, upright).any()
+    hits = cells_over(grid, upright, touched=True)
+    assert hits.low.min() == 0
+    assert hits.high.max() == 1
