@@ -23,7 +23,7 @@ from pbrs_farm.core.errors import PbrsError
 MODULES: Final = {
     "looking": ("doctor", "homes", "skies", "recipes", "layers"),
     "making": ("demo", "run", "objects", "step"),
-    "explaining": ("repair", "cameras"),
+    "explaining": ("dress", "repair", "cameras"),
     "using": ("sheet", "verify", "relight"),
     "labelling": ("export", "classes", "label-sheet"),
     "selecting": ("reference", "select"),

@@ -12,7 +12,7 @@ from typing import Final
 from pbrs_farm.assets import homes
 from pbrs_farm.assets.debian import cache_folder
 from pbrs_farm.read.common.companion_files import SourceFiles
-from pbrs_farm.read.source import SourceRef, resolve
+from pbrs_farm.read.source import SourceRef, home_id, resolve, variants
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store.object_store import Store
 from workers.job import HouseEntry
@@ -23,21 +23,26 @@ FOLDER: Final = "jobs/sources/"
 _UPLOADED: Final = (".sh3d", ".xml", ".zip", ".glb")
 
 
-def entries_from_arguments(arguments: Sequence[str]) -> list[tuple[HouseEntry, SourceRef]]:
+def entries_from_arguments(
+    arguments: Sequence[str], seeds: Sequence[int] = (0,)
+) -> list[tuple[HouseEntry, SourceRef]]:
     """The houses that arguments name: files, folders of files, example homes, `builtin`.
 
-    Touches no store. Raises BadHouse for one that names no house.
+    Each is dressed by each seed, a house of its own. Touches no store. Raises BadHouse for one that
+    names no house.
     """
     found: dict[str, tuple[HouseEntry, SourceRef]] = {}
     files = SourceFiles()
     for argument in arguments:
         for one in _expanded(argument):
             doing(one, "read")
-            ref = resolve(one, files)
-            entry = HouseEntry(
-                house_id=ref.house_id, source=_placed(ref).model_dump_json(), sha256=ref.fingerprint
-            )
-            found.setdefault(ref.house_id, (entry, ref))
+            for ref in variants(resolve(one, files), seeds):
+                entry = HouseEntry(
+                    house_id=ref.house_id,
+                    source=_placed(ref).model_dump_json(),
+                    sha256=ref.fingerprint,
+                )
+                found.setdefault(ref.house_id, (entry, ref))
     return list(found.values())
 
 
@@ -46,17 +51,19 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
 
     Folders (SUNCG, glTF with side files) are not copied: workers must see them at the same path.
     """
-    # A source in one file goes into the store, below its house's id.
-    for ref in refs:
-        placed = _placed(ref)
-        if placed.location != ref.location:
-            store.put_if_absent(placed.location, Path(ref.location).read_bytes())
+    # A source in one file goes into the store, below its home's id, once for all its variants.
+    for place, path in {_placed(ref).location: ref.location for ref in refs}.items():
+        if place != path:
+            store.put_if_absent(place, Path(path).read_bytes())
     # Homes take furniture from the examples' package: workers need it too.
-    package = homes.cached()
-    if package is not None and any(ref.kind in ("example", "sweethome3d") for ref in refs):
-        for deb in sorted(cache_folder().glob(f"{homes.PACKAGE}_*.deb")):
-            if store.head(FOLDER + _key_name(deb.name)) is None:
-                store.put_if_absent(FOLDER + _key_name(deb.name), deb.read_bytes())
+    if any(ref.kind in ("example", "sweethome3d") for ref in refs):
+        _upload_package(store, homes.PACKAGE)
+
+
+def _upload_package(store: Store, package: str) -> None:
+    for deb in sorted(cache_folder().glob(f"{package}_*.deb")):
+        if store.head(FOLDER + _key_name(deb.name)) is None:
+            store.put_if_absent(FOLDER + _key_name(deb.name), deb.read_bytes())
 
 
 def is_left_in_place(ref: SourceRef) -> bool:
@@ -108,7 +115,7 @@ def _placed(ref: SourceRef) -> SourceRef:
         or path.suffix.lower() not in _UPLOADED
     ):
         return ref
-    key = f"{FOLDER}{ref.house_id}/{_key_name(path.name)}"
+    key = f"{FOLDER}{home_id(ref)}/{_key_name(path.name)}"
     return ref.model_copy(update={"location": key})
 
 

@@ -50,6 +50,43 @@ def counted(n: int, noun: str) -> str:
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
+MAX_SEEDS: Final = 100_000  # of one command
+
+
+def add_dress(p: argparse.ArgumentParser) -> None:
+    """By which seeds each home is dressed, and with what."""
+    add = p.add_argument
+    text = "dress each home by each seed, a house of its own each: 3, 1..20 or 1,4,7"
+    add("--dress", metavar="SEEDS", type=str, help=text)
+    add_catalogue(p)
+
+
+def add_catalogue(p: argparse.ArgumentParser) -> None:
+    """What to dress with beside the furniture package."""
+    text = (
+        "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB;"
+        " `generated` leaves out the furniture package"
+    )
+    p.add_argument("--catalogue", action="append", default=[], metavar="LIBRARY", help=text)
+
+
+def dress_seeds(text: str | None) -> tuple[int, ...]:
+    """The seeds of --dress, each once; none where it is not given. Raises BadInput."""
+    if text is None:
+        return ()
+    seeds: dict[int, None] = {}
+    for word in text.split(","):
+        first, dots, last = word.partition("..")
+        bounds = [first, last] if dots else [first, first]
+        if not all(b.isascii() and b.isdigit() and len(b) < 10 for b in bounds):
+            raise BadInput("--dress", text, "expected a seed, or seeds", hint="3, 1..20 or 1,4,7")
+        low, high = (int(b) for b in bounds)
+        if not 1 <= low <= high < low + MAX_SEEDS:
+            raise BadInput("--dress", text, f"expected 1 to {MAX_SEEDS} seeds from 1 on, ascending")
+        seeds |= dict.fromkeys(range(low, high + 1))
+    return tuple(seeds)
+
+
 def at_least(name: str, value: int, least: int) -> None:
     """Raise BadInput, naming the option, where its value is below the least that makes sense."""
     if value < least:
@@ -67,13 +104,18 @@ def add_cameras(p: argparse.ArgumentParser) -> None:
 
 
 def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
-    """The recipe by name, and what overrides its fields."""
+    """The recipe by name, its seed, and what overrides its fields."""
+    add_fields(p, default)
+    p.add_argument("--seed", type=int, help="the recipe's seed (default 0)")
+
+
+def add_fields(p: argparse.ArgumentParser, default: str = "fast") -> None:
+    """The recipe by name, and what overrides its fields, the seed apart."""
     from pbrs_farm.core.recipe import RECIPE_NAMES
 
     add = p.add_argument
     add("--recipe", default=default, help=f"{', '.join(RECIPE_NAMES)} (default {default})")
     add_set(p, "GROUP.FIELD=VALUE", "override a field")
-    add("--seed", type=int, help="the recipe's seed (default 0)")
     add("--size", metavar="WxH", help="picture size, e.g. 640x480")
     add("--strict", action="store_true", help="recoverable faults of a home are errors")
 
@@ -165,6 +207,8 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
     if getattr(args, "camera_file", None):
         # A recipe's fields are JSON: quote the path.
         overrides |= {"cameras.source": "file", "cameras.file": json.dumps(str(args.camera_file))}
+    if getattr(args, "catalogue", None):
+        overrides["dress.catalogue"] = json.dumps(":".join(args.catalogue))
     if getattr(args, "exact", False):
         overrides["cameras.exact"] = "true"
     return recipe_from_name(args.recipe, overrides)

@@ -1,4 +1,4 @@
-"""Verbs that run one stage and explain it: repair, cameras. Effects: read a home, write files."""
+"""Verbs that run one stage and explain it: dress, repair, cameras. Effects: read a home, write files."""
 
 from __future__ import annotations
 
@@ -9,23 +9,43 @@ from typing import TYPE_CHECKING
 from pbrs_farm.commands.arguments import (
     Verb,
     add_cameras,
+    add_catalogue,
+    add_fields,
     add_home,
     add_recipe,
+    at_least,
+    dress_seeds,
     echo,
     echo_json,
     recipe_of,
+    warn,
 )
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
 
 if TYPE_CHECKING:
     from pbrs_farm.core.house import House
+    from pbrs_farm.core.recipe import Recipe
     from pbrs_farm.sample import CameraReport
     from pbrs_farm.sample.camera_report import SectorReport
     from pbrs_farm.sample.house_sampler import Sampling
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add repair and cameras."""
+    """Add dress, repair and cameras."""
+    text = "make a home look lived in: before and after, the bundle, a report in plain words"
+    p = verb("dress", _dress, text)
+    add_home(p)
+    add = p.add_argument
+    text = "what is chosen: another seed, another home (default 1)"
+    add("--seed", dest="dress", default="1", metavar="N", help=text)
+    text = "folder for before_after.png, house.glb, house.json, dress.json, repair.json"
+    add("--out", type=Path, required=True, help=text)
+    text = "pictures of before and after, a room each (default 1; 0 = none)"
+    add("--views", type=int, default=1, metavar="N", help=text)
+    add_catalogue(p)
+    add_fields(p)
+
     text = "read and repair a home: bundle, report in plain words, a cut through the walls"
     p = verb("repair", _repair, text)
     add_home(p)
@@ -44,6 +64,65 @@ def add_verbs(verb: Verb) -> None:
     add_cameras(p)
     add("--json", action="store_true", help="views and report as JSON")
     add_recipe(p)
+
+
+def _dress(args: argparse.Namespace) -> int:
+    from pbrs_farm.core import keys
+    from pbrs_farm.dress.report import summary_of_dressing
+    from pbrs_farm.formats.house_bundle import bundle_from_house
+    from pbrs_farm.formats.serialise import json_bytes
+    from pbrs_farm.read.source import resolve, variants
+    from pbrs_farm.run.attributions import attribution_text
+    from pbrs_farm.run.steps import made_house
+    from pbrs_farm.store.folder import FolderStore
+
+    at_least("--views", args.views, 0)
+    seeds = dress_seeds(args.dress)
+    if len(seeds) != 1:
+        raise BadInput("--seed", args.dress, "expected one seed")
+    recipe = recipe_of(args)
+    (source,) = variants(resolve(args.home), seeds)
+    house, repairs, report = made_house(source, recipe)
+    if report is None:
+        raise BadInput(args.home, "", "an object without context is not dressed")
+    # Write the dressed and repaired house and what was done to it.
+    store = FolderStore(args.out)
+    glb, description = bundle_from_house(house)
+    text = attribution_text([house.source.attribution], report.credits)
+    files = {
+        "house.glb": glb, "house.json": description, keys.DRESS: json_bytes(report),
+        "repair.json": json_bytes(repairs), keys.ATTRIBUTION: text.encode(),
+    }  # fmt: skip
+    files = {name: data for name, data in files.items() if data}
+    if args.views:
+        files |= _before_after(args, house, recipe)
+    for name, data in files.items():
+        store.put(name, data)
+    echo(summary_of_dressing(report))
+    echo(f"{args.out}: {' '.join(files)}")
+    return 0 if report.is_sound else 1
+
+
+def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dict[str, bytes]:
+    """The pictures of the home as it was and as it is, by file name."""
+    from pbrs_farm.gallery.before_after import before_after_png
+    from pbrs_farm.read.source import resolve
+    from pbrs_farm.run.before_after import pairs
+    from pbrs_farm.run.processes.verb_process import doing
+    from pbrs_farm.run.steps import repaired_house
+
+    undressed = recipe.model_copy(update={"dress": type(recipe.dress)()})
+    bare, _report = repaired_house(resolve(args.home), undressed)
+    doing(args.home, "before and after")
+    files = {}
+    for n, pair in enumerate(pairs(bare, house, recipe, args.views)):
+        caption = f"{house.name}, view {pair.view.id}, bare and dressed"
+        caption = "; ".join(t for t in (caption, house.source.attribution) if t)
+        name = f"before_after{f'_{n + 1}' if n else ''}.png"
+        files[name] = before_after_png(pair.before, pair.after, caption)
+    if not files:
+        warn("no room has a view: no picture of before and after")
+    return files
 
 
 def _repair(args: argparse.Namespace) -> int:

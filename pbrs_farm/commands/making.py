@@ -14,11 +14,13 @@ from pbrs_farm.commands.arguments import (
     HOME,
     Verb,
     add_cameras,
+    add_dress,
     add_light,
     add_output,
     add_recipe,
     at_least,
     counted,
+    dress_seeds,
     echo,
     home_arguments,
     recipe_of,
@@ -39,6 +41,7 @@ def add_verbs(verb: Verb) -> None:
     text = "example home, `builtin`, or a file (default Studio)"
     p.add_argument("--home", default="Studio", help=text)
     p.add_argument("--out", default="out/demo", help="output folder")
+    add_dress(p)
     _add_run(p, "preview")
 
     p = verb("run", _run, "houses -> repaired houses -> cameras -> pictures and labels")
@@ -50,6 +53,7 @@ def add_verbs(verb: Verb) -> None:
     add("--out", required=True, help="output folder or store URL")
     add_cameras(p)
     add("--camera-file", type=Path, help="your own: JSON list, or room_camera.txt")
+    add_dress(p)
     _add_run(p)
 
     text = "single models without context: 20 views each (paper section 4.1)"
@@ -71,6 +75,7 @@ def add_verbs(verb: Verb) -> None:
     add("--out", required=True)
     add("--view")
     add("--layers", nargs="+", default=[])
+    add("--dress", type=int, default=0, metavar="SEED", help="of a dressed variant")
 
 
 def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
@@ -109,7 +114,7 @@ def _run_homes(
     # Run it, reporting progress as standard output suits.
     _warn_of_slowness()
     started = time.monotonic()
-    n_homes = len(homes) + len(sources)
+    n_homes = (len(homes) + len(sources)) * max(1, len(run.dress_seeds))
     with progress_reporter(n_homes, args.views, as_json=args.json) as report:
         summary = run_local(run, report)
     _report(args, summary, time.monotonic() - started)
@@ -133,6 +138,7 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
         debug=args.debug,
         store=settings_from_environment().store,
         sources=sources,
+        dress_seeds=dress_seeds(getattr(args, "dress", None)),
     )
 
 
@@ -211,7 +217,7 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 def _step(args: argparse.Namespace) -> int:
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.read.source import resolve, variants
     from pbrs_farm.run.house_cache import HouseCache
     from pbrs_farm.run.plan import STEPS, needed_of_house
     from pbrs_farm.run.step_cache import Work
@@ -224,7 +230,7 @@ def _step(args: argparse.Namespace) -> int:
         raise BadInput("step", args.step, "no such step", hint=f"of {', '.join(STEPS)}")
     store = store_from_url(args.out, settings_from_environment().store)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
-    source = resolve(args.home)
+    (source,) = variants(resolve(args.home), [args.dress or recipe.dress.seed])
     # One process, one house: the cache keeps it for all steps.
     work = Work(
         store=store, recipe=recipe, house_id=source.house_id, house_cache=HouseCache(), source=source,

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import (
     Verb,
+    add_dress,
     add_farm,
     add_light,
     add_output,
     add_recipe,
     at_least,
     counted,
+    dress_seeds,
     echo,
     echo_json,
     farm_of,
@@ -33,6 +35,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("homes", nargs="+", metavar="HOME", help="files, folders, example homes")
     text = "file with a SUNCG house id a line (HOME: root)"
     p.add_argument("--houses", metavar="LIST", help=text)
+    add_dress(p)
     add_recipe(p)
     add_light(p)
     add_output(p)
@@ -56,7 +59,8 @@ def _submit(args: argparse.Namespace) -> int:
 
     spec = _spec(args)
     # Read the homes: what each is, and where workers will find it.
-    found = entries_from_arguments(home_arguments(args.homes, args.houses))
+    seeds = dress_seeds(args.dress) or (spec.recipe.dress.seed,)
+    found = entries_from_arguments(home_arguments(args.homes, args.houses), seeds)
     reference = placed_reference(args.reference) if args.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
     houses = [entry for entry, _ref in found]

@@ -3,7 +3,7 @@
 A key is a path with "/" below the output root. Equal inputs give equal digests on every machine:
 digests are over canonical JSON, never over Python's own hash.
 
-    houses/<house>/<file>                        recipe.json   manifest.jsonl
+    houses/<house>/<file>                        recipe.json   manifest.jsonl   ATTRIBUTION.txt
     houses/<house>/views/<view>/<file>           selection.json
     houses/<house>/done/<step>[.<view>].json     selection/<run>.<ending>
     objects/<house>/...  for objects             selection/histograms/<house>.bin
@@ -23,6 +23,8 @@ from pbrs_farm.core.errors import BadInput
 
 RECIPE: Final = "recipe.json"
 MANIFEST: Final = "manifest.jsonl"
+ATTRIBUTION: Final = "ATTRIBUTION.txt"
+DRESS: Final = "dress.json"  # of a house that was dressed
 SELECTION: Final = "selection.json"
 # The folders of an output root that hold a folder per house and per object without context.
 FOLDERS: Final = ("houses", "objects")
@@ -53,6 +55,11 @@ def slug(name: str) -> str:
 def house_id(file_stem: str, source_sha256: str) -> str:
     """`<slug of the file name>-<first 8 hex of the source's sha256>`."""
     return f"{slug(file_stem)}-{source_sha256[:8]}"
+
+
+def dressed_id(house: str, seed: int) -> str:
+    """The id of a house dressed by a seed: `<house>-d<seed>`."""
+    return f"{house}-d{seed}"
 
 
 # Ids of objects without context begin so; no house's id can (a slug has no underscore).

@@ -16,6 +16,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe_fields import (
     CameraFields,
+    DressFields,
     EmissionFields,
     FieldGroup,
     HistogramFields,
@@ -33,6 +34,7 @@ from pbrs_farm.core.recipe_fields import (
 __all__ = [
     "RECIPE_NAMES",
     "CameraFields",
+    "DressFields",
     "EmissionFields",
     "HistogramFields",
     "ImageFields",
@@ -57,6 +59,7 @@ class Recipe(FieldGroup):
     name: str = "fast"
     seed: int = Field(0, ge=0, lt=2**64)
     read: ReadFields = ReadFields()
+    dress: DressFields = DressFields()
     repair: RepairFields = RepairFields()
     cameras: CameraFields = CameraFields()
     image: ImageFields = ImageFields()
@@ -72,8 +75,8 @@ class Recipe(FieldGroup):
     def digest(self, *groups: str) -> str:
         """Digest of the seed and the named groups; of all fields but the name when none is named.
 
-        A field of _CAME_LATER is left out at its default, so that what was stored before the
-        field existed keeps its digest.
+        A field of _CAME_LATER is left out at its default, and a group of such fields alone with
+        them, so that what was stored before the field existed keeps its digest.
         """
         return self._digest(groups, with_light_groups=self.light.groups != "two")
 
@@ -90,11 +93,15 @@ class Recipe(FieldGroup):
             for name in names:
                 if fields[group][name] == defaults[name].default:
                     del fields[group][name]
-        return keys.digest({g: fields[g] for g in ("seed", *groups)} if groups else fields)
+            if not fields[group]:
+                del fields[group]
+        chosen = {g: fields[g] for g in ("seed", *groups) if g in fields}
+        return keys.digest(chosen if groups else fields)
 
 
 _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "cameras": ("max_opening_fraction", "min_score", "min_room_score", "hfov_spread"),
+    "dress": tuple(DressFields.model_fields),
     "repair": ("lamp_in_every_room",),
     "selection": ("min_room_lx",),
 }

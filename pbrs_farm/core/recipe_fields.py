@@ -39,6 +39,24 @@ class ReadFields(FieldGroup):
     )
 
 
+class DressFields(FieldGroup):
+    """Dressing: how far a home is made to look lived in, between reading and repair (docs/dress.md)."""
+
+    seed: int = Field(0, ge=0, lt=2**32, description="of what is chosen; 0 = not dressed")
+    surfaces: Share = Field(1.0, description="of rooms that get floors and walls of a style")
+    parts: Share = Field(1.0, description="of furniture whose wood, cloth and metal change")
+    swap: Share = Field(0.7, description="of furniture that another model of its class replaces")
+    clutter: Share = Field(1.0, description="of the things that stand on furniture")
+    walls: Share = Field(1.0, description="of pictures, mirrors, clocks, sockets and switches")
+    textiles: Share = Field(1.0, description="of curtains, blinds, rugs, pillows, blankets")
+    lamps: Share = Field(1.0, description="of rooms without a lamp that get one")
+    style: str = Field("", max_length=64, description="every home's; empty = drawn by the seed")
+    catalogue: str = Field(
+        "", max_length=4096,
+        description="libraries beside the furniture package, ':' between; `generated` = no package",
+    )  # fmt: skip
+
+
 class RepairFields(FieldGroup):
     """Geometry repair (paper section 3, "Data")."""
 

@@ -5,6 +5,7 @@ Effects: reads files, and the example homes' package from the cache (or through 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
@@ -37,6 +38,7 @@ class SourceRef(BaseModel):
     location: a path, an example home's name, or "builtin"; of an object without context the JSON
     of its ObjectModel. sha256: of the file's bytes (SUNCG: of house.json). companions: digest of
     all other files that reading opens, "" = none, None = not known (named by an earlier version).
+    dress_seed: what it is dressed by between reading and repair; its id then ends in `-d<seed>`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -45,11 +47,34 @@ class SourceRef(BaseModel):
     house_id: str
     sha256: str
     companions: str | None = None
+    dress_seed: int = 0  # 0 = as it was drawn
 
     @property
     def fingerprint(self) -> str:
         """Digest of every file the source reads; without companions that of its own file."""
         return f"{self.sha256}+{self.companions}" if self.companions else self.sha256
+
+
+def home_id(source: SourceRef) -> str:
+    """The id of the source's house as it was drawn, whatever it is dressed by."""
+    return source.house_id.removesuffix(keys.dressed_id("", source.dress_seed))
+
+
+def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
+    """The source dressed by each seed, a house of its own each; itself for seed 0.
+
+    An object without context is never dressed: it is given back once.
+    """
+    if source.kind == "object":
+        return [source]
+    return [
+        source.model_copy(
+            update={"house_id": keys.dressed_id(source.house_id, seed), "dress_seed": seed}
+        )
+        if seed
+        else source
+        for seed in seeds
+    ]
 
 
 def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:

@@ -17,8 +17,9 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.read.common.companion_files import SourceFiles
-from pbrs_farm.read.source import SourceRef, resolve
+from pbrs_farm.read.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan
+from pbrs_farm.run.attributions import write_attribution
 from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
 from pbrs_farm.run.plan import Wanted
 from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
@@ -46,6 +47,7 @@ class Run:
     debug: bool = False  # tracebacks travel with failures
     store: StoreSettings = field(default_factory=StoreSettings)
     sources: Sequence[SourceRef] = ()  # homes that are resolved already
+    dress_seeds: Sequence[int] = ()  # each home dressed by each of them; none = by the recipe's
 
 
 @dataclass(slots=True)
@@ -85,6 +87,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
         finish_house(store, house_id)
     below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
     merge_manifests(store, [at.house for at in below if at and at.file == keys.MANIFEST])
+    write_attribution(store)
     return summary
 
 
@@ -97,7 +100,8 @@ def _limits(run: Run, n_jobs: int) -> ProcessLimits:
 
 
 def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
-    sources = {s.house_id: s for s in run.sources}
+    seeds = run.dress_seeds or (run.recipe.dress.seed,)
+    sources = {s.house_id: s for given in run.sources for s in variants(given, seeds)}
     files = SourceFiles()
     for word in run.homes:
         doing(word, "read")
@@ -106,7 +110,8 @@ def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
         except PbrsError as error:
             summary.failures.append((shown(word, MAX_PLACE), str(error), ""))
             continue
-        sources.setdefault(source.house_id, source)
+        for variant in variants(source, seeds):
+            sources.setdefault(variant.house_id, variant)
     return list(sources.values())
 
 
@@ -199,8 +204,10 @@ class _Schedule:
         self._waiting.extendleft(reversed(tasks))
 
     def _command(self, event: Event) -> str:
-        source = self._sources[event.house_id].location
-        words = ["pbrs-farm", "step", event.step, source, "--out", self._run.store_url]
+        source = self._sources[event.house_id]
+        words = ["pbrs-farm", "step", event.step, source.location, "--out", self._run.store_url]
+        if source.dress_seed:
+            words += ["--dress", str(source.dress_seed)]
         if event.view_id:
             words += ["--view", event.view_id]
         return shlex.join(words)

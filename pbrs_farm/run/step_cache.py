@@ -22,6 +22,7 @@ from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
+from pbrs_farm.run.dressed_house import dressing_digest
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.sample.room_camera import with_names
 from pbrs_farm.store.object_store import Store
@@ -114,7 +115,9 @@ def _inputs(step: plan.Step, work: Work) -> dict[str, str]:
 def _extra(name: str, work: Work) -> object:
     """What a step depends on beside recipe fields and other steps."""
     if name == "house":
-        return required_source(work).fingerprint
+        source = required_source(work)
+        dressing = dressing_digest(source, work.recipe)
+        return [source.fingerprint, dressing] if dressing else source.fingerprint
     if name == "truth":
         return work.layers
     if name == "cameras" and work.recipe.cameras.source == "file":

@@ -32,6 +32,7 @@ from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.formats.view_json import view_description, view_json
 from pbrs_farm.read.source import SourceRef, read_house
 from pbrs_farm.run import plan
+from pbrs_farm.run.dressed_house import dressed
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.processes.verb_process import doing
@@ -46,6 +47,7 @@ from pbrs_farm.run.step_cache import (
 from pbrs_farm.run.view_histogram import view_histogram
 
 if TYPE_CHECKING:
+    from pbrs_farm.dress.report import DressReport
     from pbrs_farm.repair import RepairReport
     from pbrs_farm.sample import CameraReport
     from pbrs_farm.selection.view_record import ViewPlace
@@ -72,16 +74,18 @@ def _view_at_size(work: Work, cached: CachedHouse) -> tuple[View, Camera]:
 
 
 def _house(work: Work) -> StepOutput:
-    """house.glb, house.json, repair.json: the source read and repaired."""
+    """house.glb, house.json, repair.json, of a dressed one dress.json: the source made ready."""
     from pbrs_farm.formats.house_bundle import bundle_from_house
 
     # The submitted id has the source's digest: another one means another file at that place.
     source = required_source(work)
-    repaired, report = repaired_house(source, work.recipe)
+    repaired, report, dressing = made_house(source, work.recipe)
     if repaired.id != work.house_id:
         raise BadInput(source.location, repaired.id, f"expected house {work.house_id}")
     glb, description = bundle_from_house(repaired)
     files = {"house.glb": glb, "house.json": description, "repair.json": json_bytes(report)}
+    if dressing is not None:
+        files[keys.DRESS] = json_bytes(dressing)
     facts: dict[str, Any] = {
         name: len(getattr(repaired, name)) for name in ("rooms", "items", "notes")
     }
@@ -92,7 +96,13 @@ def _house(work: Work) -> StepOutput:
 
 
 def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
-    """The house of a source, read and repaired, and what was changed. Raises BadHouse."""
+    """The house of a source, read, dressed where asked for, and repaired. Raises BadHouse."""
+    house, report, _dressing = made_house(source, recipe)
+    return house, report
+
+
+def made_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport, DressReport | None]:
+    """As repaired_house, with what dressing did; None where the source is not dressed."""
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.repair import RepairReport, repair
 
@@ -100,13 +110,14 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
     doing(source.location, "read")
     house = read_house(source, recipe.read)
     if source.kind == "object":
-        return house, RepairReport(house_id=house.id, was_repaired=True)
+        return house, RepairReport(house_id=house.id, was_repaired=True), None
 
     def occluder_from(some: House) -> Caster:
         return Caster(geometry_from_house(some))
 
+    house, dressing = dressed(house, source, recipe)
     doing(source.location, "repair")
-    return repair(house, recipe.repair, occluder_from=occluder_from)
+    return *repair(house, recipe.repair, occluder_from=occluder_from), dressing
 
 
 def _cameras(work: Work) -> StepOutput:

@@ -15,6 +15,7 @@ from typing import IO, Any
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing
 from pbrs_farm.formats.manifest import lines_by_house
+from pbrs_farm.run.attributions import write_attribution
 from pbrs_farm.store.object_store import Store
 from workers.ids import job_key
 from workers.job import JobSpec, houses_from_lines
@@ -62,6 +63,7 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
                 file.write(part)
                 n_objects += part.count(b"\n") if house in own else 0  # a row an object
         _put_file(store, keys.MANIFEST, file)
+    write_attribution(store)
     report: dict[str, Any] = {
         "job": spec.job_id,
         "houses": len(houses),

@@ -1,0 +1,98 @@
+"""The stage: a House that looks lived in, from a House, a Catalogue and a seed; no effects.
+
+The parts follow one another as people furnish: surfaces, furniture, lamps, large textiles, what
+hangs on walls, and last what lies about. Then the gates take out what stands wrong.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.catalogue import Catalogue, Piece
+from pbrs_farm.core.house import House, Item, Source
+from pbrs_farm.core.recipe import DressFields
+from pbrs_farm.dress.draft import ADDED_TAG, CHANGED_TAG, Draft
+from pbrs_farm.dress.report import Credit, DressReport, is_owed
+
+Part = Callable[[Draft, Catalogue, float], None]
+
+_PARTS: tuple[tuple[str, Part], ...] = ()
+"""Field of the recipe that holds the part's share, and the part, in the order they are done."""
+
+
+def dress(
+    house: House, catalogue: Catalogue, fields: DressFields, seed: int
+) -> tuple[House, DressReport]:
+    """The house dressed by a seed, and what was added, changed, refused and measured.
+
+    house: as read, not repaired. Equal arguments give equal bits. Raises BadRecipe for an unknown
+    style.
+    """
+    draft = Draft(house, seed)
+    for field, part in _PARTS:
+        share = float(getattr(fields, field))
+        if share > 0:
+            part(draft, catalogue, share)
+    dressed = draft.house()
+    credits = _credits(dressed, catalogue)
+    dressed = replace(
+        dressed, id=keys.dressed_id(house.id, seed), source=_credited(house.source, credits)
+    )
+    return dressed, _report(dressed, draft, credits)
+
+
+def _report(house: House, draft: Draft, credits: tuple[Credit, ...]) -> DressReport:
+    changed = Counter(
+        tag.removeprefix(CHANGED_TAG)
+        for item in house.items
+        for tag in item.tags
+        if tag.startswith(CHANGED_TAG)
+    )
+    return DressReport(
+        house_id=house.id,
+        seed=draft.seed,
+        added=dict(sorted(draft.done.items())),
+        changed=dict(sorted(changed.items())),
+        refused=dict(sorted(draft.refused.items())),
+        credits=credits,
+        notes=tuple(f"{n.kind}: {n.place}: {n.text}" for n in draft.notes),
+    )
+
+
+def piece_of(item: Item) -> str:
+    """The id of the piece that an added item was made from; "" for an item of the source."""
+    return next((t.removeprefix(ADDED_TAG) for t in item.tags if t.startswith(ADDED_TAG)), "")
+
+
+def _credits(house: House, catalogue: Catalogue) -> tuple[Credit, ...]:
+    """The pieces and pictures of libraries that the house shows, by id."""
+    pieces: dict[str, Piece] = {p.id: p for p in catalogue.pieces}
+    counts = Counter(piece_of(item) for item in house.items)
+    found = [
+        Credit(id=p.id, name=p.name, library=p.library, creator=p.creator, licence=p.licence, n=n)
+        for p, n in ((pieces.get(i), n) for i, n in counts.items())
+        if p is not None and p.library
+    ]
+    # A picture is known by its texture, however many surfaces show it.
+    found += [
+        Credit(
+            id=p.texture.id, name=p.texture.name, library="", creator=p.creator,
+            licence=p.licence, n=1,
+        )
+        for p in catalogue.pictures
+        if p.texture.id in house.textures
+    ]  # fmt: skip
+    return tuple(sorted(found, key=lambda c: c.id))
+
+
+def _credited(source: Source, credits: tuple[Credit, ...]) -> Source:
+    """The source with a short line of the libraries that must be named."""
+    owed = sorted({c.library or c.creator for c in credits if is_owed(c)} - {""})
+    if not owed:
+        return source
+    licences = sorted({c.licence for c in credits if is_owed(c)})
+    line = f"furnished with models of {', '.join(owed)}, {', '.join(licences)}, see ATTRIBUTION.txt"
+    return replace(source, attribution="; ".join(t for t in (source.attribution, line) if t))

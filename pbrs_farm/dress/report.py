@@ -1,0 +1,110 @@
+"""What dressing added, changed and refused, and what its gates found: dress.json. No effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pydantic import BaseModel, ConfigDict
+
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Credit(_Record):
+    """A model or picture of a library that stands in the house, and on which terms."""
+
+    id: str  # in the catalogue
+    name: str
+    library: str
+    creator: str
+    licence: str
+    n: int  # how often
+
+
+class Gate(_Record):
+    """A rule that a dressed house must keep, and what came of it."""
+
+    name: str  # "penetration", "support", "doors", "windows", "path", "must_haves"
+    n_checked: int  # pairs, things or doors that were measured
+    n_taken_out: int  # things that broke it and were taken out, or put back as they were
+    n_left: int  # that break it in the house as it is now
+
+
+class DressReport(_Record):
+    """Everything that dressing did to a house, in counts and names."""
+
+    house_id: str  # as dressed
+    seed: int
+    style: str = ""
+    added: dict[str, int] = {}  # `<part>: <group>` -> things that stand in the house now
+    changed: dict[str, int] = {}  # part -> things of the source that it changed
+    refused: dict[str, int] = {}  # `<part>: <reason>` -> tries that were given up
+    gates: tuple[Gate, ...] = ()
+    credits: tuple[Credit, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether nothing in the house breaks a gate."""
+        return not any(gate.n_left for gate in self.gates)
+
+
+def summary_of_dressing(report: DressReport) -> str:
+    """What was added to a house, changed in it and refused, a sentence per line."""
+    return "\n".join(
+        [f"{report.house_id}:", *(f"- {shown(line, MAX_MESSAGE)}" for line in _lines(report))]
+    )
+
+
+_GATE_TEXT = {
+    "penetration": "no two things share more than 1 cm",
+    "support": "nothing floats or sinks by more than 2 mm",
+    "doors": "every door swings free, with 0.8 m before it",
+    "windows": "no window is covered by furniture by more than a fifth",
+    "path": "a way 0.6 m wide joins the doors that it joined before",
+    "must_haves": "every room has the beds, seats and fittings that it had",
+}
+
+
+def _lines(report: DressReport) -> Iterator[str]:
+    style = f", style {report.style}" if report.style else ""
+    yield f"dressed by seed {report.seed}{style}."
+    # Say what came in, by part, the most frequent first.
+    for part, groups in _by_part(report.added).items():
+        named = ", ".join(f"{n} {group.replace('_', ' ')}" for group, n in groups)
+        yield f"{part}: {sum(n for _group, n in groups)} added: {named}."
+    for part, n in sorted(report.changed.items()):
+        yield f"{part}: {n} things of the home changed."
+    # Say what did not, and why.
+    for part, reasons in _by_part(report.refused).items():
+        named = ", ".join(f"{n} {reason}" for reason, n in reasons)
+        yield f"{part}: not done: {named}."
+    for gate in report.gates:
+        text = _GATE_TEXT.get(gate.name, gate.name)
+        if gate.n_left:
+            yield f"GATE BROKEN: {text}: {gate.n_left} still do."
+        else:
+            out = f"; {gate.n_taken_out} taken out or put back for it" if gate.n_taken_out else ""
+            yield f"{text}: holds ({gate.n_checked} measured{out})."
+    owed = [c for c in report.credits if is_owed(c)]
+    if report.credits:
+        yield f"{len(report.credits)} models and pictures of libraries used, {len(owed)} of them CC-BY."
+    yield from report.notes
+
+
+def _by_part(counts: dict[str, int]) -> dict[str, list[tuple[str, int]]]:
+    parts: dict[str, list[tuple[str, int]]] = {}
+    for key, n in sorted(
+        counts.items(), key=lambda row: (row[0].partition(": ")[0], -row[1], row[0])
+    ):
+        part, _, what = key.partition(": ")
+        parts.setdefault(part, []).append((what, n))
+    return parts
+
+
+def is_owed(credit: Credit) -> bool:
+    """Whether a credit must be given: all but what is in the public domain or our own."""
+    return bool(credit.licence) and not credit.licence.upper().startswith(("CC0", "PUBLIC"))

@@ -1,0 +1,80 @@
+"""ATTRIBUTION.txt of an output root: whose models and pictures its dressed homes show; effects: the store's.
+
+It is derived from the manifest and each dressed house's dress.json, so that any process may write
+it: who writes looks again afterwards, and writes anew where a house has come in meanwhile.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import ObjectMissing
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+from pbrs_farm.dress.report import Credit, DressReport, is_owed
+from pbrs_farm.store.object_store import Store
+
+_ROUNDS = 5  # of looking again; more houses than that do not come in while a text is written
+
+
+def write_attribution(store: Store) -> None:
+    """Write ATTRIBUTION.txt where a house of the root shows what must be credited."""
+    seen: list[dict[str, str]] | None = None
+    for _round in range(_ROUNDS):
+        rows = _rows_of_dressings(store)
+        if rows == seen:
+            return
+        seen = rows
+        homes = (row.get("attribution", "") for row in rows)
+        text = attribution_text(homes, _credits(store, (row["key"] for row in rows)))
+        if not text:
+            return
+        data = text.encode("utf-8", "replace")
+        if store.head(keys.ATTRIBUTION) is None or store.get(keys.ATTRIBUTION) != data:
+            store.put(keys.ATTRIBUTION, data)
+
+
+def attribution_text(homes: Iterable[str], credits: Iterable[Credit]) -> str:
+    """The file's text; "" where nothing that is shown asks for a credit.
+
+    homes: the lines that the homes themselves ask for.
+    """
+    lines: dict[bool, set[str]] = {True: set(), False: set()}
+    for credit in credits:
+        by = f", by {credit.creator}" if credit.creator else ""
+        of = f" ({credit.library})" if credit.library else ""
+        line = f"- {credit.name}{by}{of}: {credit.licence or 'no licence named'}"
+        lines[is_owed(credit)].add(shown(line, MAX_MESSAGE))
+    if not lines[True]:
+        return ""
+    parts = [
+        "The pictures of this folder show works of others, placed, scaled and recoloured.",
+        *_paragraph("Homes:", {f"- {shown(line, MAX_MESSAGE)}" for line in homes if line}),
+        *_paragraph("Models and surface pictures that must be credited:", lines[True]),
+        *_paragraph("Models and surface pictures free of conditions:", lines[False]),
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _paragraph(title: str, lines: set[str]) -> list[str]:
+    return ["", title, *sorted(lines)] if lines else []
+
+
+def _rows_of_dressings(store: Store) -> list[dict[str, str]]:
+    """The rows of every dress.json in the root's manifest."""
+    try:
+        manifest = store.get(keys.MANIFEST)
+    except ObjectMissing:
+        return []
+    return [json.loads(x) for x in manifest.splitlines() if f"/{keys.DRESS}".encode() in x]
+
+
+def _credits(store: Store, dressed: Iterable[str]) -> list[Credit]:
+    found: list[Credit] = []
+    for key in dressed:
+        try:
+            found += DressReport.model_validate_json(store.get(key)).credits
+        except (ObjectMissing, ValueError):
+            continue  # made anew at this moment, or by another version: it comes with its own run
+    return found

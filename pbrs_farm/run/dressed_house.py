@@ -1,0 +1,61 @@
+"""Between read and repair: a source's house dressed by its seed, from the catalogue of the recipe.
+
+Effects: reads the furniture package from the cache (or through apt) and the user's libraries.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.catalogue import EMPTY, Catalogue
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import DressFields, Recipe
+from pbrs_farm.read.source import SourceRef
+from pbrs_farm.run.processes.verb_process import doing
+
+if TYPE_CHECKING:
+    from pbrs_farm.dress.report import DressReport
+
+
+def seed_of(source: SourceRef, recipe: Recipe) -> int:
+    """What a source is dressed by: its own seed, else the recipe's; 0 = not at all."""
+    if source.kind == "object":
+        return 0
+    return source.dress_seed or recipe.dress.seed
+
+
+def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, DressReport | None]:
+    """A house as read, dressed by its source's seed, and what was done; None where it is not.
+
+    Raises BadRecipe for an unknown style, BadInput for a library that is none, MachineFailed
+    where the furniture package cannot be had.
+    """
+    seed = seed_of(source, recipe)
+    if not seed:
+        return house, None
+    from pbrs_farm.dress.dressing import dress
+
+    doing(source.location, "dress")
+    return dress(house, catalogue_of(recipe.dress), recipe.dress, seed)
+
+
+def dressing_digest(source: SourceRef, recipe: Recipe) -> str:
+    """Digest of all that dressing depends on beside the house; "" where it is not dressed."""
+    seed = seed_of(source, recipe)
+    if not seed:
+        return ""
+    # Where the libraries lie is no matter: their content is.
+    fields = recipe.dress.model_dump(mode="json", exclude={"seed", "catalogue"})
+    return keys.digest(seed, fields, catalogue_of(recipe.dress).digest)
+
+
+def catalogue_of(fields: DressFields) -> Catalogue:
+    """The catalogue that a recipe names, read once a process."""
+    return _catalogue(fields.catalogue)
+
+
+@lru_cache(maxsize=2)
+def _catalogue(words: str) -> Catalogue:
+    return EMPTY
