@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.noop_runner import NoopRunner
+from benchmarks.farm.noop_runner import NoopRunner
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.store import MemoryStore

@@ -10,7 +10,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.sample import sample_cameras
 from tests.builders import builtin_home
 
-gl_items = pytest.importorskip("benchmarks.gl_items")
+gl_items = pytest.importorskip("benchmarks.views.gl_items")
 
 
 def test_item_buffers_agree_with_opengls_but_for_pixels_on_edges() -> None:

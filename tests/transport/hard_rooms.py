@@ -1,4 +1,4 @@
-"""Rooms in which light is hard to find, for the Metropolis tests and benchmarks/light.py."""
+"""Rooms in which light is hard to find, for the Metropolis tests and benchmarks/light/equal_time.py."""
 
 from __future__ import annotations
 

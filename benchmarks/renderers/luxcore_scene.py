@@ -1,4 +1,4 @@
-"""Renders exported scenes with LuxCore: run by benchmarks/luxcore.py, in its own Python.
+"""Renders exported scenes with LuxCore: run by benchmarks/renderers/luxcore.py, in its own Python.
 
 `pyluxcore` is Apache-2.0. This file imports nothing of pbrs_farm and nothing imports it; both sides
 meet in files: scene.npz, scene.json, dome.npy, linear textures as NPY. For every job of jobs.json it

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.noop_runner import N_HOUSES, batches_of
+from benchmarks.farm.noop_runner import N_HOUSES, batches_of
 from benchmarks.report import write_report
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
@@ -80,7 +80,7 @@ class Bench:
             "PBRS_REDIS_URL": f"redis://127.0.0.1:{port}/0",
             "PBRS_STORE": (self.folder / "store").as_uri(),
             "PBRS_FARM_SCRATCH": str(self.folder),
-            "PBRS_FARM_RUNNER": "benchmarks.noop_runner:runner",
+            "PBRS_FARM_RUNNER": "benchmarks.farm.noop_runner:runner",
         }
         self.start("redis", words)
         time.sleep(0.5)

@@ -64,14 +64,14 @@ def _in_a_process(module: str, name: str) -> dict[str, Any]:
 
 
 def _lit(name: str) -> dict[str, Any]:
-    row = _in_a_process("benchmarks.house_light", name)
+    row = _in_a_process("benchmarks.homes.house_light", name)
     print(f"{name:<34}{row['views']:>6}{len(row['dark']):>6}  {'; '.join(row['left_out'])}")
     print(*(f"  {line}\n" for line in row["dark"]), sep="", end="", flush=True)
     return row
 
 
 def _measured(name: str) -> dict[str, Any]:
-    row = _in_a_process("benchmarks.houses", name)
+    row = _in_a_process("benchmarks.homes.houses", name)
     print(
         f"{name:<34}{row['read_s']:>8.2f}{row['repair_s']:>9.2f}{row['seconds']:>7.2f}{row['mb']:>6}"
         f"{row['triangles']:>11}{row['n_sky']:>7}{row['closed_share']:>8.2f}",

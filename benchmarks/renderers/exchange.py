@@ -1,6 +1,6 @@
 """What our kernels gather from, written as files for other renderers. Effects: writes them.
 
-benchmarks/cycles.py and benchmarks/luxcore.py write a scene with it; each renderer's own program
+benchmarks/renderers/cycles.py and benchmarks/renderers/luxcore.py write a scene with it; each renderer's own program
 reads scene.npz and scene.json, and pictures in a form of its own.
 """
 

@@ -1,7 +1,7 @@
 """The views that a `preview` run chooses in a home, three at most: which of them are dark.
 
-`python -m benchmarks.house_light NAME` renders them small in this process and prints JSON;
-benchmarks/houses.py runs it for each example home.
+`python -m benchmarks.homes.house_light NAME` renders them small in this process and prints JSON;
+benchmarks/homes/houses.py runs it for each example home.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Camera sampling: candidates a second, against a moderngl loop and Mitsuba's bare ray rate.
 
-`python -m benchmarks.cameras --home NAME` samples one home in this process and prints JSON: the
+`python -m benchmarks.views.cameras --home NAME` samples one home in this process and prints JSON: the
 bench runs it in a process of its own, with an empty kernel cache.
 """
 
@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import view_content
 from benchmarks.memory import peak_mb
 from benchmarks.report import write_report
+from benchmarks.views import view_content
 from pbrs_farm.assets import homes
 from pbrs_farm.assets.debian import cache_folder
 from pbrs_farm.core.camera import Camera, Intrinsics
@@ -169,7 +169,7 @@ def _bare_mrays(geometry: Geometry, cameras: list[Camera]) -> float:
 
 def _gl_per_s(geometry: Geometry, cameras: list[Camera], n_items: int) -> float:
     """Candidates a second of a loop that draws each one and counts its pixels on the CPU."""
-    from benchmarks.gl_items import GlItems
+    from benchmarks.views.gl_items import GlItems
 
     gl = GlItems(geometry, *SIZE)
 
@@ -191,7 +191,7 @@ def _home_in_a_process(name: str) -> dict[str, float]:
 
 def _in_a_process(*words: str, env: Mapping[str, str] | None = None) -> dict[str, Any]:
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.cameras", *words],
+        [sys.executable, "-m", "benchmarks.views.cameras", *words],
         env=env,
         stdout=subprocess.PIPE,
         text=True,

@@ -2,10 +2,10 @@
 
 `make bench-luxcore` installs `pyluxcore` (Apache-2.0) into out/luxcore-venv and runs this. Scenes
 are written to out/bench/luxcore as the tables that our own kernels gather from;
-benchmarks/luxcore_scene.py, a process of its own, renders them: LuxCore's PATHCPU and BIDIRCPU, each
+benchmarks/renderers/luxcore_scene.py, a process of its own, renders them: LuxCore's PATHCPU and BIDIRCPU, each
 with its Sobol and with its Metropolis sampler. LUXCORE_SCENES="door home" names some scenes.
 
-Scenes: the rooms of benchmarks/light.py and the first stored camera of an example home, its coats
+Scenes: the rooms of benchmarks/light/equal_time.py and the first stored camera of an example home, its coats
 taken off. Both engines: the sum of all light, 64x48 pixels, box filter, 12 segments, no denoiser, no
 clamping, all cores. LuxCore's roulette is on where its pictures stay right with it: in PATHCPU where
 no sky shines (docs/light.md).
@@ -13,7 +13,7 @@ no sky shines (docs/light.md).
 Method. Our Metropolis with its usual settings and MUTATIONS a pixel says how much CPU time a picture
 has; `path` gets as many samples as fit into it, LuxCore's threads are stopped when they have had
 it (loading, BVH, kernels before the clock). PICTURES of each, other seeds. All errors are relative, as
-in benchmarks/light.py, to one reference, the mean of N_REFERENCE more pictures of our Metropolis, here
+in benchmarks/light/equal_time.py, to one reference, the mean of N_REFERENCE more pictures of our Metropolis, here
 the least noisy: squares of luminance are divided by ref^2 + 1e-3 mean(ref)^2. relMSE is the mean over
 pixels of the variance between an engine's pictures: no noise of the reference counts, nor what the
 engines' materials differ by. The median pixel's error is against the reference, whose noise is
@@ -36,8 +36,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exchange import home_without_coats, without_coats, write_scene
-from benchmarks.noise import blocks
+from benchmarks.renderers.exchange import home_without_coats, without_coats, write_scene
+from benchmarks.renderers.noise import blocks
 from benchmarks.report import FOLDER, write_report
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb

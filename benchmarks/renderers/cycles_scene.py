@@ -1,4 +1,4 @@
-"""Renders an exported scene with Blender's Cycles: run by benchmarks/cycles.py, in its own Python.
+"""Renders an exported scene with Blender's Cycles: run by benchmarks/renderers/cycles.py, in its own Python.
 
 `bpy` is GPL: this file is a program of its own. It imports nothing of pbrs_farm and nothing
 imports it; both sides meet in files: scene.npz, scene.json, dome.exr, textures as PNG. For every

@@ -2,7 +2,7 @@
 
 `make bench-cycles` installs `bpy` into out/cycles-venv (it wants numpy below 2: no extra of ours
 can hold it) and runs this. The scene is written to out/bench/cycles as the tables that our own
-kernels gather from; benchmarks/cycles_scene.py, a process of its own, renders them with Cycles.
+kernels gather from; benchmarks/renderers/cycles_scene.py, a process of its own, renders them with Cycles.
 
 Coats are taken off for both (diffuse, textured; metals diffuse; mirrors, glass and shades as they
 are): then the two agree on every block of the picture, while Blender's Principled coat lets more
@@ -35,8 +35,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exchange import home_without_coats, write_scene
-from benchmarks.noise import blocks, relative_square
+from benchmarks.renderers.exchange import home_without_coats, write_scene
+from benchmarks.renderers.noise import blocks, relative_square
 from benchmarks.report import FOLDER, write_report
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import LUMINANCE

@@ -1,6 +1,6 @@
 """What the views of a preset show, over the nine example homes, against NYUv2's photographs.
 
-No effects of its own; benchmarks/cameras.py runs it in a process for each home.
+No effects of its own; benchmarks/views/cameras.py runs it in a process for each home.
 """
 
 from __future__ import annotations

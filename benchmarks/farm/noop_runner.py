@@ -1,4 +1,4 @@
-"""A runner that makes no pictures: one small output and one marker a task. For benchmarks.farm."""
+"""A runner that makes no pictures: one small output and one marker a task. For farm_cost.py."""
 
 from __future__ import annotations
 

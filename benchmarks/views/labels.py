@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.gl import turned_cameras
 from benchmarks.report import write_report
+from benchmarks.views.gl import turned_cameras
 from pbrs_farm import truth
 from pbrs_farm.check import Certificate, verify
 from pbrs_farm.check.certificate import Count

@@ -1,0 +1,1 @@
+"""Reading and repairing whole homes."""

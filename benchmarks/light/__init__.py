@@ -1,0 +1,1 @@
+"""Light transport: noise, cost, how bright rooms are."""

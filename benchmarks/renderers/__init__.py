@@ -1,0 +1,1 @@
+"""Against other renderers: the same scenes, cameras and light."""

@@ -1,0 +1,1 @@
+"""What a view costs: cameras, OpenGL, labels, the whole of it."""
