@@ -1,4 +1,4 @@
-"""Named contents beside a house's plan: models, textures; reads bytes that are already in memory.
+"""Named contents beside a house's plan: models, textures. Effect: reads the archive, where it is a file.
 
 Nothing is trusted: names with `..`, absolute names and entries of absurd size are rejected, and a
 compressed entry is never unpacked further than it may be.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import zipfile
 import zlib
+from pathlib import Path
 from typing import Protocol
 
 from pbrs_farm.core.errors import BadHouse
@@ -27,16 +28,17 @@ class Resources(Protocol):
 
 
 class ZipResources:
-    """The entries of a zip archive held in memory; every read is bounded.
+    """The entries of a zip archive in memory or on disk; every read is bounded.
 
     Raises BadHouse for what is no zip, a damaged one, a name that leaves the archive's root, too
     many entries, or one that is or claims to be larger than MAX_ENTRY_BYTES.
     """
 
-    def __init__(self, data: bytes, file: str) -> None:
+    def __init__(self, data: bytes | Path, file: str) -> None:
+        """data: the archive's bytes, or where it lies: what is not read is never loaded."""
         self._file = file
         try:
-            self._zip = zipfile.ZipFile(io.BytesIO(data))
+            self._zip = zipfile.ZipFile(io.BytesIO(data) if isinstance(data, bytes) else data)
             entries = self._zip.infolist()
         except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, EOFError):
             hint = "copy or save the file again"

@@ -1,0 +1,1 @@
+"""Furniture and texture libraries -> core.catalogue.Catalogue."""

@@ -1,0 +1,122 @@
+"""Furniture and texture libraries, folders of models -> Catalogue; read once, shapes when they are used.
+
+Effects: reads the libraries' catalogues and digests; shapes are read from them later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.read.catalogue.library_files import (
+    JAR_FURNITURE,
+    Entry,
+    Library,
+    LibraryNotes,
+    furniture_library,
+)
+from pbrs_farm.read.catalogue.library_shapes import library_shape
+from pbrs_farm.read.catalogue.piece_groups import GroupRule, Verdict, group_rule, verdicts
+
+VERSION: Final = 1
+"""Of the rules and the tables: part of the digest. Raised when a piece changes."""
+_AS_WRITTEN: Final = Verdict("", 0.0, "")
+
+Loader = Callable[[], Shape | None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """What a library or a folder holds."""
+
+    sha256: str
+    pieces: tuple[tuple[Piece, Loader], ...] = ()
+
+
+def catalogue_from(
+    libraries: Sequence[Path], *, jar: Path | None = None, given: Sequence[Path] = ()
+) -> Catalogue:
+    """The catalogue of all libraries; an id that comes again goes to the later library.
+
+    libraries: .sh3f files of the packages. jar: the program's, with its own models. given: the
+    user's .sh3f files. What is damaged becomes a note; BadInput for a path that does not exist
+    or is nothing of the kind.
+    """
+    notes = LibraryNotes()
+    found = []
+    if jar is not None:
+        found.append(_furniture(jar, notes, JAR_FURNITURE))
+    found += [_furniture(path, notes) for path in libraries]
+    found += [_given(path, notes) for path in given]
+    held = [f for f in found if f is not None]
+    # Later libraries replace pieces of earlier ones.
+    pieces: dict[str, Piece] = {}
+    loaders: dict[str, Loader] = {}
+    for library in held:
+        for piece, loader in library.pieces:
+            pieces[piece.id], loaders[piece.id] = piece, loader
+    return Catalogue(
+        pieces=tuple(pieces.values()),
+        load=lambda piece: loaders[piece.id]() if piece.id in loaders else None,
+        digest=keys.digest({"version": VERSION, "libraries": [f.sha256 for f in held]}),
+        notes=tuple(notes.found),
+    )
+
+
+def _given(path: Path, notes: LibraryNotes) -> Found | None:
+    if not path.exists():
+        raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
+    if path.suffix.lower() == ".sh3f":
+        return _furniture(path, notes)
+    raise BadInput(path, "", "is no catalogue", hint="a library .sh3f is read")
+
+
+def _furniture(path: Path, notes: LibraryNotes, catalogue: str | None = None) -> Found | None:
+    library = (
+        furniture_library(path, notes)
+        if catalogue is None
+        else furniture_library(path, notes, catalogue)
+    )
+    if library is None:
+        return None
+    pieces = []
+    for entry in library.entries:
+        seen = verdicts().get(entry.id)
+        rule = None if seen and not seen.group else _rule(entry, seen.group if seen else "")
+        if rule is not None:
+            pieces.append(_piece(library, entry, rule, seen or _AS_WRITTEN, notes))
+    if not pieces:
+        notes.add("no-classes", library.name, "no piece of the library has a known class")
+    return Found(library.sha256, tuple(pieces))
+
+
+def _rule(entry: Entry, group: str) -> GroupRule | None:
+    piece, inner = entry.piece, entry.id.partition("#")[2]
+    return group_rule(piece.name, entry.category, piece.size, inner=inner, group=group)
+
+
+def _piece(
+    library: Library, entry: Entry, rule: GroupRule, seen: Verdict, notes: LibraryNotes
+) -> tuple[Piece, Loader]:
+    width, depth, height = entry.piece.size
+    is_across = round(seen.turn_deg / 90) % 2 == 1
+    piece = Piece(
+        id=entry.id,
+        name=entry.piece.name,
+        group=rule.group,
+        place=rule.place,
+        nyu40=rule.nyu40,
+        size=(depth, width, height) if is_across else (width, depth, height),
+        kind=rule.kind,
+        library=library.name,
+        creator=entry.creator,
+        licence=library.licence,
+    )
+    load = partial(library_shape, entry, rule.place, seen.turn_deg, library.contents, notes)
+    return piece, load

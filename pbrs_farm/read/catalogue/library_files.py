@@ -1,0 +1,170 @@
+"""Furniture libraries on disk: what each entry says, and the archive its model lies in.
+
+Effects: opens `.sh3f` files and the program's jar; reads their catalogues, and models when asked.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.core.errors import BadHouse, BadInput
+from pbrs_farm.core.house import Note
+from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
+from pbrs_farm.read.catalogue.properties import numbered_entries, numbers, parse_properties
+from pbrs_farm.read.common.resources import ZipResources
+from pbrs_farm.read.sweethome3d.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
+from pbrs_farm.read.sweethome3d.parse_pieces import FULL_CUT_OUT
+from pbrs_farm.regular_files import digest_of_regular, fault_of
+
+FURNITURE: Final = "PluginFurnitureCatalog.properties"
+JAR_FURNITURE: Final = "com/eteks/sweethome3d/io/DefaultFurnitureCatalog.properties"
+_MAX_M: Final = 50.0  # no piece is larger
+_POWER: Final = 0.5  # of every lamp that the program places
+_WHOLE: Final = DoorFrame(FULL_CUT_OUT, 1.0, 0.0, 1.0, 0.0, False)
+_KNOWN_LICENCES: Final = (
+    (r"public domain|\bcc.?0\b|cc-zero", "CC0"),
+    (r"attribution 3\.0 united states|cc-by-3\.0-us", "CC-BY 3.0 US"),
+    (r"attribution 3\.0|attribution 3\b|cc-by.3\.0", "CC-BY 3.0"),
+    (r"attribution 4\.0|cc-by.4\.0", "CC-BY 4.0"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One entry of a library's catalogue, as written."""
+
+    id: str  # `<library>#<id>`
+    category: str
+    creator: str
+    piece: PlanPiece  # as a home places it that turns and paints nothing
+    file: str = ""  # the model's, where it lies in a folder
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Library:
+    """A furniture library that could be opened."""
+
+    name: str
+    licence: str
+    entries: tuple[Entry, ...]
+    contents: ZipResources
+    sha256: str
+
+
+@dataclass(slots=True)
+class LibraryNotes:
+    """What was wrong with the libraries, each once."""
+
+    found: dict[Note, None] = field(default_factory=dict)
+
+    def add(self, kind: str, place: str, text: str) -> None:
+        """Remember a fault; the rest goes on."""
+        self.found[Note(kind, shown(place, MAX_PLACE), shown(text, MAX_MESSAGE))] = None
+
+
+def opened_archive(path: Path) -> tuple[ZipResources, str]:
+    """The archive at path, its entries unread, and its sha256; BadHouse where it is damaged."""
+    try:
+        sha256 = digest_of_regular(path)
+        return ZipResources(path, path.name), sha256
+    except FileNotFoundError:
+        raise BadInput(path, "", "no such file or folder") from None
+    except OSError as error:
+        raise BadHouse(path, "", fault_of(error)) from None
+
+
+def furniture_library(
+    path: Path, notes: LibraryNotes, catalogue: str = FURNITURE
+) -> Library | None:
+    """The library in a .sh3f (or the program's jar); None, with a note, where it is damaged.
+
+    catalogue: the property file in the archive. Raises BadInput for a path that does not exist.
+    """
+    try:
+        archive, sha256 = opened_archive(path)
+        data = archive.read(catalogue)
+    except BadHouse as error:
+        notes.add("damaged-library", path.name, error.message)
+        return None
+    if data is None:
+        notes.add("damaged-library", path.name, f"holds no {catalogue}")
+        return None
+    properties = parse_properties(data)
+    # Call the library by its file: its own name changes with the language.
+    name = path.stem if catalogue == FURNITURE else "eTeks"
+    held = set(archive.names())
+    entries = []
+    for row in numbered_entries(properties):
+        entry = _entry(row, name, notes)
+        if entry is not None and entry.piece.model not in held:
+            notes.add(
+                "missing-model", entry.id, f"no {entry.piece.model[:80]!r} in the library: left out"
+            )
+        elif entry is not None:
+            entries.append(entry)
+    return Library(name, licence_of(properties), tuple(entries), archive, sha256)
+
+
+def licence_of(properties: Mapping[str, str]) -> str:
+    """A library's licence in short: "CC0", "CC-BY 3.0", else as it is written."""
+    text = properties.get("license", "")
+    for pattern, short in _KNOWN_LICENCES:
+        if re.search(pattern, text, re.IGNORECASE):
+            return short
+    return shown(text, MAX_PLACE)
+
+
+def _entry(row: dict[str, str], library: str, notes: LibraryNotes) -> Entry | None:
+    inner = row.get("id") or row.get("name", "")
+    inner = inner.partition("#")[2] or inner
+    place = f"{library}#{inner}"
+    try:
+        width, depth, height = (float(row[key]) / 100 for key in ("width", "depth", "height"))
+        if not (0 < width < _MAX_M and 0 < depth < _MAX_M and 0 < height < _MAX_M):
+            raise ValueError(f"a size is not between 0 and {_MAX_M:.0f} m")
+        is_opening = row.get("doorOrWindow", "").lower() == "true"
+        rotation = numbers(row.get("modelRotation", ""))
+        if len(rotation) not in (0, 9):
+            raise ValueError(f"modelRotation has {len(rotation)} numbers, not 9")
+        lights = _lights(row, (width, depth, height))
+        elevation = float(row.get("elevation") or 0) / 100
+    except (KeyError, ValueError) as error:
+        notes.add("unreadable-entry", place, f"{error}: left out")
+        return None
+    piece = PlanPiece(
+        tag="light" if lights else "pieceOfFurniture", place=place, level="", catalogue_id=place,
+        name=row.get("name", inner), model=row.get("model", "").lstrip("/"), centre=(0.0, 0.0),
+        elevation=elevation, angle=0.0, pitch=0.0, roll=0.0, size=(width, depth, height),
+        height_in_plan=None, is_mirrored=False, rotation=tuple(rotation) or None,
+        paint=Paint(), materials=(), frame=_WHOLE if is_opening else None, lights=lights,
+        power=_POWER if lights else 0.0,
+    )  # fmt: skip
+    return Entry(place, row.get("category", ""), row.get("creator", ""), piece)
+
+
+def _lights(row: dict[str, str], size: tuple[float, float, float]) -> tuple[PlanLight, ...]:
+    # Each source as fractions of the piece's width, depth and height, its colour, its diameter.
+    places = [numbers(row.get(f"lightSource{axis}", "")) for axis in "XYZ"]
+    colours = row.get("lightSourceColor", "").split()
+    diameters = numbers(row.get("lightSourceDiameter", ""))
+    width, depth, height = (100 * s for s in size)
+    return tuple(
+        PlanLight(
+            (x / width, y / depth, z / height),
+            rgb_from_hex(colours[k]) if k < len(colours) else (1.0, 1.0, 1.0),
+            diameters[k] / width if k < len(diameters) else None,
+        )
+        for k, (x, y, z) in enumerate(zip(*places, strict=False))
+    )
+
+
+def rgb_from_hex(text: str) -> tuple[float, float, float]:
+    """`#RRGGBB` (or `#AARRGGBB`) as sRGB 0..1; ValueError for anything else."""
+    digits = text.removeprefix("#")
+    if not re.fullmatch(r"([0-9a-fA-F]{2})?[0-9a-fA-F]{6}", digits):
+        raise ValueError(f"{text[:20]!r} is no colour")
+    return int(digits[-6:-4], 16) / 255, int(digits[-4:-2], 16) / 255, int(digits[-2:], 16) / 255

@@ -1,0 +1,128 @@
+"""A library's entry -> its Shape: the model turned to its front, scaled, on its base; no effects
+but reading the model from its archive.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from PIL import Image
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Place, Shape
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Surface, Texture
+from pbrs_farm.read.catalogue.library_files import Entry, LibraryNotes
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.resources import Resources
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
+from pbrs_farm.read.sweethome3d.home_xml import PlanPiece
+from pbrs_farm.read.sweethome3d.light_sources import light_parts
+from pbrs_farm.read.sweethome3d.piece_materials import piece_material
+from pbrs_farm.read.sweethome3d.piece_models import Models
+from pbrs_farm.read.sweethome3d.placement import Frame, local_from_model, placed_surface
+
+MAX_TRIANGLES: Final = 40_000  # of a piece: a home holds two hundred
+MAX_TEXTURE_PX: Final = 512  # of a piece's picture: more shows in no view of a room
+_JPEG_QUALITY: Final = 92
+
+
+def library_shape(
+    entry: Entry, place: Place, turn_deg: float, contents: Resources, notes: LibraryNotes
+) -> Shape | None:
+    """The shape of a library's piece; None, with a note, where its model cannot be used.
+
+    turn_deg: about the vertical, of a model that faces another way than its library says.
+    """
+    own = Notes(entry.id, strict=False)
+    materials = HomeMaterials(contents, own)
+    piece = entry.piece
+    try:
+        model = Models(materials, entry.id, MAX_TRIANGLES).get(piece.model, entry.id)
+    except BadHouse as error:
+        notes.add("unusable-model", entry.id, error.message)
+        return None
+    if model is None:
+        for note in own.all():
+            notes.add(note.kind, entry.id, note.text)
+        return None
+    piece = turned(piece, turn_deg)
+    matrix = local_from_model(piece, model)
+    width, depth, height = piece.size
+    half = np.array([width, height, depth]) / 2
+    frame = Frame(_origin(place, half), np.eye(3), half, 1.0)
+    # Keep every mesh that can be seen, with its material.
+    surfaces: list[Surface] = []
+    emitting: list[int] = []
+    for mesh in model.meshes:
+        painted = piece_material(piece, mesh, model, materials)
+        if painted is None or not len(mesh.faces):
+            continue
+        if painted.emits:
+            emitting.append(len(surfaces))
+        local = mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]
+        surfaces.append(placed_surface(mesh, painted, frame, local, matrix))
+    if not surfaces:
+        notes.add("empty-model", entry.id, "nothing to see in it")
+        return None
+    lights = light_parts(piece, frame, tuple(emitting))
+    return _with_small_textures(
+        Shape(tuple(surfaces), materials.library.materials, materials.library.textures, lights)
+    )
+
+
+def turned(piece: PlanPiece, turn_deg: float) -> PlanPiece:
+    """The piece with its model turned about the vertical in its box, by a multiple of 90 degrees."""
+    n = round(turn_deg / 90) % 4
+    if not n:
+        return piece
+    model = np.eye(3) if piece.rotation is None else np.array(piece.rotation).reshape(3, 3)
+    width, depth, height = piece.size
+    # A lamp's sources go round with it: right, back, left, front.
+    lights = piece.lights
+    for _ in range(n):
+        lights = tuple(replace(x, at=(1 - x.at[1], x.at[0], x.at[2])) for x in lights)
+    return replace(
+        piece,
+        rotation=tuple(float(v) for v in (rotation_y(n * math.pi / 2) @ model).ravel()),
+        size=(depth, width, height) if n % 2 else piece.size,
+        lights=lights,
+    )
+
+
+def _origin(place: Place, half: F64) -> F64:
+    # The box's middle when its base is on the origin; what hangs has its back there.
+    return np.array([0.0, half[1], half[2] if place is Place.WALL else 0.0])
+
+
+def _with_small_textures(shape: Shape) -> Shape:
+    small = {name: small_texture(t, MAX_TEXTURE_PX) for name, t in shape.textures.items()}
+    materials = tuple(
+        replace(m, texture_id=small[m.texture_id].id) if m.texture_id else m
+        for m in shape.materials
+    )
+    return replace(shape, materials=materials, textures={t.id: t for t in small.values()})
+
+
+def small_texture(texture: Texture, edge_px: int) -> Texture:
+    """The texture with no edge above edge_px; JPEG where nothing is cut out of it, else PNG."""
+    picture: Image.Image = Image.open(io.BytesIO(texture.data))
+    if max(picture.size) <= edge_px:
+        return texture
+    has_alpha = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
+    picture = picture.convert("RGBA" if has_alpha else "RGB")
+    picture.thumbnail((edge_px, edge_px), Image.Resampling.LANCZOS)
+    buffer = io.BytesIO()
+    if has_alpha:
+        picture.save(buffer, "PNG")
+    else:
+        picture.save(buffer, "JPEG", quality=_JPEG_QUALITY)
+    data = buffer.getvalue()
+    kind = "image/png" if has_alpha else "image/jpeg"
+    return Texture(keys.sha256(data)[:16], texture.name, kind, data)

@@ -1,0 +1,170 @@
+"""What a piece of a library is, from its name, category and size: its group. Reads the tables beside it.
+
+groups.csv: what the words of a name stand for, and the sizes that a thing of the group has.
+exceptions.csv: pieces of the packages that were looked at and are something else, face another
+way, or stay out, each with its reason.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Final
+
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.read.common.furniture_classes import class_of_piece, plain
+
+Size = tuple[float, float, float]  # width, depth, height in metres
+
+_ASIDE: Final = frozenset(["with", "and", "on", "of", "for", "from", "under", "without", "in"])
+_OUTSIDE: Final = frozenset(
+    [
+        "exterior",
+        "characters",
+        "character",
+        "vehicles",
+        "vehicle",
+        "staircases",
+        "people",
+        "road",
+        "garden",
+    ]
+)
+"""Categories of nothing that stands in a room."""
+_LONGEST_PHRASE: Final = 5  # words
+_LAMP: Final = "lamp"
+
+
+@dataclass(frozen=True, slots=True)
+class GroupRule:
+    """A row of groups.csv: a group, and what fits it. Lengths in metres."""
+
+    group: str
+    place: Place
+    nyu40: int
+    category: str  # "" = any
+    side: tuple[float, float]  # of the longer horizontal side
+    height: tuple[float, float]
+    words: tuple[str, ...]
+
+    @property
+    def kind(self) -> ItemKind:
+        """What an item of this group is to the pipeline."""
+        if self.place is Place.OPENING:
+            return ItemKind.DOOR if self.group == "door" else ItemKind.WINDOW
+        if self.group == "plant":
+            return ItemKind.PLANT
+        return ItemKind.LAMP if NYU40_NAMES[self.nyu40] == _LAMP else ItemKind.OBJECT
+
+    def fits(self, category: str, size: Size) -> bool:
+        """Whether a thing of that size in that category may be one of this group."""
+        width, depth, height = size
+        side = max(width, height if self.place is Place.WALL and height < depth else depth)
+        is_of_category = not self.category or self.category in plain(category).split()
+        in_range = self.side[0] <= side <= self.side[1]
+        return is_of_category and in_range and self.height[0] <= height <= self.height[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A piece that was looked at: its group ("" = left out), how it must be turned, and why."""
+
+    group: str
+    turn_deg: float
+    reason: str
+
+
+def group_rule(
+    name: str, category: str, size: Size, *, inner: str = "", group: str = ""
+) -> GroupRule | None:
+    """The rule of the group that a piece belongs to, or None: it is nothing to dress with.
+
+    inner: its id in the library, which is asked where the name says nothing. group: a group or a
+    class named by the user, which goes before the words; the size still decides between rules.
+    """
+    if group:
+        named = [r for r in group_rules() if r.group == group] or _rules_of(group)
+        return next((r for r in named if r.fits("", size)), named[0] if named else None)
+    if _OUTSIDE & set(plain(category).split()):
+        return None
+    for text in (name, inner):
+        found = _rule_by_words(text, category, size)
+        if found is not None:
+            return found
+    # Ask the vocabulary of all languages for the class that the name stands for.
+    by_word = class_of_piece("", name).nyu40
+    return _rule_by_words(NYU40_NAMES[by_word], category, size) if by_word else None
+
+
+@cache
+def group_rules() -> tuple[GroupRule, ...]:
+    """The rows of groups.csv in their order."""
+    return tuple(
+        GroupRule(
+            r["group"], Place(r["place"]), NYU40_NAMES.index(r["nyu40"]), r["category"],
+            _range(r["side_cm"]), _range(r["height_cm"]), tuple(r["words"].split("|")),
+        )
+        for r in _rows("groups.csv")
+    )  # fmt: skip
+
+
+@cache
+def verdicts() -> Mapping[str, Verdict]:
+    """Piece id (`<library>#<id>`) -> what was seen of it: the rows of exceptions.csv."""
+    return {
+        r["id"]: Verdict(r["group"], float(r["turn_deg"] or 0), r["reason"])
+        for r in _rows("exceptions.csv")
+    }
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    text = files("pbrs_farm.read.catalogue").joinpath(name).read_text("utf-8")
+    return list(csv.DictReader(text.splitlines()))
+
+
+def _range(text: str) -> tuple[float, float]:
+    low, high = text.split("-")
+    return float(low) / 100, float(high) / 100
+
+
+def _words(text: str) -> list[str]:
+    # Whole words without accents, plurals made singular, "12-oz" parted; numbers are left out.
+    words = re.findall(r"[a-z]+|&", plain(text))
+    return [w[:-1] if len(w) > 3 and w.endswith("s") and not w.endswith("ss") else w for w in words]
+
+
+@cache
+def _by_phrase() -> Mapping[str, tuple[GroupRule, ...]]:
+    found: dict[str, list[GroupRule]] = {}
+    for rule in group_rules():
+        for phrase in rule.words:
+            found.setdefault(" ".join(_words(phrase)), []).append(rule)
+    return {phrase: tuple(rules) for phrase, rules in found.items()}
+
+
+def _rules_of(phrase: str) -> list[GroupRule]:
+    return list(_by_phrase().get(" ".join(_words(phrase)), ()))
+
+
+def _rule_by_words(text: str, category: str, size: Size) -> GroupRule | None:
+    for phrase in _phrases(_words(text)):
+        for rule in _by_phrase().get(phrase, ()):
+            if rule.fits(category, size):
+                return rule
+    return None
+
+
+def _phrases(words: list[str]) -> Iterator[str]:
+    # The whole name first; then what stands before an aside, its last words first.
+    yield " ".join(words)
+    aside = next((k for k, w in enumerate(words) if k and w in _ASIDE), len(words))
+    for part in (words[:aside], words[aside:]):
+        for end in range(len(part), 0, -1):
+            for start in range(max(0, end - _LONGEST_PHRASE), end):
+                yield " ".join(part[start:end])

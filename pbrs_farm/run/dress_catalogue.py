@@ -1,0 +1,63 @@
+"""The catalogue that a command or a step dresses homes with, read once a process.
+
+Effects: reads the cached packages and the user's libraries; downloads nothing unless asked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+from pbrs_farm.assets import furniture, homes
+from pbrs_farm.assets.debian import cache_folder
+from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.house import Note
+from pbrs_farm.read.catalogue.catalogue import catalogue_from
+
+NO_FURNITURE = "no-furniture"
+"""The kind of the note that says that the packages' furniture is not there."""
+
+
+def dress_catalogue(given: tuple[Path, ...] = (), *, fetch: bool = False) -> Catalogue:
+    """The packages' catalogue and the user's libraries (--catalogue) after it.
+
+    fetch: download the packages where they are not cached (MachineFailed if apt cannot);
+    otherwise a missing package is a note of the kind NO_FURNITURE, and the rest serves. BadInput
+    for a given path that does not exist or is no catalogue.
+    """
+    if fetch:
+        furniture.fetch()
+        homes.fetch()
+    stamps = tuple((path, _stamp(path)) for path in given)
+    return _catalogue(stamps, furniture.PACKAGE in _cached_names())
+
+
+def has_furniture() -> bool:
+    """Whether the furniture package is cached, without reading it."""
+    return furniture.PACKAGE in _cached_names()
+
+
+def _cached_names() -> frozenset[str]:
+    folder = cache_folder()
+    return frozenset(p.name.split("_")[0] for p in folder.glob("*.deb"))
+
+
+def _stamp(path: Path) -> int:
+    # A library that changes is read anew.
+    return path.stat().st_mtime_ns if path.exists() else 0
+
+
+@lru_cache(maxsize=4)
+def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool) -> Catalogue:
+    package, program = furniture.cached() if has_package else None, homes.cached()
+    catalogue = catalogue_from(
+        package.libraries if package else (),
+        jar=program.jar if program else None,
+        given=[path for path, _ in given],
+    )
+    if package is not None:
+        note = package.note and Note("package-version", furniture.PACKAGE, package.note)
+        return replace(catalogue, notes=(note, *catalogue.notes)) if note else catalogue
+    text = "furniture package not fetched: `pbrs-farm homes --furniture` fetches it (120 MB)"
+    return replace(catalogue, notes=(Note(NO_FURNITURE, furniture.PACKAGE, text), *catalogue.notes))
