@@ -6,13 +6,15 @@ Effects: reads the furniture package from the cache (or through apt) and the use
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.catalogue import EMPTY, Catalogue
+from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import DressFields, Recipe
 from pbrs_farm.read.source import SourceRef
+from pbrs_farm.run.dress_catalogue import dress_catalogue
 from pbrs_farm.run.processes.verb_process import doing
 
 if TYPE_CHECKING:
@@ -58,4 +60,4 @@ def catalogue_of(fields: DressFields) -> Catalogue:
 
 @lru_cache(maxsize=2)
 def _catalogue(words: str) -> Catalogue:
-    return EMPTY
+    return dress_catalogue(tuple(Path(word) for word in words.split(":") if word))

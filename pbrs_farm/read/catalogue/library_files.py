@@ -16,8 +16,8 @@ from pbrs_farm.core.house import Note
 from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
 from pbrs_farm.read.catalogue.properties import numbered_entries, numbers, parse_properties
 from pbrs_farm.read.common.resources import ZipResources
-from pbrs_farm.read.sweethome3d.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
-from pbrs_farm.read.sweethome3d.parse_pieces import FULL_CUT_OUT
+from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
+from pbrs_farm.read.sweethome3d.home_file.parse_pieces import FULL_CUT_OUT
 from pbrs_farm.regular_files import digest_of_regular, fault_of
 
 FURNITURE: Final = "PluginFurnitureCatalog.properties"

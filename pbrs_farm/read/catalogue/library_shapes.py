@@ -21,12 +21,12 @@ from pbrs_farm.core.house import Surface, Texture
 from pbrs_farm.read.catalogue.library_files import Entry, LibraryNotes
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.resources import Resources
+from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanPiece
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
-from pbrs_farm.read.sweethome3d.home_xml import PlanPiece
 from pbrs_farm.read.sweethome3d.light_sources import light_parts
 from pbrs_farm.read.sweethome3d.piece_materials import piece_material
-from pbrs_farm.read.sweethome3d.piece_models import Models
-from pbrs_farm.read.sweethome3d.placement import Frame, local_from_model, placed_surface
+from pbrs_farm.read.sweethome3d.piece_models import PieceModels
+from pbrs_farm.read.sweethome3d.placement import PieceFrame, local_from_model, placed_surface
 
 MAX_TRIANGLES: Final = 40_000  # of a piece: a home holds two hundred
 MAX_TEXTURE_PX: Final = 512  # of a piece's picture: more shows in no view of a room
@@ -44,7 +44,7 @@ def library_shape(
     materials = HomeMaterials(contents, own)
     piece = entry.piece
     try:
-        model = Models(materials, entry.id, MAX_TRIANGLES).get(piece.model, entry.id)
+        model = PieceModels(materials, entry.id, MAX_TRIANGLES).get(piece.model, entry.id)
     except BadHouse as error:
         notes.add("unusable-model", entry.id, error.message)
         return None
@@ -56,7 +56,7 @@ def library_shape(
     matrix = local_from_model(piece, model)
     width, depth, height = piece.size
     half = np.array([width, height, depth]) / 2
-    frame = Frame(_origin(place, half), np.eye(3), half, 1.0)
+    frame = PieceFrame(_origin(place, half), np.eye(3), half, 1.0)
     # Keep every mesh that can be seen, with its material.
     surfaces: list[Surface] = []
     emitting: list[int] = []
