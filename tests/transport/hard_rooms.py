@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import House, Material, MaterialKind, Surface
-from tests.transport.rooms import (
+from pbrs_farm.transport.validation.known_rooms import (
     BULB,
     Triple,
     box,
@@ -72,7 +72,7 @@ def covered_cup() -> tuple[House, Camera]:
 
 def sunlit() -> tuple[House, Camera]:
     """A room with one window and nothing else; the sky decides."""
-    from tests.transport.rooms import window_room
+    from pbrs_farm.transport.validation.known_rooms import window_room
 
     return window_room(0.7)
 

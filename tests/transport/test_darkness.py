@@ -6,7 +6,7 @@ import numpy as np
 
 from pbrs_farm.transport.illuminance import darkness_of_room, photometric_warnings
 from pbrs_farm.transport.light_result import LightResult, darkness_of_picture
-from tests.transport import rooms
+from pbrs_farm.transport.validation import known_rooms as rooms
 
 SHAPE = (24, 32, 3)
 

@@ -12,7 +12,7 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.illuminance import illuminance_record, photometric_warnings
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky, sunsky
-from tests.transport import rooms
+from pbrs_farm.transport.validation import known_rooms as rooms
 
 RECIPE = recipe_from_name("fast")
 

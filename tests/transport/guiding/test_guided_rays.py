@@ -17,8 +17,9 @@ from pbrs_farm.transport.guiding.guiding_targets import BACK_SIDE, GuidingTarget
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
+from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.statistics import blocks, z_scores
-from tests.transport import hard_rooms, rooms
+from tests.transport import hard_rooms
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"

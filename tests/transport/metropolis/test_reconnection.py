@@ -11,10 +11,10 @@ from pbrs_farm.core.lighting import Group
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
+from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.statistics import blocks, z_scores
-from tests.transport import rooms
-from tests.transport.test_metropolis import METROPOLIS
-from tests.transport.test_path import FIELDS, RECIPE
+from tests.transport.metropolis.test_metropolis import METROPOLIS
+from tests.transport.test_path_tracer import FIELDS, RECIPE
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"

@@ -12,10 +12,11 @@ from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky, sunsky, uniform_sky
+from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.known_rooms import furnace
 from pbrs_farm.transport.validation.statistics import blocks, z_scores
-from tests.transport import hard_rooms, rooms
-from tests.transport.test_path import FIELDS, RECIPE, rendered
+from tests.transport import hard_rooms
+from tests.transport.test_path_tracer import FIELDS, RECIPE, rendered
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"

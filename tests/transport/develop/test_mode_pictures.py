@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import numpy as np
+
+from pbrs_farm.core.recipe import ToneFields
+from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
+
+
+def grey(level: float) -> np.ndarray:
+    return np.full((32, 32, 3), level, np.float32)
+
+
+def test_exposure_brings_any_level_to_the_same_grey() -> None:
+    pictures = [tone(grey(x), ToneFields()) for x in (1e-4, 1.0, 1e4)]
+    assert len({int(p[0, 0, 0]) for p in pictures}) == 1
+    expected = round(255 * (1.055 * 0.18 ** (1 / 2.4) - 0.055))
+    assert abs(int(pictures[0][0, 0, 0]) - expected) <= 1
+
+
+def test_a_window_does_not_darken_the_room() -> None:
+    room = grey(1.0)
+    with_window = room.copy()
+    with_window[:8, :8] = 500.0
+    dark, lit = tone(with_window, ToneFields()), tone(room, ToneFields())
+    assert int(dark[20, 20, 0]) > 0.6 * int(lit[20, 20, 0])
+    assert dark[0, 0, 0] >= 250
+
+
+def test_tone_rises_with_radiance_and_never_wraps() -> None:
+    ramp = np.geomspace(1e-3, 1e4, 1024).astype(np.float32).reshape(1, -1, 1).repeat(3, -1)
+    for preset in ("photo", "released"):
+        values = tone(ramp, ToneFields(preset=preset))[0, :, 0].astype(int)
+        assert (np.diff(values) >= 0).all()
+        assert values[-1] >= 250
+
+
+def test_black_stays_black_and_bad_numbers_count_as_black() -> None:
+    bad = grey(0.0)
+    bad[0, 0] = np.nan
+    bad[1, 1] = np.inf
+    for preset in ("photo", "released"):
+        assert not tone(bad, ToneFields(preset=preset)).any()
+    assert exposure_of(grey(0.0), ToneFields()) == 1.0
+
+
+def test_the_released_tone_is_reinhards_formula() -> None:
+    rng = np.random.default_rng(0)
+    rgb = rng.lognormal(0, 1, (16, 16, 3)).astype(np.float32)
+    w = np.array([0.212671, 0.715160, 0.072169])
+    y = rgb.astype(np.float64) @ w
+    scaled = y * 0.8 / np.exp(np.log(y + 1e-3).mean())
+    white = scaled.max() * 0.8**2
+    mapped = scaled * (1 + scaled / white**2) / (1 + scaled)
+    linear = np.clip(rgb * (mapped / y)[..., None], 0, 1)
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    ours = tone(rgb, ToneFields(preset="released", key=0.8)).astype(int)
+    assert np.abs(ours - np.round(255 * srgb)).max() <= 1

@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.core.recipe import Recipe, recipe_from_name
+from pbrs_farm.transport.scene_tables.material_rows import (
+    MAX_ALBEDO,
+    TextureAtlas,
+    material_rows,
+    texture_atlas,
+)
+from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS, nearest_portals, portals_of_house
+from pbrs_farm.transport.validation import known_rooms as rooms
+
+FAST = recipe_from_name("fast")
+
+
+EMPTY = TextureAtlas(np.zeros(1, np.uint32), {})
+
+
+def one(material: Material, recipe: Recipe = FAST) -> tuple[np.ndarray, list[str]]:
+    rows, notes = material_rows(rooms.house([], [material]), EMPTY, recipe)
+    return rows[0], notes
+
+
+def test_whites_stop_at_the_albedo_of_paint() -> None:
+    row, _notes = one(Material("white"))
+    np.testing.assert_allclose(row[:3], MAX_ALBEDO)
+
+
+def test_kd_and_ks_above_one_are_scaled_and_reported() -> None:
+    bright = Material("bright", diffuse=(1, 1, 1), specular=(1, 1, 1), shininess=50)
+    row, notes = one(bright)
+    assert row[4] == pytest.approx(0.08)
+    assert any("'bright'" in n and "scaled" in n for n in notes)
+    metal, _notes = one(Material("m", diffuse=(0.2, 0.2, 0.2), specular=(1, 1, 1), shininess=50))
+    assert metal[0] + metal[4] <= 1 + 1e-6
+
+
+def test_the_released_preset_reads_kd_as_linear_and_glass_as_nothing() -> None:
+    released = recipe_from_name("released")
+    grey, _notes = one(
+        Material("grey", diffuse=(0.5, 0.5, 0.5), specular=(1, 1, 1), shininess=9), released
+    )
+    assert grey[0] == 0.5
+    assert grey[7] == 0
+    glass, _notes = one(Material("glass", opacity=0.5), released)
+    assert glass[11] == 3
+
+
+def test_texels_keep_every_8_bit_value() -> None:
+    ramp = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, -1)
+    house = rooms.house([], [Material("t", texture_id="ramp")])
+    packed = texture_atlas(house, {"ramp": ramp})
+    root = (packed.texels[1:] & 1023) / 1023
+    v = np.arange(256) / 255
+    linear = np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(root**2, linear, atol=1.2e-3)
+    assert packed.slots["ramp"] == (1, 16, 16)
+
+
+def test_only_windows_and_glazed_doors_are_portals_and_the_widest_are_kept() -> None:
+    house, view = rooms.window_room()
+    assert portals_of_house(house).shape == (1, 4, 3)
+    many = np.concatenate([portals_of_house(house) + np.array([0, 0, 5.0 * k]) for k in range(9)])
+    assert len(nearest_portals(many, view.eye)) == MAX_PORTALS
+    assert any((p == many[0]).all() for p in nearest_portals(many, view.eye))
+
+
+def test_pane_materials_make_a_door_a_portal() -> None:
+    house, _view = rooms.window_room(pane=True)
+    door = replace(house.openings[0], is_window=False, item_id="walls")
+    assert len(portals_of_house(replace(house, openings=(door,)))) == 1
+    solid, _view = rooms.window_room()
+    assert len(portals_of_house(replace(solid, openings=(door,)))) == 0
+    assert house.materials[2].kind is MaterialKind.PANE
+
+
+def grey(level: float) -> np.ndarray:
+    return np.full((32, 32, 3), level, np.float32)
