@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import pytest
+
+from pbrs_farm.core.errors import BadInput
+from tests.workers.conftest import spec
+from workers.ids import check_job_id, queue_of, stages_of_queue, task_from_text
+from workers.node.house_runner import steps_of_stage
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a/b", "a/b/c", "a/0/gl/x", "../x/gl", "a/0/rm -rf", "a\n/0/gl", "a/0/gl\n"]
+)
+def test_a_task_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(BadInput, match="not a task"):
+        task_from_text(text)
+
+
+def test_ids_read_back() -> None:
+    assert str(task_from_text("studio-1a2b/3/light")) == "studio-1a2b/3/light"
+    assert str(task_from_text("-/s3/shard")) == "-/s3/shard"
+    with pytest.raises(BadInput):
+        check_job_id("../../etc")
+
+
+def test_every_stage_has_a_queue_and_back() -> None:
+    for stage in ("geometry", "gl", "light", "reduce", "shard", "job"):
+        for gpu in (False, True):
+            assert stage in stages_of_queue(queue_of(stage, gpu=gpu))
+    assert queue_of("light", gpu=True) == "light.gpu"
+
+
+def test_the_last_stage_of_a_batch_writes_the_view() -> None:
+    both = spec(1)
+    assert steps_of_stage(both, "gl") == ("truth", "opengl_dl", "opengl_il")
+    assert steps_of_stage(both, "light")[-1] == "view"
+    only_gl = both.model_copy(update={"modes": ("opengl_dl",), "batch_stages": ("gl",)})
+    assert steps_of_stage(only_gl, "gl") == ("truth", "opengl_dl", "view")
