@@ -31,6 +31,7 @@ class Draft:
         self.done: Counter[str] = Counter()  # what was added or changed, by part and group
         self.refused: Counter[str] = Counter()  # `<part>: <reason>` of what was not
         self.used: dict[str, Piece] = {}  # pieces of the catalogue in the house, by id
+        self.kept: dict[str, object] = {}  # what parts compute from the items and use again
         self._number = {m: i for i, m in reversed(list(enumerate(self.materials)))}
 
     def rng(self, *words: str | int) -> np.random.Generator:

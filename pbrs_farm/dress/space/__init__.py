@@ -1,0 +1,19 @@
+"""Where things can stand and hang in a home: rooms, free walls, doors, windows, floors; no effects."""
+
+from pbrs_farm.dress.space.floor_bitmaps import FloorBitmap, doors_are_joined, floor_bitmap
+from pbrs_farm.dress.space.footprints import item_footprint
+from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
+from pbrs_farm.dress.space.passages import Passage
+from pbrs_farm.dress.space.wall_faces import WallFace
+
+__all__ = [
+    "FloorBitmap",
+    "HouseSpace",
+    "Passage",
+    "RoomSpace",
+    "WallFace",
+    "doors_are_joined",
+    "floor_bitmap",
+    "house_space",
+    "item_footprint",
+]

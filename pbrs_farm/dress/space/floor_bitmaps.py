@@ -1,0 +1,91 @@
+"""A room's floor as a bitmap: where things stand, where one can walk, whether doors are joined."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
+
+CELL_M = 0.05
+WALK_M = 0.6  # the width of a way
+_STEP_M = 0.08  # what is lower is walked over
+_HEAD_M = 1.8  # what is higher is walked under
+_DOOR_REACH_M = 0.15  # beyond half the way's width, in front of a door
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorBitmap:
+    """Cells of 5 cm over a room: row i at z = origin[1] + i * CELL_M, column j at x likewise."""
+
+    origin: tuple[float, float]  # x, z of the first cell's corner
+    inside: Bools  # (H, W) in the room and in no wall
+    occupied: Bools  # (H, W) inside, and something stands there below a man's head
+    ways: NDArray[np.int32]  # (H, W) number of the connected way one can walk; 0 = none
+
+    def cells(self, places: F64) -> NDArray[np.int64]:
+        """(N, 2) row and column of plan places (N, 2); may lie outside."""
+        cells = np.floor((places - np.asarray(self.origin)) / CELL_M).astype(np.int64)
+        return np.asarray(cells[:, ::-1])
+
+    @property
+    def walkable_share(self) -> float:
+        """Share of the floor that a way 0.6 m wide covers; 0 for no floor."""
+        free = ndimage.distance_transform_edt(self.ways == 0) * CELL_M <= WALK_M / 2
+        return float((free & self.inside).sum() / max(self.inside.sum(), 1))
+
+
+def floor_bitmap(
+    space: HouseSpace, room: RoomSpace, *, without: Collection[int] = ()
+) -> FloorBitmap:
+    """The room's floor; without: numbers of items that are not counted."""
+    x0, z0, x1, z1 = room.area.bounds if not room.area.is_empty else (0.0, 0.0, CELL_M, CELL_M)
+    origin = x0 - 2 * CELL_M, z0 - 2 * CELL_M
+    shape = int((z1 - z0) / CELL_M) + 5, int((x1 - x0) / CELL_M) + 5
+    x = origin[0] + (np.arange(shape[1]) + 0.5) * CELL_M
+    z = origin[1] + (np.arange(shape[0]) + 0.5) * CELL_M
+    xx, zz = np.meshgrid(x, z)
+    inside = shapely.contains_xy(room.area, xx, zz) & ~shapely.contains_xy(room.walls, xx, zz)
+    # Mark every cell above which a thing has a point between a step and a head.
+    occupied = np.zeros(shape, bool)
+    low, high = room.room.floor_y + _STEP_M, room.room.floor_y + _HEAD_M
+    for number in room.items:
+        points = space.points[number]
+        if number in without:
+            continue
+        body = points[(points[:, 1] > low) & (points[:, 1] < high)]
+        j = ((body[:, 0] - origin[0]) / CELL_M).astype(np.int64)
+        i = ((body[:, 2] - origin[1]) / CELL_M).astype(np.int64)
+        good = (i >= 0) & (i < shape[0]) & (j >= 0) & (j < shape[1])
+        occupied[i[good], j[good]] = True
+    occupied &= inside
+    # A way's middle keeps half its width from everything.
+    free = inside & ~occupied
+    wide = ndimage.distance_transform_edt(free) * CELL_M >= WALK_M / 2
+    ways, _n = ndimage.label(wide, structure=np.ones((3, 3)))
+    return FloorBitmap(origin, np.asarray(inside), occupied, ways.astype(np.int32))
+
+
+def doors_are_joined(bitmap: FloorBitmap, room: RoomSpace) -> bool:
+    """Whether one way leads to every door of the room; True with fewer than two doors."""
+    common: set[int] | None = None
+    doors = [(d, s) for d in room.doors if (s := d.side_of(room.room.id)) is not None]
+    if len(doors) < 2:
+        return True
+    for door, side in doors:
+        # Look at the ways that pass close to where one stands before the door.
+        middle = door.face_point(side) + door.inward(side) * (WALK_M / 2 + _DOOR_REACH_M / 2)
+        row, column = bitmap.cells(middle[None, [0, 2]])[0]
+        r = int(np.ceil((_DOOR_REACH_M + CELL_M) / CELL_M))
+        part = bitmap.ways[
+            max(row - r, 0) : max(row + r + 1, 0), max(column - r, 0) : max(column + r + 1, 0)
+        ]
+        near = {int(way) for way in np.unique(part)} - {0}
+        common = near if common is None else common & near
+    return bool(common)

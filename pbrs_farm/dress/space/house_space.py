@@ -1,0 +1,225 @@
+"""The space of a home being dressed: rooms with their walls, doors, windows, things; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import Item, ItemKind, Room
+from pbrs_farm.core.mesh import area_vectors
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space.footprints import areal, plan_area
+from pbrs_farm.dress.space.passages import Passage, passages_of
+from pbrs_farm.dress.space.room_faces import (
+    WallAreas,
+    meeting,
+    reach_of,
+    room_faces,
+    with_structure,
+    with_things,
+)
+from pbrs_farm.dress.space.room_kinds import RoomKind, room_kind
+from pbrs_farm.dress.space.surface_points import item_triangles, lowest_above, surface_points
+from pbrs_farm.dress.space.wall_faces import WallFace, wall_planes
+
+_ABOVE_FLOOR_M = 0.5  # structure lower than this above a floor is no ceiling
+_CHEST_M = 1.2  # above the floor, where walls are cut for their plan
+_INSIDE_SHARE = 0.34  # of a thing's points, in its room
+_RUG = 20  # NYU40
+_STRUCTURE = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomSpace:
+    """A room, what is in it and round it."""
+
+    room: Room
+    kind: RoomKind
+    area: BaseGeometry  # its polygon, valid, plan (x, z)
+    faces: tuple[WallFace, ...]
+    doors: tuple[Passage, ...]  # and archways
+    windows: tuple[Passage, ...]
+    items: tuple[int, ...]  # numbers in Draft.items of what stands or hangs in it
+    walls: BaseGeometry  # plan area of the walls at the height of a man's chest
+    above: F64  # (F, 3, 3) triangles of ceilings and of what else is over it
+
+    def ceiling_y(self, places: F64) -> F64:
+        """(N,) y of the lowest structure above the floor at plan places (N, 2), else the nominal one."""
+        return _ceiling(self.above, self.room)(places)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HouseSpace:
+    """The home's rooms in its order, its doors and windows, and points on every item's surface."""
+
+    rooms: tuple[RoomSpace, ...]
+    passages: tuple[Passage, ...]
+    points: tuple[F64, ...]  # (N, 3) by number of Draft.items; empty for structure
+    bounds: F64  # (I, 2, 3) of those points; NaN where there are none
+
+    def room(self, room_id: str) -> RoomSpace:
+        """The room of that id; KeyError if there is none."""
+        for room in self.rooms:
+            if room.room.id == room_id:
+                return room
+        raise KeyError(room_id)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _EmptyRoom:
+    # What no dressing moves: the room, and its walls with nothing before them.
+    room: Room
+    area: BaseGeometry
+    faces: tuple[WallFace, ...]
+    walls: BaseGeometry
+    above: F64
+
+
+@dataclass(slots=True)
+class _Kept:
+    # What stays as long as the items it came from stay the same objects.
+    rooms: tuple[_EmptyRoom, ...]
+    passages: tuple[Passage, ...]
+    items: dict[int, tuple[Item, F64, F64]]  # with points on it and their bounds
+    faces: dict[int, tuple[tuple[int, ...], WallFace]]  # by the empty face, with the things near it
+    space: tuple[tuple[int, ...], HouseSpace] | None = None
+
+
+def house_space(draft: Draft) -> HouseSpace:
+    """The space of the draft as it is now; what did not change since the last call is kept."""
+    kept = draft.kept.get("space")
+    if not isinstance(kept, _Kept):
+        kept = draft.kept["space"] = _empty_house(draft)
+    key = tuple(id(item) for item in draft.items)
+    if kept.space is None or kept.space[0] != key:
+        # Spread points over new items; keep those of the others.
+        kept.items = {id(i): kept.items.get(id(i)) or _with_points(i) for i in draft.items}
+        kept.space = key, _house_space(draft.items, kept)
+    return kept.space[1]
+
+
+def _with_points(item: Item) -> tuple[Item, F64, F64]:
+    if item.kind in _STRUCTURE:
+        return item, np.zeros((0, 3)), np.full((2, 3), np.nan)
+    points = surface_points(item_triangles(item))
+    bounds = np.array([points.min(0), points.max(0)]) if len(points) else np.full((2, 3), np.nan)
+    return item, points, bounds
+
+
+def _empty_house(draft: Draft) -> _Kept:
+    house = draft.source
+    areas = [room_area(room) for room in house.rooms]
+    wall_items = [i for i in house.items if i.kind is ItemKind.WALL and i.n_faces]
+    bounds = np.array([i.bounds for i in wall_items]).reshape(-1, 2, 3)
+    walls = WallAreas(
+        tuple(plan_area(item_triangles(i), upright=False) for i in wall_items), bounds
+    )
+    # A place in two rooms belongs to the smaller.
+    order = sorted(range(len(areas)), key=lambda k: (areas[k].area, k))
+    in_order = [(house.rooms[k], areas[k]) for k in order]
+    passages = passages_of(
+        house.items, house.openings, in_order, areal(shapely.union_all(walls.areas))
+    )
+    overhead = _overhead(house.items)
+    faces = room_faces(wall_planes(wall_items), house.rooms, areas)
+    rooms = []
+    for k, room in enumerate(house.rooms):
+        above = _near(overhead, areas[k])
+        empty = _EmptyRoom(room, areas[k], (), walls.at(room.floor_y + _CHEST_M), above)
+        ceiling_y = _ceiling(above, room)
+        cut = [with_structure(face, walls, passages, ceiling_y) for face in faces.get(k, [])]
+        rooms.append(replace(empty, faces=tuple(face for face in cut if face.clear.any())))
+    return _Kept(tuple(rooms), passages, {}, {})
+
+
+def room_area(room: Room) -> BaseGeometry:
+    """The room's outline as a valid plan area; empty where it has fewer than three corners."""
+    if len(room.polygon) < 3 or not np.isfinite(room.polygon).all():
+        return shapely.Polygon()
+    return areal(shapely.Polygon(room.polygon))
+
+
+def _overhead(items: Sequence[Item]) -> F64:
+    # Triangles that can close a room from above: no upright ones.
+    corners = [item_triangles(i) for i in items if i.kind in _STRUCTURE]
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    vectors = area_vectors(triangles)
+    return np.asarray(triangles[np.abs(vectors[:, 1]) > 0.02 * np.linalg.norm(vectors, axis=1)])
+
+
+def _near(triangles: F64, area: BaseGeometry) -> F64:
+    if area.is_empty or not len(triangles):
+        return triangles[:0]
+    x0, z0, x1, z1 = area.bounds
+    low, high = triangles.min(1), triangles.max(1)
+    meets = (high[:, 0] > x0) & (low[:, 0] < x1) & (high[:, 2] > z0) & (low[:, 2] < z1)
+    return np.asarray(triangles[meets])
+
+
+def _ceiling(above: F64, room: Room) -> Callable[[F64], F64]:
+    def ceiling_y(places: F64) -> F64:
+        found = lowest_above(above, places, room.floor_y + _ABOVE_FLOOR_M)
+        return np.where(np.isfinite(found), found, room.ceiling_y)
+
+    return ceiling_y
+
+
+def _house_space(items: Sequence[Item], kept: _Kept) -> HouseSpace:
+    points = tuple(kept.items[id(i)][1] for i in items)
+    bounds = np.array([kept.items[id(i)][2] for i in items]).reshape(-1, 2, 3)
+    rooms = []
+    for empty in kept.rooms:
+        inside = _items_in(items, points, bounds, empty)
+        own = [p for p in kept.passages if empty.room.id in p.room_ids]
+        faces = [_filled(face, items, points, bounds, kept) for face in empty.faces]
+        rooms.append(
+            RoomSpace(
+                empty.room,
+                room_kind(empty.room, [items[n] for n in inside], float(empty.area.area)),
+                empty.area,
+                tuple(face for face in faces if face.clear.any()),
+                tuple(p for p in own if not p.is_window),
+                tuple(p for p in own if p.is_window),
+                inside,
+                empty.walls,
+                empty.above,
+            )
+        )
+    return HouseSpace(tuple(rooms), kept.passages, points, bounds)
+
+
+def _filled(
+    face: WallFace, items: Sequence[Item], points: Sequence[F64], bounds: F64, kept: _Kept
+) -> WallFace:
+    """The empty face with what stands or hangs before it now; rugs do not count."""
+    near = [n for n in meeting(bounds, reach_of(face)) if items[n].nyu40 != _RUG]
+    key = tuple(id(items[n]) for n in near)
+    known = kept.faces.get(id(face))
+    if known is None or known[0] != key:
+        known = kept.faces[id(face)] = key, with_things(face, [points[n] for n in near])
+    return known[1]
+
+
+def _items_in(
+    items: Sequence[Item], points: Sequence[F64], bounds: F64, empty: _EmptyRoom
+) -> tuple[int, ...]:
+    """Numbers of the items of which a good part is in the room; neighbours' poke through outlines."""
+    room, area = empty.room, empty.area
+    if area.is_empty:
+        return ()
+    x0, z0, x1, z1 = area.bounds
+    shapely.prepare(area)
+    found = []
+    reach = np.array([[x0, room.floor_y - 0.05, z0], [x1, room.ceiling_y, z1]])
+    for number in meeting(bounds, reach):
+        if items[number].kind in (ItemKind.DOOR, ItemKind.WINDOW):
+            continue
+        some = points[number][:: max(1, len(points[number]) // 200)]
+        if shapely.contains_xy(area, some[:, 0], some[:, 2]).mean() > _INSIDE_SHARE:
+            found.append(number)
+    return tuple(found)

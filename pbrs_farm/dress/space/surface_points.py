@@ -1,0 +1,76 @@
+"""Points spread evenly over an item's triangles, and heights of triangles above places; no effects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import area_vectors, triangle_corners
+
+SPACING_M = 0.03
+_MOST_POINTS = 200_000  # of one item: larger ones are spread more thinly
+
+
+def item_triangles(item: Item) -> F64:
+    """(F, 3, 3) corners of all triangles of an item that are finite, metres."""
+    parts = [triangle_corners(s.positions, s.faces) for s in item.surfaces if len(s.faces)]
+    corners = np.concatenate([np.zeros((0, 3, 3)), *parts])
+    return np.asarray(corners[np.isfinite(corners).all((1, 2))])
+
+
+def surface_points(corners: F64, spacing_m: float = SPACING_M) -> F64:
+    """(N, 3) points on triangles (F, 3, 3), at most one in each cube of half the spacing.
+
+    No place of a triangle is farther than about 0.7 spacing_m from a point.
+    """
+    if not len(corners):
+        return np.zeros((0, 3))
+    area = float(np.linalg.norm(area_vectors(corners), axis=1).sum()) / 2
+    spacing_m = max(spacing_m, float(np.sqrt(area / _MOST_POINTS)))
+    # Turn each triangle so that its longest edge is the base, the apex opposite.
+    lengths = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=2)
+    first = lengths.argmax(1)
+    rows = np.arange(len(corners))
+    a, b, c = (corners[rows, (first + k) % 3] for k in range(3))
+    base = lengths[rows, first]
+    height = np.linalg.norm(area_vectors(corners), axis=1) / np.maximum(base, 1e-12)
+    # Lay a grid over it: steps along the base, rows towards the apex; take the cells' middles.
+    n_u = np.maximum(np.ceil(base / spacing_m), 1).astype(np.int64)
+    n_v = np.maximum(np.ceil(height / spacing_m), 1).astype(np.int64)
+    counts = n_u * n_v
+    of = np.repeat(rows, counts)
+    k = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+    u = ((k % n_u[of] + 0.5) / n_u[of])[:, None]
+    v = ((k // n_u[of] + 0.5) / n_v[of])[:, None]
+    points = (a[of] * (1 - u) + b[of] * u) * (1 - v) + c[of] * v
+    # Fine meshes have many points in one place.
+    cube = np.floor((points - points.min(0)) / (spacing_m / 2)).astype(np.int64)
+    size = cube.max(0) + 1
+    _, first = np.unique(
+        (cube[:, 0] * size[1] + cube[:, 1]) * size[2] + cube[:, 2], return_index=True
+    )
+    return np.asarray(points[first])
+
+
+def lowest_above(triangles: F64, places: F64, least_y: float) -> F64:
+    """(N,) y of the lowest of the triangles (F, 3, 3) above least_y at plan places (N, 2); inf = none."""
+    found = np.full(len(places), np.inf)
+    if not len(places) or not len(triangles):
+        return found
+    # Keep triangles above whose bounds meet the places'.
+    low, high = triangles[:, :, [0, 2]].min(1), triangles[:, :, [0, 2]].max(1)
+    meets = (high >= places.min(0)).all(1) & (low <= places.max(0)).all(1)
+    for p, q, r in triangles[meets & (triangles[:, :, 1].max(1) > least_y)]:
+        # Solve for the place in the triangle's plan; upright ones have none.
+        e, f = (q - p)[[0, 2]], (r - p)[[0, 2]]
+        det = e[0] * f[1] - e[1] * f[0]
+        if abs(det) < 1e-9:
+            continue
+        d = places - p[[0, 2]]
+        u = (d[:, 0] * f[1] - d[:, 1] * f[0]) / det
+        v = (e[0] * d[:, 1] - e[1] * d[:, 0]) / det
+        y = p[1] + u * (q[1] - p[1]) + v * (r[1] - p[1])
+        covers = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (y > least_y)
+        found = np.where(covers, np.minimum(found, y), found)
+    return found
