@@ -7,7 +7,8 @@ it: who writes looks again afterwards, and writes anew where a house has come in
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing
@@ -22,17 +23,22 @@ def write_attribution(store: Store) -> None:
     """Write ATTRIBUTION.txt where a house of the root shows what must be credited."""
     seen: list[dict[str, str]] | None = None
     for _round in range(_ROUNDS):
-        rows = _rows_of_dressings(store)
+        rows = dressing_rows(_manifest(store))
         if rows == seen:
             return
         seen = rows
-        homes = (row.get("attribution", "") for row in rows)
-        text = attribution_text(homes, _credits(store, (row["key"] for row in rows)))
-        if not text:
-            return
-        data = text.encode("utf-8", "replace")
-        if store.head(keys.ATTRIBUTION) is None or store.get(keys.ATTRIBUTION) != data:
-            store.put(keys.ATTRIBUTION, data)
+        write_attribution_of(store, rows)
+
+
+def write_attribution_of(store: Store, rows: Sequence[dict[str, str]]) -> None:
+    """Write ATTRIBUTION.txt of these dressing_rows, where they ask for one."""
+    homes = (row.get("attribution", "") for row in rows)
+    text = attribution_text(homes, _credits(store, (row["key"] for row in rows)))
+    if not text:
+        return
+    data = text.encode("utf-8", "replace")
+    if store.head(keys.ATTRIBUTION) is None or store.get(keys.ATTRIBUTION) != data:
+        store.put(keys.ATTRIBUTION, data)
 
 
 def attribution_text(homes: Iterable[str], credits: Iterable[Credit]) -> str:
@@ -61,13 +67,17 @@ def _paragraph(title: str, lines: set[str]) -> list[str]:
     return ["", title, *sorted(lines)] if lines else []
 
 
-def _rows_of_dressings(store: Store) -> list[dict[str, str]]:
-    """The rows of every dress.json in the root's manifest."""
+def dressing_rows(manifest: bytes) -> list[dict[str, str]]:
+    """The rows of every dress.json in a manifest."""
+    found = re.finditer(rb"^.*/" + re.escape(keys.DRESS).encode() + rb".*$", manifest, re.MULTILINE)
+    return [json.loads(match[0]) for match in found]
+
+
+def _manifest(store: Store) -> bytes:
     try:
-        manifest = store.get(keys.MANIFEST)
+        return store.get(keys.MANIFEST)
     except ObjectMissing:
-        return []
-    return [json.loads(x) for x in manifest.splitlines() if f"/{keys.DRESS}".encode() in x]
+        return b""
 
 
 def _credits(store: Store, dressed: Iterable[str]) -> list[Credit]:

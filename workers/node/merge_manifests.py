@@ -15,7 +15,7 @@ from typing import IO, Any
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing
 from pbrs_farm.formats.manifest import lines_by_house
-from pbrs_farm.run.attributions import write_attribution
+from pbrs_farm.run.attributions import dressing_rows, write_attribution_of
 from pbrs_farm.store.object_store import Store
 from workers.ids import job_key
 from workers.job import JobSpec, houses_from_lines
@@ -53,6 +53,7 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
     houses = house_ids(store, spec)
     own = set(houses)
     missing: list[str] = []
+    dressed: list[dict[str, str]] = []
     n_objects = 0
     # Merge two streams that are sorted by house: nothing but a shard's rows is held.
     with TemporaryFile() as file:
@@ -61,9 +62,10 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
                 missing.append(house)
             else:
                 file.write(part)
+                dressed += dressing_rows(part)
                 n_objects += part.count(b"\n") if house in own else 0  # a row an object
         _put_file(store, keys.MANIFEST, file)
-    write_attribution(store)
+    write_attribution_of(store, dressed)
     report: dict[str, Any] = {
         "job": spec.job_id,
         "houses": len(houses),
