@@ -1,0 +1,105 @@
+"""Parts of a generated thing put together as a piece of the catalogue and its shape; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Piece, Place, Shape
+from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
+from pbrs_farm.dress.style import Rgb, Style, mix, shade
+
+Part = tuple[Surface, Material]
+Made = tuple[Piece, Shape]
+
+GENERATED = "generated#"  # before the family, in the id of a generated piece
+OTHER_PROP = 40
+
+
+def made(
+    family: str, parts: Sequence[Part], *, group: str = "", nyu40: int = OTHER_PROP,
+    place: Place = Place.SURFACE, textures: Iterable[Texture] = (),
+) -> Made:  # fmt: skip
+    """The parts as one piece, the middle of its base at the origin; one surface a material."""
+    materials: list[Material] = []
+    gathered: dict[tuple[int, bool], list[Surface]] = {}
+    for surface, material in parts:
+        if material not in materials:
+            materials.append(material)
+        key = (materials.index(material), surface.normals is None)
+        gathered.setdefault(key, []).append(surface)
+    joined = [_joined(surfaces, number) for (number, _), surfaces in gathered.items()]
+    # Stand the whole on its base.
+    points = np.concatenate([s.positions for s in joined]).astype(np.float64)
+    low, high = points.min(0), points.max(0)
+    base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2], np.float64)
+    moved = tuple(replace(s, positions=(s.positions - base).astype(np.float32)) for s in joined)
+    width, height, depth = (float(v) for v in high - low)
+    piece = Piece(
+        f"{GENERATED}{family}", family.replace("_", " ").capitalize(), group or family, place,
+        nyu40, (width, depth, height), library="generated",
+    )  # fmt: skip
+    return piece, Shape(moved, tuple(materials), {t.id: t for t in textures})
+
+
+def transformed(surface: Surface, matrix: F64, offset: Sequence[float] = (0, 0, 0)) -> Surface:
+    """The surface turned by a rotation (3, 3) and then moved, metres."""
+    positions = surface.positions.astype(np.float64) @ matrix.T + np.asarray(offset, np.float64)
+    normals = surface.normals
+    if normals is not None:
+        normals = (normals.astype(np.float64) @ matrix.T).astype(np.float32)
+    return replace(surface, positions=positions.astype(np.float32), normals=normals)
+
+
+def plain(name: str, colour: Rgb, roughness: float) -> Material:
+    """An opaque material of one colour (sRGB); equal ones are shared in the house."""
+    r, g, b = (round(float(np.clip(c, 0.02, 0.95)), 3) for c in colour)
+    return Material(name, diffuse=(r, g, b), roughness=roughness)
+
+
+def metal(style: Style) -> Material:
+    """The metal of the home's fittings."""
+    return Material(
+        style.metal.name, diffuse=(0.03, 0.03, 0.03), specular=style.metal.colour,
+        shininess=40.0, roughness=style.metal.roughness,
+    )  # fmt: skip
+
+
+def glass(tint: Rgb = (1.0, 1.0, 1.0), opacity: float = 0.1) -> Material:
+    """Thin glass."""
+    return Material("glass", MaterialKind.GLASS, tint, (1.0, 1.0, 1.0), 200.0, opacity)
+
+
+def any_colour(rng: np.random.Generator, style: Style) -> Rgb:
+    """A colour for a small thing: of the style, calm or loud, or any at all."""
+    kind = rng.random()
+    if kind < 0.3:
+        return style.textiles[int(rng.integers(len(style.textiles)))]
+    if kind < 0.45:
+        return style.accent
+    if kind < 0.6:
+        return style.palette[4]
+    if kind < 0.75:
+        return shade(style.palette[0], float(rng.uniform(0.9, 1.05)))
+    hue = rng.random(3)
+    return mix((float(hue[0]), float(hue[1]), float(hue[2])), (0.6, 0.58, 0.55), 0.45)
+
+
+def _joined(surfaces: list[Surface], material: int) -> Surface:
+    starts = np.cumsum([0, *(len(s.positions) for s in surfaces)])
+    faces = np.concatenate([s.faces + n for s, n in zip(surfaces, starts[:-1], strict=True)])
+    uvs = [s.uvs if s.uvs is not None else np.zeros((len(s.positions), 2)) for s in surfaces]
+    normals = None
+    if surfaces[0].normals is not None:
+        normals = np.concatenate([s.normals for s in surfaces if s.normals is not None])
+    return Surface(
+        surfaces[0].name,
+        np.concatenate([s.positions for s in surfaces]).astype(np.float32),
+        faces.astype(np.int32),
+        material,
+        np.concatenate(uvs).astype(np.float32),
+        normals,
+    )
