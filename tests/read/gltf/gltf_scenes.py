@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from pbrs_farm.core.house import House, Item
+from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import GlbWriter
+from pbrs_farm.read.gltf.scene import Beside, read_gltf
 
 Quad = list[list[float]]
 
@@ -97,3 +100,19 @@ def two_rooms() -> Scene:
     ]
     s.node("Wall.001", mesh=s.mesh(inner))
     return s
+
+
+def read(scene: Scene, **beside: Any) -> House:
+    """The House of a scene, with what lies beside it."""
+    return read_gltf(scene.glb(), "scene.glb", fields=ReadFields(), beside=Beside(**beside))
+
+
+def item(house: House, name: str) -> Item:
+    """The item of that name."""
+    return next(i for i in house.items if i.name == name)
+
+
+def area(polygon: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    """Area of an (N, 2) polygon, positive counter-clockwise."""
+    x, z = polygon.T
+    return float(0.5 * (x @ np.roll(z, -1) - z @ np.roll(x, -1)))

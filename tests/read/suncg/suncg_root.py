@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from pbrs_farm.core.house import House, Item, Material, Surface
 from tests.read.suncg.suncg_meshes import Hole, Obj, ball, mtl, slab_with_holes
 
 HOUSE = "0123456789abcdef0123456789abcdef"
@@ -315,3 +316,20 @@ def write_large_root(
     plain = house_json() | {"levels": [{"id": "0", "nodes": nodes}]}
     write(root / f"house/{HOUSE}/house.json", json.dumps(plain))
     return HOUSE
+
+
+def item(house: House, item_id: str) -> Item:
+    """The item of that id."""
+    return next(i for i in house.items if i.id == item_id)
+
+
+def material_of(house: House, item_id: str, surface: str) -> Material:
+    """The material of an item's surface, by their names."""
+    found = next(s for s in item(house, item_id).surfaces if s.name == surface)
+    return house.materials[found.material]
+
+
+def outward_volume(surfaces: tuple[Surface, ...]) -> float:
+    """Signed volume by the divergence theorem: positive when closed faces look outwards."""
+    p = np.concatenate([s.positions[s.faces] for s in surfaces]).astype(np.float64)
+    return float(np.einsum("ij,ij->i", p[:, 0], np.cross(p[:, 1], p[:, 2])).sum() / 6)

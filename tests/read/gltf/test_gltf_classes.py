@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import ItemKind
+from tests.read.gltf.gltf_scenes import item, read, two_rooms
+
+
+def test_names_tell_classes_and_unknown_ones_are_otherprop_and_said_so() -> None:
+    s = two_rooms()
+    cube = s.box([0, 0, 0], [0.5, 0.5, 0.5])
+    for name in ("Armchair_01", "wall lamp", "Thing.002", "floor mat", "Kitchen cabinet L"):
+        s.node(name, mesh=cube, translation=[1, 0, 1])
+    house = read(s)
+    got = {i.name: (i.nyu40, i.kind) for i in house.items}
+    assert got["Floor"] == (2, ItemKind.FLOOR)
+    assert got["Walls outer"] == (1, ItemKind.WALL)
+    assert got["Wall.001"] == (1, ItemKind.WALL)
+    assert got["Ceiling"] == (22, ItemKind.CEILING)
+    assert got["Armchair_01"] == (5, ItemKind.OBJECT)
+    assert got["wall lamp"] == (35, ItemKind.LAMP)
+    assert got["floor mat"] == (20, ItemKind.OBJECT)
+    assert got["Kitchen cabinet L"] == (3, ItemKind.OBJECT)
+    assert got["Thing.002"] == (40, ItemKind.OBJECT)
+    assert [n.kind for n in house.notes] == ["unmapped-class"]
+    assert "Thing.002" in house.notes[0].place
+
+
+def test_the_mapping_file_beats_names_and_extras_beat_the_mapping() -> None:
+    s = two_rooms()
+    cube = s.box([0, 0, 0], [0.5, 0.5, 0.5])
+    s.node("Chair A", mesh=cube)
+    s.node("Chair B", mesh=cube)
+    s.node("Chair C", mesh=cube, extras={"class": "night_stand"})
+    s.node("X7", mesh=cube)
+    mapping = {"nodes": {"Chair*": "sofa", "Chair B": {"class": "bed", "kind": "object"}, "X?": 25}}
+    house = read(s, mapping=json.dumps(mapping).encode())
+    assert [item(house, f"Chair {x}").nyu40 for x in "ABC"] == [6, 4, 32]
+    assert item(house, "X7").nyu40 == 25
+    assert not house.notes
+
+
+def test_a_group_is_one_item_unless_its_name_means_several() -> None:
+    s = two_rooms()
+    cube = s.box([0, 0, 0], [0.2, 0.2, 0.2])
+    legs = [s.node(f"leg {k}", mesh=cube, translation=[k, 0, 0]) for k in range(3)]
+    s.node("Table", children=legs)
+    chairs = [s.node(f"Cube.{k:03}", mesh=cube) for k in range(2)]
+    s.node("Chairs", children=chairs)
+    lamp = s.node("Lamp", mesh=cube)
+    vase = s.node("Vase", mesh=cube, extras={"class": "otherprop"})
+    s.node("Furniture", children=[s.node("Desk", mesh=cube, children=[lamp, vase])])
+    house = read(s)
+    assert item(house, "Table").n_faces == 36
+    names = [i.name for i in house.items][7:]
+    assert names == ["Table", "Cube.000", "Cube.001", "Desk", "Vase"]
+    assert item(house, "Cube.001").nyu40 == 5
+    assert item(house, "Desk").n_faces == 24  # its lamp, untagged, is a part of it
+    assert not house.notes
+
+
+def test_a_storey_named_floor_is_no_floor() -> None:
+    s = two_rooms()
+    cube = s.node("Cube", mesh=s.box([1, 0, 1], [1.5, 0.5, 1.5]))
+    chair = s.node("Chair", mesh=s.box([2, 0, 1], [2.5, 0.5, 1.5]))
+    s.node("Ground floor", children=[0, 1, 2, 3, cube, chair])
+    house = read(s)
+    assert [i.name for i in house.items if i.kind is ItemKind.FLOOR] == ["Floor"]
+    assert item(house, "Cube").tags == ("unmapped",)
+    assert item(house, "Chair").nyu40 == 5
+    assert len(house.rooms) == 2
+
+
+def test_a_wrong_mapping_row_is_refused_naming_it() -> None:
+    with pytest.raises(BadHouse, match="names no class"):
+        read(two_rooms(), mapping=b'{"nodes": {"A": "spaceship"}}')

@@ -1,0 +1,165 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import ItemKind, MaterialKind
+from pbrs_farm.core.lighting import LightForm, flux_lm
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.formats.house_bundle import bundle_from_house
+from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.read.gltf.scene import read_gltf
+from tests.read.gltf.gltf_scenes import item, read, two_rooms
+from tests.read.small_houses import png
+
+
+def test_texture_coordinates_turn_v_up_and_follow_the_texture_transform() -> None:
+    s = two_rooms()
+    view = s.writer.add_bytes(png())
+    s.more = {
+        "images": [{"bufferView": view, "mimeType": "image/png", "name": "red"}],
+        "textures": [{"source": 0}],
+    }
+    info: dict[str, Any] = {"index": 0}
+    s.materials.append({"pbrMetallicRoughness": {"baseColorTexture": info}})
+    s.node("Chair", mesh=s.mesh([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]], 0))
+    house = read(s)
+    (surface,) = item(house, "Chair").surfaces
+    assert surface.uvs is not None
+    assert np.allclose(surface.uvs, [[0, 0], [1, 0], [1, 1], [0, 1]])  # bottom left first
+    texture = house.textures[house.materials[surface.material].texture_id or ""]
+    assert (texture.name, texture.data) == ("red", png())
+    info["extensions"] = {"KHR_texture_transform": {"scale": [2, 3], "offset": [0.25, 0.5]}}
+    (surface,) = item(read(s), "Chair").surfaces
+    assert surface.uvs is not None
+    assert np.allclose(surface.uvs[2], [2.25, 1 - 0.5])  # uv (1, 0) v down -> (2.25, 0.5)
+    assert np.allclose(surface.uvs[0], [0.25, 1 - 3.5])
+
+
+def test_materials_keep_colour_gloss_glass_and_mirror() -> None:
+    s = two_rooms()
+    pbr = "pbrMetallicRoughness"
+    s.materials += [
+        {"name": "paint", pbr: {"baseColorFactor": [0.214, 0, 0, 1], "metallicFactor": 0, "roughnessFactor": 1}},
+        {"name": "glass", "alphaMode": "BLEND", pbr: {"baseColorFactor": [1, 1, 1, 0.2], "metallicFactor": 0}},
+        {"name": "silver", pbr: {"metallicFactor": 1, "roughnessFactor": 0.02}},
+        {"name": "clear", pbr: {"metallicFactor": 0}, "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}},
+    ]  # fmt: skip
+    for k, name in enumerate(("Table", "Window", "Mirror", "Chair")):
+        s.node(name, mesh=s.box([0, 0, 0], [1, 1, 0.05], k))
+    house = read(s)
+    look = {m.name: m for m in house.materials}
+    assert look["paint"].diffuse == pytest.approx((0.5, 0, 0), abs=1e-3)
+    assert (look["paint"].shininess, look["paint"].specular) == (0.0, (0.0, 0.0, 0.0))
+    assert (look["glass"].kind, look["glass"].opacity) == (MaterialKind.PANE, 0.2)
+    assert look["silver"].kind is MaterialKind.MIRROR
+    assert (look["clear"].kind, look["clear"].opacity) == (MaterialKind.GLASS, 0.0)
+
+
+def test_gloss_survives_the_way_through_our_own_glb() -> None:
+    home = builtin_home()
+    shiny = replace(home.materials[0], shininess=40.0)
+    home = replace(home, materials=(shiny, *home.materials[1:]))
+    house = read_gltf(bundle_from_house(home)[0], "a.glb", fields=ReadFields())
+    assert next(m for m in house.materials if m.name == shiny.name).shininess == pytest.approx(40.0)
+
+
+def test_punctual_lights_become_lumens_of_the_lamp_they_hang_in() -> None:
+    s = two_rooms()
+    s.more["extensions"] = {
+        "KHR_lights_punctual": {
+            "lights": [
+                {"type": "point", "intensity": 50, "color": [1, 0.5, 0.25]},
+                {"type": "spot", "intensity": 100, "spot": {"outerConeAngle": np.pi / 3}},
+                {"type": "directional", "intensity": 3},
+            ]
+        }
+    }
+    uses = [{"KHR_lights_punctual": {"light": k}} for k in range(3)]
+    bulb = s.node("bulb", extensions=uses[0], translation=[0, 0.3, 0])
+    s.node("Lamp", mesh=s.box([0, 0, 0], [0.2, 0.2, 0.2]), children=[bulb], translation=[1, 1, 1])
+    turn = [-np.sqrt(0.5), 0, 0, np.sqrt(0.5)]  # -z turned down
+    s.node("Spot", extensions=uses[1], translation=[2, 2.4, 1], rotation=turn)
+    s.node("Sun", extensions=uses[2])
+    house = read(s)
+    (point,) = item(house, "Lamp").lights
+    assert np.allclose(point.position, [1, 1.3, 1])
+    assert flux_lm(point.power, point.unit, point.share) == pytest.approx(50 * 4 * np.pi)
+    assert point.rgb_linear == (1.0, 0.5, 0.25)
+    (spot,) = item(house, "Spot").lights
+    assert (item(house, "Spot").kind, item(house, "Spot").room_id) == (ItemKind.LAMP, "0_0")
+    assert spot.form is LightForm.SPOT
+    assert np.allclose(spot.direction, [0, -1, 0], atol=1e-6)
+    assert spot.power == pytest.approx(100 * np.pi)
+    assert not any(i.name == "Sun" for i in house.items)
+
+
+def test_emissive_surfaces_of_objects_emit_and_floors_never_glow() -> None:
+    s = two_rooms()
+    strong = {"KHR_materials_emissive_strength": {"emissiveStrength": 1000}}
+    s.materials += [
+        {"name": "screen", "emissiveFactor": [1, 1, 1], "extensions": strong},
+        {"name": "plain", "emissiveFactor": [1, 1, 1]},
+    ]
+    s.node("TV", mesh=s.mesh([[[0, 1, 0.1], [1, 1, 0.1], [1, 1.5, 0.1], [0, 1.5, 0.1]]], 0))
+    s.node("Floor lamp", mesh=s.box([3, 0, 1], [3.1, 1, 1.1], 1))
+    s.node("Picture", mesh=s.box([3, 1, 0], [3.1, 1.1, 0.1], 1))
+    s.nodes[0]["mesh"] = s.mesh([[[0, 0, 3], [6, 0, 3], [6, 0, 0], [0, 0, 0]]], 0)
+    house = read(s)
+    (screen,) = item(house, "TV").lights
+    assert screen.emitting == (0,)
+    assert screen.power == pytest.approx(np.pi * 1000 * 0.5)
+    (lamp,) = item(house, "Floor lamp").lights
+    assert (lamp.power, lamp.emitting) == (800.0, (0,))
+    assert not item(house, "Picture").lights
+    floor = item(house, "Floor")
+    assert not floor.lights
+    assert house.materials[floor.surfaces[0].material].kind is MaterialKind.OPAQUE
+
+
+def test_a_lamp_without_any_light_gets_an_assumed_one() -> None:
+    s = two_rooms()
+    s.node("Lamp", mesh=s.box([1, 0, 1], [1.2, 1, 1.2]))
+    lamp = item(read(s), "Lamp")
+    assert lamp.tags == ("assumed_light",)
+    assert np.allclose(lamp.lights[0].position, [1.1, 0.5, 1.1])
+
+
+@pytest.mark.parametrize(
+    ("names", "panes"),
+    [
+        (("Glass", "Frame"), {"Glass"}),
+        (("windowGlass.001", "wood"), {"windowGlass.001"}),
+        (("Fensterscheibe Glas", "Fensterrahmen"), {"Fensterscheibe Glas"}),
+        (("Window", "Wood"), {"Window"}),
+        (("window", "glass"), {"glass"}),  # beside a glass "window" names the frame
+        (("glass frame", "plastic"), set()),
+    ],
+)
+def test_an_opaque_material_named_glass_in_a_window_is_a_pane(
+    names: tuple[str, ...], panes: set[str]
+) -> None:
+    s = two_rooms()
+    s.materials += [{"name": n, "pbrMetallicRoughness": {}} for n in names]
+    parts = [s.node(f"part {k}", mesh=s.box([1, 1 + k, 0], [2, 2 + k, 0.05], k)) for k in range(2)]
+    s.node("Window", children=parts)
+    s.node("Table", mesh=s.box([1, 0, 1], [2, 0.7, 2], 0))
+    house = read(s)
+    seen = [house.materials[x.material] for x in item(house, "Window").surfaces]
+    assert {m.name for m in seen if m.kind is MaterialKind.PANE} == panes
+    assert all(m.opacity < 0.5 for m in seen if m.kind is MaterialKind.PANE)
+    (table,) = (house.materials[x.material] for x in item(house, "Table").surfaces)
+    assert table.kind is MaterialKind.OPAQUE
+
+
+def test_a_part_named_glass_of_a_window_is_a_pane_whatever_its_material() -> None:
+    s = two_rooms()
+    pane = s.node("Glass", mesh=s.box([1, 1, 0], [2, 2, 0.02]))
+    frame = s.node("Glass frame", mesh=s.box([1, 0.9, 0], [2, 1, 0.05]))
+    s.node("Window", children=[pane, frame])
+    house = read(s)
+    kinds = [house.materials[x.material].kind for x in item(house, "Window").surfaces]
+    assert kinds == [MaterialKind.PANE, MaterialKind.OPAQUE]
