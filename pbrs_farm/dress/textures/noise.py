@@ -1,0 +1,77 @@
+"""Periodic noise and shapes on a torus: every array continues at its opposite edge; no effects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F32
+
+Shape2 = tuple[int, int]  # rows, columns
+
+
+def noise(
+    rng: np.random.Generator,
+    shape: Shape2,
+    *,
+    slope: float = 2.0,
+    stretch: tuple[float, float] = (1.0, 1.0),
+    band: tuple[float, float] = (1.0, 1e9),
+) -> F32:
+    """(H, W) float32 of mean 0 and deviation 1, periodic by construction.
+
+    Power falls with frequency k as k^-slope (0 white, 2 clouds, 4 hills). stretch: how many times
+    longer features are along rows and along columns. band: cycles per texture that are let
+    through, softly at the upper end.
+    """
+    rows, columns = shape
+    fy = np.fft.fftfreq(rows, 1.0 / rows).astype(np.float32)[:, None] * np.float32(stretch[0])
+    fx = np.arange(columns // 2 + 1, dtype=np.float32)[None] * np.float32(stretch[1])
+    k2 = fy * fy + fx * fx
+    # Let the band through; the mean is nothing.
+    gain = np.maximum(k2, 1e-6) ** np.float32(-slope / 4.0) * (k2 >= band[0] ** 2 * 0.999)
+    if band[1] < max(shape):
+        gain *= np.exp(-k2 / np.float32(band[1] ** 2))
+    gain[0, 0] = 0.0
+    # Draw the half spectrum that a real picture has.
+    size = (rows, columns // 2 + 1)
+    spectrum = np.empty(size, np.complex64)
+    spectrum.real = rng.standard_normal(size, np.float32)
+    spectrum.imag = rng.standard_normal(size, np.float32)
+    field = np.fft.irfft2(spectrum * gain.astype(np.float32), shape)
+    deviation = float(field.std())
+    return np.asarray(field / max(deviation, 1e-12), np.float32)
+
+
+def blurred(field: F32, sigma_px: float) -> F32:
+    """The field (H, W) under a periodic Gaussian of sigma_px pixels."""
+    rows, columns = field.shape
+    fy = np.fft.fftfreq(rows).astype(np.float32)[:, None]
+    fx = np.fft.rfftfreq(columns).astype(np.float32)[None]
+    gain = np.exp(-2.0 * (np.pi * sigma_px) ** 2 * (fy * fy + fx * fx)).astype(np.float32)
+    return np.asarray(np.fft.irfft2(np.fft.rfft2(field) * gain, field.shape), np.float32)
+
+
+def grid(shape: Shape2) -> tuple[F32, F32]:
+    """(H, 1) and (1, W): v and u of the pixels' centres, 0..1 from the lower left corner."""
+    rows, columns = shape
+    v = 1.0 - (np.arange(rows, dtype=np.float32) + 0.5) / rows
+    u = (np.arange(columns, dtype=np.float32) + 0.5) / columns
+    return v[:, None], u[None]
+
+
+def smoothstep(low: float, high: float, x: F32) -> F32:
+    """0 below low, 1 above high, smooth between; low > high turns it round."""
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t), np.float32)
+
+
+def coverage(distance_m: F32, half_width_m: float, pixel_m: float) -> F32:
+    """How much of a pixel a line covers: box-filtered, exact for lines along the axes."""
+    reach = (half_width_m + 0.5 * pixel_m - distance_m) / pixel_m
+    return np.asarray(np.clip(reach, 0.0, min(1.0, 2.0 * half_width_m / pixel_m)), np.float32)
+
+
+def sampled(field: F32, rows: np.ndarray, columns: np.ndarray) -> F32:
+    """field at integer pixels, wrapped at its edges."""
+    h, w = field.shape
+    return np.asarray(field[rows % h, columns % w], np.float32)
