@@ -51,14 +51,6 @@ def blurred(field: F32, sigma_px: float) -> F32:
     return np.asarray(np.fft.irfft2(np.fft.rfft2(field) * gain, field.shape), np.float32)
 
 
-def grid(shape: Shape2) -> tuple[F32, F32]:
-    """(H, 1) and (1, W): v and u of the pixels' centres, 0..1 from the lower left corner."""
-    rows, columns = shape
-    v = 1.0 - (np.arange(rows, dtype=np.float32) + 0.5) / rows
-    u = (np.arange(columns, dtype=np.float32) + 0.5) / columns
-    return v[:, None], u[None]
-
-
 def smoothstep(low: float, high: float, x: F32) -> F32:
     """0 below low, 1 above high, smooth between; low > high turns it round."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)

@@ -24,9 +24,7 @@ def paint_maps(
     stipple = noise(rng, shape, slope=0.5, band=(size_m[0] * 50, min(size_m[0] * 220, per_metre)))
     colour = np.array(tint, np.float32) * (1.0 + 0.005 * clouds + 0.006 * stipple)[..., None]
     height = np.asarray(0.00009 * stipple + 0.0003 * clouds, np.float32)
-    return SurfaceMaps(
-        colour_bytes(colour), 0.85, normals_from_height(height, size_m), size_m, 0.0
-    )
+    return SurfaceMaps(colour_bytes(colour), 0.85, normals_from_height(height, size_m), size_m, 0.0)
 
 
 def plaster_maps(
@@ -76,7 +74,7 @@ def carpet_maps(
     fleck = noise(rng, shape, slope=0.6)
     if loops:
         # Set loops in rows, every other row half a loop on.
-        n = int(round(size_m[0] / 0.008)) // 2 * 2
+        n = round(size_m[0] / 0.008) // 2 * 2
         y = (np.arange(shape[0], dtype=np.float32) + 0.5) / shape[0] * n
         x = (np.arange(shape[1], dtype=np.float32) + 0.5) / shape[1] * n
         shift = np.where(np.floor(y) % 2 == 1, 0.5, 0.0)[:, None]
@@ -98,7 +96,7 @@ def weave_maps(
 
     threads_m: threads a metre, as many as the picture can show.
     """
-    n = max(8, int(round(min(threads_m, shape[1] / size_m[0] / 3.2) * size_m[0])) // 4 * 4)
+    n = max(8, round(min(threads_m, shape[1] / size_m[0] / 3.2) * size_m[0]) // 4 * 4)
     y = ((np.arange(shape[0], dtype=np.float32) + 0.5) / shape[0] * n)[:, None]
     x = ((np.arange(shape[1], dtype=np.float32) + 0.5) / shape[1] * n)[None]
     # Let the warp lie on top in every other crossing, or in twos along a diagonal.
@@ -140,7 +138,7 @@ def leather_maps(
 
 def _cells(rng: np.random.Generator, shape: Shape2, n: int) -> tuple[F32, F32]:
     # Distance to the nearest and second nearest of about n jittered points, in cell widths.
-    side = max(4, int(round(np.sqrt(n))))
+    side = max(4, round(float(np.sqrt(n))))
     jitter = rng.random((2, side, side)).astype(np.float32)
     y = ((np.arange(shape[0], dtype=np.float32) + 0.5) / shape[0] * side)[:, None]
     x = ((np.arange(shape[1], dtype=np.float32) + 0.5) / shape[1] * side)[None]

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.dress.textures.maps import SurfaceMaps, colour_bytes, normals_from_height
 from pbrs_farm.dress.textures.noise import Shape2, noise, smoothstep
@@ -51,10 +51,10 @@ def _pixels(shape: Shape2) -> tuple[F32, F32]:
     return np.broadcast_to(x[None], shape), np.broadcast_to(y[:, None], shape)
 
 
-def _filled(distance: F32, shape: Shape2) -> F32:
+def _filled(distance: F32 | F64, shape: Shape2) -> F32:
     # 1 inside (distance < 0), one pixel soft.
     pixel = 1.0 / shape[1]
-    return smoothstep(0.8 * pixel, -0.8 * pixel, distance)
+    return smoothstep(0.8 * pixel, -0.8 * pixel, distance.astype(np.float32))
 
 
 def _stripes(rng: np.random.Generator, shape: Shape2) -> list[F32]:
@@ -147,7 +147,11 @@ def _turned(x: F32, y: F32, at: tuple[float, float], angle: float) -> tuple[F32,
 
 
 def _stamp(
-    mask: F32, at: tuple[float, float], angle: float, reach: float, distance: Callable[[F32, F32], F32]
+    mask: F32,
+    at: tuple[float, float],
+    angle: float,
+    reach: float,
+    distance: Callable[[F32, F32], F32],
 ) -> None:
     # Draw a shape around a point into the mask, through its edges; only near pixels are touched.
     edge = mask.shape[0]

@@ -79,9 +79,7 @@ def wood_sheet(
     return WoodSheet(np.asarray(tone - 0.9 * knot_dark, np.float32), pixel_m)
 
 
-def _with_knot(
-    rng: np.random.Generator, phase: F32, dark: F32, pixel_m: float
-) -> tuple[F32, F32]:
+def _with_knot(rng: np.random.Generator, phase: F32, dark: F32, pixel_m: float) -> tuple[F32, F32]:
     # Push the rings aside around a knot, and darken its heart.
     rows, columns = phase.shape
     y0, x0 = rng.random(2) * (rows, columns)

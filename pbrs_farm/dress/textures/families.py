@@ -1,0 +1,221 @@
+"""Every kind of procedural surface by name, and the material it gives a house.
+
+Effects: JPEGs are encoded through a temporary file; a draft keeps what was made for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.style import WOODS, Rgb, Wood
+from pbrs_farm.dress.textures.maps import SurfaceMaps, encoded
+from pbrs_farm.dress.textures.plain import (
+    carpet_maps,
+    concrete_maps,
+    leather_maps,
+    paint_maps,
+    plaster_maps,
+    weave_maps,
+)
+from pbrs_farm.dress.textures.planks import (
+    Layout,
+    PlankLook,
+    chevron,
+    grain_maps,
+    herringbone,
+    plank_maps,
+    rows_of_planks,
+)
+from pbrs_farm.dress.textures.tiles import (
+    Glaze,
+    Laying,
+    brick_maps,
+    cut_from,
+    marble,
+    terracotta_maps,
+    tile_grid,
+    tile_maps,
+)
+from pbrs_farm.dress.textures.wallpaper import wallpaper_maps
+
+_FINE, _COARSE = (1024, 1024), (512, 512)  # pixels of one repeat
+_FLOOR_M = (2.0, 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """What a procedural surface looks like: equal patterns give equal pixels."""
+
+    family: str  # of FAMILIES
+    seed: int
+    tints: tuple[Rgb, ...] = ((0.9, 0.9, 0.9),)  # sRGB-encoded, the main one first
+    wood: Wood = WOODS["oak"]  # of wood
+    variant: str = ""  # of tiles and wallpaper: how they are laid or printed
+    darkness: float = 0.0  # of wood: -1 bleached .. 1 stained
+
+
+@dataclass(frozen=True, slots=True)
+class PatternMaterial:
+    """A pattern as a house has it."""
+
+    number: int  # in Draft.materials
+    size_m: tuple[float, float]  # of one repeat: uv = metres / size
+    mean_rgb: Rgb  # mean linear colour
+
+
+_Painter = Callable[[np.random.Generator, Pattern], SurfaceMaps]
+
+
+def maps_of(pattern: Pattern) -> SurfaceMaps:
+    """The pattern's pixels; KeyError for an unknown family."""
+    return FAMILIES[pattern.family](np.random.default_rng(pattern.seed), pattern)
+
+
+def pattern_material(draft: Draft, pattern: Pattern) -> PatternMaterial:
+    """The pattern as a material of the draft's house, made once a draft."""
+    key = f"pattern {pattern!r}"
+    kept = draft.kept.get(key)
+    if isinstance(kept, PatternMaterial):
+        return kept
+    maps = maps_of(pattern)
+    material, textures = material_from_maps(maps, f"{pattern.family}-{pattern.seed:08x}")
+    made = PatternMaterial(draft.material(material, textures), maps.size_m, maps.mean_rgb)
+    draft.kept[key] = made
+    return made
+
+
+def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Texture, ...]]:
+    """A material that shows the maps, and the textures it names."""
+    colour, rough, normal = encoded(maps, name)
+    # Keep the Phong lobe that matches, for who reads no roughness.
+    alpha = max(maps.mean_roughness, 0.1) ** 2
+    coat = maps.gloss
+    material = Material(
+        name=name,
+        specular=(coat, coat, coat),
+        shininess=round(2.0 / alpha**2 - 2.0, 1) if coat else 0.0,
+        texture_id=colour.id,
+        roughness=1.0 if rough is not None else round(maps.mean_roughness, 4),
+        roughness_texture_id=None if rough is None else rough.id,
+        normal_texture_id=None if normal is None else normal.id,
+    )
+    return material, tuple(t for t in (colour, rough, normal) if t is not None)
+
+
+def _strip(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    layout = rows_of_planks(rng, _FINE, _FLOOR_M, 28, 4)
+    return _planks(rng, p, layout, _FLOOR_M, PlankLook(variation=0.05))
+
+
+def _boards(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    # Long boards: a wide repeat, a joint or two in each row.
+    size = (2.4, 2.4)
+    layout = rows_of_planks(rng, _FINE, size, int(rng.choice([12, 14, 17])), 1)
+    look = PlankLook(bevel_m=0.003, variation=0.04, roughness=0.42)
+    return _planks(rng, p, layout, size, look)
+
+
+def _laminate(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    size = (2.6, 1.92)
+    layout = rows_of_planks(rng, (768, 1024), size, 10, 2)
+    return _planks(rng, p, layout, size, PlankLook(0.0006, 0.0, 0.03, 0.34, 0.5))
+
+
+def _herringbone(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    layout = herringbone(_FINE, _FLOOR_M, int(rng.choice([5, 6, 7])), 2)
+    return _planks(rng, p, layout, _FLOOR_M, PlankLook(variation=0.05))
+
+
+def _chevron(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    layout = chevron(_FINE, _FLOOR_M, 4, int(rng.choice([14, 16])))
+    return _planks(rng, p, layout, _FLOOR_M, PlankLook(variation=0.045))
+
+
+def _planks(
+    rng: np.random.Generator, p: Pattern, layout: Layout, size: tuple[float, float], look: PlankLook
+) -> SurfaceMaps:
+    return plank_maps(rng, p.wood, layout, size, look, p.darkness)
+
+
+# Rows and columns in one repeat of that size, shift of every other row, joint, bevel; pixels.
+_TILES: dict[str, tuple[tuple[float, float], Laying, float, tuple[int, int]]] = {
+    "10": ((1.0, 1.0), Laying(10, 10, 0.0, 0.003), 0.003, _COARSE),
+    "15": ((1.2, 1.2), Laying(8, 8, 0.0, 0.003), 0.003, _COARSE),
+    "20": ((1.6, 1.6), Laying(8, 8, 0.0, 0.003), 0.003, _FINE),
+    "30": ((1.8, 1.8), Laying(6, 6, 0.0, 0.003), 0.002, _FINE),
+    "45": ((1.8, 1.8), Laying(4, 4, 0.0, 0.003), 0.002, _FINE),
+    "60": ((2.4, 2.4), Laying(4, 4, 0.0, 0.002), 0.001, _FINE),
+    "30x60": ((2.4, 2.4), Laying(8, 4, 0.5, 0.002), 0.001, _FINE),
+    "20x40": ((1.6, 1.6), Laying(8, 4, 0.0, 0.002), 0.002, _FINE),
+    "subway": ((1.2, 1.2), Laying(16, 8, 0.5, 0.002), 0.006, _FINE),
+    "mosaic": ((0.5, 0.5), Laying(20, 20, 0.0, 0.002), 0.002, _COARSE),
+}
+
+
+def _tiles(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    """Variant: `<laying>[-checker|-mixed|-stone]`; the last tint is the grout where there are more."""
+    laid, _, kind = p.variant.partition("-")
+    size, laying, bevel, shape = _TILES[laid or "30"]
+    grout = p.tints[-1] if len(p.tints) > 1 else (0.72, 0.71, 0.68)
+    colours = p.tints[:-1] if len(p.tints) > 1 else p.tints
+    if kind == "stone":
+        # Stone ware: clouds through the whole tile, dull.
+        glaze = Glaze(colours, "plain", 0.03, 0.02, 0.45, 0.4, bevel, grout)
+    else:
+        mottle = 0.004 if min(colours[0]) > 0.8 else 0.012
+        glaze = Glaze(colours, kind or "plain", mottle, 0.009, 0.14, 0.5, bevel, grout)
+    return tile_maps(rng, shape, size, laying, glaze)
+
+
+def _marble(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    size, laying = (2.4, 2.4), Laying(4, 4, 0.0, 0.002)
+    sheet = marble(rng, _FINE, p.tints[0], p.tints[-1])
+    body = cut_from(rng, sheet, tile_grid(_FINE, size, laying))
+    grout = p.tints[0]
+    return tile_maps(rng, _FINE, size, laying, Glaze((), "plain", 0.004, 0.008, 0.1, 0.5, 0.001, grout), body)  # fmt: skip
+
+
+def _terracotta(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    n = int(rng.choice([7, 8, 10]))
+    return terracotta_maps(rng, _FINE, _FLOOR_M, Laying(n, n, 0.0, 0.007), p.tints[0])
+
+
+def _wallpaper(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    """Variant: a name of wallpaper.PATTERNS; tints: ground, print, accent."""
+    return wallpaper_maps(rng, _COARSE, p.variant, p.tints[0], p.tints[1], p.tints[2])
+
+
+def _cloth(rng: np.random.Generator, p: Pattern, *, twill: bool) -> SurfaceMaps:
+    second = p.tints[1] if len(p.tints) > 1 else None
+    return weave_maps(rng, _COARSE, (0.25, 0.25), p.tints[0], second=second, twill=twill)
+
+
+FAMILIES: dict[str, _Painter] = {
+    "strip": _strip,
+    "planks": _boards,
+    "laminate": _laminate,
+    "herringbone": _herringbone,
+    "chevron": _chevron,
+    "tiles": _tiles,
+    "marble": _marble,
+    "terracotta": _terracotta,
+    "brick": lambda r, p: brick_maps(r, _FINE, _FLOOR_M, p.tints[0], painted=False),
+    "painted brick": lambda r, p: brick_maps(r, _FINE, _FLOOR_M, p.tints[0], painted=True),
+    "paint": lambda r, p: paint_maps(r, _COARSE, (1.0, 1.0), p.tints[0]),
+    "plaster": lambda r, p: plaster_maps(r, _FINE, _FLOOR_M, p.tints[0]),
+    "smooth plaster": lambda r, p: plaster_maps(r, _COARSE, _FLOOR_M, p.tints[0], depth=0.35),
+    "concrete": lambda r, p: concrete_maps(r, _FINE, _FLOOR_M, p.tints[0]),
+    "carpet": lambda r, p: carpet_maps(r, _COARSE, (1.0, 1.0), p.tints[0], loops=False),
+    "loop carpet": lambda r, p: carpet_maps(r, _COARSE, (0.64, 0.64), p.tints[0], loops=True),
+    "wallpaper": _wallpaper,
+    "grain": lambda r, p: grain_maps(r, p.wood),
+    "weave": lambda r, p: _cloth(r, p, twill=False),
+    "twill": lambda r, p: _cloth(r, p, twill=True),
+    "leather": lambda r, p: leather_maps(r, _COARSE, (0.3, 0.3), p.tints[0]),
+}
+"""Painters by family; docs/dress.md shows them all."""
