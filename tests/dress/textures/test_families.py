@@ -18,7 +18,7 @@ ALL = [
     *(
         Pattern("tiles", 6, GREEN, variant=v)
         for v in ("60-stone", "10-checker", "mosaic-mixed", "subway")
-    ),  # fmt: skip
+    ),
 ]
 
 
