@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Final
-from xml.etree import ElementTree as ET
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
+
+from pbrs_farm.core.svg import element, svg_picture, svg_text
 
 Rgb = tuple[int, int, int]  # 0..255
 
@@ -22,19 +23,15 @@ class SvgPicture:
 
     def __init__(self, width: float, height: float, label: str) -> None:
         self.width, self.height = width, height
-        attributes = {"viewBox": f"0 0 {width} {height}", "role": "img", "aria-label": label}
-        self._svg = ET.Element("svg", attributes)
+        self._svg = svg_picture(viewBox=f"0 0 {width} {height}", role="img", aria_label=label)
 
     def add(self, tag: str, content: str = "", **attributes: object) -> None:
-        """Draw an element above what is there; css= is its class, "_" stands for "-"."""
-        # Translate Python's names into SVG's, leaving out what is empty.
-        names = {name: "class" if name == "css" else name.replace("_", "-") for name in attributes}
-        written = {names[name]: str(value) for name, value in attributes.items() if value != ""}
-        ET.SubElement(self._svg, tag, written).text = content
+        """Draw an element above what is there, as core.svg.element does."""
+        element(self._svg, tag, content, **attributes)
 
     def svg(self) -> Markup:
         """The picture as text, its words escaped."""
-        return Markup(ET.tostring(self._svg, encoding="unicode", short_empty_elements=False))
+        return Markup(svg_text(self._svg))
 
 
 class PlotArea(SvgPicture):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 
 _GAP_M = 1.0  # between the two panels
 _TEXT_M = 0.25  # height of letters
@@ -34,34 +35,34 @@ def section_svg(
     # Frame both panels alike, half a metre around.
     low, high = everything.min(0) - 0.5, everything.max(0) + 0.5
     size = high - low
-    panels = [
-        _panel("before", low, "".join(_walls(p, "#c98b4a", "0.45", "#5a3210") for p in parts)),
-        _panel("after", low, _walls(solid, "#3d3d3d", "1", "none")),
-    ]
     total = 2 * size[0] + _GAP_M
-    shifted = f'<g transform="translate({size[0] + _GAP_M:.3f} 0)">{panels[1]}</g>'
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width_px}" '
-        f'height="{round(width_px * size[1] / total)}" viewBox="0 0 {total:.3f} {size[1]:.3f}">'
-        f'<rect width="100%" height="100%" fill="white"/>{panels[0]}{shifted}</svg>\n'
-    )
+    height_px = round(width_px * size[1] / total)
+    box = f"0 0 {total:.3f} {size[1]:.3f}"
+    root = svg_file(width=width_px, height=height_px, viewBox=box)
+    element(root, "rect", width="100%", height="100%", fill="white")
+    left = _panel(root, "before", low)
+    for segments in parts:
+        _walls(left, segments, fill="#c98b4a", fill_opacity="0.45", stroke="#5a3210")
+    right = element(root, "g", transform=f"translate({size[0] + _GAP_M:.3f} 0)")
+    _walls(_panel(right, "after", low), solid, fill="#3d3d3d", fill_opacity="1", stroke="none")
+    return svg_text(root) + "\n"
 
 
-def _panel(title: str, low: F64, body: str) -> str:
-    text = f'<text x="0.2" y="0.35" font-size="{_TEXT_M}" font-family="sans-serif">{title}</text>'
-    return f'{text}<g transform="translate({-low[0]:.3f} {-low[1]:.3f})">{body}</g>'
+def _panel(parent: Element, title: str, low: F64) -> Element:
+    element(parent, "text", title, x=0.2, y=0.35, font_size=_TEXT_M, font_family="sans-serif")
+    return element(parent, "g", transform=f"translate({-low[0]:.3f} {-low[1]:.3f})")
 
 
-def _walls(segments: F64, fill: str, opacity: str, stroke: str) -> str:
+def _walls(panel: Element, segments: F64, **style: str) -> None:
     # Fill a closed cut; draw an open one, of a planar wall, as a red line.
     polygons = solid_polygons(segments)
-    style = f'fill="{fill}" fill-opacity="{opacity}" stroke="{stroke}" stroke-width="0.012"'
-    if not polygons:
-        lines = "".join(f"M{_xy(a)}L{_xy(b)}" for a, b in segments)
-        return f'<path d="{lines}" fill="none" stroke="#c02020" stroke-width="0.02"/>' if lines else ""  # fmt: skip
-    rings = [r for p in polygons for r in (p.exterior, *p.interiors)]
-    d = "".join("M" + "L".join(_xy(c) for c in r.coords[:-1]) + "Z" for r in rings)
-    return f'<path d="{d}" fill-rule="evenodd" {style}/>'
+    if polygons:
+        rings = [r for p in polygons for r in (p.exterior, *p.interiors)]
+        d = "".join("M" + "L".join(_xy(c) for c in r.coords[:-1]) + "Z" for r in rings)
+        element(panel, "path", d=d, fill_rule="evenodd", **style, stroke_width="0.012")
+    elif len(segments):
+        d = "".join(f"M{_xy(a)}L{_xy(b)}" for a, b in segments)
+        element(panel, "path", d=d, fill="none", stroke="#c02020", stroke_width="0.02")
 
 
 def _xy(point: Sequence[float] | F64) -> str:

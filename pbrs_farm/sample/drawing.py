@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
+
+from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 
 Shape = Literal["polygon", "line", "dot", "text"]
 
@@ -36,15 +36,12 @@ class Drawing:
 
     def svg(self) -> str:
         """The drawing as a whole SVG file."""
-        lines = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{self.width}" '
-            f'height="{self.height}" viewBox="0 0 {self.width} {self.height}" '
-            'font-family="sans-serif">',
-            '<rect width="100%" height="100%" fill="#ffffff"/>',
-            *(_svg(mark) for mark in self.marks),
-            "</svg>",
-        ]
-        return "\n".join(lines) + "\n"
+        box = f"0 0 {self.width} {self.height}"
+        root = svg_file(width=self.width, height=self.height, viewBox=box, font_family="sans-serif")
+        element(root, "rect", width="100%", height="100%", fill="#ffffff")
+        for mark in self.marks:
+            _draw(root, mark)
+        return svg_text(root) + "\n"
 
     def rgb(self) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 sRGB, drawn at twice the size and halved."""
@@ -64,24 +61,22 @@ class Drawing:
         return np.asarray(image, np.uint8)
 
 
-def _svg(mark: Mark) -> str:
-    title = f"<title>{escape(mark.title)}</title>" if mark.title else ""
-    x, y = mark.points[0]
+def _draw(root: Element, mark: Mark) -> None:
+    x, y = (f"{value:.1f}" for value in mark.points[0])
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in mark.points)
     if mark.shape == "dot":
-        attributes = f'circle cx="{x:.1f}" cy="{y:.1f}" r="{mark.size:.1f}" fill="{mark.colour}"'
+        shape = element(root, "circle", cx=x, cy=y, r=f"{mark.size:.1f}", fill=mark.colour)
     elif mark.shape == "text":
-        size = f'font-size="{mark.size:.0f}" dominant-baseline="middle" fill="{mark.colour}"'
-        return f'<text x="{x:.1f}" y="{y:.1f}" {size}>{escape(mark.text)}</text>'
+        where = {"x": x, "y": y, "dominant_baseline": "middle"}
+        size = f"{mark.size:.0f}"
+        shape = element(root, "text", mark.text, **where, font_size=size, fill=mark.colour)
     elif mark.shape == "polygon":
-        attributes = f'polygon points="{_path(mark.points)}" fill="{mark.colour}"'
+        shape = element(root, "polygon", points=points, fill=mark.colour)
     else:
-        stroke = f'fill="none" stroke="{mark.colour}" stroke-width="{mark.size:.1f}"'
-        attributes = f'polyline points="{_path(mark.points)}" {stroke}'
-    return f"<{attributes}>{title}</{attributes.split()[0]}>"
-
-
-def _path(points: Sequence[tuple[float, float]]) -> str:
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+        stroke = {"stroke": mark.colour, "stroke_width": f"{mark.size:.1f}"}
+        shape = element(root, "polyline", points=points, fill="none", **stroke)
+    if mark.title:
+        element(shape, "title", mark.title)
 
 
 def _paint(pen: ImageDraw.ImageDraw, mark: Mark) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from pbrs_farm.assets import homes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields, Recipe
@@ -16,6 +17,7 @@ from pbrs_farm.read.common.notes import HARMLESS, Notes
 from pbrs_farm.read.common.textures import texture_from_bytes
 from pbrs_farm.read.source import SourceRef, read_house, resolve
 from pbrs_farm.run.steps import repaired_house
+from tests.example_homes import example_homes
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, WALLS, home_xml, piece, sh3d
 from tests.read.textured_sources import FORMATS
 
@@ -98,10 +100,7 @@ def test_a_harmless_note_is_kept_and_passes_reader_and_step(tmp_path: Path) -> N
 
 @pytest.mark.homes
 def test_eight_of_the_nine_example_homes_are_accepted_strictly() -> None:
-    from pbrs_farm.assets import homes
-
-    if homes.cached() is None:
-        pytest.skip("the example homes are not fetched")
+    example_homes()
     rejected = [h.name for h in homes.example_homes() if not _reads_strictly(resolve(h.name))]
     assert rejected == ["2BedroomApartmentWithBowWindow"]
 
