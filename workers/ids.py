@@ -9,6 +9,7 @@ views. House "-" is the job: `-/s3/shard` merges shard 3, `-/-/job` ends the job
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -80,9 +81,26 @@ def log_key(job: str, task: str, attempt: int) -> str:
     return job_key(job, f"logs/{_flat(task)}.{attempt}.txt")
 
 
+def attempts_from_log_keys(job: str, task: str, keys: Iterable[str]) -> dict[int, str]:
+    """Attempt -> the key of its log, for those of the keys that are logs of the task."""
+    pattern = re.compile(re.escape(log_key(job, task, 0)).replace(r"\.0\.txt", r"\.(\d+)\.txt"))
+    return {int(match[1]): key for key in keys if (match := pattern.fullmatch(key))}
+
+
 def failed_key(job: str, task: str) -> str:
     """Key of the record of a task that failed for good; survives the loss of Redis."""
     return job_key(job, f"failed/{_flat(task)}.json")
+
+
+def task_from_failed_key(job: str, key: str) -> str:
+    """The task whose record of failure lies under key."""
+    flat = key.removeprefix(job_key(job, "failed/")).removesuffix(".json")
+    return flat.replace("whole/", "-/", 1) if flat.startswith("whole/") else flat
+
+
+def shard_key(job: str, shard: int) -> str:
+    """Key of a shard's merged manifest."""
+    return job_key(job, f"shards/{shard}.jsonl")
 
 
 def _flat(task: str) -> str:

@@ -155,7 +155,7 @@ class MemoryRegistry:
     def slots(self) -> dict[str, int]:
         return self.n_slots
 
-    def refused(self, reason: str) -> None:
+    def note_rejection(self, reason: str) -> None:
         self.refusals.append(reason)
 
     def open_breaker(self, reason: str) -> None:

@@ -4,7 +4,16 @@ import pytest
 
 from pbrs_farm.core.errors import BadInput
 from tests.workers.conftest import spec
-from workers.ids import check_job_id, queue_of, stages_of_queue, task_from_text
+from workers.ids import (
+    attempts_from_log_keys,
+    check_job_id,
+    failed_key,
+    log_key,
+    queue_of,
+    stages_of_queue,
+    task_from_failed_key,
+    task_from_text,
+)
 from workers.node.house_runner import steps_of_stage
 
 
@@ -36,3 +45,12 @@ def test_the_last_stage_of_a_batch_writes_the_view() -> None:
     assert steps_of_stage(both, "light")[-1] == "view"
     only_gl = both.model_copy(update={"modes": ("opengl_dl",), "batch_stages": ("gl",)})
     assert steps_of_stage(only_gl, "gl") == ("truth", "opengl_dl", "view")
+
+
+def test_keys_of_logs_and_failures_name_their_task_back() -> None:
+    job = "0123456789ab"
+    for task in ("h1/0/light", "h1/-/geometry", "-/s3/shard", "-/-/job"):
+        assert task_from_failed_key(job, failed_key(job, task)) == task
+        logs = [log_key(job, task, k) for k in (1, 12)]
+        others = [log_key(job, "h1/1/light", 1), log_key(job, "h1/0/gl", 1)]
+        assert attempts_from_log_keys(job, task, [*others, *logs]) == {1: logs[0], 12: logs[1]}

@@ -23,7 +23,14 @@ from pbrs_farm.store import Store, store_from_url
 from workers.client.explain import explain
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
-from workers.ids import check_job_id, failed_key, job_key, log_key, task_from_text
+from workers.ids import (
+    attempts_from_log_keys,
+    check_job_id,
+    failed_key,
+    job_key,
+    log_key,
+    task_from_text,
+)
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import ALIVE_S, JobView
 from workers.ledger.worker_registry import Registry
@@ -171,15 +178,9 @@ class Farm:
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
         """The stored log of a task's attempt (the last one by default); BadInput when none."""
         task = task_from_text(text)
-        # One object an attempt: jobs/<id>/logs/<task>.<attempt>.txt
-        prefix = log_key(job, str(task), 0).removesuffix("0.txt")
-        folder = prefix.rpartition("/")[0] + "/"
-        found = {
-            int(number): key
-            for key in self.store.list(folder)
-            if key.startswith(prefix)
-            and (number := key.removeprefix(prefix).removesuffix(".txt")).isdigit()
-        }
+        # One object an attempt, in the folder of the task's unit.
+        folder = log_key(job, str(task), 0).rpartition("/")[0] + "/"
+        found = attempts_from_log_keys(job, str(task), self.store.list(folder))
         chosen = attempt if attempt is not None else max(found, default=0)
         if chosen not in found:
             raise BadInput(text, "", "no log stored", hint="logs are kept of failed attempts")

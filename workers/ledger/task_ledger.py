@@ -43,7 +43,7 @@ STATES: Final = {
 
 
 class LedgerUnavailable(PbrsError, Transient):
-    """Redis did not answer, or refused the credentials; says which."""
+    """Redis did not answer, or rejected the credentials; says which."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +167,7 @@ class WorkerRegistry(Protocol):
     """Who works on the farm, as slots and the coordinator see it."""
 
     def slots(self) -> dict[str, int]: ...
-    def refused(self, reason: str) -> None: ...
+    def note_rejection(self, reason: str) -> None: ...
     def open_breaker(self, reason: str) -> None: ...
     def breaker(self) -> str: ...
 

@@ -61,8 +61,8 @@ class Registry:
             self._ledger.client.hset(f"{self._g}worker:{worker}", "drain", "0" if undo else "1")
         return True
 
-    def refused(self, reason: str) -> None:
-        """This worker refused a task of another version; `workers` and `status` show it."""
+    def note_rejection(self, reason: str) -> None:
+        """This worker rejected a task of another version; `workers` and `status` show it."""
         with self._ledger.errors():
             key = f"{self._g}worker:{self._ledger.config.worker}"
             self._ledger.client.hset(key, mapping={"refuses": reason})

@@ -17,14 +17,9 @@ from pbrs_farm.core.errors import ObjectMissing
 from pbrs_farm.formats.manifest import lines_by_house
 from pbrs_farm.run.attributions import dressing_rows, write_attribution_of
 from pbrs_farm.store.object_store import Store
-from workers.ids import job_key
+from workers.ids import job_key, shard_key, task_from_failed_key
 from workers.job import JobSpec, houses_from_lines
 from workers.runner import OnText
-
-
-def shard_key(job: str, shard: int) -> str:
-    """Key of a shard's merged manifest."""
-    return job_key(job, f"shards/{shard}.jsonl")
 
 
 def house_ids(store: Store, spec: JobSpec) -> list[str]:
@@ -120,7 +115,7 @@ def _manifest(store: Store, house: str) -> bytes | None:
 def _failed(store: Store, job: str) -> Iterator[dict[str, Any]]:
     for key in store.list(job_key(job, "failed/")):
         record = json.loads(store.get(key))
-        task = key.rpartition("/failed/")[2].removesuffix(".json")
+        task = task_from_failed_key(job, key)
         yield {"task": task, "fault": record["fault"], "message": record["message"]}
 
 

@@ -43,7 +43,7 @@ _log = logging.getLogger("pbrs.slot")
 # Classes that say nothing of the task: no log of them is stored.
 _NO_LOG: Final = {*UNCOUNTED, "cancelled", "lost"}
 # Refusals that another worker may not meet: wait, so that it comes first.
-_WAIT_AFTER_REFUSAL: Final = {"version", "recipe", "draining", "blocked", "elsewhere"}
+_WAIT_AFTER_REJECTION: Final = {"version", "recipe", "draining", "blocked", "elsewhere"}
 _POLL_S: Final = 1.0
 _LOG_EVERY_S: Final = 60.0  # a long task's log is stored so often
 _RETRY_S: Final = 600.0  # how long Redis may be away
@@ -121,7 +121,7 @@ class Slot:
             )
             claim = self._retry(ask)
             if claim.verdict != "run":
-                self._refused(job, following, claim)
+                self._rejected(job, following, claim)
                 return
             following = self._run_claimed(_Claimed(job, following, claim))
             direct = True
@@ -219,7 +219,7 @@ class Slot:
             tail=self._process.log_tail(_TAIL_IN_FAULT),
         )
 
-    def _refused(self, job: str, task: TaskId, claim: Claim) -> None:
+    def _rejected(self, job: str, task: TaskId, claim: Claim) -> None:
         _log.log(
             logging.DEBUG if claim.verdict in ("done", "early") else logging.INFO,
             "%s/%s not run: %s %s", job, task, claim.verdict, claim.detail,
@@ -230,8 +230,8 @@ class Slot:
         if claim.verdict in ("version", "recipe"):
             reason = f"job {job} wants {claim.verdict} {claim.detail}"
             with contextlib.suppress(LedgerUnavailable):
-                self._registry.refused(reason)
-        if claim.verdict in _WAIT_AFTER_REFUSAL:
+                self._registry.note_rejection(reason)
+        if claim.verdict in _WAIT_AFTER_REJECTION:
             self._sleep(1.0)
 
     def _release_dead_sibling(self, job: str, task: TaskId, holder: str) -> None:

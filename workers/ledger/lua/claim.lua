@@ -37,7 +37,7 @@ end
 
 local t = now()
 -- Not now, or not here: the task becomes ready again, after a delay if there is one.
-local function refuse(verdict, detail, delay)
+local function reject(verdict, detail, delay)
   if letter == QUEUED then
     redis.call('ZREM', P .. 'queued', task)
     if delay > 0 then
@@ -50,13 +50,13 @@ local function refuse(verdict, detail, delay)
 end
 
 -- Refuse what must wait: the job, storage, or this worker forbids it.
-if job[1] ~= 'running' and stage ~= JOB_STAGE then return refuse('paused', '', 0) end
-if redis.call('EXISTS', G .. 'breaker') == 1 then return refuse('held', 'storage is unhealthy', 0) end
-if job[2] ~= ARGV[4] then return refuse('version', job[2], 15) end
-if job[3] ~= ARGV[5] then return refuse('recipe', job[3], 15) end
+if job[1] ~= 'running' and stage ~= JOB_STAGE then return reject('paused', '', 0) end
+if redis.call('EXISTS', G .. 'breaker') == 1 then return reject('held', 'storage is unhealthy', 0) end
+if job[2] ~= ARGV[4] then return reject('version', job[2], 15) end
+if job[3] ~= ARGV[5] then return reject('recipe', job[3], 15) end
 local self = redis.call('HMGET', G .. 'worker:' .. worker, 'drain', 'blocked_until')
-if self[1] == '1' then return refuse('draining', '', 0) end
-if self[2] and tonumber(self[2]) > t then return refuse('blocked', self[2], 2) end
+if self[1] == '1' then return reject('draining', '', 0) end
+if self[2] and tonumber(self[2]) > t then return reject('blocked', self[2], 2) end
 
 -- A failed attempt is repeated elsewhere as long as anybody else could do it.
 local tried = redis.call('HGET', P .. 'tried', task)
@@ -69,15 +69,15 @@ if tried and string.find(',' .. tried .. ',', ',' .. worker .. ',', 1, true) the
     if not seen[name] and seen_at and tonumber(seen_at) > t - ALIVE_S then others = others - 1 end
     seen[name] = true
   end
-  if others > 0 and redis.call('HINCRBY', P .. 'refused', task, 1) <= 20 then
-    return refuse('elsewhere', tried, 3)
+  if others > 0 and redis.call('HINCRBY', P .. 'rejected', task, 1) <= 20 then
+    return reject('elsewhere', tried, 3)
   end
 end
 
 -- Count the attempt and take the lease.
 local attempt = redis.call('HINCRBY', P .. 'attempts', task, 1)
 redis.call('ZREM', P .. 'queued', task)
-redis.call('HDEL', P .. 'refused', task)
+redis.call('HDEL', P .. 'rejected', task)
 set_unit(house, unit, stage, RUNNING)
 redis.call('ZADD', lease_key(stage), t + tonumber(ARGV[6]), job_of(P) .. '|' .. task)
 redis.call('HSET', P .. 'claims', task, token .. '|' .. worker .. '|' .. string.format('%.3f', t))

@@ -12,7 +12,7 @@
 --   views   hash: house -> batches       shards  hash: shard -> houses still open
 --   out:<stage>  list: the outbox        later   sorted set: task by the time it becomes ready
 --   queued  sorted set: task by the time its message was sent
---   claims  hash: task -> "<token>|<worker>|<since>"       attempts, tried, refused, failed: by task
+--   claims  hash: task -> "<token>|<worker>|<since>"       attempts, tried, rejected, failed: by task
 --   prints  hash: fingerprint of a fault -> how often
 -- Keys of the farm (G ..): leader, jobs, known, notify, breaker, lease:<queue> (sorted set: task by the
 -- end of its lease), worker:<name> (hash), workers and workers:<stage> (sorted sets: worker by heartbeat).
