@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.catalogue import Catalogue, Picture, Piece, Shape
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.read.catalogue.library_files import (
+    FURNITURE,
     JAR_FURNITURE,
     Entry,
     Library,
@@ -22,7 +23,14 @@ from pbrs_farm.read.catalogue.library_files import (
     furniture_library,
 )
 from pbrs_farm.read.catalogue.library_shapes import library_shape
+from pbrs_farm.read.catalogue.model_folder import model_folder
 from pbrs_farm.read.catalogue.piece_groups import GroupRule, Verdict, group_rule, verdicts
+from pbrs_farm.read.catalogue.surface_pictures import (
+    JAR_TEXTURES,
+    TEXTURES,
+    pictures_of_models,
+    texture_library,
+)
 
 VERSION: Final = 1
 """Of the rules and the tables: part of the digest. Raised when a piece changes."""
@@ -37,6 +45,7 @@ class Found:
 
     sha256: str
     pieces: tuple[tuple[Piece, Loader], ...] = ()
+    pictures: tuple[Picture, ...] = ()
 
 
 def catalogue_from(
@@ -52,7 +61,8 @@ def catalogue_from(
     found = []
     if jar is not None:
         found.append(_furniture(jar, notes, JAR_FURNITURE))
-    found += [_furniture(path, notes) for path in libraries]
+        found.append(_textures(jar, notes, JAR_TEXTURES))
+    found += [_furniture(path, notes, FURNITURE) for path in libraries]
     found += [_given(path, notes) for path in given]
     held = [f for f in found if f is not None]
     # Later libraries replace pieces of earlier ones.
@@ -65,6 +75,7 @@ def catalogue_from(
         pieces=tuple(pieces.values()),
         load=lambda piece: loaders[piece.id]() if piece.id in loaders else None,
         digest=keys.digest({"version": VERSION, "libraries": [f.sha256 for f in held]}),
+        pictures=tuple({p.texture.id: p for f in held for p in f.pictures}.values()),
         notes=tuple(notes.found),
     )
 
@@ -72,17 +83,24 @@ def catalogue_from(
 def _given(path: Path, notes: LibraryNotes) -> Found | None:
     if not path.exists():
         raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
+    if path.is_dir():
+        sha256, pieces = model_folder(path, notes)
+        return Found(sha256, pieces)
+    if path.suffix.lower() == ".sh3t":
+        return _textures(path, notes, TEXTURES)
     if path.suffix.lower() == ".sh3f":
-        return _furniture(path, notes)
-    raise BadInput(path, "", "is no catalogue", hint="a library .sh3f is read")
+        return _furniture(path, notes, FURNITURE)
+    hint = ".sh3f, .sh3t or a folder of OBJ and GLB is read"
+    raise BadInput(path, "", "is no catalogue", hint=hint)
 
 
-def _furniture(path: Path, notes: LibraryNotes, catalogue: str | None = None) -> Found | None:
-    library = (
-        furniture_library(path, notes)
-        if catalogue is None
-        else furniture_library(path, notes, catalogue)
-    )
+def _textures(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
+    found = texture_library(path, notes, catalogue)
+    return Found(found[0], pictures=found[1]) if found else None
+
+
+def _furniture(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
+    library = furniture_library(path, notes, catalogue)
     if library is None:
         return None
     pieces = []
@@ -93,7 +111,8 @@ def _furniture(path: Path, notes: LibraryNotes, catalogue: str | None = None) ->
             pieces.append(_piece(library, entry, rule, seen or _AS_WRITTEN, notes))
     if not pieces:
         notes.add("no-classes", library.name, "no piece of the library has a known class")
-    return Found(library.sha256, tuple(pieces))
+    pictures = pictures_of_models(library.name, library.contents, library.licence, notes)
+    return Found(library.sha256, tuple(pieces), pictures)
 
 
 def _rule(entry: Entry, group: str) -> GroupRule | None:

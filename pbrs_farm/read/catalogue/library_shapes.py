@@ -19,6 +19,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface, Texture
 from pbrs_farm.read.catalogue.library_files import Entry, LibraryNotes
+from pbrs_farm.read.catalogue.lighter_shapes import lighter_shape
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanPiece
@@ -28,7 +29,10 @@ from pbrs_farm.read.sweethome3d.piece_materials import piece_material
 from pbrs_farm.read.sweethome3d.piece_models import PieceModels
 from pbrs_farm.read.sweethome3d.placement import PieceFrame, local_from_model, placed_surface
 
-MAX_TRIANGLES: Final = 40_000  # of a piece: a home holds two hundred
+MAX_TRIANGLES: Final = 200_000  # of a model that is read
+SMALL: Final = (3_000, 1 / 48)  # triangles of what stands on furniture, and how coarse it may get
+LARGE: Final = (10_000, 1 / 110)
+TOO_MANY: Final = 30_000  # what cannot be made lighter than this stays out
 MAX_TEXTURE_PX: Final = 512  # of a piece's picture: more shows in no view of a room
 _JPEG_QUALITY: Final = 92
 
@@ -72,9 +76,21 @@ def library_shape(
         notes.add("empty-model", entry.id, "nothing to see in it")
         return None
     lights = light_parts(piece, frame, tuple(emitting))
-    return _with_small_textures(
-        Shape(tuple(surfaces), materials.library.materials, materials.library.textures, lights)
-    )
+    library = materials.library
+    shape = Shape(tuple(surfaces), library.materials, library.textures, lights)
+    return fitted_shape(shape, place, entry.id, notes)
+
+
+def fitted_shape(shape: Shape, place: Place, piece_id: str, notes: LibraryNotes) -> Shape | None:
+    """The shape as light as a home can bear it, its pictures no larger than they show.
+
+    None, with a note, where it cannot be made lighter than TOO_MANY triangles.
+    """
+    lighter = lighter_shape(shape, *(SMALL if place is Place.SURFACE else LARGE))
+    if sum(len(s.faces) for s in lighter.surfaces) > TOO_MANY:
+        notes.add("heavy-model", piece_id, f"more than {TOO_MANY} triangles: left out")
+        return None
+    return _with_small_textures(lighter)
 
 
 def turned(piece: PlanPiece, turn_deg: float) -> PlanPiece:

@@ -1,0 +1,166 @@
+"""Photographed surfaces of libraries: those that models of the packages wear, and texture libraries.
+
+surface-pictures.csv: pictures that were looked at, each without a seam, and how large one repeat
+is. Grain runs along u. Effects: reads the libraries.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import posixpath
+from collections import Counter
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from PIL import Image
+
+from pbrs_farm.core.catalogue import Picture
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import Texture
+from pbrs_farm.read.catalogue.library_files import LibraryNotes, licence_of, opened_archive
+from pbrs_farm.read.catalogue.library_shapes import small_texture
+from pbrs_farm.read.catalogue.properties import numbered_entries, parse_properties
+from pbrs_farm.read.common.furniture_classes import plain
+from pbrs_farm.read.common.resources import Resources
+from pbrs_farm.read.common.textures import texture_from_bytes
+
+TEXTURES: Final = "PluginTexturesCatalog.properties"
+JAR_TEXTURES: Final = "com/eteks/sweethome3d/io/DefaultTexturesCatalog.properties"
+MOST_OF_A_GROUP: Final = 24  # pictures that are kept of a library
+_EDGE_PX: Final = 1024
+_GROUPS: Final = (
+    ("tiles", "tile ceramic mosaic porcelain terracotta"),
+    ("brick", "brick"),
+    ("marble", "marble"),
+    ("granite", "granite terrazzo"),
+    ("leather", "leather"),
+    ("carpet", "carpet rug moquette"),
+    ("cloth", "cloth fabric textile denim linen wool cotton velvet"),
+    ("wallpaper", "wallpaper paper"),
+    ("plaster", "plaster roughcast stucco"),
+    ("concrete", "concrete cement"),
+    ("metal", "metal steel iron copper brass"),
+    ("stone", "stone rock slate paving"),
+    ("planks", "parquet plank floorboard floorboards laminate floor flooring"),
+    ("wood", "wood wooden oak pine beech walnut ash maple cherry teak"),
+)
+"""What a picture shows, by whole words of its name and category; the first that fits."""
+_PLACES: Final = ("floor", "wall", "sky")  # categories that say nothing of what it is
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    # A row of surface-pictures.csv.
+    image: str
+    group: str
+    is_turned: bool  # a quarter, so that its grain runs along u
+    size: tuple[float, float]
+
+
+def pictures_of_models(
+    library: str, contents: Resources, licence: str, notes: LibraryNotes
+) -> tuple[Picture, ...]:
+    """The surface pictures that a library of the packages holds among its models."""
+    found = []
+    for row in _seen().get(library, ()):
+        texture = _texture(contents, row.image, f"{library}#{row.image}", notes)
+        if texture is not None:
+            texture = _turned(texture) if row.is_turned else texture
+            found.append(Picture(texture, row.group, row.size, library, licence))
+    return tuple(found)
+
+
+def texture_library(
+    path: Path, notes: LibraryNotes, catalogue: str = TEXTURES
+) -> tuple[str, tuple[Picture, ...]] | None:
+    """(sha256, pictures) of a .sh3t; None, with a note, where it is damaged.
+
+    At most MOST_OF_A_GROUP pictures of a kind are kept, in the library's order. What is no
+    picture, or of no known kind, becomes a note or is passed over. BadInput: no such file.
+    """
+    try:
+        archive, sha256 = opened_archive(path)
+        data = archive.read(catalogue)
+    except BadHouse as error:
+        notes.add("damaged-library", path.name, error.message)
+        return None
+    if data is None:
+        notes.add("damaged-library", path.name, f"holds no {catalogue}")
+        return None
+    properties = parse_properties(data)
+    licence, count, found = licence_of(properties), Counter[str](), []
+    for row in numbered_entries(properties):
+        group = surface_group(row.get("name", ""), row.get("category", ""))
+        if not group or count[group] >= MOST_OF_A_GROUP:
+            continue
+        picture = _picture(row, group, archive, path.stem, licence, notes)
+        if picture is not None:
+            count[group] += 1
+            found.append(picture)
+    if not found:
+        notes.add("no-classes", path.name, "no picture of the library is of a known kind")
+    return sha256, tuple(found)
+
+
+def surface_group(name: str, category: str) -> str:
+    """What a surface is of, by whole words of its name, then of its category; "" = unknown."""
+    for text in (name, category if plain(category) not in _PLACES else ""):
+        words = set(plain(text).replace("-", " ").replace("_", " ").split())
+        words |= {w.removesuffix("s") for w in words}
+        for group, known in _GROUPS:
+            if words & set(known.split()):
+                return group
+    return ""
+
+
+def _picture(
+    row: dict[str, str], group: str, contents: Resources, library: str, licence: str,
+    notes: LibraryNotes,
+) -> Picture | None:  # fmt: skip
+    place = f"{library}#{row.get('id', row.get('name', ''))}"
+    try:
+        width, height = (float(row[key]) / 100 for key in ("width", "height"))
+        if not (0 < width < 100 and 0 < height < 100):
+            raise ValueError("its size is not between 0 and 100 m")
+    except (KeyError, ValueError) as error:
+        notes.add("unreadable-entry", place, f"{error}: left out")
+        return None
+    texture = _texture(contents, row.get("image", "").lstrip("/"), place, notes)
+    if texture is None:
+        return None
+    texture = small_texture(texture, _EDGE_PX)
+    return Picture(texture, group, (width, height), row.get("creator", library), licence)
+
+
+def _texture(contents: Resources, image: str, place: str, notes: LibraryNotes) -> Texture | None:
+    try:
+        data = contents.read(image)
+        if data is None:
+            raise ValueError(f"no {image[:80]!r} in the library")
+        return texture_from_bytes(data, posixpath.basename(image))[0]
+    except (ValueError, BadHouse) as error:
+        notes.add("unreadable-texture", place, f"{error}: left out")
+        return None
+
+
+def _turned(texture: Texture) -> Texture:
+    picture = Image.open(io.BytesIO(texture.data)).convert("RGB")
+    buffer = io.BytesIO()
+    picture.transpose(Image.Transpose.ROTATE_90).save(buffer, "JPEG", quality=92)
+    return texture_from_bytes(buffer.getvalue(), texture.name)[0]
+
+
+@cache
+def _seen() -> dict[str, list[_Seen]]:
+    folder = files("pbrs_farm.read.catalogue")
+    text = folder.joinpath("surface-pictures.csv").read_text("utf-8")
+    found: dict[str, list[_Seen]] = {}
+    for r in csv.DictReader(text.splitlines()):
+        size = (float(r["width_cm"]) / 100, float(r["height_cm"]) / 100)
+        row = _Seen(r["image"], r["group"], r["turned"] == "1", size)
+        found.setdefault(r["library"], []).append(row)
+    return found
