@@ -91,6 +91,11 @@ class Material:
         named = (self.texture_id, self.roughness_texture_id, self.normal_texture_id)
         return tuple(name for name in named if name)
 
+    @property
+    def shows_maps(self) -> bool:
+        """Whether light follows its roughness and normal maps: glass and bulbs stay flat."""
+        return self.kind in (MaterialKind.OPAQUE, MaterialKind.MIRROR, MaterialKind.SHADE)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:

@@ -14,7 +14,19 @@ from pbrs_farm.raycast.tracer import scene_from_mesh
 from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance
 from pbrs_farm.transport.kernels.packets import colour, point, vector
 from pbrs_farm.transport.kernels.sampler import device_array
-from pbrs_farm.transport.scene_tables.material_rows import GLASS, MATERIAL_FLOATS, MIRROR, NULL
+from pbrs_farm.transport.kernels.texture_lookup import (
+    ShadedSurface,
+    Triangle,
+    colour_at,
+    follow_maps,
+)
+from pbrs_farm.transport.scene_tables.material_rows import (
+    FIRST_MAP_TEXEL,
+    GLASS,
+    MATERIAL_FLOATS,
+    MIRROR,
+    NULL,
+)
 from pbrs_farm.transport.scene_tables.scene_tables import (
     BACK_PDF,
     FACE_FLOATS,
@@ -27,6 +39,7 @@ _RAY_OFFSET = 2e-5  # of a point's largest coordinate plus 1 m
 _MAX_TRANSPARENT = 16  # surfaces that a shadow ray passes
 _FACE_PACKETS = FACE_FLOATS // 4
 _MATERIAL_PACKETS = MATERIAL_FLOATS // 4
+_MAP_PACKET = FIRST_MAP_TEXEL // 4  # the last one, of the maps
 
 
 class SurfaceInteraction(NamedTuple):
@@ -35,7 +48,7 @@ class SurfaceInteraction(NamedTuple):
     valid: Any  # Bool: the ray meets a surface
     p: Any  # Point3f
     ng: Any  # unit normal of the face
-    n: Any  # unit shading normal, bent where it would turn away from the ray
+    n: Any  # unit shading normal, of the normal map too, bent where it would turn from the ray
     n_interpolated: Any  # the same before bending
     emitter: Any  # UInt32, NO_LAMP = none
     bsdf: Bsdf
@@ -74,7 +87,7 @@ class DeviceScene:
         """The first surface along a ray."""
         found = self._all.ray_intersect_preliminary(_ray(o, d, dr.inf), coherent, active)
         valid = active & found.is_valid()
-        return self._interaction(found.prim_index, found.prim_uv, d, valid)
+        return self._interaction(found.prim_index, found.prim_uv, d, valid, with_maps=True)
 
     def transmittance(self, o: Any, d: Any, distance: Any, active: Any) -> Any:
         """Color3f of light let through between o and o + distance d: 0 behind opaque faces."""
@@ -135,7 +148,9 @@ class DeviceScene:
     def _packet(self, face: Any, k: int, active: Any) -> Any:
         return dr.gather(mi.Vector4f, self._rows, face * _FACE_PACKETS + k, active)
 
-    def _interaction(self, face: Any, bary: Any, d: Any, valid: Any) -> SurfaceInteraction:
+    def _interaction(
+        self, face: Any, bary: Any, d: Any, valid: Any, *, with_maps: bool = False
+    ) -> SurfaceInteraction:
         # Interpolate the position, the shading normal and the texture coordinates.
         rows = [self._packet(face, k, valid) for k in range(_FACE_PACKETS)]
         e1, e2 = vector(rows[1]), vector(rows[2])
@@ -149,12 +164,21 @@ class DeviceScene:
             rows[1][3] + v * rows[3][0] + w * rows[3][2],
         )
 
+        # Gather the material; its maps count in the frame of the face's front.
+        tag = dr.gather(mi.UInt32, self._tags, face, valid)  # material + 65536 * emitter
+        bsdf, is_cutout, map_roughness = self._material(tag & 0xFFFF, uv, valid)
+        if with_maps:
+            uv1, uv2 = mi.Point2f(rows[2][3], rows[3][0]), mi.Point2f(rows[3][1], rows[3][2])
+            mapped = follow_maps(
+                self._texels, self._materials, (tag & 0xFFFF) * _MATERIAL_PACKETS + _MAP_PACKET, uv,
+                Triangle(e1, e2, uv1, uv2), ShadedSurface(normal, bsdf.alpha), map_roughness,
+                valid & (map_roughness > 0),
+            )  # fmt: skip
+            normal, bsdf = mapped.normal, bsdf._replace(alpha=mapped.alpha)
+
         # Turn both normals to the ray's side; bend a shading normal back that turns away.
         turned = dr.dot(ng, d) > 0
         ng, normal = dr.select(turned, -ng, ng), dr.select(turned, -normal, normal)
-
-        tag = dr.gather(mi.UInt32, self._tags, face, valid)  # material + 65536 * emitter
-        bsdf, is_cutout = self._material(tag & 0xFFFF, uv, valid)
         return SurfaceInteraction(
             valid=valid,
             p=p,
@@ -169,17 +193,16 @@ class DeviceScene:
             target_emitter=dr.reinterpret_array(mi.UInt32, rows[6][3]),
         )
 
-    def _material(self, index: Any, uv: Any, active: Any) -> tuple[Bsdf, Any]:
-        """(parameters, whether nothing is here) of a material where its texture is uv."""
+    def _material(self, index: Any, uv: Any, active: Any) -> tuple[Bsdf, Any, Any]:
+        """(parameters, whether nothing is here, roughness of the maps) of a material at uv."""
         first = index * _MATERIAL_PACKETS
         packets = [
-            dr.gather(mi.Vector4f, self._materials, first + k, active)
-            for k in range(_MATERIAL_PACKETS)
+            dr.gather(mi.Vector4f, self._materials, first + k, active) for k in range(_MAP_PACKET)
         ]
         kd, f0, tau, texture = packets
         first_texel: Any = dr.reinterpret_array(mi.UInt32, texture[0])
         has_texture: Any = active & (first_texel > mi.UInt32(0))
-        rgb, is_solid = self._texture(first_texel, texture[1], texture[2], uv, has_texture)
+        rgb, is_solid = colour_at(self._texels, texture, uv, has_texture)
         kind = mi.UInt32(tau[3])
         tinted = has_texture & (kind != MIRROR)
         bsdf = Bsdf(
@@ -191,33 +214,7 @@ class DeviceScene:
         )
         may_be_cut: Any = texture[3] > 0
         is_cut = has_texture & may_be_cut & ~is_solid
-        return bsdf, active & (is_cut | (kind == NULL))
-
-    def _texture(
-        self, first: Any, width: Any, height: Any, uv: Any, active: Any
-    ) -> tuple[Any, Any]:
-        """(Color3f, whether it is opaque): four texels blended, both axes repeating."""
-        # Find the texel to the top left; row 0 is the top (v = 1).
-        w, h = dr.maximum(mi.Int32(width), 1), dr.maximum(mi.Int32(height), 1)
-        x = (uv.x - dr.floor(uv.x)) * width - 0.5
-        y = (1 - (uv.y - dr.floor(uv.y))) * height - 0.5
-        fx, fy = dr.floor(x), dr.floor(y)
-        x0, y0 = mi.Int32(fx), mi.Int32(fy)
-        tx, ty = x - fx, y - fy
-        # Blend; a texel holds square roots in 10 bits each, and alpha.
-        total = mi.Color3f(0)
-        solid = mi.Float(0)
-        for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
-            column, row = x0 + dx, y0 + dy
-            column = dr.select(column < 0, column + w, dr.select(column >= w, column - w, column))
-            row = dr.select(row < 0, row + h, dr.select(row >= h, row - h, row))
-            index = first + mi.UInt32(row * w + column)
-            bits = dr.gather(mi.UInt32, self._texels, index, active)
-            weight = (tx if dx else 1 - tx) * (ty if dy else 1 - ty)
-            root = mi.Color3f(bits & 1023, (bits >> 10) & 1023, (bits >> 20) & 1023) * (1 / 1023)
-            total += weight * dr.square(root)
-            solid += dr.select((bits >> 30) > 0, weight, 0)
-        return total, solid >= 0.5
+        return bsdf, active & (is_cut | (kind == NULL)), kd[3]
 
 
 def bend_normal(n: Any, d: Any) -> Any:

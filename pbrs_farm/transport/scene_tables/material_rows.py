@@ -1,62 +1,38 @@
-"""Materials as rows of floats for the kernels, textures as one atlas; pure numpy, no effects."""
+"""Materials as rows of floats for the kernels; pure numpy, no effects."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.transport.scene_tables.texture_atlas import TextureAtlas, map_key
 
-MATERIAL_FLOATS: Final = 16  # columns of a material's row: four packets of four
+MATERIAL_FLOATS: Final = 20  # columns of a material's row: five packets of four
+MAP_ROUGHNESS = 3  # what the maps' roughness is multiplied by; 0 = the material has no maps
 KD, TAU = slice(0, 3), slice(8, 11)  # diffuse reflectance; transmittance, diffuse or of thin glass
 F0, ALPHA = slice(4, 7), 7  # specular reflectance at right angles, GGX roughness
 KIND = 11  # of the next four
 FIRST_TEXEL = 12  # in the atlas, 0 = none: an unsigned integer in the float's bits
 TEXTURE_SIZE, IS_CUTOUT = slice(13, 15), 15  # width and height in texels; alpha cuts out
+FIRST_MAP_TEXEL, MAP_SIZE = 16, slice(17, 19)  # the same of the roughness and normal maps
 
 SURFACE, MIRROR, GLASS = 0, 1, 2  # rough and diffuse, delta mirror, thin glass
 NULL = 3  # Mitsuba's null BSDF: rays pass as if there were nothing
 
 MAX_ALBEDO: Final = 0.9  # in the preset `physical`: the whitest paints; paths in 1 would never end
 _MIRROR_REFLECTANCE: Final = 0.9  # of a mirror whose source tells no colour
-_MIN_ALPHA: Final = 0.05  # below it a highlight is as narrow as a mirror's
-_MAX_TEXTURE_PX: Final = 2048
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TextureAtlas:
-    """All textures in one list of texels."""
-
-    texels: NDArray[np.uint32]  # 10 bits for the square root of each linear component, 2 of alpha
-    slots: dict[str, tuple[int, int, int]]  # texture id -> first texel, width, height
-
-
-def texture_atlas(house: House, textures: dict[str, NDArray[np.uint8]]) -> TextureAtlas:
-    """The atlas of the textures that materials use, without those that could not be decoded."""
-    # Leave texel 0 out: a first texel of 0 means that there is no texture.
-    parts: list[NDArray[np.uint32]] = [np.zeros(1, np.uint32)]
-    slots: dict[str, tuple[int, int, int]] = {}
-    first = 1
-    for texture_id in sorted({m.texture_id for m in house.materials if m.texture_id}):
-        picture = textures.get(texture_id)
-        if picture is None or picture.size == 0:
-            continue
-        texels = _packed(_shrunk(picture))
-        slots[texture_id] = (first, texels.shape[1], texels.shape[0])
-        parts.append(texels.ravel())
-        first += texels.size
-    return TextureAtlas(np.concatenate(parts), slots)
+MIN_ALPHA: Final = 0.05  # below it a highlight is as narrow as a mirror's
+_MIN_F0: Final = 0.04  # of a surface whose roughness is known: a dielectric of index 1.5
 
 
 def material_rows(house: House, packed: TextureAtlas, recipe: Recipe) -> tuple[F32, list[str]]:
-    """(M, 16) rows and notes on what had to be changed."""
+    """(M, 20) rows and notes on what had to be changed."""
     rows = np.zeros((max(len(house.materials), 1), MATERIAL_FLOATS), np.float32)
     scaled: list[str] = []
     for index, material in enumerate(house.materials):
@@ -69,9 +45,12 @@ def material_rows(house: House, packed: TextureAtlas, recipe: Recipe) -> tuple[F
         # Add the place of the texture in the atlas.
         slot = packed.slots.get(material.texture_id or "")
         if slot is not None:
-            row[FIRST_TEXEL] = np.array([slot[0]], np.uint32).view(np.float32)[0]
-            row[TEXTURE_SIZE] = slot[1:]
+            row[FIRST_TEXEL], row[TEXTURE_SIZE] = _float_of_bits(slot[0]), slot[1:]
             row[IS_CUTOUT] = float(material.alpha_cutout)
+        slot = packed.map_slots.get(map_key(material))
+        if slot is not None and material.shows_maps and int(row[KIND]) != NULL:
+            row[FIRST_MAP_TEXEL], row[MAP_SIZE] = _float_of_bits(slot[0]), slot[1:]
+            row[MAP_ROUGHNESS] = math.sqrt(row[ALPHA]) if row[ALPHA] > 0 else 1.0
         rows[index] = row
     notes = [f"material {n!r}: Kd + Ks above 1, scaled to conserve energy" for n in scaled]
     return rows, notes
@@ -82,7 +61,9 @@ def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
 
     Ks is read as the strength of a clear coat, F0 = 0.08 Ks (0.04 = glass of index 1.5 at Ks
     0.5), unless Ks is four times brighter than Kd: then the surface is a metal of reflectance Ks.
-    What the coat reflects is taken off Kd (bsdf.py); metals are scaled to Kd + Ks <= 1.
+    What the coat reflects is taken off Kd (bsdf.py); metals are scaled to Kd + Ks <= 1. A material
+    that names its roughness has a coat of F0 0.04 at least, and GGX alpha is the roughness squared
+    (glTF 2.0, appendix B).
     """
     # Decode colours to linear light.
     row = np.zeros(MATERIAL_FLOATS, np.float32)
@@ -106,7 +87,8 @@ def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
         return row, False
     # Tell metals from coated surfaces.
     too_much = bool(np.any(kd + ks > 1 + 1e-6))
-    has_coat = material.shininess > 1 and float(ks.max()) > 0
+    is_rough = material.roughness is not None or material.roughness_texture_id is not None
+    has_coat = is_rough or (material.shininess > 1 and float(ks.max()) > 0)
     if (
         has_coat
         and material.texture_id is None
@@ -116,13 +98,19 @@ def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
         scale = 1 / max(float((kd + ks).max()), 1.0)
         kd, f0 = kd * scale, ks * scale
     else:
-        f0 = 0.08 * ks_encoded
-    # Turn the Phong exponent into GGX roughness.
+        f0 = np.maximum(0.08 * ks_encoded, _MIN_F0 if is_rough else 0)
+    # Square the roughness, or turn the Phong exponent into GGX roughness.
     row[KD] = kd
     if has_coat:
+        phong = math.sqrt(2 / (min(material.shininess, 1e4) + 2))
         row[F0] = f0
-        row[ALPHA] = max(math.sqrt(2 / (min(material.shininess, 1e4) + 2)), _MIN_ALPHA)
+        named = 1.0 if material.roughness is None else min(max(material.roughness, 0.0), 1.0)
+        row[ALPHA] = max(named**2 if is_rough else phong, MIN_ALPHA)
     return row, too_much and has_coat
+
+
+def _float_of_bits(number: int) -> np.float32:
+    return np.float32(np.array([number], np.uint32).view(np.float32)[0])
 
 
 def _released(material: Material) -> F32:
@@ -132,25 +120,3 @@ def _released(material: Material) -> F32:
     row[KIND] = NULL if transparent else SURFACE
     row[KD] = 1.0 if material.texture_id else np.clip(np.nan_to_num(material.diffuse), 0, 1)
     return row
-
-
-def _shrunk(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    step = -(-max(picture.shape[:2]) // _MAX_TEXTURE_PX)
-    return picture[::step, ::step] if step > 1 else picture
-
-
-def _packed(picture: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """(H, W) uint32 texels, as TextureAtlas packs them."""
-    # Take grey pictures as three equal components.
-    if picture.ndim == 2:
-        picture = picture[..., None]
-    rgb = picture[..., :3] if picture.shape[-1] >= 3 else np.repeat(picture[..., :1], 3, -1)
-    # Encode by the square root of linear light; cut alpha at one half.
-    table = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 1023).astype(np.uint32)
-    bits = table[rgb]
-    alpha = picture[..., 3] if picture.shape[-1] == 4 else np.full(picture.shape[:2], 255, np.uint8)
-    opaque = np.where(alpha >= 128, np.uint32(3), np.uint32(0)) << np.uint32(30)
-    packed: NDArray[np.uint32] = (
-        bits[..., 0] | bits[..., 1] << np.uint32(10) | bits[..., 2] << np.uint32(20) | opaque
-    )
-    return packed

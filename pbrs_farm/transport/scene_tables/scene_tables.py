@@ -18,11 +18,8 @@ from pbrs_farm.core.house import Geometry, House, MaterialKind, geometry_from_ho
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter, area_emitters_of_house
-from pbrs_farm.transport.scene_tables.material_rows import (
-    MATERIAL_FLOATS,
-    material_rows,
-    texture_atlas,
-)
+from pbrs_farm.transport.scene_tables.material_rows import MATERIAL_FLOATS, material_rows
+from pbrs_farm.transport.scene_tables.texture_atlas import texture_atlas
 
 FACE_FLOATS: Final = 28  # columns of a face's row: seven packets of four, gathered together
 ORIGIN, EDGE1, EDGE2 = slice(0, 3), slice(4, 7), slice(8, 11)  # first corner, edges to the others
@@ -41,7 +38,7 @@ class SceneTables:
     face_rows: F32  # (F, 28), columns as above
     face_tags: NDArray[np.uint32]  # (F,) material + 65536 * lamp
     transparent: Bools  # (F,) thin glass and alpha cut-outs: shadow rays may pass
-    material_rows: F32  # (M, 16), columns as in material_rows.py
+    material_rows: F32  # (M, 20), columns as in material_rows.py
     texels: NDArray[np.uint32]  # the texture atlas
     lamps: tuple[AreaEmitter, ...]  # L of them
     lamp_rows: F32  # (L, 4) radiance r g b, area in m2
@@ -64,7 +61,8 @@ def tables_from_house(
     notes = [f"{n_left_out} degenerate faces left out of the light"] * (n_left_out > 0)
 
     # Tag each face with its material and its lamp.
-    packed = texture_atlas(house, textures)
+    released = recipe.materials.preset == "released"
+    packed = texture_atlas(house, textures, with_roughness=not released)
     rows, material_notes = material_rows(house, packed, recipe)
     lamps = area_emitters_of_house(house, geometry, keep, recipe)
     faces = geometry.faces[keep]
@@ -74,7 +72,6 @@ def tables_from_house(
     material = geometry.face_material[keep].astype(np.uint32)
     first, lamp_faces, lamp_areas = _lamp_triangles(lamps, np.cumsum(keep) - 1)
     # Tell which materials let a shadow ray pass; in `released` opacity below 1 does, too.
-    released = recipe.materials.preset == "released"
     transparent = np.array([
         m.kind is MaterialKind.GLASS or m.alpha_cutout or (released and m.opacity < 1)
         for m in house.materials

@@ -2,7 +2,8 @@
 
 Effects: holds Mitsuba scenes. `scalar_rgb` has no Dr.Jit arrays for our kernels, so this renders
 there, slowly. In tests it is an independent second opinion. Coats become `roughplastic`, which is
-like our BSDF but not equal to it; diffuse scenes agree exactly.
+like our BSDF but not equal to it (its roughness is the map's mean); metals become `roughconductor`,
+normal maps `normalmap`. Diffuse scenes agree exactly. Cut-outs are solid.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, I32
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
@@ -21,21 +22,36 @@ from pbrs_farm.raycast.variant import mitsuba
 from pbrs_farm.transport.scene_tables.material_rows import (
     ALPHA,
     F0,
+    FIRST_MAP_TEXEL,
     FIRST_TEXEL,
     GLASS,
     KD,
     KIND,
+    MAP_ROUGHNESS,
+    MAP_SIZE,
+    MIN_ALPHA,
     MIRROR,
     NULL,
     TAU,
     TEXTURE_SIZE,
 )
-from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
+from pbrs_farm.transport.scene_tables.scene_tables import (
+    DUV1,
+    DUV2,
+    EDGE1,
+    EDGE2,
+    NO_LAMP,
+    NORMALS,
+    ORIGIN,
+    UV0,
+    SceneTables,
+)
 from pbrs_farm.transport.scene_tables.sky import Sky
+from pbrs_farm.transport.scene_tables.texture_atlas import unpacked_colours, unpacked_maps
 
 
 class ReferenceScene:
-    """A house in Mitsuba's plugins, one scene per light group. Textures are their mean colour."""
+    """A house in Mitsuba's plugins, one scene per light group."""
 
     def __init__(self, tables: SceneTables, sky: Sky, variant: str) -> None:
         self._variant = variant
@@ -68,63 +84,104 @@ class ReferenceScene:
         shapes: dict[str, Any] = {}
         # Make a mesh of the faces that share a material and a lamp.
         for tag in np.unique(t.face_tags):
-            faces = t.faces[t.face_tags == tag]
-            row = _untextured(t.material_rows[int(tag & 0xFFFF)], t.texels)
+            row = t.material_rows[int(tag & 0xFFFF)]
             if int(row[KIND]) == NULL:
                 continue
-            fields: dict[str, Any] = {"bsdf": _bsdf(row)}
+            fields: dict[str, Any] = {"bsdf": _bsdf(mi, row, t.texels)}
             if group is Group.INDOOR and tag >> 16 != NO_LAMP:
                 radiance = [float(v) for v in t.lamp_rows[int(tag >> 16), :3]]
                 fields["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
-            shapes[f"mesh_{tag}"] = _mesh(mi, t.positions, faces, fields)
+            shapes[f"mesh_{tag}"] = _mesh(mi, t.face_rows[t.face_tags == tag], fields)
         return shapes
 
 
-def _untextured(row: F32, texels: NDArray[np.uint32]) -> F32:
-    """The material with its texture's mean colour in place of the texture."""
-    first = int(row[FIRST_TEXEL : FIRST_TEXEL + 1].view(np.uint32)[0])
-    if first == 0 or int(row[KIND]) == MIRROR:
-        return row
-    # Unpack the texels: squares of ten bits for each component.
-    bits = texels[first : first + int(np.prod(row[TEXTURE_SIZE].astype(np.int64)))]
-    mean = [np.mean(((bits >> shift & 1023) / 1023) ** 2) for shift in (0, 10, 20)]
-    untextured = row.copy()
-    untextured[KD] *= mean
-    untextured[TAU] *= mean
-    return untextured
-
-
-def _mesh(mi: Any, positions: F32, faces: I32, fields: dict[str, Any]) -> Any:
-    # Keep the vertices in use; a mesh takes its BSDF and emitter when it is made.
-    used, renumbered = np.unique(faces, return_inverse=True)
+def _mesh(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
+    # Give every face corners of its own; a mesh takes its BSDF and emitter when it is made.
+    n = len(rows)
     properties = mi.Properties()
     for name, plugin in fields.items():
         properties[name] = mi.load_dict(plugin)
-    mesh = mi.Mesh("part", len(used), len(faces), props=properties)
+    mesh = mi.Mesh(
+        "part", 3 * n, n, props=properties, has_vertex_normals=True, has_vertex_texcoords=True
+    )
+    corners = rows[:, None, ORIGIN] + np.stack(
+        [0 * rows[:, EDGE1], rows[:, EDGE1], rows[:, EDGE2]], 1
+    )
+    # Mitsuba measures v downwards, from the first row of a picture.
+    uvs = rows[:, None, UV0] + np.stack([0 * rows[:, DUV1], rows[:, DUV1], rows[:, DUV2]], 1)
+    uvs[..., 1] = 1 - uvs[..., 1]
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = np.ascontiguousarray(positions[used], np.float32).ravel()
-    parameters["faces"] = renumbered.astype(np.uint32).ravel()
+    parameters["vertex_positions"] = np.ascontiguousarray(corners, np.float32).ravel()
+    parameters["vertex_normals"] = np.stack([rows[:, c] for c in NORMALS], 1).ravel()
+    parameters["vertex_texcoords"] = np.ascontiguousarray(uvs, np.float32).ravel()
+    parameters["faces"] = np.arange(3 * n, dtype=np.uint32)
     parameters.update()
     return mesh
 
 
-def _bsdf(row: F32) -> dict[str, Any]:
+def _bsdf(mi: Any, row: F32, texels: NDArray[np.uint32]) -> dict[str, Any]:
+    bent = _bent(mi, row, texels, _flat_bsdf(mi, row, texels))
+    return bent if int(row[KIND]) == GLASS else {"type": "twosided", "nested": bent}
+
+
+def _flat_bsdf(mi: Any, row: F32, texels: NDArray[np.uint32]) -> dict[str, Any]:
+    """The plugin of a material, seen from one side, without its normal map."""
+    colours = _texels(row, texels, FIRST_TEXEL, TEXTURE_SIZE)
+
     def rgb(values: F32) -> dict[str, Any]:
-        return {"type": "rgb", "value": [float(v) for v in values]}
+        if colours is None:
+            return {"type": "rgb", "value": [float(v) for v in values]}
+        return _bitmap(mi, unpacked_colours(colours) * values)
 
     # Choose the plugin by the kind of BSDF.
     if int(row[KIND]) == MIRROR:
-        return {
-            "type": "twosided",
-            "nested": {"type": "conductor", "material": "none", "specular_reflectance": rgb(row[F0])},
-        }  # fmt: skip
+        tint = {"type": "rgb", "value": [float(v) for v in row[F0]]}
+        return {"type": "conductor", "material": "none", "specular_reflectance": tint}
     if int(row[KIND]) == GLASS:
         pane = {"type": "thindielectric", "int_ior": 1.5, "ext_ior": 1.0}
         return pane | {"specular_transmittance": rgb(row[TAU])}
-    if row[ALPHA] > 0:
-        coat = {"type": "roughplastic", "alpha": float(row[ALPHA]), "nonlinear": False}
-        return {"type": "twosided", "nested": coat | {"diffuse_reflectance": rgb(row[KD])}}
-    return {"type": "twosided", "nested": {"type": "diffuse", "reflectance": rgb(row[KD])}}
+    if row[ALPHA] <= 0:
+        return {"type": "diffuse", "reflectance": rgb(row[KD])}
+    # Square the roughness of maps, texel by texel.
+    alpha = np.full((1, 1), row[ALPHA], np.float64)
+    maps = _texels(row, texels, FIRST_MAP_TEXEL, MAP_SIZE)
+    if maps is not None:
+        _normals, roughness = unpacked_maps(maps)
+        alpha = np.maximum((row[MAP_ROUGHNESS] * roughness) ** 2, MIN_ALPHA)
+    if row[KD].max() > 0:
+        coat = {"type": "roughplastic", "alpha": float(alpha.mean()), "nonlinear": False}
+        return coat | {"diffuse_reflectance": rgb(row[KD])}
+    metal = {"type": "roughconductor", "material": "none", "distribution": "ggx"}
+    tint = {"type": "rgb", "value": [float(v) for v in row[F0]]}
+    return metal | {"specular_reflectance": tint, "alpha": _bitmap(mi, alpha[..., None])}
+
+
+def _bent(mi: Any, row: F32, texels: NDArray[np.uint32], nested: dict[str, Any]) -> dict[str, Any]:
+    """The plugin below its normal map, if it has one."""
+    maps = _texels(row, texels, FIRST_MAP_TEXEL, MAP_SIZE)
+    if maps is None:
+        return nested
+    normals, _roughness = unpacked_maps(maps)
+    # As ours: what leaves through the face is lost, and nothing else.
+    plain = {"flip_invalid_normals": False, "use_shadowing_function": False}
+    picture = _bitmap(mi, 0.5 * normals + 0.5)
+    return {"type": "normalmap", "normalmap": picture, "nested": nested} | plain
+
+
+def _texels(
+    row: F32, texels: NDArray[np.uint32], first: int, size: slice
+) -> NDArray[np.uint32] | None:
+    """(H, W) texels of a material's colours or maps, None without any."""
+    begin = int(row[first : first + 1].view(np.uint32)[0])
+    if begin == 0:
+        return None
+    width, height = (int(n) for n in row[size])
+    return texels[begin : begin + width * height].reshape(height, width)
+
+
+def _bitmap(mi: Any, values: NDArray[np.float64]) -> dict[str, Any]:
+    picture = mi.Bitmap(np.ascontiguousarray(values, np.float32))
+    return {"type": "bitmap", "bitmap": picture, "raw": True, "wrap_mode": "repeat"}
 
 
 def _outdoor(mi: Any, sky: Sky) -> dict[str, Any]:

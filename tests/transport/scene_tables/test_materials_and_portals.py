@@ -7,12 +7,7 @@ import pytest
 
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
-from pbrs_farm.transport.scene_tables.material_rows import (
-    MAX_ALBEDO,
-    TextureAtlas,
-    material_rows,
-    texture_atlas,
-)
+from pbrs_farm.transport.scene_tables.material_rows import MAX_ALBEDO, material_rows
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS, nearest_portals, portals_of_house
 from pbrs_farm.transport.validation import known_rooms as rooms
 
