@@ -19,6 +19,7 @@ from pbrs_farm.truth.albedo import albedo_png
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
 from pbrs_farm.truth.depth_sensor import sensor_depth
 from pbrs_farm.truth.hha import hha_png
+from pbrs_farm.truth.shading_normal import shading_normals
 from pbrs_farm.truth.standard_layers import (
     depth_mm,
     encoded_normal,
@@ -39,7 +40,7 @@ class LabelInputs:
     geometry: Geometry  # of house: what hit.face counts in
     camera: Camera
     hit_without: HitWithout  # for the layers behind glass
-    textures: Mapping[str, NDArray[np.uint8]]  # id -> (H, W, 3 or 4) sRGB, row 0 = top, for albedo
+    textures: Mapping[str, NDArray[np.uint8]]  # id -> (H, W, 3 or 4) sRGB, row 0 = top
     seed: int = 0  # of depth_sensor's noise
 
     @cached_property
@@ -99,11 +100,16 @@ def _normal(inputs: LabelInputs, hit: HitRecord) -> NDArray[np.uint16]:
     return normal_png(hit.geo_normal_world, inputs.camera.world_from_camera)
 
 
+def _normal_shading(inputs: LabelInputs) -> NDArray[np.uint16]:
+    normals = shading_normals(inputs.hit, inputs.house, inputs.geometry, inputs.textures)
+    return normal_png(normals, inputs.camera.world_from_camera)
+
+
 _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     # Geometry of the hit.
     "depth_z": lambda s: s.hit.depth_z,
     "position": lambda s: s.hit.position_world,
-    "normal_shading": lambda s: normal_png(s.hit.shading_normal_world, s.camera.world_from_camera),
+    "normal_shading": _normal_shading,
     "normal_world": lambda s: encoded_normal(s.hit.geo_normal_world),
     # Appearance and classes of the hit.
     "albedo": lambda s: albedo_png(s.hit, s.house, s.geometry, s.textures),

@@ -226,3 +226,50 @@ def test_the_sensors_shadow_lies_left_of_what_is_near():
     assert lost[144:148].min() > 0.9
     assert lost[100:138].max() < 0.3
     assert lost[153:300].max() < 0.3
+
+
+def tilted_map(degrees: float, *, along_v: bool = False) -> np.ndarray:
+    """A normal map of one normal, turned by degrees from z towards u or v."""
+    x, z = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+    normal = (0, x, z) if along_v else (x, 0, z)
+    return np.full((4, 4, 3), np.round((np.array(normal) + 1) * 127.5), np.uint8)
+
+
+def decoded(picture: np.ndarray) -> np.ndarray:
+    """Published camera frame (x right, y forward, z up) of a stored normal, in OpenGL axes."""
+    n = picture.astype(np.float64) * 2 / 65535 - 1
+    return np.stack([n[..., 0], n[..., 2], -n[..., 1]], -1)
+
+
+@pytest.mark.parametrize(("mirrored", "back"), [(False, False), (True, False), (False, True)])
+def test_the_shading_layer_shows_the_normal_map_and_no_other_layer_does(
+    mirrored: bool, back: bool
+) -> None:
+    plain = house(5, half=1.0)
+    mapped = replace(plain, materials=(Material("m", normal_texture_id="n"),))
+    uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32) * [-1 if mirrored else 1, 1]
+    (item,) = mapped.items
+    faces = item.surfaces[0].faces[:, ::-1] if back else item.surfaces[0].faces
+    surface = replace(item.surfaces[0], uvs=uvs.astype(np.float32), faces=faces)
+    mapped = mapped.with_items([replace(item, surfaces=(surface,))])
+    maps = {"n": tilted_map(30)}
+    for along_v in (False, True):
+        maps = {"n": tilted_map(30, along_v=along_v)}
+        layers = truth.optional_layers(
+            ("normal_shading", "normal_world"), label_inputs_of(mapped, camera(), maps)
+        )
+        # u points right, v up; mirrored, u points left. Seen from the back, bumps are dents.
+        turn = -1 if back or (mirrored and not along_v) else 1
+        expected = np.array([0, turn * 0.5, 0]) if along_v else np.array([turn * 0.5, 0, 0])
+        expected[2] = np.cos(np.radians(30))
+        seen = decoded(layers["normal_shading"])[3, 4]
+        np.testing.assert_allclose(seen, expected, atol=0.006)
+        flat = truth.optional_layers(("normal_world",), label_inputs_of(plain, camera()))
+        np.testing.assert_array_equal(layers["normal_world"], flat["normal_world"])
+
+
+def test_a_surface_without_texture_coordinates_is_flat_under_a_normal_map() -> None:
+    mapped = replace(house(5, half=1.0), materials=(Material("m", normal_texture_id="n"),))
+    inputs = label_inputs_of(mapped, camera(), {"n": tilted_map(30)})
+    layers = truth.optional_layers(("normal_shading",), inputs)
+    np.testing.assert_allclose(decoded(layers["normal_shading"])[3, 4], [0, 0, 1], atol=1e-4)

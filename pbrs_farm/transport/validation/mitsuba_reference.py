@@ -8,13 +8,14 @@ normal maps `normalmap`. Diffuse scenes agree exactly. Cut-outs are solid.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, Bools
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
@@ -82,17 +83,24 @@ class ReferenceScene:
     def _shapes(self, mi: Any, group: Group) -> dict[str, Any]:
         t = self._tables
         shapes: dict[str, Any] = {}
-        # Make a mesh of the faces that share a material and a lamp.
-        for tag in np.unique(t.face_tags):
+        # Make a mesh of the faces that share a material, a lamp and the side their texture shows.
+        mirrored = _is_mirrored(t.face_rows)
+        for tag, flipped in itertools.product(np.unique(t.face_tags), (False, True)):
+            faces = (t.face_tags == tag) & (mirrored == flipped)
             row = t.material_rows[int(tag & 0xFFFF)]
-            if int(row[KIND]) == NULL:
+            if int(row[KIND]) == NULL or not faces.any():
                 continue
-            fields: dict[str, Any] = {"bsdf": _bsdf(mi, row, t.texels)}
+            fields: dict[str, Any] = {"bsdf": _bsdf(mi, row, t.texels, mirrored=flipped)}
             if group is Group.INDOOR and tag >> 16 != NO_LAMP:
                 radiance = [float(v) for v in t.lamp_rows[int(tag >> 16), :3]]
                 fields["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
-            shapes[f"mesh_{tag}"] = _mesh(mi, t.face_rows[t.face_tags == tag], fields)
+            shapes[f"mesh_{tag}_{int(flipped)}"] = _mesh(mi, t.face_rows[faces], fields)
         return shapes
+
+
+def _is_mirrored(rows: F32) -> Bools:
+    a, b = rows[:, DUV1], rows[:, DUV2]
+    return np.asarray(a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0])
 
 
 def _mesh(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
@@ -119,9 +127,21 @@ def _mesh(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
     return mesh
 
 
-def _bsdf(mi: Any, row: F32, texels: NDArray[np.uint32]) -> dict[str, Any]:
-    bent = _bent(mi, row, texels, _flat_bsdf(mi, row, texels))
-    return bent if int(row[KIND]) == GLASS else {"type": "twosided", "nested": bent}
+def _bsdf(mi: Any, row: F32, texels: NDArray[np.uint32], *, mirrored: bool) -> dict[str, Any]:
+    flat = _flat_bsdf(mi, row, texels)
+    if int(row[KIND]) == GLASS:
+        return flat
+    bent = flat
+    maps = _texels(row, texels, FIRST_MAP_TEXEL, MAP_SIZE)
+    if maps is not None:
+        # Mitsuba's second tangent is the cross product; a mirrored texture's looks the other way.
+        normals, _roughness = unpacked_maps(maps)
+        normals[..., 1] *= -1 if mirrored else 1
+        picture = _bitmap(mi, 0.5 * normals + 0.5)
+        # As ours: what leaves through the face is lost, and nothing else.
+        plain = {"flip_invalid_normals": False, "use_shadowing_function": False}
+        bent = {"type": "normalmap", "normalmap": picture, "nested": flat} | plain
+    return {"type": "twosided", "nested": bent}
 
 
 def _flat_bsdf(mi: Any, row: F32, texels: NDArray[np.uint32]) -> dict[str, Any]:
@@ -154,18 +174,6 @@ def _flat_bsdf(mi: Any, row: F32, texels: NDArray[np.uint32]) -> dict[str, Any]:
     metal = {"type": "roughconductor", "material": "none", "distribution": "ggx"}
     tint = {"type": "rgb", "value": [float(v) for v in row[F0]]}
     return metal | {"specular_reflectance": tint, "alpha": _bitmap(mi, alpha[..., None])}
-
-
-def _bent(mi: Any, row: F32, texels: NDArray[np.uint32], nested: dict[str, Any]) -> dict[str, Any]:
-    """The plugin below its normal map, if it has one."""
-    maps = _texels(row, texels, FIRST_MAP_TEXEL, MAP_SIZE)
-    if maps is None:
-        return nested
-    normals, _roughness = unpacked_maps(maps)
-    # As ours: what leaves through the face is lost, and nothing else.
-    plain = {"flip_invalid_normals": False, "use_shadowing_function": False}
-    picture = _bitmap(mi, 0.5 * normals + 0.5)
-    return {"type": "normalmap", "normalmap": picture, "nested": nested} | plain
 
 
 def _texels(

@@ -7,8 +7,15 @@ import pytest
 
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
-from pbrs_farm.transport.scene_tables.material_rows import MAX_ALBEDO, material_rows
+from pbrs_farm.transport.scene_tables.material_rows import (
+    ALPHA,
+    F0,
+    MAP_ROUGHNESS,
+    MAX_ALBEDO,
+    material_rows,
+)
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS, nearest_portals, portals_of_house
+from pbrs_farm.transport.scene_tables.texture_atlas import TextureAtlas, texture_atlas
 from pbrs_farm.transport.validation import known_rooms as rooms
 
 FAST = recipe_from_name("fast")
@@ -47,15 +54,28 @@ def test_the_released_preset_reads_kd_as_linear_and_glass_as_nothing() -> None:
     assert glass[11] == 3
 
 
-def test_texels_keep_every_8_bit_value() -> None:
-    ramp = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, -1)
-    house = rooms.house([], [Material("t", texture_id="ramp")])
-    packed = texture_atlas(house, {"ramp": ramp})
-    root = (packed.texels[1:] & 1023) / 1023
-    v = np.arange(256) / 255
-    linear = np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
-    np.testing.assert_allclose(root**2, linear, atol=1.2e-3)
-    assert packed.slots["ramp"] == (1, 16, 16)
+def row_of(material: Material, packed: TextureAtlas = EMPTY) -> np.ndarray:
+    return material_rows(rooms.house([], [material]), packed, FAST)[0][0]
+
+
+def test_a_named_roughness_is_squared_and_gives_a_coat_of_glass_at_least() -> None:
+    assert row_of(Material("m", roughness=0.5))[ALPHA] == pytest.approx(0.25)
+    np.testing.assert_allclose(row_of(Material("m", roughness=0.5))[F0], 0.04)
+    assert row_of(Material("m", roughness=0.0))[ALPHA] == pytest.approx(0.05)
+    assert row_of(Material("m"))[ALPHA] == 0
+    lacquer = Material("m", roughness=0.3, specular=(0.8, 0.8, 0.8))
+    np.testing.assert_allclose(row_of(lacquer)[F0], 0.064)
+    gold = Material("m", roughness=0.3, diffuse=(0, 0, 0), specular=(1, 0.8, 0.4))
+    assert row_of(gold)[F0][0] == pytest.approx(1.0)
+
+
+def test_a_normal_map_leaves_the_roughness_that_a_phong_exponent_gives() -> None:
+    shiny = Material("m", specular=(0.5, 0.5, 0.5), shininess=30, normal_texture_id="n")
+    flat = np.full((4, 4, 3), (128, 128, 255), np.uint8)
+    packed = texture_atlas(rooms.house([], [shiny]), {"n": flat})
+    row = row_of(shiny, packed)
+    assert row[MAP_ROUGHNESS] ** 2 == pytest.approx(row[ALPHA])
+    assert row_of(shiny)[MAP_ROUGHNESS] == 0
 
 
 def test_only_windows_and_glazed_doors_are_portals_and_the_widest_are_kept() -> None:
