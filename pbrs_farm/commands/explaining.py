@@ -73,6 +73,8 @@ def _dress(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.read.source import resolve, variants
     from pbrs_farm.run.attributions import attribution_text
+    from pbrs_farm.run.dressed_house import fetch_catalogue
+    from pbrs_farm.run.processes.verb_process import doing
     from pbrs_farm.run.steps import made_house
     from pbrs_farm.store.folder import FolderStore
 
@@ -82,6 +84,8 @@ def _dress(args: argparse.Namespace) -> int:
         raise BadInput("--seed", args.dress, "expected one seed")
     recipe = recipe_of(args)
     (source,) = variants(resolve(args.home), seeds)
+    doing(args.home, "catalogue")
+    fetch_catalogue(recipe.dress)
     house, repairs, report = made_house(source, recipe)
     if report is None:
         raise BadInput(args.home, "", "an object without context is not dressed")

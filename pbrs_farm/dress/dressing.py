@@ -12,15 +12,19 @@ from dataclasses import replace
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Piece
-from pbrs_farm.core.house import House, Item, Source
+from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.recipe import DressFields
-from pbrs_farm.dress.draft import ADDED_TAG, CHANGED_TAG, Draft
-from pbrs_farm.dress.report import Credit, DressReport, is_owed
+from pbrs_farm.dress.draft import CHANGED_TAG, Draft
+from pbrs_farm.dress.gates import group_of, keep_gates, part_of, piece_id
+from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
 
 Part = Callable[[Draft, Catalogue, float], None]
 
-_PARTS: tuple[tuple[str, Part], ...] = ()
-"""Field of the recipe that holds the part's share, and the part, in the order they are done."""
+_FURNITURE: tuple[tuple[str, Part], ...] = ()
+"""Field of the recipe that holds the part's share, and the part: what changes the home's own things."""
+
+_THINGS: tuple[tuple[str, Part], ...] = ()
+"""The same of the parts that add things, in the order they are done."""
 
 
 def dress(
@@ -32,45 +36,62 @@ def dress(
     style.
     """
     draft = Draft(house, seed)
-    for field, part in _PARTS:
-        share = float(getattr(fields, field))
-        if share > 0:
-            part(draft, catalogue, share)
+    pieces = {p.id: p for p in catalogue.pieces}
+    gates: tuple[Gate, ...] = ()
+    # Put back what stands wrong before things are laid on it, then look at everything.
+    for parts in (_FURNITURE, _THINGS):
+        for field, part in parts:
+            share = float(getattr(fields, field))
+            if share > 0:
+                part(draft, catalogue, share)
+        gates = _joined(gates, keep_gates(draft, pieces | draft.used))
     dressed = draft.house()
     credits = _credits(dressed, catalogue)
     dressed = replace(
         dressed, id=keys.dressed_id(house.id, seed), source=_credited(house.source, credits)
     )
-    return dressed, _report(dressed, draft, credits)
+    return dressed, _report(dressed, draft, gates, credits)
 
 
-def _report(house: House, draft: Draft, credits: tuple[Credit, ...]) -> DressReport:
+def _joined(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ...]:
+    """The gates as they are now, with what was taken out for them before."""
+    taken = {gate.name: gate.n_taken_out for gate in before}
+    return tuple(
+        gate.model_copy(update={"n_taken_out": gate.n_taken_out + taken.get(gate.name, 0)})
+        for gate in after
+    )
+
+
+def _report(
+    house: House, draft: Draft, gates: tuple[Gate, ...], credits: tuple[Credit, ...]
+) -> DressReport:
     changed = Counter(
         tag.removeprefix(CHANGED_TAG)
         for item in house.items
         for tag in item.tags
         if tag.startswith(CHANGED_TAG)
     )
+    # Count what stands there now, whatever was tried.
+    added = Counter(
+        f"{part_of(item)}: {group_of(item, draft.used)}"
+        for item in house.items[len(draft.source.items) :]
+    )
     return DressReport(
         house_id=house.id,
         seed=draft.seed,
-        added=dict(sorted(draft.done.items())),
+        added=dict(sorted(added.items())),
         changed=dict(sorted(changed.items())),
         refused=dict(sorted(draft.refused.items())),
+        gates=gates,
         credits=credits,
         notes=tuple(f"{n.kind}: {n.place}: {n.text}" for n in draft.notes),
     )
 
 
-def piece_of(item: Item) -> str:
-    """The id of the piece that an added item was made from; "" for an item of the source."""
-    return next((t.removeprefix(ADDED_TAG) for t in item.tags if t.startswith(ADDED_TAG)), "")
-
-
 def _credits(house: House, catalogue: Catalogue) -> tuple[Credit, ...]:
     """The pieces and pictures of libraries that the house shows, by id."""
     pieces: dict[str, Piece] = {p.id: p for p in catalogue.pieces}
-    counts = Counter(piece_of(item) for item in house.items)
+    counts = Counter(piece_id(item) for item in house.items)
     found = [
         Credit(id=p.id, name=p.name, library=p.library, creator=p.creator, licence=p.licence, n=n)
         for p, n in ((pieces.get(i), n) for i, n in counts.items())

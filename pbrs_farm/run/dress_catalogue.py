@@ -19,6 +19,19 @@ NO_FURNITURE = "no-furniture"
 """The kind of the note that says that the packages' furniture is not there."""
 
 
+GENERATED = "generated"
+"""The word of dress.catalogue that leaves the packages out."""
+
+
+def catalogue_of_words(words: str, *, fetch: bool = False) -> Catalogue:
+    """The catalogue that dress.catalogue names: paths with ":" between; fetch as dress_catalogue."""
+    given = [word for word in words.split(":") if word]
+    paths = tuple(Path(word) for word in given if word != GENERATED)
+    if GENERATED in given:
+        return _catalogue(tuple((path, _stamp(path)) for path in paths), None)
+    return dress_catalogue(paths, fetch=fetch)
+
+
 def dress_catalogue(given: tuple[Path, ...] = (), *, fetch: bool = False) -> Catalogue:
     """The packages' catalogue and the user's libraries (--catalogue) after it.
 
@@ -49,7 +62,10 @@ def _stamp(path: Path) -> int:
 
 
 @lru_cache(maxsize=4)
-def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool) -> Catalogue:
+def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
+    # None: no package is wanted.
+    if has_package is None:
+        return catalogue_from((), given=[path for path, _ in given])
     package, program = furniture.cached() if has_package else None, homes.cached()
     catalogue = catalogue_from(
         package.libraries if package else (),

@@ -5,8 +5,6 @@ Effects: reads the furniture package from the cache (or through apt) and the use
 
 from __future__ import annotations
 
-from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.core import keys
@@ -14,7 +12,7 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import DressFields, Recipe
 from pbrs_farm.read.source import SourceRef
-from pbrs_farm.run.dress_catalogue import dress_catalogue
+from pbrs_farm.run.dress_catalogue import catalogue_of_words
 from pbrs_farm.run.processes.verb_process import doing
 
 if TYPE_CHECKING:
@@ -53,11 +51,14 @@ def dressing_digest(source: SourceRef, recipe: Recipe) -> str:
     return keys.digest(seed, fields, catalogue_of(recipe.dress).digest)
 
 
+def fetch_catalogue(fields: DressFields) -> Catalogue:
+    """The catalogue that a recipe names, its packages downloaded where they are not cached.
+
+    Raises MachineFailed, with the command to type, where apt cannot give them.
+    """
+    return catalogue_of_words(fields.catalogue, fetch=True)
+
+
 def catalogue_of(fields: DressFields) -> Catalogue:
     """The catalogue that a recipe names, read once a process."""
-    return _catalogue(fields.catalogue)
-
-
-@lru_cache(maxsize=2)
-def _catalogue(words: str) -> Catalogue:
-    return dress_catalogue(tuple(Path(word) for word in words.split(":") if word))
+    return catalogue_of_words(fields.catalogue)

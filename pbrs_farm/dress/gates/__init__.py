@@ -1,0 +1,6 @@
+"""What a dressed house must keep, measured on its meshes; what breaks it is taken out again."""
+
+from pbrs_farm.dress.gates.bodies import piece_id
+from pbrs_farm.dress.gates.keep_gates import group_of, keep_gates, part_of
+
+__all__ = ["group_of", "keep_gates", "part_of", "piece_id"]

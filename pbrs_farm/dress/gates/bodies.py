@@ -1,0 +1,156 @@
+"""The things of a draft as the gates see them: triangles, bounds, connected shells; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Piece
+from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corners
+from pbrs_farm.dress.draft import ADDED_TAG, Draft
+
+Faces = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shell:
+    """A connected part of a mesh."""
+
+    vertices: F64  # (V, 3) metres
+    faces: Faces  # (F, 3)
+    low: F64  # (3,)
+    high: F64
+    is_closed: bool  # each directed edge has its reverse, and the faces look outwards
+
+    @property
+    def corners(self) -> F64:
+        """(F, 3, 3) its triangles."""
+        return np.asarray(self.vertices[self.faces])
+
+
+@dataclass(slots=True, eq=False)
+class Body:
+    """An item: what it is made of, and whether dressing put it there."""
+
+    index: int  # in Draft.items
+    item: Item
+    corners: F64  # (F, 3, 3) finite triangles, metres
+    low: F64  # (3,)
+    high: F64
+    is_new: bool  # added, or another mesh than the source's
+    was: Item | None  # what stood there in the source; None for what was added
+    piece: Piece | None  # it was made from
+    _shells: list[Shell] | None = field(default=None, repr=False)
+
+    @property
+    def group(self) -> str:
+        """What it is, as the catalogue calls it; "" for an item of the source."""
+        return self.piece.group if self.piece else ""
+
+    @property
+    def shells(self) -> list[Shell]:
+        """Its connected parts, found at the first call."""
+        if self._shells is None:
+            self._shells = shells_of(self.corners)
+        return self._shells
+
+
+def bodies_of(
+    draft: Draft, pieces: Mapping[str, Piece], known: Mapping[int, Body] | None = None
+) -> list[Body]:
+    """A body for each item of the draft that has triangles, in order.
+
+    pieces: by id. known: bodies by the id of their item, which are taken as they are.
+    """
+    found = []
+    n_source = len(draft.source.items)
+    for index, item in enumerate(draft.items):
+        was = draft.source.items[index] if index < n_source else None
+        held = (known or {}).get(id(item))
+        if held is not None:
+            held.index = index
+            found.append(held)
+            continue
+        corners = corners_of(item)
+        if not len(corners):
+            continue
+        points = corners.reshape(-1, 3)
+        is_new = was is None or not has_same_mesh(item, was)
+        piece = pieces.get(piece_id(item)) if is_new else None
+        found.append(Body(index, item, corners, points.min(0), points.max(0), is_new, was, piece))
+    return found
+
+
+def piece_id(item: Item) -> str:
+    """The id of the piece that an added item was made from; "" for an item of the source."""
+    return next((t.removeprefix(ADDED_TAG) for t in item.tags if t.startswith(ADDED_TAG)), "")
+
+
+def corners_of(item: Item) -> F64:
+    """(F, 3, 3) all triangles of an item that are finite, metres."""
+    parts = [triangle_corners(s.positions, s.faces) for s in item.surfaces if len(s.faces)]
+    corners = np.concatenate([np.zeros((0, 3, 3)), *parts])
+    return np.asarray(corners[np.isfinite(corners).all((1, 2))])
+
+
+def has_same_mesh(a: Item, b: Item) -> bool:
+    """Whether two items have the same triangles, whatever they are made of."""
+    if a is b or a.surfaces is b.surfaces:
+        return True
+    return len(a.surfaces) == len(b.surfaces) and all(
+        (s.positions is t.positions or np.array_equal(s.positions, t.positions))
+        and (s.faces is t.faces or np.array_equal(s.faces, t.faces))
+        for s, t in zip(a.surfaces, b.surfaces, strict=True)
+    )
+
+
+def shells_of(corners: F64) -> list[Shell]:
+    """The connected parts of triangles (F, 3, 3); corners of one place are one vertex."""
+    faces, vertices = welded(corners)
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
+    if not len(faces):
+        return []
+    # Number the parts by the vertices that triangles share.
+    n = len(vertices)
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    links = coo_array((np.ones(len(start), np.int8), (start, end)), (n, n))
+    _, part = connected_components(links, directed=False)
+    of_face = part[faces[:, 0]]
+    order = np.argsort(of_face, kind="stable")
+    cuts = np.flatnonzero(np.diff(of_face[order])) + 1
+    return [_shell(vertices, faces[rows]) for rows in np.split(order, cuts)]
+
+
+def _shell(vertices: F64, faces: Faces) -> Shell:
+    used, numbers = np.unique(faces, return_inverse=True)
+    vertices, faces = vertices[used], numbers.reshape(-1, 3)
+    low, high = vertices.min(0), vertices.max(0)
+    is_closed = edges_are_paired(faces)
+    # Turn a closed shell that is inside out; one without volume is a sheet.
+    if is_closed:
+        volume = signed_volume(vertices[faces], low)
+        is_closed = abs(volume) > 1e-9
+        faces = faces[:, ::-1] if volume < 0 else faces
+    return Shell(vertices, faces, low, high, is_closed)
+
+
+def welded(corners: F64) -> tuple[Faces, F64]:
+    """Faces (F, 3) as numbers of places, and the places (V, 3), of triangles (F, 3, 3)."""
+    points = np.ascontiguousarray(corners.reshape(-1, 3)) + 0.0  # no negative zero
+    # Compare the bits of whole points: faster than comparing column by column.
+    keys = points.view(np.dtype((np.void, 24))).ravel()
+    _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)
+    return numbers.reshape(-1, 3).astype(np.int64), points[first]
+
+
+def boxes_of(bodies: Sequence[Body]) -> tuple[F64, F64]:
+    """(N, 3) lowest and highest corners of bodies."""
+    low = np.array([b.low for b in bodies]).reshape(-1, 3)
+    return low, np.array([b.high for b in bodies]).reshape(-1, 3)

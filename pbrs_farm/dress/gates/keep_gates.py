@@ -1,0 +1,161 @@
+"""Measure a draft by its gates, take out what breaks one, and measure again; state: the draft's.
+
+What was added is taken out; what replaced a thing of the source goes, and that thing comes back.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from pbrs_farm.core.catalogue import Piece
+from pbrs_farm.core.house import Item
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.gates.bodies import Body, bodies_of, piece_id
+from pbrs_farm.dress.gates.penetration import MOST_M, near_pairs, penetration_m
+from pbrs_farm.dress.gates.plumb import Plumb
+from pbrs_farm.dress.gates.solids import Solids
+from pbrs_farm.dress.gates.support import MOST_M as SUPPORT_M
+from pbrs_farm.dress.gates.support import held, held_as_drawn
+from pbrs_farm.dress.gates.ways import blocked_doors, closed_ways, covered_windows
+from pbrs_farm.dress.report import Gate
+from pbrs_farm.dress.space import house_space
+
+_ROUNDS: Final = 12
+_NAMES: Final = ("must_haves", "penetration", "support", "doors", "windows", "path")
+_REASONS: Final = {
+    "must_haves": "is no longer what the room had",
+    "penetration": "stood in another thing",
+    "support": "floated or sank",
+    "doors": "stood before a door",
+    "windows": "covered a window",
+    "path": "closed a way",
+}
+
+
+@dataclass(slots=True)
+class _Memory:
+    """What was measured of items that have not changed since. Items are held, so ids stay theirs."""
+
+    bodies: dict[int, Body] = field(default_factory=dict)  # by id of the item
+    apart: set[tuple[int, int]] = field(default_factory=set)  # ids of items that share nothing
+    supports: dict[int, tuple[int, ...]] = field(default_factory=dict)  # id -> of what holds it
+    solids: Solids = field(default_factory=Solids)
+
+
+def keep_gates(draft: Draft, pieces: Mapping[str, Piece]) -> tuple[Gate, ...]:
+    """Take out of the draft what breaks a gate, until nothing does. pieces: by id."""
+    memory = _Memory()
+    taken: Counter[str] = Counter()
+    for _round in range(_ROUNDS):
+        checked, broken = _measured(draft, pieces, memory)
+        out: dict[int, str] = {}
+        for name in _NAMES:
+            for index in broken[name]:
+                out.setdefault(index, name)
+        if not out:
+            break
+        taken.update(out.values())
+        _take_out(draft, out)
+    else:
+        checked, broken = _measured(draft, pieces, memory)
+    return tuple(
+        Gate(name=n, n_checked=checked[n], n_taken_out=taken[n], n_left=len(broken[n]))
+        for n in _NAMES
+    )
+
+
+def _measured(
+    draft: Draft, pieces: Mapping[str, Piece], memory: _Memory
+) -> tuple[dict[str, int], dict[str, list[int]]]:
+    """Gate -> how much was measured, and gate -> indices of the items that break it."""
+    bodies = _bodies(draft, pieces, memory)
+    space = house_space(draft)
+    checked, broken = dict.fromkeys(_NAMES, 0), {name: list[int]() for name in _NAMES}
+    checked["must_haves"], broken["must_haves"] = _changed_class(draft)
+    # Of two things that share space the one that came later goes.
+    for i, j in near_pairs(bodies):
+        checked["penetration"] += 1
+        if not _are_apart(bodies[i], bodies[j], memory):
+            broken["penetration"].append(bodies[j if bodies[j].is_new else i].index)
+    checked["support"], broken["support"] = _unsupported(bodies, memory)
+    for name, (n, found) in {
+        "doors": blocked_doors(space, bodies),
+        "windows": covered_windows(space, bodies),
+        "path": closed_ways(space, bodies),
+    }.items():
+        checked[name] = n
+        broken[name] = sorted({bodies[b.body].index for b in found})
+    return checked, broken
+
+
+def _bodies(draft: Draft, pieces: Mapping[str, Piece], memory: _Memory) -> list[Body]:
+    """The draft's bodies, with the shells that were found before."""
+    fresh = bodies_of(draft, pieces, memory.bodies)
+    memory.bodies |= {id(b.item): b for b in fresh}
+    return fresh
+
+
+def _are_apart(a: Body, b: Body, memory: _Memory) -> bool:
+    key = (id(a.item), id(b.item))
+    if key not in memory.apart:
+        if penetration_m(a, b, memory.solids) > MOST_M:
+            return False
+        memory.apart.add(key)
+    return True
+
+
+def _unsupported(bodies: list[Body], memory: _Memory) -> tuple[int, list[int]]:
+    """How many new bodies there are, and the indices of those that nothing holds."""
+    there = {id(b.item) for b in bodies}
+    new = [k for k, b in enumerate(bodies) if b.is_new]
+    # Measure what was not, and what has lost all that held it.
+    asked = [k for k in new if not there.intersection(memory.supports.get(id(bodies[k].item), ()))]
+    if not asked:
+        return len(new), []
+    plumb = Plumb(bodies)
+    found = held(bodies, asked, plumb)
+    for number, by in found.items():
+        memory.supports[id(bodies[number].item)] = tuple(id(bodies[b].item) for b in by.by)
+    bad = [k for k, by in found.items() if not by.is_good]
+    # What has another model than in the source may be held as loosely as it was there.
+    return len(new), [
+        bodies[k].index
+        for k in bad
+        if bodies[k].was is None
+        or abs(found[k].gap_m) > abs(held_as_drawn(bodies, k, plumb).gap_m) + SUPPORT_M
+    ]
+
+
+def _changed_class(draft: Draft) -> tuple[int, list[int]]:
+    """How many things of the source there are, and which are no longer of their class."""
+    was = draft.source.items
+    return len(was), [
+        k for k, (a, b) in enumerate(zip(was, draft.items, strict=False)) if a.nyu40 != b.nyu40
+    ]
+
+
+def _take_out(draft: Draft, out: Mapping[int, str]) -> None:
+    """Take items out of the draft, or put those of the source back; count why."""
+    n_source = len(draft.source.items)
+    for index, name in out.items():
+        item = draft.items[index]
+        draft.refused[f"{part_of(item) if index >= n_source else 'swap'}: {_REASONS[name]}"] += 1
+        if index < n_source:
+            draft.items[index] = draft.source.items[index]
+    draft.items = [x for k, x in enumerate(draft.items) if k < n_source or k not in out]
+
+
+def part_of(item: Item) -> str:
+    """The part of the dressing that added an item, of its id `dress-<part>-<n>`."""
+    words = item.id.split("-")
+    return words[1] if len(words) > 2 and words[0] == "dress" else "dress"
+
+
+def group_of(item: Item, pieces: Mapping[str, Piece]) -> str:
+    """What an added item is, as the catalogue calls it."""
+    name = piece_id(item)
+    piece = pieces.get(name)
+    return piece.group if piece is not None else name.rpartition("#")[2]

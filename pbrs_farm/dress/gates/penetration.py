@@ -1,0 +1,101 @@
+"""Gate: no two things share more than 1 cm, measured on their meshes; no effects.
+
+What two closed shells share is computed as a solid. Of an open one, points on each mesh are looked
+for inside the other. Boxes only say which pairs need no measuring.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.dress.gates.bodies import Body, Shell, boxes_of
+from pbrs_farm.dress.gates.inside import depths_inside
+from pbrs_farm.dress.gates.solids import Solids, thickness
+from pbrs_farm.dress.space.surface_points import surface_points
+
+MOST_M: Final = 0.01
+_SPACING_M: Final = 0.015  # of points on open meshes
+_MOST_POINTS: Final = 500  # of one shell in another
+_FLOOR_MAT, _CURTAIN, _BLINDS = 20, 16, 13  # NYU40
+_UNMEASURED = (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.PERSON)
+_BEHIND_CURTAINS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
+
+
+def near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
+    """Pairs of numbers, ascending, of a new body and any other that boxes cannot tell apart."""
+    low, high = boxes_of(bodies)
+    measured = np.array([b.item.kind not in _UNMEASURED for b in bodies], bool)
+    is_new = np.array([b.is_new for b in bodies], bool) & measured
+    for i in np.flatnonzero(is_new):
+        meets = (_box_depth(low[i], high[i], low, high) > MOST_M) & measured
+        # A pair of two new bodies is given once.
+        meets[: i + 1] &= ~is_new[: i + 1]
+        for j in np.flatnonzero(meets):
+            pair = (int(min(i, j)), int(max(i, j)))
+            if not is_allowed(bodies[pair[0]], bodies[pair[1]]):
+                yield pair
+
+
+def _box_depth(low: F64, high: F64, lows: F64, highs: F64) -> F64:
+    """(N,) how far a box must be moved along an axis to leave each of the others."""
+    return np.asarray(np.minimum(high - lows, highs - low).min(-1))
+
+
+def is_allowed(a: Body, b: Body) -> bool:
+    """Whether two things may share space: rugs under legs, curtains against walls and windows."""
+    for one, other in ((a, b), (b, a)):
+        if one.is_new and one.item.nyu40 == _FLOOR_MAT:
+            return True
+        if one.item.nyu40 in (_CURTAIN, _BLINDS) and other.item.kind in _BEHIND_CURTAINS:
+            return True
+    return False
+
+
+def penetration_m(a: Body, b: Body, solids: Solids) -> float:
+    """How deep two bodies enter each other, metres; 0 where they do not.
+
+    The deepest point of either in the other, or how thick what they share is, whichever is more.
+    """
+    deepest = 0.0
+    for one in _shells_near(a, b):
+        for other in _shells_near(b, a):
+            if _box_depth(one.low, one.high, other.low, other.high) > MOST_M:
+                deepest = max(deepest, _depth_of_shells(one, other, solids))
+    return deepest
+
+
+def _shells_near(body: Body, other: Body) -> list[Shell]:
+    return [s for s in body.shells if _box_depth(s.low, s.high, other.low, other.high) > MOST_M]
+
+
+def _depth_of_shells(a: Shell, b: Shell, solids: Solids) -> float:
+    if a.is_closed and b.is_closed:
+        return max((_depth_of_part(part, a, b) for part in solids.shared(a, b)), default=0.0)
+    return max(_deepest(_points_in(a, b), b), _deepest(_points_in(b, a), a))
+
+
+def _depth_of_part(part: F64, a: Shell, b: Shell) -> float:
+    # A thin plate in a solid shares little thickness, and its points lie deep.
+    points = np.concatenate([part.reshape(-1, 3), part.mean(1)])
+    points = points[:: max(1, len(points) // _MOST_POINTS)]
+    return max(thickness(part), _deepest(points, a), _deepest(points, b))
+
+
+def _deepest(points: F64, shell: Shell) -> float:
+    return float(depths_inside(points, shell.corners).max(initial=0.0))
+
+
+def _points_in(a: Shell, b: Shell) -> F64:
+    """Points on one shell that lie in the box of another, spread evenly."""
+    corners = a.corners
+    low, high = corners.min(1), corners.max(1)
+    meets = (low <= b.high).all(1) & (high >= b.low).all(1)
+    points = np.concatenate([a.vertices, surface_points(corners[meets], _SPACING_M)])
+    inside = ((points > b.low + MOST_M / 2) & (points < b.high - MOST_M / 2)).all(1)
+    points = points[inside]
+    return points[:: max(1, len(points) // _MOST_POINTS)]

@@ -1,0 +1,156 @@
+"""Gate: nothing floats or sinks by more than 2 mm where it is held; on meshes, no effects.
+
+What stands is held where an upright line from its lowest places meets a face; what hangs, where
+its mesh comes nearest to a wall or to what it hangs on; what hangs from the ceiling, at its top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.core.mesh import distances_to_triangles
+from pbrs_farm.dress.gates.bodies import Body, boxes_of, corners_of
+from pbrs_farm.dress.gates.plumb import Plumb
+
+MOST_M: Final = 0.002
+_RING_M: Final = 0.003  # above the lowest point of a thing: what it stands on
+_MOST_PLACES: Final = 32  # of one thing
+_REACH_M: Final = 0.3  # up or down, that a gap is told of
+_SOFT: Final = frozenset({"blanket", "throw", "towel", "pillow", "cushion", "curtain"})
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """How far a thing is from what holds it, and by what it is held."""
+
+    gap_m: float  # 0 = it touches; below 0 = the nearest face lies above its lowest places
+    by: tuple[int, ...] = ()  # numbers of the bodies that it touches
+
+    @property
+    def is_good(self) -> bool:
+        """Whether it neither floats nor sinks."""
+        return abs(self.gap_m) <= MOST_M
+
+
+def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[int, Held]:
+    """By what each of some bodies is held. plumb: of all bodies."""
+    low, high = boxes_of(bodies)
+    found = _standing(bodies, numbers, plumb)
+    for number in numbers:
+        body = bodies[number]
+        ways = [found[number]] if _may_stand(body) else []
+        if not any(w.is_good for w in ways) and _may_hang(body):
+            ways.append(_hanging(bodies, number, low, high))
+        found[number] = min(ways, key=lambda w: abs(w.gap_m))
+    return found
+
+
+def held_as_drawn(bodies: Sequence[Body], number: int, plumb: Plumb) -> Held:
+    """By what the thing of the source was held that a body has replaced, among the same bodies."""
+    body = bodies[number]
+    assert body.was is not None
+    corners = corners_of(body.was)
+    points = corners.reshape(-1, 3)
+    former = Body(body.index, body.was, corners, points.min(0), points.max(0), True, body.was, None)
+    return held([*bodies[:number], former, *bodies[number + 1 :]], [number], plumb)[number]
+
+
+def _place(body: Body) -> Place | None:
+    return body.piece.place if body.piece is not None else None
+
+
+def _may_stand(body: Body) -> bool:
+    return _place(body) not in (Place.WALL, Place.OPENING)
+
+
+def _may_hang(body: Body) -> bool:
+    # A piece of the source that was replaced may have stood or hung.
+    is_swapped = body.was is not None
+    hangs = _place(body) in (Place.WALL, Place.OPENING, Place.CEILING, None)
+    return is_swapped or hangs or body.group in _SOFT
+
+
+def _standing(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[int, Held]:
+    """What each body stands on, or hangs from at its top, where its piece belongs to the ceiling."""
+    places = [_places(bodies[n]) for n in numbers]
+    points = np.concatenate([np.zeros((0, 3)), *places])
+    of = np.repeat(np.asarray(numbers, np.int64), [len(p) for p in places])
+    hits = plumb.hits(points[:, [0, 2]])
+    # The gap is from a place down to the face below it, negative to a face above.
+    gap = points[hits.place, 1] - hits.y
+    own = of[hits.place]
+    keep = (hits.body != own) & (np.abs(gap) < _REACH_M)
+    gap, own, body = gap[keep], own[keep], hits.body[keep]
+    found = dict.fromkeys(numbers, Held(_REACH_M))
+    order = np.argsort(own, kind="stable")
+    gap, own, body = gap[order], own[order], body[order]
+    cuts = np.flatnonzero(own[1:] != own[:-1]) + 1 if len(own) else np.zeros(0, np.int64)
+    for first, last in zip(np.r_[0, cuts], np.r_[cuts, len(own)], strict=True):
+        if first == last:
+            continue
+        gaps = gap[first:last]
+        nearest = float(gaps[np.argmin(np.abs(gaps))])
+        by = np.unique(body[first:last][np.abs(gaps) <= MOST_M])
+        found[int(own[first])] = Held(nearest, tuple(int(b) for b in by))
+    return found
+
+
+def _places(body: Body) -> F64:
+    """(P, 3) the lowest points of a body, or the highest of what hangs from a ceiling."""
+    points = np.unique(body.corners.reshape(-1, 3), axis=0)
+    if _place(body) is Place.CEILING:
+        ring = points[points[:, 1] > body.high[1] - _RING_M]
+    elif body.group in _SOFT:
+        ring = points
+    else:
+        ring = points[points[:, 1] < body.low[1] + _RING_M]
+    n = _MOST_PLACES * (8 if body.group in _SOFT else 1)
+    rows = np.unique(np.linspace(0, len(ring) - 1, min(n, len(ring))).astype(np.int64))
+    return np.asarray(ring[rows])
+
+
+def _hanging(bodies: Sequence[Body], number: int, low: F64, high: F64) -> Held:
+    """The nearest that a body's mesh comes to that of another."""
+    body = bodies[number]
+    below, above = body.low - _REACH_M / 10, body.high + _REACH_M / 10
+    near = np.flatnonzero(((low <= above) & (high >= below)).all(1))
+    best, by = _REACH_M, list[int]()
+    for other in near.tolist():
+        if other == number or bodies[other].item.kind is ItemKind.PERSON:
+            continue
+        distance = _distance_m(body, bodies[other])
+        if distance <= MOST_M:
+            by.append(other)
+        best = min(best, distance)
+    return Held(best, tuple(by))
+
+
+def _distance_m(a: Body, b: Body) -> float:
+    """The least distance from vertices of one body to faces of the other, either way."""
+    return min(_vertices_to_faces(a, b), _vertices_to_faces(b, a))
+
+
+def _vertices_to_faces(a: Body, b: Body) -> float:
+    # Look at vertices and faces near the other's box alone.
+    points = np.unique(a.corners.reshape(-1, 3), axis=0)
+    reach = _REACH_M / 10
+    points = points[((points > b.low - reach) & (points < b.high + reach)).all(1)]
+    corners = b.corners
+    near = (corners.min(1) < a.high + reach).all(1) & (corners.max(1) > a.low - reach).all(1)
+    corners = corners[near]
+    if not len(points) or not len(corners):
+        return _REACH_M
+    points = points[:: max(1, len(points) // 400)]
+    # Leave out pairs that lie apart by their boxes.
+    low, high = corners.min(1) - reach, corners.max(1) + reach
+    i, j = np.nonzero((points[:, None] > low).all(-1) & (points[:, None] < high).all(-1))
+    if not len(i):
+        return _REACH_M
+    return float(distances_to_triangles(points[i], corners[j]).min())

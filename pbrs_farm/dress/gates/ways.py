@@ -1,0 +1,142 @@
+"""Gates of what must stay free: doors and the space before them, windows, ways; on meshes, no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.mesh import clipped_to_box
+from pbrs_farm.dress.gates.bodies import Body
+from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace, doors_are_joined, floor_bitmap
+from pbrs_farm.dress.space.passages import BEFORE_DOOR_M
+
+MOST_COVERED: Final = 0.2  # of a window
+_HEAD_M: Final = 2.0  # above the floor: what is higher blocks no door
+_STEP_M: Final = 0.03  # what is lower is walked over
+_FACE_M: Final = 0.03  # before the wall: sockets and mouldings are no obstacle
+_BESIDE_M: Final = 0.01  # of a door's width, at either end
+_BEFORE_WINDOW_M: Final = 0.6
+_CELL_M: Final = 0.05
+_CURTAINS: Final = frozenset({13, 16, 20})  # NYU40: blinds, curtains, floor mats
+
+
+@dataclass(frozen=True, slots=True)
+class Blocked:
+    """A door, window or way that a body keeps from being used."""
+
+    what: str  # the passage or room
+    body: int  # number in the list of bodies
+
+
+def _counts(body: Body) -> bool:
+    return body.is_new and body.item.nyu40 not in _CURTAINS
+
+
+def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
+    """How many sides of doors there are, and the new bodies in a swing or within 0.8 m of one."""
+    n, found = 0, []
+    for door in space.passages:
+        sides = [] if door.is_window else [s for s in (0, 1) if door.room_ids[s] is not None]
+        for side in sides:
+            n += 1
+            floor_y = space.room(door.room_ids[side] or "").room.floor_y
+            depth = max(BEFORE_DOOR_M, min(door.width, 1.0))
+            low = np.array([-door.width / 2 + _BESIDE_M, floor_y + _STEP_M, _FACE_M])
+            high = np.array([door.width / 2 - _BESIDE_M, min(door.top_y, floor_y + _HEAD_M), depth])
+            for number, body in enumerate(bodies):
+                if _counts(body) and _enters(body, door, side, low, high):
+                    found.append(Blocked(door.id, number))
+    return n, found
+
+
+def _enters(body: Body, door: Passage, side: int, low: F64, high: F64) -> bool:
+    """Whether a body's mesh enters a box before a door: along it, up, and out into the room."""
+    centre = (body.low + body.high) / 2
+    reach = float(np.linalg.norm(body.high - body.low)) / 2 + door.width + 2.0
+    if np.linalg.norm(centre - door.face_point(side)) > reach + 2.0:
+        return False
+    local = in_front_of(door, side, body.corners)
+    if (local.max((0, 1)) < low).any() or (local.min((0, 1)) > high).any():
+        return False
+    return bool(len(clipped_to_box(local, low, high)))
+
+
+def in_front_of(passage: Passage, side: int, points: F64) -> F64:
+    """(..., 3) points as metres along a passage from its middle, world y, and out from the wall."""
+    moved = points - passage.face_point(side)
+    return np.stack([moved @ passage.along, points[..., 1], moved @ passage.inward(side)], axis=-1)
+
+
+def covered_windows(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
+    """How many sides of windows there are, and the new furniture that covers a fifth of one.
+
+    Of several that cover it together, those that cover most, until less than a fifth is.
+    """
+    n, found = 0, []
+    for window in space.passages:
+        sides = [s for s in (0, 1) if window.is_window and window.room_ids[s] is not None]
+        for side in sides:
+            n += 1
+            covers = {k: m for k, m in _covers(window, side, space, bodies).items() if m.any()}
+            while covers and np.mean(np.any(list(covers.values()), 0)) >= MOST_COVERED:
+                worst = max(covers, key=lambda k: (int(covers[k].sum()), k))
+                found.append(Blocked(window.id, worst))
+                del covers[worst]
+    return n, found
+
+
+def _covers(
+    window: Passage, side: int, space: HouseSpace, bodies: Sequence[Body]
+) -> dict[int, Bools]:
+    """New body -> (rows, columns) which cells of a window it covers, seen from the room."""
+    columns = max(1, round(window.width / _CELL_M))
+    rows = max(1, round((window.top_y - window.bottom_y) / _CELL_M))
+    found = {}
+    for number, body in enumerate(bodies):
+        if not _counts(body):
+            continue
+        local = in_front_of(window, side, space.points[body.index])
+        near = (local[:, 2] > 0.01) & (local[:, 2] < _BEFORE_WINDOW_M)
+        column = np.floor((local[near, 0] / window.width + 0.5) * columns).astype(np.int64)
+        height = (local[near, 1] - window.bottom_y) / (window.top_y - window.bottom_y)
+        row = np.floor(height * rows).astype(np.int64)
+        seen = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        mask = np.zeros((rows, columns), bool)
+        mask[row[seen], column[seen]] = True
+        found[number] = mask
+    return found
+
+
+def closed_ways(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
+    """How many rooms have two doors, and the new bodies that part them where nothing new would.
+
+    Bodies are named from the last on, until a way 0.6 m wide joins the doors again.
+    """
+    n, found = 0, []
+    number_of = {body.index: k for k, body in enumerate(bodies) if body.is_new}
+    for room in space.rooms:
+        if sum(door.side_of(room.room.id) is not None for door in room.doors) < 2:
+            continue
+        n += 1
+        new = [i for i in room.items if i in number_of]
+        if _is_joined(space, room, ()) or not _is_joined(space, room, new):
+            continue
+        without: list[int] = []
+        for index in reversed(new):
+            # Name what alone opens the way, or what does with those before it.
+            if _is_joined(space, room, [index]):
+                without = [index]
+                break
+            without.append(index)
+            if _is_joined(space, room, without):
+                break
+        found += [Blocked(room.room.id, number_of[i]) for i in without]
+    return n, found
+
+
+def _is_joined(space: HouseSpace, room: RoomSpace, without: Collection[int]) -> bool:
+    return doors_are_joined(floor_bitmap(space, room, without=without), room)
