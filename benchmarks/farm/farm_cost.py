@@ -39,6 +39,7 @@ from workers.ledger.task_ledger import HouseState
 
 FULL = os.environ.get("FULL") == "1"
 N_TASKS = 410_000 if FULL else 100_000
+N_RECOVERED = 100_000
 # A busy or slow machine runs fewer tasks rather than for longer; farm.tasks says how many.
 MOST_S = 270.0
 # The bench as a whole ends within nine minutes, unless FULL.
@@ -244,13 +245,13 @@ class Watch:
 
 
 def recover_s(farm: Farm, job: str) -> float:
-    """Seconds to rebuild the ledger after FLUSHALL from a store that holds 100,000 done tasks.
+    """Seconds to rebuild the ledger after FLUSHALL from a store of N_RECOVERED done tasks or more.
 
     What the job has not done by then is written as its tasks would have.
     """
     n_done = 0
     for index in range(N_HOUSES):
-        if n_done >= 100_000:
+        if n_done >= N_RECOVERED:
             break
         house = f"h{index:05d}"
         steps = [f"{n}_{s}" for n in range(len(batches_of(house))) for s in ("gl", "light")]
@@ -263,7 +264,7 @@ def recover_s(farm: Farm, job: str) -> float:
     seconds = time.monotonic() - began
     done = sum(view.counts.get(f"done:{s}", 0) for s in ("gl", "light", "reduce"))
     print(f"   recovered {done:.0f} finished tasks in {seconds:.1f} s", flush=True)
-    if done < 100_000:
+    if done < N_RECOVERED:
         raise AssertionError(f"only {done:.0f} tasks were recovered")
     return round(seconds, 1)
 
@@ -358,9 +359,8 @@ def _same_objects(alone: FolderStore, farm: FolderStore) -> int:
         {key for key in store.list() if not key.startswith("jobs/")} for store in (alone, farm)
     )
     odd = sorted(keys_alone ^ keys_farm)
-    odd += [
-        key for key in sorted(keys_alone & keys_farm) if _plain(alone, key) != _plain(farm, key)
-    ]
+    both = sorted(keys_alone & keys_farm)
+    odd += [key for key in both if _plain(alone, key) != _plain(farm, key)]
     if odd or not keys_alone:
         raise AssertionError(f"{len(odd)} objects of local run and farm differ: {odd[:5]}")
     return len(keys_alone)

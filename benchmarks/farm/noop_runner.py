@@ -15,7 +15,7 @@ from workers.runner import OnText, Request, Result, Survey
 # 45,622 houses of 17 or 18 views are the paper's 779,342.
 N_HOUSES = 45_622
 N_VIEWS = 779_342
-PER_GROUP = 5
+PER_BATCH = 5
 
 
 def views_of(index: int) -> int:
@@ -26,7 +26,7 @@ def views_of(index: int) -> int:
 def batches_of(house: str) -> tuple[tuple[str, ...], ...]:
     """The batches of a house "h<index>"."""
     views = [f"r{k // 6}_{k % 6}" for k in range(views_of(int(house[1:])))]
-    return tuple(tuple(views[k : k + PER_GROUP]) for k in range(0, len(views), PER_GROUP))
+    return tuple(tuple(views[k : k + PER_BATCH]) for k in range(0, len(views), PER_BATCH))
 
 
 def runner(config: FarmConfig, _on_waiting: OnText) -> NoopRunner:

@@ -87,7 +87,7 @@ def dress_seeds(text: str | None) -> tuple[int, ...]:
     return tuple(seeds)
 
 
-def at_least(name: str, value: int, least: int) -> None:
+def at_least(name: str, value: float, least: int) -> None:
     """Raise BadInput, naming the option, where its value is below the least that makes sense."""
     if value < least:
         raise BadInput(name, str(value), f"expected {least} or more")

@@ -88,6 +88,10 @@ def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
     add("--jobs", type=int, default=1, metavar="N", help=text)
     text = "seconds a step may take"
     add("--step-timeout", type=float, default=3600.0, metavar="S", help=text)
+    text = "seconds a process may say nothing (default: those of a step)"
+    add("--silence", type=float, default=0.0, metavar="S", help=text)
+    text = "memory a process may hold (default: its share of the machine)"
+    add("--memory", type=float, default=0.0, metavar="MB", help=text)
     text = "give the output folder this recipe, rendering again what differs"
     add("--update", action="store_true", help=text)
     add("--json", action="store_true", help="a JSON line per event")
@@ -110,6 +114,8 @@ def _run_homes(
 
     at_least("--jobs", args.jobs, 1)
     at_least("--views", args.views, 0)
+    at_least("--silence", args.silence, 0)
+    at_least("--memory", args.memory, 0)
     run = _described(args, homes, sources)
     # Run it, reporting progress as standard output suits.
     _warn_of_slowness()
@@ -135,6 +141,8 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
         n_jobs=args.jobs,
         update=args.update,
         step_timeout_s=args.step_timeout,
+        silence_s=args.silence,
+        memory_mb=args.memory,
         debug=args.debug,
         store=settings_from_environment().store,
         sources=sources,

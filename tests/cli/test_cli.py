@@ -113,3 +113,18 @@ def test_noise_time_budget_and_groups_are_short_forms_of_the_recipes_fields(verb
     light = recipe_of(build_parser().parse_args(words)).light
     assert (light.noise, light.time_budget_s, light.groups) == (0.05, 30.0, "lamps")
     assert recipe_of(build_parser().parse_args(verb.split())).light.groups == "two"
+
+
+@pytest.mark.parametrize("option", ["--silence", "--memory"])
+def test_a_limit_below_nothing_is_rejected_by_its_name(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "builtin", "--out", str(tmp_path), option, "-1"]) != 0
+    assert f"{option}: -1.0: expected 0 or more" in capsys.readouterr().err
+
+
+def test_a_process_over_the_memory_that_was_asked_for_is_killed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "builtin", "--out", str(tmp_path), "--memory", "1"]) == 1
+    assert "MB resident, 1 allowed; killed" in "".join(capsys.readouterr())

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import manifold3d
 import numpy as np
@@ -107,9 +108,16 @@ def faces_of_patches(patches: Sequence[Patch]) -> NDArray[np.int64]:
     return np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
 
 
-def _welded(
-    patches: Sequence[Patch], weld_m: float
-) -> tuple[F64, NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint64]]:
+class _Welded(NamedTuple):
+    """The patches as one mesh."""
+
+    vertices: F64  # (V, 8) x y z u v, normal
+    faces: NDArray[np.int64]  # (F, 3)
+    merge_from: NDArray[np.uint64]  # vertices that are one with
+    merge_to: NDArray[np.uint64]  # these
+
+
+def _welded(patches: Sequence[Patch], weld_m: float) -> _Welded:
     # Join the vertex lists; declare equal positions of different patches to be one vertex.
     positions = np.concatenate([p.positions for p in patches])
     keys = np.round(positions / weld_m) if weld_m else positions + 0.0  # + 0.0 makes -0 and 0 equal
@@ -123,7 +131,8 @@ def _welded(
     uvs = np.concatenate([p.uvs for p in patches])
     normals = np.concatenate([p.normals for p in patches])
     vertices = np.concatenate([positions, uvs, normals], 1)
-    return vertices, faces, twins.astype(np.uint64), canonical[twins].astype(np.uint64)
+    merge_to = canonical[twins].astype(np.uint64)
+    return _Welded(vertices, faces, twins.astype(np.uint64), merge_to)
 
 
 def united(solids: Iterable[Manifold]) -> Manifold:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,16 +79,23 @@ def _lamp_interiors(
     return spheres
 
 
-def pdfs_by_face(
-    targets: GuidingTargets,
-) -> tuple[NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint32]]:
-    """(faces, pdfs of their fronts, of their backs, lamps), a row a face."""
+class FacePdfs(NamedTuple):
+    """How often guided rays aim at each face, a row a face."""
+
+    faces: NDArray[np.uint32]
+    front: NDArray[np.float32]  # per m2
+    back: NDArray[np.float32]
+    lamps: NDArray[np.uint32]
+
+
+def pdfs_by_face(targets: GuidingTargets) -> FacePdfs:
+    """The targets' pdfs, the two sides of a face together."""
     faces, row = np.unique(targets.sides & np.uint32(BACK_SIDE - 1), return_inverse=True)
     lamps = np.zeros(len(faces), np.uint32)
     lamps[row] = np.searchsorted(targets.first, np.arange(len(row)), side="right") - 1
     values = np.zeros((2, len(faces)), np.float32)
     values[(targets.sides >= BACK_SIDE).astype(int), row] = targets.pdfs
-    return faces, values[0], values[1], lamps
+    return FacePdfs(faces, values[0], values[1], lamps)
 
 
 def _corners(tables: SceneTables, faces: NDArray[np.int64]) -> NDArray[np.float64]:
