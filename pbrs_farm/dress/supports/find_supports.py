@@ -23,7 +23,7 @@ LEAST_AREA_M2 = 0.02
 LEAST_FREE_M = 0.12
 MOST_FREE_M = 3.0  # what is higher above a support is nobody's business
 _LEAST_NORMAL_Y = 0.95
-_FLAT_M = 0.001  # heights of one support differ by less
+_FLAT_M = 0.0006  # heights of one support differ by less
 _BORDER = 5  # cells of the grid around a support
 _NEAR_M = 0.003  # a face this near to the support's height lies on it
 _OPEN_SHARE = 0.5  # of a side's length
@@ -66,7 +66,7 @@ def supports_of_item(scene: SceneTriangles, index: int, room: Room) -> list[Supp
     found = []
     for group in groups:
         mask = covered(grid, group) & indoors & ~around.solid
-        found += _supports_at(around, mask, float(group[..., 1].max()), room)
+        found += _supports_at(around, mask, float(group[..., 1].max()), room, item.box is not None)
     return found
 
 
@@ -145,7 +145,9 @@ def surroundings(scene: SceneTriangles, index: int, grid: PlanGrid, low_y: float
     return Surroundings(index, grid, hits, owner[hits.triangle] == index, solid)
 
 
-def _supports_at(around: Surroundings, mask: Bools, height: float, room: Room) -> list[Support]:
+def _supports_at(
+    around: Surroundings, mask: Bools, height: float, room: Room, has_front: bool
+) -> list[Support]:
     least = LEAST_AREA_M2 / CELL_M**2
     if mask.sum() < least:
         return []
@@ -175,7 +177,7 @@ def _supports_at(around: Surroundings, mask: Bools, height: float, room: Room) -
                     around.grid.cropped(around_it), part, air, sides,
                     bool(np.mean(air[part] < 0.6) > 0.5),
                 ),
-                room,
+                room, has_front=has_front,
             )
         )  # fmt: skip
     return found
@@ -207,27 +209,36 @@ def _shifted(mask: Bools, axis: int, by: int) -> Bools:
     return moved
 
 
-def turned_to_front(support: Support, room: Room) -> Support:
+def turned_to_front(support: Support, room: Room, *, has_front: bool) -> Support:
     """The support with its grid turned by quarters, so that +z is the side it is used from.
 
-    That is the front of its furniture where open; else the open side with most room before it.
+    That is the front of its furniture where it is known and open (has_front: its grid's +z); else
+    the open side with most room before it.
     """
-    quarter = _front_quarter(support, room)
+    quarter = _front_quarter(support, room, has_front)
     if quarter == 0:
         return support
     return _turned(support, quarter)
 
 
-def _front_quarter(support: Support, room: Room) -> int:
+def _front_quarter(support: Support, room: Room, has_front: bool) -> int:
     # 0 = +z, 1 = +x, 2 = -z, 3 = -x, as quarters of a turn about +y.
     right, front, left, back = support.open_sides
     is_open = {0: front, 1: right, 2: back, 3: left}
     reach = {q: _way_to_wall(support, q, room) for q in is_open}
     # A top that is open all around faces the room; a shelf faces where it is open.
-    if is_open[0] and reach[0] > 0.25:
+    if has_front and is_open[0] and reach[0] > 0.25:
         return 0
     choices = [q for q in is_open if is_open[q]] or list(is_open)
-    return max(choices, key=lambda q: (round(reach[q], 2), -q))
+    rows, columns = np.nonzero(support.mask)
+    depth = (np.ptp(rows), np.ptp(columns))
+
+    def liking(q: int) -> tuple[float, float, int, int]:
+        # Room before it, a wall behind it, its short side from front to back.
+        before, behind = min(reach[q], 1.0), min(reach[(q + 2) % 4], 1.0)
+        return round(before, 1), -round(behind, 1), -int(depth[q % 2]), -q
+
+    return max(choices, key=liking)
 
 
 def _way_to_wall(support: Support, quarter: int, room: Room) -> float:

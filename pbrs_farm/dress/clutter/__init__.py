@@ -1,0 +1,5 @@
+"""What lies about in a home: things on furniture, books on shelves, cushions, some on the floor."""
+
+from pbrs_farm.dress.clutter.clutter import clutter
+
+__all__ = ["clutter"]

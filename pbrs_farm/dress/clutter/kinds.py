@@ -1,0 +1,130 @@
+"""Kinds of small things and where they come from: the catalogue's groups, or generated; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.dress.generated.books import magazines, open_book, stack_of_books
+from pbrs_farm.dress.generated.covers import Covers
+from pbrs_farm.dress.generated.made import Made
+from pbrs_farm.dress.generated.things import GENERATORS
+from pbrs_farm.dress.style import Style
+
+_MOST_FACES: Final = 4000  # of a small thing from a catalogue
+_GENERATED_SHARE: Final = 0.5  # where there are both
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """Where a kind's pieces come from."""
+
+    groups: tuple[str, ...] = ()  # of the catalogue
+    made: str = ""  # generator's name
+    most_m: float = 0.6  # the longest side
+    is_round: bool = False  # it may face anywhere
+
+
+_MADE_ONLY = (
+    "bag", "binders", "brush_cup", "carton", "cartons", "folded_blanket", "folded_clothes", "jar",
+    "kitchen_roll", "mills", "notebook", "papers", "pen_pot", "plant_pot", "shelf_basket",
+    "soap_bar", "soap_dispenser", "sponge", "spray_bottle", "storage_box", "table_frame",
+    "tissue_box", "toilet_rolls", "toiletries",
+)  # fmt: skip
+
+_KINDS: Final[dict[str, Kind]] = {
+    **{name: Kind(made=name) for name in _MADE_ONLY},
+    "ball": Kind(("ball",), most_m=0.3, is_round=True),
+    "bath_small": Kind(("bath_small",), "toiletries", 0.3),
+    "bin": Kind(("bin",), "bin", 0.6, True),
+    "basket": Kind(("basket",), "basket", 0.6, True),
+    "bottle": Kind(("bottle",), "bottle", 0.4, True),
+    "bowl": Kind(("bowl",), "bowl", 0.4, True),
+    "box": Kind(("box",), "storage_box", 0.45),
+    "candle": Kind(("candle",), "candle", 0.4, True),
+    "clock": Kind(("clock",), "clock", 0.3),
+    "coffee_machine": Kind(("coffee_machine",), most_m=0.5),
+    "cup": Kind(("cup",), "cup", 0.2, True),
+    "cutlery": Kind(("cutlery",), most_m=0.35),
+    "electronics": Kind(("electronics", "speaker"), most_m=0.5),
+    "folded_towels": Kind(("towel",), "folded_towels", 0.5),
+    "food": Kind(("food",), "fruit", 0.4, True),
+    "fruit": Kind(("fruit",), "fruit", 0.4, True),
+    "glass": Kind(("glass",), "glass", 0.3, True),
+    "jewel": Kind(("jewel",), most_m=0.2),
+    "kettle": Kind(("kettle",), "kettle", 0.35, True),
+    "kitchen_tool": Kind(("kitchen_tool", "kitchen_appliance"), "jar", 0.5),
+    "laptop": Kind(("laptop",), "laptop", 0.45),
+    "microwave": Kind(("microwave",), most_m=0.6),
+    "monitor": Kind(("monitor",), most_m=0.7),
+    "ornament": Kind(("ornament",), "ornament", 0.5, True),
+    "pan": Kind(("pot_pan",), "pan", 0.5),
+    "phone": Kind(("phone",), "phone", 0.3),
+    "plates": Kind(("plate",), "plates", 0.4, True),
+    "pot": Kind(("pot_pan",), "pot", 0.45),
+    "remote": Kind(("remote",), "remote", 0.3, True),
+    "shoes": Kind(("shoes",), "shoes", 0.4),
+    "table_lamp": Kind(("table_lamp",), most_m=0.65),
+    "toaster": Kind(("toaster",), most_m=0.45),
+    "toy": Kind(("toy",), most_m=0.45, is_round=True),
+    "vase": Kind(("vase",), "vase", 0.5, True),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stock:
+    """What a home's small things are taken from."""
+
+    catalogue: Catalogue
+    covers: Covers
+
+    def take(self, rng: np.random.Generator, kind: str, style: Style) -> Made | None:
+        """A thing of that kind; None where there is none that can be used."""
+        if kind == "book":
+            # One or a pile; now and then one lies open.
+            n = int(rng.choice([0, 1, 1, 2, 3, 4, 5]))
+            return stack_of_books(rng, self.covers, n) if n else open_book(rng, self.covers)
+        if kind == "magazines":
+            return magazines(rng, self.covers, int(rng.integers(1, 6)))
+        found = _KINDS[kind]
+        choices = self._choices(found)
+        # Draw for all alike, so that what the catalogue holds moves no later draw.
+        is_made, number = rng.random() < _GENERATED_SHARE, int(rng.integers(1 << 30))
+        own = np.random.default_rng(number)
+        if choices and not (found.made and is_made):
+            piece = choices[number % len(choices)]
+            shape = self.catalogue.shape(piece)
+            if shape is not None and _is_usable(shape, found):
+                return piece, shape
+        return GENERATORS[found.made](own, style) if found.made else None
+
+    def _choices(self, kind: Kind) -> list[Piece]:
+        return [
+            p
+            for p in self.catalogue.of(*kind.groups)
+            if p.place is Place.SURFACE
+            and max(p.size) <= kind.most_m
+            and p.kind in (ItemKind.OBJECT, ItemKind.LAMP)
+        ]
+
+
+def is_round(kind: str) -> bool:
+    """Whether things of that kind may face anywhere."""
+    return kind in _KINDS and _KINDS[kind].is_round
+
+
+def is_known(kind: str) -> bool:
+    """Whether there is such a kind."""
+    return kind in _KINDS or kind in ("book", "magazines")
+
+
+def _is_usable(shape: Shape, kind: Kind) -> bool:
+    n_faces = sum(len(s.faces) for s in shape.surfaces)
+    if not 0 < n_faces <= _MOST_FACES:
+        return False
+    low, high = shape.bounds
+    return bool(np.isfinite([low, high]).all() and (high - low).max() <= kind.most_m + 0.05)

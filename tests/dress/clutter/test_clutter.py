@@ -1,0 +1,115 @@
+"""Small things stand on furniture: they touch it, nothing penetrates, books stand in shelves."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from manifold3d import Manifold, Mesh
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.house import House, Item
+from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.clutter.kinds import is_known
+from pbrs_farm.dress.clutter.receptacles import shares
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.style import style_for
+from tests.dress.furniture import bookcase, house, solid
+
+_BOOKS = 23
+
+
+def _dressed(home: House, seed: int = 1, share: float = 1.0) -> Draft:
+    draft = Draft(home, seed)
+    clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), share)
+    return draft
+
+
+def _room() -> House:
+    return house(
+        bookcase(),
+        solid("Desk", [2.6, 0, 0], [3.8, 0.74, 0.6], 14),
+        solid("Chest", [0, 0, 2], [0.5, 0.9, 3], 17),
+        solid("Table", [1.4, 0, 1.6], [2.6, 0.42, 2.2], 7),
+        solid("Lamp", [2.7, 0.74, 0.1], [2.9, 1.1, 0.3], 35),
+    )
+
+
+def _added(draft: Draft) -> list[Item]:
+    return draft.items[len(draft.source.items) :]
+
+
+def _body(item: Item) -> Manifold:
+    corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in item.surfaces])
+    places, number = np.unique(np.round(corners.reshape(-1, 3), 6), axis=0, return_inverse=True)
+    faces = number.reshape(-1, 3).astype(np.uint32)
+    return Manifold(Mesh(places.astype(np.float32), faces))
+
+
+def test_every_thing_touches_what_it_stands_on() -> None:
+    draft = _dressed(_room())
+    levels = np.array([0.74, 0.9, 0.42, 0.12, 0.59, 1.06, 1.53, 2.0])
+    added = _added(draft)
+    assert len(added) > 15
+    for item in added:
+        gap = item.bounds[0, 1] - levels
+        assert np.abs(gap).min() < 0.0005, item.name
+
+
+def test_nothing_penetrates_anything() -> None:
+    for seed in (1, 2):
+        draft = _dressed(_room(), seed)
+        bodies = [(item, _body(item)) for item in draft.items]
+        for (one, a), (two, b) in combinations(bodies, 2):
+            apart = (one.bounds[0] > two.bounds[1] + 1e-4) | (two.bounds[0] > one.bounds[1] + 1e-4)
+            if apart.any() or (one in draft.source.items and two in draft.source.items):
+                continue
+            assert (a ^ b).volume() < 1e-8, f"{one.name} in {two.name}"
+
+
+def test_books_stand_in_the_bookcase_with_their_spines_out() -> None:
+    draft = _dressed(_room())
+    books = [i for i in _added(draft) if i.nyu40 == _BOOKS and i.bounds[1, 2] < 0.31]
+    assert books
+    for item in books:
+        assert item.box is not None
+        assert item.box.axes[:, 2] == pytest.approx([0, 0, 1], abs=1e-6)
+        assert item.bounds[0, 2] > 0.01, "in front of the back"
+        assert item.bounds[1, 2] <= 0.3 + 1e-6, "on the board"
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_gives_others() -> None:
+    one, again, other = _dressed(_room(), 3), _dressed(_room(), 3), _dressed(_room(), 4)
+    assert [i.id for i in one.items] == [i.id for i in again.items]
+    for a, b in zip(one.items, again.items, strict=True):
+        for s, t in zip(a.surfaces, b.surfaces, strict=True):
+            assert s.positions.tobytes() == t.positions.tobytes()
+    assert [i.bounds.tolist() for i in one.items] != [i.bounds.tolist() for i in other.items]
+
+
+def test_ids_are_unique_and_every_thing_has_a_class_and_a_room() -> None:
+    added = _added(_dressed(_room()))
+    assert len({i.id for i in added}) == len(added)
+    assert all(i.id.startswith("dress-clutter-") and i.nyu40 and i.room_id == "0_0" for i in added)
+
+
+def test_a_smaller_share_puts_less() -> None:
+    def count(share: float) -> int:
+        return sum(len(_added(_dressed(_room(), seed, share))) for seed in range(4))
+
+    assert count(0.25) < 0.7 * count(1.0)
+
+
+def test_a_table_full_of_things_gets_no_more() -> None:
+    block = solid("Monitor", [2.6, 0.74, 0.0], [3.8, 1.0, 0.6], 40)
+    draft = _dressed(house(solid("Desk", [2.6, 0, 0], [3.8, 0.74, 0.6], 14), block))
+    assert all(i.bounds[0, 1] > 0.9 for i in _added(draft))
+
+
+def test_the_table_of_shares_names_kinds_that_exist() -> None:
+    for receptacle, rows in shares().items():
+        for row in rows:
+            assert is_known(row.kind), f"{receptacle}: {row.kind}"
+            assert 0 < row.share <= 1
