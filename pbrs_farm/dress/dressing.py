@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Piece
@@ -17,13 +19,33 @@ from pbrs_farm.core.recipe import DressFields
 from pbrs_farm.dress.draft import CHANGED_TAG, Draft
 from pbrs_farm.dress.gates import group_of, keep_gates, part_of, piece_id
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
+from pbrs_farm.dress.style import Style, style_for
 
-Part = Callable[[Draft, Catalogue, float], None]
+Part = Callable[[Draft, Catalogue, Style, float], None]
 
-_FURNITURE: tuple[tuple[str, Part], ...] = ()
+
+def _parts(*names: tuple[str, str, str]) -> tuple[tuple[str, Part], ...]:
+    # A part that has not landed yet is left out.
+    found = []
+    for field, module, name in names:
+        place = f"pbrs_farm.dress.{module}"
+        if find_spec(place) is not None and hasattr(import_module(place), name):
+            found.append((field, getattr(import_module(place), name)))
+    return tuple(found)
+
+
+_FURNITURE = _parts(
+    ("surfaces", "surfaces", "surfaces"), ("parts", "parts", "parts"), ("swap", "swap", "swap")
+)
 """Field of the recipe that holds the part's share, and the part: what changes the home's own things."""
 
-_THINGS: tuple[tuple[str, Part], ...] = ()
+_THINGS = _parts(
+    ("lamps", "lamps", "lamps"),
+    ("textiles", "textiles", "textiles_large"),
+    ("walls", "walls", "walls"),
+    ("clutter", "clutter", "clutter"),
+    ("textiles", "textiles", "textiles_small"),
+)
 """The same of the parts that add things, in the order they are done."""
 
 
@@ -36,6 +58,7 @@ def dress(
     style.
     """
     draft = Draft(house, seed)
+    style = style_for(draft.rng("style"), fields.style)
     pieces = {p.id: p for p in catalogue.pieces}
     gates: tuple[Gate, ...] = ()
     # Put back what stands wrong before things are laid on it, then look at everything.
@@ -43,14 +66,14 @@ def dress(
         for field, part in parts:
             share = float(getattr(fields, field))
             if share > 0:
-                part(draft, catalogue, share)
+                part(draft, catalogue, style, share)
         gates = _joined(gates, keep_gates(draft, pieces | draft.used))
     dressed = draft.house()
     credits = _credits(dressed, catalogue)
     dressed = replace(
         dressed, id=keys.dressed_id(house.id, seed), source=_credited(house.source, credits)
     )
-    return dressed, _report(dressed, draft, gates, credits)
+    return dressed, _report(dressed, draft, style, gates, credits)
 
 
 def _joined(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ...]:
@@ -63,7 +86,7 @@ def _joined(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ..
 
 
 def _report(
-    house: House, draft: Draft, gates: tuple[Gate, ...], credits: tuple[Credit, ...]
+    house: House, draft: Draft, style: Style, gates: tuple[Gate, ...], credits: tuple[Credit, ...]
 ) -> DressReport:
     changed = Counter(
         tag.removeprefix(CHANGED_TAG)
@@ -79,6 +102,7 @@ def _report(
     return DressReport(
         house_id=house.id,
         seed=draft.seed,
+        style=style.name,
         added=dict(sorted(added.items())),
         changed=dict(sorted(changed.items())),
         refused=dict(sorted(draft.refused.items())),

@@ -169,6 +169,20 @@ def test_the_verb_writes_the_bundle_the_report_and_a_picture(tmp_path: Path, cap
     assert "dressed by seed 2" in capsys.readouterr().out
 
 
+def test_an_unknown_style_is_one_line_that_names_those_there_are(tmp_path: Path, capsys):
+    words = ["dress", "builtin", "--out", str(tmp_path), "--catalogue", "generated"]
+    assert main([*words, "--set", "dress.style=baroque"]) == 1
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "nordic" in told
+
+
+def test_an_unknown_catalogue_is_one_line(tmp_path: Path, capsys):
+    words = ["dress", "builtin", "--out", str(tmp_path / "out")]
+    assert main([*words, "--catalogue", f"generated:{tmp_path}/none.sh3f"]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
 @pytest.mark.parametrize("seed", ["x", "0", "1..3"])
 def test_the_verb_refuses_what_is_no_seed_in_one_line(seed, tmp_path: Path, capsys):
     assert main(["dress", "builtin", "--seed", seed, "--out", str(tmp_path)]) == 1
