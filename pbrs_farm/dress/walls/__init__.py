@@ -1,0 +1,5 @@
+"""What hangs on walls: pictures, mirrors, clocks, shelves, sockets and switches; no effects."""
+
+from pbrs_farm.dress.walls.hang_walls import walls
+
+__all__ = ["walls"]

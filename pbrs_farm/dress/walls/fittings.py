@@ -1,0 +1,199 @@
+"""Mirrors, clocks, wall shelves, sockets and switches of one room."""
+
+from __future__ import annotations
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from pbrs_farm.core.arrays import F64, Srgb8Image
+from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.dress.space import HouseSpace, Passage
+from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.style import Rgb, Style, shade
+from pbrs_farm.dress.walls.frames import (
+    MIRROR,
+    Made,
+    clock,
+    frame_material,
+    jpeg_texture,
+    metal_of,
+    mirror,
+    plain,
+    plate,
+    round_mirror,
+    wall_shelf,
+)
+from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
+
+_SINK = 34
+_SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
+_CASING_M = 0.16  # from a door's hole to the middle of its switch
+_CLOCKS = {RoomKind.KITCHEN: 0.6, RoomKind.LIVING: 0.4, RoomKind.OFFICE: 0.5, RoomKind.DINING: 0.3}
+_SHELVES = {RoomKind.LIVING: 0.45, RoomKind.BEDROOM: 0.4, RoomKind.OFFICE: 0.6, RoomKind.KITCHEN: 0.4, RoomKind.OTHER: 0.4}  # fmt: skip
+_SOCKETS = {RoomKind.HALL: 1, RoomKind.BATHROOM: 1, RoomKind.KITCHEN: 2}
+
+
+def hang_mirrors(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
+    """A mirror over each washbasin of a bathroom, and one in most halls, where none is."""
+    room = hanging.room
+    rng = hanging.draft.rng("mirrors", room.room.id)
+    if any(hanging.draft.items[n].nyu40 == MIRROR for n in room.items):
+        return
+    if room.kind is RoomKind.BATHROOM and rng.random() < share:
+        for number in room.items:
+            if hanging.draft.items[number].nyu40 == _SINK:
+                _over_basin(hanging, space.bounds[number], rng, style)
+    if room.kind in (RoomKind.HALL, RoomKind.BEDROOM):
+        likely = 0.7 if room.kind is RoomKind.HALL else 0.3
+        if rng.random() < likely * share:
+            _tall_mirror(hanging, rng, style)
+
+
+def _over_basin(hanging: Hanging, bounds: F64, rng: np.random.Generator, style: Style) -> None:
+    basin = float(max(bounds[1, 0] - bounds[0, 0], bounds[1, 2] - bounds[0, 2]))
+    rim = min(float(bounds[1, 1]), hanging.floor_y + 0.95)
+    frame = frame_material(rng, style) if rng.random() < 0.4 else None
+    for k, s0, s1 in faces_behind(hanging.room, bounds[0], bounds[1])[:2]:
+        for factor in (1.0, 0.75, 0.5):
+            width = float(np.clip(basin * 0.95, 0.4, 1.1)) * factor
+            height = float(rng.uniform(0.6, 0.85)) * (0.5 + 0.5 * factor)
+            low = rim + float(rng.uniform(0.15, 0.3))
+            s = (s0 + s1) / 2
+            if hanging.faces[k].free_m(s - width / 2, s + width / 2, low, low + height) > 0.12:
+                hanging.hang(*mirror(width, height, frame), k, s, low)
+                return
+    hanging.draft.refused["walls: no free wall for a mirror"] += 1
+
+
+def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> None:
+    frame = frame_material(rng, style)
+    if rng.random() < 0.35:
+        diameter = float(rng.uniform(0.45, 0.75))
+        made, low = round_mirror(diameter, frame), 1.55 - diameter / 2
+    else:
+        width, height = float(rng.uniform(0.4, 0.6)), float(rng.uniform(1.1, 1.5))
+        made, low = mirror(width, height, frame, 0.03), 0.45
+    _anywhere(hanging, made, low, 0.4, rng)
+
+
+def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
+    """A clock in some kitchens, living rooms and studies."""
+    rng = hanging.draft.rng("clock", hanging.room.room.id)
+    if rng.random() >= _CLOCKS.get(hanging.room.kind, 0.0) * share:
+        return
+    frame = frame_material(rng, style)
+    light = rng.random() < 0.75
+    dial = jpeg_texture("dial", _dial(rng, (0.93, 0.92, 0.88) if light else (0.1, 0.1, 0.11)))
+    _anywhere(hanging, clock(float(rng.uniform(0.24, 0.36)), dial, frame), 1.85, 0.3, rng)
+
+
+def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
+    image = Image.new("RGB", (320, 320), tuple(int(255 * c) for c in ground))
+    pen = ImageDraw.Draw(image)
+    ink = (25, 25, 28) if ground[0] > 0.5 else (230, 228, 220)
+    numerals = rng.random() < 0.5
+    font = ImageFont.load_default(size=30.0)
+    for k in range(60 if rng.random() < 0.5 else 12):
+        n = 60 if k >= 12 else 12
+        a = 2 * np.pi * k / n
+        inner = 0.42 if n == 12 else 0.445
+        tip = [(160 + 320 * r * np.sin(a), 160 - 320 * r * np.cos(a)) for r in (inner, 0.465)]
+        pen.line(tip, fill=ink, width=6 if n == 12 else 2)
+        if numerals and n == 12:
+            at = (160 + 115 * np.sin(a), 160 - 115 * np.cos(a))
+            pen.text(at, str(k or 12), font=font, fill=ink, anchor="mm")
+    # Set the hands to some time of day.
+    hour = float(rng.uniform(0, 12))
+    for turn, length, width in ((hour / 12, 78, 9), (hour % 1.0, 118, 6)):
+        a = 2 * np.pi * turn
+        pen.line([(160 - 20 * np.sin(a), 160 + 20 * np.cos(a)),
+                  (160 + length * np.sin(a), 160 - length * np.cos(a))], fill=ink, width=width)  # fmt: skip
+    pen.ellipse((151, 151, 169, 169), fill=ink)
+    return np.asarray(image, np.uint8)
+
+
+def hang_shelf(hanging: Hanging, style: Style, share: float) -> None:
+    """A shelf of one to three boards in some rooms: the clutter that follows fills it."""
+    room = hanging.room
+    rng = hanging.draft.rng("shelf", room.room.id)
+    if rng.random() >= _SHELVES.get(room.kind, 0.0) * share:
+        return
+    boards = int(rng.choice([1, 1, 2, 2, 3]))
+    width, depth = float(rng.uniform(0.6, 1.2)), float(rng.uniform(0.18, 0.24))
+    wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
+    board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
+    made = wall_shelf(width, depth, boards, board, metal_of(style))
+    # Boards at head height over free floor would be run into: hang them over furniture or high.
+    room_above = 0.32
+    low = 1.4 if boards > 1 else 1.5
+    _anywhere(hanging, made, low, depth + 0.35, rng, above_m=room_above, tags=("support",))
+
+
+def _anywhere(
+    hanging: Hanging, made: Made, low_m: float, depth_m: float, rng: np.random.Generator, *,
+    above_m: float = 0.05, tags: tuple[str, ...] = (),
+) -> None:  # fmt: skip
+    """Hang the thing at that height at a place drawn from all that have the space before them."""
+    piece, shape = made
+    (x0, _y0, _z0), (x1, y1, _z1) = shape.bounds
+    low, width = hanging.floor_y + low_m, float(x1 - x0)
+    places = [
+        (k, float(s))
+        for k, face in enumerate(hanging.faces)
+        for s in face.starts(width + 0.1, low - 0.05, low + float(y1) + above_m, depth_m)
+    ]
+    if not places:
+        hanging.draft.refused[f"walls: no free wall for a {piece.group}"] += 1
+        return
+    k, s = places[int(rng.integers(len(places)))]
+    hanging.hang(piece, shape, k, s + 0.05 + width / 2, low, tags=tags)
+
+
+def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: float) -> None:
+    """A switch beside each door on its room's side, and sockets low on the walls."""
+    room = hanging.room
+    rng = hanging.draft.rng("switches", room.room.id)
+    colour = (0.9, 0.9, 0.88) if rng.random() < 0.8 else shade(style.metal.colour, 0.8)
+    if rng.random() >= share:
+        return
+    switch = _fitting(catalogue, "switch", rng) or plate(1, is_socket=False, colour=colour)
+    lit = 0
+    for door in room.doors:
+        side = door.side_of(room.room.id)
+        if side is not None and lit < 3 and _beside(hanging, door, side, switch, rng):
+            lit += 1
+    for _ in range(_SOCKETS.get(room.kind, 3)):
+        n = int(rng.choice([1, 1, 2, 3]))
+        socket = _fitting(catalogue, "socket", rng) or plate(n, is_socket=True, colour=colour)
+        _anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
+
+
+def _fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Made | None:
+    """A socket or switch of the catalogue that is as small as they are; None = make one."""
+    fit = [p for p in catalogue.of(group) if max(p.size) < 0.2 and p.size[1] < 0.06]
+    if not fit or rng.random() < 0.4:
+        return None
+    piece: Piece = fit[int(rng.integers(len(fit)))]
+    shape: Shape | None = catalogue.shape(piece)
+    return (piece, shape) if shape is not None else None
+
+
+def _beside(
+    hanging: Hanging, door: Passage, side: int, made: Made, rng: np.random.Generator
+) -> bool:
+    """Hang a switch on one side of a door: the handle's side is unknown, so either that is free."""
+    piece, shape = made
+    low = hanging.floor_y + _SWITCH_M - float(shape.bounds[1, 1]) / 2
+    half = float(np.abs(shape.bounds[:, 0]).max()) + 0.02
+    order = (1.0, -1.0) if rng.random() < 0.5 else (-1.0, 1.0)
+    for sign in order:
+        at = door.face_point(side) + door.along * sign * (door.width / 2 + _CASING_M)
+        for k, face in enumerate(hanging.faces):
+            out = float(face.out_of(at[None])[0])
+            if abs(out) > 0.06 or float(face.normal @ door.inward(side)) < 0.95:
+                continue
+            s = float(face.s_of(at[None])[0])
+            if face.free_m(s - half, s + half, low, low + 0.1) > 0.03:
+                hanging.hang(piece, shape, k, s, low, margin_m=0.02)
+                return True
+    return False

@@ -1,0 +1,74 @@
+"""Walls of one room while things are hung on them; state: what is taken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Piece, Shape
+from pbrs_farm.core.house import Item
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space import RoomSpace, WallFace
+
+GAP_M = 0.0008  # between a wall's face and the back of what hangs on it
+IN_FRONT_M = 0.35  # that a picture needs free to be seen
+
+
+@dataclass
+class Hanging:
+    """A room's wall faces, with what this part has hung taken out of them."""
+
+    draft: Draft
+    room: RoomSpace
+    part: str
+    faces: list[WallFace] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.faces = list(self.room.faces)
+
+    @property
+    def floor_y(self) -> float:
+        """World y of the room's floor."""
+        return self.room.room.floor_y
+
+    def hang(
+        self, piece: Piece, shape: Shape, face: int, s: float, low_y: float, *,
+        tags: tuple[str, ...] = (), margin_m: float = 0.05,
+    ) -> Item:  # fmt: skip
+        """Hang a piece with the middle of its lower edge at s on faces[face], and take its place."""
+        wall = self.faces[face]
+        item = self.draft.placed(
+            piece, shape, wall.point(s, low_y, GAP_M), wall.turn_rad,
+            item_id=next_id(self.draft, self.part), room_id=self.room.room.id,
+            level_id=self.room.room.level_id, tags=tags,
+        )  # fmt: skip
+        self.draft.add(item, self.part, piece)
+        low, high = shape.bounds
+        self.faces[face] = wall.taken(
+            s + float(low[0]) - margin_m, s + float(high[0]) + margin_m,
+            low_y + float(low[1]) - margin_m, low_y + float(high[1]) + margin_m,
+        )  # fmt: skip
+        return item
+
+
+def next_id(draft: Draft, part: str) -> str:
+    """A new id `dress-<part>-<n>`."""
+    n = draft.kept.get(f"number of {part}", 0)
+    assert isinstance(n, int)
+    draft.kept[f"number of {part}"] = n + 1
+    return f"dress-{part}-{n}"
+
+
+def faces_behind(
+    room: RoomSpace, low: F64, high: F64, reach_m: float = 0.12
+) -> list[tuple[int, float, float]]:
+    """(face, s0, s1) of every wall face that a box low..high (3,) stands against, largest first."""
+    corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
+    found = []
+    for k, face in enumerate(room.faces):
+        out, s = face.out_of(corners), face.s_of(corners)
+        if -0.1 < out.min() < reach_m and s.max() > 0 and s.min() < face.length:
+            found.append((k, float(s.min()), float(s.max())))
+    return sorted(found, key=lambda f: f[1] - f[2])

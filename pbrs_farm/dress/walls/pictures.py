@@ -1,0 +1,223 @@
+"""Hangs pictures in a room: singles, pairs, rows and galleries, over furniture or at eye height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space import HouseSpace, RoomSpace
+from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.style import Rgb, Style, room_style
+from pbrs_farm.dress.walls.frames import Made, canvas, frame_material, framed, jpeg_texture, poster
+from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
+from pbrs_farm.dress.walls.prints import print_pixels
+
+MOST_PICTURES = 6  # in a room
+_MOST_PRINTS = 20  # drawn for a home; further pictures show one of them again
+_EYE_M = 1.55  # height of a picture's middle above the floor
+_CEILING_M = 0.12  # kept free below the ceiling
+_APART_M = 0.25  # between one group of pictures and the next
+
+# How many groups of pictures a room gets, by its use.
+_GROUPS = {
+    RoomKind.LIVING: (2, 3), RoomKind.BEDROOM: (1, 2), RoomKind.DINING: (1, 2),
+    RoomKind.HALL: (1, 3), RoomKind.OFFICE: (1, 2), RoomKind.OTHER: (1, 2),
+    RoomKind.KITCHEN: (0, 2), RoomKind.BATHROOM: (0, 1),
+}  # fmt: skip
+# Bed, sofa, table, cabinet, desk, dresser, television: pictures hang over them, and seat backs.
+_BENEATH = {4: 1.0, 6: 1.0, 7: 0.5, 3: 0.5, 14: 0.6, 17: 0.8, 39: 0.4, 5: 0.3}
+_LOWEST_M, _TALLEST_BENEATH_M = 0.35, 1.25
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Pictures that hang together: (left, bottom, width, height) of each, metres from the lower left."""
+
+    frames: tuple[tuple[float, float, float, float], ...]
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of the whole."""
+        return (
+            max(x + w for x, _y, w, _h in self.frames),
+            max(y + h for _x, y, _w, h in self.frames),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A place for a group: middle s on a face, above what (world y of its top; None = eye height)."""
+
+    score: float
+    face: int
+    s: float
+    width: float  # that suits it
+    above_y: float | None
+
+
+class Gallery:
+    """The prints of a home, drawn as they are needed; state: those drawn so far."""
+
+    def __init__(self, draft: Draft, style: Style) -> None:
+        self._rng = draft.rng("prints")
+        self._style = style
+        self._prints: list[tuple[float, Texture, Rgb]] = []  # with aspect and mean colour
+
+    def print_for(self, aspect: float) -> tuple[Texture, Rgb]:
+        """A picture of about that width over height, and its mean colour; new while there are few."""
+        if len(self._prints) < _MOST_PRINTS:
+            pixels, family = print_pixels(self._rng, aspect, self._style)
+            r, g, b = (float(c) for c in pixels.reshape(-1, 3).mean(0) / 255)
+            self._prints.append((aspect, jpeg_texture(f"print {family}", pixels), (r, g, b)))
+            return self._prints[-1][1:]
+        # Show one of a like shape again.
+        likeness = [abs(np.log(a / aspect)) for a, _t, _c in self._prints]
+        near = [k for k, d in enumerate(likeness) if d < min(likeness) + 0.1]
+        return self._prints[near[int(self._rng.integers(len(near)))]][1:]
+
+
+def hang_pictures(
+    hanging: Hanging, space: HouseSpace, gallery: Gallery, style: Style, share: float
+) -> None:
+    """Pictures for one room, as many as its use and its walls allow."""
+    room = hanging.room
+    low, high = _GROUPS.get(room.kind, (0, 0))
+    rng = hanging.draft.rng("pictures", room.room.id)
+    wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
+    taste = room_style(style, rng)
+    frame = frame_material(rng, taste)
+    left = MOST_PICTURES
+    for spot in _spots(hanging, space, rng):
+        if wanted <= 0 or left <= 0:
+            return
+        group = _group_for(rng, spot, hanging, left)
+        if group is None:
+            continue
+        _hang_group(rng, hanging, spot, group, gallery, taste, frame)
+        left -= len(group[0].frames)
+        wanted -= 1
+    if wanted > 0:
+        hanging.draft.refused["walls: no free wall for pictures"] += wanted
+
+
+def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> list[Spot]:
+    """Places for pictures, best first: over furniture, then the middles of free stretches."""
+    room, found = hanging.room, []
+    for number in room.items:
+        item, (low, high) = hanging.draft.items[number], space.bounds[number]
+        liked = _BENEATH.get(item.nyu40, 0.0)
+        top = float(high[1]) - hanging.floor_y
+        if not liked or not _LOWEST_M < top < _TALLEST_BENEATH_M:
+            continue
+        for k, s0, s1 in faces_behind(room, low, high)[:1]:
+            if s1 - s0 > 0.5:
+                width = (s1 - s0) * float(rng.uniform(0.55, 0.8))
+                score = liked + 0.3 * (s1 - s0) + float(rng.uniform(0, 0.6))
+                found.append(Spot(score, k, (s0 + s1) / 2, width, float(high[1])))
+    y0, y1 = hanging.floor_y + 1.3, hanging.floor_y + 1.8
+    for k, face in enumerate(hanging.faces):
+        starts = face.starts(0.3, y0, y1, IN_FRONT_M)
+        for first, last in _stretches(starts):
+            length = last - first + 0.3
+            # Long walls take several groups.
+            n = max(1, int(length / 1.8))
+            for j in range(n):
+                s = first + length * (j + 0.5) / n
+                score = 0.25 * min(length / n, 2.5) + float(rng.uniform(0, 0.7))
+                found.append(Spot(score, k, s, min(length / n - 0.2, 1.5), None))
+    return sorted(found, key=lambda spot: -spot.score)
+
+
+def _stretches(starts: F64) -> list[tuple[float, float]]:
+    if not len(starts):
+        return []
+    gaps = np.flatnonzero(np.diff(starts) > 0.03)
+    first, last = np.r_[0, gaps + 1], np.r_[gaps, len(starts) - 1]
+    return [(float(starts[a]), float(starts[b])) for a, b in zip(first, last, strict=True)]
+
+
+def _group_for(
+    rng: np.random.Generator, spot: Spot, hanging: Hanging, left: int
+) -> tuple[Group, float, float] | None:
+    """A group that fits at the spot, with its left edge and its bottom; smaller ones are tried."""
+    face, floor = hanging.faces[spot.face], hanging.floor_y
+    for attempt in range(5):
+        width = min(max(spot.width * 0.85**attempt, 0.22), 1.6)
+        group = _drawn(rng, width, left)
+        w, h = group.size
+        bottom = floor + _EYE_M + float(rng.uniform(-0.08, 0.08)) - h / 2
+        if spot.above_y is not None:
+            over = spot.above_y + float(rng.uniform(0.15, 0.25))
+            bottom = over if over + h / 2 > floor + 1.2 else max(bottom, over)
+        for shift in (0.0, 0.15, -0.15, 0.3, -0.3):
+            s = spot.s + shift - w / 2
+            free = face.free_m(
+                s - _APART_M / 2, s + w + _APART_M / 2, bottom - 0.06, bottom + h + _CEILING_M
+            )
+            if free >= IN_FRONT_M:
+                return group, s, bottom
+    return None
+
+
+def _drawn(rng: np.random.Generator, width: float, left: int) -> Group:
+    """A group about so wide of at most `left` pictures; sides of 20 to 110 cm."""
+    gap = float(rng.uniform(0.05, 0.08))
+    kind = rng.random()
+    if width > 0.75 and left >= 4 and kind < 0.15:
+        w = min((width - gap) / 2, 0.5)
+        h = w * float(rng.choice([1.0, 1.3]))
+        cells = [(x, y, w, h) for y in (0.0, h + gap) for x in (0.0, w + gap)]
+        return Group(tuple(cells))
+    if width > 0.8 and left >= 3 and kind < 0.38:
+        w = min((width - 2 * gap) / 3, 0.5)
+        h = w * float(rng.choice([1.0, 1.25, 1.41]))
+        return Group(tuple((k * (w + gap), 0.0, w, h) for k in range(3)))
+    if width > 0.55 and left >= 2 and kind < 0.6:
+        w = min((width - gap) / 2, 0.6)
+        h = w * float(rng.choice([1.0, 1.3, 1.41]))
+        return Group(tuple((k * (w + gap), 0.0, w, min(h, 0.95)) for k in range(2)))
+    w = min(max(width, 0.22), 1.05)
+    shapes = [0.7, 0.75, 1.0] if w > 0.7 else [1.0, 1.3, 1.41]
+    h = float(np.clip(w * float(rng.choice(shapes)), 0.2, 1.0))
+    return Group(((0.0, 0.0, w, h),))
+
+
+def _hang_group(
+    rng: np.random.Generator, hanging: Hanging, spot: Spot, group: tuple[Group, float, float],
+    gallery: Gallery, style: Style, frame: Material,
+) -> None:  # fmt: skip
+    pictures, left, bottom = group
+    # What hangs together is framed alike.
+    kind = str(rng.choice(["framed", "canvas", "poster"], p=[0.68, 0.22, 0.1]))
+    own = int(rng.integers(1 << 30))
+    for x, y, w, h in pictures.frames:
+        piece, shape = _picture(np.random.default_rng(own), kind, (w, h), gallery, style, frame)
+        middle = left + x + w / 2
+        hanging.hang(piece, shape, spot.face, middle, bottom + y, margin_m=0.0)
+    w, h = pictures.size
+    face = hanging.faces[spot.face]
+    hanging.faces[spot.face] = face.taken(
+        left - 0.1, left + w + 0.1, bottom - 0.1, bottom + h + 0.1
+    )
+
+
+def _picture(
+    rng: np.random.Generator, kind: str, size: tuple[float, float], gallery: Gallery, style: Style,
+    frame: Material,
+) -> Made:  # fmt: skip
+    width, height = size
+    texture, mean = gallery.print_for(width / height)
+    if kind == "canvas":
+        return canvas(width, height, texture, mean)
+    if kind == "poster":
+        return poster(width, height, texture)
+    return framed(rng, style, width, height, texture, frame)
+
+
+def rooms_with_walls(space: HouseSpace) -> list[RoomSpace]:
+    """The rooms that have a face to hang something on."""
+    return [room for room in space.rooms if room.faces and room.kind is not RoomKind.OUTDOOR]

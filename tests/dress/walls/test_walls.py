@@ -1,0 +1,156 @@
+"""What hangs on walls: where, how it is made, and that a seed decides it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.catalogue import EMPTY, Catalogue
+from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind
+from pbrs_farm.core.mesh import signed_volume, triangle_corners
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
+from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.walls import frames, walls
+from pbrs_farm.dress.walls.prints import FAMILIES, palette_of, print_pixels
+from tests.builders import builtin_home
+
+
+def _style(seed: int = 1) -> Style:
+    return style_for(np.random.default_rng(seed))
+
+
+def _dressed(seed: int, share: float = 1.0, catalogue: Catalogue = EMPTY) -> Draft:
+    draft = Draft(builtin_home(), seed)
+    walls(draft, catalogue, _style(seed), share)
+    return draft
+
+
+def _added(draft: Draft) -> list[Item]:
+    return draft.items[len(draft.source.items) :]
+
+
+def _face_of(item: Item, space: HouseSpace) -> WallFace:
+    """The face whose plane the item's back is nearest to, of those that it turns its back to."""
+    points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
+    faces = [f for r in space.rooms if r.room.id == item.room_id for f in r.faces]
+    return min(faces, key=lambda f: abs(float(f.out_of(points).min())))
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_things_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
+    draft = _dressed(seed)
+    space = house_space(Draft(builtin_home(), 1))
+    assert _added(draft)
+    for item in _added(draft):
+        points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
+        out = _face_of(item, space).out_of(points)
+        assert 0.0005 <= out.min() <= 0.001, item.name
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_nothing_hangs_over_an_opening_or_above_the_ceiling(seed: int) -> None:
+    draft = _dressed(seed)
+    space = house_space(Draft(builtin_home(), 1))
+    for item in _added(draft):
+        low, high = item.bounds
+        assert low[1] > 0.0
+        assert high[1] < 2.5
+        for hole in space.passages:
+            box = [hole.centre - 0.3 * hole.normal, hole.centre + 0.3 * hole.normal]
+            box += [hole.centre - hole.along * hole.width / 2, hole.centre + hole.along * hole.width / 2]  # fmt: skip
+            a, b = np.min(box, 0), np.max(box, 0)
+            a[1], b[1] = hole.bottom_y, hole.top_y
+            assert (low >= b).any() or (high <= a).any(), (item.name, hole.id)
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_things_keep_clear_of_furniture_and_of_each_other(seed: int) -> None:
+    draft = _dressed(seed)
+    space = house_space(draft)
+    added = range(len(draft.source.items), len(draft.items))
+    for n in added:
+        low, high = space.bounds[n]
+        for m, other in enumerate(draft.items):
+            if m != n and len(space.points[m]) and other.kind is not ItemKind.DOOR:
+                inside = ((space.points[m] > low) & (space.points[m] < high)).all(1)
+                assert not inside.any(), (draft.items[n].name, other.name)
+
+
+def test_a_home_gets_pictures_and_every_thing_its_class_source_and_seed() -> None:
+    draft = _dressed(3)
+    classes = [i.nyu40 for i in _added(draft)]
+    assert classes.count(frames.PICTURE) >= 2
+    for item in _added(draft):
+        assert item.nyu40 in (frames.PICTURE, frames.MIRROR, frames.SHELVES, frames.OTHER_PROP)
+        assert item.tags[:2] == (f"dressed:{item.source_class}", "seed:3")
+        assert item.room_id in ("0_0", "0_1")
+    ids = [i.id for i in _added(draft)]
+    assert len(set(ids)) == len(ids)
+
+
+def test_a_seed_decides_every_bit() -> None:
+    a, b, c = _dressed(4), _dressed(4), _dressed(5)
+    assert [i.id for i in a.items] == [i.id for i in b.items]
+    assert a.textures.keys() == b.textures.keys()
+    for x, y in zip(_added(a), _added(b), strict=True):
+        for s, t in zip(x.surfaces, y.surfaces, strict=True):
+            assert np.array_equal(s.positions, t.positions)
+    assert a.textures.keys() != c.textures.keys()
+
+
+def test_no_share_hangs_nothing() -> None:
+    assert not _added(_dressed(1, 0.0))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_family_of_prints_shows_something(family: str) -> None:
+    rng = np.random.default_rng(7)
+    picture = FAMILIES[family](rng, (120, 160), palette_of(rng, _style()))
+    assert picture.shape == (160, 120, 3)
+    assert np.isfinite(picture).all()
+    assert picture.std() > 0.02
+
+
+def test_prints_have_the_shape_that_is_asked_for() -> None:
+    pixels, _family = print_pixels(np.random.default_rng(1), 0.7, _style())
+    assert pixels.dtype == np.uint8
+    assert pixels.shape[1] / pixels.shape[0] == pytest.approx(0.7, abs=0.01)
+
+
+def test_a_framed_print_shows_its_picture_upright_and_its_faces_outward() -> None:
+    texture = frames.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
+    rng = np.random.default_rng(2)
+    piece, shape = frames.framed(rng, _style(), 0.5, 0.7, texture, Material("frame"))
+    assert piece.size[0] == pytest.approx(0.5)
+    assert piece.size[2] == pytest.approx(0.7)
+    shown = next(s for s in shape.surfaces if shape.materials[s.material].texture_id)
+    top = shown.positions[:, 1] == shown.positions[:, 1].max()
+    right = shown.positions[:, 0] == shown.positions[:, 0].max()
+    assert shown.uvs is not None
+    assert (shown.uvs[top, 1] == 1).all()
+    assert (shown.uvs[right, 0] == 1).all()
+    assert shape.bounds[0, 2] == 0.0
+    for surface in shape.surfaces:
+        if surface.name == "frame":
+            assert (
+                signed_volume(triangle_corners(surface.positions, surface.faces), np.zeros(3)) > 0
+            )
+
+
+def test_a_round_thing_looks_away_from_the_wall() -> None:
+    dial = frames.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
+    for _piece, shape in (
+        frames.clock(0.3, dial, Material("rim")),
+        frames.round_mirror(0.5, Material("rim")),
+    ):
+        front = shape.surfaces[1]
+        assert front.normals is not None
+        assert front.normals[:, 2].min() > 0.99
+        assert shape.bounds[0, 1] == pytest.approx(0, abs=1e-6)
+        assert shape.bounds[0, 2] == pytest.approx(0, abs=1e-6)
+
+
+def test_a_mirror_is_a_mirror() -> None:
+    _piece, shape = frames.mirror(0.5, 0.8, None)
+    assert any(m.kind is MaterialKind.MIRROR for m in shape.materials)
