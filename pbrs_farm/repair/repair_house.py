@@ -12,13 +12,13 @@ from pbrs_farm.core.house import Enclosure, House, Note, Room
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.cleaning import with_sound_faces, with_white_walls, without_persons_and_plants
 from pbrs_farm.repair.lamps.bulbs import with_bulbs
-from pbrs_farm.repair.lamps.room_lighting import with_room_lighting
+from pbrs_farm.repair.lamps.room_lighting import GivenLights, with_room_lighting
 from pbrs_farm.repair.lamps.shades import with_shades
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
 from pbrs_farm.repair.measure.leaks import leaks_of_house
 from pbrs_farm.repair.measure.occluder import Occluder
-from pbrs_farm.repair.repair_report import RepairReport, RoomAudit, StructureReport
+from pbrs_farm.repair.repair_report import RepairReport, RoomAudit, SourceRepair, StructureReport
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.flush_frames import with_frames_apart
 from pbrs_farm.repair.structure.watertight import repaired_structure, with_structure
@@ -46,13 +46,7 @@ def repair(
     house = replace(house, notes=(*house.notes, *_lost(structure.report)))
     house, n_apart = with_frames_apart(house)
 
-    # Give every lamp a bulb, every dim lamp a translucent shade, rooms without one a lamp.
-    house, sources = with_bulbs(house, fields)
-    if occluder_from is not None:
-        house, sources = with_shades(house, sources, fields, occluder_from)
-    house, given = with_room_lighting(
-        house, fallback=fields.fallback_light, in_every_room=fields.lamp_in_every_room
-    )
+    house, sources, given = _with_light(house, fields, occluder_from)
 
     # Say which rooms are closed, and let rays look for leaks in them.
     house = replace(house, rooms=_with_enclosure(house.rooms, structure.spaces), is_repaired=True)
@@ -77,6 +71,19 @@ def repair(
         furniture=furniture_audit(house),
     )
     return house, report
+
+
+def _with_light(
+    house: House, fields: RepairFields, occluder_from: Callable[[House], Occluder] | None
+) -> tuple[House, list[SourceRepair], GivenLights]:
+    """Give every lamp a bulb, every dim lamp a translucent shade, rooms without one a lamp."""
+    house, sources = with_bulbs(house, fields)
+    if occluder_from is not None:
+        house, sources = with_shades(house, sources, fields, occluder_from)
+    house, given = with_room_lighting(
+        house, fallback=fields.fallback_light, in_every_room=fields.lamp_in_every_room
+    )
+    return house, sources, given
 
 
 def _lost(report: StructureReport) -> list[Note]:

@@ -66,6 +66,7 @@ class PhotoSampler:
 
     def room_candidates(self, room: Room) -> RoomCandidates:
         """Every candidate of a room, rejected by a rule or scored."""
+        # Reject by position first, and look at what is left through small pictures.
         f = self.fields
         names = (self.seed, self.house.id, room.id)
         candidates = grid_candidates(room_grid(room), f, names)
@@ -90,6 +91,7 @@ class PhotoSampler:
         Sectors take turns by their best score, over all rooms, so that of two twins the better
         one stays.
         """
+        # Let every sector that has a candidate take its turn, the best first.
         turns = [
             (-scored.score[ranked[0]], scored, sector)
             for scored in rooms
@@ -97,6 +99,7 @@ class PhotoSampler:
             if len(ranked := scored.ranked(sector))
         ]
         turns.sort(key=lambda turn: turn[0])
+        # Give each its views, compared with those of all rooms that are taken already.
         taken: list[tuple[Camera, NDArray[np.float32]]] = []
         chosen: dict[tuple[str, int], list[int]] = {}
         with_view: set[str] = set()
@@ -122,6 +125,7 @@ class PhotoSampler:
         if is_first and scored.score[ranked[0]] >= f.min_room_score:
             weak[0] = False
         scored.verdict[ranked[weak]] = Verdict.WEAK
+        # Try the others from the best down; leave out what a view taken before shows.
         small = self._intrinsics(*DEPTH_SIZE)
         for number in ranked[~weak][: _TRIES * f.per_sector].tolist():
             camera = scored.candidates.cameras(np.array([number]), small)[0]
@@ -138,6 +142,7 @@ class PhotoSampler:
 
     def views(self, scored: RoomCandidates, sector: int, chosen: list[int]) -> list[View]:
         """The chosen candidates of a sector as views, at the scoring size."""
+        # Count the pixels of furniture again at the size that scores are stored for.
         f = self.fields
         full = self._intrinsics(f.score_width_px, f.score_height_px)
         cameras = scored.candidates.cameras(np.array(chosen, np.intp), full)
@@ -176,6 +181,7 @@ class PhotoSampler:
 def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) -> SectorReport:
     """How many candidates of a sector each rule rejected, and its view."""
     verdict = scored.verdict[scored.candidates.sector == sector]
+    # Count by the first rule that rejected; name the commonest where no view is left.
     tally = collections.Counter(verdict.tolist())
     refused = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
     ranked = scored.ranked(sector)

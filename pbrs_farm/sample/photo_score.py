@@ -13,21 +13,24 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.classes import NYU13_FROM_NYU40
+from pbrs_farm.core.classes import DOOR, NYU13_FROM_NYU40, NYU40_NAMES, WINDOW
 from pbrs_farm.core.house import House, Item, ItemKind
 
-BLINDS, CURTAIN, OTHER_STRUCTURE = 13, 16, 38
-DOOR, WINDOW = 8, 9
+# NYU40 classes of what hangs at openings or is built in: no furniture.
+NO_FURNITURE: Final = tuple(map(NYU40_NAMES.index, ("blinds", "curtain", "otherstructure")))
 
+# Shares of the picture above which furniture and floor earn nothing more.
 MOST_FURNITURE: Final = 0.45
-"""More of the picture than this earns nothing more."""
-
+MOST_FLOOR: Final = 0.08
+# What each object and class earns, and how many do.
 OBJECT_WORTH, MOST_OBJECTS = 0.05, 8
 CLASS_WORTH, MOST_CLASSES = 0.06, 8
+LEAST_CLASS_SHARE: Final = 0.005  # of the picture, that a class is seen at all
+# Shares from which doors and windows, one piece, one wall cost.
 MOST_OPENING, OPENING_COST = 0.10, 1.5
-MOST_OF_ONE, MOST_OF_A_WALL, MOST_FLOOR = 0.30, 0.50, 0.08
+MOST_OF_ONE, MOST_OF_A_WALL = 0.30, 0.50
+# The median depth that costs nothing, and what a metre out of it costs.
 NEAR_M, FAR_M, NEAR_COST, FAR_COST = 1.6, 4.5, 0.5, 0.1
-LEAST_CLASS_SHARE: Final = 0.005
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,11 +85,13 @@ def photo_shares(
     counts: (N, n_items + 1) pixels of each instance. depth_m: (N, K) planar depth at K pixels
     spread over the picture, 0 = nothing. least: the share of the picture that makes an object.
     """
+    # Turn pixels into shares, of instances and of classes.
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
     share = counts / pixels[:, None]
     classes = np.zeros((len(counts), 14))
     for k in range(1, 14):
         classes[:, k] = share[:, roles.nyu13 == k].sum(1)
+    # Take the median depth of what is not nothing; a picture of nothing has 0.
     seen = np.where(depth_m > 0, depth_m, np.nan)
     median = np.zeros(len(counts))
     some = np.isfinite(seen).any(1)
@@ -105,13 +110,16 @@ def photo_shares(
 
 def photo_score(seen: PhotoShares) -> NDArray[np.float64]:
     """(N,) score: furniture, things and classes count; doors, close-ups and bare walls cost."""
+    # Reward what people photograph, up to what is enough.
     score = np.minimum(seen.furniture, MOST_FURNITURE)
     score += OBJECT_WORTH * np.minimum(seen.n_objects, MOST_OBJECTS)
     score += CLASS_WORTH * np.minimum(seen.n_classes, MOST_CLASSES)
     score += np.minimum(seen.floor, MOST_FLOOR)
+    # Charge what fills a picture without telling of the room.
     score -= OPENING_COST * np.maximum(seen.opening - MOST_OPENING, 0)
     score -= np.maximum(seen.largest - MOST_OF_ONE, 0)
     score -= np.maximum(seen.wall - MOST_OF_A_WALL, 0)
+    # Prefer the distance across a room.
     score -= NEAR_COST * np.maximum(NEAR_M - seen.median_m, 0)
     score -= FAR_COST * np.maximum(seen.median_m - FAR_M, 0)
     return score
@@ -123,7 +131,7 @@ def _is_opening(item: Item) -> bool:
 
 def _is_furniture(item: Item) -> bool:
     built_in = item.kind.is_structure or item.kind is ItemKind.STAIRS
-    return not (built_in or _is_opening(item) or item.nyu40 in (BLINDS, CURTAIN, OTHER_STRUCTURE))
+    return not (built_in or _is_opening(item) or item.nyu40 in NO_FURNITURE)
 
 
 def _flags(values: list[bool]) -> NDArray[np.bool_]:

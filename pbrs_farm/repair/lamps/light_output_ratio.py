@@ -123,12 +123,8 @@ def light_output_of_source(
 
     shades: indices of parts that let light through, each time weakened by transmission.
     """
-    lamp = scene.house.items[item]
-    emitting = [lamp.surfaces[k] for k in lamp.lights[source].emitting]
     rng = np.random.default_rng([item, source])
-    # Send the rays from the bulb where it stands in the scene.
-    origins, directions = diffuse_rays(emitting, N_RAYS, rng)
-    origins += scene.offset_of[item]
+    origins, directions = _rays_of_source(scene, item, source, rng)
     # The last row of both stands for the structure, which is _STRUCTURE = -1.
     blocked = np.zeros(len(scene.parts) + 1)
     is_shade = np.zeros(len(scene.parts) + 1, np.bool_)
@@ -169,6 +165,16 @@ def light_output_of_source(
         directions, weight = directions[going], weight[going]
         origins = points[going] + 1e-4 * directions  # off the face just met
     return LightOutput(ratio, blocked[:-1])
+
+
+def _rays_of_source(
+    scene: LampScene, item: int, source: int, rng: np.random.Generator
+) -> tuple[F64, F64]:
+    """Rays from a source's bulb where it stands in the scene."""
+    lamp = scene.house.items[item]
+    emitting = [lamp.surfaces[k] for k in lamp.lights[source].emitting]
+    origins, directions = diffuse_rays(emitting, N_RAYS, rng)
+    return origins + scene.offset_of[item], directions
 
 
 def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) -> tuple[F64, F64]:
