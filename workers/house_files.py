@@ -9,16 +9,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from pbrs_farm.assets import homes
-from pbrs_farm.assets.debian import cache_folder
+from pbrs_farm.assets import furniture, homes
+from pbrs_farm.assets.debian import cache_folder, write_whole
+from pbrs_farm.core import keys
+from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, home_id, resolve, variants
+from pbrs_farm.run.dress_catalogue import GENERATED, has_furniture
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store.object_store import Store
 from workers.job import HouseEntry
 
 # Where sources lie in the store.
 FOLDER: Final = "jobs/sources/"
+_LIBRARIES: Final = f"{FOLDER}libraries/"  # the user's own, to dress with
 # Formats that are one file.
 _UPLOADED: Final = (".sh3d", ".xml", ".zip", ".glb")
 
@@ -80,19 +84,69 @@ def placed_reference(path: Path) -> tuple[str, bytes]:
     return f"{FOLDER}references/{reference.digest}.npz", bytes_from_reference(reference)
 
 
-def fill_cache(store: Store) -> None:
-    """On a worker: take the example homes' package from the store when it is not cached here."""
-    if homes.cached() is not None:
-        return
-    for key in store.list(FOLDER):
+def upload_catalogue(store: Store, recipe: Recipe) -> Recipe:
+    """Put into the store what dressing by a recipe needs, and the recipe that names it there.
+
+    The furniture package goes there where it is cached; else workers fetch it themselves. A folder
+    of models stays where it is: workers must see it at the same path. Raises BadInput for a
+    library that is none.
+    """
+    from pbrs_farm.run.dressed_house import catalogue_of
+
+    catalogue_of(recipe.dress)
+    if GENERATED not in recipe.dress.catalogue.split(":"):
+        _upload_package(store, furniture.PACKAGE)
+    placed = placed_catalogue(recipe.dress.catalogue)
+    for key, path in placed.items():
+        if key != path:
+            store.put_if_absent(key, Path(path).read_bytes())
+    return with_catalogue(recipe, ":".join(placed))
+
+
+def placed_catalogue(words: str) -> dict[str, str]:
+    """The words of dress.catalogue as workers find them -> as they were given."""
+    placed = {}
+    for word in filter(None, words.split(":")):
+        path = Path(word)
+        if path.is_file():
+            digest = keys.sha256(path.read_bytes())
+            placed[f"{_LIBRARIES}{digest[:16]}/{_key_name(path.name)}"] = word
+        else:
+            placed[word] = word
+    return placed
+
+
+def with_catalogue(recipe: Recipe, words: str) -> Recipe:
+    """The recipe with another dress.catalogue."""
+    fields = recipe.dress.model_copy(update={"catalogue": words})
+    return recipe.model_copy(update={"dress": fields})
+
+
+def local_catalogue(store: Store, recipe: Recipe) -> Recipe:
+    """On a worker: the recipe with libraries of the store as files of this machine's cache."""
+    words = []
+    for word in filter(None, recipe.dress.catalogue.split(":")):
+        path = cache_folder() / "libraries" / word.removeprefix(_LIBRARIES)
+        if word.startswith(_LIBRARIES) and not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, store.get(word))
+        words.append(str(path) if word.startswith(_LIBRARIES) else word)
+    return with_catalogue(recipe, ":".join(words))
+
+
+def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
+    """On a worker: take packages from the store that are not cached here.
+
+    The example homes' package, and the furniture's where a house is dressed.
+    """
+    wanted = [homes.PACKAGE] if homes.cached() is None else []
+    if with_furniture and not has_furniture():
+        wanted.append(furniture.PACKAGE)
+    for key in store.list(FOLDER) if wanted else ():
         name = key.removeprefix(FOLDER)
-        if name.startswith(f"{homes.PACKAGE}_") and name.endswith(".deb"):
-            folder = cache_folder()
-            folder.mkdir(parents=True, exist_ok=True)
-            # It appears whole or not at all.
-            part = folder / f".{name}.part"
-            part.write_bytes(store.get(key))
-            part.replace(folder / name)
+        if name.endswith(".deb") and name.partition("_")[0] in wanted:
+            cache_folder().mkdir(parents=True, exist_ok=True)
+            write_whole(cache_folder() / name, store.get(key))
 
 
 def _expanded(word: str) -> list[str]:

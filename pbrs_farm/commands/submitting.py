@@ -55,6 +55,7 @@ def _submit(args: argparse.Namespace) -> int:
         is_left_in_place,
         placed_reference,
         upload,
+        upload_catalogue,
     )
 
     spec = _spec(args)
@@ -80,6 +81,9 @@ def _submit(args: argparse.Namespace) -> int:
     # Fail before anything is uploaded where Redis does not answer.
     farm = farm_of(args)
     farm.ledger.ping()
+    if any(seeds):
+        recipe = upload_catalogue(farm.store, spec.recipe)
+        spec = spec.model_copy(update={"recipe": recipe})
     upload(farm.store, [ref for _entry, ref in found])
     if reference[0]:
         farm.store.put_if_absent(*reference)

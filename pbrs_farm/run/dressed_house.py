@@ -5,7 +5,7 @@ Effects: reads the furniture package from the cache (or through apt) and the use
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue
@@ -17,6 +17,10 @@ from pbrs_farm.run.processes.verb_process import doing
 
 if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
+
+
+VERSION: Final = 1
+"""Of the stage: part of a dressed house's digest. Raised when it makes another house."""
 
 
 def seed_of(source: SourceRef, recipe: Recipe) -> int:
@@ -48,7 +52,7 @@ def dressing_digest(source: SourceRef, recipe: Recipe) -> str:
         return ""
     # Where the libraries lie is no matter: their content is.
     fields = recipe.dress.model_dump(mode="json", exclude={"seed", "catalogue"})
-    return keys.digest(seed, fields, catalogue_of(recipe.dress).digest)
+    return keys.digest(VERSION, seed, fields, catalogue_of(recipe.dress).digest)
 
 
 def fetch_catalogue(fields: DressFields) -> Catalogue:

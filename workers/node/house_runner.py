@@ -17,6 +17,7 @@ from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
+from pbrs_farm.run.dressed_house import fetch_catalogue, seed_of
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
 from pbrs_farm.run.plan import Wanted, view_steps, wanted
@@ -26,7 +27,7 @@ from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
-from workers.house_files import FOLDER, fill_cache, is_left_in_place
+from workers.house_files import FOLDER, fill_cache, is_left_in_place, local_catalogue
 from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
 from workers.job import JobSpec
 from workers.node.merge_manifests import merge_job, merge_shard
@@ -93,11 +94,19 @@ class HouseRunner:
         return Survey(batches=batches, missing=units, reduced=finished and has_manifest)
 
     def _geometry(self, request: Request, spec: JobSpec, on_step: OnText) -> Result:
-        fill_cache(self._store)
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
+            is_dressed = bool(seed_of(source, spec.recipe))
+            fill_cache(self._store, with_furniture=is_dressed)
+            here = spec
+            if is_dressed:
+                # Look for the furniture before the house is read: another worker may have it.
+                recipe = local_catalogue(self._store, spec.recipe)
+                fetch_catalogue(recipe.dress)
+                here = spec.model_copy(update={"recipe": recipe})
             for step in _steps_before_views(spec, request.house):
-                self._step(request, spec, on_step, step, source=source)
+                at = here if step == "house" else spec
+                self._step(request, at, on_step, step, source=source)
         return Result(batches=self._batches(spec, request.house))
 
     def _pack_histograms(self, house: str, spec: JobSpec, on_step: OnText) -> None:
