@@ -37,11 +37,11 @@ class ProgressReporter(ABC):
     def __call__(self, event: Event) -> None: ...
 
 
-def progress_reporter(n_homes: int, n_views: int, *, as_json: bool) -> ProgressReporter:
-    """The reporter that fits standard output. n_views: the limit of views a house, 0 = none."""
+def progress_reporter(n_homes: int, *, as_json: bool) -> ProgressReporter:
+    """The reporter that fits standard output."""
     if as_json:
         return _JsonLines()
-    return _Bars(n_homes, n_views) if sys.stdout.isatty() else _PlainLines()
+    return _Bars(n_homes) if sys.stdout.isatty() else _PlainLines()
 
 
 def _name(event: Event) -> str:
@@ -66,6 +66,8 @@ class _JsonLines(ProgressReporter):
         }
         if event.message:
             row["message"] = event.message
+        if event.kind == "planned":
+            row["views"] = event.facts["views"]
         _write_line(json.dumps(row))
 
 
@@ -109,8 +111,7 @@ def _facts(event: Event) -> str:
 class _Bars(ProgressReporter):
     """A bar for houses and one for views, with rate and time left."""
 
-    def __init__(self, n_homes: int, n_views: int) -> None:
-        self._limit = n_views  # of views a house, 0 = none
+    def __init__(self, n_homes: int) -> None:
         self._progress = Progress(
             TextColumn("{task.description:<7}"),
             BarColumn(),
@@ -122,7 +123,7 @@ class _Bars(ProgressReporter):
         )
         self._houses = self._progress.add_task("houses", total=n_homes, note="")
         self._views = self._progress.add_task("views", total=None, note="")
-        self._n_views = 0  # of all houses whose cameras are known
+        self._n_views = 0  # of all houses whose views are known
         self._n_ended = 0
         self._started = 0.0  # when the first view ended; 0 = not yet
 
@@ -143,10 +144,8 @@ class _Bars(ProgressReporter):
         elif event.kind == "begin":
             note = f"{_name(event)} {event.step}"
             self._progress.update(self._views, note=f"{self._rate()}  {note}")
-        elif event.step == "cameras" and event.kind in ("done", "kept"):
-            n = len(event.facts.get("views", []))
-            # The number of views is known once the cameras are.
-            self._n_views += min(n, self._limit) if self._limit else n
+        elif event.kind == "planned":
+            self._n_views += len(event.facts["views"])
             self._progress.update(self._views, total=self._n_views)
         elif event.kind == "end" and event.view_id is None:
             self._progress.advance(self._houses)

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -31,7 +31,9 @@ _POLL_S: Final = 0.1
 class Ended:
     """How a command ended. code: negative for a signal. killed: "time" or "memory" by our guard.
 
-    seconds: of the clock, less those its processes were ready and no processor was free.
+    seconds: of the clock, less those that the command and the one of its processes that waited
+    longest were ready and no processor was free. cpu_s, peak_mb: of all its processes, the render
+    processes with sessions of their own too: their sum, and the largest.
     """
 
     code: int
@@ -57,22 +59,25 @@ def watch(words: Sequence[str], limit_s: float = LIMIT_S) -> Ended:
         )
         peak_mb, cpu_s, seconds, killed = 0.0, 0.0, 0.0, ""
         delays: dict[int, float] = {}
+        sessions = {str(process.pid)}
         while process.poll() is None:
-            found = _session(process.pid)
+            found = _family(sessions)
             peak_mb = max([peak_mb, *(_high_water_mb(pid) for pid in found)])
             cpu_s = max(cpu_s, sum(_cpu_s(pid) for pid in found))
-            delays |= {pid: _delay_s(pid) for pid in found}
-            seconds = time.monotonic() - started - sum(delays.values())
+            delays |= {pid: max(_delay_s(pid), delays.get(pid, 0.0)) for pid in found}
+            others = (d for pid, d in delays.items() if pid != process.pid)
+            waited = delays.get(process.pid, 0.0) + max(others, default=0.0)
+            seconds = time.monotonic() - started - waited
             if seconds > limit_s:
                 killed = "time"
             elif peak_mb > LIMIT_MB:
                 killed = "memory"
             if killed:
-                _kill(process.pid)
+                _kill(found)
                 break
             time.sleep(_POLL_S)
         code = process.wait()
-        _kill(process.pid)  # whatever it left behind
+        _kill(_family(sessions))  # whatever it left behind
         output.seek(0)
         text = output.read(4_000_000).decode("utf-8", "replace")
     return Ended(code, text, seconds, cpu_s, peak_mb, killed)
@@ -83,15 +88,22 @@ def _limit() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _session(leader: int) -> list[int]:
-    """The processes of a session: a command and all it started."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            fields = _stat(int(entry.name))
-            if len(fields) > 3 and fields[3] == str(leader):
-                found.append(int(entry.name))
-    return found
+def _family(sessions: set[str]) -> list[int]:
+    """The processes of a command's sessions, to which those are added that its processes began."""
+    rows = {int(e.name): _stat(int(e.name)) for e in Path("/proc").iterdir() if e.name.isdigit()}
+    rows = {pid: fields for pid, fields in rows.items() if len(fields) > 3}
+    family: set[int] = set()
+    # A process belongs to it by its parent or its session; go on until nothing is added.
+    while True:
+        more = {
+            pid
+            for pid, fields in rows.items()
+            if pid not in family and (int(fields[1]) in family or fields[3] in sessions)
+        }
+        if not more:
+            return sorted(family)
+        family |= more
+        sessions.update(rows[pid][3] for pid in more)
 
 
 def _stat(pid: int) -> list[str]:
@@ -103,8 +115,9 @@ def _stat(pid: int) -> list[str]:
 
 
 def _cpu_s(pid: int) -> float:
+    # Its own time, and that of its children that have ended.
     fields = _stat(pid)
-    return sum(int(x) for x in fields[11:13]) / os.sysconf("SC_CLK_TCK") if fields else 0.0
+    return sum(int(x) for x in fields[11:15]) / os.sysconf("SC_CLK_TCK") if fields else 0.0
 
 
 def _delay_s(pid: int) -> float:
@@ -125,8 +138,8 @@ def _high_water_mb(pid: int) -> float:
     return int(row.split()[1]) * 1024 / 1e6
 
 
-def _kill(leader: int) -> None:
-    """Kill every process of a session that we started."""
-    for pid in _session(leader):
+def _kill(processes: Iterable[int]) -> None:
+    """Kill processes that we started."""
+    for pid in processes:
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)

@@ -193,7 +193,9 @@ def _write_map(path: Path, house: House, sampling: Sampling) -> None:
     from pbrs_farm.sample.camera_map import camera_map_rgb, camera_map_svg
     from pbrs_farm.store.folder import FolderStore
 
-    folder, name = FolderStore(path.parent), path.stem
+    # Take the ending off where it says what is written; other dots are part of the name.
+    name = path.stem if path.suffix.lower() in (".png", ".svg") else path.name
+    folder = FolderStore(path.parent)
     folder.put(f"{name}.png", png_from_array(camera_map_rgb(house, sampling)))
     folder.put(f"{name}.svg", camera_map_svg(house, sampling).encode())
 

@@ -31,6 +31,7 @@ from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.recipe import recipe_from_json
 
 if TYPE_CHECKING:
+    from pbrs_farm.read.objects.model_folders import ObjectModel
     from pbrs_farm.read.source import SourceRef
     from pbrs_farm.run.local import Run
 
@@ -106,9 +107,15 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _run_homes(
-    args: argparse.Namespace, homes: list[str], sources: Sequence[SourceRef] = ()
+    args: argparse.Namespace,
+    homes: list[str],
+    sources: Sequence[SourceRef] = (),
+    refused: Sequence[tuple[str, str]] = (),
 ) -> int:
-    """Run the plan on homes and on sources that are known already; the exit code."""
+    """Run the plan on homes and on sources that are known already; the exit code.
+
+    refused: what was asked for and cannot be read, and why. A wall that repair lost is an error.
+    """
     from pbrs_farm.progress import progress_reporter
     from pbrs_farm.run.local import run_local
 
@@ -116,15 +123,15 @@ def _run_homes(
     at_least("--views", args.views, 0)
     at_least("--silence", args.silence, 0)
     at_least("--memory", args.memory, 0)
-    run = _described(args, homes, sources)
+    run = replace(_described(args, homes, sources), refused=refused)
     # Run it, reporting progress as standard output suits.
     _warn_of_slowness()
     started = time.monotonic()
     n_homes = (len(homes) + len(sources)) * max(1, len(run.dress_seeds))
-    with progress_reporter(n_homes, args.views, as_json=args.json) as report:
+    with progress_reporter(n_homes, as_json=args.json) as report:
         summary = run_local(run, report)
     _report(args, summary, time.monotonic() - started)
-    return 1 if summary.failures or summary.n_views == 0 else 0
+    return 1 if summary.failures or summary.walls_lost or summary.n_views == 0 else 0
 
 
 def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[SourceRef]) -> Run:
@@ -165,14 +172,17 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
     if args.json:
         echo(_summary_line(summary, seconds))
         return
+    lost = f"{counted(len(summary.walls_lost), 'wall')} LOST, " if summary.walls_lost else ""
     echo(
-        f"{counted(len(summary.houses), 'house')}, {counted(summary.n_views, 'view')}: "
+        f"{counted(len(summary.houses), 'house')}, {counted(summary.n_views, 'view')}: {lost}"
         f"{counted(summary.n_done, 'step')} done, "
         f"{summary.n_kept} already there, {len(summary.failures)} failed; "
         f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
     )
     for house, reason in summary.leaks:
         warn(f"{house}: LIGHT LEAKS IN: {reason}; see repair.json, or `pbrs-farm repair`")
+    for house, reason in summary.walls_lost:
+        warn(f"{house}: WALL LOST: {reason}; see repair.json, or `pbrs-farm repair`")
     for house, reason in summary.left_out:
         warn(f"{house}: {reason}")
     for view, reason in summary.dark:
@@ -202,7 +212,8 @@ def _summary_line(summary: Any, seconds: float) -> str:
         "without_views": [list(pair) for pair in summary.without_views],
         "left_out": [list(pair) for pair in summary.left_out],
         "dark": [list(pair) for pair in summary.dark], "failures": failures,
-        "leaks": [list(pair) for pair in summary.leaks], "notes": dict(summary.notes),
+        "leaks": [list(pair) for pair in summary.leaks],
+        "walls_lost": [list(pair) for pair in summary.walls_lost], "notes": dict(summary.notes),
     }  # fmt: skip
     return json.dumps(row)
 
@@ -264,7 +275,17 @@ def _objects(args: argparse.Namespace) -> int:
         raise BadInput("--count", str(args.count), "expected at least one model")
     categories = args.categories.split(",") if args.categories else []
     # Pick at random by the recipe's seed: the same models each time.
-    models = find_models(args.models)
+    models: dict[str, ObjectModel] = {}
+    refused = []
+    for path in args.models:
+        # A path without a model costs itself, unless it is the only one.
+        try:
+            models |= {model.id: model for model in find_models([path])}
+        except BadInput as error:
+            if len(args.models) == 1:
+                raise
+            refused.append((str(path), str(error)))
     files = SourceFiles()
-    chosen = pick_models(models, categories, args.count, recipe_of(args).seed)
-    return _run_homes(args, [], [object_source(model, files) for model in chosen])
+    chosen = pick_models(list(models.values()), categories, args.count, recipe_of(args).seed)
+    sources = [object_source(model, files) for model in chosen]
+    return _run_homes(args, [], sources, refused)

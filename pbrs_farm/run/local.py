@@ -49,6 +49,7 @@ class Run:
     store: StoreSettings = field(default_factory=StoreSettings)
     sources: Sequence[SourceRef] = ()  # homes that are resolved already
     dress_seeds: Sequence[int] = ()  # each home dressed by each of them; none = by the recipe's
+    refused: Sequence[tuple[str, str]] = ()  # what was asked for and cannot be read, and why
 
 
 @dataclass(slots=True)
@@ -64,6 +65,7 @@ class Summary:
     without_views: list[tuple[str, str]] = field(default_factory=list)  # house, why it has none
     left_out: list[tuple[str, str]] = field(default_factory=list)  # house, which views and why
     leaks: list[tuple[str, str]] = field(default_factory=list)  # house, rays that reached the sky
+    walls_lost: list[tuple[str, str]] = field(default_factory=list)  # house, walls repair lost
     notes: Counter[str] = field(default_factory=Counter)  # of the houses, by kind
     dark: list[tuple[str, str]] = field(default_factory=list)  # house/view, how dark it is
 
@@ -75,6 +77,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     """
     store = store_from_url(run.store_url, run.store)
     summary = Summary()
+    summary.failures += [(shown(what, MAX_PLACE), text, "") for what, text in run.refused]
     sources = _resolved(run, summary)
     if not sources:
         return summary
@@ -164,12 +167,7 @@ class _Schedule:
             summary.n_done += event.kind == "done"
             summary.n_kept += event.kind == "kept"
             if event.step == "house":
-                summary.houses.append(event.house_id)
-                summary.notes.update(event.facts.get("note_kinds", {}))
-                if "leaks" in event.facts:
-                    n_sky, n_rays = event.facts["leaks"]
-                    line = f"{n_sky} of {n_rays} rays from closed rooms reached the sky"
-                    summary.leaks.append((event.house_id, line))
+                self._take_house(event)
             if event.step == "cameras":
                 self._cameras[event.house_id] = event.facts
             if event.step == "illuminance":
@@ -187,6 +185,16 @@ class _Schedule:
             self._add_views(event.house_id, self._cameras.pop(event.house_id))
         self._observe(event)
 
+    def _take_house(self, event: Event) -> None:
+        summary, facts = self._summary, event.facts
+        summary.houses.append(event.house_id)
+        summary.notes.update(facts.get("note_kinds", {}))
+        if "leaks" in facts:
+            n_sky, n_rays = facts["leaks"]
+            line = f"{n_sky} of {n_rays} rays from closed rooms reached the sky"
+            summary.leaks.append((event.house_id, line))
+        summary.walls_lost += [(event.house_id, line) for line in facts.get("walls_lost", ())]
+
     def _add_views(self, house: str, facts: dict[str, Any]) -> None:
         want, source = self._run.want, self._sources[house]
         rows = [(str(v), str(room), float(score)) for v, room, score in facts["views"]]
@@ -198,6 +206,7 @@ class _Schedule:
             reason = reason or "; ".join(lines)
         views = plan.spread(rows, want.n_views)
         self._summary.n_views += len(views)
+        self._observe(Event("planned", house, None, "view", facts={"views": views}))
         if not views:
             self._summary.without_views.append((house, reason))
         # What needs illuminance would fail for the reason that illuminance has told already.

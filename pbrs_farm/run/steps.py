@@ -92,6 +92,8 @@ def _house(work: Work) -> StepOutput:
     facts["note_kinds"] = dict(Counter(note.kind for note in repaired.notes))
     if report.leaks is not None and report.leaks.n_sky:
         facts["leaks"] = [report.leaks.n_sky, report.leaks.n_rays]
+    if lost := [f"{n.place}: {n.text}" for n in repaired.notes if n.kind == "wall-lost"]:
+        facts["walls_lost"] = lost
     return StepOutput(files, facts)
 
 

@@ -13,9 +13,13 @@ import pytest
 from pbrs_farm import doctor, images
 from pbrs_farm.assets import homes
 from pbrs_farm.cli import main
+from pbrs_farm.commands import explaining
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.house_bundle import house_from_bundle
+from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.sample.camera_report import CameraReport
+from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.store.folder import FolderStore
 from tests.example_homes import example_homes
 from tests.selection.histogram_sets import record
@@ -179,6 +183,17 @@ def test_cameras_writes_the_views_and_a_map(chosen):
     }  # fmt: skip
     assert len(written["views"]) == written["report"]["n_views"] > 0
     assert images.array_from_png((folder / "plan.png").read_bytes()).ndim == 3
+
+
+@pytest.mark.parametrize(
+    ("given", "name"), [("map_rel", "map_rel"), ("v1.2", "v1.2"), ("a.SVG", "a")]
+)
+def test_the_map_has_the_name_that_was_given(given, name, tmp_path):
+    report = CameraReport(
+        preset="photo", source="sampled", n_views=0, n_candidates=0, refused={}, rooms=()
+    )
+    explaining._write_map(tmp_path / given, builtin_home(), Sampling((), report, ()))
+    assert {p.name for p in tmp_path.iterdir() if p.is_file()} == {f"{name}.png", f"{name}.svg"}
 
 
 def test_cameras_prints_the_same_views_as_json(chosen, capsys):

@@ -10,6 +10,13 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.run.plan import STEPS
 from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, run_unless_done
 
+SPOILT = {
+    "note_kinds": {"missing-texture": 3, "wall-lost": 1},
+    "leaks": [833, 20_000],
+    "walls_lost": ["w3: repair left 0.5 of 24.0 m2 of it"],
+}
+"""Facts of a house that lost something."""
+
 
 def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
     """A step that writes its own name, unless the recipe's name says otherwise for it."""
@@ -32,6 +39,8 @@ def _make(name: str, work: Work) -> StepOutput:
         return StepOutput(
             {f"{name}.txt": b""}, {"floor_lux": {"0_0": {"outdoor": 0.3, "indoor": 0.0}}}
         )
+    if name == "house" and word == "spoilt":
+        return StepOutput({f"{name}.txt": b""}, dict(SPOILT))
     facts: dict[str, object] = {"dark": ["black"]} if name == "light" and word == "black" else {}
     facts |= {"views": [["0_0_0", "0_0", 2.0], ["0_0_1", "0_0", 1.0]]} if name == "cameras" else {}
     return StepOutput({f"{name}.txt": at.encode()}, facts)

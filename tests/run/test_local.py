@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from pbrs_farm.cli import main
 from pbrs_farm.commands import making
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run import local
 from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.plan import wanted
-from pbrs_farm.run.processes.render_task import Setting
+from pbrs_farm.run.processes.render_task import Event, Setting
 
 FAKE = "tests.run.fakes:run_step"
 N_STEPS = 3 + 2 * 6
@@ -118,6 +119,42 @@ def test_a_view_that_came_out_black_is_told(
     assert "0_0_1: dark: black" in capsys.readouterr().err
     # A second run finds them done and tells it again.
     assert len(run(tmp_path, "black").dark) == 2
+
+
+def test_leaks_notes_and_lost_walls_are_told_also_by_a_run_that_finds_them_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for _ in range(2):
+        making._report(
+            argparse.Namespace(json=False, out=str(tmp_path)), run(tmp_path, "spoilt"), 1.0
+        )
+        told = capsys.readouterr()
+        assert "LIGHT LEAKS IN: 833 of 20000 rays" in told.err
+        assert "WALL LOST: w3: repair left 0.5 of 24.0 m2 of it" in told.err
+        assert "2 views: 1 wall LOST, " in told.out
+        assert "4 notes (3 missing-texture, 1 wall-lost): `notes` in" in told.out.splitlines()[-1]
+
+
+@pytest.mark.parametrize(("name", "code"), [("spoilt", 1), ("plain", 0)])
+def test_a_lost_wall_is_an_error_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int
+) -> None:
+    monkeypatch.setattr(making, "recipe_of", lambda _args: named(name))
+    assert main(["run", "builtin", "--out", str(tmp_path / "out")]) == code
+    assert "truth.0_0_0" in markers(tmp_path / "out")
+
+
+def test_progress_counts_the_views_that_will_be_made(tmp_path: Path) -> None:
+    for name, views in (("dark", []), ("plain", ["0_0_0", "0_0_1"])):
+        events: list[Event] = []
+        run_local(Run(["builtin"], str(tmp_path / name), named(name)), events.append)
+        assert [e.facts["views"] for e in events if e.kind == "planned"] == [views]
+
+
+def test_what_was_refused_before_the_run_is_one_of_its_failures(tmp_path: Path) -> None:
+    summary = run(tmp_path, refused=[("bad.sh3f", "bad.sh3f: is no furniture library")])
+    assert summary.failures == [("bad.sh3f", "bad.sh3f: is no furniture library", "")]
+    assert summary.n_views == 2
 
 
 def test_a_bug_is_told_by_its_type_and_the_run_goes_on(tmp_path: Path) -> None:

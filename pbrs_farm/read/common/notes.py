@@ -12,7 +12,7 @@ from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
 HARMLESS: Final = frozenset(
     {
         "unmapped-class",  # the item is otherprop
-        "hidden-level",  # left out as the home's author chose (read.hidden_levels)
+        "hidden-level",  # left out as the home's author chose, or read though it was hidden
         "degenerate-faces",  # faces without area, which nobody could see
         "unknown-material",  # the surface has its format's default colour
         "unknown-type",  # a node that is no room, object, box or ground

@@ -237,16 +237,20 @@ def _mesh(
     if not len(index):
         return None, n_dropped
     points = pools[0]
-    # Use texture coordinates and normals where every corner has them.
-    has_uvs = bool((index[:, :, 1] >= 0).all())
+    # Use a face's texture coordinates where every corner has them; (0, 0) for the mesh's others.
+    uv_index, uv_pool = index[:, :, 1], pools[1]
+    is_textured: NDArray[np.bool_] = np.all(uv_index >= 0, axis=1)
+    has_uvs = bool(is_textured.any())
+    if has_uvs and not is_textured.all():
+        uv_index = np.where(is_textured[:, None], uv_index, len(uv_pool))
+        uv_pool = np.concatenate([uv_pool, np.zeros((1, 2))])
+    # Use normals where every corner has one.
     if (index[:, :, 2] >= 0).all():
         normal_pool, normal_index = pools[2], index[:, :, 2]
     else:
         crease = 0.0 if part.is_flat else DEFAULT_CREASE_RAD
         normal_pool, normal_index = crease_normals(points, index[:, :, 0], crease)
-    keys = np.stack(
-        [index[:, :, 0], index[:, :, 1] if has_uvs else 0 * normal_index, normal_index], -1
-    )
+    keys = np.stack([index[:, :, 0], uv_index if has_uvs else 0 * normal_index, normal_index], -1)
     # Make a vertex of each different (position, uv, normal).
     unique, faces = _unique_rows(keys.reshape(-1, 3))
     normals = normal_pool[unique[:, 2]]
@@ -256,7 +260,7 @@ def _mesh(
         part.material,
         points[unique[:, 0]],
         faces.reshape(-1, 3).astype(np.int32),
-        pools[1][unique[:, 1]] if has_uvs else None,
+        uv_pool[unique[:, 1]] if has_uvs else None,
         normals / np.where(length > 0, length, 1),
     )
     return mesh, n_dropped

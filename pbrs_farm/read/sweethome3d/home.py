@@ -50,8 +50,8 @@ def read_home(
     fields = fields or ReadFields()
     file = PurePath(name).name
     container = open_container(data, file, resources)
-    plan = _shown(parse_plan(container.root, file, fields.max_extent_m), fields)
     notes = Notes(file, strict=fields.strict)
+    plan = _shown(parse_plan(container.root, file, fields.max_extent_m), fields, notes)
     if package_note:
         notes.add("package-version", package, package_note)
     materials = HomeMaterials(container.contents, notes)
@@ -90,7 +90,7 @@ def _numbered(items: tuple[Item, ...], file: str) -> tuple[Item, ...]:
     return items
 
 
-def _shown(plan: Plan, fields: ReadFields) -> Plan:
+def _shown(plan: Plan, fields: ReadFields, notes: Notes) -> Plan:
     """The plan with hidden levels made visible: all if the recipe says so, else those between.
 
     A level between shown ones was hidden to draw, or to look below it: the rooms under it would
@@ -103,11 +103,18 @@ def _shown(plan: Plan, fields: ReadFields) -> Plan:
         apart = all(abs(x.elevation - y) > SAME_LEVEL_M for y in shown)
         return bool(shown) and min(shown) < x.elevation < max(shown) and apart
 
-    levels = [
-        replace(x, is_visible=x.is_visible or fields.hidden_levels or is_between(x))
-        for x in plan.levels
-    ]
+    levels = []
+    for level in plan.levels:
+        is_added = not level.is_visible and (fields.hidden_levels or is_between(level))
+        if is_added and not fields.hidden_levels:
+            text = "not visible, but between levels that are: read"
+            notes.add("hidden-level", _place_of(level), text)
+        levels.append(replace(level, is_visible=level.is_visible or is_added))
     return replace(plan, levels=tuple(levels))
+
+
+def _place_of(level: PlanLevel) -> str:
+    return f"level {level.id} '{level.name}'"
 
 
 def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:
@@ -124,8 +131,8 @@ def _house_levels(plan: Plan, notes: Notes) -> dict[str, str]:
     """The home's level id -> the House's; hidden levels are noted and left out."""
     for level in plan.levels:
         if not level.is_visible:
-            place = f"level {level.id} '{level.name}'"
-            notes.add("hidden-level", place, "not visible: left out (read.hidden_levels)")
+            text = "not visible: left out (read.hidden_levels)"
+            notes.add("hidden-level", _place_of(level), text)
     visible = [level for level in plan.levels if level.is_visible]
     return {level.id: str(k) for k, level in enumerate(visible)} | {"": "0"}
 

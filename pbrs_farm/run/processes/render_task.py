@@ -43,8 +43,9 @@ class Setting:
 class Event:
     """Something that happened to a step, or the end of a task."""
 
-    # done: made now; kept: was there already; end: of a task.
-    kind: Literal["begin", "done", "kept", "failed", "end"]
+    # done: made now; kept: was there already; end: of a task. planned: the views of a house that
+    # will be made, known once its cameras are and the dark ones left out.
+    kind: Literal["begin", "done", "kept", "failed", "end", "planned"]
     house_id: str
     view_id: str | None
     step: str

@@ -128,6 +128,13 @@ def test_a_bad_obj_is_refused_with_its_place(text: str, what: str) -> None:
         parse_obj(text.encode(), "m.obj")
 
 
+def test_faces_without_texture_coordinates_leave_those_of_the_others() -> None:
+    mesh = one(QUAD + "vt 0.5 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1 3 4\n")
+    assert mesh.uvs is not None
+    assert sorted(map(tuple, mesh.uvs[mesh.faces[0]].tolist())) == [(0.5, 0), (1, 0), (1, 1)]
+    assert not mesh.uvs[mesh.faces[1]].any()
+
+
 def test_a_texture_index_out_of_range_costs_only_the_texture() -> None:
     mesh = one(QUAD + "vt 0 0\nf 1/1 2/7 3/1\n")
     assert mesh.uvs is None

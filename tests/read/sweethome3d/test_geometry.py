@@ -164,6 +164,9 @@ def test_a_hidden_level_between_shown_ones_is_read() -> None:
     levels += "<level id='5' elevation='1310' floorThickness='12' height='250' visible='false'/>"
     house = read(levels, room=ROOM.replace("<room ", "<room level='0' "))
     assert [round(level.elevation, 2) for level in house.levels] == [0.0, 2.62, 5.24, 7.86]
+    notes = {n.place[:7]: n.text for n in house.notes if n.kind == "hidden-level"}
+    assert notes["level 1"] == "not visible, but between levels that are: read"
+    assert "left out" in notes["level 5"]
 
 
 def test_floors_look_up_and_ceilings_down_over_the_room_exactly() -> None:
