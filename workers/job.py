@@ -8,22 +8,21 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.record import Record
 from workers.ids import GL, LIGHT
 
 
-class HouseEntry(BaseModel):
+class HouseEntry(Record):
     """A house of a job."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     house_id: str
     source: str = ""  # JSON the runner understands; it travels to the geometry task only
     sha256: str = ""  # of the source: a house that changed since submission is noticed
 
 
-class JobRules(BaseModel):
+class JobRules(Record):
     """When to give up on a task, a house, a job."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     max_attempts: int = Field(3, ge=1)
     failed_share: float = Field(0.5, description="of a house's batches; more quarantines the house")
     max_quarantined: int = Field(20, ge=1, description="houses; fewer never pause a job")

@@ -12,19 +12,17 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Protocol
 
-from pydantic import BaseModel, ConfigDict
-
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.record import Record
 from workers.config import FarmConfig
 from workers.job import JobSpec
 
 OnText = Callable[[str], None]
 
 
-class Request(BaseModel):
+class Request(Record):
     """A task for the runner."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     job_id: str
     house: str
     unit: str
@@ -34,10 +32,9 @@ class Request(BaseModel):
     attempt: int = 1
 
 
-class Result(BaseModel):
+class Result(Record):
     """What came of a task."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     batches: tuple[tuple[str, ...], ...] = ()  # of views to be made, only after geometry
     n_views: int = 0
 

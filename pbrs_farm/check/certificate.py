@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
-
+from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
 
 MAX_LISTED = 20  # failures of one check that are listed by place; all are counted
 
 
-class Count(BaseModel):
+class Count(Record):
     """How one check ended."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     checked: int = 0  # pixels, files or facts that were looked at
     failed: int = 0
     ties: int = 0  # right by another of two right answers
 
 
-class Coincidence(BaseModel):
+class Coincidence(Record):
     """Surfaces of two items of a house in one place, within 0.1 mm: either is a right answer."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     house: str
     items: tuple[str, str]  # ids, in order; twice the same for an item's own surfaces
     pixels: int  # where the stored one is the other than the one that a ray met here
 
 
-class Certificate(BaseModel):
+class Certificate(Record):
     """The outcome of verify."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     folder: str
     all_pixels: bool
     n_houses: int

@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 import pyarrow.compute as pc
-from pydantic import BaseModel, ConfigDict
 
 from pbrs_farm.core.recipe import SelectionFields
+from pbrs_farm.core.record import Record
 from pbrs_farm.selection.binning import Binning, BinningRow
 from pbrs_farm.selection.reference_set import Reference
 from pbrs_farm.selection.verdicts import REASONS
@@ -20,19 +20,17 @@ PAPER_VIEWS: Final = 779_342
 PAPER_KEPT: Final = 568_793
 
 
-class KeptCount(BaseModel):
+class KeptCount(Record):
     """Views of one house or room type, and how many of them are kept."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     name: str
     views: int
     kept: int
 
 
-class ReferenceSummary(BaseModel):
+class ReferenceSummary(Record):
     """Which photographs the views were compared with, and how."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     source: str
     source_sha256: str
     digest: str
@@ -41,10 +39,9 @@ class ReferenceSummary(BaseModel):
     table: tuple[BinningRow, ...]
 
 
-class SelectionSummary(BaseModel):
+class SelectionSummary(Record):
     """selection.json: the counts of a run, and what they were made with."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     run: str
     fields: SelectionFields
     reference: ReferenceSummary

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field
 
+from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Credit(_Record):
+class Credit(Record):
     """A model or picture of a library that stands in the house, and on which terms."""
 
     id: str  # in the catalogue
@@ -24,7 +21,7 @@ class Credit(_Record):
     n: int  # how often
 
 
-class Gate(_Record):
+class Gate(Record):
     """A rule that a dressed house must keep, and what came of it."""
 
     name: str  # "penetration", "support", "doors", "windows", "path", "must_haves"
@@ -33,15 +30,21 @@ class Gate(_Record):
     n_left: int  # that break it in the house as it is now
 
 
-class DressReport(_Record):
+class DressReport(Record):
     """Everything that dressing did to a house, in counts and names."""
 
     house_id: str  # as dressed
     seed: int
     style: str = ""
-    added: dict[str, int] = {}  # `<part>: <group>` -> things that stand in the house now
-    changed: dict[str, int] = {}  # part -> things of the source that it changed
-    refused: dict[str, int] = {}  # `<part>: <reason>` -> tries that were given up
+    added: dict[str, int] = Field(
+        default_factory=dict
+    )  # `<part>: <group>` -> things that stand in the house now
+    changed: dict[str, int] = Field(
+        default_factory=dict
+    )  # part -> things of the source that it changed
+    refused: dict[str, int] = Field(
+        default_factory=dict
+    )  # `<part>: <reason>` -> tries that were given up
     gates: tuple[Gate, ...] = ()
     credits: tuple[Credit, ...] = ()
     notes: tuple[str, ...] = ()
@@ -96,7 +99,7 @@ def _lines(report: DressReport) -> Iterator[str]:
 
 
 def _by_part(counts: dict[str, int]) -> dict[str, list[tuple[str, int]]]:
-    parts: dict[str, list[tuple[str, int]]] = {}
+    parts: dict[str, list[tuple[str, int]]] = Field(default_factory=dict)
     for key, n in sorted(
         counts.items(), key=lambda row: (row[0].partition(": ")[0], -row[1], row[0])
     ):

@@ -10,40 +10,38 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.core.record import Record
 
 # The mode whose picture decides for the view in all modes (paper section 3.3).
 SCORED_MODE: Final = Mode.MLT_IL_OL
 
 
-class PictureQuality(BaseModel):
+class PictureQuality(Record):
     """Of one lighting mode."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     brightness: float  # median sRGB luma, 0..1
     blown: float  # share of pixels with a channel >= 254
 
 
-class SceneQuality(BaseModel):
+class SceneQuality(Record):
     """Of a view, whatever its light. All shares are of the picture."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     surface: float  # share of the largest instance
     near: float  # share nearer than near_m: a camera inside an object sees little else
     n_objects: int  # of object_fraction or more; walls, floors and ceilings apart
     noise: float | None = None  # relative error of the raw light, None where none was traced
     missing_textures: int = 0  # of the house
-    classes: dict[int, float] = {}  # NYU40 id (1..40) -> its share
+    classes: dict[int, float] = Field(default_factory=dict)  # NYU40 id (1..40) -> its share
 
 
-class SparseCounts(BaseModel):
+class SparseCounts(Record):
     """Counts of the bins that are not empty."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     size: int  # number of all bins
     bins: tuple[int, ...]  # ascending
     counts: tuple[int, ...]  # of each of them
@@ -72,10 +70,9 @@ class SparseCounts(BaseModel):
         return counts
 
 
-class ViewRecord(BaseModel):
+class ViewRecord(Record):
     """A view as selection sees it."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     format: Literal["pbrs_farm histogram 1"] = "pbrs_farm histogram 1"
     settings: HistogramFields
     house: str

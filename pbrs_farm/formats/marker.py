@@ -7,32 +7,33 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import Field, ValidationError
 
 from pbrs_farm.core.errors import StoreFailed
+from pbrs_farm.core.record import Record
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.store.object_store import Store
 
 
-class StoredFile(BaseModel):
+class StoredFile(Record):
     """One object a step wrote."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     key: str
     n_bytes: int
     sha256: str
 
 
-class Marker(BaseModel):
+class Marker(Record):
     """What a step was done with and what it wrote; itself written last and if-absent."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     step: str
     house_id: str
     view_id: str | None = None
     digest: str  # of ids, the recipe's fields in use, the step's version, its inputs' digests
     files: tuple[StoredFile, ...] = ()
-    facts: dict[str, Any] = {}  # for later steps and view.json; equal for equal inputs
+    facts: dict[str, Any] = Field(
+        default_factory=dict
+    )  # for later steps and view.json; equal for equal inputs
     # The only clocks in the whole output:
     seconds: float = 0.0
     worker: str = ""

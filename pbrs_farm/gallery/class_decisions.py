@@ -10,19 +10,17 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict
-
 from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.record import Record
 
 _TAG: Final = "class:"
 _RULES: Final = ("source", "catalogue", "element", "name", "group", "id", "inner-word")  # by trust
 _STRUCTURE: Final = frozenset({"wall", "floor", "ceiling", "ground"})  # kinds, always the source's
 
 
-class ClassDecision(BaseModel):
+class ClassDecision(Record):
     """What one rule made of all items of one name."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     rule: str  # of _RULES, or size or none
     name: str  # NYU40
     item: str  # the item's name

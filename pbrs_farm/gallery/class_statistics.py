@@ -6,21 +6,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.record import Record
 from pbrs_farm.formats.output_folder import ViewEntry, json_object, views_of
 from pbrs_farm.gallery.class_decisions import ClassDecision, class_decisions, decisions_text
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import read_regular
 
 
-class ClassRow(BaseModel):
+class ClassRow(Record):
     """How often one NYU40 class is seen."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     nyu40: int
     name: str
     pixel_share: float  # of the pixels of all images
@@ -28,10 +27,9 @@ class ClassRow(BaseModel):
     n_instances: int  # in all images
 
 
-class ClassStatistics(BaseModel):
+class ClassStatistics(Record):
     """Classes by pixel share, largest first; id 0 is what has no class or is nothing."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     n_views: int
     classes_per_image: float  # mean, id 0 not counted
     rows: tuple[ClassRow, ...]

@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.core.record import Record
 from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
@@ -32,7 +33,7 @@ _FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip o
 SourceKind = Literal["builtin", "example", "sweethome3d", "suncg", "gltf", "object"]
 
 
-class SourceRef(BaseModel):
+class SourceRef(Record):
     """A house before it is read.
 
     location: a path, an example home's name, or "builtin"; of an object without context the JSON
@@ -41,7 +42,6 @@ class SourceRef(BaseModel):
     dress_seed: what it is dressed by between reading and repair; its id then ends in `-d<seed>`.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     kind: SourceKind
     location: str
     house_id: str

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
-
-
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
+from pbrs_farm.core.record import Record
 
 Point = tuple[float, float, float]
 
 
-class Removed(_Record):
+class Removed(Record):
     """An item that was taken out."""
 
     item_id: str
@@ -20,7 +15,7 @@ class Removed(_Record):
     reason: str  # "person", "plant", or "nothing left of it": inside other walls and openings
 
 
-class LeftAsIs(_Record):
+class LeftAsIs(Record):
     """Something repair could not do its work on."""
 
     what: str  # "wall", "floor", "ceiling", "opening"
@@ -28,7 +23,7 @@ class LeftAsIs(_Record):
     reason: str
 
 
-class SideArea(_Record):
+class SideArea(Record):
     """A wall seen from the side, openings cut apart, or a floor or ceiling seen from above."""
 
     item_id: str
@@ -37,7 +32,7 @@ class SideArea(_Record):
     after_m2: float
 
 
-class WallLoss(_Record):
+class WallLoss(Record):
     """A wall of which repair took more than a tenth: a fault of the repair."""
 
     item_id: str
@@ -45,7 +40,7 @@ class WallLoss(_Record):
     after_m2: float
 
 
-class StructureReport(_Record):
+class StructureReport(Record):
     """What was done to walls, floors, ceilings and openings."""
 
     n_walls: int = 0
@@ -64,14 +59,14 @@ class StructureReport(_Record):
     walls_lost: tuple[WallLoss, ...] = ()
 
 
-class FacesReport(_Record):
+class FacesReport(Record):
     """Triangles dropped because they have no area or no finite corner, and turned the right way."""
 
     n_degenerate_dropped: int = 0
     n_turned: int = 0
 
 
-class SourceRepair(_Record):
+class SourceRepair(Record):
     """One light source of a lamp."""
 
     item_id: str
@@ -85,7 +80,7 @@ class SourceRepair(_Record):
     shades: tuple[str, ...] = ()  # names of the surfaces that became shades
 
 
-class RoomAudit(_Record):
+class RoomAudit(Record):
     """A room: what lights it, how large, whether closed."""
 
     room_id: str
@@ -97,14 +92,14 @@ class RoomAudit(_Record):
     space: tuple[str, ...]  # ids of the rooms it opens into, its own included
 
 
-class Leak(_Record):
+class Leak(Record):
     """A ray that reached the sky: where it started, and where it went."""
 
     origin: Point
     direction: Point
 
 
-class SpaceLeaks(_Record):
+class SpaceLeaks(Record):
     """Leak meter of one closed space: rooms that open into each other."""
 
     rooms: tuple[str, ...]
@@ -114,7 +109,7 @@ class SpaceLeaks(_Record):
     leaks: tuple[Leak, ...] = ()  # the first 50
 
 
-class LeakReport(_Record):
+class LeakReport(Record):
     """Leak meter of the house."""
 
     spaces: tuple[SpaceLeaks, ...] = ()
@@ -124,7 +119,7 @@ class LeakReport(_Record):
     closed_share: float = 0.0  # floor area in closed rooms / all floor area
 
 
-class Overlap(_Record):
+class Overlap(Record):
     """Two pieces that share volume."""
 
     a: str
@@ -133,14 +128,14 @@ class Overlap(_Record):
     share: float  # of the smaller piece, 0..1
 
 
-class Floating(_Record):
+class Floating(Record):
     """A piece that nothing carries."""
 
     item_id: str
     gap_m: float  # down to what is below it; -1 = nothing is
 
 
-class FurnitureAudit(_Record):
+class FurnitureAudit(Record):
     """Furniture that shares volume, floats, or stands twice in the same place."""
 
     overlaps: tuple[Overlap, ...] = ()
@@ -150,7 +145,7 @@ class FurnitureAudit(_Record):
     n_unmeasured: int = 0  # pairs whose boxes meet beyond those that are intersected, at least
 
 
-class RepairReport(_Record):
+class RepairReport(Record):
     """Everything that was changed in a house and what was measured in it afterwards."""
 
     house_id: str

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from pbrs_farm.core.record import Record
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class SectorReport(_Record):
+class SectorReport(Record):
     """One sector of a room. Scores are pixels at full size, or the released sum of logarithms."""
 
     sector: int
@@ -23,7 +19,7 @@ class SectorReport(_Record):
     reason: str = ""  # why there is no camera
 
 
-class RoomReport(_Record):
+class RoomReport(Record):
     """One room."""
 
     room_id: str
@@ -32,7 +28,7 @@ class RoomReport(_Record):
     sectors: tuple[SectorReport, ...] = ()
 
 
-class CameraReport(_Record):
+class CameraReport(Record):
     """What the sampler did with a house."""
 
     preset: str

@@ -11,18 +11,17 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
+from pbrs_farm.core.record import Record
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.similarity import best_match
 
 MIN_PASSING: Final = 0.95  # share of the reference's own images that pass at the chosen binning
 
 
-class Binning(BaseModel):
+class Binning(Record):
     """Bins that are compared: colour per channel, jointly, and depth over the range of settings."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     colour: tuple[int, int, int]  # bins of each channel
     depth: int
 
@@ -41,10 +40,9 @@ BINNINGS: Final = tuple(
 )  # fmt: skip
 
 
-class BinningRow(BaseModel):
+class BinningRow(Record):
     """How a reference's own images score at one binning, each left out in turn."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     binning: Binning
     colour_passing: float  # share of the images above the threshold
     colour_median: float  # median best intersection

@@ -13,11 +13,12 @@ from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
+from pbrs_farm.core.record import Record
 from pbrs_farm.selection.binning import Binning, BinningRow, binning_table, finest_passing
 from pbrs_farm.selection.histograms import (
     Counts,
@@ -31,10 +32,9 @@ from pbrs_farm.selection.similarity import Shares
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # the earliest a ZIP can say: equal content, equal bytes
 
 
-class ReferenceFacts(BaseModel):
+class ReferenceFacts(Record):
     """What a reference file says of itself."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     format: Literal["pbrs_farm reference 1"] = "pbrs_farm reference 1"
     source: str  # name of what it was built from
     source_sha256: str
