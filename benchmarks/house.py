@@ -25,8 +25,22 @@ from benchmarks.report import write_report
 PACKAGES = ("pbrs_farm", "workers")
 MARKERS = "not slow and not gpu and not chaos and not infra"
 PRAGMAS = ("noqa", "type:", "fmt:", "pragma:")
+DRESSING = (Path("pbrs_farm/dress"), Path("pbrs_farm/read/catalogue"))
+LINE_KINDS = (
+    "lines_of_statements",
+    "lines_of_imports",
+    "lines_of_docstrings",
+    "lines_of_comments",
+    "lines_blank",
+)
 UNITS = {
     "house.lines": "lines of .py of pbrs_farm and workers",
+    "house.lines_of_statements": "of these, neither blank, comment, docstring nor import",
+    "house.lines_of_imports": "of these",
+    "house.lines_of_docstrings": "of these",
+    "house.lines_of_comments": "of these, comments alone",
+    "house.lines_blank": "of these",
+    "house.lines_of_dressing": "of these, in dress and read/catalogue",
     "house.comments_per_100": "lines with a comment, pragmas apart, per 100 lines",
     "house.max_folder_files": "files of the fullest folder, one level, __init__ apart",
     "house.function_p90": "lines, 90th percentile of all functions, docstrings included",
@@ -50,8 +64,12 @@ def static_figures() -> dict[str, Any]:
     n_lines = sum(len(text.splitlines()) for text in texts.values())
     n_comments = sum(commented_lines(text) for text in texts.values())
     lengths = [n for text in texts.values() for n in function_lengths(text)]
+    kinds = sum((line_kinds(text) for text in texts.values()), Counter[str]())
+    dressing = [t for path, t in texts.items() if any(d in path.parents for d in DRESSING)]
     return {
         "house.lines": n_lines,
+        **{f"house.{name}": kinds[name] for name in LINE_KINDS},
+        "house.lines_of_dressing": sum(len(t.splitlines()) for t in dressing),
         "house.comments_per_100": round(100 * n_comments / n_lines, 2),
         "house.max_folder_files": max(folder_files().values()),
         "house.function_p90": int(np.percentile(lengths, 90)),
@@ -72,6 +90,30 @@ def commented_lines(text: str) -> int:
     tokens = tokenize.generate_tokens(io.StringIO(text).readline)
     comments = (t for t in tokens if t.type == tokenize.COMMENT)
     return len({t.start[0] for t in comments if not t.string.lstrip("# ").startswith(PRAGMAS)})
+
+
+def line_kinds(text: str) -> Counter[str]:
+    """How many lines of each of LINE_KINDS a module has; every line counts once."""
+    # Mark the lines of imports and docstrings, then tell the others by how they begin.
+    kind: dict[int, str] = {}
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            kind |= dict.fromkeys(_lines(node), "lines_of_imports")
+        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            kind |= dict.fromkeys(_lines(node), "lines_of_docstrings")
+    found = Counter[str]()
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip():
+            found["lines_blank"] += 1
+        elif line.lstrip().startswith("#"):
+            found["lines_of_comments"] += 1
+        else:
+            found[kind.get(number, "lines_of_statements")] += 1
+    return found
+
+
+def _lines(node: ast.stmt) -> range:
+    return range(node.lineno, (node.end_lineno or node.lineno) + 1)
 
 
 def function_lengths(text: str) -> Iterator[int]:
