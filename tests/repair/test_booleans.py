@@ -13,8 +13,8 @@ from pbrs_farm.read.mesh.horizontal_polygons import horizontal
 from pbrs_farm.repair import repair
 from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, solid_from_patches
 from tests.repair.embree import EmbreeOccluder
-from tests.repair.rooms import FLOOR, HEIGHT_M, WALL, covers, house, room
 from tests.repair.shells import unpaired_edges
+from tests.repair.wall_rooms import FLOOR, HEIGHT_M, WALL, covers, house, room
 
 SEEDS_THAT_KILLED = (132, 142, 152, 168, 170, 186)
 

@@ -14,8 +14,8 @@ from pbrs_farm.repair.structure import own_sides, watertight
 from pbrs_farm.repair.structure.booleans import reduced
 from pbrs_farm.repair.structure.prisms import level_plane, solid_prisms
 from tests.repair.embree import EmbreeOccluder
-from tests.repair.rooms import Rect, covers, house, room, turned, wall, walls_around
 from tests.repair.shells import coinciding_share, seen_from, unpaired_edges
+from tests.repair.wall_rooms import Rect, covers, house, room, turned, wall, walls_around
 
 LIVING: Rect = (0.0, 0.0, 10.0, 6.0)
 BATH: Rect = (7.0, 3.0, 10.0, 6.0)  # in a corner of the living room's outline

@@ -14,7 +14,6 @@ from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair import RepairReport, repair
 from tests.repair.embree import EmbreeOccluder
-from tests.repair.rooms import covers, house, planar_walls, room, turned, wall, walls_around
 from tests.repair.shells import (
     coinciding_share,
     leaning_area,
@@ -22,6 +21,7 @@ from tests.repair.shells import (
     structure_of,
     unpaired_edges,
 )
+from tests.repair.wall_rooms import covers, house, planar_walls, room, turned, wall, walls_around
 
 RECT = (0.0, 0.0, 4.0, 3.0)
 MIDDLE = (2.0, 1.3, 1.5)

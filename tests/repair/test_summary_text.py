@@ -16,7 +16,7 @@ from pbrs_farm.repair.measure import furniture_audit as furniture_audit_module
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
 from pbrs_farm.repair.repair_report import LeakReport
 from pbrs_farm.repair.section_drawing import section_of_items, solid_polygons
-from tests.repair.rooms import covers, house, room, walls_around
+from tests.repair.wall_rooms import covers, house, room, walls_around
 
 RECT = (0.0, 0.0, 4.0, 3.0)
 

@@ -12,7 +12,7 @@ from pbrs_farm.sample import room_camera, sample_cameras
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from pbrs_farm.sample.stored_cameras import views_from_cameras
 from tests.builders import builtin_home
-from tests.sample.rooms import QUICK, counter_of
+from tests.sample.sampled_rooms import QUICK, counter_of
 
 LINE = "1.5 1.55 2  0.6929 -0.19612 0.6929  0.1386 0.98058 0.1386  0.5534 0.433896  540"
 

@@ -9,7 +9,7 @@ from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.eye_probes import Counter
 from pbrs_farm.sample.sector_choice import Coarse, FullScores, best_first
 from tests.builders import builtin_home
-from tests.sample.rooms import QUICK, IndependentLook, counter_of, furnished
+from tests.sample.sampled_rooms import QUICK, IndependentLook, counter_of, furnished
 
 
 def winners(

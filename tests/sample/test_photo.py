@@ -17,7 +17,7 @@ from pbrs_farm.sample.photo_sampler import PhotoSampler
 from pbrs_farm.sample.photo_score import PhotoShares, item_roles, photo_score, photo_shares
 from pbrs_farm.sample.rejection import Verdict
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE, overlap, shared_part
-from tests.sample.rooms import box, furnished, room_house, shell
+from tests.sample.sampled_rooms import box, furnished, room_house, shell
 
 FIELDS: CameraFields = recipe_from_name("fast").cameras.model_copy(
     update={

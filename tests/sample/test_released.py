@@ -12,7 +12,7 @@ from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.rejection import Verdict
 from pbrs_farm.sample.released_rules import room_grid, viewpoint_mask
 from pbrs_farm.sample.view_score import released_columns, released_score
-from tests.sample.rooms import box, counter_of, furnished, room_house, shell
+from tests.sample.sampled_rooms import box, counter_of, furnished, room_house, shell
 
 RELEASED = recipe_from_name("released").cameras
 SMALL = RELEASED.model_copy(update={"score_width_px": 80, "score_height_px": 60, "cell_m": 0.4})

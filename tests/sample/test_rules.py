@@ -14,7 +14,15 @@ from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.rejection import Verdict
 from tests.builders import builtin_home
-from tests.sample.rooms import QUICK, IndependentLook, box, counter_of, furnished, room_house, shell
+from tests.sample.sampled_rooms import (
+    QUICK,
+    IndependentLook,
+    box,
+    counter_of,
+    furnished,
+    room_house,
+    shell,
+)
 
 
 def hold_the_rules(house: House, fields: CameraFields, seed: int) -> int:

@@ -12,7 +12,7 @@ from pbrs_farm.read.sweethome3d import read_home
 from pbrs_farm.repair import repair
 from pbrs_farm.sample import sample_cameras
 from tests.example_homes import example_homes
-from tests.sample.rooms import IndependentLook
+from tests.sample.sampled_rooms import IndependentLook
 from tests.sample.test_rules import hold_the_rules
 
 pytestmark = pytest.mark.homes
