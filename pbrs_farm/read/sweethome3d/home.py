@@ -15,16 +15,16 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
-from pbrs_farm.read.sweethome3d.furniture import piece_item, piece_opening
+from pbrs_farm.read.sweethome3d.home_cameras import stored_cameras
 from pbrs_farm.read.sweethome3d.home_file.container import open_container
 from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, Plan, PlanLevel, level_of
 from pbrs_farm.read.sweethome3d.home_file.parse_home import parse_plan
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom, plane_items, read_rooms, room_nouns
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
+from pbrs_farm.read.sweethome3d.piece_items import piece_item, piece_opening
 from pbrs_farm.read.sweethome3d.piece_models import PieceModels
 from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
-from pbrs_farm.read.sweethome3d.stored_cameras import stored_cameras
 from pbrs_farm.read.sweethome3d.wall_solids import wall_items
 
 _NO_ROOMS = "draw rooms (Plan > Create rooms) and save the home again"
