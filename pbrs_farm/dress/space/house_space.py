@@ -69,6 +69,13 @@ class HouseSpace:
                 return room
         raise KeyError(room_id)
 
+    def is_free(self, low: F64, high: F64) -> bool:
+        """Whether no item but structure has a point in the box low..high (3,) of the world."""
+        for n in meeting(self.bounds, np.array([low, high])):
+            if ((self.points[n] >= low) & (self.points[n] <= high)).all(1).any():
+                return False
+        return True
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _EmptyRoom:

@@ -1,0 +1,162 @@
+"""Floor lamps beside sofas and lamps on nightstands, where there is room for them."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.lamps.generated_lamps import floor_lamp, table_lamp, with_flux
+from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor_bitmap, house_space
+from pbrs_farm.dress.space.surface_points import item_triangles, lowest_above
+from pbrs_farm.dress.style import Style
+from pbrs_farm.dress.walls.hanging import next_id
+
+PART = "lamps"
+_SOFA, _NIGHT_STAND = 6, 32  # NYU40
+_BY_SOFA, _BY_BED = 0.55, 0.7  # how often
+_FLOOR_LM, _TABLE_LM = 900.0, 400.0
+_UPSIDE_DOWN = np.array([1.0, -1.0, 1.0])
+
+
+def stand_by_sofas(
+    draft: Draft, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator
+) -> None:
+    """A floor lamp at one end of a sofa, where the floor is free and every way stays open."""
+    space = house_space(draft)
+    room = space.room(room_id)
+    has_one = any(
+        draft.items[n].kind is ItemKind.LAMP and _stands(space, room, n) for n in room.items
+    )
+    sofas = [n for n in room.items if draft.items[n].nyu40 == _SOFA]
+    if has_one or not sofas or rng.random() >= _BY_SOFA:
+        return
+    piece, shape = _drawn(catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
+    radius = float(np.abs(shape.bounds[:, [0, 2]]).max())
+    for number in sofas:
+        for place in _ends(space, room, number, radius):
+            if _floor_is_free(space, room, place, radius, float(shape.bounds[1, 1])):
+                at = np.array([place[0], room.room.floor_y, place[1]])
+                _stand(draft, room, piece, with_flux(shape, _FLOOR_LM), at, 0.0)
+                if _ways_are_open(draft, room_id):
+                    return
+                draft.items.pop()
+                draft.done[f"{PART}: {piece.group}"] -= 1
+    draft.refused[f"{PART}: no floor beside a sofa"] += 1
+
+
+def stand_by_beds(
+    draft: Draft, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator
+) -> None:
+    """The same lamp on every nightstand of the room that is free."""
+    space = house_space(draft)
+    room = space.room(room_id)
+    stands = [n for n in room.items if draft.items[n].nyu40 == _NIGHT_STAND]
+    if not stands or rng.random() >= _BY_BED:
+        return
+    piece, shape = _drawn(catalogue, "table_lamp", rng) or table_lamp(rng, style)
+    for number in stands:
+        low, high = space.bounds[number]
+        middle = ((low + high) / 2)[[0, 2]]
+        at = _top(draft, space, number, middle, shape)
+        if at is None:
+            draft.refused[f"{PART}: no free nightstand"] += 1
+            continue
+        turn = draft.items[number].oriented_box.axes[:, 2]
+        _stand(
+            draft, room, piece, with_flux(shape, _TABLE_LM), at, float(np.arctan2(turn[0], turn[2]))
+        )
+
+
+def _drawn(
+    catalogue: Catalogue, group: str, rng: np.random.Generator
+) -> tuple[Piece, Shape] | None:
+    """A lamp of the catalogue that shines and is not too large to stand; None = make one."""
+    fit = [p for p in catalogue.of(group) if p.size[2] < (0.55 if group == "table_lamp" else 1.95)]
+    if not fit or rng.random() < 0.15:
+        return None
+    piece = fit[int(rng.integers(len(fit)))]
+    shape = catalogue.shape(piece)
+    return (piece, shape) if shape is not None and shape.lights else None
+
+
+def _stand(
+    draft: Draft, room: RoomSpace, piece: Piece, shape: Shape, at: F64, turn_rad: float
+) -> None:
+    item = draft.placed(
+        piece, shape, at, turn_rad, item_id=next_id(draft, PART), room_id=room.room.id,
+        level_id=room.room.level_id,
+    )  # fmt: skip
+    draft.add(item, PART, piece)
+
+
+def _stands(space: HouseSpace, room: RoomSpace, number: int) -> bool:
+    # A lamp that reaches from the floor to a man's chest.
+    low, high = space.bounds[number][:, 1] - room.room.floor_y
+    return bool(low < 0.1 and high > 1.0)
+
+
+def _ends(space: HouseSpace, room: RoomSpace, number: int, radius: float) -> list[F64]:
+    """Places beyond the two ends of a thing's longer side, near its back and near its middle."""
+    low, high = space.bounds[number]
+    middle, half = ((low + high) / 2)[[0, 2]], ((high - low) / 2)[[0, 2]]
+    long = int(np.argmax(half))
+    found = []
+    for across in (0.5, -0.5, 0.0):
+        for sign in (1.0, -1.0):
+            offset = np.zeros(2)
+            offset[long] = sign * (half[long] + radius + 0.06)
+            offset[1 - long] = across * half[1 - long]
+            found.append(middle + offset)
+    # Corners are where lamps stand: nearest to the room's edge first.
+    edge = room.area.boundary
+    return sorted(found, key=lambda p: float(shapely.distance(shapely.Point(p), edge)))
+
+
+def _floor_is_free(
+    space: HouseSpace, room: RoomSpace, place: F64, radius: float, height: float
+) -> bool:
+    disc = shapely.Point(place).buffer(radius + 0.02)
+    free = shapely.difference(room.area, room.walls)
+    if not shapely.contains(free, disc):
+        return False
+    for door in room.doors:
+        side = door.side_of(room.room.id)
+        if side is not None and (door.before(side).intersects(disc) or door.swing(side).intersects(disc)):  # fmt: skip
+            return False
+    around = radius + 0.02
+    low = np.array([place[0] - around, room.room.floor_y + 0.02, place[1] - around])
+    return space.is_free(low, low + np.array([2 * around, height + 0.03, 2 * around]))
+
+
+def _ways_are_open(draft: Draft, room_id: str) -> bool:
+    space = house_space(draft)
+    room = space.room(room_id)
+    last = len(draft.items) - 1
+    before = doors_are_joined(floor_bitmap(space, room, without=(last,)), room)
+    return not before or doors_are_joined(floor_bitmap(space, room), room)
+
+
+def _top(draft: Draft, space: HouseSpace, number: int, place: F64, shape: Shape) -> F64 | None:
+    """(3,) where the shape stands on the thing's flat and free top; None where it cannot."""
+    low, high = shape.bounds
+    radius = float(np.abs([low[[0, 2]], high[[0, 2]]]).max())
+    foot = [s.positions for s in shape.surfaces]
+    base = np.concatenate(foot)
+    base = base[base[:, 1] < 0.02][:, [0, 2]]
+    reach = float(np.abs(base).max()) if len(base) else radius
+    ring = [
+        place + reach * 0.95 * np.array([np.cos(a), np.sin(a)]) for a in np.arange(8) * np.pi / 4
+    ]
+    triangles = item_triangles(draft.items[number]) * _UPSIDE_DOWN
+    heights = -lowest_above(triangles, np.array([place, *ring]), -1e9)
+    if not np.isfinite(heights).all() or np.ptp(heights) > 0.001:
+        return None
+    y = float(heights.max())
+    # Nothing else stands there.
+    a = np.array([place[0] - radius, y + 0.004, place[1] - radius])
+    b = np.array([place[0] + radius, y + float(high[1]) + 0.02, place[1] + radius])
+    return np.array([place[0], y, place[1]]) if space.is_free(a, b) else None
