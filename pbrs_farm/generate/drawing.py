@@ -1,0 +1,24 @@
+"""A floor plan by seed: programme, layout, walls, openings; no effects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbrs_farm.generate.layout import layout
+from pbrs_farm.generate.openings import openings_of
+from pbrs_farm.generate.plan import Plan
+from pbrs_farm.generate.programme import Programme, Wishes, drawn_programme
+from pbrs_farm.generate.walls import rooms_of, runs_of, walls_of
+
+
+def drawn_plan(
+    rng: np.random.Generator, wishes: Wishes | None = None, programme: Programme | None = None
+) -> Plan:
+    """A plan for a programme, or for one drawn by seed as wished. Raises BadInput if none fits."""
+    where = layout(programme or drawn_programme(rng, wishes), rng)
+    runs = runs_of(where)
+    walls = walls_of(where, runs)
+    rooms = rooms_of(where, walls)
+    all_rooms, all_walls, openings = openings_of(where, runs, walls, rooms, rng)
+    height = float(rng.choice([2.4, 2.5, 2.5, 2.5, 2.6, 2.7]))
+    return Plan(all_rooms, all_walls, openings, height)

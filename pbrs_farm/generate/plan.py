@@ -1,0 +1,128 @@
+"""The nouns of a floor plan: rooms, walls, openings; frozen values in metres, no effects.
+
+Coordinates are (x, z) as in a house: x to the right, z downwards on the page, as Sweet Home 3D
+draws its plans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+Point = tuple[float, float]
+Rect = tuple[float, float, float, float]  # x0, z0, x1, z1
+
+
+class RoomType(StrEnum):
+    """What a room is for."""
+
+    LIVING = "living"
+    KITCHEN = "kitchen"
+    BEDROOM = "bedroom"
+    STUDIO = "studio"  # to live and to sleep in
+    BATHROOM = "bathroom"
+    WC = "wc"
+    HALL = "hall"
+    STORE = "store"
+    WARDROBE = "wardrobe"
+    BALCONY = "balcony"
+
+    @property
+    def is_habitable(self) -> bool:
+        """Whether people spend their days or nights there: it needs daylight."""
+        return self in (RoomType.LIVING, RoomType.KITCHEN, RoomType.BEDROOM, RoomType.STUDIO)
+
+    @property
+    def is_wet(self) -> bool:
+        """Whether water runs there."""
+        return self in (RoomType.KITCHEN, RoomType.BATHROOM, RoomType.WC)
+
+
+class OpeningKind(StrEnum):
+    """What an opening of a wall is."""
+
+    DOOR = "door"
+    ENTRANCE = "entrance"
+    WINDOW = "window"
+    FRENCH_WINDOW = "french_window"
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRoom:
+    """A room; its polygon follows the inner faces of its walls."""
+
+    type: RoomType
+    name: str
+    polygon: tuple[Point, ...]  # anticlockwise with x right and z up, not closed
+
+    @property
+    def area(self) -> float:
+        """Floor area in square metres."""
+        return abs(sum(x0 * z1 - x1 * z0 for (x0, z0), (x1, z1) in _edges(self.polygon))) / 2
+
+    @property
+    def bounds(self) -> Rect:
+        """The axis-aligned rectangle around it."""
+        xs, zs = [p[0] for p in self.polygon], [p[1] for p in self.polygon]
+        return min(xs), min(zs), max(xs), max(zs)
+
+    @property
+    def edges(self) -> Iterator[tuple[Point, Point]]:
+        """Each side of the polygon, from corner to corner."""
+        return _edges(self.polygon)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanWall:
+    """A straight wall along the middle line start..end."""
+
+    start: Point
+    end: Point
+    thickness: float
+    is_outer: bool = False
+    height: float | None = None  # of a parapet; None = the storey's
+
+    @property
+    def length(self) -> float:
+        """Of the middle line, metres."""
+        return abs(self.end[0] - self.start[0]) + abs(self.end[1] - self.start[1])
+
+    def at(self, along: float) -> Point:
+        """The point of the middle line `along` metres from its start."""
+        t = along / self.length
+        (x0, z0), (x1, z1) = self.start, self.end
+        return x0 + t * (x1 - x0), z0 + t * (z1 - z0)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanOpening:
+    """A door or window in a wall."""
+
+    kind: OpeningKind
+    wall: int  # index into Plan.walls
+    along: float  # of its middle from the wall's start, metres
+    width: float
+    height: float
+    sill: float  # of its lower edge above the floor, metres
+    room: int  # index into Plan.rooms: a door swings into it, a window lights it
+    other: int | None = None  # the room on the other side; None = outside
+    hinge_at_start: bool = True  # a door's hinges stand towards the wall's start
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """One storey."""
+
+    rooms: tuple[PlanRoom, ...]
+    walls: tuple[PlanWall, ...]
+    openings: tuple[PlanOpening, ...]
+    height: float  # floor to ceiling, metres
+
+    def openings_of(self, room: int) -> tuple[PlanOpening, ...]:
+        """The doors and windows of a room, from either side."""
+        return tuple(o for o in self.openings if room in (o.room, o.other))
+
+
+def _edges(polygon: tuple[Point, ...]) -> Iterator[tuple[Point, Point]]:
+    return zip(polygon, (*polygon[1:], polygon[0]), strict=True)

@@ -1,0 +1,167 @@
+"""Programmes: which rooms a home has and how large; drawn by seed or given by a user; no effects.
+
+Medians and shares are those of nine homes drawn by people (65 rooms), docs/homes.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plan import RoomType
+
+MEDIAN_AREA: Final = {
+    RoomType.LIVING: 27.2,
+    RoomType.KITCHEN: 9.7,
+    RoomType.BEDROOM: 10.9,
+    RoomType.STUDIO: 24.0,
+    RoomType.BATHROOM: 6.0,
+    RoomType.WC: 1.7,
+    RoomType.STORE: 2.2,
+    RoomType.WARDROBE: 3.4,
+}
+"""Square metres of floor."""
+
+AREA_RANGE: Final = {
+    RoomType.LIVING: (14.0, 45.0),
+    RoomType.KITCHEN: (7.2, 20.0),
+    RoomType.BEDROOM: (9.0, 17.0),
+    RoomType.STUDIO: (18.0, 34.0),
+    RoomType.BATHROOM: (3.8, 9.0),
+    RoomType.WC: (1.3, 2.4),
+    RoomType.STORE: (1.5, 4.0),
+    RoomType.WARDROBE: (2.5, 6.0),
+    RoomType.HALL: (3.0, 16.0),
+}
+"""Smallest and largest, square metres."""
+
+_SPREAD: Final = {RoomType.BEDROOM: 0.16, RoomType.LIVING: 0.20}  # of the logarithm; others .18
+_BEDROOMS: Final = (0, 1, 2, 3, 4)
+_BEDROOM_SHARES: Final = (0.10, 0.25, 0.35, 0.22, 0.08)
+_HALL_SHARE: Final = (0.08, 0.12)  # of all other rooms
+
+
+@dataclass(frozen=True, slots=True)
+class RoomWish:
+    """One room of a programme."""
+
+    type: RoomType
+    area: float  # square metres of floor
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Programme:
+    """The rooms of a home."""
+
+    rooms: tuple[RoomWish, ...]
+    open_kitchen: bool = False  # no wall between kitchen and living room
+    n_blind_sides: int = 0  # sides of the outline that neighbours' homes stand against
+    notch: float = 0.0  # area of a corner that the outline leaves out, square metres
+    l_shaped: bool = False  # the living room has a second arm
+    balcony: bool = False
+
+    @property
+    def area(self) -> float:
+        """Floor of all rooms, square metres."""
+        return sum(wish.area for wish in self.rooms)
+
+
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What a user asks of drawn homes."""
+
+    bedrooms: tuple[int, int] = (0, 4)
+    area: tuple[float, float] = (20.0, 250.0)  # of all rooms, square metres
+
+    def __post_init__(self) -> None:
+        """Raise BadInput for ranges that no home can meet."""
+        low, high = self.bedrooms
+        if not 0 <= low <= high <= 4:
+            raise BadInput(
+                "--rooms", f"{low}..{high}", "homes have 0 to 4 bedrooms", hint="--rooms 2..4"
+            )
+        if not 0 < self.area[0] <= self.area[1]:
+            raise BadInput("--area", "", f"{self.area[0]:g}..{self.area[1]:g} is no range")
+        least = _AREA_OF_HOMES[low][0]
+        most = _AREA_OF_HOMES[high][1]
+        if self.area[1] < least or self.area[0] > most:
+            raise BadInput(
+                "--area", f"{self.area[0]:g}..{self.area[1]:g}",
+                f"homes of {low} to {high} bedrooms have {least:g} to {most:g} m2",
+                hint=f"--area {least:g}..{most:g}",
+            )  # fmt: skip
+
+
+_AREA_OF_HOMES: Final = ((28, 60), (36, 85), (48, 115), (62, 150), (76, 180))  # by bedrooms
+
+
+def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> Programme:
+    """A programme by seed: studio to four bedrooms, closed or open kitchen, WC, store, wardrobe."""
+    wishes = wishes or Wishes()
+    # Draw until the area is as wished; then scale the rooms to it.
+    for _ in range(64):
+        programme = _drawn(rng, wishes.bedrooms)
+        if wishes.area[0] <= programme.area <= wishes.area[1]:
+            return programme
+    return _scaled(programme, float(np.clip(programme.area, *wishes.area)))
+
+
+def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int]) -> Programme:
+    shares = np.array(_BEDROOM_SHARES)[bedrooms[0] : bedrooms[1] + 1]
+    n = int(rng.choice(np.arange(bedrooms[0], bedrooms[1] + 1), p=shares / shares.sum()))
+    types = [RoomType.STUDIO if n == 0 else RoomType.LIVING, RoomType.KITCHEN]
+    types += [RoomType.BEDROOM] * n + [RoomType.BATHROOM]
+    # Add the small rooms that larger homes have more often.
+    if n >= 4 or (n == 3 and rng.random() < 0.3):
+        types.append(RoomType.BATHROOM)
+    for type_, chances in (
+        (RoomType.WC, (0, 0.1, 0.4, 0.7, 0.8)),
+        (RoomType.STORE, (0, 0.2, 0.3, 0.4, 0.5)),
+        (RoomType.WARDROBE, (0, 0.1, 0.2, 0.3, 0.4)),
+    ):
+        if rng.random() < chances[n]:
+            types.append(type_)
+    rooms = [RoomWish(t, _drawn_area(rng, t)) for t in types]
+    # Homes with few bedrooms have smaller living rooms and kitchens.
+    if n <= 1:
+        rooms = [
+            RoomWish(r.type, max(r.area * 0.8, AREA_RANGE[r.type][0]))
+            if r.type in (RoomType.LIVING, RoomType.KITCHEN)
+            else r
+            for r in rooms
+        ]
+    # The hall takes its share of what it opens to.
+    total = sum(r.area for r in rooms)
+    hall = max(total * rng.uniform(*_HALL_SHARE), 3.0 + 0.95 * len(rooms))
+    rooms.append(RoomWish(RoomType.HALL, float(hall)))
+    blind = int(rng.choice([0, 1, 2], p=[0.45, 0.4, 0.15]))
+    return Programme(
+        tuple(rooms),
+        open_kitchen=bool(rng.random() < (0.7 if n == 0 else 0.5)),
+        n_blind_sides=blind,
+        notch=float(total * rng.uniform(0.06, 0.12)) if n >= 1 and rng.random() < 0.3 else 0.0,
+        l_shaped=bool(n >= 2 and rng.random() < 0.25),
+        balcony=bool(rng.random() < 0.4),
+    )
+
+
+def _drawn_area(rng: np.random.Generator, type_: RoomType) -> float:
+    area = MEDIAN_AREA[type_] * float(np.exp(rng.normal(0.0, _SPREAD.get(type_, 0.18))))
+    return float(np.clip(area, *AREA_RANGE[type_]))
+
+
+def _scaled(programme: Programme, area: float) -> Programme:
+    # Scale every room, each within its own bounds.
+    factor = area / programme.area
+    rooms = tuple(
+        RoomWish(r.type, float(np.clip(r.area * factor, *AREA_RANGE[r.type])), r.name)
+        for r in programme.rooms
+    )
+    return Programme(
+        rooms, programme.open_kitchen, programme.n_blind_sides, programme.notch,
+        programme.l_shaped, programme.balcony,
+    )  # fmt: skip

@@ -1,0 +1,331 @@
+"""Slicing floor plans: a rectangle cut in two again and again, annealed until each room fits; no effects.
+
+Wong and Liu, "A new algorithm for floorplan design" (DAC 1986). All coordinates are whole steps
+of 5 cm on the walls' middle lines, so that rooms that share a wall share its numbers exactly. The
+budget is counted in moves, never in seconds: the same seed gives the same plan on any machine.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+STEP_M: Final = 0.05
+N_MOVES: Final = 4000
+N_TRIES: Final = 10
+_T_START, _T_END = 3.0, 0.5
+_WALL_STEPS: Final = 3  # what walls take from a room's width, about
+_UNMET: Final = 1.5  # cost of a hard rule that is not met, beside how far it is from it
+
+_GOOD: Final = 0.1  # cost that more moves hardly better
+
+IntRect = tuple[int, int, int, int]  # x0, z0, x1, z1 in steps
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """A rectangle of the plan and what it must be; lengths in metres."""
+
+    area: float  # with its share of the walls, square metres
+    min_width: float
+    max_aspect: float = math.inf
+    outer: float = 0.0  # least length of outer wall with daylight
+    any_outer: float = 0.0  # least length of any outer wall
+    is_corner: bool = False  # a notch of the outline: it lies in a corner and counts as outside
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A rule that a leaf shares a stretch of wall with one of others."""
+
+    leaf: int
+    others: tuple[int, ...]
+    length: float  # metres
+    is_hard: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Brief:
+    """What annealing has to solve."""
+
+    leaves: tuple[Leaf, ...]
+    contacts: tuple[Contact, ...]
+    hall: int  # the leaf that a first tree puts in the middle
+    width: int  # of the outline, steps
+    depth: int
+    lit_sides: tuple[bool, bool, bool, bool]  # left, top, right, bottom: daylight comes in there
+
+
+@dataclass(slots=True)
+class _Tree:
+    # Node k < n - 1 is a cut with two children; node n - 1 + i is a place for a leaf.
+    vertical: list[bool]  # of each cut
+    children: list[tuple[int, int]]
+    leaf_at: list[int]  # leaf in place i
+
+    def cut(self, a: int, b: int, vertical: bool) -> int:
+        """Join two nodes by a new cut; gives its number."""
+        self.vertical.append(vertical)
+        self.children.append((a, b))
+        return len(self.children) - 1
+
+    def chain(self, leaves: list[int], vertical: bool, n: int) -> int:
+        """Put leaves of n in the next places, in a row; gives the node of the row."""
+        node = -1
+        for leaf in leaves:
+            self.leaf_at.append(leaf)
+            place = n - 2 + len(self.leaf_at)
+            node = place if node < 0 else self.cut(node, place, vertical)
+        return node
+
+    def copy(self) -> _Tree:
+        return _Tree(self.vertical[:], self.children[:], self.leaf_at[:])
+
+
+def solved(
+    leaves: tuple[Leaf, ...],
+    contacts: tuple[Contact, ...],
+    hall: int,
+    lit_sides: tuple[bool, bool, bool, bool],
+    rng: np.random.Generator,
+) -> tuple[Brief, list[IntRect]] | None:
+    """An outline and a rectangle for each leaf that meet every hard rule; None if annealing fails.
+
+    The outline is another one each time: 0.6 to 1.7 times as wide as it is deep.
+    """
+    area = sum(leaf.area for leaf in leaves)
+    width = math.sqrt(area * float(rng.uniform(0.6, 1.7)))
+    w, d = round(width / STEP_M), round(area / width / STEP_M)
+    brief = Brief(leaves, contacts, hall, w, d, lit_sides)
+    rects, unmet = _annealed(brief, _Random(rng))
+    return None if unmet else (brief, rects)
+
+
+class _Random:
+    """Uniform numbers drawn in blocks: a generator's call costs more than a move."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self._block: list[float] = []
+
+    def __call__(self) -> float:
+        if not self._block:
+            self._block = self._rng.random(4096).tolist()
+        return self._block.pop()
+
+    def below(self, n: int) -> int:
+        return int(self() * n)
+
+
+def _annealed(brief: Brief, draw: _Random) -> tuple[list[IntRect], int]:
+    """The best rectangles of one annealing and how many hard rules they break."""
+    tree = _spine_tree(brief, draw)
+    rules = _Rules(brief)
+    rects = _laid_out(tree, brief)
+    cost, unmet = rules.judge(rects)
+    best, best_score = rects, (unmet, cost)
+    cooling = (_T_END / _T_START) ** (1 / N_MOVES)
+    temperature = _T_START
+    for _ in range(N_MOVES):
+        temperature *= cooling
+        moved = _moved(tree, draw)
+        new_rects = _laid_out(moved, brief)
+        new_cost, unmet = rules.judge(new_rects)
+        if new_cost <= cost or draw() < math.exp((cost - new_cost) / temperature):
+            tree, cost = moved, new_cost
+            if (unmet, cost) < best_score:
+                best, best_score = new_rects, (unmet, cost)
+                if cost < _GOOD:
+                    break
+    return best, best_score[0]
+
+
+def _spine_tree(brief: Brief, draw: _Random) -> _Tree:
+    """The hall along the middle with a row of rooms on either side, in random order."""
+    n = len(brief.leaves)
+    rest = [i for i in range(n) if i != brief.hall]
+    for i in range(len(rest) - 1, 0, -1):
+        j = draw.below(i + 1)
+        rest[i], rest[j] = rest[j], rest[i]
+    # Fill the first row up to about half of the area.
+    half = sum(brief.leaves[i].area for i in rest) * (0.35 + 0.3 * draw())
+    rows: tuple[list[int], list[int]] = ([], [])
+    for i in rest:
+        rows[half < 0 and len(rows[0]) > 0].append(i)
+        half -= brief.leaves[i].area
+    # Join each row into a chain of cuts, then the rows and the hall.
+    upright = draw() < 0.5
+    tree = _Tree([], [], [])
+    tops = [tree.chain(row, upright, n) for row in (rows[0], [brief.hall], rows[1]) if row]
+    node = tops[0]
+    for top in tops[1:]:
+        node = tree.cut(node, top, not upright)
+    return tree
+
+
+def _moved(tree: _Tree, draw: _Random) -> _Tree:
+    """A neighbour: leaves swapped, a cut turned, children swapped, a subtree turned or moved."""
+    new = tree.copy()
+    n_cuts, kind = len(new.children), draw()
+    if kind < 0.40:
+        i, j = draw.below(n_cuts + 1), draw.below(n_cuts + 1)
+        new.leaf_at[i], new.leaf_at[j] = new.leaf_at[j], new.leaf_at[i]
+    elif kind < 0.60:
+        k = draw.below(n_cuts)
+        new.vertical[k] = not new.vertical[k]
+    elif kind < 0.72:
+        k = draw.below(n_cuts)
+        a, b = new.children[k]
+        new.children[k] = (b, a)
+    elif kind < 0.85:
+        # Turn all cuts below one.
+        stack = [draw.below(n_cuts)]
+        while stack:
+            k = stack.pop()
+            if k < n_cuts:
+                new.vertical[k] = not new.vertical[k]
+                stack += new.children[k]
+    else:
+        _exchange_subtrees(new, draw.below(n_cuts), draw.below(n_cuts), draw)
+    return new
+
+
+def _exchange_subtrees(tree: _Tree, i: int, j: int, draw: _Random) -> None:
+    """Swap a child of cut i with a child of cut j, unless one lies below the other."""
+    side_i, side_j = draw.below(2), draw.below(2)
+    a, b = tree.children[i][side_i], tree.children[j][side_j]
+    if i == j or _is_below(tree, j, a) or _is_below(tree, i, b):
+        return
+    for k, side, child in ((i, side_i, b), (j, side_j, a)):
+        pair = tree.children[k]
+        tree.children[k] = (child, pair[1]) if side == 0 else (pair[0], child)
+
+
+def _is_below(tree: _Tree, node: int, top: int) -> bool:
+    stack = [top]
+    while stack:
+        k = stack.pop()
+        if k == node:
+            return True
+        if k < len(tree.children):
+            stack += tree.children[k]
+    return False
+
+
+def _laid_out(tree: _Tree, brief: Brief) -> list[IntRect]:
+    """The rectangle of each leaf: every cut divides its rectangle by the areas of its children."""
+    n_cuts = len(tree.children)
+    leaves, leaf_at, children = brief.leaves, tree.leaf_at, tree.children
+    # The root is the cut that no other has as a child: exchanges keep it the last one.
+    area = [0.0] * (2 * n_cuts + 1)
+    for i, leaf in enumerate(leaf_at):
+        area[n_cuts + i] = leaves[leaf].area
+    order = [n_cuts - 1]
+    for k in order:
+        order += [c for c in children[k] if c < n_cuts]
+    for k in reversed(order):
+        a, b = children[k]
+        area[k] = area[a] + area[b]
+    # Go down from the outline.
+    rects: list[IntRect] = [(0, 0, 0, 0)] * (n_cuts + 1)
+    stack = [(n_cuts - 1, 0, 0, brief.width, brief.depth)]
+    while stack:
+        k, x0, z0, x1, z1 = stack.pop()
+        if k >= n_cuts:
+            rects[leaf_at[k - n_cuts]] = (x0, z0, x1, z1)
+            continue
+        a, b = children[k]
+        share = area[a] / area[k]
+        if tree.vertical[k]:
+            cut = x0 + round((x1 - x0) * share)
+            stack += ((a, x0, z0, cut, z1), (b, cut, z0, x1, z1))
+        else:
+            cut = z0 + round((z1 - z0) * share)
+            stack += ((a, x0, z0, x1, cut), (b, x0, cut, x1, z1))
+    return rects
+
+
+class _Rules:
+    """How far the rooms of a layout are from what they must be."""
+
+    def __init__(self, brief: Brief) -> None:
+        self._brief = brief
+        self._notches = [i for i, leaf in enumerate(brief.leaves) if leaf.is_corner]
+
+    def judge(self, rects: list[IntRect]) -> tuple[float, int]:
+        """(cost, hard rules that are broken) of one rectangle for each leaf."""
+        total, unmet = 0.0, 0
+        for leaf, rect in zip(self._brief.leaves, rects, strict=True):
+            width = rect[2] - rect[0] - _WALL_STEPS
+            depth = rect[3] - rect[1] - _WALL_STEPS
+            short, long = (width, depth) if width < depth else (depth, width)
+            short_m = short * STEP_M
+            if short_m < leaf.min_width:
+                total += _UNMET + 4 * (leaf.min_width - short_m)
+                unmet += 1
+            aspect = long / short if short > 0 else 20.0
+            if aspect > leaf.max_aspect:
+                total += min(2 * (aspect - leaf.max_aspect), 6.0)
+                unmet += aspect > 1.3 * leaf.max_aspect
+            missing = self._missing_outside(leaf, rect, rects)
+            if missing > 0:
+                total += _UNMET + missing
+                unmet += 1
+        for contact in self._brief.contacts:
+            rect = rects[contact.leaf]
+            missing = min(_missing_contact(rect, rects[o], contact.length) for o in contact.others)
+            if missing > 0:
+                total += _UNMET + missing if contact.is_hard else 0.2 + 0.3 * min(missing, 2.0)
+                unmet += contact.is_hard
+        return total, unmet
+
+    def _missing_outside(self, leaf: Leaf, rect: IntRect, rects: list[IntRect]) -> float:
+        """Metres of outer wall that a leaf lacks; of a notch, whether it is off the corners."""
+        if leaf.is_corner:
+            return self._off_corner(rect)
+        if not leaf.outer and not leaf.any_outer:
+            return 0.0
+        x0, z0, x1, z1 = rect
+        left, top, right, bottom = self._brief.lit_sides
+        # Measure the stretches on the outline, with daylight and without.
+        lengths = (
+            (z1 - z0 if x0 == 0 else 0, left),
+            (x1 - x0 if z0 == 0 else 0, top),
+            (z1 - z0 if x1 == self._brief.width else 0, right),
+            (x1 - x0 if z1 == self._brief.depth else 0, bottom),
+        )
+        daylight = max(length if is_lit else 0 for length, is_lit in lengths)
+        anywhere = max(length for length, _ in lengths)
+        # A notch is outside, too.
+        for notch in self._notches:
+            beside = shared_length(rect, rects[notch])
+            daylight, anywhere = max(daylight, beside), max(anywhere, beside)
+        return max(leaf.outer - daylight * STEP_M, leaf.any_outer - anywhere * STEP_M)
+
+    def _off_corner(self, rect: IntRect) -> float:
+        x0, z0, x1, z1 = rect
+        at_x = x0 == 0 or x1 == self._brief.width
+        at_z = z0 == 0 or z1 == self._brief.depth
+        spans = x1 - x0 == self._brief.width or z1 - z0 == self._brief.depth
+        return 0.0 if at_x and at_z and not spans else 2.0 - at_x - at_z + spans
+
+
+def _missing_contact(a: IntRect, b: IntRect, length: float) -> float:
+    """Metres by which two rectangles miss `length` of common wall, the gap between them counted."""
+    overlap_x = min(a[2], b[2]) - max(a[0], b[0])
+    overlap_z = min(a[3], b[3]) - max(a[1], b[1])
+    # Rectangles of a slicing tree never overlap: one of these is a gap, or 0.
+    gap, along = (-overlap_x, overlap_z) if overlap_x <= overlap_z else (-overlap_z, overlap_x)
+    return gap * STEP_M + max(length - max(along, 0) * STEP_M, 0.0)
+
+
+def shared_length(a: IntRect, b: IntRect) -> int:
+    """Steps of wall between two rectangles that do not overlap."""
+    if a[2] == b[0] or b[2] == a[0]:
+        return max(min(a[3], b[3]) - max(a[1], b[1]), 0)
+    if a[3] == b[1] or b[3] == a[1]:
+        return max(min(a[2], b[2]) - max(a[0], b[0]), 0)
+    return 0
