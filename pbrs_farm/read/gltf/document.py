@@ -191,3 +191,28 @@ def numbers(gltf: Gltf, value: Any, n: int, place: str) -> NDArray[np.float64]:
     if not fits or not all(type(v) in (int, float) and abs(v) < 1e12 for v in value):
         raise BadHouse(gltf.file, place, f"expected {n} finite numbers")
     return np.array(value, np.float64)
+
+
+def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]:
+    """The textures of a material that are looked at, by their key in glTF, the leading one first.
+
+    A surface has one set of texture coordinates: that of the first of them.
+    """
+    if material is None:
+        return {}
+    fields_json = entry(gltf, "materials", material)
+    look = fields_json.get("pbrMetallicRoughness")
+    look = look if isinstance(look, dict) else {}
+    found = {
+        "baseColorTexture": look.get("baseColorTexture"),
+        "normalTexture": fields_json.get("normalTexture"),
+        "metallicRoughnessTexture": look.get("metallicRoughnessTexture"),
+    }
+    return {key: info for key, info in found.items() if isinstance(info, dict)}
+
+
+def texture_layout(info: dict[str, Any]) -> tuple[Any, Any]:
+    """What places a texture on a surface: its set of texture coordinates and their transform."""
+    extensions = info.get("extensions")
+    turn = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
+    return info.get("texCoord", 0), turn

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, accessor_array, entry
-from pbrs_farm.read.gltf.document import numbers
+from pbrs_farm.read.gltf.document import numbers, texture_slots
 from pbrs_farm.read.mesh.obj import Mesh
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
@@ -47,8 +47,8 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     faces = _faces(gltf, primitive, len(positions), place)
     if not len(faces):
         return None
-    # Take the texture coordinates that the base colour's picture uses.
-    look = _texture_info(gltf, primitive.get("material"))
+    # Take the texture coordinates that the leading picture uses.
+    look = next(iter(texture_slots(gltf, primitive.get("material")).values()), {})
     name, uvs = f"TEXCOORD_{look.get('texCoord', 0)}", None
     if name in attributes:
         uvs = _floats(gltf, attributes[name], 2, f"{place}.TEXCOORD")
@@ -99,15 +99,6 @@ def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> NDArray
     fan, strip = (np.zeros_like(k), k + 1, k + 2), (k, k + 1 + odd, k + 2 - odd)
     corners = np.stack([order[i] for i in (fan if mode == _FAN else strip)], 1)
     return corners.reshape(-1, 3).astype(np.int32)
-
-
-def _texture_info(gltf: Gltf, material: Any) -> dict[str, Any]:
-    """baseColorTexture of a material, or nothing."""
-    if material is None:
-        return {}
-    look = entry(gltf, "materials", material).get("pbrMetallicRoughness")
-    info = look.get("baseColorTexture") if isinstance(look, dict) else None
-    return info if isinstance(info, dict) else {}
 
 
 def _transformed(

@@ -12,7 +12,14 @@ from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.gltf.document import Fetch, MissingFile, image_bytes, numbers
+from pbrs_farm.read.gltf.document import (
+    Fetch,
+    MissingFile,
+    image_bytes,
+    numbers,
+    texture_layout,
+    texture_slots,
+)
 
 # Reflectance of a dielectric at normal incidence, linear (glTF 2.0, appendix B).
 F0: Final = 0.04
@@ -40,12 +47,13 @@ class SceneMaterials:
         place = f"materials[{number}]"
         look = _object(fields_json, "pbrMetallicRoughness")
         factor = numbers(self._gltf, look.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
-        # The metallic-roughness factors; a texture of them is not looked at.
+        # The metallic-roughness factors; of a texture of them metal is not looked at.
         metallic = self._fraction(look, "metallicFactor", 1.0, place)
         roughness = self._fraction(look, "roughnessFactor", 1.0, place)
         if "metallicRoughnessTexture" in look:
-            metallic = 0.0  # the factors only scale a picture that this reader does not look at
+            metallic = 0.0  # its factor only scales what this reader does not look at
         found = self._texture(look.get("baseColorTexture"), place)
+        maps = self._maps(number, place)
         transmission = _object(_object(fields_json, "extensions"), "KHR_materials_transmission")
         passes = self._fraction(transmission, "transmissionFactor", 0.0, place)
         # Opacity is what blending lets through, or transmission, whichever is less.
@@ -55,7 +63,10 @@ class SceneMaterials:
         colour = np.clip(factor[:3], 0, 1)
         # Roughness to a Phong exponent: alpha = roughness^2, n = 2 / alpha^2 - 2.
         shininess = min(2.0 / max(roughness, 1e-3) ** 4 - 2.0, MAX_SHININESS)
-        specular = F0 + (colour - F0) * metallic if shininess > 0 else np.zeros(3)
+        is_metal = metallic > 0 and found is None
+        specular = F0 + (colour - F0) * metallic if shininess > 0 or is_metal else np.zeros(3)
+        # What is as rough as can be and no metal is matte.
+        has_coat = roughness < 1 or is_metal or "metallicRoughnessTexture" in maps
         material = Material(
             name=str(fields_json.get("name", ""))[:100],
             kind=self._kind(fields_json, clear, opacity, metallic, roughness),
@@ -65,9 +76,35 @@ class SceneMaterials:
             opacity=opacity,
             texture_id=found.texture.id if found else None,
             alpha_cutout=bool(found and found.has_holes and mode != "OPAQUE"),
+            roughness=roughness if has_coat else None,
+            roughness_texture_id=maps.get("metallicRoughnessTexture"),
+            normal_texture_id=maps.get("normalTexture"),
+            normal_scale=self._normal_scale(fields_json, place) if "normalTexture" in maps else 1.0,
             is_default=found is None and "baseColorFactor" not in look,
         )
         return material, self._emission(fields_json, place)
+
+    def _maps(self, number: int, place: str) -> dict[str, str]:
+        """Texture ids of the roughness and normal maps that lie as the leading texture does."""
+        slots = texture_slots(self._gltf, number)
+        layouts = {key: texture_layout(info) for key, info in slots.items()}
+        maps: dict[str, str] = {}
+        for key, info in slots.items():
+            if key == "baseColorTexture":
+                continue
+            if layouts[key] != next(iter(layouts.values())):
+                text = f"{key} lies on the surface otherwise than the first texture: left out"
+                self._notes.add("texture-layout", place, text)
+                continue
+            found = self._texture(info, f"{place}: {key}")
+            if found is not None:
+                maps[key] = found.texture.id
+        return maps
+
+    def _normal_scale(self, fields_json: dict[str, Any], place: str) -> float:
+        scale = _object(fields_json, "normalTexture").get("scale", 1.0)
+        (value,) = numbers(self._gltf, [scale], 1, f"{place}: scale of the normal map")
+        return float(value)
 
     def _kind(
         self,

@@ -67,6 +67,54 @@ def test_gloss_survives_the_way_through_our_own_glb() -> None:
     assert next(m for m in house.materials if m.name == shiny.name).shininess == pytest.approx(40.0)
 
 
+def test_roughness_and_normal_maps_come_with_their_factors() -> None:
+    s = two_rooms()
+    pictures = [png(), png(rgb=(128, 128, 255))]
+    views = [s.writer.add_bytes(data) for data in pictures]
+    s.more = {
+        "images": [{"bufferView": v, "mimeType": "image/png", "name": f"p{v}"} for v in views],
+        "textures": [{"source": 0}, {"source": 1}],
+    }
+    rough = {"roughnessFactor": 0.5, "metallicRoughnessTexture": {"index": 0}}
+    s.materials += [
+        {"name": "wood", "pbrMetallicRoughness": rough, "normalTexture": {"index": 1, "scale": 0.5}},
+        {"name": "iron", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}},
+        {"name": "askew", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
+         "normalTexture": {"index": 1, "texCoord": 1}},
+    ]  # fmt: skip
+    for k in range(3):
+        s.node("Chair", mesh=s.mesh([[[0, 0, k], [1, 0, k], [1, 1, k], [0, 1, k]]], k))
+    house = read(s)
+    look = {m.name: m for m in house.materials}
+    wood = look["wood"]
+    assert house.textures[wood.roughness_texture_id or ""].data == pictures[0]
+    assert house.textures[wood.normal_texture_id or ""].data == pictures[1]
+    assert (wood.roughness, wood.normal_scale, wood.texture_id) == (0.5, 0.5, None)
+    # glTF's defaults are metal of roughness 1: no longer black.
+    assert look["iron"].roughness == 1.0
+    assert look["iron"].specular == pytest.approx((0.735,) * 3, abs=1e-3)
+    # A surface has one set of texture coordinates.
+    assert look["askew"].normal_texture_id is None
+    assert any(n.kind == "texture-layout" and "normalTexture" in n.text for n in house.notes)
+
+
+def test_maps_survive_the_way_through_our_own_glb() -> None:
+    home = builtin_home()
+    number = next(k for k, m in enumerate(home.materials) if m.texture_id)
+    picture = home.materials[number].texture_id
+    mapped = replace(
+        home.materials[number],
+        roughness=0.5, roughness_texture_id=picture, normal_texture_id=picture, normal_scale=2.0,
+    )  # fmt: skip
+    materials = (*home.materials[:number], mapped, *home.materials[number + 1 :])
+    home = replace(home, materials=materials)
+    house = read_gltf(bundle_from_house(home)[0], "a.glb", fields=ReadFields())
+    back = next(m for m in house.materials if m.name == mapped.name)
+    assert (back.roughness, back.normal_scale) == (0.5, 2.0)
+    assert back.roughness_texture_id == back.normal_texture_id == picture
+    assert all(m.roughness is None for m in house.materials if m.name == "carpet")
+
+
 def test_punctual_lights_become_lumens_of_the_lamp_they_hang_in() -> None:
     s = two_rooms()
     s.more["extensions"] = {
