@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.house import Item
+from pbrs_farm.core.house import Item, ItemKind
+from pbrs_farm.dress.clutter.beds import dress_bed
 from pbrs_farm.dress.clutter.kinds import Stock
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of
+from pbrs_farm.dress.clutter.seats import dress_seat
 from pbrs_farm.dress.clutter.shelves import fill_shelf, plan_shelves
 from pbrs_farm.dress.clutter.tops import fill_top
 from pbrs_farm.dress.clutter.worktop import Worktop
@@ -19,13 +21,15 @@ from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
 
 _LEAST_SHELF_DEPTH_M = 0.12
+_BED, _SOFA, _CHAIR = 4, 6, 5
 
 
 def clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Put small things where they belong, touching what they stand on and nothing else."""
     space = house_space(draft)
     scene = SceneTriangles(draft.items)
-    stock = Stock(catalogue, book_covers(draft.rng("clutter", "covers"), style))
+    covers = book_covers(draft.rng("clutter", "covers"), style)
+    stock = Stock(catalogue, covers, int(draft.rng("clutter", "stock").integers(1 << 31)))
     bias = house_bias(draft.rng("clutter", "bias"))
     for room in space.rooms:
         rng = draft.rng("clutter", room.room.id)
@@ -42,8 +46,14 @@ def house_bias(rng: np.random.Generator) -> float:
 def _fill_room(placing: Placing, scene: SceneTriangles, room: RoomSpace) -> None:
     for index in room.items:
         item = scene.items[index] if index < len(scene.items) else None
-        if item is not None and can_hold(item):
+        if item is None:
+            continue
+        if can_hold(item):
             _fill_item(placing, scene, room, index, item)
+        elif item.kind is ItemKind.OBJECT and item.nyu40 == _BED:
+            dress_bed(placing, scene, index)
+        elif item.kind is ItemKind.OBJECT and item.nyu40 in (_SOFA, _CHAIR):
+            _dress_seat(placing, scene, index, item)
 
 
 def _fill_item(
@@ -61,3 +71,13 @@ def _fill_item(
                 fill_shelf(placing, top, plan)
         else:
             fill_top(placing, top, receptacle)
+
+
+def _dress_seat(placing: Placing, scene: SceneTriangles, index: int, item: Item) -> None:
+    low, high = item.bounds
+    width = float(max(high[0] - low[0], high[2] - low[2]))
+    # Chairs at tables carry none, armchairs one now and then.
+    if item.nyu40 == _SOFA:
+        dress_seat(placing, scene, index, 4 if width > 1.5 else 2)
+    elif width > 0.72 and placing.rng.random() < 0.5:
+        dress_seat(placing, scene, index, 1)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
+from pbrs_farm.core.catalogue import Catalogue, Place, Shape
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.dress.generated.books import magazines, open_book, stack_of_books
 from pbrs_farm.dress.generated.covers import Covers
@@ -15,8 +15,10 @@ from pbrs_farm.dress.generated.made import Made
 from pbrs_farm.dress.generated.things import GENERATORS
 from pbrs_farm.dress.style import Style
 
-_MOST_FACES: Final = 4000  # of a small thing from a catalogue
+_MOST_FACES: Final = 1500  # of a small thing from a catalogue
 _GENERATED_SHARE: Final = 0.5  # where there are both
+_DESIGNS: Final = 1  # of a kind in one home
+_MOST_TRIES: Final = 2  # models that are loaded to find them
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,12 +77,14 @@ _KINDS: Final[dict[str, Kind]] = {
 }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Stock:
-    """What a home's small things are taken from."""
+    """What a home's small things are taken from: one model of each kind, as people own sets."""
 
-    catalogue: Catalogue
-    covers: Covers
+    def __init__(self, catalogue: Catalogue, covers: Covers, seed: int) -> None:
+        self.covers = covers
+        self._catalogue = catalogue
+        self._seed = seed
+        self._designs: dict[str, list[Made]] = {}
 
     def take(self, rng: np.random.Generator, kind: str, style: Style) -> Made | None:
         """A thing of that kind; None where there is none that can be used."""
@@ -90,26 +94,36 @@ class Stock:
             return stack_of_books(rng, self.covers, n) if n else open_book(rng, self.covers)
         if kind == "magazines":
             return magazines(rng, self.covers, int(rng.integers(1, 6)))
-        found = _KINDS[kind]
-        choices = self._choices(found)
         # Draw for all alike, so that what the catalogue holds moves no later draw.
+        found = _KINDS[kind]
         is_made, number = rng.random() < _GENERATED_SHARE, int(rng.integers(1 << 30))
+        designs = [] if found.made and is_made else self._owned(kind)
+        if designs:
+            return designs[number % len(designs)]
         own = np.random.default_rng(number)
-        if choices and not (found.made and is_made):
-            piece = choices[number % len(choices)]
-            shape = self.catalogue.shape(piece)
-            if shape is not None and _is_usable(shape, found):
-                return piece, shape
         return GENERATORS[found.made](own, style) if found.made else None
 
-    def _choices(self, kind: Kind) -> list[Piece]:
-        return [
-            p
-            for p in self.catalogue.of(*kind.groups)
-            if p.place is Place.SURFACE
-            and max(p.size) <= kind.most_m
-            and p.kind in (ItemKind.OBJECT, ItemKind.LAMP)
-        ]
+    def _owned(self, kind: str) -> list[Made]:
+        """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
+        if kind not in self._designs:
+            found = _KINDS[kind]
+            fitting = [
+                p
+                for p in self._catalogue.of(*found.groups)
+                if p.place is Place.SURFACE
+                and max(p.size) <= found.most_m
+                and p.kind in (ItemKind.OBJECT, ItemKind.LAMP)
+            ]
+            order = np.random.default_rng([self._seed, *kind.encode()]).permutation(len(fitting))
+            owned: list[Made] = []
+            for k in order[:_MOST_TRIES]:
+                if len(owned) == _DESIGNS:
+                    break
+                shape = self._catalogue.shape(fitting[k])
+                if shape is not None and _is_usable(shape, found):
+                    owned.append((fitting[k], shape))
+            self._designs[kind] = owned
+        return self._designs[kind]
 
 
 def is_round(kind: str) -> bool:
