@@ -7,8 +7,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Final
+
+import numpy as np
 
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
@@ -21,9 +24,12 @@ from pbrs_farm.dress.gates.support import MOST_M as SUPPORT_M
 from pbrs_farm.dress.gates.support import held, held_as_drawn
 from pbrs_farm.dress.gates.ways import blocked_doors, closed_ways, covered_windows
 from pbrs_farm.dress.report import Gate
-from pbrs_farm.dress.space import house_space
+from pbrs_farm.dress.space import HouseSpace, house_space
 
 _ROUNDS: Final = 12
+_LARGE_M: Final = 0.35  # of the longest side
+_ON_FLOOR_M: Final = 0.1
+_WAYS: Final = {"doors": blocked_doors, "windows": covered_windows, "path": closed_ways}
 _NAMES: Final = ("must_haves", "penetration", "support", "doors", "windows", "path")
 _REASONS: Final = {
     "must_haves": "is no longer what the room had",
@@ -43,6 +49,7 @@ class _Memory:
     apart: set[tuple[int, int]] = field(default_factory=set)  # ids of items that share nothing
     supports: dict[int, tuple[int, ...]] = field(default_factory=dict)  # id -> of what holds it
     solids: Solids = field(default_factory=Solids)
+    free: dict[str, int] = field(default_factory=dict)  # ways that nothing closes, how many
 
 
 def keep_gates(draft: Draft, pieces: Mapping[str, Piece]) -> tuple[Gate, ...]:
@@ -72,23 +79,43 @@ def _measured(
 ) -> tuple[dict[str, int], dict[str, list[int]]]:
     """Gate -> how much was measured, and gate -> indices of the items that break it."""
     bodies = _bodies(draft, pieces, memory)
-    space = house_space(draft)
     checked, broken = dict.fromkeys(_NAMES, 0), {name: list[int]() for name in _NAMES}
     checked["must_haves"], broken["must_haves"] = _changed_class(draft)
+    if not any(body.is_new for body in bodies):
+        return checked, broken
     # Of two things that share space the one that came later goes.
     for i, j in near_pairs(bodies):
         checked["penetration"] += 1
         if not _are_apart(bodies[i], bodies[j], memory):
             broken["penetration"].append(bodies[j if bodies[j].is_new else i].index)
     checked["support"], broken["support"] = _unsupported(bodies, memory)
-    for name, (n, found) in {
-        "doors": blocked_doors(space, bodies),
-        "windows": covered_windows(space, bodies),
-        "path": closed_ways(space, bodies),
-    }.items():
-        checked[name] = n
-        broken[name] = sorted({bodies[b.body].index for b in found})
-    return checked, broken
+    # What is free stays free when things are taken out.
+    if any(name not in memory.free for name in _WAYS):
+        space, large = _space(draft, bodies)
+        for name, gate in _WAYS.items():
+            n, found = gate(space, large)
+            checked[name], broken[name] = n, sorted({b.index for b in found})
+            if not found:
+                memory.free[name] = n
+    return checked | memory.free, broken
+
+
+def _space(draft: Draft, bodies: list[Body]) -> tuple[HouseSpace, list[Body]]:
+    """The space of the draft without small things, and the bodies in it, as numbered there.
+
+    What is small and stands on other things is in nobody's way, and there are hundreds.
+    """
+    floors = np.array([room.floor_y for room in draft.source.rooms] or [0.0])
+    large = [
+        b
+        for b in bodies
+        if not b.is_new
+        or float((b.high - b.low).max()) > _LARGE_M
+        or float(np.abs(floors - b.low[1]).min()) < _ON_FLOOR_M
+    ]
+    some = copy(draft)
+    some.items = [b.item for b in large]
+    return house_space(some), large
 
 
 def _bodies(draft: Draft, pieces: Mapping[str, Piece], memory: _Memory) -> list[Body]:

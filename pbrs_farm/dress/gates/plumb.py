@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.dress.gates.bodies import Body
 
-_CELL_M: Final = 0.1
-_MANY_CELLS: Final = 400  # a triangle over more is looked at for every place
+_CELLS_M: Final = (0.1, 1.0)
+_MANY_CELLS: Final = 400  # a triangle over more goes into the next larger cells
 _STEEP: Final = 1e-9  # square metres in plan: a triangle with less stands upright
 _EDGE: Final = 1e-6  # of a triangle's extent: a place on its edge is on it
 
@@ -39,43 +39,72 @@ class Plumb:
         ab, ac = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
         lies = np.abs(ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]) > 2 * _STEEP
         self._corners, self._owner = corners[lies], owner[lies]
-        # Enter each triangle into the cells of its bounds.
-        plan = plan[lies]
-        self._origin = plan.min((0, 1)) if len(plan) else np.zeros(2)
-        first = np.floor((plan.min(1) - self._origin) / _CELL_M - _EDGE).astype(np.int64)
-        last = np.floor((plan.max(1) - self._origin) / _CELL_M + _EDGE).astype(np.int64)
-        shape = last - first + 1
-        n_cells = shape.prod(1)
-        self._large = np.flatnonzero(n_cells > _MANY_CELLS)
-        small = np.flatnonzero(n_cells <= _MANY_CELLS)
-        triangle = np.repeat(small, n_cells[small])
-        k = np.arange(len(triangle)) - np.repeat(
-            np.cumsum(n_cells[small]) - n_cells[small], n_cells[small]
-        )
-        across = shape[triangle, 1]
-        cell = np.stack([first[triangle, 0] + k // across, first[triangle, 1] + k % across], -1)
-        self._stride = int(last[:, 1].max(initial=0)) + 2
-        keys = cell[:, 0] * self._stride + cell[:, 1]
-        order = np.argsort(keys, kind="stable")
-        self._keys, self._triangle = keys[order], triangle[order]
+        y = self._corners[:, :, 1]
+        self._low, self._high = y.min(1), y.max(1)
+        # Enter each triangle into cells of a size that suits it.
+        left, self._grids = np.arange(len(self._corners)), list[_Grid]()
+        for cell_m in _CELLS_M:
+            grid, left = _grid(self._corners, left, cell_m, is_last=cell_m == _CELLS_M[-1])
+            self._grids.append(grid)
 
-    def hits(self, places: F64) -> Hits:
-        """Every face above or below plan places (N, 2), edges included."""
-        cell = np.floor((places - self._origin) / _CELL_M).astype(np.int64)
-        keys = cell[:, 0] * self._stride + cell[:, 1]
-        keys[(cell < 0).any(1) | (cell[:, 1] >= self._stride)] = -1
-        low, high = np.searchsorted(self._keys, keys), np.searchsorted(self._keys, keys, "right")
-        count = high - low
-        place = np.repeat(np.arange(len(places)), count)
-        k = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
-        triangle = self._triangle[np.repeat(low, count) + k]
-        # Add the large triangles for every place.
-        n = len(self._large)
-        place = np.concatenate([place, np.repeat(np.arange(len(places)), n)])
-        triangle = np.concatenate([triangle, np.tile(self._large, len(places))])
-        y = heights_at(places[place], self._corners[triangle])
-        met = np.isfinite(y)
+    def hits(self, points: F64, reach_m: float) -> Hits:
+        """Every face at most reach_m above or below points (N, 3), edges included."""
+        found = [grid.candidates(points[:, [0, 2]]) for grid in self._grids]
+        place, triangle = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        # Leave out faces that lie too high or too low.
+        y = points[place, 1]
+        near = (self._low[triangle] < y + reach_m) & (self._high[triangle] > y - reach_m)
+        place, triangle = place[near], triangle[near]
+        y = heights_at(points[place][:, [0, 2]], self._corners[triangle])
+        with np.errstate(invalid="ignore"):
+            met = np.abs(y - points[place, 1]) < reach_m
         return Hits(place[met], y[met], self._owner[triangle[met]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Grid:
+    # Numbers of triangles by the square cell of the plan that they reach into.
+    cell_m: float
+    origin: F64  # (2,)
+    stride: int
+    keys: Ints  # ascending
+    triangle: Ints  # of the key of the same row
+
+    def candidates(self, plan: F64) -> tuple[Ints, Ints]:
+        """(places, triangles) that share a cell, for plan places (N, 2)."""
+        cell = np.floor((plan - self.origin) / self.cell_m).astype(np.int64)
+        keys = cell[:, 0] * self.stride + cell[:, 1]
+        keys[(cell < 0).any(1) | (cell[:, 1] >= self.stride)] = -1
+        low, high = np.searchsorted(self.keys, keys), np.searchsorted(self.keys, keys, "right")
+        count = high - low
+        place = np.repeat(np.arange(len(plan)), count)
+        return place, self.triangle[np.repeat(low, count) + _counting(count)]
+
+
+def _grid(corners: F64, numbers: Ints, cell_m: float, *, is_last: bool) -> tuple[_Grid, Ints]:
+    """A grid of some of the triangles (F, 3, 3), and the numbers of those too large for it."""
+    plan = corners[numbers][:, :, [0, 2]]
+    origin = plan.min((0, 1)) if len(plan) else np.zeros(2)
+    first = np.floor((plan.min(1) - origin) / cell_m - _EDGE).astype(np.int64)
+    last = np.floor((plan.max(1) - origin) / cell_m + _EDGE).astype(np.int64)
+    shape = last - first + 1
+    n_cells = shape.prod(1)
+    fits = (n_cells <= _MANY_CELLS) | is_last
+    first, shape, n_cells = first[fits], shape[fits], n_cells[fits]
+    # Repeat each triangle for the cells of its bounds, row by row.
+    row = np.repeat(np.arange(len(n_cells)), n_cells)
+    k, across = _counting(n_cells), shape[row, 1]
+    cell = np.stack([first[row, 0] + k // across, first[row, 1] + k % across], -1)
+    stride = int(last[:, 1].max(initial=0)) + 2
+    keys = cell[:, 0] * stride + cell[:, 1]
+    order = np.argsort(keys, kind="stable")
+    held = _Grid(cell_m, origin, stride, keys[order], numbers[fits][row[order]])
+    return held, numbers[~fits]
+
+
+def _counting(counts: Ints) -> Ints:
+    """0, 1, ... for each count, one after another."""
+    return np.asarray(np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts))
 
 
 def heights_at(places: F64, corners: F64) -> F64:

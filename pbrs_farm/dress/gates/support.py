@@ -21,7 +21,7 @@ from pbrs_farm.dress.gates.plumb import Plumb
 
 MOST_M: Final = 0.002
 _RING_M: Final = 0.003  # above the lowest point of a thing: what it stands on
-_MOST_PLACES: Final = 32  # of one thing
+_MOST_PLACES: Final = 12  # of one thing
 _REACH_M: Final = 0.3  # up or down, that a gap is told of
 _SOFT: Final = frozenset({"blanket", "throw", "towel", "pillow", "cushion", "curtain"})
 
@@ -82,11 +82,11 @@ def _standing(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> d
     places = [_places(bodies[n]) for n in numbers]
     points = np.concatenate([np.zeros((0, 3)), *places])
     of = np.repeat(np.asarray(numbers, np.int64), [len(p) for p in places])
-    hits = plumb.hits(points[:, [0, 2]])
+    hits = plumb.hits(points, _REACH_M)
     # The gap is from a place down to the face below it, negative to a face above.
     gap = points[hits.place, 1] - hits.y
     own = of[hits.place]
-    keep = (hits.body != own) & (np.abs(gap) < _REACH_M)
+    keep = hits.body != own
     gap, own, body = gap[keep], own[keep], hits.body[keep]
     found = dict.fromkeys(numbers, Held(_REACH_M))
     order = np.argsort(own, kind="stable")
@@ -104,14 +104,15 @@ def _standing(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> d
 
 def _places(body: Body) -> F64:
     """(P, 3) the lowest points of a body, or the highest of what hangs from a ceiling."""
-    points = np.unique(body.corners.reshape(-1, 3), axis=0)
+    points = body.corners.reshape(-1, 3)
     if _place(body) is Place.CEILING:
         ring = points[points[:, 1] > body.high[1] - _RING_M]
     elif body.group in _SOFT:
         ring = points
     else:
         ring = points[points[:, 1] < body.low[1] + _RING_M]
-    n = _MOST_PLACES * (8 if body.group in _SOFT else 1)
+    ring = np.unique(ring, axis=0)
+    n = _MOST_PLACES * (16 if body.group in _SOFT else 1)
     rows = np.unique(np.linspace(0, len(ring) - 1, min(n, len(ring))).astype(np.int64))
     return np.asarray(ring[rows])
 
@@ -139,9 +140,10 @@ def _distance_m(a: Body, b: Body) -> float:
 
 def _vertices_to_faces(a: Body, b: Body) -> float:
     # Look at vertices and faces near the other's box alone.
-    points = np.unique(a.corners.reshape(-1, 3), axis=0)
+    points = a.corners.reshape(-1, 3)
     reach = _REACH_M / 10
     points = points[((points > b.low - reach) & (points < b.high + reach)).all(1)]
+    points = np.unique(points, axis=0)
     corners = b.corners
     near = (corners.min(1) < a.high + reach).all(1) & (corners.max(1) > a.low - reach).all(1)
     corners = corners[near]

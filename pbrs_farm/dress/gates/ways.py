@@ -1,4 +1,7 @@
-"""Gates of what must stay free: doors and the space before them, windows, ways; on meshes, no effects."""
+"""Gates of what must stay free: doors and the space before them, windows, ways; on meshes, no effects.
+
+The bodies are those of the space, in its order.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,7 @@ class Blocked:
     """A door, window or way that a body keeps from being used."""
 
     what: str  # the passage or room
-    body: int  # number in the list of bodies
+    index: int  # of the body's item in the draft
 
 
 def _counts(body: Body) -> bool:
@@ -47,9 +50,9 @@ def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[
             depth = max(BEFORE_DOOR_M, min(door.width, 1.0))
             low = np.array([-door.width / 2 + _BESIDE_M, floor_y + _STEP_M, _FACE_M])
             high = np.array([door.width / 2 - _BESIDE_M, min(door.top_y, floor_y + _HEAD_M), depth])
-            for number, body in enumerate(bodies):
+            for body in bodies:
                 if _counts(body) and _enters(body, door, side, low, high):
-                    found.append(Blocked(door.id, number))
+                    found.append(Blocked(door.id, body.index))
     return n, found
 
 
@@ -84,7 +87,7 @@ def covered_windows(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
             covers = {k: m for k, m in _covers(window, side, space, bodies).items() if m.any()}
             while covers and np.mean(np.any(list(covers.values()), 0)) >= MOST_COVERED:
                 worst = max(covers, key=lambda k: (int(covers[k].sum()), k))
-                found.append(Blocked(window.id, worst))
+                found.append(Blocked(window.id, bodies[worst].index))
                 del covers[worst]
     return n, found
 
@@ -99,7 +102,7 @@ def _covers(
     for number, body in enumerate(bodies):
         if not _counts(body):
             continue
-        local = in_front_of(window, side, space.points[body.index])
+        local = in_front_of(window, side, space.points[number])
         near = (local[:, 2] > 0.01) & (local[:, 2] < _BEFORE_WINDOW_M)
         column = np.floor((local[near, 0] / window.width + 0.5) * columns).astype(np.int64)
         height = (local[near, 1] - window.bottom_y) / (window.top_y - window.bottom_y)
@@ -117,24 +120,23 @@ def closed_ways(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Bl
     Bodies are named from the last on, until a way 0.6 m wide joins the doors again.
     """
     n, found = 0, []
-    number_of = {body.index: k for k, body in enumerate(bodies) if body.is_new}
     for room in space.rooms:
         if sum(door.side_of(room.room.id) is not None for door in room.doors) < 2:
             continue
         n += 1
-        new = [i for i in room.items if i in number_of]
+        new = [k for k in room.items if bodies[k].is_new]
         if _is_joined(space, room, ()) or not _is_joined(space, room, new):
             continue
         without: list[int] = []
-        for index in reversed(new):
+        for number in reversed(new):
             # Name what alone opens the way, or what does with those before it.
-            if _is_joined(space, room, [index]):
-                without = [index]
+            if _is_joined(space, room, [number]):
+                without = [number]
                 break
-            without.append(index)
+            without.append(number)
             if _is_joined(space, room, without):
                 break
-        found += [Blocked(room.room.id, number_of[i]) for i in without]
+        found += [Blocked(room.room.id, bodies[k].index) for k in without]
     return n, found
 
 
