@@ -7,6 +7,7 @@ import numpy as np
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.dress.clutter.beds import dress_bed
+from pbrs_farm.dress.clutter.floors import fill_floor
 from pbrs_farm.dress.clutter.kinds import Stock
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of
@@ -36,6 +37,7 @@ def clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> N
         own = room_style(style, draft.rng("style", room.room.id))
         placing = Placing(draft, stock, room.room, own, rng, share, bias)
         _fill_room(placing, scene, room)
+        fill_floor(placing, scene, room)
 
 
 def house_bias(rng: np.random.Generator) -> float:

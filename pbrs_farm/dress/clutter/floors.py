@@ -1,0 +1,161 @@
+"""Things on the floor: bins, bags, shoes, baskets, boxes near walls, never in anybody's way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy import ndimage
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.dress.clutter.placing import Placing
+from pbrs_farm.dress.clutter.worktop import LIFT_M
+from pbrs_farm.dress.generated.made import Made
+from pbrs_farm.dress.space.house_space import RoomSpace
+from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.supports.find_supports import surroundings
+from pbrs_farm.dress.supports.plan_grid import PlanGrid
+from pbrs_farm.dress.supports.scene_triangles import SceneTriangles
+
+_CELL_M = 0.05
+_WALK_M = 0.6  # the width of a way
+_REACH_M = 0.35  # a thing's middle is no farther from a wall or furniture
+_KEPT_M = 0.04  # between things
+_DOOR_M = 1.0  # kept free before doors
+_HEAD_M = 1.9
+_RUG_M = 0.03  # what is lower may lie anywhere, but carries nothing
+
+# What stands on floors: kind, chance in a room.
+_USUAL: dict[RoomKind, tuple[tuple[str, float], ...]] = {
+    RoomKind.HALL: (("shoes", 0.8), ("shoes", 0.6), ("bag", 0.35), ("basket", 0.15)),
+    RoomKind.LIVING: (("basket", 0.5), ("magazines", 0.4), ("toy", 0.35), ("bag", 0.2), ("storage_box", 0.2), ("book", 0.25)),
+    RoomKind.BEDROOM: (("basket", 0.4), ("shoes", 0.45), ("toy", 0.3), ("bag", 0.3), ("book", 0.25), ("storage_box", 0.25), ("bin", 0.2)),
+    RoomKind.KITCHEN: (("bin", 0.75), ("bag", 0.25), ("bottle", 0.25), ("carton", 0.12)),
+    RoomKind.DINING: (("basket", 0.25), ("toy", 0.2), ("bag", 0.2)),
+    RoomKind.BATHROOM: (("basket", 0.55), ("bin", 0.5), ("shoes", 0.15)),
+    RoomKind.OFFICE: (("bin", 0.8), ("carton", 0.4), ("bag", 0.4), ("book", 0.5), ("storage_box", 0.3)),
+    RoomKind.STORE: (("cartons", 0.8), ("carton", 0.8), ("storage_box", 0.6), ("basket", 0.3), ("bag", 0.3), ("shoes", 0.4)),
+    RoomKind.OTHER: (("carton", 0.3), ("basket", 0.4), ("bag", 0.2)),
+    RoomKind.OUTDOOR: (("plant_pot", 0.5), ("plant_pot", 0.3)),
+}  # fmt: skip
+
+
+@dataclass(slots=True)
+class _Floor:
+    # Cells of a room's floor while things are put there.
+    grid: PlanGrid
+    inside: Bools
+    free: Bools  # nothing stands there, no door needs it
+    walkable: Bools  # nothing stands there
+    doors: list[F64]  # (2,) plan points where one stands before each door
+
+
+def fill_floor(placing: Placing, scene: SceneTriangles, room: RoomSpace) -> int:
+    """Put things on the floor of a room; how many."""
+    rng = placing.rng
+    wanted = [
+        kind for kind, chance in _USUAL.get(room.kind, ()) if rng.random() < chance * placing.share
+    ]
+    floor = _floor(scene, room) if wanted else None
+    if floor is None or not floor.free.any():
+        return 0
+    n = 0
+    for kind in wanted:
+        made = placing.stock.take(rng, kind, placing.style)
+        if made is not None:
+            n += _put(placing, floor, made)
+    return n
+
+
+def _floor(scene: SceneTriangles, room: RoomSpace) -> _Floor | None:
+    if room.area.is_empty or room.room.polygon.shape[0] < 3:
+        return None
+    y = room.room.floor_y
+    grid = PlanGrid.around(np.asarray(room.room.polygon, np.float64), 0.0, _CELL_M, 0.0)
+    plan = grid.centres()
+    inside = shapely.contains_xy(room.area, plan[..., 0], plan[..., 1])
+    around = surroundings(scene, -1, grid, y)
+    hits = around.hits
+    inside &= ~around.solid
+    # Rugs carry nothing, but one walks over them.
+    stands = (hits.low < y + _HEAD_M) & (hits.high > y + 0.002)
+    blocks = stands & (hits.high > y + _RUG_M)
+    low, body = np.zeros(grid.shape, np.bool_), np.zeros(grid.shape, np.bool_)
+    low[hits.row[stands], hits.column[stands]] = True
+    body[hits.row[blocks], hits.column[blocks]] = True
+    walkable = inside & ~body
+    # Keep a metre before doors and windows that reach the floor.
+    kept = np.zeros(grid.shape, np.bool_)
+    doors = []
+    for passage in (*room.doors, *(w for w in room.windows if w.bottom_y < y + 0.4)):
+        side = passage.side_of(room.room.id)
+        if side is None:
+            continue
+        zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(_CELL_M)
+        kept |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
+        if passage in room.doors:
+            at = passage.face_point(side) + passage.inward(side) * (_WALK_M / 2 + 0.05)
+            doors.append(at[[0, 2]])
+    return _Floor(grid, inside, inside & ~low & ~kept, walkable, doors)
+
+
+def _put(placing: Placing, floor: _Floor, made: Made) -> bool:
+    low, high = made[1].bounds
+    reach = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
+    # Its middle keeps from everything by its own radius, but not much more.
+    distance = ndimage.distance_transform_edt(np.pad(floor.free, 1))[1:-1, 1:-1] * _CELL_M
+    to_wall = ndimage.distance_transform_edt(np.pad(floor.walkable, 1))[1:-1, 1:-1] * _CELL_M
+    least = reach + _KEPT_M + _CELL_M
+    rows, columns = np.nonzero((distance >= least) & (to_wall <= least + _REACH_M))
+    for k in placing.rng.permutation(len(rows))[:12]:
+        disc = _disc(floor.grid.shape, int(rows[k]), int(columns[k]), reach + _CELL_M)
+        if not _ways_stay(floor, disc):
+            continue
+        x, z = floor.grid.plan_of(columns[k] + 0.5, rows[k] + 0.5)
+        turn = _facing(to_wall, int(rows[k]), int(columns[k]))
+        placing.put(
+            made, np.array([x, placing.room.floor_y + LIFT_M, z]),
+            turn + float(placing.rng.normal(0, 0.2)),
+        )  # fmt: skip
+        floor.free &= ~disc
+        floor.walkable &= ~disc
+        return True
+    placing.refuse("no place on the floor")
+    return False
+
+
+def _disc(shape: tuple[int, int], row: int, column: int, radius_m: float) -> Bools:
+    i, j = np.ogrid[: shape[0], : shape[1]]
+    return np.asarray((i - row) ** 2 + (j - column) ** 2 <= (radius_m / _CELL_M) ** 2)
+
+
+def _facing(to_wall: F64, row: int, column: int) -> float:
+    # Away from what is nearest: up the slope of the distance.
+    i, j = slice(max(row - 2, 0), row + 3), slice(max(column - 2, 0), column + 3)
+    part = to_wall[i, j]
+    if min(part.shape) < 2:
+        return 0.0
+    down, right = np.gradient(part)
+    return float(np.arctan2(right.mean(), down.mean()))
+
+
+def _ways_stay(floor: _Floor, disc: Bools) -> bool:
+    """Whether one way still joins the doors that one way joined before."""
+    before, after = (_ways(floor, mask) for mask in (floor.walkable, floor.walkable & ~disc))
+    pairs_before = {(a, b) for a, x in enumerate(before) for b, y in enumerate(before) if x & y}
+    pairs_after = {(a, b) for a, x in enumerate(after) for b, y in enumerate(after) if x & y}
+    return pairs_before <= pairs_after
+
+
+def _ways(floor: _Floor, walkable: Bools) -> list[set[int]]:
+    # The ways that pass where one stands before each door.
+    room = ndimage.distance_transform_edt(np.pad(walkable, 1))[1:-1, 1:-1] * _CELL_M
+    ways, _n = ndimage.label(room >= _WALK_M / 2, structure=np.ones((3, 3)))
+    ways = np.asarray(ways)
+    found = []
+    for door in floor.doors:
+        column, row = np.floor((door - floor.grid.origin) / _CELL_M).astype(int)
+        near = ways[max(row - 4, 0) : max(row + 5, 0), max(column - 4, 0) : max(column + 5, 0)]
+        found.append({int(w) for w in np.unique(near)} - {0})
+    return found

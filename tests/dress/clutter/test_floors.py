@@ -1,0 +1,70 @@
+"""Things on the floor keep out of the way: of doors, of ways, of each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.house import Item
+from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
+from pbrs_farm.dress.style import style_for
+from tests.builders import builtin_home
+from tests.dress.furniture import house, solid
+
+
+def _dressed(seed: int) -> Draft:
+    draft = Draft(builtin_home(), seed)
+    clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+    return draft
+
+
+def _on_floor(draft: Draft) -> list[Item]:
+    floors = {r.id: r.floor_y for r in draft.source.rooms}
+    added = draft.items[len(draft.source.items) :]
+    return [i for i in added if abs(i.bounds[0, 1] - floors[i.room_id or ""]) < 0.01]
+
+
+def test_things_on_the_floor_touch_it_inside_their_room() -> None:
+    things = [(d, i) for seed in range(3) for d in [_dressed(seed)] for i in _on_floor(d)]
+    assert len(things) >= 3
+    for draft, item in things:
+        room = draft.source.room(item.room_id or "")
+        assert 0 <= item.bounds[0, 1] - room.floor_y < 0.0005
+        (x0, z0), (x1, z1) = item.bounds[:, [0, 2]]
+        assert shapely.Polygon(room.polygon).contains(shapely.box(x0, z0, x1, z1))
+
+
+def test_no_thing_stands_before_a_door_and_the_doors_stay_joined() -> None:
+    for seed in range(3):
+        bare, dressed = Draft(builtin_home(), seed), _dressed(seed)
+        space, before = house_space(dressed), house_space(bare)
+        footprints = [shapely.box(*i.bounds[:, [0, 2]].ravel()) for i in _on_floor(dressed)]
+        for room in space.rooms:
+            for door in room.doors:
+                side = door.side_of(room.room.id)
+                if side is not None:
+                    zone = door.before(side).union(door.swing(side))
+                    assert not any(zone.intersects(f) for f in footprints)
+            was = before.room(room.room.id)
+            if doors_are_joined(floor_bitmap(before, was), was):
+                assert doors_are_joined(floor_bitmap(space, room), room)
+
+
+def test_a_room_without_floor_to_stand_on_gets_nothing() -> None:
+    full = solid("Block", [0, 0, 0], [4, 1.0, 3], 39)
+    draft = Draft(house(full), 1)
+    clutter(draft, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    assert not _on_floor(draft)
+
+
+def test_a_room_of_two_corners_is_left_alone() -> None:
+    home = house()
+    flat = replace(home.rooms[0], polygon=np.array([[0.0, 0.0], [1.0, 0.0]]))
+    draft = Draft(replace(home, rooms=(flat,)), 1)
+    clutter(draft, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    assert not _on_floor(draft)
