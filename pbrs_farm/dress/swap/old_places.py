@@ -1,0 +1,147 @@
+"""Where a piece of furniture of the source stands, which way it faces, what it is; no effects."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Piece
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Item
+
+_UPRIGHT: Final = 0.999  # cosine to the vertical of what is not tilted
+_HIGH_PART: Final = 0.25  # of the height, at the top: where the back of a seat is
+_CLEAR: Final = 0.12  # of the depth: how far the top must lie behind the middle
+_TABLE: Final = 7  # nyu40
+_HIGH_TABLE_M: Final = 0.62  # one eats or works at what is higher
+_BACKED: Final = frozenset({"chair", "armchair", "sofa", "bed"})
+
+
+class Held(Enum):
+    """What of a piece keeps its place when it gets another model."""
+
+    BACK = "back"
+    CENTRE = "centre"
+    TOP = "top"
+
+
+# What may be swapped. Doors, windows and what kitchens are built of stay.
+HELD: Final[Mapping[str, Held]] = {
+    **dict.fromkeys(
+        ("sofa", "armchair", "bed", "desk", "nightstand", "tv_stand", "bookcase", "shelves",
+         "wardrobe", "dresser", "cabinet", "fridge", "toilet", "bidet", "washbasin", "bathtub",
+         "washer", "wall_lamp", "piano", "radiator"),
+        Held.BACK,
+    ),
+    **dict.fromkeys(
+        ("chair", "stool", "ottoman", "coffee_table", "dining_table", "plant", "table_lamp",
+         "floor_lamp", "tv", "laptop", "vase", "bin"),
+        Held.CENTRE,
+    ),
+    "ceiling_lamp": Held.TOP,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OldPlace:
+    """An item as it stands: its box about its own axes, front towards +z."""
+
+    turn_rad: float  # about +y
+    low: F64  # (3,) in the turned frame, metres
+    high: F64
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Width, depth, height in metres."""
+        width, height, depth = (float(v) for v in self.high - self.low)
+        return width, depth, height
+
+    @property
+    def turn(self) -> F64:
+        """(3, 3) world from the turned frame."""
+        return rotation_y(self.turn_rad)
+
+    def local(self, points: F64) -> F64:
+        """(N, 3) points of the turned frame."""
+        return np.asarray(points @ self.turn)
+
+    def held_at(self, held: Held) -> F64:
+        """(3,) in the turned frame: the point that stays, of the box's bottom or top."""
+        middle = (self.low + self.high) / 2
+        y = self.high[1] if held is Held.TOP else self.low[1]
+        return np.array([middle[0], y, self.low[2] if held is Held.BACK else middle[2]])
+
+
+def old_place(item: Item, group: str) -> OldPlace | None:
+    """Where an item stands; None where it is tilted or its front is not known.
+
+    The front is its box's third axis; of seats and beds the back rest says which way it looks.
+    """
+    if item.box is None or item.box.axes[1, 1] < _UPRIGHT or not item.n_faces:
+        return None
+    points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
+    if not np.isfinite(points).all():
+        return None
+    front = item.box.axes[:, 2]
+    turn_rad = float(np.arctan2(front[0], front[2]))
+    place = _boxed(points, turn_rad)
+    if group in _BACKED:
+        back = _back_of(place.local(points), place)
+        # Seats that look another way than their box are turned by quarters.
+        quarter = {"-z": 0, "+z": 2, "-x": 1, "+x": 3}.get(back, 0)
+        if quarter:
+            place = _boxed(points, turn_rad + quarter * np.pi / 2)
+    return place
+
+
+def _boxed(points: F64, turn_rad: float) -> OldPlace:
+    local = points @ rotation_y(turn_rad)
+    return OldPlace(turn_rad, local.min(0), local.max(0))
+
+
+def _back_of(local: F64, place: OldPlace) -> str:
+    # Where the highest part lies against the middle, if clearly to one side.
+    low, high = place.low, place.high
+    top = local[local[:, 1] > high[1] - _HIGH_PART * (high[1] - low[1])]
+    off = ((top.min(0) + top.max(0)) / 2 - (low + high) / 2) / np.maximum(high - low, 1e-6)
+    axis = 0 if abs(off[0]) > abs(off[2]) else 2
+    if abs(off[axis]) < _CLEAR:
+        return ""
+    return ("-" if off[axis] < 0 else "+") + ("x" if axis == 0 else "z")
+
+
+def group_of_item(item: Item, catalogue: Mapping[str, Piece]) -> str:
+    """The group of an item of the source by its catalogue id, else by its class; "" = unknown.
+
+    catalogue: by plain_id.
+    """
+    piece = catalogue.get(plain_id(item.source_class))
+    if piece is not None and (piece.nyu40 == item.nyu40 or piece.group in HELD):
+        return piece.group
+    if item.nyu40 == _TABLE:
+        low, high = item.bounds
+        return "dining_table" if high[1] - low[1] > _HIGH_TABLE_M else "coffee_table"
+    return _GROUP_OF_CLASS.get(item.nyu40, "")
+
+
+# Classes that mean one group, whatever the size.
+_GROUP_OF_CLASS: Final[Mapping[int, str]] = {
+    4: "bed", 6: "sofa", 14: "desk", 17: "dresser", 32: "nightstand", 33: "toilet", 36: "bathtub",
+    5: "chair", 10: "bookcase", 25: "tv",
+}  # fmt: skip
+
+
+def plain_id(text: str) -> str:
+    """An id without case, blanks and hyphens: libraries write their own name in two ways."""
+    return re.sub(r"[\s_-]", "", text).lower()
+
+
+def pieces_by_plain_id(catalogue: Catalogue) -> dict[str, Piece]:
+    """The catalogue's pieces by plain_id."""
+    return {plain_id(p.id): p for p in catalogue.pieces}

@@ -1,0 +1,225 @@
+"""The part `swap`: furniture gets another model of its group within its old footprint; no effects.
+
+Sets swap together: what is the same model in one room (chairs round a table, both bedside tables).
+What stood on it is set down on the new one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.house import Box, Item, LightPart, Surface
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space.surface_points import item_triangles
+from pbrs_farm.dress.style import Style
+from pbrs_farm.dress.swap.fits import Scale, common_scale, is_lit_alike
+from pbrs_farm.dress.swap.old_places import (
+    HELD,
+    Held,
+    OldPlace,
+    group_of_item,
+    old_place,
+    pieces_by_plain_id,
+    plain_id,
+)
+from pbrs_farm.dress.swap.standing_things import drop_onto, things_on
+from pbrs_farm.dress.swap.surroundings import Surroundings
+
+PART: Final = "swap"
+FREE_CUBES: Final = 6  # of 2 cm, shared with neighbours beyond what the old one shared: a touch
+_TRIES: Final = 5  # pieces that are tried for a set
+_MOST_LIFT_M: Final = 0.3  # a thing that stands on it goes no farther up or down
+_UNDER_TABLES: Final = frozenset({"dining_table", "desk", "coffee_table"})
+_SEATS: Final = 5  # nyu40 of what is pushed under a table
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Member:
+    # One item of a set.
+    index: int
+    item: Item
+    place: OldPlace
+    on: tuple[int, ...]  # what stands on it
+
+
+def swap(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Give a share of the source's furniture another model of the catalogue.
+
+    Each side of the new one is 75 to 100 % of the old one's, its height within 15 %; its back and
+    its axis stay. Things on it are set down on the new one; where one would find no place, where
+    the new one would reach into its neighbours, or where things stand in it, the old one stays.
+    """
+    around = Surroundings(draft.items)
+    for key, indices in _sets(draft, catalogue).items():
+        group = key[0]
+        rng = draft.rng(PART, *key)
+        if rng.random() >= share:
+            continue
+        members = _members(draft, indices, group, around)
+        if members is None:
+            continue
+        _swap_set(draft, catalogue, group, members, around, rng)
+
+
+def _sets(draft: Draft, catalogue: Catalogue) -> dict[tuple[str, ...], list[int]]:
+    # Items of one model in one room, by group, room, level and model.
+    by_id = pieces_by_plain_id(catalogue)
+    found: dict[tuple[str, ...], list[int]] = {}
+    for index, item in enumerate(draft.items[: len(draft.source.items)]):
+        group = "" if item.kind.is_structure else group_of_item(item, by_id)
+        if group in HELD:
+            key = (group, item.level_id, item.room_id or "", item.source_class or item.name)
+            found.setdefault(key, []).append(index)
+    return found
+
+
+def _members(
+    draft: Draft, indices: Sequence[int], group: str, around: Surroundings
+) -> list[_Member] | None:
+    found = []
+    for index in indices:
+        item = draft.items[index]
+        place = old_place(item, group)
+        if place is None:
+            draft.refused[f"{PART}: which way it faces is not known"] += 1
+            return None
+        on, inside = things_on(around, index)
+        if group in _UNDER_TABLES:
+            inside = [k for k in inside if draft.items[k].nyu40 != _SEATS]
+        if inside:
+            draft.refused[f"{PART}: things stand in it or under it"] += 1
+            return None
+        found.append(_Member(index, item, place, tuple(on)))
+    return found
+
+
+def _swap_set(
+    draft: Draft, catalogue: Catalogue, group: str, members: list[_Member],
+    around: Surroundings, rng: np.random.Generator,
+) -> None:  # fmt: skip
+    places, items = [m.place for m in members], [m.item for m in members]
+    old = plain_id(items[0].source_class)
+    candidates = [
+        (piece, scale)
+        for piece in catalogue.of(group)
+        if plain_id(piece.id) != old and (scale := common_scale(piece, places)) is not None
+    ]
+    if not candidates:
+        draft.refused[f"{PART}: no other model fits"] += 1
+        return
+    why = "no other model can be used"
+    for k in rng.permutation(len(candidates))[:_TRIES]:
+        piece, scale = candidates[int(k)]
+        shape = catalogue.shape(piece)
+        if shape is None or not is_lit_alike(bool(shape.lights), items):
+            continue
+        new = [_placed(draft, piece, shape, scale, group, m) for m in members]
+        lifts = _lifts(around, members, new)
+        if lifts is None:
+            why = "a thing on it would find no place"
+        elif not _is_free(around, members, new):
+            why = "it would reach into its neighbours"
+        else:
+            _put(draft, group, piece, members, new, lifts)
+            return
+    draft.refused[f"{PART}: {why}"] += 1
+
+
+def _placed(
+    draft: Draft, piece: Piece, shape: Shape, scale: Scale, group: str, member: _Member
+) -> Item:
+    """The piece as the member's item: same id, room, kind and tags of its source."""
+    held, place, item = HELD[group], member.place, member.item
+    low, high = shape.bounds * np.array(scale)
+    # Bring the point that is held to where the old one's was.
+    own = np.array([
+        (low[0] + high[0]) / 2,
+        high[1] if held is Held.TOP else low[1],
+        low[2] if held is Held.BACK else (low[2] + high[2]) / 2,
+    ])  # fmt: skip
+    at = place.turn @ (place.held_at(held) - own)
+    new = draft.placed(
+        piece, shape, at, place.turn_rad, item_id=item.id, room_id=item.room_id,
+        level_id=item.level_id, scale=np.array(scale),
+    )  # fmt: skip
+    new = replace(new, nyu40=item.nyu40 or piece.nyu40, kind=item.kind)
+    return replace(new, lights=_lights_like(item.lights, new.lights))
+
+
+def _lights_like(old: tuple[LightPart, ...], new: tuple[LightPart, ...]) -> tuple[LightPart, ...]:
+    # A lamp keeps its power and its colour; one that was off stays off.
+    if not old:
+        return ()
+    total = sum(light.share for light in new) or 1.0
+    whole = sum(light.share for light in old)
+    first = old[0]
+    return tuple(
+        replace(
+            light, power=first.power, unit=first.unit, share=light.share / total * whole,
+            rgb_linear=first.rgb_linear,
+        )
+        for light in new
+    )  # fmt: skip
+
+
+def _is_free(around: Surroundings, members: list[_Member], new: list[Item]) -> bool:
+    # The new ones may reach into their neighbours no farther than the old ones did.
+    own = {m.index for m in members} | {k for m in members for k in m.on}
+    return all(
+        around.n_shared(item, own) <= around.n_shared(m.item, own) + FREE_CUBES
+        for m, item in zip(members, new, strict=True)
+    )
+
+
+def _lifts(
+    around: Surroundings, members: list[_Member], new: list[Item]
+) -> dict[int, float] | None:
+    # How far each thing on the old ones goes up, with what stands on it; None: one finds no place.
+    lifts: dict[int, float] = {}
+    for member, item in zip(members, new, strict=True):
+        corners = item_triangles(item)
+        for index in member.on:
+            up = drop_onto(around.items[index], corners)
+            if up is None or abs(up) > _MOST_LIFT_M:
+                return None
+            on, inside = things_on(around, index)
+            lifts.update({k: up for k in (index, *on, *inside) if k != member.index})
+    return lifts
+
+
+def _put(
+    draft: Draft, group: str, piece: Piece, members: list[_Member], new: list[Item],
+    lifts: dict[int, float],
+) -> None:  # fmt: skip
+    for member, item in zip(members, new, strict=True):
+        draft.change(member.index, item, PART)
+        draft.done[f"{PART}: {group}"] += 1
+    for index, up in lifts.items():
+        draft.change(index, _moved(draft.items[index], up), PART)
+    draft.used[piece.id] = piece
+
+
+def _moved(item: Item, up: float) -> Item:
+    step = np.array([0.0, up, 0.0])
+
+    def surface(s: Surface) -> Surface:
+        return replace(s, positions=(s.positions + step).astype(np.float32))
+
+    def light(part: LightPart) -> LightPart:
+        x, y, z = part.position
+        end = part.position_end
+        return replace(
+            part, position=(x, y + up, z),
+            position_end=(end[0], end[1] + up, end[2]) if end is not None else None,
+        )  # fmt: skip
+
+    box = item.box and Box(item.box.centre + step, item.box.half, item.box.axes)
+    return replace(
+        item, surfaces=tuple(surface(s) for s in item.surfaces),
+        lights=tuple(light(part) for part in item.lights), box=box,
+    )  # fmt: skip

@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Material
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.primitives import box
+from pbrs_farm.dress.draft import ADDED_TAG, Draft
+from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.swap import swap
+from tests.dress.furniture import house, solid
+
+Size = tuple[float, float, float]  # width, depth, height
+
+
+def _chair_boxes(size: Size) -> list[tuple[F64, F64]]:
+    # A seat block and a back rest at the back.
+    w, d, h = size
+    return [
+        (np.array([-w / 2, 0.0, -d / 2]), np.array([w / 2, h / 2, d / 2])),
+        (np.array([-w / 2, h / 2, -d / 2]), np.array([w / 2, h, -d / 2 + 0.1 * d])),
+    ]
+
+
+def _shape(size: Size, *, is_seat: bool = False, lights: tuple[LightPart, ...] = ()) -> Shape:
+    w, d, h = size
+    whole = [(np.array([-w / 2, 0.0, -d / 2]), np.array([w / 2, h, d / 2]))]
+    parts = _chair_boxes(size) if is_seat else whole
+    surfaces = tuple(box("new", (a + b) / 2, (b - a) / 2, 0) for a, b in parts)
+    return Shape(surfaces, (Material("new", diffuse=(0.1, 0.2, 0.3)),), {}, lights)
+
+
+def _catalogue(*entries: tuple[str, str, Size], lights: tuple[LightPart, ...] = ()) -> Catalogue:
+    classes = {"chair": 5, "dresser": 17, "table_lamp": 35, "nightstand": 32, "bed": 4}
+    pieces = tuple(
+        Piece(f"T#{name}", name, group, Place.FLOOR, classes[group], size)
+        for group, name, size in entries
+    )
+    seats = ("chair", "bed")
+    return Catalogue(
+        pieces, lambda p: _shape(p.size, is_seat=p.group in seats, lights=lights), "test"
+    )
+
+
+def _item(
+    item_id: str, size: Size, at: list[float], nyu40: int, *, turn_deg: float = 0.0,
+    is_seat: bool = False, kind: ItemKind = ItemKind.OBJECT, lights: tuple[LightPart, ...] = (),
+) -> Item:  # fmt: skip
+    turn, shape = rotation_y(np.radians(turn_deg)), _shape(size, is_seat=is_seat)
+    place = np.array(at)
+    surfaces = tuple(
+        replace(s, positions=(s.positions @ turn.T + place).astype(np.float32))
+        for s in shape.surfaces
+    )
+    w, d, h = size
+    whole = Box(place + np.array([0, h / 2, 0]), np.array([w, h, d]) / 2, turn)
+    return Item(
+        item_id, item_id, kind, "0", surfaces, nyu40, "T#old", "0_0", box=whole, lights=lights
+    )  # fmt: skip
+
+
+def _swapped(catalogue: Catalogue, *items: Item, share: float = 1.0, seed: int = 3) -> Draft:
+    draft = Draft(house(*items), seed)
+    swap(draft, catalogue, style_for(draft.rng("style"), ""), share)
+    return draft
+
+
+def _corners(item: Item) -> F64:
+    return np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
+
+
+DRESSER: Size = (1.2, 0.5, 0.8)
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 90.0, 180.0, 33.0])
+def test_a_new_model_keeps_back_axis_and_floor_within_the_old_footprint(turn_deg: float) -> None:
+    old = _item("d", DRESSER, [2.0, 0.1, 1.5], 17, turn_deg=turn_deg)
+    draft = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
+    turn = rotation_y(np.radians(turn_deg))
+    own, was = (_corners(i) @ turn for i in (draft.items[0], old))
+    assert draft.items[0].source_class == "T#new"
+    assert_allclose(own[:, 2].min(), was[:, 2].min(), atol=1e-5)
+    assert_allclose(own[:, 1].min(), was[:, 1].min(), atol=1e-5)
+    assert_allclose((own.min(0) + own.max(0))[0], (was.min(0) + was.max(0))[0], atol=1e-5)
+    assert (np.ptp(own, axis=0) <= np.ptp(was, axis=0) * [1, 1.15, 1] + 1e-5).all()
+    assert (np.ptp(own, axis=0) >= np.ptp(was, axis=0) * [0.75, 0.85, 0.75] - 1e-5).all()
+
+
+def test_it_keeps_its_id_and_says_what_it_was_made_from() -> None:
+    draft = _swapped(_catalogue(("dresser", "new", DRESSER)), _item("d", DRESSER, [2, 0, 1], 17))
+    item = draft.items[0]
+    assert (item.id, item.nyu40, item.room_id, len(draft.items)) == ("d", 17, "0_0", 1)
+    assert f"{ADDED_TAG}T#new" in item.tags
+    assert draft.done["swap: dresser"] == 1
+
+
+@pytest.mark.parametrize("size", [(2.0, 0.5, 0.8), (0.5, 0.5, 0.8), (1.2, 0.5, 1.6), (0, 0.5, 0.8)])
+def test_a_model_of_another_size_does_not_fit(size: Size) -> None:
+    draft = _swapped(_catalogue(("dresser", "new", size)), _item("d", DRESSER, [2, 0, 1], 17))
+    assert draft.items[0].source_class == "T#old"
+    assert draft.refused["swap: no other model fits"] == 1
+
+
+def test_a_seat_that_looks_another_way_than_its_box_keeps_its_back_rest_behind() -> None:
+    # Its box says +z, its back rest stands at +x.
+    old = _item("c", (0.45, 0.45, 0.9), [2, 0, 1], 5, turn_deg=-90.0, is_seat=True)
+    assert old.box is not None
+    old = replace(old, box=replace(old.box, axes=np.eye(3)))
+    new = _swapped(_catalogue(("chair", "new", (0.45, 0.45, 0.9))), old).items[0]
+    high, was = (p[p[:, 1] > 0.8].mean(0) for p in (_corners(new), _corners(old)))
+    assert new.source_class == "T#new"
+    assert_allclose(high, was, atol=0.02)
+
+
+def test_chairs_of_one_room_get_one_model() -> None:
+    size = (0.45, 0.45, 0.9)
+    catalogue = _catalogue(*(("chair", f"n{k}", (0.45, 0.43, 0.88 + 0.01 * k)) for k in range(6)))
+    chairs = [_item(f"c{k}", size, [1.0 + k, 0, 1], 5, is_seat=True) for k in range(3)]
+    for seed in range(4):
+        models = {i.source_class for i in _swapped(catalogue, *chairs, seed=seed).items}
+        assert len(models) == 1
+        assert models != {"T#old"}
+
+
+def test_a_thing_on_it_comes_to_stand_on_the_new_one() -> None:
+    thing = solid("vase", [1.9, 0.8, 1.0], [2.1, 1.1, 1.2], 40)
+    catalogue = _catalogue(("dresser", "new", (1.2, 0.5, 0.9)))
+    draft = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), thing)
+    top = _corners(draft.items[0])[:, 1].max()
+    assert top == pytest.approx(0.9)
+    assert draft.items[1].bounds[0, 1] == pytest.approx(top, abs=1e-4)
+
+
+def test_a_thing_inside_or_under_it_keeps_it() -> None:
+    thing = solid("box", [1.9, 0.3, 1.0], [2.1, 0.5, 1.2], 29)
+    catalogue = _catalogue(("dresser", "new", DRESSER))
+    draft = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), thing)
+    assert draft.items[0].source_class == "T#old"
+    assert draft.refused["swap: things stand in it or under it"] == 1
+
+
+def test_it_never_reaches_farther_into_its_neighbours() -> None:
+    shelf = solid("shelf", [1.4, 0.83, 0.9], [2.6, 0.85, 1.3], 15)
+    catalogue = _catalogue(("dresser", "new", (1.2, 0.5, 0.9)))
+    draft = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), shelf)
+    assert draft.items[0].source_class == "T#old"
+    assert draft.refused["swap: it would reach into its neighbours"] == 1
+
+
+def _light(power: float) -> LightPart:
+    return LightPart(
+        (0.0, 0.3, 0.0), 0.03, power, PowerUnit.SWEETHOME3D, rgb_linear=(1.0, 0.5, 0.2)
+    )
+
+
+def test_a_lamp_keeps_its_power_and_its_colour() -> None:
+    size = (0.3, 0.3, 0.5)
+    lamp = _item("l", size, [2, 0.7, 1], 35, kind=ItemKind.LAMP, lights=(_light(0.8),))
+    new = replace(_light(0.5), rgb_linear=(1.0, 1.0, 1.0), share=1.0)
+    draft = _swapped(
+        _catalogue(("table_lamp", "old", size), ("table_lamp", "new", size), lights=(new,)), lamp
+    )
+    (light,) = draft.items[0].lights
+    assert draft.items[0].source_class == "T#new"
+    assert (light.power, light.rgb_linear) == (0.8, (1.0, 0.5, 0.2))
+    assert_allclose(light.position, [2, 1.0, 1], atol=1e-6)
+
+
+def test_a_lamp_that_is_lit_gets_no_model_without_a_light_source() -> None:
+    size = (0.3, 0.3, 0.5)
+    lamp = _item("l", size, [2, 0.7, 1], 35, kind=ItemKind.LAMP, lights=(_light(0.8),))
+    catalogue = _catalogue(("table_lamp", "old", size), ("table_lamp", "new", size))
+    draft = _swapped(catalogue, lamp)
+    assert draft.items[0] is lamp
+    assert draft.refused["swap: no other model can be used"] == 1
+
+
+def test_the_share_says_how_many_and_the_seed_which() -> None:
+    catalogue = _catalogue(("dresser", "new", DRESSER))
+    items = [
+        replace(_item(f"d{k}", DRESSER, [2.0 * k, 0, 1], 17), source_class=f"T#old{k}")
+        for k in range(40)
+    ]
+    assert not _swapped(catalogue, *items, share=0.0).done
+    half = [i.source_class for i in _swapped(catalogue, *items, share=0.5).items]
+    assert 10 <= half.count("T#new") <= 30
+    assert half == [i.source_class for i in _swapped(catalogue, *items, share=0.5).items]
+
+
+def test_a_model_that_cannot_be_used_leaves_the_old_one() -> None:
+    broken = replace(_catalogue(("dresser", "new", DRESSER)), load=lambda _piece: None)
+    draft = _swapped(broken, _item("d", DRESSER, [2, 0, 1], 17))
+    assert draft.items[0].source_class == "T#old"
+    assert draft.refused["swap: no other model can be used"] == 1
