@@ -99,7 +99,7 @@ def _lines(report: DressReport) -> Iterator[str]:
 
 
 def _by_part(counts: dict[str, int]) -> dict[str, list[tuple[str, int]]]:
-    parts: dict[str, list[tuple[str, int]]] = Field(default_factory=dict)
+    parts: dict[str, list[tuple[str, int]]] = {}
     for key, n in sorted(
         counts.items(), key=lambda row: (row[0].partition(": ")[0], -row[1], row[0])
     ):
