@@ -67,7 +67,7 @@ def tile_grid(
     edge = np.minimum(edge_u, edge_v)
     return TileGrid(
         row * laying.columns + column, row, column, np.asarray(edge, np.float32),
-        np.asarray(np.sqrt(edge_u * edge_v), np.float32), laying.rows * laying.columns,
+        np.asarray(np.sqrt(np.maximum(edge_u * edge_v, 0)), np.float32), laying.rows * laying.columns,
     )  # fmt: skip
 
 

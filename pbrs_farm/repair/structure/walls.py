@@ -23,6 +23,7 @@ from pbrs_farm.repair.structure.prisms import (
     polygons_of,
     prism,
 )
+from pbrs_farm.repair.structure.reveals import REVEAL
 
 BASEBOARD = "baseboard"
 """Tag of wall items that are baseboards."""
@@ -88,7 +89,7 @@ def _wall(
         bottom_y=float(low[1]),
         high_y=float(high[1]),
         top=top,
-        material=named.get("left", item.surfaces[0].material),
+        material=named.get(REVEAL, named.get("left", item.surfaces[0].material)),
         thickened=thickened,
         is_board=BASEBOARD in item.tags,
         room_id=item.room_id,

@@ -1,0 +1,222 @@
+"""The part of dressing that gives every room its floor, walls, ceiling and skirting boards.
+
+Effects: on the draft.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.house import Item, ItemKind, Material
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space.house_space import RoomSpace, house_space
+from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.style import Rgb, Style, room_style
+from pbrs_farm.dress.surfaces.choices import (
+    Floor,
+    HomeFinish,
+    WallFinish,
+    floor_of,
+    home_finish,
+    walls_of,
+)
+from pbrs_farm.dress.surfaces.floor_materials import laid
+from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
+from pbrs_farm.dress.surfaces.wall_materials import RoomWalls, painted_wall
+from pbrs_farm.dress.surfaces.wall_sides import RoomFinder, SidedWall, sided_wall
+from pbrs_farm.dress.textures.families import Pattern, PatternMaterial, pattern_material
+
+PART = "surfaces"
+
+_KEPT_SHARE = 0.1  # of photographed floors and walls that stay
+_BOARD_ROUGHNESS = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class _RoomFinish:
+    # What one room gets; None leaves what the source has.
+    space: RoomSpace
+    floor: Floor | None
+    walls: WallFinish | None
+
+
+def surfaces(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Give a share of the rooms floors, walls and ceilings of the style, and skirting boards."""
+    del catalogue  # surfaces are made, not fetched
+    rooms = house_space(draft).rooms
+    home = home_finish(draft.rng(PART, "home"), style)
+    finishes = [_room_finish(draft, style, home, room, share) for room in rooms]
+    _lay_floors(draft, home, finishes)
+    _paint_walls(draft, finishes)
+    _set_boards(draft, home, finishes)
+
+
+def _room_finish(
+    draft: Draft, style: Style, home: HomeFinish, room: RoomSpace, share: float
+) -> _RoomFinish:
+    # Streams of their own: what one room draws changes nothing in another.
+    rng = draft.rng(PART, room.room.id)
+    taste = room_style(style, rng)
+    floor = floor_of(draft.rng(PART, room.room.id, "floor"), taste, home, room.kind)
+    walls = walls_of(draft.rng(PART, room.room.id, "walls"), taste, home, room.kind)
+    if rng.random() >= share:
+        return _RoomFinish(room, None, None)
+    # Now and then a photographed floor stays.
+    if rng.random() < _KEPT_SHARE and _is_photographed(draft, f"floor_{room.room.id}"):
+        floor = None
+    return _RoomFinish(room, floor, walls)
+
+
+def _is_photographed(draft: Draft, item_id: str) -> bool:
+    return any(
+        draft.materials[s.material].texture_id is not None
+        for item in draft.items
+        if item.id == item_id
+        for s in item.surfaces
+    )
+
+
+def _lay_floors(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> None:
+    of_room = {f.space.room.id: f for f in finishes}
+    for index, item in enumerate(draft.items):
+        finish = of_room.get(item.room_id or "")
+        if finish is None or item.kind not in (ItemKind.FLOOR, ItemKind.CEILING):
+            continue
+        if item.kind is ItemKind.CEILING:
+            # Ceilings of rooms that are left alone stay as well.
+            if finish.walls is None:
+                continue
+            pattern, turn = home.ceiling, 0.0
+        elif finish.floor is not None:
+            pattern, turn = finish.floor.pattern, finish.floor.turn_rad
+        else:
+            continue
+        material = pattern_material(draft, pattern)
+        draft.change(index, laid(item, material, finish.space.area, turn), PART)
+        draft.done[f"{PART}: {pattern.family} {item.kind}"] += 1
+
+
+def _paint_walls(draft: Draft, finishes: list[_RoomFinish]) -> None:
+    house = draft.source
+    finder = RoomFinder(house.rooms, [f.space.area for f in finishes])
+    walls = {
+        index: sided_wall(item, finder)
+        for index, item in enumerate(draft.items)
+        if item.kind is ItemKind.WALL and item.n_faces and BASEBOARD not in item.tags
+    }
+    accents = _accent_runs(walls, finishes)
+    foot = draft.material(_plain("reveal", (0.93, 0.925, 0.91), 0.6))
+    for index, wall in walls.items():
+        looks = {
+            (k, r): _room_walls(draft, finishes[run.room], is_accent=(index, k, r) in accents)
+            for k, side in enumerate(wall.sides)
+            for r, run in enumerate(side.runs)
+            if run.room is not None and finishes[run.room].walls is not None
+        }
+        if looks:
+            draft.change(index, painted_wall(draft.items[index], wall, looks, foot), PART)
+    for finish in finishes:
+        if finish.walls is not None:
+            draft.done[f"{PART}: {(finish.walls.low or finish.walls.main).family} walls"] += 1
+
+
+def _room_walls(draft: Draft, finish: _RoomFinish, *, is_accent: bool) -> RoomWalls:
+    walls, floor_y = finish.walls, finish.space.room.floor_y
+    if walls is None:
+        raise ValueError("a room without a wall finish has no wall materials")
+    if is_accent and walls.accent is not None:
+        return RoomWalls(pattern_material(draft, walls.accent), floor_y)
+    low = None if walls.low is None else pattern_material(draft, walls.low)
+    return RoomWalls(pattern_material(draft, walls.main), floor_y, low, floor_y + walls.low_m)
+
+
+def _accent_runs(
+    walls: Mapping[int, SidedWall], finishes: list[_RoomFinish]
+) -> frozenset[tuple[int, int, int]]:
+    """(wall, side, run) of every run in the plane of a room's longest wall, where it has an accent."""
+    planes: dict[int, dict[tuple[int, int, int], float]] = {}
+    runs: list[tuple[tuple[int, int, int], int, tuple[int, int, int]]] = []
+    for index, wall in walls.items():
+        for k, side in enumerate(wall.sides):
+            # Walls in one plane are one wall to who looks at it.
+            x, z = side.normal[0], side.normal[2]
+            plane = (round(float(x) * 50), round(float(z) * 50), round(side.offset * 20))
+            for r, run in enumerate(side.runs):
+                if run.room is None or (finishes[run.room].walls or _NO_ACCENT).accent is None:
+                    continue
+                lengths = planes.setdefault(run.room, {})
+                lengths[plane] = lengths.get(plane, 0.0) + run.end - run.start
+                runs.append(((index, k, r), run.room, plane))
+    longest = {room: max(found, key=lambda p: found[p]) for room, found in planes.items()}
+    return frozenset(key for key, room, plane in runs if longest[room] == plane)
+
+
+_NO_ACCENT = WallFinish(Pattern("paint", 0))
+
+
+def _set_boards(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> None:
+    if has_boards(draft.source):
+        _paint_boards(draft, home, finishes)
+        return
+    walls = wall_plans(draft.source)
+    for finish in finishes:
+        room = finish.space.room
+        if finish.walls is None or finish.walls.is_tiled or finish.space.kind is RoomKind.STORE:
+            continue
+        material = _board_material(draft, home, finish)
+        board = skirting_board(draft.source, room, finish.space.area, walls, home.board_m, material)
+        if board is not None:
+            draft.add(replace(board, tags=(*board.tags, f"seed:{draft.seed}")), PART)
+            draft.done[f"{PART}: skirting board"] += 1
+
+
+def _paint_boards(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> None:
+    """Give the source's boards the home's colour; those before tiles become tiles' colour."""
+    finder = RoomFinder(draft.source.rooms, [f.space.area for f in finishes])
+    for index, item in enumerate(draft.items):
+        if BASEBOARD not in item.tags or item.kind is not ItemKind.WALL or not item.n_faces:
+            continue
+        rooms = _rooms_before(item, finder)
+        if not rooms or all(finishes[k].walls is None for k in rooms):
+            continue
+        finish = next(finishes[k] for k in rooms if finishes[k].walls is not None)
+        material = _board_material(draft, home, finish)
+        painted = tuple(replace(s, material=material) for s in item.surfaces)
+        draft.change(index, replace(item, surfaces=painted), PART)
+
+
+def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:
+    # The rooms of a board by the points of its own plan, most points first.
+    wall = sided_wall(board, finder)
+    lengths: dict[int, float] = {}
+    for side in wall.sides:
+        for run in side.runs:
+            if run.room is not None:
+                lengths[run.room] = lengths.get(run.room, 0.0) + run.end - run.start
+    return sorted(lengths, key=lambda k: (-lengths[k], k))
+
+
+def _board_material(draft: Draft, home: HomeFinish, finish: _RoomFinish) -> int:
+    walls, floor = finish.walls, finish.floor
+    if walls is not None and walls.is_tiled:
+        # Tiled rooms have a skirting of tiles.
+        return draft.material(_plain("skirting tile", (walls.low or walls.main).tints[0], 0.15))
+    if home.board is not None:
+        return draft.material(_plain("skirting", home.board, _BOARD_ROUGHNESS))
+    if floor is None or floor.pattern.family not in ("planks", "strip", "laminate", "herringbone", "chevron"):  # fmt: skip
+        return draft.material(_plain("skirting", (0.94, 0.935, 0.92), _BOARD_ROUGHNESS))
+    material: PatternMaterial = pattern_material(draft, floor.pattern)
+    r, g, b = (float(np.clip(1.055 * c ** (1 / 2.4) - 0.055, 0, 1)) for c in material.mean_rgb)
+    return draft.material(_plain("skirting wood", (r, g, b), _BOARD_ROUGHNESS))
+
+
+def _plain(name: str, colour: Rgb, roughness: float) -> Material:
+    r, g, b = (round(c, 4) for c in colour)
+    return Material(
+        f"{name} {r:.2f} {g:.2f} {b:.2f}", diffuse=(r, g, b), specular=(0.4, 0.4, 0.4),
+        shininess=round(2.0 / roughness**4 - 2.0, 1), roughness=roughness,
+    )  # fmt: skip
