@@ -82,7 +82,8 @@ def bodies_of(
         if not len(corners):
             continue
         points = corners.reshape(-1, 3)
-        is_new = was is None or not has_same_mesh(item, was)
+        # Walls are cut where rooms meet, but stand where they stood; boards lie along them.
+        is_new = not item.kind.is_structure and (was is None or not has_same_mesh(item, was))
         piece = pieces.get(piece_id(item)) if is_new else None
         found.append(Body(index, item, corners, points.min(0), points.max(0), is_new, was, piece))
     return found

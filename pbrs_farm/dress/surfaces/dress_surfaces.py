@@ -175,7 +175,7 @@ def _set_boards(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> 
 
 
 def _paint_boards(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> None:
-    """Give the source's boards the home's colour; those before tiles become tiles' colour."""
+    """Give the source's boards the home's colour; before tiles, the tiles'."""
     finder = RoomFinder(draft.source.rooms, [f.space.area for f in finishes])
     for index, item in enumerate(draft.items):
         if BASEBOARD not in item.tags or item.kind is not ItemKind.WALL or not item.n_faces:

@@ -81,7 +81,7 @@ class RoomFinder:
         for k in self.order:
             room = self.rooms[k]
             shared = min(high_y, room.ceiling_y) - max(low_y, room.floor_y)
-            if shared < _LEAST_HEIGHT_M:
+            if shared < min(_LEAST_HEIGHT_M, 0.5 * (high_y - low_y)):
                 continue
             inside = shapely.contains_xy(self.areas[k], places[:, 0], places[:, 1])
             found[(found < 0) & inside] = k
