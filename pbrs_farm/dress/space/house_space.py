@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,10 +69,16 @@ class HouseSpace:
                 return room
         raise KeyError(room_id)
 
-    def is_free(self, low: F64, high: F64) -> bool:
-        """Whether no item but structure has a point in the box low..high (3,) of the world."""
+    def is_free(self, low: F64, high: F64, *, without: Collection[int] = ()) -> bool:
+        """Whether no item but structure has a point in the box low..high (3,) of the world.
+
+        without: numbers of items that do not count.
+        """
         for n in meeting(self.bounds, np.array([low, high])):
-            if ((self.points[n] >= low) & (self.points[n] <= high)).all(1).any():
+            if (
+                n not in without
+                and ((self.points[n] >= low) & (self.points[n] <= high)).all(1).any()
+            ):
                 return False
         return True
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +11,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.space import HouseSpace, RoomSpace
+from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Rgb, Style, room_style
 from pbrs_farm.dress.walls.frames import Made, canvas, frame_material, framed, jpeg_texture, poster
@@ -17,7 +19,7 @@ from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
 from pbrs_farm.dress.walls.prints import print_pixels
 
 MOST_PICTURES = 6  # in a room
-_MOST_PRINTS = 20  # drawn for a home; further pictures show one of them again
+_MOST_PRINTS = 24  # drawn for a home; further pictures show one of them again
 _EYE_M = 1.55  # height of a picture's middle above the floor
 _CEILING_M = 0.12  # kept free below the ceiling
 _APART_M = 0.25  # between one group of pictures and the next
@@ -59,25 +61,40 @@ class Spot:
     above_y: float | None
 
 
+@dataclass(frozen=True, slots=True)
+class Print:
+    """A picture of the home's collection."""
+
+    aspect: float  # width over height
+    texture: Texture
+    mean: Rgb
+
+
 class Gallery:
     """The prints of a home, drawn as they are needed; state: those drawn so far."""
 
     def __init__(self, draft: Draft, style: Style) -> None:
         self._rng = draft.rng("prints")
         self._style = style
-        self._prints: list[tuple[float, Texture, Rgb]] = []  # with aspect and mean colour
+        self._prints: list[Print] = []
+        self._families: Counter[str] = Counter()
 
-    def print_for(self, aspect: float) -> tuple[Texture, Rgb]:
-        """A picture of about that width over height, and its mean colour; new while there are few."""
+    def print_for(self, aspect: float, besides: Collection[str] = ()) -> Print:
+        """A picture of about that width over height; new while there are few.
+
+        besides: ids of textures that hang beside it: another is taken where there is one.
+        """
         if len(self._prints) < _MOST_PRINTS:
-            pixels, family = print_pixels(self._rng, aspect, self._style)
+            pixels, family = print_pixels(self._rng, aspect, self._style, self._families)
+            self._families[family] += 1
             r, g, b = (float(c) for c in pixels.reshape(-1, 3).mean(0) / 255)
-            self._prints.append((aspect, jpeg_texture(f"print {family}", pixels), (r, g, b)))
-            return self._prints[-1][1:]
+            self._prints.append(Print(aspect, jpeg_texture(f"print {family}", pixels), (r, g, b)))
+            return self._prints[-1]
         # Show one of a like shape again.
-        likeness = [abs(np.log(a / aspect)) for a, _t, _c in self._prints]
-        near = [k for k, d in enumerate(likeness) if d < min(likeness) + 0.1]
-        return self._prints[near[int(self._rng.integers(len(near)))]][1:]
+        free = [p for p in self._prints if p.texture.id not in besides] or self._prints
+        likeness = [abs(np.log(p.aspect / aspect)) for p in free]
+        near = [p for p, d in zip(free, likeness, strict=True) if d < min(likeness) + 0.15]
+        return near[int(self._rng.integers(len(near)))]
 
 
 def hang_pictures(
@@ -193,9 +210,11 @@ def _hang_group(
     pictures, left, bottom = group
     # What hangs together is framed alike.
     kind = str(rng.choice(["framed", "canvas", "poster"], p=[0.68, 0.22, 0.1]))
-    own = int(rng.integers(1 << 30))
+    own, hung = int(rng.integers(1 << 30)), list[str]()
     for x, y, w, h in pictures.frames:
-        piece, shape = _picture(np.random.default_rng(own), kind, (w, h), gallery, style, frame)
+        shown = gallery.print_for(w / h, hung)
+        hung.append(shown.texture.id)
+        piece, shape = _picture(np.random.default_rng(own), kind, (w, h), shown, style, frame)
         middle = left + x + w / 2
         hanging.hang(piece, shape, spot.face, middle, bottom + y, margin_m=0.0)
     w, h = pictures.size
@@ -206,18 +225,12 @@ def _hang_group(
 
 
 def _picture(
-    rng: np.random.Generator, kind: str, size: tuple[float, float], gallery: Gallery, style: Style,
+    rng: np.random.Generator, kind: str, size: tuple[float, float], shown: Print, style: Style,
     frame: Material,
 ) -> Made:  # fmt: skip
     width, height = size
-    texture, mean = gallery.print_for(width / height)
     if kind == "canvas":
-        return canvas(width, height, texture, mean)
+        return canvas(width, height, shown.texture, shown.mean)
     if kind == "poster":
-        return poster(width, height, texture)
-    return framed(rng, style, width, height, texture, frame)
-
-
-def rooms_with_walls(space: HouseSpace) -> list[RoomSpace]:
-    """The rooms that have a face to hang something on."""
-    return [room for room in space.rooms if room.faces and room.kind is not RoomKind.OUTDOOR]
+        return poster(width, height, shown.texture)
+    return framed(rng, style, width, height, shown.texture, frame)

@@ -5,7 +5,8 @@ Every family is a function (rng, size, palette) -> (H, W, 3) float32, sRGB-encod
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -18,6 +19,7 @@ Size = tuple[int, int]  # width and height in pixels
 Palette = tuple[Rgb, ...]  # paper first, then from calm to loud
 Family = Callable[[np.random.Generator, Size, Palette], F32]
 
+_NONE: Mapping[str, int] = MappingProxyType({})
 EDGE_PX = 448  # the longer edge of a picture
 _WORDS = (
     "home", "slow down", "be kind", "breathe", "less is more", "dream", "hello", "good things",
@@ -26,11 +28,17 @@ _WORDS = (
 )  # fmt: skip
 
 
-def print_pixels(rng: np.random.Generator, aspect: float, style: Style) -> tuple[Srgb8Image, str]:
-    """(H, W, 3) uint8 of a new picture, and its family's name; aspect: width over height."""
+def print_pixels(
+    rng: np.random.Generator, aspect: float, style: Style, drawn: Mapping[str, int] = _NONE
+) -> tuple[Srgb8Image, str]:
+    """(H, W, 3) uint8 of a new picture, and its family's name.
+
+    aspect: width over height. drawn: how often each family was drawn before: others are liked more.
+    """
     scale = EDGE_PX / max(aspect, 1.0)
     size = max(int(scale * aspect), 32), max(int(scale), 32)
-    name = str(rng.choice(list(FAMILIES), p=_WEIGHTS))
+    weights = _LIKED / (1 + 2 * np.array([drawn.get(name, 0) for name in FAMILIES]))
+    name = str(rng.choice(list(FAMILIES), p=weights / weights.sum()))
     picture = FAMILIES[name](rng, size, palette_of(rng, style))
     # Paper and paint are never quite even.
     picture = picture + 0.012 * rng.standard_normal(picture.shape[:2], np.float32)[..., None]
@@ -376,4 +384,3 @@ FAMILIES: dict[str, Family] = {
     "tiles": _tiles, "marbled": _marbled, "words": _words, "skyline": _skyline,
 }  # fmt: skip
 _LIKED = np.array([1.4, 1.0, 1.2, 1.2, 1.0, 0.6, 1.2, 1.3, 0.7, 1.0, 1.0, 0.7, 0.8])
-_WEIGHTS = _LIKED / _LIKED.sum()

@@ -1,0 +1,273 @@
+"""Curtains and blinds at a window, made to its size; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Piece, Place, Shape
+from pbrs_farm.core.house import Item, Material, Surface
+from pbrs_farm.core.primitives import box, sphere
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
+from pbrs_farm.dress.style import Style, mix, shade
+from pbrs_farm.dress.textiles.cloth import Folds, bar, panel
+from pbrs_farm.dress.textures.families import Pattern, pattern_material
+from pbrs_farm.dress.walls.frames import made, metal_of, plain
+from pbrs_farm.dress.walls.hanging import GAP_M, next_id
+
+PART = "textiles"
+CURTAIN, BLINDS = 16, 13  # NYU40
+_FROM_FLOOR_M = 0.015
+_OVER_WINDOW_M = 0.12  # of the rod above the hole
+_UNDER_CEILING_M = 0.05
+_MOST_OUT_M = 0.2  # of the rod from the wall
+_ROD_M = 0.012  # its radius
+
+
+@dataclass(frozen=True, slots=True)
+class WindowSide:
+    """A window as one room sees it, with what is in the way of cloth before it."""
+
+    window: Passage
+    side: int
+    origin: F64  # (3,) on the wall's face, middle of the window, at the floor's height
+    along: F64  # to the right of who looks at it from the room
+    inward: F64
+    floor_y: float
+    ceiling_y: float
+    sticks_out_m: float  # how far the window's frame and handle stand out of the wall
+
+    @property
+    def turn_rad(self) -> float:
+        """The turn about +y that brings a piece's front into the room."""
+        return float(np.arctan2(self.inward[0], self.inward[2]))
+
+    def bounds(self, x0: float, x1: float, y0: float, y1: float, out: float) -> tuple[F64, F64]:
+        """Low and high corner in the world of the box before the wall."""
+        ends = [
+            self.origin + self.along * x + self.inward * z for x in (x0, x1) for z in (0.004, out)
+        ]
+        low, high = np.min(ends, 0), np.max(ends, 0)
+        low[1], high[1] = y0, y1
+        return low, high
+
+
+def window_side(
+    draft: Draft, space: HouseSpace, room: RoomSpace, window: Passage
+) -> WindowSide | None:
+    """The window from the room; None where it has cloth already or nothing fits before it."""
+    side = window.side_of(room.room.id)
+    if side is None or window.width < 0.35:
+        return None
+    inward = window.inward(side)
+    along = np.array([inward[2], 0.0, -inward[0]])
+    origin = window.face_point(side)
+    origin[1] = room.room.floor_y
+    ceiling = float(room.ceiling_y((origin + 0.1 * inward)[None, [0, 2]])[0])
+    number = next((n for n, i in enumerate(draft.items) if i.id == window.item_id), None)
+    sticks_out = 0.0
+    if number is not None and len(space.points[number]):
+        sticks_out = max(float(((space.points[number] - origin) @ inward).max()), 0.0)
+    seen = WindowSide(window, side, origin, along, inward, room.room.floor_y, ceiling, sticks_out)
+    return None if _is_dressed(draft, space, seen) else seen
+
+
+def _is_dressed(draft: Draft, space: HouseSpace, seen: WindowSide) -> bool:
+    # A curtain or blind of the source, or of the window's other neighbour, hangs there.
+    half = seen.window.width / 2
+    low, high = seen.bounds(-half, half, seen.window.bottom_y, seen.window.top_y, 0.3)
+    low, high = low - 0.1, high + 0.1
+    return any(
+        draft.items[n].nyu40 in (CURTAIN, BLINDS)
+        and (space.bounds[n][0] < high).all()
+        and (space.bounds[n][1] > low).all()
+        for n in range(len(draft.items))
+    )
+
+
+def hang_curtains(
+    draft: Draft, space: HouseSpace, room: RoomSpace, seen: WindowSide, cloth: Cloth,
+    rng: np.random.Generator,
+) -> bool:  # fmt: skip
+    """A rod and one or two panels; False, with its reason counted, where they do not fit."""
+    window = seen.window
+    rod_y = min(window.top_y + _OVER_WINDOW_M, seen.ceiling_y - _UNDER_CEILING_M)
+    depth = float(rng.uniform(0.026, 0.038))
+    rod_z = max(seen.sticks_out_m + 1.3 * depth + 0.015, 0.075)
+    if rod_y < window.top_y + 0.02 or rod_z > _MOST_OUT_M:
+        draft.refused[f"{PART}: no place for a curtain rod"] += 1
+        return False
+    out = rod_z + 1.4 * depth
+    panels = []
+    cover = float(rng.uniform(0.15, 0.25)) * window.width
+    for sign in (-1, 1):
+        found = _panel_place(space, room, seen, sign, cover, rod_y, out, window.item_id, draft)
+        if found is not None:
+            panels.append(found)
+    if not panels:
+        draft.refused[f"{PART}: no room beside a window"] += 1
+        return False
+    # Both panels end at one height.
+    bottom = max(p[2] for p in panels)
+    piece, shape, middle = _curtain_set(seen, panels, bottom, rod_y, rod_z, depth, cloth, rng)
+    _add(draft, room, piece, shape, seen, middle, bottom)
+    return True
+
+
+def _panel_place(
+    space: HouseSpace, room: RoomSpace, seen: WindowSide, sign: int, cover: float, rod_y: float,
+    out: float, window_id: str | None, draft: Draft,
+) -> tuple[float, float, float] | None:  # fmt: skip
+    """x0, x1 across and the lowest y of a panel at one end of the window; None = no room."""
+    half = seen.window.width / 2
+    sill = seen.window.bottom_y
+    without = [n for n, i in enumerate(draft.items) if i.id == window_id]
+    free = shapely.difference(room.area, room.walls)
+    for beyond in (0.17, 0.12, 0.07):
+        inner, outer = sign * (half - cover), sign * (half + beyond)
+        x0, x1 = min(inner, outer), max(inner, outer)
+        corner = seen.origin + seen.along * (outer + sign * 0.04) + seen.inward * out / 2
+        if not shapely.contains_xy(free, corner[0], corner[2]):
+            continue
+        for bottom in (seen.floor_y + _FROM_FLOOR_M, sill - 0.15, sill - 0.05):
+            if bottom > sill or bottom < seen.floor_y:
+                continue
+            low, high = seen.bounds(x0, x1, bottom, rod_y + 0.02, out)
+            if space.is_free(low, high, without=without):
+                return x0, x1, bottom
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Cloth:
+    """A room's cloth and the metal it hangs from."""
+
+    material: Material
+    tile_m: float
+    fold_m: float
+    rod: Material
+
+
+def room_cloth(draft: Draft, style: Style, room: RoomSpace, rng: np.random.Generator) -> Cloth:
+    """What the curtains of a room are made of: calm, light colours more often than loud ones."""
+    tint = style.textiles[
+        int(min(rng.integers(len(style.textiles)), rng.integers(len(style.textiles))))
+    ]
+    if rng.random() < 0.45:
+        tint = mix(tint, (0.93, 0.91, 0.87), float(rng.uniform(0.5, 0.85)))
+    family = "weave" if rng.random() < 0.6 else "twill"
+    pattern = pattern_material(draft, Pattern(family, int(rng.integers(4)), (_rounded(tint),)))
+    return Cloth(
+        draft.materials[pattern.number], pattern.size_m[0], float(rng.uniform(0.12, 0.18)),
+        metal_of(style) if rng.random() < 0.6 else plain("rod", style.wood.mean, 0.4),
+    )  # fmt: skip
+
+
+def _curtain_set(
+    seen: WindowSide, panels: list[tuple[float, float, float]], bottom: float, rod_y: float,
+    rod_z: float, depth: float, cloth: Cloth, rng: np.random.Generator,
+) -> tuple[Piece, Shape, float]:  # fmt: skip
+    """The panels with their rod; and where their middle is across the window."""
+    height = rod_y - bottom
+    x0, x1 = min(p[0] for p in panels), max(p[1] for p in panels)
+    middle = (x0 + x1) / 2
+    parts: list[tuple[Surface, Material]] = []
+    for a, b, _low in panels:
+        folds = Folds(cloth.fold_m, depth, float(rng.uniform(0, 6)), float(rng.uniform(0.1, 0.6)))
+        sheet = panel("curtain", b - a, height, rod_z, folds, cloth.tile_m)
+        parts.append((_moved(sheet, (a - middle, 0.0, 0.0)), cloth.material))
+    # The rod passes over the panels and rests on two brackets.
+    half, y = (x1 - x0) / 2 + 0.03, height + _ROD_M
+    parts.append((bar("rod", -half, half, y, rod_z, _ROD_M), cloth.rod))
+    for sign in (-1, 1):
+        parts.append((sphere("finial", np.array([sign * half, y, rod_z]), 0.022, 0), cloth.rod))
+        arm = np.array([sign * (half - 0.06), y - _ROD_M - 0.004, rod_z / 2])
+        parts.append((box("bracket", arm, np.array([0.008, 0.006, rod_z / 2]), 0), cloth.rod))
+    piece, shape = made("curtains", "curtain", CURTAIN, parts)
+    return piece, shape, middle
+
+
+def hang_blind(
+    draft: Draft, space: HouseSpace, room: RoomSpace, seen: WindowSide, style: Style,
+    rng: np.random.Generator,
+) -> bool:  # fmt: skip
+    """A roller blind or slats before the window, let down a little to half."""
+    window = seen.window
+    z = max(seen.sticks_out_m + 0.012, 0.012)
+    top = min(window.top_y + 0.06, seen.ceiling_y - 0.01)
+    half = window.width / 2 + 0.03
+    drop = float(rng.uniform(0.12, 0.5)) * (window.top_y - window.bottom_y) + top - window.top_y
+    low, high = seen.bounds(-half, half, top - drop, top, z + 0.07)
+    own = [n for n, i in enumerate(draft.items) if i.id == window.item_id]
+    if z > 0.1 or top < window.top_y + 0.01 or not space.is_free(low, high, without=own):
+        draft.refused[f"{PART}: no place for a blind"] += 1
+        return False
+    calm = mix(style.textiles[0], (0.92, 0.91, 0.88), float(rng.uniform(0.3, 0.9)))
+    parts = _slats(half, drop, z, calm) if rng.random() < 0.4 else _roller(half, drop, z, calm)
+    # Two holders reach back to the wall.
+    white = plain("blind holder", (0.85, 0.85, 0.84), 0.4)
+    for sign in (-1, 1):
+        arm = np.array([sign * (half - 0.004), drop - 0.03, (z + 0.02) / 2])
+        parts.append((box("holder", arm, np.array([0.004, 0.02, (z + 0.02) / 2]), 0), white))
+    piece, shape = made("blind", "blinds", BLINDS, parts)
+    _add(draft, room, piece, shape, seen, 0.0, top - drop)
+    return True
+
+
+def _roller(
+    half: float, drop: float, z: float, colour: tuple[float, float, float]
+) -> list[tuple[Surface, Material]]:
+    cloth = plain("blind cloth", colour, 0.9)
+    roll = bar("roll", -half + 0.01, half - 0.01, drop - 0.03, z + 0.03, 0.024)
+    sheet = np.array([0.0, (drop - 0.03) / 2, z + 0.008])
+    weight = bar("weight", -half + 0.01, half - 0.01, 0.008, z + 0.008, 0.008)
+    return [
+        (roll, cloth),
+        (box("sheet", sheet, np.array([half - 0.015, (drop - 0.03) / 2, 0.0008]), 0), cloth),
+        (weight, plain("blind weight", shade(colour, 0.8), 0.5)),
+    ]
+
+
+def _slats(
+    half: float, drop: float, z: float, colour: tuple[float, float, float]
+) -> list[tuple[Surface, Material]]:
+    slat = plain("slat", colour, 0.45)
+    parts = [
+        (
+            box("rail", np.array([0.0, drop - 0.02, z + 0.02]), np.array([half, 0.018, 0.018]), 0),
+            slat,
+        )
+    ]
+    c, s = np.cos(0.6), np.sin(0.6)
+    turn = np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
+    for y in np.arange(0.015, drop - 0.045, 0.022):
+        size = np.array([half - 0.006, 0.0006, 0.0125])
+        parts.append((box("slat", np.array([0.0, y, z + 0.02]), size, 0, axes=turn), slat))
+    return parts
+
+
+def _add(
+    draft: Draft, room: RoomSpace, piece: Piece, shape: Shape, seen: WindowSide, x: float, y: float
+) -> Item:
+    at = seen.origin + seen.along * x + seen.inward * GAP_M
+    at[1] = y
+    placed = replace(piece, place=Place.WALL)
+    item = draft.placed(
+        placed, shape, at, seen.turn_rad, item_id=next_id(draft, PART), room_id=room.room.id,
+        level_id=room.room.level_id,
+    )  # fmt: skip
+    draft.add(item, PART, placed)
+    return item
+
+
+def _moved(surface: Surface, offset: tuple[float, float, float]) -> Surface:
+    return replace(surface, positions=(surface.positions + np.array(offset)).astype(np.float32))
+
+
+def _rounded(colour: tuple[float, float, float]) -> tuple[float, float, float]:
+    r, g, b = (round(c, 2) for c in colour)
+    return (r, g, b)

@@ -1,0 +1,262 @@
+"""Lays rugs under sofas, beds and tables, mats before doors and in bathrooms; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.house import Item, Material
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
+from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.style import Style
+from pbrs_farm.dress.textiles.rug_patterns import rug_pixels
+from pbrs_farm.dress.walls.frames import Made, jpeg_texture, made, plain, slab
+from pbrs_farm.dress.walls.hanging import next_id
+
+PART = "textiles"
+RUG = 20  # NYU40 floor mat
+RUG_TAG = "rug"
+_FROM_WALL_M = 0.3
+_GAP_M = 0.0005  # between the floor and the rug's back
+_SOFA, _BED, _TABLE, _BATHTUB, _SINK = 6, 4, 7, 36, 34
+_SIZES = ((1.6, 2.3), (1.7, 2.4), (2.0, 3.0), (2.0, 2.9), (1.4, 2.0), (1.2, 1.7))
+# Turns a slab that hangs to one that lies, its picture up.
+_LYING = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]], np.float32)
+
+
+def rug(
+    rng: np.random.Generator, width: float, length: float, style: Style, family: str = ""
+) -> Made:
+    """A rug with its length along x, lying with its back at y = 0."""
+    thick = float(rng.uniform(0.008, 0.0095))
+    pixels = rug_pixels(rng, width, length, style, family)
+    texture = jpeg_texture(f"rug {family or 'any'}", pixels)
+    low, high = np.array([-length / 2, -width / 2]), np.array([length / 2, width / 2])
+    face, back = slab("rug", low, high, (0.0, thick))
+    shown = Material(f"rug {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
+    r, g, b = (round(float(c) / 255, 2) for c in pixels.reshape(-1, 3).mean(0))
+    parts = [(face, shown), (back, plain("rug edge", (r, g, b), 1.0))]
+    lying = [(replace(s, positions=s.positions @ _LYING.T), m) for s, m in parts]
+    return made("rug", "rug", RUG, lying, [texture], Place.FLOOR)
+
+
+def lay_rugs(
+    draft: Draft, room_id: str, style: Style, rng: np.random.Generator, share: float
+) -> None:
+    """The rugs and mats of one room."""
+    space = house_space(draft)
+    room = space.room(room_id)
+    lay = {
+        RoomKind.LIVING: _by_sofa, RoomKind.BEDROOM: _by_bed, RoomKind.DINING: _by_table,
+        RoomKind.BATHROOM: _bath_mat, RoomKind.HALL: _runner, RoomKind.OTHER: _by_sofa,
+    }.get(room.kind)  # fmt: skip
+    likely = {RoomKind.DINING: 0.45, RoomKind.HALL: 0.6}.get(room.kind, 0.8)
+    if lay is not None and rng.random() < likely * share:
+        lay(draft, space, room, style, rng)
+    if rng.random() < 0.8 * share:
+        _doormats(draft, space, room, style, rng)
+
+
+def _by_sofa(
+    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+) -> None:
+    sofas = _things(draft, room, _SOFA)
+    if not sofas:
+        if room.kind is RoomKind.LIVING:
+            _by_table(draft, space, room, style, rng)
+        return
+    box = max((draft.items[n].oriented_box for n in sofas), key=lambda b: float(b.half[0]))
+    front = box.axes[:, 2] * [1, 0, 1]
+    # In front of the sofa, its feet on the rug; round the table that stands there.
+    middle = box.centre + front * (float(box.half[2]) + 0.65)
+    tables = [
+        draft.items[n].oriented_box.centre
+        for n in _things(draft, room, _TABLE)
+        if np.linalg.norm((draft.items[n].oriented_box.centre - middle)[[0, 2]]) < 1.0
+    ]
+    if tables:
+        middle = np.mean([middle, *tables[:1]], axis=0)
+    turn = float(np.arctan2(front[0], front[2]))
+    _lay_largest(draft, space, room, style, rng, middle, turn, _shuffled(rng))
+
+
+def _by_bed(
+    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+) -> None:
+    beds = _things(draft, room, _BED)
+    if not beds:
+        return
+    box = max((draft.items[n].oriented_box for n in beds), key=lambda b: float(b.half[0]))
+    front, right = box.axes[:, 2] * [1, 0, 1], box.axes[:, 0] * [1, 0, 1]
+    half = box.half
+    turn = float(np.arctan2(front[0], front[2]))
+    # Across the bed under its foot, else a runner along a side or at the foot.
+    if half[0] > 0.6 and rng.random() < 0.65:
+        wide = 2 * float(half[0]) + float(rng.uniform(0.7, 1.1))
+        at = box.centre + front * float(half[2]) * 0.45
+        sizes = [(w, min(wide, 3.0)) for w in (2.0, 1.7, 1.4)] + [(1.4, wide - 0.4)]
+        if _lay_largest(draft, space, room, style, rng, at, turn, sizes, from_wall=0.1):
+            return
+    for sign in (1.0, -1.0):
+        at = box.centre + right * sign * (float(half[0]) + 0.42)
+        if _lay_largest(draft, space, room, style, rng, at, turn + np.pi / 2, [(0.7, 1.5), (0.6, 1.1)], from_wall=0.05):  # fmt: skip
+            return
+    at = box.centre + front * (float(half[2]) + 0.45)
+    _lay_largest(draft, space, room, style, rng, at, turn, [(0.7, 1.4), (0.6, 1.0)], from_wall=0.1)
+
+
+def _by_table(
+    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+) -> None:
+    boxes = [draft.items[n].oriented_box for n in _things(draft, room, _TABLE)]
+    large = [b for b in boxes if min(b.half[0], b.half[2]) > 0.35]
+    if not large:
+        return
+    box = max(large, key=lambda b: float(b.half[0] * b.half[2]))
+    axis = 0 if box.half[0] >= box.half[2] else 2
+    along = box.axes[:, axis]
+    turn = float(np.arctan2(-along[2], along[0]))
+    sizes = [
+        (2 * float(box.half[2 - axis]) + more, 2 * float(box.half[axis]) + more)
+        for more in (1.2, 1.0, 0.7)
+    ]
+    _lay_largest(draft, space, room, style, rng, box.centre, turn, sizes, from_wall=0.2)
+
+
+def _bath_mat(
+    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+) -> None:
+    for wanted in (_BATHTUB, _SINK):
+        for number in _things(draft, room, wanted):
+            box = draft.items[number].oriented_box
+            for axis, sign in ((2, 1.0), (0, 1.0), (0, -1.0)):
+                out = box.axes[:, axis] * sign * [1, 0, 1]
+                at = box.centre + out * (float(box.half[axis]) + 0.3)
+                turn = float(np.arctan2(out[0], out[2]))
+                if _lay_largest(
+                    draft, space, room, style, rng, at, turn, [(0.5, 0.8), (0.45, 0.65)],
+                    from_wall=0.02, family="shag", bare=True,
+                ):  # fmt: skip
+                    return
+
+
+def _runner(
+    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+) -> None:
+    inner = room.area.representative_point()
+    x, z = float(inner.x), float(inner.y)
+    x0, z0, x1, z1 = room.area.bounds
+    turn = 0.0 if x1 - x0 >= z1 - z0 else np.pi / 2
+    sizes = [(0.8, 2.6), (0.8, 2.0), (0.7, 1.5), (0.6, 1.0)]
+    _lay_largest(draft, space, room, style, rng, np.array([x, 0.0, z]), turn, sizes, from_wall=0.12)
+
+
+def _doormats(
+    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+) -> None:
+    # Inside every door that leads out of the home.
+    for door in room.doors:
+        side = door.side_of(room.room.id)
+        if side is None or None not in door.room_ids or door.width > 1.4:
+            continue
+        at = door.face_point(side) + door.inward(side) * 0.38
+        out = door.inward(side)
+        turn = float(np.arctan2(out[0], out[2]))
+        _lay_largest(
+            draft, house_space(draft), room, style, rng, at, turn, [(0.45, 0.75), (0.4, 0.6)],
+            from_wall=0.05, family="plain", bare=True, at_doors=True,
+        )  # fmt: skip
+
+
+def _things(draft: Draft, room: RoomSpace, nyu40: int) -> list[int]:
+    # Toys of the class stand on tables; furniture stands on the floor.
+    floor = room.room.floor_y
+    return [
+        n
+        for n in room.items
+        if draft.items[n].nyu40 == nyu40 and draft.items[n].bounds[0, 1] < floor + 0.3
+    ]
+
+
+def _shuffled(rng: np.random.Generator) -> list[tuple[float, float]]:
+    # A size drawn among the large ones, smaller ones after it.
+    first = int(rng.integers(0, 4))
+    return [_SIZES[first], *_SIZES[first + 1 :], _SIZES[1], *_SIZES[4:]]
+
+
+def _lay_largest(
+    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator,
+    middle: F64, turn: float, sizes: list[tuple[float, float]], *, from_wall: float = _FROM_WALL_M,
+    family: str = "", bare: bool = False, at_doors: bool = False,
+) -> bool:  # fmt: skip
+    """Lay the first size (width, length) that fits near the place; length goes across `turn`'s front.
+
+    bare: nothing may stand on it. at_doors: it may lie where a door swings.
+    """
+    free = shapely.buffer(shapely.difference(room.area, room.walls), -from_wall, join_style="mitre")
+    taken = _floor_mats(draft, space, room)
+    if not at_doors:
+        swings = [d.swing(s) for d in room.doors if (s := d.side_of(room.room.id)) is not None]
+        taken = shapely.union_all([taken, *swings])
+    for width, length in sizes:
+        for shift in (
+            (0.0, 0.0),
+            (0.15, 0.0),
+            (-0.15, 0.0),
+            (0.3, 0.0),
+            (-0.3, 0.0),
+            (0.0, 0.15),
+            (0.0, -0.15),
+        ):
+            at = middle + _offset(turn, shift)
+            area = _rectangle(at, turn, width, length)
+            if not shapely.contains(free, area) or shapely.intersects(taken, area):
+                continue
+            if bare and not _is_bare(space, room, area):
+                continue
+            piece, shape = rug(rng, width, length, style, family)
+            where = np.array([at[0], room.room.floor_y + _GAP_M, at[2]])
+            item: Item = draft.placed(
+                piece, shape, where, turn, item_id=next_id(draft, PART), room_id=room.room.id,
+                level_id=room.room.level_id, tags=(RUG_TAG,),
+            )  # fmt: skip
+            draft.add(item, PART, piece)
+            return True
+    draft.refused[f"{PART}: no floor for a rug"] += 1
+    return False
+
+
+def _offset(turn: float, shift: tuple[float, float]) -> F64:
+    c, s = np.cos(turn), np.sin(turn)
+    return np.array([shift[0] * c + shift[1] * s, 0.0, -shift[0] * s + shift[1] * c])
+
+
+def _rectangle(at: F64, turn: float, width: float, length: float) -> BaseGeometry:
+    corners = [
+        (at + _offset(turn, (sx * length / 2, sz * width / 2)))[[0, 2]]
+        for sx, sz in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    ]
+    return shapely.Polygon(corners)
+
+
+def _floor_mats(draft: Draft, space: HouseSpace, room: RoomSpace) -> BaseGeometry:
+    """The plan area of rugs that lie in the room, and of low things that rugs would cut."""
+    shapes = []
+    for n in room.items:
+        low, high = space.bounds[n]
+        if draft.items[n].nyu40 == RUG or high[1] < room.room.floor_y + 0.05:
+            shapes.append(shapely.box(low[0], low[2], high[0], high[2]))
+    return shapely.union_all(shapes)
+
+
+def _is_bare(space: HouseSpace, room: RoomSpace, area: BaseGeometry) -> bool:
+    x0, z0, x1, z1 = area.bounds
+    low = np.array([x0, room.room.floor_y + 0.002, z0])
+    high = np.array([x1, room.room.floor_y + 0.1, z1])
+    return space.is_free(low, high)

@@ -1,0 +1,190 @@
+"""Curtains, blinds, rugs and towels: cloth that is closed, hangs on walls and lies on floors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.house import House, Item, ItemKind, Surface
+from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corners
+from pbrs_farm.core.primitives import box
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space import house_space
+from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.textiles import textiles_large
+from pbrs_farm.dress.textiles.cloth import Folds, bar, panel, towel_over_bar
+from pbrs_farm.dress.textiles.rug_patterns import FAMILIES, inks_of, rug_pixels
+from pbrs_farm.dress.textiles.rugs import rug
+from pbrs_farm.dress.textiles.towels import towel_rail
+from tests.builders import builtin_home
+
+STYLE = style_for(np.random.default_rng(1))
+CURTAIN, BLINDS, RUG = 16, 13, 20
+
+
+def _bare() -> House:
+    """The built-in home without its rug."""
+    home = builtin_home()
+    return replace(home, items=tuple(i for i in home.items if i.nyu40 != RUG))
+
+
+def _dressed(seed: int, house: House | None = None, share: float = 1.0) -> Draft:
+    draft = Draft(house or _bare(), seed)
+    textiles_large(draft, EMPTY, STYLE, share)
+    return draft
+
+
+def _added(draft: Draft, nyu40: int) -> list[Item]:
+    return [i for i in draft.items[len(draft.source.items) :] if i.nyu40 == nyu40]
+
+
+def _is_closed(surface: Surface) -> bool:
+    corners = triangle_corners(surface.positions, surface.faces)
+    _, places = np.unique(np.round(corners.reshape(-1, 3), 6), axis=0, return_inverse=True)
+    return edges_are_paired(places.reshape(-1, 3)) and signed_volume(corners, corners[0, 0]) > 0
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        panel("p", 0.6, 2.2, 0.1, Folds(0.15, 0.03, 1.0), 0.25),
+        towel_over_bar(0.4, 0.6, 0.07, np.random.default_rng(1)),
+        bar("b", -0.5, 0.5, 2.0, 0.1, 0.012),
+    ],
+    ids=["panel", "towel", "bar"],
+)
+def test_cloth_is_a_closed_body_with_its_front_outside(surface: Surface) -> None:
+    assert _is_closed(surface)
+    assert surface.normals is not None
+    # Shading normals agree with the faces.
+    corners = triangle_corners(surface.positions, surface.faces)
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    shading = surface.normals[surface.faces].sum(1)
+    assert ((flat * shading).sum(1) > -1e-12).mean() > 0.99
+
+
+def test_a_panel_has_the_folds_that_were_asked_for() -> None:
+    folds = Folds(0.15, 0.03, sway=0.0)
+    depth = folds.depths(np.linspace(0, 0.9, 400), np.zeros(400))
+    assert 5 <= np.count_nonzero(np.diff((depth > 0).astype(int)) == 1) <= 7
+    sheet = panel("p", 0.9, 2.0, 0.1, folds, 0.25)
+    assert 0.04 < np.ptp(sheet.positions[:, 2]) < 0.09
+    assert np.ptp(sheet.positions[:, 0]) == pytest.approx(0.9, abs=0.005)
+
+
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_curtains_hang_from_the_wall_over_the_window(seed: int) -> None:
+    draft = _dressed(seed)
+    faces = {"window_living": (2, 0.0, 1.0), "window_bedroom": (2, 4.0, -1.0)}
+    for item in _added(draft, CURTAIN) + _added(draft, BLINDS):
+        points = np.concatenate([s.positions for s in item.surfaces])
+        axis, at, sign = faces["window_living" if item.room_id == "0_0" else "window_bedroom"]
+        out = sign * (points[:, axis] - at)
+        assert 0.0005 < out.min() < 0.001
+        assert out.max() < 0.3
+        assert item.bounds[1, 1] < 2.5
+        if item.nyu40 == CURTAIN:
+            assert item.bounds[1, 1] > 2.1
+
+
+def test_each_panel_covers_a_seventh_to_a_quarter_of_its_window() -> None:
+    seen = 0
+    for seed in range(1, 9):
+        for item in _added(_dressed(seed), CURTAIN):
+            x0, x1 = (1.6, 3.4) if item.room_id == "0_0" else (6.7, 7.9)
+            for sheet in (s for s in item.surfaces if s.name == "curtain"):
+                a, b = float(sheet.positions[:, 0].min()), float(sheet.positions[:, 0].max())
+                cover = (min(b, x1) - max(a, x0)) / (x1 - x0)
+                assert 0.14 < cover < 0.26
+                seen += 1
+    assert seen > 4
+
+
+def test_a_window_that_has_curtains_keeps_them() -> None:
+    home = _bare()
+    cloth = box("c", np.array([2.5, 1.3, 0.06]), np.array([1.0, 1.2, 0.03]), 0)
+    own = Item("own", "Curtains", ItemKind.OBJECT, "0", (cloth,), CURTAIN)
+    full = replace(home, items=(*home.items, own))
+    for seed in range(1, 6):
+        draft = _dressed(seed, full)
+        assert all(i.room_id != "0_0" for i in _added(draft, CURTAIN) + _added(draft, BLINDS))
+
+
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_rugs_lie_flat_in_the_room_clear_of_doors(seed: int) -> None:
+    draft = _dressed(seed)
+    space = house_space(draft)
+    for item in _added(draft, RUG):
+        low, high = item.bounds
+        assert 0 <= low[1] < 0.001
+        assert 0.008 < high[1] < 0.0105
+        assert "rug" in item.tags
+        room = space.room(str(item.room_id))
+        area = shapely.box(low[0], low[2], high[0], high[2])
+        assert room.area.contains(area)
+        if "generated#rug" in item.source_class and area.area > 0.5:
+            for door in room.doors:
+                side = door.side_of(room.room.id)
+                assert side is not None
+                assert not door.swing(side).buffer(-0.01).intersects(area)
+
+
+def test_some_seed_lays_a_large_rug_before_the_sofa() -> None:
+    areas = [
+        float(np.prod(np.ptp(i.bounds, axis=0)[[0, 2]]))
+        for seed in range(1, 7)
+        for i in _added(_dressed(seed), RUG)
+        if i.room_id == "0_0"
+    ]
+    assert max(areas) > 2.5
+
+
+def test_a_room_with_a_rug_there_gets_no_second_one_on_it() -> None:
+    for seed in range(1, 5):
+        draft = _dressed(seed, builtin_home())
+        old = next(i for i in draft.items if i.nyu40 == RUG)
+        a = shapely.box(*old.bounds[0, [0, 2]], *old.bounds[1, [0, 2]])
+        for item in _added(draft, RUG):
+            b = shapely.box(*item.bounds[0, [0, 2]], *item.bounds[1, [0, 2]])
+            assert not a.intersects(b)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_family_of_rugs_can_be_woven(family: str) -> None:
+    pixels = rug_pixels(np.random.default_rng(3), 1.6, 2.3, STYLE, family)
+    assert pixels.shape == (304, 436, 3)
+    assert pixels.std() > 2
+    assert len(inks_of(np.random.default_rng(3), STYLE)) == 5
+
+
+def test_a_rug_shows_its_picture_on_top() -> None:
+    _piece, shape = rug(np.random.default_rng(1), 1.0, 2.0, STYLE)
+    face = shape.surfaces[0]
+    assert shape.materials[face.material].texture_id
+    corners = triangle_corners(face.positions, face.faces)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (normal[:, 1] > 0).all()
+    assert np.ptp(face.positions[:, 0]) == pytest.approx(2.0)
+    assert np.ptp(face.positions[:, 2]) == pytest.approx(1.0)
+
+
+def test_a_towel_hangs_over_its_rail() -> None:
+    draft = Draft(builtin_home(), 1)
+    piece, shape = towel_rail(draft, STYLE, np.random.default_rng(2))
+    assert piece.nyu40 == 27
+    assert shape.bounds[0, 2] == pytest.approx(0, abs=1e-6)
+    assert shape.bounds[0, 1] == pytest.approx(0, abs=0.005)
+
+
+def test_a_seed_decides_every_bit_and_no_share_adds_nothing() -> None:
+    a, b = _dressed(3), _dressed(3)
+    assert [i.id for i in a.items] == [i.id for i in b.items]
+    for x, y in zip(a.items, b.items, strict=True):
+        for s, t in zip(x.surfaces, y.surfaces, strict=True):
+            assert np.array_equal(s.positions, t.positions)
+    assert a.textures.keys() == b.textures.keys()
+    assert len(_dressed(3, share=0.0).items) == len(_bare().items)
