@@ -16,15 +16,18 @@ def normals_from_picture(pixels: NDArray[np.uint8] | F32, scale: float) -> F32:
     A byte b is 2 b / 255 - 1; scale multiplies x and y before the normal is made of unit length
     (glTF 2.0, section 3.9.3). z is at least MIN_Z.
     """
-    normals = pixels[..., :3].astype(np.float32) * np.float32(2 / 255) - 1
-    normals[..., :2] *= np.float32(scale)
+    # Decode channel by channel: pictures are large.
+    x, y, z = (pixels[..., k] * np.float32(2 / 255) - np.float32(1) for k in range(3))
+    is_black = (x <= -1) & (y <= -1) & (z <= -1)
+    x *= np.float32(scale)
+    y *= np.float32(scale)
     # Lift normals that lean into the surface; black pixels, which say nothing, are flat.
-    is_black = ~pixels[..., :3].any(-1)
-    normals[is_black] = (0, 0, 1)
-    across = np.linalg.norm(normals[..., :2], axis=-1)
-    normals[..., 2] = np.maximum(normals[..., 2], np.float32(MIN_Z) * np.maximum(across, 1e-6))
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    return normals
+    across = np.sqrt(x * x + y * y)
+    z = np.maximum(z, np.float32(MIN_Z) * np.maximum(across, np.float32(1e-6)))
+    for component, flat in ((x, 0), (y, 0), (z, 1)):
+        component[is_black] = flat
+    length = np.sqrt(x * x + y * y + z * z)
+    return np.asarray(np.stack([x / length, y / length, z / length], -1), np.float32)
 
 
 def tangents(corners: F64, uvs: F64) -> tuple[F64, F64, Bools]:

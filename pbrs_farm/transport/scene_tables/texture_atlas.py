@@ -124,11 +124,15 @@ def _packed_maps(
     # Bring both to one size, and pack.
     height, width = np.maximum(rough.shape[:2], bent.shape[:2])
     rough, bent = _resized(rough, height, width), _resized(bent, height, width)
-    bent /= np.maximum(np.linalg.norm(bent, axis=-1, keepdims=True), 1e-6)
-    xy = np.round(bent[..., :2] * 1023 + NORMAL_ZERO).astype(np.uint32)
-    r = np.round(np.clip(rough[..., 0] / 255, 0, 1) * 1023).astype(np.uint32)
-    packed: NDArray[np.uint32] = xy[..., 0] | xy[..., 1] << np.uint32(11) | r << np.uint32(22)
+    length = np.sqrt(np.maximum(np.einsum("ijk,ijk->ij", bent, bent), 1e-12))
+    x, y = (_rounded(bent[..., k] / length * np.float32(1023) + NORMAL_ZERO) for k in range(2))
+    r = _rounded(np.clip(rough[..., 0], 0, 255) * np.float32(1023 / 255))
+    packed: NDArray[np.uint32] = x | y << np.uint32(11) | r << np.uint32(22)
     return packed
+
+
+def _rounded(values: F32) -> NDArray[np.uint32]:
+    return (values + np.float32(0.5)).astype(np.uint32)
 
 
 def _step(picture: Picture) -> int:
