@@ -37,7 +37,7 @@ test-farm: setup ## the farm's tests that really kill processes
 test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm.md)
 	$(BIN)/pytest -m infra -rs
 
-bench: setup ## measure everything but house, light, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
+bench: setup ## measure everything but house, dress, light, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## light transport: path, metropolis, denoiser

@@ -25,6 +25,7 @@ DEFAULT: Final = {
 }
 OWN_TARGET: Final = {
     "house": "house",
+    "dress": "dress.dress",
     "light": "light.equal_time",
     "presets": "light.presets",
     "cycles": "renderers.cycles",

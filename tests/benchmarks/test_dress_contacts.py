@@ -1,0 +1,55 @@
+"""The bench's own check of dressed homes finds what is wrong: it must be able to fail."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.dress.contacts import blocked_doors, floating, penetrations, things_of
+from pbrs_farm.core.house import House, Item
+from tests.builders import builtin_home
+from tests.dress.furniture import bookcase, house, solid
+
+TABLE = solid("table", [1.0, 0.0, 1.0], [2.2, 0.75, 1.8])
+
+
+def with_new(home: House, *items: Item) -> House:
+    return home.with_items((*home.items, *items))
+
+
+@pytest.mark.parametrize(("y", "n"), [(0.75, 0), (0.7515, 0), (0.755, 1), (0.74, 1)])
+def test_what_floats_or_sinks_is_found(y: float, n: int) -> None:
+    home = house(TABLE)
+    cup = solid("dress-clutter-1", [1.2, y, 1.2], [1.3, y + 0.1, 1.3])
+    assert len(floating(things_of(with_new(home, cup), home))) == n
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "n"),
+    [
+        ([1.4, 0.12, 0.05], [1.43, 0.4, 0.25], 0),  # on a shelf
+        ([1.4, 0.2, 0.05], [1.43, 0.7, 0.25], 1),  # through one
+        ([0.9, 0.12, 0.05], [1.1, 0.4, 0.25], 1),  # through the side
+    ],
+)
+def test_a_book_through_a_board_is_found(low: list[float], high: list[float], n: int) -> None:
+    home = house(bookcase())
+    book = solid("dress-clutter-1", low, high)
+    assert len(penetrations(things_of(with_new(home, book), home))) == n
+
+
+def test_a_thing_inside_another_is_found_and_what_came_with_the_home_is_not() -> None:
+    home = house(TABLE, solid("twin", [1.0, 0.0, 1.0], [2.2, 0.75, 1.8]))
+    assert penetrations(things_of(home, home)) == []
+    inside = solid("dress-clutter-1", [1.5, 0.3, 1.3], [1.6, 0.4, 1.4])
+    assert len(penetrations(things_of(with_new(house(TABLE), inside), house(TABLE)))) == 1
+
+
+def test_what_stands_before_a_door_is_found() -> None:
+    home = builtin_home()
+    door = next(i for i in home.items if i.id == "door_inner")
+    x, _y, z = door.bounds.mean(0)
+    before = solid("dress-clutter-1", [x - 0.7, 0, z - 0.1], [x - 0.6, 0.5, z + 0.1])
+    beside = solid("dress-clutter-2", [x - 0.7, 0, z - 0.75], [x - 0.6, 0.5, z - 0.6])
+    dressed = with_new(home, before, beside)
+    found = {thing for _door, thing in blocked_doors(dressed, things_of(dressed, home))}
+    assert found == {"dress-clutter-1"}
