@@ -66,7 +66,7 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
     if rng.random() < 0.45 * placing.share:
         made = cushion(rng, placing.style)
         at = float(rng.uniform(0.4, 0.6))
-        n += lay_down(placing, scene, index, made, *_place(bed, at, 0.56, made), bed.level)
+        n += lay_down(placing, scene, index, made, *_place(bed, at, 0.75, made), bed.level)
     return n
 
 

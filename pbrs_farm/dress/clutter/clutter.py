@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Item, ItemKind
@@ -22,6 +24,7 @@ from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
 
 _LEAST_SHELF_DEPTH_M = 0.12
+_DOOR_MARGIN_M = 0.02  # around where doors swing
 _BED, _SOFA, _CHAIR = 4, 6, 5
 
 
@@ -37,7 +40,7 @@ def clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> N
         own = room_style(style, draft.rng("style", room.room.id))
         placing = Placing(draft, stock, room.room, own, rng, share, bias)
         _fill_room(placing, scene, room)
-        fill_floor(placing, scene, room)
+        fill_floor(placing, scene, space, room)
 
 
 def house_bias(rng: np.random.Generator) -> float:
@@ -45,13 +48,21 @@ def house_bias(rng: np.random.Generator) -> float:
     return float(rng.beta(3.5, 1.9) * 0.4 - 0.15)
 
 
+def _door_zone(room: RoomSpace) -> BaseGeometry:
+    """Where leaves swing and people go: nothing is put there, not even on a shelf."""
+    sides = [(door, door.side_of(room.room.id)) for door in room.doors]
+    zones = [d.before(s).union(d.swing(s)) for d, s in sides if s is not None]
+    return shapely.union_all(zones).buffer(_DOOR_MARGIN_M)
+
+
 def _fill_room(placing: Placing, scene: SceneTriangles, room: RoomSpace) -> None:
+    zone = _door_zone(room)
     for index in room.items:
         item = scene.items[index] if index < len(scene.items) else None
         if item is None:
             continue
         if can_hold(item):
-            _fill_item(placing, scene, room, index, item)
+            _fill_item(placing, scene, room, index, zone)
         elif item.kind is ItemKind.OBJECT and item.nyu40 == _BED:
             dress_bed(placing, scene, index)
         elif item.kind is ItemKind.OBJECT and item.nyu40 in (_SOFA, _CHAIR):
@@ -59,14 +70,15 @@ def _fill_room(placing: Placing, scene: SceneTriangles, room: RoomSpace) -> None
 
 
 def _fill_item(
-    placing: Placing, scene: SceneTriangles, room: RoomSpace, index: int, item: Item
+    placing: Placing, scene: SceneTriangles, room: RoomSpace, index: int, zone: BaseGeometry
 ) -> None:
-    plan = None
+    plan, item = None, scene.items[index]
     for support in supports_of_item(scene, index, room.room):
         receptacle = receptacle_of(item, support, room.kind)
         if not receptacle:
             continue
         top = Worktop(support)
+        top.keep_free(zone)
         if receptacle == "shelf":
             plan = plan or plan_shelves(placing, room.kind)
             if top.depth >= _LEAST_SHELF_DEPTH_M:

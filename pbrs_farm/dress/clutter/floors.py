@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -12,14 +12,14 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.worktop import LIFT_M
 from pbrs_farm.dress.generated.made import Made
-from pbrs_farm.dress.space.house_space import RoomSpace
+from pbrs_farm.dress.space.floor_bitmaps import CELL_M, FloorBitmap, doors_are_joined, floor_bitmap
+from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.supports.find_supports import surroundings
 from pbrs_farm.dress.supports.plan_grid import PlanGrid
 from pbrs_farm.dress.supports.scene_triangles import SceneTriangles
 
-_CELL_M = 0.05
-_WALK_M = 0.6  # the width of a way
+_WALK_M = 0.65  # the width of a way, with something to spare
 _REACH_M = 0.35  # a thing's middle is no farther from a wall or furniture
 _KEPT_M = 0.04  # between things
 _DOOR_M = 1.0  # kept free before doors
@@ -44,20 +44,21 @@ _USUAL: dict[RoomKind, tuple[tuple[str, float], ...]] = {
 @dataclass(slots=True)
 class _Floor:
     # Cells of a room's floor while things are put there.
-    grid: PlanGrid
-    inside: Bools
+    room: RoomSpace
+    bitmap: FloorBitmap
+    grid: PlanGrid  # of the same cells
     free: Bools  # nothing stands there, no door needs it
     walkable: Bools  # nothing stands there
-    doors: list[F64]  # (2,) plan points where one stands before each door
+    has_ways: bool  # one way joins the room's doors
 
 
-def fill_floor(placing: Placing, scene: SceneTriangles, room: RoomSpace) -> int:
+def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> int:
     """Put things on the floor of a room; how many."""
     rng = placing.rng
     wanted = [
         kind for kind, chance in _USUAL.get(room.kind, ()) if rng.random() < chance * placing.share
     ]
-    floor = _floor(scene, room) if wanted else None
+    floor = _floor(scene, space, room) if wanted else None
     if floor is None or not floor.free.any():
         return 0
     n = 0
@@ -68,16 +69,15 @@ def fill_floor(placing: Placing, scene: SceneTriangles, room: RoomSpace) -> int:
     return n
 
 
-def _floor(scene: SceneTriangles, room: RoomSpace) -> _Floor | None:
+def _floor(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> _Floor | None:
     if room.area.is_empty or room.room.polygon.shape[0] < 3:
         return None
     y = room.room.floor_y
-    grid = PlanGrid.around(np.asarray(room.room.polygon, np.float64), 0.0, _CELL_M, 0.0)
+    bitmap = floor_bitmap(space, room)
+    grid = PlanGrid(np.asarray(bitmap.origin), 0.0, CELL_M, bitmap.inside.shape)
     plan = grid.centres()
-    inside = shapely.contains_xy(room.area, plan[..., 0], plan[..., 1])
     around = surroundings(scene, -1, grid, y)
-    hits = around.hits
-    inside &= ~around.solid
+    hits, inside = around.hits, bitmap.inside & ~around.solid
     # Rugs carry nothing, but one walks over them.
     stands = (hits.low < y + _HEAD_M) & (hits.high > y + 0.002)
     blocks = stands & (hits.high > y + _RUG_M)
@@ -87,30 +87,27 @@ def _floor(scene: SceneTriangles, room: RoomSpace) -> _Floor | None:
     walkable = inside & ~body
     # Keep a metre before doors and windows that reach the floor.
     kept = np.zeros(grid.shape, np.bool_)
-    doors = []
     for passage in (*room.doors, *(w for w in room.windows if w.bottom_y < y + 0.4)):
         side = passage.side_of(room.room.id)
         if side is None:
             continue
-        zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(_CELL_M)
+        zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(CELL_M)
         kept |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
-        if passage in room.doors:
-            at = passage.face_point(side) + passage.inward(side) * (_WALK_M / 2 + 0.05)
-            doors.append(at[[0, 2]])
-    return _Floor(grid, inside, inside & ~low & ~kept, walkable, doors)
+    joined = doors_are_joined(bitmap, room)
+    return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, joined)
 
 
 def _put(placing: Placing, floor: _Floor, made: Made) -> bool:
     low, high = made[1].bounds
     reach = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     # Its middle keeps from everything by its own radius, but not much more.
-    distance = ndimage.distance_transform_edt(np.pad(floor.free, 1))[1:-1, 1:-1] * _CELL_M
-    to_wall = ndimage.distance_transform_edt(np.pad(floor.walkable, 1))[1:-1, 1:-1] * _CELL_M
-    least = reach + _KEPT_M + _CELL_M
+    distance = ndimage.distance_transform_edt(np.pad(floor.free, 1))[1:-1, 1:-1] * CELL_M
+    to_wall = ndimage.distance_transform_edt(np.pad(floor.walkable, 1))[1:-1, 1:-1] * CELL_M
+    least = reach + _KEPT_M + CELL_M
     rows, columns = np.nonzero((distance >= least) & (to_wall <= least + _REACH_M))
     for k in placing.rng.permutation(len(rows))[:12]:
-        disc = _disc(floor.grid.shape, int(rows[k]), int(columns[k]), reach + _CELL_M)
-        if not _ways_stay(floor, disc):
+        disc = _disc(floor.grid.shape, int(rows[k]), int(columns[k]), reach + CELL_M)
+        if floor.has_ways and not _ways_stay(floor, disc):
             continue
         x, z = floor.grid.plan_of(columns[k] + 0.5, rows[k] + 0.5)
         turn = _facing(to_wall, int(rows[k]), int(columns[k]))
@@ -120,6 +117,7 @@ def _put(placing: Placing, floor: _Floor, made: Made) -> bool:
         )  # fmt: skip
         floor.free &= ~disc
         floor.walkable &= ~disc
+        floor.bitmap.occupied[disc] = True
         return True
     placing.refuse("no place on the floor")
     return False
@@ -127,7 +125,7 @@ def _put(placing: Placing, floor: _Floor, made: Made) -> bool:
 
 def _disc(shape: tuple[int, int], row: int, column: int, radius_m: float) -> Bools:
     i, j = np.ogrid[: shape[0], : shape[1]]
-    return np.asarray((i - row) ** 2 + (j - column) ** 2 <= (radius_m / _CELL_M) ** 2)
+    return np.asarray((i - row) ** 2 + (j - column) ** 2 <= (radius_m / CELL_M) ** 2)
 
 
 def _facing(to_wall: F64, row: int, column: int) -> float:
@@ -141,21 +139,10 @@ def _facing(to_wall: F64, row: int, column: int) -> float:
 
 
 def _ways_stay(floor: _Floor, disc: Bools) -> bool:
-    """Whether one way still joins the doors that one way joined before."""
-    before, after = (_ways(floor, mask) for mask in (floor.walkable, floor.walkable & ~disc))
-    pairs_before = {(a, b) for a, x in enumerate(before) for b, y in enumerate(before) if x & y}
-    pairs_after = {(a, b) for a, x in enumerate(after) for b, y in enumerate(after) if x & y}
-    return pairs_before <= pairs_after
-
-
-def _ways(floor: _Floor, walkable: Bools) -> list[set[int]]:
-    # The ways that pass where one stands before each door.
-    room = ndimage.distance_transform_edt(np.pad(walkable, 1))[1:-1, 1:-1] * _CELL_M
-    ways, _n = ndimage.label(room >= _WALK_M / 2, structure=np.ones((3, 3)))
-    ways = np.asarray(ways)
-    found = []
-    for door in floor.doors:
-        column, row = np.floor((door - floor.grid.origin) / _CELL_M).astype(int)
-        near = ways[max(row - 4, 0) : max(row + 5, 0), max(column - 4, 0) : max(column + 5, 0)]
-        found.append({int(w) for w in np.unique(near)} - {0})
-    return found
+    """Whether one way still joins all doors, where one did."""
+    occupied = floor.bitmap.occupied | disc
+    free = floor.bitmap.inside & ~occupied
+    wide = ndimage.distance_transform_edt(free) * CELL_M >= _WALK_M / 2
+    ways, _n = ndimage.label(wide, structure=np.ones((3, 3)))
+    after = replace(floor.bitmap, occupied=occupied, ways=np.asarray(ways, np.int32))
+    return doors_are_joined(after, floor.room)

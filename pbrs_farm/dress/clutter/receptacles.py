@@ -35,6 +35,7 @@ _DRESSER, _FRIDGE, _TV, _NIGHTSTAND, _TOILET, _SINK, _LAMP, _BATHTUB = (
     36,
 )
 _OTHER_FURNITURE, _OTHER_STRUCTURE, _OTHER_PROP = 39, 38, 40
+_MACHINES = ("cooker", "stove", "oven", "washer", "washing", "dryer", "dishwasher", "fridge")
 _HOLDERS = frozenset({
     _CABINET, _TABLE, _BOOKSHELF, _COUNTER, _DESK, _SHELVES, _DRESSER, _FRIDGE, _TV, _NIGHTSTAND,
     _TOILET, _SINK, _OTHER_FURNITURE, _OTHER_PROP,
@@ -87,6 +88,8 @@ def receptacle_of(item: Item, support: Support, kind: RoomKind) -> str:
     if item.nyu40 in (_BOOKSHELF, _SHELVES):
         return "bath_shelf" if kind is RoomKind.BATHROOM else "shelf"
     is_inner = float(item.bounds[1, 1]) - support.height > 0.1
+    if is_inner and at < 0.8 and any(word in name for word in _MACHINES):
+        return ""
     if (
         is_inner
         and at < 1.9

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.dress.supports import Support
@@ -81,6 +83,12 @@ class Worktop:
         """Nothing else can stand there."""
         ahead = slice(spot.row, spot.row + spot.n_rows)
         self.clear[ahead, spot.column : spot.column + spot.n_columns] = 0.0
+
+    def keep_free(self, zone: BaseGeometry) -> None:
+        """Nothing can stand over a plan area."""
+        plan = self.grid.centres()
+        if not zone.is_empty and shapely.box(*plan.min((0, 1)), *plan.max((0, 1))).intersects(zone):
+            self.clear[shapely.contains_xy(zone, plan[..., 0], plan[..., 1])] = 0.0
 
     def middle(self, spot: Spot) -> F64:
         """(3,) world place of the spot's middle, on the support."""

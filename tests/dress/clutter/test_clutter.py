@@ -55,7 +55,8 @@ def test_every_thing_touches_what_it_stands_on() -> None:
     assert len(added) > 15
     for item in added:
         gap = item.bounds[0, 1] - levels
-        assert np.abs(gap).min() < 0.0005, item.name
+        # Floor, board or top; shoes and bins stand on the floor.
+        assert np.abs(gap).min() < 0.0005 or item.bounds[0, 1] < 0.0005, item.name
 
 
 def test_nothing_penetrates_anything() -> None:
@@ -105,7 +106,7 @@ def test_a_smaller_share_puts_less() -> None:
 def test_a_table_full_of_things_gets_no_more() -> None:
     block = solid("Monitor", [2.6, 0.74, 0.0], [3.8, 1.0, 0.6], 40)
     draft = _dressed(house(solid("Desk", [2.6, 0, 0], [3.8, 0.74, 0.6], 14), block))
-    assert all(i.bounds[0, 1] > 0.9 for i in _added(draft))
+    assert not any(0.1 < i.bounds[0, 1] < 0.9 for i in _added(draft))
 
 
 def test_the_table_of_shares_names_kinds_that_exist() -> None:
