@@ -1,0 +1,223 @@
+"""The part `parts`: wood, cloth, leather and metals on furniture that has plain colours.
+
+Wood keeps near the part's own colour and takes the grain of the home's wood; cloth and leather
+take colours of the style; metals have measured colours. White lacquer, glass, mirrors, bulbs,
+screens and what has a picture already stay. Effects: those of textures.families.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb, srgb_from_linear
+from pbrs_farm.core.house import Item, Material, MaterialKind, Surface
+from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.parts.box_mapping import box_mapped
+from pbrs_farm.dress.parts.part_kinds import (
+    PartKind,
+    has_taps,
+    is_bed,
+    is_brown,
+    is_dark,
+    is_furniture,
+    is_upholstered,
+    is_vivid,
+    is_white,
+    kind_by_name,
+    kind_of_part,
+)
+from pbrs_farm.dress.style import METALS, WOODS, Metal, Rgb, Style
+from pbrs_farm.dress.textures.families import Pattern, pattern_material
+
+PART: Final = "parts"
+_LEAST_BOARD_M2: Final = 0.05  # a part of no class that is smaller stays: knobs, feet
+_UPWARD: Final = 0.7  # cosine: what one sits or lies on
+_LEATHER_SHARE: Final = 0.25  # of sofas and armchairs
+_PAINT_STAYS: Final = 0.35  # of furniture painted in a colour that wood never has
+_GREY_STAYS: Final = 0.6
+_DARKEST: Final = 0.02  # linear: black wood still shows its grain
+_PALE: Final = "birch"
+_METAL_OF_NAME: Final = (
+    (("brass", "gold", "laiton"), "brass"), (("copper", "cuivre"), "copper"),
+    (("bronze",), "bronze"), (("chrom", "inox"), "chrome"), (("alu",), "aluminium"),
+    (("iron",), "black steel"), (("steel", "acier", "nickel"), "brushed steel"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Finish:
+    # A material, and how its picture is laid; size None: its coordinates stay.
+    number: int
+    size_m: tuple[float, float] | None = None
+    is_grained: bool = False
+
+
+def parts(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Give a share of the furniture's plain parts the look of what they are made of.
+
+    Parts of one colour in one room get one look, so that sets stay sets.
+    """
+    groups = {p.id: p.group for p in catalogue.pieces}
+    for index, item in enumerate(draft.items[: len(draft.source.items)]):
+        if item.kind.is_structure or not item.n_faces:
+            continue
+        group = groups.get(item.source_class, "")
+        kinds = _kinds(draft, item, group)
+        surfaces = tuple(
+            _finished(draft, style, share, item, group, surface, kind)
+            for surface, kind in zip(item.surfaces, kinds, strict=True)
+        )
+        if any(a is not b for a, b in zip(surfaces, item.surfaces, strict=True)):
+            draft.change(index, replace(item, surfaces=surfaces), PART)
+            draft.done[f"{PART}: {item.kind.value}"] += 1
+
+
+def _kinds(draft: Draft, item: Item, group: str) -> list[PartKind]:
+    kinds = [kind_of_part(draft.materials[s.material], item, group) for s in item.surfaces]
+    materials = [draft.materials[s.material] for s in item.surfaces]
+    # One sits or lies on the soft part, whatever it is called.
+    if is_upholstered(item, group):
+        areas = [
+            0.0 if kind_by_name(m.name) in (PartKind.WOOD, PartKind.METAL) else _upward_area(s)
+            for s, m in zip(item.surfaces, materials, strict=True)
+        ]
+        k = int(np.argmax(areas))
+        if areas[k] > 0 and materials[k].texture_id is None and materials[k].opacity == 1:
+            own = materials[k]
+            kinds = [
+                PartKind.SOFT if m is own and kind is not PartKind.METAL else kind
+                for m, kind in zip(materials, kinds, strict=True)
+            ]
+    # Boards are of wood in any colour but white; a draw per colour decides later.
+    is_simple = len(set(materials)) <= 2
+    for k, (surface, material) in enumerate(zip(item.surfaces, materials, strict=True)):
+        if kinds[k] is PartKind.OTHER and _may_be_board(surface, material, item, group):
+            if not is_upholstered(item, group) or (is_bed(item) and is_simple):
+                kinds[k] = PartKind.WOOD
+            elif is_bed(item) and is_vivid(material.diffuse):
+                kinds[k] = PartKind.SOFT
+    return kinds
+
+
+def _may_be_board(surface: Surface, material: Material, item: Item, group: str) -> bool:
+    is_plain = material.texture_id is None and material.kind is MaterialKind.OPAQUE
+    is_free = is_plain and kind_by_name(material.name) is None and not is_white(material.diffuse)
+    return is_free and is_furniture(item, group) and _area(surface) >= _LEAST_BOARD_M2
+
+
+def _finished(
+    draft: Draft, style: Style, share: float, item: Item, group: str, surface: Surface,
+    kind: PartKind,
+) -> Surface:  # fmt: skip
+    material = draft.materials[surface.material]
+    if kind is PartKind.OTHER:
+        return surface
+    shade = "".join(f"{round(31 * c):02x}" for c in material.diffuse)
+    rng = draft.rng(
+        PART, item.level_id, item.room_id or "", kind.value, group * (kind is PartKind.SOFT), shade
+    )
+    if rng.random() >= share:
+        return surface
+    finish = {PartKind.WOOD: _wood, PartKind.SOFT: _soft, PartKind.METAL: _metal}[kind](
+        draft, style, item, material, rng
+    )
+    if finish is None:
+        return surface
+    if finish.size_m is None:
+        return replace(surface, material=finish.number)
+    axes = np.eye(3) if item.box is None else item.box.axes
+    mapped = box_mapped(surface, axes, finish.size_m, is_grained=finish.is_grained)
+    return replace(mapped, material=finish.number)
+
+
+def _wood(
+    draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
+) -> _Finish | None:
+    own, stays = material.diffuse, rng.random()
+    # Paint may stay paint; so may grey.
+    if is_vivid(own) and stays < _PAINT_STAYS:
+        return None
+    if not (is_brown(own) or is_dark(own) or is_vivid(own)) and stays < _GREY_STAYS:
+        return None
+    mean = linear_from_srgb(np.array(style.wood.mean))
+    mine = np.maximum(linear_from_srgb(np.array(own)), _DARKEST)
+    weight = 1.0 if is_vivid(own) else float(rng.uniform(0.25, 0.85))
+    # What is dark stays dark: mix in the logarithm.
+    wanted = np.exp((1 - weight) * np.log(mine) + weight * np.log(mean))
+    if is_dark(own):
+        wanted = mean * float(mine @ LUMINANCE + 0.02) / float(mean @ LUMINANCE)
+    is_pale = float(wanted @ LUMINANCE) > float(mean @ LUMINANCE)
+    wood = WOODS[_PALE] if is_pale else style.wood
+    pattern = Pattern("grain", int(draft.rng(PART, "grain", wood.name).integers(2**31)), wood=wood)
+    return _tinted(draft, pattern, wanted, is_grained=True)
+
+
+def _soft(
+    draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
+) -> _Finish | None:
+    colours: Mapping[bool, tuple[Rgb, ...]] = {False: style.textiles, True: style.textiles[:3]}
+    wanted = linear_from_srgb(
+        np.array(colours[is_bed(item)][int(rng.integers(len(colours[is_bed(item)])))])
+    )
+    family = (
+        "leather" if "leather" in material.name.lower() else str(rng.choice(["weave", "twill"]))
+    )
+    # Bed linen is light; some sofas are of leather, in its own browns and blacks.
+    if is_bed(item):
+        wanted = 0.45 * wanted + 0.55 * np.array([0.8, 0.79, 0.76])
+    elif family != "leather" and rng.random() < _LEATHER_SHARE:
+        family = "leather"
+    if family == "leather":
+        hides = [(0.13, 0.1, 0.09), (0.42, 0.24, 0.14), (0.6, 0.4, 0.25), (0.78, 0.72, 0.63)]
+        wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
+    seed = int(draft.rng(PART, family).integers(2**31))
+    return _tinted(draft, Pattern(family, seed), wanted, is_grained=False)
+
+
+def _metal(
+    draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
+) -> _Finish | None:
+    if is_dark(material.diffuse) or (is_vivid(material.diffuse) and not is_brown(material.diffuse)):
+        return None
+    metal = _metal_of(material.name.lower(), METALS["chrome"] if has_taps(item) else style.metal)
+    # Nearly all light is in the highlight: a metal has no colour beneath it.
+    r, g, b = (0.4 * c for c in metal.colour)
+    polished = replace(
+        material, diffuse=(r, g, b), specular=metal.colour, roughness=metal.roughness,
+        shininess=round(2 / max(metal.roughness, 0.1) ** 4 - 2, 1),
+    )  # fmt: skip
+    return _Finish(draft.material(polished))
+
+
+def _metal_of(name: str, usual: Metal) -> Metal:
+    for words, known in _METAL_OF_NAME:
+        if any(word in name for word in words):
+            return METALS[known]
+    return usual
+
+
+def _tinted(draft: Draft, pattern: Pattern, wanted: F64, *, is_grained: bool) -> _Finish:
+    # The pattern's material in another colour: its picture times a diffuse of at most 1.
+    made = pattern_material(draft, pattern)
+    ratio = wanted / np.maximum(np.array(made.mean_rgb), 1e-3)
+    ratio = ratio / max(1.0, float(ratio.max()))
+    r, g, b = (round(float(c), 4) for c in srgb_from_linear(ratio))
+    tinted = replace(draft.materials[made.number], diffuse=(r, g, b))
+    return _Finish(draft.material(tinted), made.size_m, is_grained)
+
+
+def _area(surface: Surface) -> float:
+    return float(face_areas(triangle_corners(surface.positions, surface.faces)).sum())
+
+
+def _upward_area(surface: Surface) -> float:
+    vectors = area_vectors(triangle_corners(surface.positions, surface.faces))
+    length = np.linalg.norm(vectors, axis=1)
+    return float(length[vectors[:, 1] > _UPWARD * length].sum())

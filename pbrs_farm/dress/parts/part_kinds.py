@@ -1,0 +1,127 @@
+"""What a part of a piece of furniture is made of, by its class, its material's name and colour; no effects."""
+
+from __future__ import annotations
+
+import colorsys
+import re
+from enum import StrEnum
+from typing import Final
+
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind
+from pbrs_farm.dress.style import Rgb
+
+
+class PartKind(StrEnum):
+    """What a part is made of, as far as dressing changes it."""
+
+    WOOD = "wood"
+    SOFT = "soft"  # cloth or leather
+    METAL = "metal"
+    OTHER = "other"  # stays as it is
+
+
+_WOODEN: Final = frozenset(
+    NYU40_NAMES.index(name)
+    for name in (
+        "cabinet", "bed", "chair", "sofa", "table", "desk", "bookshelf", "shelves", "dresser",
+        "night stand", "counter", "door",
+    )
+)  # fmt: skip
+_UPHOLSTERED: Final = frozenset(NYU40_NAMES.index(name) for name in ("bed", "sofa", "pillow"))
+_BED: Final = NYU40_NAMES.index("bed")
+_WET: Final = frozenset(
+    NYU40_NAMES.index(n)
+    for n in ("sink", "bathtub", "toilet", "refrigerator", "otherfurniture", "otherprop", "towel")
+)
+_WOODEN_GROUPS: Final = frozenset({"tv_stand", "wardrobe", "piano", "ottoman"})
+_SOFT_GROUPS: Final = frozenset({"armchair", "ottoman", "sofa", "corner_sofa"})
+_KINDS: Final = (ItemKind.OBJECT, ItemKind.LAMP, ItemKind.DOOR)
+
+_WORDS: Final = (
+    (PartKind.OTHER, "glass verre mirror screen plastic pane paper light bulb lens led"),
+    (PartKind.METAL, "metal chrome chromed steel iron aluminium aluminum alu inox brass silver "
+     "gold copper bronze nickel acier"),
+    (PartKind.WOOD, "wood wooden oak pine bois holz madera legno walnut beech teak cherry birch "
+     "mahogany maple alder rovere hout drewno"),
+    (PartKind.SOFT, "fabric cloth textile tissu cushion coussin mattress matelas leather cuir "
+     "sheet blanket velvet upholstery stoff tela seat"),
+)  # fmt: skip
+
+
+def kind_of_part(material: Material, item: Item, group: str) -> PartKind:
+    """What a material of an item is made of. group: the catalogue's, "" where it is not known.
+
+    Glass, mirrors, bulbs, pictures and screens are OTHER; so is all wood and cloth of things that
+    are never made of it.
+    """
+    if material.kind is not MaterialKind.OPAQUE or item.kind not in _KINDS:
+        return PartKind.OTHER
+    if material.texture_id is not None or material.opacity < 1:
+        return PartKind.OTHER
+    named = kind_by_name(material.name)
+    if named in (PartKind.METAL, PartKind.OTHER):
+        return named
+    may_be_wood = item.nyu40 in _WOODEN or group in _WOODEN_GROUPS
+    if named is PartKind.WOOD or (named is None and is_brown(material.diffuse)):
+        return PartKind.WOOD if may_be_wood else PartKind.OTHER
+    if named is PartKind.SOFT:
+        may_be_soft = may_be_wood or item.nyu40 in _UPHOLSTERED or group in _SOFT_GROUPS
+        return PartKind.SOFT if may_be_soft else PartKind.OTHER
+    return PartKind.OTHER
+
+
+def kind_by_name(name: str) -> PartKind | None:
+    """What whole words of a material's name say, or None."""
+    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    words = set(re.findall(r"[a-z]+", parted.lower()))
+    for kind, known in _WORDS:
+        if words & set(known.split()):
+            return kind
+    return None
+
+
+def is_bed(item: Item) -> bool:
+    """Whether it is a bed."""
+    return item.nyu40 == _BED
+
+
+def has_taps(item: Item) -> bool:
+    """Whether its metal is a tap, a sink or a rail: bright whatever the home's taste."""
+    return item.nyu40 in _WET
+
+
+def is_upholstered(item: Item, group: str) -> bool:
+    """Whether its largest soft part is cloth or leather whatever its name."""
+    return item.nyu40 in _UPHOLSTERED or group in _SOFT_GROUPS
+
+
+def is_furniture(item: Item, group: str) -> bool:
+    """Whether boards of any colour may be of wood: furniture, but no door."""
+    is_known = item.nyu40 in _WOODEN or group in _WOODEN_GROUPS
+    return is_known and item.kind is ItemKind.OBJECT
+
+
+def is_brown(colour: Rgb) -> bool:
+    """Whether an sRGB-encoded colour is one that wood has."""
+    hue, saturation, value = colorsys.rgb_to_hsv(*colour)
+    is_bright_wood = saturation >= 0.5 and value > 0.93  # the yellow that models call pine
+    is_wood = saturation >= 0.18 and 0.1 <= value <= 0.93
+    return 8 / 360 <= hue <= 52 / 360 and (is_wood or is_bright_wood)
+
+
+def is_white(colour: Rgb) -> bool:
+    """Whether it is white lacquer, or near it."""
+    _, saturation, value = colorsys.rgb_to_hsv(*colour)
+    return value >= 0.72 and saturation <= 0.15
+
+
+def is_dark(colour: Rgb) -> bool:
+    """Whether it is black or nearly so."""
+    return max(colour) < 0.28
+
+
+def is_vivid(colour: Rgb) -> bool:
+    """Whether it is a colour that wood never has: paint."""
+    _, saturation, _ = colorsys.rgb_to_hsv(*colour)
+    return saturation >= 0.3 and not is_brown(colour) and not is_dark(colour)

@@ -1,0 +1,153 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
+from pbrs_farm.core.house import House, Item, Material, MaterialKind
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.parts import parts
+from pbrs_farm.dress.parts.part_kinds import is_brown, is_dark, is_white, kind_by_name
+from pbrs_farm.dress.style import Rgb, style_for
+from pbrs_farm.dress.textures.families import PatternMaterial
+from tests.dress.furniture import boards, house, solid
+
+BROWN: Rgb = (0.58, 0.27, 0.0)
+WHITE: Rgb = (0.97, 0.97, 0.97)
+
+
+def _thing(class_name: str, item_id: str = "t") -> Item:
+    return solid(item_id, [1, 0, 1], [2, 0.8, 1.6], NYU40_NAMES.index(class_name))
+
+
+def _dressed(
+    *items: Item, materials: tuple[Material, ...], share: float = 1.0, seed: int = 5
+) -> Draft:
+    whole: House = replace(house(*items), materials=materials)
+    draft = Draft(whole, seed)
+    parts(draft, EMPTY, style_for(draft.rng("style"), ""), share)
+    return draft
+
+
+def _material(draft: Draft, index: int = 0, surface: int = 0) -> Material:
+    return draft.materials[draft.items[index].surfaces[surface].material]
+
+
+def test_a_brown_table_becomes_wood_near_its_own_colour() -> None:
+    draft = _dressed(_thing("table"), materials=(Material("amber", diffuse=BROWN),))
+    wood, surface = _material(draft), draft.items[0].surfaces[0]
+    assert wood.name.startswith("grain")
+    assert wood.roughness_texture_id
+    assert surface.uvs is not None
+    own = linear_from_srgb(np.array(BROWN)) @ LUMINANCE
+    # Its mean is that of the picture times its colour.
+    (kept,) = (v for v in draft.kept.values() if isinstance(v, PatternMaterial))
+    mean = np.array(kept.mean_rgb) * linear_from_srgb(np.array(wood.diffuse))
+    assert 0.4 * own < mean @ LUMINANCE < 5 * own
+    assert mean[0] > mean[1] > mean[2]
+
+
+@pytest.mark.parametrize(
+    "class_name", ["refrigerator", "television", "toilet", "sink", "lamp", "window", "clothes"]
+)
+def test_what_is_never_made_of_wood_stays(class_name: str) -> None:
+    draft = _dressed(_thing(class_name), materials=(Material("amber", diffuse=BROWN),))
+    assert draft.items[0] is draft.source.items[0]
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        Material("amber", MaterialKind.GLASS, BROWN),
+        Material("amber", MaterialKind.MIRROR, BROWN),
+        Material("amber", MaterialKind.BULB, BROWN),
+        Material("wood", diffuse=BROWN, texture_id="t"),
+        Material("wood", diffuse=BROWN, opacity=0.5),
+        Material("glass", diffuse=BROWN),
+        Material("screen", diffuse=BROWN),
+        Material("white", diffuse=WHITE),
+    ],
+)
+def test_glass_mirrors_bulbs_pictures_and_white_lacquer_stay(material: Material) -> None:
+    draft = _dressed(_thing("table"), materials=(material,))
+    assert draft.items[0] is draft.source.items[0]
+
+
+def test_the_soft_part_of_a_sofa_is_cloth_or_leather_in_a_colour_of_the_style() -> None:
+    seen = {
+        _material(_dressed(_thing("sofa"), materials=(Material("iris", diffuse=BROWN),), seed=s)).name
+        for s in range(12)
+    }  # fmt: skip
+    families = {name.rpartition("-")[0] for name in seen}
+    assert families == {"weave", "twill", "leather"}
+
+
+def test_a_bed_has_linen_on_a_wooden_frame() -> None:
+    head = solid("b", [0, 0, 0], [0.1, 1.0, 1.6], 4).surfaces[0]
+    mattress = replace(solid("b", [0.1, 0.3, 0.1], [1.9, 0.5, 1.5], 4).surfaces[0], material=1)
+    bed = replace(_thing("bed"), surfaces=(head, mattress))
+    materials = (Material("a", diffuse=BROWN), Material("b", diffuse=WHITE))
+    draft = _dressed(bed, materials=materials)
+    names = [_material(draft, 0, k).name.split("-")[0] for k in (0, 1)]
+    assert names[0] == "grain"
+    assert names[1] in ("weave", "twill")
+
+
+def test_metals_have_measured_colours_and_no_colour_beneath() -> None:
+    draft = _dressed(_thing("sink"), materials=(Material("Chrome_01", diffuse=(0.7, 0.7, 0.7)),))
+    metal = _material(draft)
+    kd, ks = (linear_from_srgb(np.array(c)) @ LUMINANCE for c in (metal.diffuse, metal.specular))
+    assert metal.roughness is not None
+    assert ks > 4 * kd
+    assert ks > 0.2
+    brass = _dressed(_thing("lamp"), materials=(Material("brass", diffuse=(0.7, 0.6, 0.2)),))
+    assert _material(brass).specular == (0.91, 0.78, 0.42)
+
+
+def test_parts_of_one_colour_in_one_room_get_one_look() -> None:
+    chairs = [_thing("chair", f"c{k}") for k in range(5)]
+    draft = _dressed(*chairs, materials=(Material("amber", diffuse=BROWN),))
+    assert len({i.surfaces[0].material for i in draft.items}) == 1
+    assert draft.done["parts: object"] == 5
+
+
+def test_the_share_and_the_seed_decide() -> None:
+    material = (Material("amber", diffuse=BROWN),)
+    assert not _dressed(_thing("table"), materials=material, share=0.0).done
+    one, again, other = (_dressed(_thing("table"), materials=material, seed=s) for s in (1, 1, 2))
+    assert _material(one) == _material(again)
+    assert one.items[0].surfaces[0].uvs is not None
+    assert_allclose(one.items[0].surfaces[0].uvs, again.items[0].surfaces[0].uvs)  # type: ignore[arg-type]
+    assert _material(one) != _material(other)
+
+
+def test_small_knobs_of_other_colours_stay() -> None:
+    desk = boards("d", [([0, 0, 0], [1.2, 0.7, 0.6]), ([0.5, 0.3, 0.6], [0.52, 0.32, 0.62])], 14)
+    knob = replace(desk.surfaces[1], material=1)
+    desk = replace(desk, surfaces=(desk.surfaces[0], knob))
+    materials = (Material("amber", diffuse=BROWN), Material("x", diffuse=(0.5, 0.5, 0.5)))
+    draft = _dressed(desk, materials=materials)
+    assert draft.items[0].surfaces[1] is knob
+    assert _material(draft).name.startswith("grain")
+
+
+def test_words_of_a_name_say_the_kind() -> None:
+    assert kind_by_name("Metal_Chrome.001") == "metal"
+    assert kind_by_name("lightWood") == "other"
+    assert kind_by_name("dark wood") == "wood"
+    assert kind_by_name("sofaFabric") == "soft"
+    assert kind_by_name("amber") is None
+
+
+def test_colours_are_told_apart() -> None:
+    assert is_brown(BROWN)
+    assert is_brown((0.98, 0.67, 0.0))
+    assert not is_brown((0.1, 0.2, 0.6))
+    assert is_white(WHITE)
+    assert not is_white((0.9, 0.5, 0.5))
+    assert is_dark((0.1, 0.1, 0.1))
