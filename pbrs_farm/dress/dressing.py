@@ -35,7 +35,7 @@ def _parts(*names: tuple[str, str, str]) -> tuple[tuple[str, Part], ...]:
 
 
 _FURNITURE = _parts(
-    ("surfaces", "surfaces", "surfaces"), ("parts", "parts", "parts"), ("swap", "swap", "swap")
+    ("surfaces", "surfaces", "surfaces"), ("swap", "swap", "swap"), ("parts", "parts", "parts")
 )
 """Field of the recipe that holds the part's share, and the part: what changes the home's own things."""
 
