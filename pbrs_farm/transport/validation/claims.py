@@ -132,6 +132,21 @@ def _open_ground(variant: str) -> LightClaim:
     return _near(text, lux["outdoor"], sky.sky_lx + sky.sun_lx, 0.02, "lx")
 
 
+def _normal_map(variant: str) -> LightClaim:
+    corners = [(-50.0, 0.0, 50.0), (50.0, 0.0, 50.0), (50.0, 0.0, -50.0), (-50.0, 0.0, -50.0)]
+    material = replace(rooms.matte("floor", 0.5), normal_texture_id="n")
+    house = rooms.house([rooms.quad(corners, 0)], [material])
+    # A map of one normal, 60 degrees from upright: of the sky it sees (1 + cos) / 2.
+    normal = np.array([math.sin(math.pi / 3), 0, math.cos(math.pi / 3)])
+    maps = {"n": np.full((2, 2, 3), np.round((normal + 1) * 127.5), np.uint8)}
+    scene = LightScene.load(house, maps, Recipe(), uniform_sky(_SKY_OF_ONE), variant=variant)
+    camera = rooms.camera((0, 2, 0.01), (0, 0, 0), 8, 8, 0.3)
+    result = scene.render(camera, "0_0", _spp(256), 1)
+    measured = float((result.outdoor @ LUMINANCE).mean()) / 0.5
+    text = "a normal map takes of a white sky what a tilted floor sees above the ground"
+    return _near(text, measured, (1 + math.cos(math.pi / 3)) / 2, 0.01, "of it")
+
+
 def _near(text: str, measured: float, expected: float, tolerance: float, unit: str) -> LightClaim:
     return LightClaim(
         text,
@@ -275,6 +290,7 @@ _CLAIMS: Final[tuple[Callable[[str], LightClaim], ...]] = (
     *(_furnace(_FEW_CHAINS, "Metropolis", albedo) for albedo in (0.3, 0.8)),
     _floor,
     _open_ground,
+    _normal_map,
     _metropolis_is_path("sun through a window", _window, _sun),
     _metropolis_is_path("door ajar", rooms.door_ajar, dark_sky),
     _direct_and_indirect,
