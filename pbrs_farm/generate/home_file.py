@@ -1,0 +1,342 @@
+"""A furnished plan as a Sweet Home 3D file: Home.xml, models, textures; no effects.
+
+The program writes the same names and units: centimetres, angles in radians, x to the right and y
+downwards on the plan (https://www.sweethome3d.com, SweetHome3D.dtd of version 7).
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Catalogue, Picture, Place, Shape
+from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.joinery import joinery
+from pbrs_farm.generate.model_file import model_files
+from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, PlanRoom, PlanWall, RoomType
+from pbrs_farm.images import png_from_array
+
+AUTHOR: Final = "pbrs_farm"
+VERSION: Final = "7200"
+_ZIP_TIME: Final = (2000, 1, 1, 0, 0, 0)  # of every entry: the same home has the same bytes
+_EYE_M: Final = 1.6
+_FIELD_OF_VIEW_RAD: Final = 1.1
+_LAMP_POWER: Final = 0.5
+_DOOR_NAMES: Final = {
+    OpeningKind.DOOR: "Door", OpeningKind.ENTRANCE: "Front door",
+    OpeningKind.WINDOW: "Window", OpeningKind.FRENCH_WINDOW: "French window",
+}  # fmt: skip
+_FLOOR_GROUPS: Final = {
+    RoomType.KITCHEN: "tiles", RoomType.BATHROOM: "tiles", RoomType.WC: "tiles",
+}  # fmt: skip
+_DRY_FLOOR: Final = "wood"
+
+
+@dataclass(frozen=True, slots=True)
+class Paints:
+    """The colours of a home, "RRGGBB"."""
+
+    walls: tuple[str, ...]  # of rooms to live in, one drawn for each
+    wet_walls: str
+    floor: str
+    wet_floor: str
+    ceiling: str
+    joinery: tuple[float, float, float]  # sRGB
+
+
+def drawn_paints(rng: np.random.Generator) -> Paints:
+    """Soft walls, light ceilings, doors and windows of one paint."""
+    walls = ("F4F1EA", "EFEBE0", "E8ECEA", "F3E9DC", "E6E3DA", "DDE4E6", "F6F3EE", "EDE6DD")
+    chosen = [walls[i] for i in rng.permutation(len(walls))[:3]]
+    white, oak, grey = (0.93, 0.92, 0.90), (0.66, 0.50, 0.33), (0.45, 0.46, 0.47)
+    wood = (white, white, oak, grey)[int(rng.integers(4))]
+    return Paints(tuple(chosen), "EEF1F1", "B08A62", "C9C6BF", "FAFAF8", wood)
+
+
+def home_file(
+    plan: Plan,
+    pieces: Iterable[PlacedPiece],
+    catalogue: Catalogue,
+    rng: np.random.Generator,
+    *,
+    name: str = "home",
+) -> bytes:
+    """The bytes of a .sh3d; equal arguments give equal bytes.
+
+    Pieces whose model the catalogue cannot load are left out.
+    """
+    placed = list(pieces)
+    home = ET.Element("home", {
+        "version": VERSION, "name": f"{name}.sh3d", "camera": "observerCamera",
+        "wallHeight": _cm(plan.height),
+    })  # fmt: skip
+    contents = _Contents()
+    _add_properties(home, placed)
+    _add_surroundings(home, plan)
+    for opening in plan.openings:
+        _add_opening(home, plan, opening, contents, paints := drawn_paints(_fork(rng)))
+    if not plan.openings:
+        paints = drawn_paints(_fork(rng))
+    for piece in placed:
+        _add_piece(home, piece, catalogue, contents, plan.height)
+    _add_walls(home, plan, paints)
+    _add_rooms(home, plan, paints, catalogue, contents, rng)
+    xml = ET.tostring(home, encoding="UTF-8", xml_declaration=True)
+    return contents.archive(xml)
+
+
+def _fork(rng: np.random.Generator) -> np.random.Generator:
+    # The same paints whenever they are asked for: the stream itself stays where it is.
+    state = rng.bit_generator.state
+    copy = np.random.default_rng()
+    copy.bit_generator.state = state
+    return copy
+
+
+class _Contents:
+    """The files of the archive beside Home.xml; each model once."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, bytes] = {}
+        self._models: dict[str, str] = {}
+        self.icon = "icon.png"
+        picture = np.full((32, 32, 4), 255, np.uint8)
+        picture[4:28, 4:28, :3] = (170, 170, 165)
+        self._files[self.icon] = png_from_array(picture)
+
+    def model(self, key: str, shape: Shape) -> str:
+        """The path of a shape's model; key: what tells it from others."""
+        if key not in self._models:
+            folder = str(len(self._models))
+            for name, data in model_files(shape).items():
+                self._files[f"{folder}/{name}"] = data
+            self._models[key] = f"{folder}/model.obj"
+        return self._models[key]
+
+    def picture(self, picture: Picture) -> str:
+        """The path of a surface picture."""
+        ending = "png" if picture.texture.media_type == "image/png" else "jpg"
+        path = f"t{picture.texture.id}.{ending}"
+        self._files[path] = picture.texture.data
+        return path
+
+    def archive(self, xml: bytes) -> bytes:
+        """The ZIP with Home.xml first."""
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w") as archive:
+            for name, data in {"Home.xml": xml, **self._files}.items():
+                info = zipfile.ZipInfo(name, _ZIP_TIME)
+                packed = name.endswith((".png", ".jpg"))
+                info.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
+                archive.writestr(info, data)
+        return buffer.getvalue()
+
+
+def _cm(metres: float) -> str:
+    return f"{metres * 100:.2f}".rstrip("0").rstrip(".")
+
+
+def _add_properties(home: ET.Element, pieces: list[PlacedPiece]) -> None:
+    # Say who made it, and whose models it holds.
+    owed = Counter(
+        (p.piece.creator or p.piece.library, p.piece.licence)
+        for p in pieces
+        if p.piece.licence.startswith("CC-BY")
+    )
+    credits = "; ".join(f"{creator}, {licence}" for creator, licence in sorted(owed))
+    rows = {"Author": AUTHOR, "License": "CC-BY 3.0" if owed else "CC0"}
+    if credits:
+        rows["Models"] = credits
+    for key, value in rows.items():
+        ET.SubElement(home, "property", {"name": key, "value": value})
+
+
+def _add_surroundings(home: ET.Element, plan: Plan) -> None:
+    ET.SubElement(home, "environment", {
+        "groundColor": "00A8A8A8", "skyColor": "00CCE4FC", "lightColor": "00D0D0D0",
+        "ceillingLightColor": "00D0D0D0",
+    })  # fmt: skip
+    xs = [p for wall in plan.walls for p in (wall.start[0], wall.end[0])]
+    zs = [p for wall in plan.walls for p in (wall.start[1], wall.end[1])]
+    middle, size = (sum((min(xs), max(xs))) / 2, max(zs)), max(max(xs), max(zs))
+    living = max(plan.rooms, key=lambda room: room.area)
+    x0, z0, x1, z1 = living.bounds
+    for tag, x, z, y, pitch in (
+        ("observerCamera", (x0 + x1) / 2, (z0 + z1) / 2, _EYE_M, 0.14),
+        ("topCamera", middle[0], middle[1] + size * 0.6, size * 1.1, 0.9),
+    ):
+        ET.SubElement(home, "observerCamera" if tag[0] == "o" else "camera", {
+            "attribute": tag, "x": _cm(x), "y": _cm(z), "z": _cm(y), "yaw": f"{math.pi:.6f}",
+            "pitch": f"{pitch:g}", "fieldOfView": f"{_FIELD_OF_VIEW_RAD:g}",
+            "lens": "PINHOLE", "time": "1700000000000",
+        })  # fmt: skip
+
+
+def _add_opening(
+    home: ET.Element, plan: Plan, opening: PlanOpening, contents: _Contents, paints: Paints
+) -> None:
+    wall = plan.walls[opening.wall]
+    shape = joinery(opening, wall.thickness, paints.joinery)
+    low, high = shape.bounds
+    x, z = wall.at(opening.along)
+    angle = _angle_into(plan, opening, wall)
+    # A door turned about has its hinges on the wall's other end.
+    key = (
+        f"{opening.kind} {opening.width} {opening.height} {wall.thickness} {opening.hinge_at_start}"
+    )
+    ET.SubElement(home, "doorOrWindow", {
+        "id": f"doorOrWindow-{len(home)}", "name": _DOOR_NAMES[opening.kind],
+        "catalogId": f"pbrs_farm#{opening.kind.value}", "creator": AUTHOR,
+        "icon": contents.icon, "model": contents.model(key, shape),
+        "x": _cm(x), "y": _cm(z), "elevation": _cm(opening.sill), "angle": f"{angle:.6f}",
+        "width": _cm(opening.width), "depth": _cm(float(high[2] - low[2])),
+        "height": _cm(opening.height), "movable": "false",
+        "wallThickness": "1", "wallDistance": "0", "boundToWall": "true",
+    })  # fmt: skip
+
+
+def _angle_into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> float:
+    """The angle at which an opening's front looks into its room."""
+    x, z = wall.at(opening.along)
+    x0, z0, x1, z1 = plan.rooms[opening.room].bounds
+    if wall.start[0] == wall.end[0]:
+        return -math.pi / 2 if (x0 + x1) / 2 > x else math.pi / 2
+    return 0.0 if (z0 + z1) / 2 > z else math.pi
+
+
+def _add_piece(
+    home: ET.Element, placed: PlacedPiece, catalogue: Catalogue, contents: _Contents, height: float
+) -> None:
+    piece = placed.piece
+    shape = catalogue.shape(piece)
+    if shape is None:
+        return
+    is_light = bool(shape.lights) or piece.group.endswith("_lamp")
+    element = ET.SubElement(home, "light" if is_light else "pieceOfFurniture", {
+        "id": f"pieceOfFurniture-{len(home)}", "name": piece.name, "catalogId": piece.id,
+        "creator": piece.creator or piece.library or AUTHOR, "license": piece.licence,
+        "icon": contents.icon, "model": contents.model(piece.id, shape),
+        "x": _cm(placed.x), "y": _cm(placed.z), "angle": f"{placed.angle_rad:.6f}",
+        "elevation": _cm(min(placed.elevation, height - placed.height)),
+        "width": _cm(placed.width), "depth": _cm(placed.depth), "height": _cm(placed.height),
+    })  # fmt: skip
+    if placed.mirrored:
+        element.set("modelMirrored", "true")
+    if placed.colour:
+        element.set("color", f"FF{placed.colour.lstrip('#')}")
+    if is_light:
+        element.set("power", f"{_LAMP_POWER:g}")
+        _add_light_sources(element, shape)
+    if piece.place is Place.CEILING:
+        element.set("elevation", _cm(height - placed.height))
+
+
+def _add_light_sources(element: ET.Element, shape: Shape) -> None:
+    """The sources as shares of the model's box: x to the right, y from front to back, z up."""
+    low, high = shape.bounds
+    size = np.maximum(high - low, 1e-6)
+    points = [np.asarray(light.position) for light in shape.lights]
+    for point in points or [(low + high) / 2]:
+        x, y, z = (point - low) / size
+        ET.SubElement(element, "lightSource", {
+            "x": f"{x:.4f}", "y": f"{1 - z:.4f}", "z": f"{y:.4f}", "color": "00FFE8CC",
+            "diameter": f"{min(0.065 / size[0], 1.0):.4f}",
+        })  # fmt: skip
+
+
+def _add_walls(home: ET.Element, plan: Plan, paints: Paints) -> None:
+    joints = _joints(plan.walls)
+    for number, wall in enumerate(plan.walls):
+        (x0, z0), (x1, z1) = wall.start, wall.end
+        element = ET.SubElement(home, "wall", {
+            "id": f"wall-{number}", "xStart": _cm(x0), "yStart": _cm(z0), "xEnd": _cm(x1),
+            "yEnd": _cm(z1), "height": _cm(wall.height or plan.height),
+            "thickness": _cm(wall.thickness), "pattern": "hatchUp",
+        })  # fmt: skip
+        for attribute, end in (("wallAtStart", 0), ("wallAtEnd", 1)):
+            if (number, end) in joints:
+                element.set(attribute, f"wall-{joints[number, end]}")
+        for side, outwards in (("leftSideColor", -1), ("rightSideColor", 1)):
+            room = _room_beside(plan, wall, outwards)
+            element.set(side, f"FF{_wall_colour(plan, room, paints)}")
+
+
+def _joints(walls: tuple[PlanWall, ...]) -> dict[tuple[int, int], int]:
+    """(wall, end) -> the wall it is mitred with: where two ends meet at a right angle, alone."""
+    ends: dict[tuple[float, float], list[tuple[int, int]]] = {}
+    for number, wall in enumerate(walls):
+        for end, (x, z) in enumerate((wall.start, wall.end)):
+            ends.setdefault((round(x, 4), round(z, 4)), []).append((number, end))
+    joints = {}
+    for meeting in ends.values():
+        # Of three ends at a corner the two of outer walls are mitred.
+        pair = [m for m in meeting if walls[m[0]].is_outer] if len(meeting) > 2 else meeting
+        if len(pair) == 2 and _is_upright(walls[pair[0][0]]) != _is_upright(walls[pair[1][0]]):
+            joints[pair[0]], joints[pair[1]] = pair[1][0], pair[0][0]
+    return joints
+
+
+def _is_upright(wall: PlanWall) -> bool:
+    return wall.start[0] == wall.end[0]
+
+
+def _room_beside(plan: Plan, wall: PlanWall, side: int) -> PlanRoom | None:
+    """The room on the left (-1) or right (1) of a wall's middle, looking from start to end."""
+    x, z = wall.at(wall.length / 2)
+    away = wall.thickness / 2 + 0.05
+    # Right of a wall that runs to +x is +z on the page; of one that runs to +z it is -x.
+    dx, dz = (-side * away, 0.0) if _is_upright(wall) else (0.0, side * away)
+    for room in plan.rooms:
+        x0, z0, x1, z1 = room.bounds
+        if x0 <= x + dx <= x1 and z0 <= z + dz <= z1:
+            return room
+    return None
+
+
+def _wall_colour(plan: Plan, room: PlanRoom | None, paints: Paints) -> str:
+    if room is None:
+        return "E4DED2"
+    if room.type in _FLOOR_GROUPS:
+        return paints.wet_walls
+    return paints.walls[plan.rooms.index(room) % len(paints.walls)]
+
+
+def _add_rooms(
+    home: ET.Element,
+    plan: Plan,
+    paints: Paints,
+    catalogue: Catalogue,
+    contents: _Contents,
+    rng: np.random.Generator,
+) -> None:
+    # One wood and one tile for the whole home.
+    chosen = {}
+    for group in (_DRY_FLOOR, "tiles"):
+        pictures = [p for p in catalogue.pictures if p.group == group]
+        if pictures:
+            chosen[group] = pictures[int(rng.integers(len(pictures)))]
+    for number, room in enumerate(plan.rooms):
+        is_wet = room.type in _FLOOR_GROUPS
+        element = ET.SubElement(home, "room", {
+            "id": f"room-{number}", "name": room.name,
+            "floorVisible": "true", "ceilingVisible": str(room.type is not RoomType.BALCONY).lower(),
+            "floorColor": f"FF{paints.wet_floor if is_wet else paints.floor}",
+            "ceilingColor": f"FF{paints.ceiling}", "areaVisible": "true",
+        })  # fmt: skip
+        picture = chosen.get(_FLOOR_GROUPS.get(room.type, _DRY_FLOOR))
+        if picture is not None:
+            ET.SubElement(element, "texture", {
+                "attribute": "floorTexture", "name": picture.texture.name,
+                "width": _cm(picture.size[0]), "height": _cm(picture.size[1]),
+                "image": contents.picture(picture),
+            })  # fmt: skip
+        for x, z in room.polygon:
+            ET.SubElement(element, "point", {"x": _cm(x), "y": _cm(z)})
