@@ -135,9 +135,7 @@ def _empty_house(draft: Draft) -> _Kept:
     # A place in two rooms belongs to the smaller.
     order = sorted(range(len(areas)), key=lambda k: (areas[k].area, k))
     in_order = [(house.rooms[k], areas[k]) for k in order]
-    passages = passages_of(
-        house.items, house.openings, in_order, areal(shapely.union_all(walls.areas))
-    )
+    passages = passages_of(house.items, house.openings, in_order, walls.at)
     overhead = _overhead(house.items)
     faces = room_faces(wall_planes(wall_items), house.rooms, areas)
     rooms = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,8 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind, Opening, Room
+
+WallsAt = Callable[[float], BaseGeometry]
 
 BEFORE_DOOR_M = 0.8  # that must be free in front of a door
 _REACH_M = (0.1, 0.25, 0.4, 0.6, 0.8)  # from the wall's middle, where a room is looked for
@@ -65,38 +67,45 @@ def passages_of(
     items: Sequence[Item],
     openings: Sequence[Opening],
     rooms: Sequence[tuple[Room, BaseGeometry]],
-    walls: BaseGeometry,
+    walls_at: WallsAt,
 ) -> tuple[Passage, ...]:
-    """Every door, archway and window, in the house's order; walls: plan area of all walls.
+    """Every door, archway and window, in the house's order; walls_at: plan area of walls at a height.
 
     Doors and windows that cut no hole count by their own boxes.
     """
     by_id = {item.id: item for item in items}
-    found = [_from_opening(o, rooms, walls) for o in openings]
+    found = [_from_opening(o, rooms, walls_at) for o in openings]
     with_hole = {o.item_id for o in openings}
     loose = [
         i
         for i in by_id.values()
         if i.kind in (ItemKind.DOOR, ItemKind.WINDOW) and i.id not in with_hole and i.n_faces
     ]
-    found += [_from_item(i, rooms, walls) for i in loose]
+    found += [_from_item(i, rooms, walls_at) for i in loose]
     return tuple(p for p in found if p is not None)
 
 
 def _from_opening(
-    opening: Opening, rooms: Sequence[tuple[Room, BaseGeometry]], walls: BaseGeometry
+    opening: Opening, rooms: Sequence[tuple[Room, BaseGeometry]], walls_at: WallsAt
 ) -> Passage | None:
     quad = np.asarray(opening.quad, np.float64)
     normal = np.asarray(opening.normal, np.float64)
     if not np.isfinite(quad).all() or np.linalg.norm(normal[[0, 2]]) < 0.5:
         return None  # a hole in a roof has no wall
     return _passage(
-        opening.id, opening.item_id, opening.level_id, opening.is_window, quad, normal, rooms, walls
+        opening.id,
+        opening.item_id,
+        opening.level_id,
+        opening.is_window,
+        quad,
+        normal,
+        rooms,
+        walls_at,
     )
 
 
 def _from_item(
-    item: Item, rooms: Sequence[tuple[Room, BaseGeometry]], walls: BaseGeometry
+    item: Item, rooms: Sequence[tuple[Room, BaseGeometry]], walls_at: WallsAt
 ) -> Passage | None:
     box = item.oriented_box
     corners = np.asarray(box.corners, np.float64)
@@ -106,12 +115,12 @@ def _from_item(
         return None
     normal = box.axes[:, min(level, key=lambda k: float(box.half[k]))]
     is_window = item.kind is ItemKind.WINDOW
-    return _passage(item.id, item.id, item.level_id, is_window, corners, normal, rooms, walls)
+    return _passage(item.id, item.id, item.level_id, is_window, corners, normal, rooms, walls_at)
 
 
 def _passage(
     name: str, item_id: str | None, level_id: str, is_window: bool, points: F64, normal: F64,
-    rooms: Sequence[tuple[Room, BaseGeometry]], walls: BaseGeometry,
+    rooms: Sequence[tuple[Room, BaseGeometry]], walls_at: WallsAt,
 ) -> Passage | None:  # fmt: skip
     normal = normal * [1, 0, 1]
     normal = normal / np.linalg.norm(normal)
@@ -127,6 +136,7 @@ def _passage(
     # A hole that begins at a man's height above the floor lets nobody through.
     is_window = is_window or y.max() - y.min() < _LEAST_DOOR_M
     sides = [_room_at(centre, out, rooms, y.min(), y.max()) for out in (normal, -normal)]
+    walls = walls_at(float(centre[1]))
     half = [_half_wall(centre, out, along, width, walls) for out in (normal, -normal)]
     return Passage(
         name, item_id, level_id, is_window, centre, along, normal, width,

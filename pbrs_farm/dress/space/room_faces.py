@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -28,11 +28,16 @@ class WallAreas:
 
     areas: tuple[BaseGeometry, ...]
     bounds: F64
+    _joined: dict[bytes, BaseGeometry] = field(default_factory=dict, init=False)
 
     def at(self, y: float) -> BaseGeometry:
         """The plan area of all walls that cross the height y."""
         crosses = (self.bounds[:, 0, 1] < y) & (self.bounds[:, 1, 1] > y)
-        return areal(shapely.union_all([self.areas[n] for n in np.flatnonzero(crosses)]))
+        key = crosses.tobytes()
+        if key not in self._joined:
+            parts = [self.areas[n] for n in np.flatnonzero(crosses)]
+            self._joined[key] = areal(shapely.union_all(parts))
+        return self._joined[key]
 
 
 def room_faces(
@@ -60,8 +65,9 @@ def room_faces(
                 origin = plane.point + plane.along * first + [0.0, low_y, 0.0]
                 clear = np.where(covered, np.float32(FAR_M), np.float32(0))
                 face = WallFace(
-                    plane.wall_id, room.id, room.level_id, origin, plane.along, plane.normal, clear
-                )
+                    plane.wall_id, room.id, room.level_id, origin, plane.along, plane.normal, clear,
+                    plane.recess(first, end - start),
+                )  # fmt: skip
                 found.setdefault(k, []).append(face)
     return found
 

@@ -6,7 +6,7 @@ A face is found by the walls' triangles, not by the room's outline, which may li
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -37,6 +37,7 @@ class WallFace:
     along: F64  # (3,) unit, horizontal
     normal: F64  # (3,) unit, horizontal, into the room
     clear: F32  # (H, S) metres free before the cell, at most FAR_M; 0 = no wall to be seen
+    recess: F32  # (S,) metres that the wall lies behind the face's plane, at most 2 mm
 
     @property
     def length(self) -> float:
@@ -72,6 +73,12 @@ class WallFace:
         """(N,) how far before the face points (N, 3) lie."""
         return np.asarray((points - self.origin) @ self.normal)
 
+    def recess_m(self, s0: float, s1: float) -> float:
+        """How far the wall lies behind the plane between s0 and s1, where it is nearest to it."""
+        columns = _cells(s0, s1)
+        part = self.recess[max(columns[0], 0) : max(columns[1], 0)]
+        return float(part.min()) if part.size else 0.0
+
     def free_m(self, s0: float, s1: float, y0: float, y1: float) -> float:
         """The least free space before the rectangle s0..s1, y0..y1 (world heights); 0 beyond the face."""
         rows, columns = self._window(s0, s1, y0, y1)
@@ -99,9 +106,7 @@ class WallFace:
         rows, columns = self._window(s0, s1, y0, y1)
         clear = self.clear.copy()
         clear[max(rows[0], 0) : max(rows[1], 0), max(columns[0], 0) : max(columns[1], 0)] = 0.0
-        return WallFace(
-            self.wall_id, self.room_id, self.level_id, self.origin, self.along, self.normal, clear
-        )
+        return replace(self, clear=clear)
 
     def _window(
         self, s0: float, s1: float, y0: float, y1: float
@@ -123,6 +128,17 @@ class WallPlane:
     along: F64
     normal: F64
     corners: F64  # (F, 3, 2) s and y
+    behind: F64  # (F,) metres that a triangle lies behind the plane
+
+    def recess(self, s0: float, n_columns: int) -> F32:
+        """(S,) how far the nearest triangle of each column from s0 on lies behind the plane."""
+        found = np.full(n_columns, np.inf)
+        s = (self.corners[:, :, 0] - s0) / CELL_M
+        first = np.clip(np.floor(s.min(1) + 1e-6), 0, n_columns).astype(int)
+        last = np.clip(np.ceil(s.max(1) - 1e-6), 0, n_columns).astype(int)
+        for behind, i, j in zip(self.behind, first, last, strict=True):
+            found[i:j] = np.minimum(found[i:j], behind)
+        return np.where(np.isfinite(found), found, 0.0).astype(np.float32)
 
     def world(self, s: F64, out_m: float) -> F64:
         """(N, 2) plan places at s (N,) along the plane and out_m before it."""
@@ -183,7 +199,8 @@ def wall_planes(walls: Sequence[Item]) -> Iterator[WallPlane]:
         nearest = triangles[first, 0] + normal * float(out[same].max())
         point = (nearest - along * (nearest @ along)) * [1, 0, 1]
         flat = np.stack([triangles[same] @ along, triangles[same][:, :, 1]], -1)
-        yield WallPlane(walls[owners[first]].id, point, along, normal, flat)
+        behind = float(out[same].max()) - out[same].max(1)
+        yield WallPlane(walls[owners[first]].id, point, along, normal, flat, behind)
 
 
 def _is_closed(corners: F64) -> bool:

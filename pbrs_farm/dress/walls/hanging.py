@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import RoomSpace, WallFace
+from pbrs_farm.dress.space.wall_faces import CELL_M
 
 GAP_M = 0.0008  # between a wall's face and the back of what hangs on it
+_LEAF_M = 0.03  # before a wall: where the leaf of a door would stand
 IN_FRONT_M = 0.35  # that a picture needs free to be seen
 
 
@@ -26,7 +31,9 @@ class Hanging:
     faces: list[WallFace] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.faces = list(self.room.faces)
+        sides = [(d, d.side_of(self.room.room.id)) for d in self.room.doors]
+        doors = [(d.swing(s).union(d.before(s)), d.top_y) for d, s in sides if s is not None]
+        self.faces = [_clear_of_doors(face, doors) for face in self.room.faces]
 
     @property
     def floor_y(self) -> float:
@@ -39,18 +46,32 @@ class Hanging:
     ) -> Item:  # fmt: skip
         """Hang a piece with the middle of its lower edge at s on faces[face], and take its place."""
         wall = self.faces[face]
+        low, high = shape.bounds
+        out = GAP_M - wall.recess_m(s + float(low[0]), s + float(high[0]))
         item = self.draft.placed(
-            piece, shape, wall.point(s, low_y, GAP_M), wall.turn_rad,
+            piece, shape, wall.point(s, low_y, out), wall.turn_rad,
             item_id=next_id(self.draft, self.part), room_id=self.room.room.id,
             level_id=self.room.room.level_id, tags=tags,
         )  # fmt: skip
         self.draft.add(item, self.part, piece)
-        low, high = shape.bounds
         self.faces[face] = wall.taken(
             s + float(low[0]) - margin_m, s + float(high[0]) + margin_m,
             low_y + float(low[1]) - margin_m, low_y + float(high[1]) + margin_m,
         )  # fmt: skip
         return item
+
+
+def _clear_of_doors(face: WallFace, doors: Sequence[tuple[BaseGeometry, float]]) -> WallFace:
+    """The face without what a door's leaf would hit, below the door's top."""
+    columns = (np.arange(face.clear.shape[1]) + 0.5) * CELL_M
+    places = face.origin + columns[:, None] * face.along + _LEAF_M * face.normal
+    clear = face.clear
+    for area, top_y in doors:
+        hit = shapely.contains_xy(area.buffer(CELL_M), places[:, 0], places[:, 2])
+        if hit.any():
+            clear = clear.copy()
+            clear[: max(int((top_y - face.low_y) / CELL_M), 0), hit] = 0.0
+    return face if clear is face.clear else replace(face, clear=clear)
 
 
 def next_id(draft: Draft, part: str) -> str:
