@@ -102,7 +102,7 @@ class Recipe(FieldGroup):
 _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "cameras": ("max_opening_fraction", "min_score", "min_room_score", "hfov_spread"),
     "dress": tuple(DressFields.model_fields),
-    "repair": ("lamp_in_every_room",),
+    "repair": ("lamp_in_every_room", "lamp_lx"),
     "selection": ("min_room_lx",),
 }
 
@@ -126,14 +126,14 @@ _PHOTO: Mapping[str, Any] = {
 
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "preview": {
-        "repair": {"lamp_in_every_room": True},
+        "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0},
         "cameras": _PHOTO,
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 16},
         "selection": {"min_room_lx": 1.0},
     },
     "fast": {
-        "repair": {"lamp_in_every_room": True},
+        "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0},
         "cameras": _PHOTO,
         "selection": {"min_room_lx": 1.0},
     },

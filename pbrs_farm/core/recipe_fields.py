@@ -72,6 +72,12 @@ class RepairFields(FieldGroup):
     lamp_in_every_room: bool = Field(
         False, description="a ceiling light in each room where people live that has no lamp"
     )
+    lamp_lx: float = Field(
+        0.0,
+        ge=0,
+        le=1_000,
+        description="on the floor, that an added lamp aims at by the room's area; 0 = 1,600 lm each",
+    )
     shade_transmission: float = Field(0.4, ge=0, le=1, description="diffuse, of enclosing shades")
     min_escape: float = Field(0.2, ge=0, le=1, description="share of light below which a shade is")
     bulb_radius_m: float = Field(0.0325, gt=0, le=1, description="where the source gives none")

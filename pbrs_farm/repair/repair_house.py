@@ -81,7 +81,10 @@ def _with_light(
     if occluder_from is not None:
         house, sources = with_shades(house, sources, fields, occluder_from)
     house, given = with_room_lighting(
-        house, fallback=fields.fallback_light, in_every_room=fields.lamp_in_every_room
+        house,
+        fallback=fields.fallback_light,
+        in_every_room=fields.lamp_in_every_room,
+        lamp_lx=fields.lamp_lx,
     )
     return house, sources, given
 

@@ -79,7 +79,7 @@ def _lamps(report: RepairReport) -> Iterator[str]:
     if report.fallback_lights:
         yield f"{_n(len(report.fallback_lights), 'room')} had neither lamp nor window and got a ceiling light: {_some(report.fallback_lights)}."  # fmt: skip
     if report.added_lamps:
-        yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp; a ceiling light was added for the evening: {_some(report.added_lamps)}."  # fmt: skip
+        yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp, or too weak ones; a ceiling light was added for the evening: {_some(report.added_lamps)}."  # fmt: skip
 
 
 def _rooms(report: RepairReport) -> Iterator[str]:

@@ -21,6 +21,7 @@ from pbrs_farm.repair.lamps.ceiling_lamp import place_of_lamp
 from pbrs_farm.repair.lamps.lived_in import is_lived_in
 from pbrs_farm.repair.lamps.room_lighting import GivenLights, with_room_lighting
 from pbrs_farm.repair.lamps.shades import with_shades
+from pbrs_farm.repair.structure.plan_geometry import polygon_of_room
 from tests.repair.embree import EmbreeOccluder
 
 FIELDS = RepairFields()
@@ -197,6 +198,37 @@ def test_a_room_with_a_window_and_no_lamp_gets_one_where_the_recipe_says_so() ->
     assert {r.lit_by for r in house.rooms} == {("windows", "added")}
     assert [i.tags for i in house.items if i.lights] == [("added",)] * 2
     assert "2 rooms where people live had no lamp" in summary_of_report(report)
+
+
+def test_an_added_lamps_flux_follows_the_rooms_area() -> None:
+    home = builtin_home()
+    day = replace(home, items=tuple(i for i in home.items if not i.lights))
+    house, _ = repair(day, RepairFields(lamp_in_every_room=True, lamp_lx=100))
+    areas = {r.id: polygon_of_room(r.polygon).area for r in house.rooms}
+    assert len(areas) == 2
+    for item in house.items:
+        for light in item.lights:
+            assert light.unit is PowerUnit.LUMEN
+            assert light.power == pytest.approx(100 * areas[item.room_id] / 0.3)
+
+
+@pytest.mark.parametrize(("lux", "lumen"), [(1, 600), (1_000, 10_000)])
+def test_an_added_lamps_flux_is_what_one_lamp_gives(lux: float, lumen: float) -> None:
+    home = builtin_home()
+    day = replace(home, items=tuple(i for i in home.items if not i.lights))
+    house, _ = repair(day, RepairFields(lamp_in_every_room=True, lamp_lx=lux))
+    assert {light.power for i in house.items for light in i.lights} == {lumen}
+
+
+def test_lamps_that_are_too_weak_for_the_room_get_one_beside_them() -> None:
+    home = builtin_home()
+    n_lamps = sum(bool(i.lights) for i in home.items)
+    house, report = repair(home, RepairFields(lamp_in_every_room=True, lamp_lx=1_000))
+    assert set(report.added_lamps) == {"0_0", "0_1"}
+    assert all({"lamps", "added"} <= set(r.lit_by) for r in house.rooms)
+    assert sum(bool(i.lights) for i in house.items) == n_lamps + 2
+    _, report = repair(home, RepairFields(lamp_in_every_room=True, lamp_lx=5))
+    assert report.added_lamps == ()
 
 
 def test_a_room_with_a_lamp_of_its_own_gets_no_other() -> None:

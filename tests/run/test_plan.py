@@ -67,11 +67,13 @@ def test_a_field_that_came_later_changes_no_digest_of_paper_and_released(
 ) -> None:
     assert recipe_from_name(name).digest() == digest
     assert not recipe_from_name(name).repair.lamp_in_every_room
+    assert recipe_from_name(name).repair.lamp_lx == 0
     assert recipe_from_name(name).selection.min_room_lx == 0
     for other in ("preview", "fast"):
         recipe = recipe_from_name(other)
         assert recipe.repair.lamp_in_every_room
-        off = recipe_from_name(other, {"repair.lamp_in_every_room": "false"})
+        assert recipe.repair.lamp_lx == 100
+        off = recipe_from_name(other, {"repair.lamp_in_every_room": "false", "repair.lamp_lx": "0"})
         assert recipe.digest("repair") != off.digest("repair")
         assert off.digest("repair") == recipe_from_name(name).digest("repair")
 

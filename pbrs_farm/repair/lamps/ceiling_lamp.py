@@ -24,14 +24,22 @@ _TALL_M = 0.5  # what reaches this near the ceiling takes part of it
 _HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
 _RADIUS_M = 0.1
 _POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
+_UTILISATION = 0.3  # share of a ceiling lamp's flux that a furnished floor gets, docs/houses.md
+_LEAST_LM, _MOST_LM = 600.0, 10_000.0  # of one lamp: a small bulb, a chandelier
 _ABOVE_FLOOR_M = 0.5  # structure lower than this is the floor
 _GRID_M = 0.25  # of places tried below a sloped ceiling
 
 
-def ceiling_lamp(house: House, room: Room, material: int, tag: str) -> Item:
+def flux_for_floor(area_m2: float, lux: float) -> float:
+    """Luminous flux in lm of ceiling lamps that give a floor this illuminance on average."""
+    return lux * area_m2 / _UTILISATION
+
+
+def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: float = 0.0) -> Item:
     """A ball below the ceiling, in the middle of the largest part of it that is free.
 
-    material: index of its bulb material. tag: why it was added; begins the item's id.
+    material: index of its bulb material. tag: why it was added; begins the item's id. flux_lm: its
+    luminous flux, kept within what one lamp gives; 0 = that of a lamp of Sweet Home 3D.
     """
     centre = place_of_lamp(house, room)
     radius = _RADIUS_M
@@ -43,8 +51,8 @@ def ceiling_lamp(house: House, room: Room, material: int, tag: str) -> Item:
     light = LightPart(
         position=(float(centre[0]), float(centre[1]), float(centre[2])),
         radius_m=radius,
-        power=_POWER,
-        unit=PowerUnit.SWEETHOME3D,
+        power=min(max(flux_lm, _LEAST_LM), _MOST_LM) if flux_lm else _POWER,
+        unit=PowerUnit.LUMEN if flux_lm else PowerUnit.SWEETHOME3D,
         emitting=(0,),
         escape=1.0,
     )

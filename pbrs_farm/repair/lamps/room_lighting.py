@@ -9,11 +9,18 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.house import House, Item, LightPart, Material, MaterialKind, Opening, Room
-from pbrs_farm.repair.lamps.ceiling_lamp import ADDED_LAMP, ceiling_lamp, heights_above
+from pbrs_farm.core.lighting import flux_lm
+from pbrs_farm.repair.lamps.ceiling_lamp import (
+    ADDED_LAMP,
+    ceiling_lamp,
+    flux_for_floor,
+    heights_above,
+)
 from pbrs_farm.repair.lamps.lived_in import is_lived_in
 from pbrs_farm.repair.structure import plan_geometry as plan
 
 FALLBACK = "fallback"
+_WEAK = 0.25  # share of the flux a room wants, up to which its own lamps are too weak
 _LEAST_ESCAPE = 0.01  # light output ratio below which a lamp counts as none
 _BY_THE_ROOM_M = 0.6  # an opening nearer than this is in a wall of the room
 _SKY_POINTS = 64  # of a room without a ceiling, looked up from
@@ -25,16 +32,18 @@ class GivenLights:
     """Ids of the rooms that got a ceiling light."""
 
     fallback: tuple[str, ...]  # nothing lit them
-    added: tuple[str, ...]  # they had daylight and no lamp
+    added: tuple[str, ...]  # they had daylight and no lamp, or lamps that are too weak
 
 
 def with_room_lighting(
-    house: House, *, fallback: bool, in_every_room: bool = False
+    house: House, *, fallback: bool, in_every_room: bool = False, lamp_lx: float = 0.0
 ) -> tuple[House, GivenLights]:
     """Room.lit_by of every room, and a ceiling light in each that lacks one.
 
     fallback: in each room that has a floor, a ceiling and no light. in_every_room: in each that
-    people live in and that has no lamp of its own, whatever daylight it has.
+    people live in and that has no lamp of its own, whatever daylight it has. lamp_lx: what an
+    added light aims at on the floor; a room whose own lamps have little of the flux for that gets
+    one for the rest. 0: all lights are alike, and a room with any lamp gets none.
     """
     rooms, lights = [], []
     given: dict[str, list[str]] = {FALLBACK: [], ADDED_LAMP: []}
@@ -43,7 +52,9 @@ def with_room_lighting(
     lamps = [i for i in house.items if any(_shines(light) for light in i.lights)]
     for room, area in zip(house.rooms, areas, strict=True):
         lit_by = []
-        if any(_lights(lamp, room, area) for lamp in lamps):
+        own_lm = sum(_flux_in(lamp, room, area) for lamp in lamps)
+        wanted_lm = flux_for_floor(area.area, lamp_lx)
+        if own_lm > 0:
             lit_by.append("lamps")
         if any(_opens_on(o, room, area, glazed) for o in house.openings):
             lit_by.append("windows")
@@ -53,11 +64,12 @@ def with_room_lighting(
         tag = ""
         if not lit_by and fallback and room.has_floor and room.has_ceiling and area.area > 0:
             tag = FALLBACK
-        elif in_every_room and "lamps" not in lit_by and room.has_floor:
+        elif in_every_room and own_lm <= _WEAK * wanted_lm and room.has_floor:
             tag = ADDED_LAMP if is_lived_in(room, area.area) else ""
         if tag:
             lit_by.append(tag)
-            lights.append(ceiling_lamp(house, room, len(house.materials), tag))
+            rest_lm = max(wanted_lm - own_lm, 0.0)
+            lights.append(ceiling_lamp(house, room, len(house.materials), tag, rest_lm))
             given[tag].append(room.id)
         rooms.append(replace(room, lit_by=tuple(lit_by)))
     materials = house.materials
@@ -81,12 +93,15 @@ def _has_pane(item: Item, materials: Sequence[Material]) -> bool:
     return any(materials[s.material].kind is MaterialKind.PANE for s in item.surfaces)
 
 
-def _lights(lamp: Item, room: Room, area: plan.Shape) -> bool:
-    return any(
-        room.floor_y - 0.05 <= light.position[1] <= room.ceiling_y + 0.05
-        and shapely.contains_xy(area, light.position[0], light.position[2])
+def _flux_in(lamp: Item, room: Room, area: plan.Shape) -> float:
+    """Luminous flux in lm that the lamp's sources in the room send out of it."""
+    return sum(
+        flux_lm(light.power, light.unit, light.share)
+        * (1 if light.escape is None else light.escape)
         for light in lamp.lights
         if _shines(light)
+        and room.floor_y - 0.05 <= light.position[1] <= room.ceiling_y + 0.05
+        and shapely.contains_xy(area, light.position[0], light.position[2])
     )
 
 
