@@ -12,6 +12,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Surface
+from pbrs_farm.core.mesh import cross_products
 
 # Corner i of a box has the sign of bit k of i along axis k; quads seen from outside.
 _BOX_QUADS = np.array(
@@ -26,8 +27,8 @@ def quads_surface(name: str, quads: F64, material: int) -> Surface:
     # Lay u along the first edge, v at right angles to it in the quad's plane.
     u = quads[:, 1] - quads[:, 0]
     u = u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-12)
-    normal = np.cross(u, quads[:, 3] - quads[:, 0])
-    v = np.cross(normal, u)
+    normal = cross_products(u, quads[:, 3] - quads[:, 0])
+    v = cross_products(normal, u)
     v = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
     local = quads - quads[:, :1]
     uvs = np.stack([(local * u[:, None]).sum(-1), (local * v[:, None]).sum(-1)], -1)

@@ -9,6 +9,7 @@ import types
 import typing
 from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
+from json.encoder import encode_basestring_ascii
 from typing import Any, Final
 
 import numpy as np
@@ -65,11 +66,18 @@ def pretty_json(value: Any) -> str:
 def _pretty(value: Any, indent: str) -> str:
     deeper = indent + "  "
     if isinstance(value, dict) and value:
-        rows = [f"{json.dumps(k)}: {_pretty(value[k], deeper)}" for k in sorted(value)]
+        rows = [f"{_leaf(k)}: {_pretty(value[k], deeper)}" for k in sorted(value)]
         return "{\n" + ",\n".join(deeper + r for r in rows) + "\n" + indent + "}"
     if isinstance(value, list) and _holds_dict(value):
         return "[\n" + ",\n".join(deeper + _pretty(v, deeper) for v in value) + "\n" + indent + "]"
-    return json.dumps(value, allow_nan=False)
+    return _leaf(value)
+
+
+def _leaf(value: Any) -> str:
+    # As json.dumps, which takes longer to begin than a short text takes.
+    if type(value) is str:
+        return encode_basestring_ascii(value)
+    return str(value) if type(value) is int else json.dumps(value, allow_nan=False)
 
 
 def _holds_dict(value: Any) -> bool:
@@ -111,7 +119,9 @@ def value_from_json(hint: Any, data: Any, file: str, place: str) -> Any:
 
     Unknown keys are ignored, missing fields take their defaults; what does not fit is BadHouse.
     """
-    origin = typing.get_origin(hint)
+    if hint in _SCALARS:
+        return _scalar(hint, data, file, place)
+    origin = _origin(hint)
     if origin is np.ndarray:
         dtype = typing.get_args(typing.get_args(hint)[1])[0]
         return _array(dtype, data, file, place)
@@ -128,6 +138,14 @@ def value_from_json(hint: Any, data: Any, file: str, place: str) -> Any:
     if isinstance(hint, type) and issubclass(hint, Enum):
         return _enum(hint, data, file, place)
     return _scalar(hint, data, file, place)
+
+
+_SCALARS: Final = (str, int, float, bool)
+
+
+@functools.cache
+def _origin(hint: Any) -> Any:
+    return typing.get_origin(hint)
 
 
 @functools.cache

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pbrs_farm.core.mesh import (
     area_vectors,
     closed_edge_share,
+    cross_products,
     distances_to_triangles,
     edges_are_paired,
     face_areas,
@@ -126,3 +127,12 @@ def test_edges_are_paired_where_each_is_met_by_its_reverse_as_often() -> None:
     assert edges_are_paired(np.concatenate([fan, fan[:, ::-1]]))
     # A face that is a line has the edges of a line, there and back.
     assert edges_are_paired(np.concatenate([tetrahedron, [[0, 1, 1]]]))
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_cross_products_are_numpys_to_the_bit(dtype: type) -> None:
+    a, b = np.random.default_rng(0).normal(size=(2, 500, 3)).astype(dtype)
+    found = cross_products(a, b)
+    assert found.dtype == dtype
+    assert found.tobytes() == np.cross(a, b).tobytes()
+    assert np.array_equal(cross_products(a[0], b), np.cross(a[0], b))

@@ -1,9 +1,13 @@
 """What a file of JSON is refused with: our words, never Python's."""
 
+import json
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.formats.serialise import json_from_bytes
+from pbrs_farm.formats.serialise import json_from_bytes, pretty_json
 
 PYTHONS_WORDS = ("literal", "codec", "integer string", "maximum recursion", "Traceback", "0x")
 
@@ -26,3 +30,19 @@ def test_what_is_no_json_is_refused_in_words_that_say_nothing_of_python(data, sa
     assert "a.arch.json" in text
     assert said in text
     assert not any(words in text for words in PYTHONS_WORDS)
+
+
+@given(
+    st.recursive(
+        st.none()
+        | st.booleans()
+        | st.integers()
+        | st.text()
+        | st.floats(allow_nan=False, allow_infinity=False),
+        lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    )
+)
+def test_pretty_json_says_what_json_says(value):
+    text = pretty_json(value)
+    assert json.loads(text) == value
+    assert "".join(text.split()) == "".join(json.dumps(value, sort_keys=True).split())

@@ -10,7 +10,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from typing import Final
 
@@ -132,7 +132,12 @@ def words_of(text: str) -> frozenset[str]:
     return frozenset(words) | {w[:-1] for w in words if len(w) > 3 and w.endswith("s")}
 
 
-def _candidates(name: str) -> Iterator[tuple[str, bool]]:
+@lru_cache(maxsize=4096)
+def _candidates(name: str) -> tuple[tuple[str, bool], ...]:
+    return tuple(_found_candidates(name))
+
+
+def _found_candidates(name: str) -> Iterator[tuple[str, bool]]:
     # The classes or kinds that the words of a name stand for, likeliest first, and whether the
     # word is the name's noun. Words before an aside go first ("lamp with table" is a lamp).
     # A number that stands alone begins one, a number in a word ("chair01") means nothing.

@@ -9,6 +9,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Surface
+from pbrs_farm.core.mesh import cross_products
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPicture, PlanPiece
 from pbrs_farm.read.sweethome3d.piece_materials import PieceMaterial
@@ -105,8 +106,8 @@ def placed_surface(
 
 def _inverse_transpose(linear: F64) -> F64:
     # A piece flat along an axis has no inverse: its cofactors do, up to a positive scale.
-    a, b, c = linear[:, 0], linear[:, 1], linear[:, 2]
-    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], -1)
+    columns = linear.T
+    cofactors = cross_products(columns[[1, 2, 0]], columns[[2, 0, 1]]).T
     return cofactors * (-1.0 if np.linalg.det(linear) < 0 else 1.0)
 
 
