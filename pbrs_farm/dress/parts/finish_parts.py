@@ -27,6 +27,7 @@ from pbrs_farm.dress.parts.part_kinds import (
     is_brown,
     is_dark,
     is_furniture,
+    is_lacquered,
     is_upholstered,
     is_vivid,
     is_white,
@@ -40,9 +41,10 @@ PART: Final = "parts"
 _LEAST_BOARD_M2: Final = 0.05  # a part of no class that is smaller stays: knobs, feet
 _UPWARD: Final = 0.7  # cosine: what one sits or lies on
 _LEATHER_SHARE: Final = 0.25  # of sofas and armchairs
-_PAINT_STAYS: Final = 0.35  # of furniture painted in a colour that wood never has
+_PAINT_STAYS: Final = 0.15  # of furniture painted in a colour that wood never has
 _GREY_STAYS: Final = 0.6
-_DARKEST: Final = 0.02  # linear: black wood still shows its grain
+_DARKEST: Final = 0.02  # linear: black wood still shows its grain, black paint some light
+_SHEEN: Final = (0.5, 0.5, 0.5)  # Ks of lacquer: 4 % at normal incidence
 _PALE: Final = "birch"
 _METAL_OF_NAME: Final = (
     (("brass", "gold", "laiton"), "brass"), (("copper", "cuivre"), "copper"),
@@ -103,6 +105,10 @@ def _kinds(draft: Draft, item: Item, group: str) -> list[PartKind]:
                 kinds[k] = PartKind.WOOD
             elif is_bed(item) and is_vivid(material.diffuse):
                 kinds[k] = PartKind.SOFT
+    # What is left of furniture is painted.
+    for k, material in enumerate(materials):
+        if kinds[k] is PartKind.OTHER and kind_by_name(material.name) is None:
+            kinds[k] = PartKind.LACQUER if is_lacquered(item, material, group) else PartKind.OTHER
     return kinds
 
 
@@ -125,9 +131,8 @@ def _finished(
     )
     if rng.random() >= share:
         return surface
-    finish = {PartKind.WOOD: _wood, PartKind.SOFT: _soft, PartKind.METAL: _metal}[kind](
-        draft, style, item, material, rng
-    )
+    make = {PartKind.WOOD: _wood, PartKind.SOFT: _soft, PartKind.METAL: _metal}.get(kind, _lacquer)
+    finish = make(draft, style, item, material, rng)
     if finish is None:
         return surface
     if finish.size_m is None:
@@ -142,13 +147,14 @@ def _wood(
 ) -> _Finish | None:
     own, stays = material.diffuse, rng.random()
     # Paint may stay paint; so may grey.
-    if is_vivid(own) and stays < _PAINT_STAYS:
-        return None
-    if not (is_brown(own) or is_dark(own) or is_vivid(own)) and stays < _GREY_STAYS:
-        return None
+    is_other = not (is_brown(own) or is_dark(own) or is_vivid(own))
+    if (is_vivid(own) and stays < _PAINT_STAYS) or (is_other and stays < _GREY_STAYS):
+        return _lacquer(draft, style, item, material, rng)
     mean = linear_from_srgb(np.array(style.wood.mean))
     mine = np.maximum(linear_from_srgb(np.array(own)), _DARKEST)
-    weight = 1.0 if is_vivid(own) else float(rng.uniform(0.25, 0.85))
+    # The stronger a brown, the less of it is of wood.
+    strength = (max(own) - min(own)) * max(own)
+    weight = 1.0 if is_vivid(own) else float(rng.uniform(0.25, 0.85)) ** (1 - 0.8 * strength)
     # What is dark stays dark: mix in the logarithm.
     wanted = np.exp((1 - weight) * np.log(mine) + weight * np.log(mean))
     if is_dark(own):
@@ -179,6 +185,25 @@ def _soft(
         wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
     seed = int(draft.rng(PART, family).integers(2**31))
     return _tinted(draft, Pattern(family, seed), wanted, is_grained=False)
+
+
+def _lacquer(
+    draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
+) -> _Finish | None:
+    if (
+        material.specular != (0.0, 0.0, 0.0)
+        and material.shininess > 1
+        and max(material.diffuse) > 0.1
+    ):
+        return None
+    linear = np.maximum(linear_from_srgb(np.array(material.diffuse)), _DARKEST)
+    r, g, b = (round(float(c), 4) for c in srgb_from_linear(linear))
+    roughness = round(float(rng.uniform(0.25, 0.5)), 2)
+    painted = replace(
+        material, diffuse=(r, g, b), specular=_SHEEN, roughness=roughness,
+        shininess=round(2 / roughness**4 - 2, 1),
+    )  # fmt: skip
+    return _Finish(draft.material(painted))
 
 
 def _metal(

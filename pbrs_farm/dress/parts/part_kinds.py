@@ -18,6 +18,7 @@ class PartKind(StrEnum):
     WOOD = "wood"
     SOFT = "soft"  # cloth or leather
     METAL = "metal"
+    LACQUER = "lacquer"  # keeps its colour and gets a sheen
     OTHER = "other"  # stays as it is
 
 
@@ -34,7 +35,12 @@ _WET: Final = frozenset(
     NYU40_NAMES.index(n)
     for n in ("sink", "bathtub", "toilet", "refrigerator", "otherfurniture", "otherprop", "towel")
 )
-_WOODEN_GROUPS: Final = frozenset({"tv_stand", "wardrobe", "piano", "ottoman"})
+_WOODEN_GROUPS: Final = frozenset(
+    {"tv_stand", "wardrobe", "piano", "ottoman", "sink", "base_cabinet", "upper_cabinet"}
+)
+_FRONTS: Final = frozenset(
+    {"sink", "base_cabinet", "upper_cabinet", "fridge", "cooker", "dishwasher", "washer", "oven"}
+)
 _SOFT_GROUPS: Final = frozenset({"armchair", "ottoman", "sofa", "corner_sofa"})
 _KINDS: Final = (ItemKind.OBJECT, ItemKind.LAMP, ItemKind.DOOR)
 
@@ -100,6 +106,13 @@ def is_furniture(item: Item, group: str) -> bool:
     """Whether boards of any colour may be of wood: furniture, but no door."""
     is_known = item.nyu40 in _WOODEN or group in _WOODEN_GROUPS
     return is_known and item.kind is ItemKind.OBJECT
+
+
+def is_lacquered(item: Item, material: Material, group: str) -> bool:
+    """Whether a plain part of no known kind is painted board: of furniture and kitchens."""
+    is_plain = material.texture_id is None and material.kind is MaterialKind.OPAQUE
+    may_be = is_furniture(item, group) or group in _FRONTS
+    return is_plain and may_be and item.kind is ItemKind.OBJECT and material.roughness is None
 
 
 def is_brown(colour: Rgb) -> bool:

@@ -70,12 +70,26 @@ def test_what_is_never_made_of_wood_stays(class_name: str) -> None:
         Material("wood", diffuse=BROWN, opacity=0.5),
         Material("glass", diffuse=BROWN),
         Material("screen", diffuse=BROWN),
-        Material("white", diffuse=WHITE),
     ],
 )
-def test_glass_mirrors_bulbs_pictures_and_white_lacquer_stay(material: Material) -> None:
+def test_glass_mirrors_bulbs_and_pictures_stay(material: Material) -> None:
     draft = _dressed(_thing("table"), materials=(material,))
     assert draft.items[0] is draft.source.items[0]
+
+
+def test_white_lacquer_keeps_its_colour_and_gets_a_sheen() -> None:
+    white = Material("white", diffuse=WHITE)
+    lacquer = _material(_dressed(_thing("table"), materials=(white,)))
+    assert_allclose(lacquer.diffuse, WHITE, atol=1e-3)
+    assert lacquer.texture_id is None
+    assert lacquer.roughness is not None
+
+
+def test_black_paint_throws_some_light_back() -> None:
+    black = Material("x", diffuse=(0.0, 0.0, 0.0))
+    for seed in range(3):
+        found = _material(_dressed(_thing("cabinet"), materials=(black,), seed=seed))
+        assert max(found.diffuse) > 0.1
 
 
 def test_the_soft_part_of_a_sofa_is_cloth_or_leather_in_a_colour_of_the_style() -> None:
@@ -132,7 +146,8 @@ def test_small_knobs_of_other_colours_stay() -> None:
     desk = replace(desk, surfaces=(desk.surfaces[0], knob))
     materials = (Material("amber", diffuse=BROWN), Material("x", diffuse=(0.5, 0.5, 0.5)))
     draft = _dressed(desk, materials=materials)
-    assert draft.items[0].surfaces[1] is knob
+    assert draft.items[0].surfaces[1].uvs is knob.uvs
+    assert _material(draft, 0, 1).texture_id is None
     assert _material(draft).name.startswith("grain")
 
 
