@@ -11,11 +11,12 @@ from pbrs_farm.core.arrays import F32, Srgb8Image
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import Texture
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.images import jpeg_from_array, resized
+from pbrs_farm.dress.textures.noise import halved
+from pbrs_farm.images import jpeg_from_array
 
 _COLOUR_QUALITY = 92
 _MAP_QUALITY = 90
-_RELIEF_PX = 512  # edge of stored roughness and normal maps, except of deep relief
+_RELIEF_PX = 512  # longest edge of roughness and normal maps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,8 +24,8 @@ class SurfaceMaps:
     """One repeat of a surface; row 0 is its upper edge, u to the right, v up."""
 
     colour: Srgb8Image  # (H, W, 3) uint8, sRGB-encoded, the relief's shade in it
-    roughness: Srgb8Image | float  # (H, W) uint8, 255 = 1, or one value 0..1
-    normal: Srgb8Image | None  # (H, W, 3) uint8, tangent space as glTF's; None = flat
+    roughness: Srgb8Image | float  # (h, w) uint8, 255 = 1, or one value 0..1
+    normal: Srgb8Image | None  # (h, w, 3) uint8, tangent space as glTF's; None = flat
     size_m: tuple[float, float]  # width and height of one repeat
     gloss: float = 0.0  # strength of the coat's reflection, 0 matt, 0.5 varnish or glaze
 
@@ -55,7 +56,8 @@ def ramp(tone: F32, dark: Rgb, light: Rgb) -> F32:
 
 
 def normals_from_height(height_m: F32, size_m: tuple[float, float]) -> Srgb8Image:
-    """(H, W, 3) uint8 tangent-space normals of a periodic height field in metres."""
+    """Tangent-space normals of a periodic height field in metres, uint8, at most _RELIEF_PX wide."""
+    height_m = _coarse(height_m)
     rows, columns = height_m.shape
     du, dv = size_m[0] / columns, size_m[1] / rows
     slope_u = (np.roll(height_m, -1, 1) - np.roll(height_m, 1, 1)) / np.float32(2 * du)
@@ -67,8 +69,14 @@ def normals_from_height(height_m: F32, size_m: tuple[float, float]) -> Srgb8Imag
 
 
 def roughness_bytes(roughness: F32) -> Srgb8Image:
-    """(H, W) uint8 of a roughness 0..1."""
-    return np.asarray(np.clip(roughness, 0.02, 1.0) * 255.0 + 0.5, np.uint8)
+    """uint8 of a roughness 0..1 (H, W), at most _RELIEF_PX wide."""
+    return np.asarray(np.clip(_coarse(roughness), 0.02, 1.0) * 255.0 + 0.5, np.uint8)
+
+
+def _coarse(field: F32) -> F32:
+    while max(field.shape) > _RELIEF_PX and field.shape[0] % 2 == field.shape[1] % 2 == 0:
+        field = halved(field)
+    return field
 
 
 def texture_from_pixels(name: str, pixels: Srgb8Image, quality: int) -> Texture:
@@ -78,17 +86,11 @@ def texture_from_pixels(name: str, pixels: Srgb8Image, quality: int) -> Texture:
 
 
 def encoded(maps: SurfaceMaps, name: str) -> tuple[Texture, Texture | None, Texture | None]:
-    """Colour, roughness and normal map as textures; the last two half as fine, None where flat."""
+    """Colour, roughness and normal map as textures; the last two None where there is none."""
     colour = texture_from_pixels(f"{name}.jpg", maps.colour, _COLOUR_QUALITY)
     rough = normal = None
     if not isinstance(maps.roughness, float):
-        rough = texture_from_pixels(f"{name}-roughness.jpg", _relief(maps.roughness), _MAP_QUALITY)
+        rough = texture_from_pixels(f"{name}-roughness.jpg", maps.roughness, _MAP_QUALITY)
     if maps.normal is not None:
-        normal = texture_from_pixels(f"{name}-normal.jpg", _relief(maps.normal), _MAP_QUALITY)
+        normal = texture_from_pixels(f"{name}-normal.jpg", maps.normal, _MAP_QUALITY)
     return colour, rough, normal
-
-
-def _relief(pixels: Srgb8Image) -> Srgb8Image:
-    rows, columns = pixels.shape[:2]
-    step = max(1, max(rows, columns) // _RELIEF_PX)
-    return resized(pixels, columns // step, rows // step)

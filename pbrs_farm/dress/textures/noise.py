@@ -28,7 +28,8 @@ def noise(
     fx = np.arange(columns // 2 + 1, dtype=np.float32)[None] * np.float32(stretch[1])
     k2 = fy * fy + fx * fx
     # Let the band through; the mean is nothing.
-    gain = np.maximum(k2, 1e-6) ** np.float32(-slope / 4.0) * (k2 >= band[0] ** 2 * 0.999)
+    gain = np.exp(np.log(np.maximum(k2, np.float32(1e-6))) * np.float32(-slope / 4.0))
+    gain *= k2 >= np.float32(band[0] ** 2 * 0.999)
     if band[1] < max(shape):
         gain *= np.exp(-k2 / np.float32(band[1] ** 2))
     gain[0, 0] = 0.0
@@ -49,6 +50,15 @@ def blurred(field: F32, sigma_px: float) -> F32:
     fx = np.fft.rfftfreq(columns).astype(np.float32)[None]
     gain = np.exp(-2.0 * (np.pi * sigma_px) ** 2 * (fy * fy + fx * fx)).astype(np.float32)
     return np.asarray(np.fft.irfft2(np.fft.rfft2(field) * gain, field.shape), np.float32)
+
+
+def halved(field: F32) -> F32:
+    """The means of blocks of two by two pixels; both edges even."""
+    return np.asarray(
+        (field[::2, ::2] + field[1::2, ::2] + field[::2, 1::2] + field[1::2, 1::2])
+        * np.float32(0.25),
+        np.float32,
+    )
 
 
 def smoothstep(low: float, high: float, x: F32) -> F32:

@@ -40,7 +40,7 @@ def plaster_maps(
     grain = noise(rng, shape, slope=0.4)
     tone = 0.012 * clouds + 0.014 * (strokes - 0.56) + 0.008 * grain
     colour = np.array(tint, np.float32) * (1.0 + np.float32(depth) * tone)[..., None]
-    height = depth * (0.0007 * strokes + 0.0006 * clouds + 0.00006 * grain)
+    height = depth * (0.00045 * strokes + 0.0006 * clouds + 0.00006 * grain)
     return SurfaceMaps(
         colour_bytes(colour), 0.9, normals_from_height(np.asarray(height, np.float32), size_m),
         size_m, 0.0,

@@ -19,7 +19,7 @@ from pbrs_farm.dress.textures.maps import (
     ramp,
     roughness_bytes,
 )
-from pbrs_farm.dress.textures.noise import Shape2, coverage, noise, sampled, smoothstep
+from pbrs_farm.dress.textures.noise import Shape2, coverage, halved, noise, sampled, smoothstep
 from pbrs_farm.dress.textures.wood import WoodSheet, wood_sheet
 
 _INTS = NDArray[np.int64]
@@ -158,7 +158,10 @@ def plank_maps(
     if look.bevel_m:
         height = height - look.bevel_m * 0.35 * beside
     rough = look.roughness + 0.10 * (0.62 - tone) + 0.3 * joint
-    rough = rough + 0.02 * noise(rng, (256, 256), slope=2.0).repeat(shape[0] // 256, 0).repeat(shape[1] // 256, 1)  # fmt: skip
+    # Let the varnish be smudged; its map is half as fine.
+    rough = halved(np.asarray(rough, np.float32))
+    smudge = noise(rng, (rough.shape[0], rough.shape[1]), slope=2.5)
+    rough = rough + 0.015 * np.clip(smudge, -2, 2)
     return SurfaceMaps(
         colour_bytes(colour), roughness_bytes(rough), normals_from_height(height, size_m),
         size_m, look.gloss,

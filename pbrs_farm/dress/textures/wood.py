@@ -45,7 +45,7 @@ class WoodSheet:
 
 
 def wood_sheet(
-    rng: np.random.Generator, wood: Wood, shape: Shape2 = (1024, 1024), pixel_m: float = 2 / 1024
+    rng: np.random.Generator, wood: Wood, shape: Shape2 = (512, 1024), pixel_m: float = 2 / 1024
 ) -> WoodSheet:
     """A sheet of that species; pixel_m: metres a pixel."""
     ring_m, bend, pores, knots = _SPECIES.get(wood.name.split()[-1], _SPECIES["oak"])
