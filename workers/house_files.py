@@ -60,8 +60,10 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
         if place != path:
             store.put_if_absent(place, Path(path).read_bytes())
     # Homes take furniture from the examples' package: workers need it too.
-    if any(ref.kind in ("example", "sweethome3d") for ref in refs):
+    if any(ref.kind in ("example", "sweethome3d", "made") for ref in refs):
         _upload_package(store, homes.PACKAGE)
+    if any(ref.kind == "made" for ref in refs):
+        _upload_package(store, furniture.PACKAGE)
 
 
 def _upload_package(store: Store, package: str) -> None:

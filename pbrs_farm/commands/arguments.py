@@ -155,11 +155,12 @@ def add_output(p: argparse.ArgumentParser) -> None:
 
 
 def home_arguments(homes: list[str], houses: str | None) -> list[str]:
-    """The homes asked for; with --houses, those of the list below the SUNCG root."""
+    """The homes asked for, ranges of made ones one by one; with --houses, those of the list below the SUNCG root."""
+    from pbrs_farm.core.made_home import expanded
     from pbrs_farm.read.source import suncg_list
 
     if not houses:
-        return list(homes)
+        return expanded(homes)
     if len(homes) != 1:
         raise BadInput("--houses", houses, "needs the SUNCG root as the one HOME")
     return suncg_list(Path(homes[0]), Path(houses))

@@ -132,8 +132,9 @@ def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dic
 def _repair(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.house_bundle import bundle_from_house
     from pbrs_farm.formats.serialise import json_bytes
-    from pbrs_farm.read.source import read_house, resolve
+    from pbrs_farm.read.source import resolve
     from pbrs_farm.repair import section_svg, summary_of_report
+    from pbrs_farm.run.house_of_source import house_of_source
     from pbrs_farm.run.steps import repaired_house
     from pbrs_farm.store.folder import FolderStore
 
@@ -147,7 +148,7 @@ def _repair(args: argparse.Namespace) -> int:
     for name, data in files.items():
         store.put(name, data)
     # Draw each level's walls before and after.
-    before = read_house(source, recipe.read)
+    before = house_of_source(source, recipe.read)
     cuts = {f"cut_{level.id}.svg": section_svg(before, house, level.id) for level in house.levels}
     for name, svg in cuts.items():
         store.put(name, svg.encode())

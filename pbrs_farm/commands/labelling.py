@@ -60,9 +60,10 @@ def _home_classes(args: argparse.Namespace) -> int:
     """What a home's pieces are and why, without rendering it."""
     from pbrs_farm.core.recipe import ReadFields
     from pbrs_farm.gallery.class_decisions import class_decisions, decisions_text
-    from pbrs_farm.read.source import read_house, resolve
+    from pbrs_farm.read.source import resolve
+    from pbrs_farm.run.house_of_source import house_of_source
 
-    house = read_house(resolve(args.folder), ReadFields())
+    house = house_of_source(resolve(args.folder), ReadFields())
     fields = ("kind", "nyu40", "name", "source_class", "tags")
     decisions = class_decisions({f: getattr(item, f) for f in fields} for item in house.items)
     if args.json:

@@ -16,6 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.house import House
+from pbrs_farm.core.made_home import is_made, made_homes
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.record import Record
 from pbrs_farm.read.common.companion_files import SourceFiles
@@ -30,13 +31,13 @@ if TYPE_CHECKING:
 _MODEL_SUFFIXES: Final = (".obj", ".sh3f", ".mtl", ".fbx", ".dae", ".3ds", ".ply", ".stl")
 _FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip of a unit
 
-SourceKind = Literal["builtin", "example", "sweethome3d", "suncg", "gltf", "object"]
+SourceKind = Literal["builtin", "made", "example", "sweethome3d", "suncg", "gltf", "object"]
 
 
 class SourceRef(Record):
     """A house before it is read.
 
-    location: a path, an example home's name, or "builtin"; of an object without context the JSON
+    location: a path, an example home's name, "builtin" or the word of a made home; of an object without context the JSON
     of its ObjectModel. sha256: of the file's bytes (SUNCG: of house.json). companions: digest of
     all other files that reading opens, "" = none, None = not known (named by an earlier version).
     dress_seed: what it is dressed by between reading and repair; its id then ends in `-d<seed>`.
@@ -90,6 +91,8 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
         kind = "object"
     elif word == "builtin":
         kind = "builtin"
+    elif is_made(word):
+        kind = "made"
     elif not path.exists() and not path.suffix and "/" not in word:
         kind = "example"
     elif path.is_dir() or path.name == "house.json":
@@ -121,6 +124,8 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef
 
         home = builtin_home()
         return SourceRef(kind=kind, location=location, house_id=home.id, sha256=home.source.sha256)
+    if kind == "made":
+        return _made(location)
     if kind == "suncg":
         return _suncg(Path(location), files)
     if kind == "object":
@@ -141,6 +146,27 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef
     return SourceRef(
         kind=kind, location=location, house_id=house_id, sha256=sha, companions=companions
     )
+
+
+def _made(word: str) -> SourceRef:
+    """The source of a home that its seed makes; its companion is the furniture's package."""
+    from pbrs_farm.assets import furniture
+
+    homes = made_homes(word)
+    if len(homes) != 1:
+        raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
+    companions, package = "", furniture.cached() if homes[0].furniture else None
+    if homes[0].furniture and package is None:
+        raise MachineFailed(
+            "made homes take their furniture from a package that is not fetched",
+            hint="`pbrs-farm homes --furniture` (120 MB), or made:1,furniture=none",
+        )
+    if package is not None and package.note:
+        companions = keys.sha256(package.note.encode())
+    return SourceRef(
+        kind="made", location=homes[0].word, house_id=keys.house_id(homes[0].name, homes[0].digest),
+        sha256=homes[0].digest, companions=companions,
+    )  # fmt: skip
 
 
 def _companions(kind: SourceKind, path: Path, data: bytes, files: SourceFiles) -> str:
@@ -183,7 +209,7 @@ def read_house(source: SourceRef, fields: ReadFields) -> House:
 
     Raises BadHouse with the place, also where a file of the source has changed since it was named.
     """
-    _check_unchanged(source)
+    check_unchanged(source)
     return _with_far_noted(_house_of(source, fields), fields)
 
 
@@ -268,13 +294,15 @@ def _read_object(source: SourceRef, fields: ReadFields) -> House:
     return replace(house, id=source.house_id, is_repaired=True)
 
 
-def _check_unchanged(source: SourceRef) -> None:
-    """Raise where a file of the source is not what it was when the source was named."""
+def check_unchanged(source: SourceRef) -> None:
+    """Raise BadHouse or MachineFailed where a file of the source is not what it was when the source was named."""
     now = _reference(source.kind, source.location, SourceFiles())
     is_known = source.companions is not None
     if now.sha256 == source.sha256 and (not is_known or now.companions == source.companions):
         return
-    if source.kind == "example" or (source.kind == "sweethome3d" and now.sha256 == source.sha256):
+    if source.kind in ("example", "made") or (
+        source.kind == "sweethome3d" and now.sha256 == source.sha256
+    ):
         # The file is the same or comes from the package: this machine's package differs.
         raise MachineFailed(
             f"the package here holds another {source.location} or other models than was asked for",

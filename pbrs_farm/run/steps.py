@@ -30,10 +30,11 @@ from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_exr, radiance_from_exr
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.formats.view_json import view_description, view_json
-from pbrs_farm.read.source import SourceRef, read_house
+from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.dressed_house import dressed
 from pbrs_farm.run.house_cache import CachedHouse
+from pbrs_farm.run.house_of_source import house_of_source
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.run.step_cache import (
@@ -110,7 +111,7 @@ def made_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport, 
 
     # An object without context has no walls to close.
     doing(source.location, "read")
-    house = read_house(source, recipe.read)
+    house = house_of_source(source, recipe.read)
     if source.kind == "object":
         return house, RepairReport(house_id=house.id, was_repaired=True), None
 

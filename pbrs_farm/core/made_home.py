@@ -1,0 +1,104 @@
+"""The words that name homes to generate, `made:12` or `made:1..1000,rooms=2..4`; no effects."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import Final
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadInput
+
+PREFIX: Final = "made:"
+VERSION: Final = 1
+"""Of the generator: part of a made home's id. Raised when it makes another home of a seed."""
+
+MAX_SEED: Final = 2**31 - 1
+MAX_HOMES: Final = 1_000_000
+"""Of one word."""
+
+_HINT: Final = "made:12, made:1..1000 or made:1..100,rooms=2..4,area=60..90"
+_RANGE: Final = re.compile(r"(\d{1,10})(?:\.\.(\d{1,10}))?")
+
+
+@dataclass(frozen=True, slots=True)
+class MadeHome:
+    """A home to generate."""
+
+    seed: int
+    bedrooms: tuple[int, int] = (0, 4)
+    area: tuple[int, int] = (20, 250)  # of all rooms, square metres
+    style: str = ""  # of furniture and paints; "" = drawn by seed
+    furniture: bool = True
+
+    @property
+    def word(self) -> str:
+        """The word that names this home alone."""
+        parts = [f"{PREFIX}{self.seed}"]
+        plain = MadeHome(self.seed)
+        for name, key in (("bedrooms", "rooms"), ("area", "area")):
+            low, high = getattr(self, name)
+            if (low, high) != getattr(plain, name):
+                parts.append(f"{key}={low}..{high}")
+        if self.style:
+            parts.append(f"style={self.style}")
+        if not self.furniture:
+            parts.append("furniture=none")
+        return ",".join(parts)
+
+    @property
+    def name(self) -> str:
+        """The name of its file, without the ending."""
+        return f"made-{self.seed}"
+
+    @property
+    def digest(self) -> str:
+        """Digest of all that makes it, but for the furniture's catalogue."""
+        return keys.digest("made", VERSION, self.word)
+
+
+def is_made(word: str) -> bool:
+    """Whether a word names homes to generate."""
+    return word.startswith(PREFIX)
+
+
+def made_homes(word: str) -> list[MadeHome]:
+    """The homes of a word, one a seed. Raises BadInput for a word that names none."""
+    seeds, *options = word.removeprefix(PREFIX).split(",")
+    first, last = _range(word, seeds, MAX_SEED)
+    if last - first >= MAX_HOMES:
+        raise BadInput(word, "", f"names {last - first + 1} homes, at most {MAX_HOMES}")
+    home = MadeHome(first)
+    for option in options:
+        key, _, value = option.partition("=")
+        if key == "rooms":
+            home = replace(home, bedrooms=_range(word, value, 4))
+        elif key == "area":
+            home = replace(home, area=_range(word, value, 1000))
+        elif key == "style" and re.fullmatch(r"[a-z][a-z0-9-]{0,30}", value):
+            home = replace(home, style=value)
+        elif key == "furniture" and value == "none":
+            home = replace(home, furniture=False)
+        else:
+            raise BadInput(word, option, "is no option of made homes", hint=_HINT)
+    return [replace(home, seed=seed) for seed in range(first, last + 1)]
+
+
+def expanded(words: list[str]) -> list[str]:
+    """The words, each that names a range of made homes replaced by one word a home."""
+    found: list[str] = []
+    for word in words:
+        found += [home.word for home in made_homes(word)] if is_made(word) else [word]
+    return found
+
+
+def _range(word: str, text: str, most: int) -> tuple[int, int]:
+    match = _RANGE.fullmatch(text)
+    if match is None:
+        raise BadInput(word, text[:40], "is no number and no range LOW..HIGH", hint=_HINT)
+    low, high = int(match[1]), int(match[2] or match[1])
+    if low > high:
+        raise BadInput(word, text, "runs downwards", hint=f"{high}..{low}")
+    if high > most:
+        raise BadInput(word, text, f"is above {most}", hint=_HINT)
+    return low, high

@@ -1,0 +1,35 @@
+"""Words of made homes."""
+
+from __future__ import annotations
+
+import pytest
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.made_home import MadeHome, expanded, made_homes
+
+
+def test_a_range_names_one_home_a_seed() -> None:
+    words = expanded(["builtin", "made:3..5,rooms=2..3"])
+    assert words == ["builtin", *(f"made:{k},rooms=2..3" for k in (3, 4, 5))]
+
+
+def test_a_word_says_all_of_its_home() -> None:
+    home = MadeHome(7, (1, 2), (50, 70), "nordic", furniture=False)
+    assert made_homes(home.word) == [home]
+    assert home.digest != MadeHome(7).digest
+
+
+@pytest.mark.parametrize(
+    ("word", "part"),
+    [
+        ("made:", "no number"),
+        ("made:x", "no number"),
+        ("made:9..3", "downwards"),
+        ("made:1,rooms=5", "above 4"),
+        ("made:1,walls=3", "no option"),
+        ("made:1..2000000", "at most"),
+    ],
+)
+def test_a_word_that_names_no_home_is_refused_with_the_nearest(word: str, part: str) -> None:
+    with pytest.raises(BadInput, match=part):
+        made_homes(word)

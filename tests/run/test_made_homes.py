@@ -1,0 +1,29 @@
+"""`run made:1..2`: homes by seed go through the ordinary steps."""
+
+from __future__ import annotations
+
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.read.source import resolve
+from pbrs_farm.run.house_of_source import house_of_source
+from pbrs_farm.run.steps import repaired_house
+
+BARE = ",furniture=none"  # the package need not be there
+
+
+def test_the_house_of_a_seed_has_the_id_its_word_gave() -> None:
+    source = resolve(f"made:5{BARE}")
+    house = house_of_source(source, Recipe().read)
+    assert house.id == source.house_id
+    assert house.id.startswith("made-5-")
+    assert house.source.kind == "made"
+    assert "pbrs_farm" in house.source.attribution
+
+
+def test_a_made_home_is_repaired_without_leaks() -> None:
+    _house, report = repaired_house(resolve(f"made:5{BARE}"), Recipe())
+    assert report.leaks is not None
+    assert report.leaks.n_sky == 0
+
+
+def test_two_seeds_are_two_houses() -> None:
+    assert resolve(f"made:1{BARE}").house_id != resolve(f"made:2{BARE}").house_id
