@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Sequence
 from enum import StrEnum
 
@@ -24,18 +25,56 @@ class RoomKind(StrEnum):
     OTHER = "other"
 
 
-# The first kind whose words are in the name holds.
+# Whole words, accents folded, of the languages that homes are drawn in; the first kind that has
+# one of a name's words holds.
 _WORDS = (
-    (RoomKind.OUTDOOR, "balcony terrace garden patio deck loggia porch yard balkon garten terrasse balcon jardin"),
-    (RoomKind.STORE, "garage cellar basement closet storage store laundry carport keller wardrobe cave warehouse"),
-    (RoomKind.BATHROOM, "bath bathroom toilet wc shower restroom lavatory bad badezimmer salle_de_bain"),
-    (RoomKind.KITCHEN, "kitchen kitchenette kuche küche cuisine cocina cucina"),
-    (RoomKind.BEDROOM, "bed bedroom bedrom guest child nursery kids schlafzimmer kinderzimmer chambre"),
-    (RoomKind.DINING, "dining esszimmer"),
-    (RoomKind.OFFICE, "office study library buro büro bureau"),
-    (RoomKind.LIVING, "living lounge sitting family wohnzimmer salon sejour séjour soggiorno saloon"),
-    (RoomKind.HALL, "hall hallway corridor entry entrance entryway foyer landing flur diele stairs lobby"),
+    (RoomKind.OUTDOOR, """
+        balcony terrace garden patio deck loggia porch yard balkon garten terrasse balcon jardin
+        terraza jardim varanda sacada quintal balcone terrazza giardino tuin balkong taras ogrod
+        zahrada teras bahce балкон терраса сад 베란다 발코니 테라스"""),
+    (RoomKind.STORE, """
+        garage cellar basement closet storage store laundry carport keller wardrobe cave warehouse
+        pantry waschkuche abstellraum lager buanderie cellier garaje trastero lavadero
+        garagem lavanderia cantina ripostiglio berging schuur garasje bod piwnica garaz sklep
+        kiler depo гараж кладовая подвал 창고 다용도실"""),
+    (RoomKind.BATHROOM, """
+        bath bathroom toilet wc shower restroom lavatory bad badezimmer dusche bain bains douche
+        sdb toilettes bano aseo banheiro lavabo bagno badkamer badrum baderom lazienka łazienka koupelna
+        banyo tuvalet ванная санузел туалет 욕실 화장실"""),
+    (RoomKind.KITCHEN, """
+        kitchen kitchenette kuche kueche cuisine cocina cucina cozinha keuken kok kjokken kokken
+        kuchnia kuchyn kuchyne mutfak кухня 주방 부엌"""),
+    (RoomKind.BEDROOM, """
+        bed bedroom bedrom guest child nursery kids schlafzimmer kinderzimmer gastezimmer chambre
+        dormitorio habitacion alcoba quarto suite camera cameretta slaapkamer sovrum
+        soverom sovevaerelse sypialnia loznice pokoj yatak спальня детская 침실 안방"""),
+    (RoomKind.DINING, """
+        dining esszimmer comedor manger jantar pranzo eetkamer matsal spisestue jadalnia jidelna
+        yemek столовая 식당"""),
+    (RoomKind.OFFICE, """
+        office study library buro buero bureau arbeitszimmer despacho escritorio estudio biblioteca
+        ufficio studio werkkamer kantoor kontor biuro gabinet pracovna ofis кабинет 서재"""),
+    (RoomKind.LIVING, """
+        living lounge sitting family wohnzimmer salon sejour soggiorno saloon sala salotto estar
+        woonkamer vardagsrum stue stua obyvaci oturma гостиная 거실"""),
+    (RoomKind.HALL, """
+        hall hallway corridor entry entrance entryway foyer landing flur diele stairs lobby gang
+        couloir entree degagement pasillo recibidor entrada corredor corridoio ingresso disimpegno
+        przedpokoj korytarz chodba predsin koridor antre прихожая коридор 현관 복도"""),
 )  # fmt: skip
+
+# Written without spaces: looked for anywhere in the name.
+_WITHIN = (
+    (RoomKind.OUTDOOR, "阳台 陽台 露台 花园 庭院 バルコニー ベランダ テラス"),
+    (RoomKind.STORE, "车库 車庫 储藏 儲藏 洗衣 ガレージ 納戸"),
+    (RoomKind.BATHROOM, "卫生间 衛生間 浴室 厕所 洗手间 トイレ 洗面 風呂"),
+    (RoomKind.KITCHEN, "厨房 廚房 キッチン 台所"),
+    (RoomKind.BEDROOM, "卧室 臥室 主卧 次卧 寝室 子供部屋"),
+    (RoomKind.DINING, "餐厅 餐廳 ダイニング"),
+    (RoomKind.OFFICE, "书房 書房 書斎"),
+    (RoomKind.LIVING, "客厅 客廳 起居 リビング 居間"),
+    (RoomKind.HALL, "走廊 玄关 玄關 过道 廊下 玄関"),
+)
 
 _BED, _SOFA, _TABLE, _DESK, _TOILET, _SINK, _BATHTUB, _FRIDGE = 4, 6, 7, 14, 33, 34, 36, 24
 _LARGE_M2 = 9.0
@@ -43,11 +82,9 @@ _LARGE_M2 = 9.0
 
 def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
     """What the room is for: what it is called, else what the items (those in it) say."""
-    said = " ".join((*room.types, room.name)).casefold()
-    words = set(re.findall(r"[^\W\d]+", said.replace("_", " ")))
-    for kind, names in _WORDS:
-        if words & set(names.split()):
-            return kind
+    named = _named(" ".join((*room.types, room.name)))
+    if named is not None:
+        return named
     has = {item.nyu40 for item in items}
     for kind, classes in (
         (RoomKind.BATHROOM, {_TOILET, _BATHTUB}),
@@ -62,3 +99,22 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
             return kind
     # Small or long rooms without furniture are passages.
     return RoomKind.HALL if area_m2 < _LARGE_M2 else RoomKind.OTHER
+
+
+def _named(said: str) -> RoomKind | None:
+    words = set(re.findall(r"[^\W\d]+", _folded(said)))
+    words |= {w.removesuffix("s") for w in words}
+    for kind, names in _WORDS:
+        if words & {_folded(n) for n in names.split()}:
+            return kind
+    for kind, names in _WITHIN:
+        if any(n in said for n in names.split()):
+            return kind
+    return None
+
+
+def _folded(text: str) -> str:
+    # Without accents; what that takes apart besides (Hangul) is composed again.
+    taken_apart = unicodedata.normalize("NFKD", text.casefold().replace("_", " "))
+    plain = "".join(c for c in taken_apart if not unicodedata.combining(c))
+    return unicodedata.normalize("NFC", plain)
