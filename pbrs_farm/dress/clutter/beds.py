@@ -1,4 +1,4 @@
-"""Pillows and a throw on beds; they take the shape of what they lie on."""
+"""Pillows, cushions and a folded blanket on beds; they take the shape of what they lie on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.generated.made import Made
-from pbrs_farm.dress.generated.soft import bed_pillow, cushion
+from pbrs_farm.dress.generated.soft import bed_pillow, cushion, folded_blanket
 from pbrs_farm.dress.generated.turned import smooth
 from pbrs_farm.dress.supports.exact_heights import heights_under
 from pbrs_farm.dress.supports.find_supports import plan_turn
@@ -49,7 +49,7 @@ class Lying:
 
 
 def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
-    """Put pillows, cushions and now and then a throw on items[index]; how many."""
+    """Put pillows, and now and then a cushion and a blanket, on items[index]; how many."""
     bed = lying_place(scene, index, placing.room)
     if bed is None or bed.width < 0.6 or bed.length < 1.2:
         placing.refuse("no place to lie found")
@@ -67,6 +67,12 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         made = cushion(rng, placing.style)
         at = float(rng.uniform(0.4, 0.6))
         n += lay_down(placing, scene, index, made, *_place(bed, at, 0.75, made), bed.level)
+    if rng.random() < 0.4 * placing.share:
+        # A folded blanket across the foot.
+        made = folded_blanket(rng, placing.style)
+        at = float(rng.uniform(0.35, 0.65))
+        from_head = bed.length - made[0].size[1] - float(rng.uniform(0.08, 0.25))
+        n += lay_down(placing, scene, index, made, *_place(bed, at, from_head, made), bed.level)
     return n
 
 
@@ -152,13 +158,15 @@ def lay_down(
     if others:
         placing.refuse("something lies on the bed or seat")
         return False
+    # What is folded lies flat already; a cushion's middle sinks in.
+    sunk = 1.0 if piece.group == "blanket" else _SUNK
     # Let its middle stand a little above, and press what would be lower up to the surface.
     pressed = []
     most = level + 0.12
     for surface in shape.surfaces:
         points = (surface.positions - [0, half, 0]) @ turn.T + [plan[0], 0, plan[1]]
         ground = heights_under(points[:, [0, 2]], corners, most)
-        points[:, 1] += level + _SUNK * half
+        points[:, 1] += level + sunk * half
         points[:, 1] = np.maximum(points[:, 1], ground + TOUCH_M)
         pressed.append(smooth(surface.name, points, surface.faces))
     put_as_it_is(placing, made, pressed)

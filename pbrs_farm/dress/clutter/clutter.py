@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.dress.clutter.beds import dress_bed
@@ -15,7 +16,7 @@ from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of
 from pbrs_farm.dress.clutter.seats import dress_seat
 from pbrs_farm.dress.clutter.shelves import fill_shelf, plan_shelves
-from pbrs_farm.dress.clutter.tops import fill_top
+from pbrs_farm.dress.clutter.tops import fill_top, set_table
 from pbrs_farm.dress.clutter.worktop import Worktop
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.generated.covers import book_covers
@@ -26,6 +27,7 @@ from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
 _LEAST_SHELF_DEPTH_M = 0.12
 _DOOR_MARGIN_M = 0.02  # around where doors swing
 _BED, _SOFA, _CHAIR = 4, 6, 5
+_LAID = 0.3  # of the dining tables
 
 
 def clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
@@ -84,7 +86,15 @@ def _fill_item(
             if top.depth >= _LEAST_SHELF_DEPTH_M:
                 fill_shelf(placing, top, plan)
         else:
+            if receptacle == "dining_table" and placing.rng.random() < _LAID * placing.share:
+                set_table(placing, top, _chairs(scene, room))
             fill_top(placing, top, receptacle)
+
+
+def _chairs(scene: SceneTriangles, room: RoomSpace) -> list[F64]:
+    """Plan points (2,) of the middles of the room's chairs."""
+    chairs = [k for k in room.items if scene.items[k].nyu40 == _CHAIR]
+    return [scene.bounds[k].mean(0)[[0, 2]] for k in chairs]
 
 
 def _dress_seat(placing: Placing, scene: SceneTriangles, index: int, item: Item) -> None:

@@ -64,6 +64,7 @@ _KINDS: Final[dict[str, Kind]] = {
     "microwave": Kind(("microwave",), most_m=0.6),
     "monitor": Kind(("monitor",), most_m=0.7),
     "ornament": Kind(("ornament",), "ornament", 0.5, True),
+    "one_plate": Kind(made="one_plate", is_round=True),
     "pan": Kind(("pot_pan",), "pan", 0.5),
     "phone": Kind(("phone",), "phone", 0.3),
     "plates": Kind(("plate",), "plates", 0.4, True),

@@ -16,6 +16,7 @@ from pbrs_farm.dress.generated.made import Made
 from pbrs_farm.dress.style import Style
 
 PART = "clutter"
+_NEAR_M = 0.06
 
 
 @dataclass(slots=True)
@@ -70,4 +71,20 @@ class Placing:
         spot = Spot(int(rows[k]), int(columns[k]), *n)
         top.take(spot)
         self.put(made, top.middle(spot), top.grid.turn_rad + float(turn_rad))
+        return True
+
+    def drop_near(self, top: Worktop, made: Made, at: F64) -> bool:
+        """Put the thing at a plan place (2,), or within 6 cm of it; False where it does not fit."""
+        low, high = made[1].bounds
+        rows, columns, n = top.spots(turned_size(high - low, 0.0), margin_m=0.01)
+        if not len(rows):
+            return False
+        places = top.grid.plan_of(columns + n[1] / 2, rows + n[0] / 2)
+        away = np.linalg.norm(places - at, axis=1)
+        k = int(np.argmin(away))
+        if away[k] > _NEAR_M:
+            return False
+        spot = Spot(int(rows[k]), int(columns[k]), *n)
+        top.take(spot)
+        self.put(made, top.middle(spot), top.grid.turn_rad)
         return True

@@ -82,8 +82,16 @@ def glass_of_water(rng: np.random.Generator, style: Style) -> Made:
 
 def plates(rng: np.random.Generator, style: Style) -> Made:
     """A plate, or a few on top of each other."""
+    return _pile(rng, style, int(rng.choice([1, 1, 2, 4, 6])))
+
+
+def one_plate(rng: np.random.Generator, style: Style) -> Made:
+    """A plate to eat from."""
+    return _pile(rng, style, 1)
+
+
+def _pile(rng: np.random.Generator, style: Style, n: int) -> Made:
     r, material = float(rng.uniform(0.1, 0.14)), china(rng, style)
-    n = int(rng.choice([1, 1, 2, 4, 6]))
     parts: list[Part] = []
     for k in range(n):
         outside = [(0, 0), (r * 0.6, 0), (r * 0.72, 0.006), (r, 0.02)]

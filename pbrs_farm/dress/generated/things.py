@@ -38,6 +38,7 @@ GENERATORS: Final[Mapping[str, Generator]] = {
     "kitchen_roll": soft.kitchen_roll,
     "laptop": desk.laptop,
     "mills": tableware.mills,
+    "one_plate": tableware.one_plate,
     "notebook": desk.notebook,
     "ornament": household.ornament,
     "pan": tableware.pan,

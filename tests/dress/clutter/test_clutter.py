@@ -114,3 +114,21 @@ def test_the_table_of_shares_names_kinds_that_exist() -> None:
         for row in rows:
             assert is_known(row.kind), f"{receptacle}: {row.kind}"
             assert 0 < row.share <= 1
+
+
+def test_a_laid_table_has_a_plate_before_each_chair() -> None:
+    table = solid("Table", [1.0, 0, 1.0], [2.6, 0.74, 2.0], 7)
+    chairs = [solid(f"Chair {x}", [x, 0, 0.55], [x + 0.4, 0.45, 0.95], 5) for x in (1.1, 2.0)]
+    for seed in range(30):
+        added = _added(_dressed(house(table, *chairs, name="Dining room"), seed))
+        plates = [i for i in added if i.source_class == "generated#plate"]
+        near = [p for p in plates if p.bounds[1, 2] < 1.4]
+        if (
+            len(near) == 2
+            and len([i for i in added if "glass" in i.source_class or "tumbler" in i.source_class])
+            >= 2
+        ):
+            middles = sorted(p.bounds.mean(0)[0] for p in near)
+            assert middles == pytest.approx([1.3, 2.2], abs=0.15)
+            return
+    pytest.fail("no table was laid")
