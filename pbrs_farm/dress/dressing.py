@@ -1,7 +1,7 @@
 """The stage: a House that looks lived in, from a House, a Catalogue and a seed; no effects.
 
-The parts follow one another as people furnish: surfaces, furniture, lamps, large textiles, what
-hangs on walls, and last what lies about. Then the gates take out what stands wrong.
+The parts follow one another as people furnish: surfaces, furniture and what it is made of, lamps,
+large textiles, what hangs on walls, and last what lies about. The gates take out what stands wrong.
 """
 
 from __future__ import annotations
@@ -9,44 +9,38 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
-from importlib import import_module
-from importlib.util import find_spec
+from typing import Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Piece
 from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.recipe import DressFields
+from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.draft import CHANGED_TAG, Draft
 from pbrs_farm.dress.gates import group_of, keep_gates, part_of, piece_id
+from pbrs_farm.dress.lamps import lamps
+from pbrs_farm.dress.parts import parts
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
 from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.surfaces import surfaces
+from pbrs_farm.dress.swap import swap
+from pbrs_farm.dress.textiles import textiles_large
+from pbrs_farm.dress.walls import walls
 
 Part = Callable[[Draft, Catalogue, Style, float], None]
 
 
-def _parts(*names: tuple[str, str, str]) -> tuple[tuple[str, Part], ...]:
-    # A part that has not landed yet is left out.
-    found = []
-    for field, module, name in names:
-        place = f"pbrs_farm.dress.{module}"
-        if find_spec(place) is not None and hasattr(import_module(place), name):
-            found.append((field, getattr(import_module(place), name)))
-    return tuple(found)
+_FURNITURE: Final[tuple[tuple[str, Part], ...]] = (("surfaces", surfaces), ("swap", swap))
+"""Field of the recipe that holds the part's share, and the part, in the order they are done."""
 
-
-_FURNITURE = _parts(
-    ("surfaces", "surfaces", "surfaces"), ("swap", "swap", "swap"), ("parts", "parts", "parts")
+_THINGS: Final[tuple[tuple[str, Part], ...]] = (
+    ("parts", parts),
+    ("lamps", lamps),
+    ("textiles", textiles_large),
+    ("walls", walls),
+    ("clutter", clutter),
 )
-"""Field of the recipe that holds the part's share, and the part: what changes the home's own things."""
-
-_THINGS = _parts(
-    ("lamps", "lamps", "lamps"),
-    ("textiles", "textiles", "textiles_large"),
-    ("walls", "walls", "walls"),
-    ("clutter", "clutter", "clutter"),
-    ("textiles", "textiles", "textiles_small"),
-)
-"""The same of the parts that add things, in the order they are done."""
+"""The same of what is done when it is known which furniture stays."""
 
 
 def dress(
@@ -62,8 +56,8 @@ def dress(
     pieces = {p.id: p for p in catalogue.pieces}
     gates: tuple[Gate, ...] = ()
     # Put back what stands wrong before things are laid on it, then look at everything.
-    for parts in (_FURNITURE, _THINGS):
-        for field, part in parts:
+    for several in (_FURNITURE, _THINGS):
+        for field, part in several:
             share = float(getattr(fields, field))
             if share > 0:
                 part(draft, catalogue, style, share)

@@ -20,9 +20,12 @@ from pbrs_farm.dress.gates.bodies import Body, boxes_of, corners_of
 from pbrs_farm.dress.gates.plumb import Plumb
 
 MOST_M: Final = 0.002
+_ROUNDING_M: Final = 1e-5  # of single precision
 _RING_M: Final = 0.003  # above the lowest point of a thing: what it stands on
 _MOST_PLACES: Final = 12  # of one thing
 _REACH_M: Final = 0.3  # up or down, that a gap is told of
+_ALL: Final = 1_000_000
+_PAIRS: Final = 1_000_000  # of vertex and face at once
 _SOFT: Final = frozenset({"blanket", "throw", "towel", "pillow", "cushion", "curtain"})
 
 
@@ -36,7 +39,7 @@ class Held:
     @property
     def is_good(self) -> bool:
         """Whether it neither floats nor sinks."""
-        return abs(self.gap_m) <= MOST_M
+        return abs(self.gap_m) <= MOST_M + _ROUNDING_M
 
 
 def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[int, Held]:
@@ -97,7 +100,7 @@ def _standing(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> d
             continue
         gaps = gap[first:last]
         nearest = float(gaps[np.argmin(np.abs(gaps))])
-        by = np.unique(body[first:last][np.abs(gaps) <= MOST_M])
+        by = np.unique(body[first:last][np.abs(gaps) <= MOST_M + _ROUNDING_M])
         found[int(own[first])] = Held(nearest, tuple(int(b) for b in by))
     return found
 
@@ -139,20 +142,30 @@ def _distance_m(a: Body, b: Body) -> float:
 
 
 def _vertices_to_faces(a: Body, b: Body) -> float:
-    # Look at vertices and faces near the other's box alone.
+    # Look for what touches; tell a gap by some vertices alone where nothing does.
+    for reach, most in ((2 * MOST_M, _ALL), (_REACH_M / 10, 400)):
+        i, j = _near(a, b, reach, most)
+        if len(i):
+            return float(distances_to_triangles(i, j).min())
+    return _REACH_M
+
+
+def _near(a: Body, b: Body, reach: float, most: int) -> tuple[F64, F64]:
+    """Vertices (N, 3) of a and faces (N, 3, 3) of b whose boxes come as near as reach to each other."""
     points = a.corners.reshape(-1, 3)
-    reach = _REACH_M / 10
     points = points[((points > b.low - reach) & (points < b.high + reach)).all(1)]
     points = np.unique(points, axis=0)
+    points = points[:: max(1, len(points) // most)]
     corners = b.corners
     near = (corners.min(1) < a.high + reach).all(1) & (corners.max(1) > a.low - reach).all(1)
     corners = corners[near]
-    if not len(points) or not len(corners):
-        return _REACH_M
-    points = points[:: max(1, len(points) // 400)]
-    # Leave out pairs that lie apart by their boxes.
     low, high = corners.min(1) - reach, corners.max(1) + reach
-    i, j = np.nonzero((points[:, None] > low).all(-1) & (points[:, None] < high).all(-1))
-    if not len(i):
-        return _REACH_M
-    return float(distances_to_triangles(points[i], corners[j]).min())
+    found_i, found_j = [np.zeros((0, 3))], [np.zeros((0, 3, 3))]
+    # Compare some vertices at a time: meshes of thousands have millions of pairs.
+    step = max(1, _PAIRS // max(len(corners), 1))
+    for first in range(0, len(points), step):
+        part = points[first : first + step]
+        i, j = np.nonzero(((part[:, None] > low) & (part[:, None] < high)).all(-1))
+        found_i.append(part[i])
+        found_j.append(corners[j])
+    return np.concatenate(found_i), np.concatenate(found_j)
