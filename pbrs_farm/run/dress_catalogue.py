@@ -1,6 +1,7 @@
 """The catalogue that a command or a step dresses homes with, read once a process.
 
-Effects: reads the cached packages and the user's libraries; downloads nothing unless asked.
+Effects: reads the cached packages and the user's libraries, keeps the shapes that were read in the
+cache; downloads nothing unless asked.
 """
 
 from __future__ import annotations
@@ -56,6 +57,11 @@ def _cached_names() -> frozenset[str]:
     return frozenset(p.name.split("_")[0] for p in folder.glob("*.deb"))
 
 
+def _store() -> Path:
+    # Beside the packages: what was read of their models.
+    return cache_folder() / "shapes"
+
+
 def _stamp(path: Path) -> int:
     # A library that changes is read anew.
     return path.stat().st_mtime_ns if path.exists() else 0
@@ -65,12 +71,13 @@ def _stamp(path: Path) -> int:
 def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
     # None: no package is wanted.
     if has_package is None:
-        return catalogue_from((), given=[path for path, _ in given])
+        return catalogue_from((), given=[path for path, _ in given], store=_store())
     package, program = furniture.cached() if has_package else None, homes.cached()
     catalogue = catalogue_from(
         package.libraries if package else (),
         jar=program.jar if program else None,
         given=[path for path, _ in given],
+        store=_store(),
     )
     if package is not None:
         note = package.note and Note("package-version", furniture.PACKAGE, package.note)

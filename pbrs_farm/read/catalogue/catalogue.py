@@ -25,6 +25,7 @@ from pbrs_farm.read.catalogue.library_files import (
 from pbrs_farm.read.catalogue.library_shapes import library_shape
 from pbrs_farm.read.catalogue.model_folder import model_folder
 from pbrs_farm.read.catalogue.piece_groups import GroupRule, Verdict, group_rule, verdicts
+from pbrs_farm.read.catalogue.shape_store import ShapeStore
 from pbrs_farm.read.catalogue.surface_pictures import (
     JAR_TEXTURES,
     TEXTURES,
@@ -33,7 +34,8 @@ from pbrs_farm.read.catalogue.surface_pictures import (
 )
 
 VERSION: Final = 1
-"""Of the rules and the tables: part of the digest. Raised when a piece changes."""
+"""Of the rules, the tables and the reading of models: part of the digest, and of what stored shapes
+are known by. Raised when a piece or its shape changes."""
 _AS_WRITTEN: Final = Verdict("", 0.0, "")
 
 Loader = Callable[[], Shape | None]
@@ -49,13 +51,15 @@ class Found:
 
 
 def catalogue_from(
-    libraries: Sequence[Path], *, jar: Path | None = None, given: Sequence[Path] = ()
-) -> Catalogue:
+    libraries: Sequence[Path], *, jar: Path | None = None, given: Sequence[Path] = (),
+    store: Path | None = None,
+) -> Catalogue:  # fmt: skip
     """The catalogue of all libraries; an id that comes again goes to the later library.
 
     libraries: .sh3f files of the packages. jar: the program's, with its own models. given: the
-    user's .sh3f files. What is damaged becomes a note; BadInput for a path that does not exist
-    or is nothing of the kind.
+    user's .sh3f and .sh3t libraries and folders of models. store: a folder to keep shapes in once
+    they are read. What is damaged becomes a note; BadInput for a path that does not exist or is
+    nothing of the kind.
     """
     notes = LibraryNotes()
     found = []
@@ -66,11 +70,13 @@ def catalogue_from(
     found += [_given(path, notes) for path in given]
     held = [f for f in found if f is not None]
     # Later libraries replace pieces of earlier ones.
+    shapes = ShapeStore(store) if store is not None else None
     pieces: dict[str, Piece] = {}
     loaders: dict[str, Loader] = {}
     for library in held:
         for piece, loader in library.pieces:
-            pieces[piece.id], loaders[piece.id] = piece, loader
+            pieces[piece.id] = piece
+            loaders[piece.id] = _stored(shapes, library.sha256, piece, loader)
     return Catalogue(
         pieces=tuple(pieces.values()),
         load=lambda piece: loaders[piece.id]() if piece.id in loaders else None,
@@ -78,6 +84,13 @@ def catalogue_from(
         pictures=tuple({p.texture.id: p for f in held for p in f.pictures}.values()),
         notes=tuple(notes.found),
     )
+
+
+def _stored(shapes: ShapeStore | None, sha256: str, piece: Piece, load: Loader) -> Loader:
+    if shapes is None:
+        return load
+    key = (VERSION, sha256, piece.id, piece.group, piece.place.value)
+    return lambda: shapes.shape(key, load)
 
 
 def _given(path: Path, notes: LibraryNotes) -> Found | None:

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from pbrs_farm.core.catalogue import Shape
+from pbrs_farm.core.house import LightPart, Material, MaterialKind, Texture
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.primitives import box, sphere
+from pbrs_farm.read.catalogue.catalogue import catalogue_from
+from pbrs_farm.read.catalogue.shape_store import ShapeStore
+from tests.read.catalogue.small_library import entry, library
+
+
+def _shape() -> Shape:
+    texture = Texture("ab", "a.png", "image/png", b"\x89PNG\0")
+    materials = (
+        Material("glass", MaterialKind.GLASS, (0.1, 1 / 3, 0.7), roughness=0.2),
+        Material("w", texture_id="ab"),
+    )
+    light = LightPart((0.1, 0.2, 0.3), 0.03, 0.5, PowerUnit.SWEETHOME3D, emitting=(1,))
+    surfaces = (box("b", np.zeros(3), np.ones(3), 0), sphere("s", np.zeros(3), 1 / 3, 1))
+    return Shape(surfaces, materials, {"ab": texture}, (light,))
+
+
+def _never() -> Shape | None:
+    raise AssertionError("it was stored")
+
+
+def test_a_stored_shape_has_the_same_bits(tmp_path: Path) -> None:
+    store, made = ShapeStore(tmp_path / "s"), _shape()
+    assert store.shape(("a", 1), lambda: made) is made
+    again = store.shape(("a", 1), _never)
+    assert again is not None
+    assert (again.materials, again.textures, again.lights) == (
+        made.materials, made.textures, made.lights,
+    )  # fmt: skip
+    for one, two in zip(again.surfaces, made.surfaces, strict=True):
+        assert (one.name, one.material) == (two.name, two.material)
+        for name in ("positions", "faces", "uvs", "normals"):
+            assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+def test_a_model_that_cannot_be_used_is_not_tried_again(tmp_path: Path) -> None:
+    store = ShapeStore(tmp_path)
+    assert store.shape(("a",), lambda: None) is None
+    assert store.shape(("a",), _never) is None
+
+
+@pytest.mark.parametrize("data", [b"", b"PK\3\4", b"nothing"])
+def test_a_damaged_file_is_made_anew(tmp_path: Path, data: bytes) -> None:
+    store = ShapeStore(tmp_path)
+    store.shape(("a",), _shape)
+    (file,) = tmp_path.iterdir()
+    file.write_bytes(data)
+    assert store.shape(("a",), _shape) is not None
+    assert store.shape(("a",), _never) is not None
+
+
+def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert ShapeStore(tmp_path / "file" / "below").shape(("a",), _shape) is not None
+
+
+def test_a_catalogue_with_a_store_gives_the_shapes_of_one_without(tmp_path: Path) -> None:
+    path, kept = library(tmp_path, [entry("Dresser")]), tmp_path / "kept"
+    plain, first, second = (
+        c.shape(c.pieces[0])
+        for c in (catalogue_from([path]), *(catalogue_from([path], store=kept) for _ in range(2)))
+    )
+    assert plain is not None
+    assert first is not None
+    assert second is not None
+    assert_array_equal(first.bounds, plain.bounds)
+    assert_array_equal(second.surfaces[0].positions, plain.surfaces[0].positions)
