@@ -150,6 +150,11 @@ def _is_free(
     if np.abs(lowest_above(room.above, ring, room.room.floor_y + 0.5) - top_y).max() > 0.001:
         return False
     bottom = top_y - float(high[1]) - 0.05
+    if bottom < max((d.top_y for d in room.doors), default=-np.inf) + 0.05:
+        sides = [(d, d.side_of(room.room.id)) for d in room.doors]
+        before = [d.before(s).union(d.swing(s)) for d, s in sides if s is not None]
+        if shapely.intersects(shapely.union_all(before), shapely.Point(place).buffer(radius)):
+            return False
     return space.is_free(
         np.array([place[0] - radius, bottom, place[1] - radius]),
         np.array([place[0] + radius, top_y, place[1] + radius]),

@@ -9,7 +9,7 @@ import shapely
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place, Shape
-from pbrs_farm.core.house import Item, Material, Surface
+from pbrs_farm.core.house import Item, ItemKind, Material, Surface
 from pbrs_farm.core.primitives import box, sphere
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
@@ -105,7 +105,7 @@ def hang_curtains(
     panels = []
     cover = float(rng.uniform(0.15, 0.25)) * window.width
     for sign in (-1, 1):
-        found = _panel_place(space, room, seen, sign, cover, rod_y, out, window.item_id, draft)
+        found = _panel_place(space, room, seen, sign, cover, rod_y, out, draft)
         if found is not None:
             panels.append(found)
     if not panels:
@@ -120,12 +120,12 @@ def hang_curtains(
 
 def _panel_place(
     space: HouseSpace, room: RoomSpace, seen: WindowSide, sign: int, cover: float, rod_y: float,
-    out: float, window_id: str | None, draft: Draft,
+    out: float, draft: Draft,
 ) -> tuple[float, float, float] | None:  # fmt: skip
     """x0, x1 across and the lowest y of a panel at one end of the window; None = no room."""
     half = seen.window.width / 2
     sill = seen.window.bottom_y
-    without = [n for n, i in enumerate(draft.items) if i.id == window_id]
+    without = [n for n, i in enumerate(draft.items) if i.kind is ItemKind.WINDOW]
     free = shapely.difference(room.area, room.walls)
     for beyond in (0.17, 0.12, 0.07):
         inner, outer = sign * (half - cover), sign * (half + beyond)

@@ -100,7 +100,8 @@ def _by_bed(
     if half[0] > 0.6 and rng.random() < 0.65:
         wide = 2 * float(half[0]) + float(rng.uniform(0.7, 1.1))
         at = box.centre + front * float(half[2]) * 0.45
-        sizes = [(w, min(wide, 3.0)) for w in (2.0, 1.7, 1.4)] + [(1.4, wide - 0.4)]
+        narrow = 2 * float(half[0]) + 0.3
+        sizes = [(w, min(long, 3.0)) for long in (wide, narrow) for w in (2.0, 1.7, 1.4)]
         if _lay_largest(draft, space, room, style, rng, at, turn, sizes, from_wall=0.1):
             return
     for sign in (1.0, -1.0):

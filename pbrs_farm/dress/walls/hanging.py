@@ -17,7 +17,7 @@ from pbrs_farm.dress.space import RoomSpace, WallFace
 from pbrs_farm.dress.space.wall_faces import CELL_M
 
 GAP_M = 0.0008  # between a wall's face and the back of what hangs on it
-_LEAF_M = 0.03  # before a wall: where the leaf of a door would stand
+_LEAF_M = (0.03, 0.12, 0.22)  # before a wall: where the leaf of a door would stand
 IN_FRONT_M = 0.35  # that a picture needs free to be seen
 
 
@@ -64,10 +64,12 @@ class Hanging:
 def _clear_of_doors(face: WallFace, doors: Sequence[tuple[BaseGeometry, float]]) -> WallFace:
     """The face without what a door's leaf would hit, below the door's top."""
     columns = (np.arange(face.clear.shape[1]) + 0.5) * CELL_M
-    places = face.origin + columns[:, None] * face.along + _LEAF_M * face.normal
     clear = face.clear
     for area, top_y in doors:
-        hit = shapely.contains_xy(area.buffer(CELL_M), places[:, 0], places[:, 2])
+        hit = np.zeros(len(columns), bool)
+        for out_m in _LEAF_M:
+            places = face.origin + columns[:, None] * face.along + out_m * face.normal
+            hit |= shapely.contains_xy(area.buffer(CELL_M), places[:, 0], places[:, 2])
         if hit.any():
             clear = clear.copy()
             clear[: max(int((top_y - face.low_y) / CELL_M), 0), hit] = 0.0
