@@ -2,16 +2,110 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import permutations
+from typing import Final
+
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.generate.furnish.briefs import Brief, brief_of
+from pbrs_farm.generate.furnish.ceiling import ceiling_lamps
+from pbrs_farm.generate.furnish.places import Places, places_of
+from pbrs_farm.generate.furnish.room_space import RoomSpace, room_space
+from pbrs_farm.generate.furnish.search import Arrangement, arranged
+from pbrs_farm.generate.furnish.shelf import Shelf, style_of
+from pbrs_farm.generate.furnish.template import Group
+from pbrs_farm.generate.furnish.walking import WalkMap
 from pbrs_farm.generate.furniture import PlacedPiece
-from pbrs_farm.generate.plan import Plan
+from pbrs_farm.generate.plan import Plan, Rect, RoomType
+
+_ORDER: Final = (RoomType.KITCHEN, RoomType.LIVING, RoomType.STUDIO)  # then the others
+_MOST_ORDERS: Final = 6
+_ON_FLOOR_M: Final = 0.05
 
 
 def furnished(
     plan: Plan, catalogue: Catalogue, rng: np.random.Generator, style: str = ""
 ) -> tuple[PlacedPiece, ...]:
-    """The furniture of every room; none where the catalogue is empty."""
-    del plan, catalogue, rng, style
-    return ()
+    """The furniture of every room; what the catalogue lacks is left out. Raises BadInput (style)."""
+    shelf = Shelf(catalogue, rng, style_of(style, rng))
+    seeds = rng.integers(2**63, size=len(plan.rooms))
+    found: dict[int, list[PlacedPiece]] = {}
+    numbers = sorted(range(len(plan.rooms)), key=lambda i: (_rank(plan.rooms[i].type), i))
+    for number in numbers:
+        room_rng = np.random.default_rng(int(seeds[number]))
+        space = room_space(plan, number)
+        others = [ground(p) for pieces in found.values() for p in pieces if p.elevation < 0.4]
+        brief = brief_of(plan, space, shelf, room_rng)
+        placed = arrangement_of(brief, space, others, room_rng)
+        pieces = [p for s in placed.standing for p in s.pieces(number)]
+        pieces += ceiling_lamps(space, plan.rooms[number].type, pieces, shelf)
+        found[number] = pieces
+    return tuple(p for number in sorted(found) for p in found[number])
+
+
+def _rank(type_: RoomType) -> int:
+    # An open kitchen stands before the living room that shares its floor.
+    return _ORDER.index(type_) if type_ in _ORDER else len(_ORDER)
+
+
+def arrangement_of(
+    brief: Brief, space: RoomSpace, others: list[Rect], rng: np.random.Generator
+) -> Arrangement:
+    """What stands in a room: all that must, what may, then fillers; others: of the open rooms."""
+    walk = WalkMap(space, others)
+    groups = [g for g in brief.groups if g.templates or _is_kitchen(g, brief)]
+    places = [brief.kitchen or places_of(g, space, rng) if not g.templates else places_of(g, space, rng) for g in groups]
+    best = arranged(groups, places, walk)
+    # Try the groups in other orders where one that must stand does not.
+    if best.missing:
+        best = _other_orders(groups, places, walk, best)
+    return _filled(best, brief, space, walk, rng)
+
+
+def _is_kitchen(group: Group, brief: Brief) -> bool:
+    return group.name == "kitchen" and brief.kitchen is not None
+
+
+def _other_orders(
+    groups: list[Group], places: list[Places], walk: WalkMap, best: Arrangement
+) -> Arrangement:
+    must = [k for k, g in enumerate(groups) if g.is_required]
+    may = [k for k in range(len(groups)) if k not in must]
+    for order in list(permutations(must))[:_MOST_ORDERS]:
+        row = [*order, *may]
+        tried = arranged(
+            [groups[k] for k in row], [places[k] for k in row], walk, roots=12, nodes=25
+        )
+        if tried.score > best.score:
+            best = tried
+        if not best.missing:
+            break
+    return best
+
+
+def _filled(
+    start: Arrangement, brief: Brief, space: RoomSpace, walk: WalkMap, rng: np.random.Generator
+) -> Arrangement:
+    """Add fillers until the room is as full as people's are, or one could hardly walk."""
+    filled = start
+    for group in brief.fillers:
+        wanted = brief.density * space.area
+        n = sum(s.elevation < _ON_FLOOR_M for p in filled.standing for s in p.template.slots)
+        if n + 0.5 > wanted or not group.templates:
+            continue
+        optional = replace(group, is_required=False)
+        tried = arranged(
+            [optional], [places_of(optional, space, rng)], walk, start=filled, roots=3, nodes=0,
+            least_share=brief.least_share,
+        )
+        if len(tried.standing) > len(filled.standing):
+            filled = tried
+    return filled
+
+
+def ground(piece: PlacedPiece) -> Rect:
+    """The rectangle around a piece's corners."""
+    xs, zs = [p[0] for p in piece.corners], [p[1] for p in piece.corners]
+    return min(xs), min(zs), max(xs), max(zs)

@@ -1,0 +1,249 @@
+"""A room as furniture sees it: walls to stand at, doors and windows to keep free; no effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from shapely.geometry import Polygon, box
+from shapely.ops import unary_union
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.generate.furnish.template import Frame
+from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, Point, Rect
+
+BEFORE_DOOR_M: Final = 0.8
+BEFORE_FRENCH_M: Final = 0.6
+_BEFORE_WINDOW_M: Final = 0.4
+_OPEN_M: Final = 0.9  # kept free along the middle of a side without a wall
+_EPSILON: Final = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """A straight stretch of wall from its left end, seen from the room."""
+
+    frame: Frame
+    length: float
+    is_left_corner: bool  # whether another wall meets it there, inside the room
+    is_right_corner: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """What must not be hidden: the strip before a window."""
+
+    zone: Rect
+    sill: float
+    middle: Point
+    wall: int  # index into RoomSpace.walls; -1 = none
+    low: float  # along that wall
+    high: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomSpace:
+    """One room of a plan, or a part of it."""
+
+    number: int
+    polygon: Polygon
+    walk_polygon: Polygon  # with the rooms that no wall parts from it
+    walls: tuple[Wall, ...]
+    outside: F64  # (N, 4) rectangles around the polygon
+    doors: F64  # (D, 4) rectangles before doors, on either side, swings included
+    ways: tuple[Rect, ...]  # what a way must join: before each door and open side
+    windows: tuple[Window, ...]
+    height: float
+
+    @property
+    def bounds(self) -> Rect:
+        """Around the polygon."""
+        x0, z0, x1, z1 = self.polygon.bounds
+        return x0, z0, x1, z1
+
+    @property
+    def area(self) -> float:
+        """Square metres."""
+        return float(self.polygon.area)
+
+
+def room_space(plan: Plan, number: int) -> RoomSpace:
+    """The space of a room of the plan."""
+    room = plan.rooms[number]
+    polygon = Polygon(room.polygon)
+    neighbours = _open_neighbours(plan, number)
+    walls = _walls(room.polygon, [n for _, n in neighbours])
+    doors, ways, windows = [], [], []
+    for opening in plan.openings_of(number):
+        frame = _seen_from(plan, opening, polygon)
+        if frame is None:
+            continue
+        half = opening.width / 2
+        if opening.kind is OpeningKind.WINDOW:
+            windows.append(_window(opening, frame, walls, _BEFORE_WINDOW_M))
+            continue
+        is_french = opening.kind is OpeningKind.FRENCH_WINDOW
+        swings = opening.room == number and not is_french
+        depth = max(BEFORE_DOOR_M, opening.width) if swings else BEFORE_DOOR_M
+        if is_french:
+            windows.append(_window(opening, frame, walls, BEFORE_FRENCH_M))
+            depth = BEFORE_FRENCH_M
+        doors.append(frame.rect((-half, 0.0, half, depth)))
+        if not is_french or opening.other is not None:
+            ways.append(frame.rect((-half + 0.15, 0.2, half - 0.15, 0.75)))
+    for rect in _open_sides(room.polygon, [n for _, n in neighbours]):
+        ways.append(rect[0])
+        doors.append(rect[1])
+    return RoomSpace(
+        number, polygon, unary_union([polygon, *(n.buffer(_EPSILON) for _, n in neighbours)]),
+        walls, outside_of(polygon), np.array(doors).reshape(-1, 4), tuple(ways), tuple(windows),
+        plan.height,
+    )  # fmt: skip
+
+
+def outside_of(polygon: Polygon) -> F64:
+    """(N, 4) rectangles: the rim around a rectilinear polygon, and what its bounds hold beyond it."""
+    x0, z0, x1, z1 = polygon.bounds
+    far = 3.0
+    rects = [
+        (x0 - far, z0 - far, x0, z1 + far), (x1, z0 - far, x1 + far, z1 + far),
+        (x0 - far, z0 - far, x1 + far, z0), (x0 - far, z1, x1 + far, z1 + far),
+    ]  # fmt: skip
+    # Cut the bounds along every corner; keep the cells whose middle lies beyond.
+    points = list(polygon.exterior.coords)
+    xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})
+    for xa, xb in zip(xs, xs[1:], strict=False):
+        for za, zb in zip(zs, zs[1:], strict=False):
+            cell = box(xa, za, xb, zb)
+            if polygon.intersection(cell).area < 0.999 * cell.area:
+                rects.append((xa, za, xb, zb))
+    return np.array(rects)
+
+
+def _open_neighbours(plan: Plan, number: int) -> list[tuple[int, Polygon]]:
+    """Rooms that share a stretch of outline with it: no wall stands between."""
+    own = Polygon(plan.rooms[number].polygon)
+    found = []
+    for other, room in enumerate(plan.rooms):
+        polygon = Polygon(room.polygon)
+        if other != number and own.distance(polygon) < _EPSILON:
+            common = own.buffer(2 * _EPSILON).intersection(polygon)
+            if common.area > 0.5 * 2 * _EPSILON:
+                found.append((other, polygon))
+    return found
+
+
+def _walls(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> tuple[Wall, ...]:
+    """The sides of a room, cut where it is open."""
+    near = unary_union([p.buffer(2 * _EPSILON) for p in open_to])
+    n, found = len(corners), []
+    for i, a in enumerate(corners):
+        b, before, after = corners[(i + 1) % n], corners[i - 1], corners[(i + 2) % n]
+        length = math.dist(a, b)
+        if length < 0.3 or min(abs(b[0] - a[0]), abs(b[1] - a[1])) > 0.02:
+            continue
+        dx, dz = round((b[0] - a[0]) / length), round((b[1] - a[1]) / length)
+        frame = Frame(a[0], a[1], dx, dz)
+        # An inner corner turns left, since the outline is anticlockwise.
+        left = _turn(before, a, b) > 0
+        right = _turn(a, b, after) > 0
+        for low, high in _solid(frame, length, near):
+            start = Frame(*frame.point(low, 0.0), dx, dz)
+            found.append(
+                Wall(start, high - low, left and low < 0.01, right and high > length - 0.01)
+            )
+    return tuple(found)
+
+
+def _turn(a: Point, b: Point, c: Point) -> float:
+    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+
+
+def _solid(frame: Frame, length: float, near: Polygon) -> list[tuple[float, float]]:
+    """Stretches of a side that are not open, by samples every 2.5 cm."""
+    if near.is_empty:
+        return [(0.0, length)]
+    n = max(int(length / 0.025), 2)
+    at = np.linspace(0, length, n + 1)
+    middles = (at[1:] + at[:-1]) / 2
+    probe = [box(*_around(frame.point(float(u), -0.0))) for u in middles]
+    is_open = [near.intersection(p).area > 0 for p in probe]
+    found, start = [], None
+    for k, opened in enumerate([*is_open, True]):
+        if not opened and start is None:
+            start = float(at[k])
+        if opened and start is not None:
+            if float(at[k]) - start >= 0.3:
+                found.append((start, float(at[k])))
+            start = None
+    return found
+
+
+def _around(point: Point) -> Rect:
+    return point[0] - 1e-4, point[1] - 1e-4, point[0] + 1e-4, point[1] + 1e-4
+
+
+def _open_sides(
+    corners: tuple[Point, ...], open_to: Iterable[Polygon]
+) -> list[tuple[Rect, Rect]]:
+    """(what a way must reach, what stays free) for each open side."""
+    near = unary_union([p.buffer(2 * _EPSILON) for p in open_to])
+    found = []
+    if near.is_empty:
+        return []
+    for i, a in enumerate(corners):
+        b = corners[(i + 1) % len(corners)]
+        length = math.dist(a, b)
+        if length < 0.3:
+            continue
+        frame = Frame(a[0], a[1], (b[0] - a[0]) / length, (b[1] - a[1]) / length)
+        walls = _solid(frame, length, near)
+        if walls == [(0.0, length)]:
+            continue
+        # The longest gap between its walls is the way through.
+        ends = [0.0, *(x for pair in walls for x in pair), length]
+        gaps = sorted(
+            ((ends[k], ends[k + 1]) for k in range(0, len(ends), 2)), key=lambda g: g[0] - g[1]
+        )
+        low, high = gaps[0]
+        if high - low < 0.7:
+            continue
+        middle = (low + high) / 2
+        half = min(_OPEN_M, high - low) / 2
+        reach = frame.rect((low + 0.1, 0.0, high - 0.1, 0.5))
+        found.append((reach, frame.rect((middle - half, 0.0, middle + half, BEFORE_DOOR_M))))
+    return found
+
+
+def _seen_from(plan: Plan, opening: PlanOpening, polygon: Polygon) -> Frame | None:
+    """The frame in the middle of an opening on the wall's face, v into the room."""
+    wall = plan.walls[opening.wall]
+    x, z = wall.at(opening.along)
+    half = wall.thickness / 2
+    is_vertical = wall.start[0] == wall.end[0]
+    for side in (1.0, -1.0):
+        nx, nz = (side, 0.0) if is_vertical else (0.0, side)
+        inner = box(*_around((x + nx * (half + 0.05), z + nz * (half + 0.05))))
+        if polygon.intersects(inner):
+            # v is the normal: u = (nz, -nx).
+            return Frame(x + nx * half, z + nz * half, nz, -nx)
+    return None
+
+
+def _window(opening: PlanOpening, frame: Frame, walls: tuple[Wall, ...], depth: float) -> Window:
+    half = opening.width / 2
+    number, low, high = -1, 0.0, 0.0
+    for k, wall in enumerate(walls):
+        f = wall.frame
+        if (round(f.dx), round(f.dz)) != (round(frame.dx), round(frame.dz)):
+            continue
+        along = (frame.x - f.x) * f.dx + (frame.z - f.z) * f.dz
+        across = -(frame.x - f.x) * f.dz + (frame.z - f.z) * f.dx
+        if abs(across) < 0.05 and -half < along < wall.length + half:
+            number, low, high = k, along - half, along + half
+            break
+    zone = frame.rect((-half, 0.0, half, depth))
+    return Window(zone, opening.sill, (frame.x, frame.z), number, low, high)

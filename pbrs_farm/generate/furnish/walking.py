@@ -1,0 +1,90 @@
+"""Where one can walk in a room, on a bitmap of 5 cm; no effects, no random numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.core.arrays import Bools
+from pbrs_farm.generate.furnish.room_space import RoomSpace
+from pbrs_farm.generate.plan import Rect
+
+CELL_M: Final = 0.05
+WALK_M: Final = 0.6  # the width of a way
+_RADIUS: Final = WALK_M / 2 / CELL_M  # cells
+
+
+class WalkMap:
+    """The free floor of a room; furniture is marked on copies."""
+
+    def __init__(self, space: RoomSpace, standing: Iterable[Rect] = ()) -> None:
+        x0, z0, x1, z1 = space.walk_polygon.bounds
+        self._origin = x0 - 2 * CELL_M, z0 - 2 * CELL_M
+        shape = math.ceil((z1 - z0) / CELL_M) + 4, math.ceil((x1 - x0) / CELL_M) + 4
+        xx, zz = np.meshgrid(
+            self._origin[0] + (np.arange(shape[1]) + 0.5) * CELL_M,
+            self._origin[1] + (np.arange(shape[0]) + 0.5) * CELL_M,
+        )
+        self._inside: Bools = shapely.contains_xy(space.polygon, xx, zz)
+        self._floor: Bools = shapely.contains_xy(space.walk_polygon, xx, zz)
+        self.free = self.with_bodies(self._floor, standing)
+        # A way that an empty room does not have is not asked for.
+        ways = self._ways(self.free)
+        self._start = space.ways[0] if space.ways else None
+        region = self._region(ways, self._start)
+        self._joined = [w for w in space.ways if region is not None and self._meets(region, w)]
+
+    def with_bodies(self, free: Bools, rects: Iterable[Rect]) -> Bools:
+        """The free floor without what stands on rectangles."""
+        left = free.copy()
+        for rect in rects:
+            left[self._cells(rect)] = False
+        return left
+
+    def reached(self, free: Bools, fronts: Iterable[Rect]) -> Bools | None:
+        """(H, W) middles of a man who came in by the doors; None where a door or front is cut off."""
+        region = self._region(self._ways(free), self._start)
+        if region is None:
+            return None
+        if all(self._meets(region, r) for r in (*self._joined, *fronts)):
+            return region
+        return None
+
+    def share(self, region: Bools) -> float:
+        """Share of the room's floor that ways 0.6 m wide cover."""
+        if not region.any():
+            return 0.0
+        near = ndimage.distance_transform_edt(~region) <= _RADIUS
+        return float((near & self._inside).sum() / max(self._inside.sum(), 1))
+
+    def _cells(self, rect: Rect) -> tuple[slice, slice]:
+        # A cell counts if its middle lies within.
+        def span(low: float, high: float, origin: float) -> slice:
+            a = math.ceil((low - origin) / CELL_M - 0.5 - 1e-6)
+            b = math.floor((high - origin) / CELL_M - 0.5 + 1e-6) + 1
+            return slice(max(a, 0), max(b, 0))
+
+        return span(rect[1], rect[3], self._origin[1]), span(rect[0], rect[2], self._origin[0])
+
+    def _ways(self, free: Bools) -> NDArray[np.int32]:
+        middles = ndimage.distance_transform_edt(free) >= _RADIUS - 1e-9
+        labels, _ = ndimage.label(middles)
+        return np.asarray(labels, np.int32)
+
+    def _region(self, ways: NDArray[np.int32], start: Rect | None) -> Bools | None:
+        """The way that begins at a rectangle; the largest where there is none."""
+        area = ways[self._cells(start)] if start else ways
+        counts = np.bincount(area.ravel(), minlength=1)
+        counts[0] = 0
+        if not counts.any():
+            return None
+        return np.asarray(ways == int(counts.argmax()))
+
+    def _meets(self, region: Bools, rect: Rect) -> bool:
+        return bool(region[self._cells(rect)].any())
