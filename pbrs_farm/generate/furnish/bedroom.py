@@ -59,7 +59,12 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
             rank = 0.4 * (stand is not None)
             found.append(
                 Template(
-                    "in a corner", tuple(slots), (side,), (front,), Stand.CORNER, rank=rank + 0.3,
+                    "in a corner",
+                    tuple(slots),
+                    (side,),
+                    (front,),
+                    Stand.CORNER,
+                    rank=rank + 0.3,
                     liking=_BED_LIKES,
                 )
             )
@@ -68,8 +73,13 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
         front = (-length / 2 + 0.3, 0.02 + width, length / 2, 0.02 + width + _SIDE_M)
         found.append(
             Template(
-                "along a wall", (along,), ((-length / 2, *front[1:]),), (front,), Stand.CORNER,
-                rank=0.2, liking=_BED_LIKES,
+                "along a wall",
+                (along,),
+                ((-length / 2, *front[1:]),),
+                (front,),
+                Stand.CORNER,
+                rank=0.2,
+                liking=_BED_LIKES,
             )
         )
     return tuple(found)

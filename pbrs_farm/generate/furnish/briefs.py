@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,17 +54,7 @@ def _bedroom(plan: Plan, space: RoomSpace, shelf: Shelf, rng: np.random.Generato
     is_childs = space.number != largest and rng.random() < 0.65
     doubles, singles = bedroom.double_beds(shelf), bedroom.single_beds(shelf, child=is_childs)
     if is_childs:
-        groups = (
-            _group("bed", singles or doubles, must=True),
-            _group("wardrobe", bedroom.wardrobes(shelf, 1.2)),
-            _group("desk", bedroom.desks(shelf, widest=1.45)),
-        )
-        fillers = (
-            _group("shelves", living.shelves(shelf, widest=1.1)), _group("toys", bedroom.toys(shelf)),
-            _group("dresser", living.dressers(shelf)), _group("boxes", small_rooms.boxes(shelf)),
-            _group("plant", living.plants(shelf)),
-        )  # fmt: skip
-        return Brief(groups, fillers, 0.62, 0.36)
+        return _childs_room(singles or doubles, shelf)
     # Where no bed for two fits, one for one does.
     beds = doubles + tuple(_lower(t, 2.5) for t in singles[:6])
     groups = (
@@ -81,20 +71,31 @@ def _bedroom(plan: Plan, space: RoomSpace, shelf: Shelf, rng: np.random.Generato
     return Brief(groups, tuple(fillers), 0.60, 0.38)
 
 
-def _lower(template: Template, by: float) -> Template:
-    from dataclasses import replace
+def _childs_room(beds: tuple[Template, ...], shelf: Shelf) -> Brief:
+    groups = (
+        _group("bed", beds, must=True), _group("wardrobe", bedroom.wardrobes(shelf, 1.2)),
+        _group("desk", bedroom.desks(shelf, widest=1.45)),
+    )  # fmt: skip
+    fillers = (
+        _group("shelves", living.shelves(shelf, widest=1.1)), _group("toys", bedroom.toys(shelf)),
+        _group("dresser", living.dressers(shelf)), _group("boxes", small_rooms.boxes(shelf)),
+        _group("plant", living.plants(shelf)),
+    )  # fmt: skip
+    return Brief(groups, fillers, 0.62, 0.36)
 
+
+def _lower(template: Template, by: float) -> Template:
     return replace(template, rank=template.rank - by)
 
 
-def _living(
-    space: RoomSpace, shelf: Shelf, rng: np.random.Generator, *, sleeps: bool
-) -> Brief:
+def _living(space: RoomSpace, shelf: Shelf, rng: np.random.Generator, *, sleeps: bool) -> Brief:
     seats = 6 if space.area > 24 and rng.random() < 0.6 else 4
     lounge = _group("lounge", living.lounges(shelf, space.bounds, space.area), must=True)
-    dining = _group("dining", living.dining(shelf, seats) + tuple(
-        _lower(t, 0.4) for t in living.dining(shelf, 2, at_wall=True)
-    ))
+    dining = _group(
+        "dining",
+        living.dining(shelf, seats)
+        + tuple(_lower(t, 0.4) for t in living.dining(shelf, 2, at_wall=True)),
+    )
     groups = [lounge, dining]
     if sleeps:
         beds = bedroom.double_beds(shelf) + bedroom.single_beds(shelf)
@@ -117,13 +118,16 @@ def _kitchen(space: RoomSpace, shelf: Shelf, rng: np.random.Generator) -> Brief:
     units = units_of(shelf)
     wanted = min(max(1.6 + 0.26 * space.area, 3.0), 5.2)
     found = kitchen_places(units, space, rng, wanted=wanted) if units else []
-    small = living.dining(shelf, 4) + living.dining(shelf, 3, at_wall=True)
-    groups = (_group("kitchen", (), must=units is not None), _group("dining", small))
+    groups = [_group("kitchen", (), must=units is not None)]
+    # Without a wall between, one table serves both rooms.
+    if space.walk_polygon.area < 1.2 * space.area:
+        small = living.dining(shelf, 4) + living.dining(shelf, 3, at_wall=True)
+        groups.append(_group("dining", small))
     fillers = (
         _group("bin", bathroom.small_things(shelf)),
         _group("shelves", bathroom.narrow_shelves(shelf)), _group("plant", living.plants(shelf)),
     )  # fmt: skip
-    return Brief(groups, fillers, 1.0, 0.30, fixed_places(found))
+    return Brief(tuple(groups), fillers, 1.0, 0.30, fixed_places(found))
 
 
 def _bathroom(plan: Plan, space: RoomSpace, shelf: Shelf) -> Brief:

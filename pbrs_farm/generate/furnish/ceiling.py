@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from shapely.geometry import box
+from shapely.geometry import Polygon, box
 
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.generate.furnish.room_space import RoomSpace
@@ -16,7 +16,7 @@ _HEAD_M: Final = 1.95  # the lowest point of a lamp
 _LARGE_M2: Final = 22.0  # rooms above have two
 _LONG: Final = 2.6  # and halls of this aspect
 _SHORTEST: Final = 0.35  # of its own size that a lamp may be made
-_STEPS: Final = (0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9)
+_STEPS: Final = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.9, -0.9)
 
 
 def ceiling_lamps(
@@ -97,6 +97,6 @@ def _hung(
     return None
 
 
-def _ground(piece: PlacedPiece) -> object:
+def _ground(piece: PlacedPiece) -> Polygon:
     xs, zs = [p[0] for p in piece.corners], [p[1] for p in piece.corners]
     return box(min(xs), min(zs), max(xs), max(zs))

@@ -56,7 +56,10 @@ def arrangement_of(
     """What stands in a room: all that must, what may, then fillers; others: of the open rooms."""
     walk = WalkMap(space, others)
     groups = [g for g in brief.groups if g.templates or _is_kitchen(g, brief)]
-    places = [brief.kitchen or places_of(g, space, rng) if not g.templates else places_of(g, space, rng) for g in groups]
+    places = [
+        brief.kitchen or places_of(g, space, rng) if not g.templates else places_of(g, space, rng)
+        for g in groups
+    ]
     best = arranged(groups, places, walk)
     # Try the groups in other orders where one that must stand does not.
     if best.missing:
@@ -97,7 +100,12 @@ def _filled(
             continue
         optional = replace(group, is_required=False)
         tried = arranged(
-            [optional], [places_of(optional, space, rng)], walk, start=filled, roots=3, nodes=0,
+            [optional],
+            [places_of(optional, space, rng)],
+            walk,
+            start=filled,
+            roots=3,
+            nodes=0,
             least_share=brief.least_share,
         )
         if len(tried.standing) > len(filled.standing):

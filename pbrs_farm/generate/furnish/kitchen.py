@@ -14,18 +14,15 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.catalogue import Piece
+from pbrs_farm.generate.furnish.kitchen_shapes import DEPTH_M, MODULE_M, Arm, run_shapes
 from pbrs_farm.generate.furnish.places import allowed
-from pbrs_farm.generate.furnish.room_space import RoomSpace, Wall
+from pbrs_farm.generate.furnish.room_space import RoomSpace
 from pbrs_farm.generate.furnish.shelf import Shelf
-from pbrs_farm.generate.furnish.template import Frame, Slot, Standing, Template
+from pbrs_farm.generate.furnish.template import Slot, Standing, Template
 from pbrs_farm.generate.plan import Rect
 
-DEPTH_M: Final = 0.62
 UPPER_M: Final = 1.45  # lower edge of wall cabinets
-_MODULE_M: Final = 0.60
 _FRONT_M: Final = 0.8  # free before the run
-_LONGEST_ARM_M: Final = 3.9
-_LEAST_M: Final = 1.75  # fridge, sink and cooker
 _GAP: Final = 0.005  # behind the units
 
 
@@ -46,20 +43,6 @@ class Units:
     def fixed_width(self) -> float:
         """Of what a kitchen cannot do without."""
         return self.fridge.size[0] + self.sink.size[0] + self.cooker.size[0]
-
-
-@dataclass(frozen=True, slots=True)
-class _Arm:
-    # A stretch of a wall in the run's own frame: from `low` to `high` of that wall.
-    wall: Wall
-    low: float
-    high: float
-    turns: int  # of its pieces against those of the main arm
-    corner: float  # u of the main arm's corner that it starts from
-
-    @property
-    def length(self) -> float:
-        return self.high - self.low
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +87,9 @@ def kitchen_places(
 ) -> list[Standing]:
     """Every run that the room allows, with its score; wanted: metres of modules it should have."""
     found: list[Standing] = []
-    for arms in _shapes(space):
+    for arms in run_shapes(space):
         length = sum(a.length for a in arms)
-        best = _best_run(arms, units, space, rng)
+        best = _best_run(arms, units, space)
         if best is None:
             continue
         template, score = best
@@ -118,94 +101,8 @@ def kitchen_places(
     return found
 
 
-def _shapes(space: RoomSpace) -> Iterator[tuple[_Arm, ...]]:
-    """One arm, two that meet in a corner, or three; the first is the main one."""
-    free = [_free(space, wall) for wall in space.walls]
-    for k, wall in enumerate(space.walls):
-        for low, high in free[k]:
-            for a, b in _cuts(low, high, wall):
-                yield (_Arm(wall, a, b, 0, 0.0),)
-        right = _next(space, k)
-        if right is None:
-            continue
-        for low, high in free[k]:
-            if high < wall.length - 0.01 or high - low < 1.2:
-                continue
-            for s_low, s_high in free[right]:
-                if s_low > 0.01 or s_high < DEPTH_M + 0.9:
-                    continue
-                for a in _starts(low, high):
-                    for b in _starts(-s_high, -(DEPTH_M + 0.02)):
-                        main = _Arm(wall, a, wall.length, 0, 0.0)
-                        side = _Arm(space.walls[right], DEPTH_M + 0.02, -b, 1, wall.length)
-                        yield main, side
-
-
-def _next(space: RoomSpace, k: int) -> int | None:
-    """The wall that meets wall k at its right end."""
-    wall = space.walls[k]
-    if not wall.is_right_corner:
-        return None
-    end = wall.frame.point(wall.length, 0.0)
-    for n, other in enumerate(space.walls):
-        if abs(other.frame.x - end[0]) + abs(other.frame.z - end[1]) < 0.02:
-            return n
-    return None
-
-
-def _starts(low: float, high: float) -> list[float]:
-    # Whole stretches first, then shorter ones that keep their far end in the corner.
-    cuts = [low] if high - low <= _LONGEST_ARM_M else []
-    cuts += [high - n * _MODULE_M for n in (2, 3, 4, 5, 6) if low < high - n * _MODULE_M - 0.01]
-    return cuts
-
-
-def _cuts(low: float, high: float, wall: Wall) -> list[tuple[float, float]]:
-    if high - low < _LEAST_M:
-        return []
-    found = [(low, high)] if high - low <= _LONGEST_ARM_M + 0.5 else []
-    for n in (4, 5, 6, 7):
-        length = n * _MODULE_M
-        if length < high - low - 0.01:
-            found += [(low, low + length), (high - length, high)]
-    return found
-
-
-def _free(space: RoomSpace, wall: Wall) -> list[tuple[float, float]]:
-    """Stretches of a wall before which a unit can stand."""
-    taken = []
-    strip = wall.frame.rect((0.0, 0.0, wall.length, DEPTH_M + 0.02))
-    low_windows = [w.zone for w in space.windows if w.sill < 0.8]
-    for rect in [*(tuple(r) for r in space.doors.tolist()), *low_windows]:
-        along = _along(rect, strip, wall)
-        if along is not None:
-            taken.append(along)
-    ends = [0.0]
-    for low, high in sorted(taken):
-        ends += [low, high]
-    ends.append(wall.length)
-    found, start = [], 0.0
-    for low, high in sorted(taken):
-        if low - start > 0.6:
-            found.append((start, low))
-        start = max(start, high)
-    if wall.length - start > 0.6:
-        found.append((start, wall.length))
-    return found
-
-
-def _along(rect: Rect, strip: Rect, wall: Wall) -> tuple[float, float] | None:
-    if min(rect[2], strip[2]) - max(rect[0], strip[0]) < 0.01:
-        return None
-    if min(rect[3], strip[3]) - max(rect[1], strip[1]) < 0.01:
-        return None
-    f = wall.frame
-    at = [(x - f.x) * f.dx + (z - f.z) * f.dz for x, z in (rect[:2], rect[2:])]
-    return max(min(at), 0.0), min(max(at), wall.length)
-
-
 def _best_run(
-    arms: tuple[_Arm, ...], units: Units, space: RoomSpace, rng: np.random.Generator
+    arms: tuple[Arm, ...], units: Units, space: RoomSpace
 ) -> tuple[Template, float] | None:
     """The best order of units along the arms."""
     best: tuple[float, list[_Module]] | None = None
@@ -219,16 +116,16 @@ def _best_run(
     if best is None:
         return None
     score, modules = best
-    return _template(modules, arms, units, space, rng), score
+    return _template(modules, arms, units, space), score
 
 
-def _far_ends(arms: tuple[_Arm, ...]) -> list[tuple[int, bool]]:
+def _far_ends(arms: tuple[Arm, ...]) -> list[tuple[int, bool]]:
     # The main arm's low end; and the far end of the last one.
     return [(0, False), (len(arms) - 1, True)]
 
 
 def _orders(
-    arms: tuple[_Arm, ...], units: Units, where: tuple[int, bool, int, int]
+    arms: tuple[Arm, ...], units: Units, where: tuple[int, bool, int, int]
 ) -> Iterator[list[_Module]]:
     """Rows of modules: the fridge at its end, sink and cooker anywhere, cabinets between."""
     fridge_arm, fridge_high, sink_arm, cooker_arm = where
@@ -241,11 +138,15 @@ def _orders(
         blind = k == 0 and len(arms) > 1
         if left < -1e-6 or (blind and left < 0.5):
             return
-        n = int(left / _MODULE_M + 0.5) if left > 0.28 else 0
+        n = int(left / MODULE_M + 0.5) if left > 0.28 else 0
         # A rest that is too narrow for a cabinet stays open at the free end.
         width = left / n if n else 0.0
         rows.append(
-            list(_arm_rows(k, arm, movable, widths, (n, width), units, fridge_arm == k, fridge_high, blind))
+            list(
+                _arm_rows(
+                    k, arm, movable, widths, (n, width), units, fridge_arm == k, fridge_high, blind
+                )
+            )
         )
     if len(rows) == 1:
         yield from rows[0]
@@ -256,7 +157,7 @@ def _orders(
 
 
 def _arm_rows(
-    k: int, arm: _Arm, movable: list[str], widths: dict[str, float], bases: tuple[int, float],
+    k: int, arm: Arm, movable: list[str], widths: dict[str, float], bases: tuple[int, float],
     units: Units, has_fridge: bool, fridge_high: bool, blind: bool,
 ) -> Iterator[list[_Module]]:  # fmt: skip
     n, width = bases
@@ -279,7 +180,7 @@ def _arm_rows(
         yield row
 
 
-def _run_score(modules: list[_Module], arms: tuple[_Arm, ...], space: RoomSpace) -> float | None:
+def _run_score(modules: list[_Module], arms: tuple[Arm, ...], space: RoomSpace) -> float | None:
     """How well one can cook there; None where a hood would hang before a window."""
     kinds = [m.kind for m in modules]
     sink, cooker, fridge = (kinds.index(k) for k in ("sink", "cooker", "fridge"))
@@ -300,7 +201,7 @@ def _run_score(modules: list[_Module], arms: tuple[_Arm, ...], space: RoomSpace)
     return score
 
 
-def _below_window(module: _Module, arms: tuple[_Arm, ...], space: RoomSpace) -> float:
+def _below_window(module: _Module, arms: tuple[Arm, ...], space: RoomSpace) -> float:
     """Metres of a module that stand below windows."""
     wall = arms[module.arm].wall
     return sum(
@@ -311,9 +212,8 @@ def _below_window(module: _Module, arms: tuple[_Arm, ...], space: RoomSpace) -> 
 
 
 def _template(
-    modules: list[_Module], arms: tuple[_Arm, ...], units: Units, space: RoomSpace,
-    rng: np.random.Generator,
-) -> Template:  # fmt: skip
+    modules: list[_Module], arms: tuple[Arm, ...], units: Units, space: RoomSpace
+) -> Template:
     slots: list[Slot] = []
     n_base = 0
     dishes = units.dishwasher if len(modules) >= 6 else None
@@ -331,22 +231,19 @@ def _template(
         else:
             n_base += 1
             # The dishwasher stands beside the sink.
-            if dishes is not None and abs(i - sink) == 1 and 0.55 <= module.width <= 0.66:
-                if not module.is_blind:
-                    piece, dishes = dishes, None
+            fits = 0.55 <= module.width <= 0.66 and not module.is_blind
+            if dishes is not None and abs(i - sink) == 1 and fits:
+                piece, dishes = dishes, None
         depth = DEPTH_M if module.kind != "fridge" else max(piece.size[1], 0.5)
         slots.append(_placed(Slot(piece, 0, 0, module.width, depth, height), module, arms))
-        slots += [
-            _placed(s, module, arms) for s in _above(module, units, arms, space, n_base + i)
-        ]
+        slots += [_placed(s, module, arms) for s in _above(module, units, arms, space, n_base + i)]
     clear, fronts = _rects(modules, arms)
     name = f"kitchen of {len(arms)} arms, {len(modules)} modules"
-    del rng
     return Template(name, tuple(slots), clear, fronts)
 
 
 def _above(
-    module: _Module, units: Units, arms: tuple[_Arm, ...], space: RoomSpace, number: int
+    module: _Module, units: Units, arms: tuple[Arm, ...], space: RoomSpace, number: int
 ) -> list[Slot]:
     """The hood or the wall cabinet over a module."""
     if module.kind == "fridge" or _below_window(module, arms, space) > 0.0:
@@ -364,25 +261,25 @@ def _above(
     return [Slot(upper, 0, 0, module.width, min(d, 0.36), min(h, 0.72), UPPER_M)]
 
 
-def _placed(slot: Slot, module: _Module, arms: tuple[_Arm, ...]) -> Slot:
+def _placed(slot: Slot, module: _Module, arms: tuple[Arm, ...]) -> Slot:
     """A unit with its back at its arm's wall, in the frame of the main arm's wall."""
     along, across = (module.low + module.high) / 2, _GAP + slot.depth / 2
     u, v = _in_main(along, across, arms[module.arm])
     return replace(slot, u=u, v=v, turns=arms[module.arm].turns)
 
 
-def _in_main(along: float, across: float, arm: _Arm) -> tuple[float, float]:
+def _in_main(along: float, across: float, arm: Arm) -> tuple[float, float]:
     # The side arm goes from the main one's right corner into the room.
     return (along, across) if arm.turns == 0 else (arm.corner - across, along)
 
 
 def _rects(
-    modules: list[_Module], arms: tuple[_Arm, ...]
+    modules: list[_Module], arms: tuple[Arm, ...]
 ) -> tuple[tuple[Rect, ...], tuple[Rect, ...]]:
     """What stays free before each arm, and what a way must reach: fridge, sink and cooker."""
     clear, fronts = [], []
     for k, arm in enumerate(arms):
-        low = arm.low if k else arm.low
+        low = arm.low
         high = arm.high - (DEPTH_M if k == 0 and len(arms) > 1 else 0.0)
         clear.append(_rect((low, DEPTH_M + 0.02, high, DEPTH_M + _FRONT_M), arm))
     for module in modules:
@@ -392,6 +289,6 @@ def _rects(
     return tuple(clear), tuple(fronts)
 
 
-def _rect(rect: Rect, arm: _Arm) -> Rect:
+def _rect(rect: Rect, arm: Arm) -> Rect:
     a, b = _in_main(rect[0], rect[1], arm), _in_main(rect[2], rect[3], arm)
     return min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1])

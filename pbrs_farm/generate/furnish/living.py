@@ -88,12 +88,17 @@ def dining(shelf: Shelf, seats: int, *, at_wall: bool = False) -> tuple[Template
         return ()
     found = []
     for table in tables:
-        w, d = table.size[:2]
+        w = table.size[0]
         n = _seats(table, at_wall=at_wall)
         if n > seats or n < min(seats, 4) - 2 or (at_wall and w > 1.7):
             continue
+        # Chairs of one side keep their elbows apart.
+        share = w / max(n if at_wall else n // 2, 1)
+        narrow = [c for c in chairs if c.size[0] <= share - 0.04]
+        if not narrow:
+            continue
         make = _at_wall if at_wall else _free
-        found.append(make(table, chairs[0], 0.35 * n))
+        found.append(make(table, narrow[0], 0.35 * n))
         if len(found) >= 6:
             break
     return tuple(found)
@@ -202,7 +207,9 @@ def armchairs(shelf: Shelf) -> tuple[Template, ...]:
 
 def plants(shelf: Shelf) -> tuple[Template, ...]:
     """Plants that stand on the floor, in corners and by windows."""
-    pots = [p for p in shelf.of("plant", width=(0.2, 0.9), height=(0.55, 2.0)) if p.place == "floor"]
+    pots = [
+        p for p in shelf.of("plant", width=(0.2, 0.9), height=(0.55, 2.0)) if p.place == "floor"
+    ]
     return tuple(single(p, before=0.0, corner=0.6, daylight=0.15, gap=0.04) for p in pots[:4])
 
 

@@ -109,7 +109,7 @@ def allowed(template: Template, frames: Sequence[Frame], space: RoomSpace) -> Bo
     if template.clear:
         bad |= overlap(_moved(np.array(template.clear), frames), space.outside).any(1)
     for window in space.windows:
-        tall = [s.rect for s in template.slots if s.top > window.sill + _ABOVE_SILL_M]
+        tall = [s.rect for s in template.slots if s.screen_top > window.sill + _ABOVE_SILL_M]
         if tall:
             bad |= overlap(_moved(np.array(tall), frames), np.array([window.zone])).any(1)
     return np.asarray(~bad)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from shapely.geometry import Polygon, box
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from pbrs_farm.core.arrays import F64
@@ -50,7 +52,7 @@ class RoomSpace:
 
     number: int
     polygon: Polygon
-    walk_polygon: Polygon  # with the rooms that no wall parts from it
+    walk_polygon: BaseGeometry  # with the rooms that no wall parts from it
     walls: tuple[Wall, ...]
     outside: F64  # (N, 4) rectangles around the polygon
     doors: F64  # (D, 4) rectangles before doors, on either side, swings included
@@ -115,8 +117,8 @@ def outside_of(polygon: Polygon) -> F64:
     # Cut the bounds along every corner; keep the cells whose middle lies beyond.
     points = list(polygon.exterior.coords)
     xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})
-    for xa, xb in zip(xs, xs[1:], strict=False):
-        for za, zb in zip(zs, zs[1:], strict=False):
+    for xa, xb in pairwise(xs):
+        for za, zb in pairwise(zs):
             cell = box(xa, za, xb, zb)
             if polygon.intersection(cell).area < 0.999 * cell.area:
                 rects.append((xa, za, xb, zb))
@@ -162,7 +164,7 @@ def _turn(a: Point, b: Point, c: Point) -> float:
     return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 
 
-def _solid(frame: Frame, length: float, near: Polygon) -> list[tuple[float, float]]:
+def _solid(frame: Frame, length: float, near: BaseGeometry) -> list[tuple[float, float]]:
     """Stretches of a side that are not open, by samples every 2.5 cm."""
     if near.is_empty:
         return [(0.0, length)]
@@ -186,9 +188,7 @@ def _around(point: Point) -> Rect:
     return point[0] - 1e-4, point[1] - 1e-4, point[0] + 1e-4, point[1] + 1e-4
 
 
-def _open_sides(
-    corners: tuple[Point, ...], open_to: Iterable[Polygon]
-) -> list[tuple[Rect, Rect]]:
+def _open_sides(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> list[tuple[Rect, Rect]]:
     """(what a way must reach, what stays free) for each open side."""
     near = unary_union([p.buffer(2 * _EPSILON) for p in open_to])
     found = []

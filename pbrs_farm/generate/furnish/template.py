@@ -10,10 +10,13 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 from functools import cached_property
+from typing import Final
 
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.generate.furniture import PlacedPiece
 from pbrs_farm.generate.plan import Point, Rect
+
+_WORKTOP_M: Final = 0.9
 
 
 class Stand(Enum):
@@ -71,6 +74,11 @@ class Slot:
     def top(self) -> float:
         """Metres above the floor."""
         return self.elevation + self.height
+
+    @property
+    def screen_top(self) -> float:
+        """Up to where it hides a window behind it: a sink's tap does not."""
+        return min(self.top, _WORKTOP_M) if self.piece.group == "sink" else self.top
 
     def mirrored(self) -> Slot:
         """On the other side of the template's middle."""

@@ -31,14 +31,14 @@ class WalkMap:
             self._origin[0] + (np.arange(shape[1]) + 0.5) * CELL_M,
             self._origin[1] + (np.arange(shape[0]) + 0.5) * CELL_M,
         )
-        self._inside: Bools = shapely.contains_xy(space.polygon, xx, zz)
-        self._floor: Bools = shapely.contains_xy(space.walk_polygon, xx, zz)
+        self._inside: Bools = np.asarray(shapely.contains_xy(space.polygon, xx, zz))
+        self._floor: Bools = np.asarray(shapely.contains_xy(space.walk_polygon, xx, zz))
         self.free = self.with_bodies(self._floor, standing)
         # A way that an empty room does not have is not asked for.
         ways = self._ways(self.free)
         self._start = space.ways[0] if space.ways else None
         region = self._region(ways, self._start)
-        self._joined = [w for w in space.ways if region is not None and self._meets(region, w)]
+        self.joined_ways = [w for w in space.ways if region is not None and self._meets(region, w)]
 
     def with_bodies(self, free: Bools, rects: Iterable[Rect]) -> Bools:
         """The free floor without what stands on rectangles."""
@@ -52,7 +52,7 @@ class WalkMap:
         region = self._region(self._ways(free), self._start)
         if region is None:
             return None
-        if all(self._meets(region, r) for r in (*self._joined, *fronts)):
+        if all(self._meets(region, r) for r in (*self.joined_ways, *fronts)):
             return region
         return None
 
