@@ -20,7 +20,7 @@ _HIGH_PART: Final = 0.25  # of the height, at the top: where the back of a seat 
 _CLEAR: Final = 0.12  # of the depth: how far the top must lie behind the middle
 _TABLE: Final = 7  # nyu40
 _HIGH_TABLE_M: Final = 0.62  # one eats or works at what is higher
-_BACKED: Final = frozenset({"chair", "armchair", "sofa", "bed"})
+_BACKED: Final = frozenset({"chair", "office_chair", "armchair", "sofa", "bed"})
 
 
 class Held(Enum):
@@ -40,7 +40,7 @@ HELD: Final[Mapping[str, Held]] = {
         Held.BACK,
     ),
     **dict.fromkeys(
-        ("chair", "stool", "ottoman", "coffee_table", "dining_table", "plant", "table_lamp",
+        ("chair", "office_chair", "stool", "ottoman", "coffee_table", "dining_table", "plant", "table_lamp",
          "floor_lamp", "tv", "laptop", "vase", "bin"),
         Held.CENTRE,
     ),

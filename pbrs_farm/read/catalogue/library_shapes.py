@@ -31,7 +31,9 @@ from pbrs_farm.read.sweethome3d.placement import PieceFrame, local_from_model, p
 
 MAX_TRIANGLES: Final = 200_000  # of a model that is read
 SMALL: Final = (3_000, 1 / 48)  # triangles of what stands on furniture, and how coarse it may get
+MEDIUM: Final = (5_000, 1 / 100)  # of chairs, which come in sixes
 LARGE: Final = (10_000, 1 / 110)
+MEDIUM_M: Final = 1.15  # the longest side of what is medium
 TOO_MANY: Final = 30_000  # what cannot be made lighter than this stays out
 MAX_TEXTURE_PX: Final = 512  # of a piece's picture: more shows in no view of a room
 _JPEG_QUALITY: Final = 92
@@ -86,7 +88,9 @@ def fitted_shape(shape: Shape, place: Place, piece_id: str, notes: LibraryNotes)
 
     None, with a note, where it cannot be made lighter than TOO_MANY triangles.
     """
-    lighter = lighter_shape(shape, *(SMALL if place is Place.SURFACE else LARGE))
+    longest = float(np.ptp(shape.bounds, axis=0).max())
+    most, coarsest = SMALL if place is Place.SURFACE else MEDIUM if longest < MEDIUM_M else LARGE
+    lighter = lighter_shape(shape, most, coarsest)
     if sum(len(s.faces) for s in lighter.surfaces) > TOO_MANY:
         notes.add("heavy-model", piece_id, f"more than {TOO_MANY} triangles: left out")
         return None
