@@ -20,6 +20,9 @@ _T = TypeVar("_T")
 _TILED_FLOORS = (RoomKind.BATHROOM, RoomKind.KITCHEN)
 _WOOD = ("planks", "strip", "laminate", "herringbone", "chevron")
 _WHITES = tuple(rgb(c) for c in ("f4f3ef", "f2efe8", "efece4", "f3f3f2", "edeae0"))
+_SOFT = tuple(
+    rgb(c) for c in ("f0dfb4", "eacb95", "e9c4a4", "e3b9a6", "e8cfc6", "d9b7bb", "cfc3d6", "bfc8dc", "b3cbd9", "b8d3d3", "bcd4c2", "c9d6ad", "dcdcb0", "d6cbb6", "c8b8a3", "bdb9b3")
+)  # fmt: skip
 _TILE_BODIES = tuple(
     rgb(c) for c in ("ecebe7", "e2ded5", "d5cdbf", "c4bdb1", "a9a6a1", "8c8a87", "6a6866", "d9d5cb", "b8a893", "54524f")
 )  # fmt: skip
@@ -149,12 +152,14 @@ def walls_of(
 
 def _paint(rng: np.random.Generator, style: Style, home: HomeFinish) -> Pattern:
     draw = rng.random()
-    if draw < 0.5:
+    if draw < 0.38:
         tint = home.wall
-    elif draw < 0.85:
+    elif draw < 0.65:
         tint = style.palette[int(rng.integers(2))]
+    elif draw < 0.85:
+        tint = mix(style.palette[2], (0.95, 0.94, 0.92), float(rng.uniform(0.3, 0.65)))
     else:
-        tint = mix(style.palette[2], (0.95, 0.94, 0.92), float(rng.uniform(0.45, 0.7)))
+        tint = _one(rng, _SOFT)
     return Pattern("paint", _seed(rng, 3), (tint,))
 
 

@@ -182,7 +182,7 @@ def brick_maps(
     brick = smoothstep(half - 0.001, half + 0.004, np.minimum(grid.edge_m, grid.corner_m * 0.8))
     depth = rng.normal(0, 0.0009, n).astype(np.float32)[grid.tile]
     height = brick * (0.006 + depth) + 0.00035 * clouds * brick + 0.00018 * grain
-    shade = 1.0 - 0.28 * (1.0 - brick)
+    shade = 1.0 - (0.13 if painted else 0.28) * (1.0 - brick)
     if painted:
         lightness = (shade + 0.012 * clouds + 0.012 * grain)[..., None]
         colour = np.array(tint, np.float32) * lightness
