@@ -158,18 +158,26 @@ def lay_down(
     if others:
         placing.refuse("something lies on the bed or seat")
         return False
-    # What is folded lies flat already; a cushion's middle sinks in.
+    # What is folded lies flat already; a cushion's middle sinks in, and what would be lower than
+    # the surface is pressed up to it.
     sunk = 1.0 if piece.group == "blanket" else _SUNK
-    # Let its middle stand a little above, and press what would be lower up to the surface.
-    pressed = []
-    most = level + 0.12
+    pressed, gap = [], np.inf
     for surface in shape.surfaces:
         points = (surface.positions - [0, half, 0]) @ turn.T + [plan[0], 0, plan[1]]
-        ground = heights_under(points[:, [0, 2]], corners, most)
-        points[:, 1] += level + sunk * half
-        points[:, 1] = np.maximum(points[:, 1], ground + TOUCH_M)
-        pressed.append(smooth(surface.name, points, surface.faces))
-    put_as_it_is(placing, made, pressed)
+        ground = heights_under(points[:, [0, 2]], corners, level + 0.12)
+        points[:, 1] = np.maximum(points[:, 1] + level + sunk * half, ground + TOUCH_M)
+        gap = min(gap, float((points[:, 1] - ground).min()))
+        pressed.append(points)
+    if not np.isfinite(gap):
+        placing.refuse("nothing to lie on")
+        return False
+    # Lower it to contact where the bed is not flat.
+    fall = np.array([0.0, gap - TOUCH_M, 0.0])
+    surfaces = [
+        smooth(s.name, points - fall, s.faces)
+        for s, points in zip(shape.surfaces, pressed, strict=True)
+    ]
+    put_as_it_is(placing, made, surfaces)
     return True
 
 

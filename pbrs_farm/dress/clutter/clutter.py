@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -20,7 +22,7 @@ from pbrs_farm.dress.clutter.tops import fill_top, set_table
 from pbrs_farm.dress.clutter.worktop import Worktop
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.generated.covers import book_covers
-from pbrs_farm.dress.space.house_space import RoomSpace, house_space
+from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
 
@@ -37,11 +39,12 @@ def clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> N
     covers = book_covers(draft.rng("clutter", "covers"), style)
     stock = Stock(catalogue, covers, int(draft.rng("clutter", "stock").integers(1 << 31)))
     bias = house_bias(draft.rng("clutter", "bias"))
+    owners = _owners(scene, space)
     for room in space.rooms:
         rng = draft.rng("clutter", room.room.id)
         own = room_style(style, draft.rng("style", room.room.id))
         placing = Placing(draft, stock, room.room, own, rng, share, bias)
-        _fill_room(placing, scene, room)
+        _fill_room(placing, scene, room, owners)
         fill_floor(placing, scene, space, room)
 
 
@@ -57,11 +60,23 @@ def _door_zone(room: RoomSpace) -> BaseGeometry:
     return shapely.union_all(zones).buffer(_DOOR_MARGIN_M)
 
 
-def _fill_room(placing: Placing, scene: SceneTriangles, room: RoomSpace) -> None:
+def _owners(scene: SceneTriangles, space: HouseSpace) -> dict[int, str]:
+    """The one room that furnishes each item: its own, else the first of those it stands in."""
+    owners: dict[int, str] = {}
+    for room in space.rooms:
+        for index in room.items:
+            if index not in owners or scene.items[index].room_id == room.room.id:
+                owners[index] = room.room.id
+    return owners
+
+
+def _fill_room(
+    placing: Placing, scene: SceneTriangles, room: RoomSpace, owners: Mapping[int, str]
+) -> None:
     zone = _door_zone(room)
     for index in room.items:
         item = scene.items[index] if index < len(scene.items) else None
-        if item is None:
+        if item is None or owners[index] != room.room.id:
             continue
         if can_hold(item):
             _fill_item(placing, scene, room, index, zone)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -132,3 +133,11 @@ def test_a_laid_table_has_a_plate_before_each_chair() -> None:
             assert middles == pytest.approx([1.3, 2.2], abs=0.15)
             return
     pytest.fail("no table was laid")
+
+
+def test_furniture_in_two_rooms_that_overlap_is_filled_once() -> None:
+    home = house(solid("Desk", [2.6, 0, 0], [3.8, 0.74, 0.6], 14))
+    both = (replace(home.rooms[0], id="0_1"), *home.rooms)
+    once = [i for i in _added(_dressed(replace(home, rooms=both))) if i.bounds[0, 1] > 0.5]
+    assert once
+    assert {i.room_id for i in once} == {"0_0"}
