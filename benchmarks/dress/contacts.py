@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 DEEP_M, GAP_M = 0.01, 0.002
 N_POINTS = 250  # of a thing that are looked for inside another
-FLAT = 0.2  # cosine to a face's normal below which an edge only touches it
+FLAT = 0.5  # cosine to a face's normal below which an edge only grazes it
 _STRUCTURE = (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.PERSON)
 _OPENINGS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
 _RUG, _CURTAIN, _BLINDS = 20, 16, 13  # NYU40
@@ -54,7 +54,9 @@ def things_of(house: House, source: House) -> list[Thing]:
         corners = np.concatenate(parts)
         was = source.items[k] if k < len(source.items) else None
         old = [s.positions[s.faces].astype(np.float64) for s in was.surfaces] if was else []
-        is_new = not old or not _equal(np.concatenate(old), corners)
+        # Walls and floors keep their shape; surfaces may cut their triangles anew.
+        is_kept = was is not None and was.kind.is_structure
+        is_new = not is_kept and (not old or not _equal(np.concatenate(old), corners))
         faces = np.arange(3 * len(corners)).reshape(-1, 3)
         mesh = trimesh.Trimesh(corners.reshape(-1, 3), faces, process=False)
         mesh.merge_vertices()

@@ -14,6 +14,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.dress.gates.bodies import Body, Shell, boxes_of
+from pbrs_farm.dress.gates.crossing import crossing_m
 from pbrs_farm.dress.gates.inside import depths_inside
 from pbrs_farm.dress.gates.solids import Solids, thickness
 from pbrs_farm.dress.space.surface_points import surface_points
@@ -59,7 +60,8 @@ def is_allowed(a: Body, b: Body) -> bool:
 def penetration_m(a: Body, b: Body, solids: Solids) -> float:
     """How deep two bodies enter each other, metres; 0 where they do not.
 
-    The deepest point of either in the other, or how thick what they share is, whichever is more.
+    The deepest point of either in the other, how thick what they share is, or how far an edge of
+    one passes through a face of the other, whichever is most.
     """
     deepest = 0.0
     for one in _shells_near(a, b):
@@ -75,8 +77,16 @@ def _shells_near(body: Body, other: Body) -> list[Shell]:
 
 def _depth_of_shells(a: Shell, b: Shell, solids: Solids) -> float:
     if a.is_closed and b.is_closed:
-        return max((_depth_of_part(part, a, b) for part in solids.shared(a, b)), default=0.0)
-    return max(_deepest(_points_in(a, b), b), _deepest(_points_in(b, a), a))
+        parts = solids.shared(a, b)
+        if not parts:
+            return 0.0
+        depth = max(_depth_of_part(part, a, b) for part in parts)
+    else:
+        depth = max(_deepest(_points_in(a, b), b), _deepest(_points_in(b, a), a))
+    if depth > MOST_M:
+        return depth
+    # Plates that cross share little, and no point of them lies deep.
+    return max(depth, crossing_m(a, b, MOST_M), crossing_m(b, a, MOST_M))
 
 
 def _depth_of_part(part: F64, a: Shell, b: Shell) -> float:

@@ -60,6 +60,13 @@ def test_a_thin_plate_through_a_cupboard_is_found_though_it_shares_little():
     assert depth(solid("a", [0, 0, 0], [1, 1, 1]), plate) > 0.1
 
 
+def test_two_thin_plates_that_cross_are_found_and_plates_that_touch_are_not():
+    one = solid("a", [0, 0, 0], [0.3, 0.3, 0.005])
+    across = solid("b", [0.15, 0, -0.2], [0.155, 0.3, 0.2])
+    assert depth(one, across) > 0.1
+    assert depth(one, solid("b", [0.15, 0, 0.005], [0.155, 0.3, 0.2])) == 0
+
+
 def test_a_book_through_a_shelf_is_found():
     book = solid("book", [1.4, 0.2, 0.05], [1.43, 0.7, 0.25])
     assert depth(bookcase(), book) > 0.01
