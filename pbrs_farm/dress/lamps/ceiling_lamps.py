@@ -42,9 +42,15 @@ def hang_from_ceiling(
     room = space.room(room_id)
     choices = _choices(catalogue, style, room, rng)
     for place, top_y, low_y in _places(draft, space, room):
-        for piece, shape in choices:
-            factor = _factor(shape, top_y - low_y)
-            if factor is None or not _is_free(space, room, place, top_y, shape, factor):
+        for piece, ready in choices:
+            # Load a model when it is its turn: most rooms take the first.
+            shape = ready or catalogue.shape(piece)
+            factor = _factor(shape, top_y - low_y) if shape and shape.lights else None
+            if (
+                shape is None
+                or factor is None
+                or not _is_free(space, room, place, top_y, shape, factor)
+            ):
                 continue
             height = float(shape.bounds[1, 1]) * factor
             at = np.array([place[0], top_y - height - _GAP_M, place[1]])
@@ -62,9 +68,16 @@ def hang_from_ceiling(
 
 def _choices(
     catalogue: Catalogue, style: Style, room: RoomSpace, rng: np.random.Generator
-) -> list[tuple[Piece, Shape]]:
-    """Lamps that suit the room, in a drawn order; a flat dome last, which fits nearly everywhere."""
-    made = [ceiling_dome(rng, style), globe_pendant(rng, style), shade_pendant(rng, style)]
+) -> list[tuple[Piece, Shape | None]]:
+    """Lamps that suit the room, in a drawn order; a flat dome last, which fits nearly everywhere.
+
+    The shape of a piece of the catalogue is not loaded yet: None.
+    """
+    made: list[tuple[Piece, Shape | None]] = [
+        ceiling_dome(rng, style),
+        globe_pendant(rng, style),
+        shade_pendant(rng, style),
+    ]
     if room.kind in _PLAIN and rng.random() < 0.6:
         return made
     found = []
@@ -77,9 +90,8 @@ def _choices(
             continue
         found.append(piece)
     drawn = [found[int(k)] for k in rng.permutation(len(found))][:3]
-    shapes = [(piece, catalogue.shape(piece)) for piece in drawn]
     own = [made[1], made[2]] if rng.random() < 0.5 else [made[2], made[1]]
-    some = [(p, s) for p, s in shapes if s is not None and s.lights]
+    some: list[tuple[Piece, Shape | None]] = [(piece, None) for piece in drawn]
     if rng.random() < 0.35:
         some = [own[0], *some]
     return [*some, *own, made[0]]
