@@ -101,14 +101,21 @@ def _kinds(draft: Draft, item: Item, group: str) -> list[PartKind]:
     is_simple = len(set(materials)) <= 2
     for k, (surface, material) in enumerate(zip(item.surfaces, materials, strict=True)):
         if kinds[k] is PartKind.OTHER and _may_be_board(surface, material, item, group):
-            if not is_upholstered(item, group) or (is_bed(item) and is_simple):
+            # A grey part of a bed may be its frame as well as a blanket: it stays.
+            is_frame = (
+                is_bed(item)
+                and is_simple
+                and (is_vivid(material.diffuse) or is_dark(material.diffuse))
+            )
+            if not is_upholstered(item, group) or is_frame:
                 kinds[k] = PartKind.WOOD
             elif is_bed(item) and is_vivid(material.diffuse):
                 kinds[k] = PartKind.SOFT
-    # What is left of furniture is painted.
+    # What is left of furniture is painted; beds and sofas have linen there.
     for k, material in enumerate(materials):
-        if kinds[k] is PartKind.OTHER and kind_by_name(material.name) is None:
-            kinds[k] = PartKind.LACQUER if is_lacquered(item, material, group) else PartKind.OTHER
+        is_free = kinds[k] is PartKind.OTHER and kind_by_name(material.name) is None
+        if is_free and not is_upholstered(item, group) and is_lacquered(item, material, group):
+            kinds[k] = PartKind.LACQUER
     return kinds
 
 

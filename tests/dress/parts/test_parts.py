@@ -112,6 +112,14 @@ def test_a_bed_has_linen_on_a_wooden_frame() -> None:
     assert names[1] in ("weave", "twill")
 
 
+def test_linen_of_a_bed_never_shines_as_paint_does() -> None:
+    bed = _thing("bed")
+    blanket = replace(bed.surfaces[0], material=1, faces=bed.surfaces[0].faces[:2])
+    materials = (Material("a", diffuse=(0.5, 0.5, 0.5)), Material("b", diffuse=(0.4, 0.42, 0.45)))
+    draft = _dressed(replace(bed, surfaces=(*bed.surfaces, blanket)), materials=materials)
+    assert all(m.specular != (0.5, 0.5, 0.5) for m in (_material(draft, 0, k) for k in (0, 1)))
+
+
 def test_metals_have_measured_colours_and_no_colour_beneath() -> None:
     draft = _dressed(_thing("sink"), materials=(Material("Chrome_01", diffuse=(0.7, 0.7, 0.7)),))
     metal = _material(draft)
