@@ -42,6 +42,7 @@ def add_verbs(verb: Verb) -> None:
     text = "example home, `builtin`, or a file (default Studio)"
     p.add_argument("--home", default="Studio", help=text)
     p.add_argument("--out", default="out/demo", help="output folder")
+    p.add_argument("--bare", action="store_true", help="the home as it was drawn, not dressed")
     add_dress(p)
     _add_run(p, "preview")
 
@@ -230,9 +231,25 @@ def _demo(args: argparse.Namespace) -> int:
             warn(f"the example homes cannot be fetched: {error}")
             warn("going on with the built-in home")
             home = "builtin"
+    args.dress = _demo_dressing(args)
     code = _run_homes(args, [home])
     write_sheets(Path(args.out), 24)
     return code
+
+
+def _demo_dressing(args: argparse.Namespace) -> str | None:
+    """The seeds that the demo dresses its home by; None where there is nothing to dress it with."""
+    from pbrs_farm.run.dressed_house import fetch_catalogue
+
+    if args.bare:
+        return None
+    try:
+        fetch_catalogue(recipe_of(args).dress)
+    except MachineFailed as error:
+        warn(f"the furniture cannot be fetched: {error}")
+        warn("going on with the home as it was drawn")
+        return None
+    return args.dress or "1"
 
 
 def _step(args: argparse.Namespace) -> int:

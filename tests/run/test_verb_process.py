@@ -81,7 +81,7 @@ def test_ctrl_c_means_afterwards_what_it_did_before() -> None:
         ("cameras builtin", "builtin: repair: "),
         ("step house builtin", "builtin: repair: "),
         ("run builtin", " house: FAILED: "),  # the pool's own line: its render process died
-        ("demo --home builtin", " house: FAILED: "),
+        ("demo --bare --home builtin", " house: FAILED: "),
     ],
 )
 def test_no_library_takes_a_verb_that_reads_files_with_it(
