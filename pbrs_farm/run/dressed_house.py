@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.house import House
+from pbrs_farm.core.house import House, ItemKind
 from pbrs_farm.core.recipe import DressFields, Recipe
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run.dress_catalogue import catalogue_of_words
@@ -42,7 +42,15 @@ def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, Dre
     from pbrs_farm.dress.dressing import dress
 
     doing(source.location, "dress")
-    return dress(house, catalogue_of(recipe.dress), recipe.dress, seed)
+    return dress(_kept(house, recipe), catalogue_of(recipe.dress), recipe.dress, seed)
+
+
+def _kept(house: House, recipe: Recipe) -> House:
+    """The house without the people and plants that repair will take out: nothing makes way for them."""
+    gone = {ItemKind.PERSON} if recipe.repair.remove_persons else set()
+    if recipe.repair.remove_plants:
+        gone.add(ItemKind.PLANT)
+    return house.with_items(item for item in house.items if item.kind not in gone)
 
 
 def dressing_digest(source: SourceRef, recipe: Recipe) -> str:
