@@ -21,7 +21,8 @@ from pbrs_farm.core.errors import PbrsError
 
 # Module of pbrs_farm.commands -> the verbs it adds.
 MODULES: Final = {
-    "looking": ("doctor", "homes", "skies", "recipes", "layers"),
+    "looking": ("doctor", "skies", "recipes", "layers"),
+    "homes": ("homes",),
     "making": ("demo", "run", "objects", "step"),
     "explaining": ("dress", "repair", "cameras"),
     "using": ("sheet", "verify", "relight"),

@@ -17,6 +17,7 @@ import tarfile
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -94,7 +95,15 @@ def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
 
 
 def _deb(package: str, path: Path) -> Deb:
-    return Deb(package, version_of(path), path, hashlib.sha256(path.read_bytes()).hexdigest())
+    # Hash a file once a process: a job of many homes asks for its package with each.
+    held = path.stat()
+    return Deb(package, version_of(path), path, _sha256(path, held.st_size, held.st_mtime_ns))
+
+
+@lru_cache(maxsize=16)
+def _sha256(path: Path, _size: int, _mtime_ns: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 _HINT: Final = "type `sudo apt-get update`, then try again"

@@ -1,4 +1,4 @@
-"""Verbs that look: doctor, homes, skies, recipes, layers. Effects: print; homes --fetch and skies download."""
+"""Verbs that look: doctor, skies, recipes, layers. Effects: print; skies downloads."""
 
 from __future__ import annotations
 
@@ -12,14 +12,11 @@ from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, recipe_from_name
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add doctor, homes, skies, recipes and layers."""
+    """Add doctor, skies, recipes and layers."""
     p = verb("doctor", _doctor, "what this machine can do, and what to do about what is missing")
     p.add_argument("--json", action="store_true", help="for machines")
     p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to try")
     p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to try")
-    p = verb("homes", _homes, "list the example homes; fetch them from the Debian package")
-    p.add_argument("--fetch", action="store_true", help="download the package now")
-    p.add_argument("--json", action="store_true", help="for machines")
     p = verb("skies", _skies, "fetch four outdoor panoramas (CC0) from Debian's blender-data")
     p = verb("recipes", _recipes, "every field of a recipe and its value")
     p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES)
@@ -44,27 +41,6 @@ def _doctor(args: argparse.Namespace) -> int:
     missing = "This machine cannot render yet: see MISSING above."
     echo("This machine can render." if fine else missing)
     return 0 if fine else 1
-
-
-def _homes(args: argparse.Namespace) -> int:
-    from pbrs_farm.assets import homes
-
-    if args.fetch:
-        homes.fetch()
-    rows = homes.example_homes()
-    if args.json:
-        echo_json([asdict(row) for row in rows])
-        return 0
-    # Listing fetches nothing: the list of homes is part of the program.
-    package = homes.cached()
-    for row in rows:
-        echo(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
-    echo()
-    echo(f"fetched: {package.label}" if package else "not fetched yet: pbrs-farm homes --fetch")
-    if package and package.note:
-        echo(package.note)
-    echo("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
-    return 0
 
 
 def _skies(_args: argparse.Namespace) -> int:

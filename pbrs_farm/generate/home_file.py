@@ -68,8 +68,9 @@ def home_file(
     rng: np.random.Generator,
     *,
     name: str = "home",
+    origin: str = "",
 ) -> bytes:
-    """The bytes of a .sh3d; equal arguments give equal bytes.
+    """The bytes of a .sh3d; equal arguments give equal bytes. origin: what it was made from.
 
     Pieces whose model the catalogue cannot load are left out.
     """
@@ -79,7 +80,7 @@ def home_file(
         "wallHeight": _cm(plan.height),
     })  # fmt: skip
     contents = _Contents()
-    _add_properties(home, placed)
+    _add_properties(home, placed, origin)
     _add_surroundings(home, plan)
     for opening in plan.openings:
         _add_opening(home, plan, opening, contents, paints := drawn_paints(_fork(rng)))
@@ -144,7 +145,7 @@ def _cm(metres: float) -> str:
     return f"{metres * 100:.2f}".rstrip("0").rstrip(".")
 
 
-def _add_properties(home: ET.Element, pieces: list[PlacedPiece]) -> None:
+def _add_properties(home: ET.Element, pieces: list[PlacedPiece], origin: str) -> None:
     # Say who made it, and whose models it holds.
     owed = Counter(
         (p.piece.creator or p.piece.library, p.piece.licence)
@@ -153,6 +154,8 @@ def _add_properties(home: ET.Element, pieces: list[PlacedPiece]) -> None:
     )
     credits = "; ".join(f"{creator}, {licence}" for creator, licence in sorted(owed))
     rows = {"Author": AUTHOR, "License": "CC-BY 3.0" if owed else "CC0"}
+    if origin:
+        rows["Made"] = origin
     if credits:
         rows["Models"] = credits
     for key, value in rows.items():

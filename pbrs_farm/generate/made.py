@@ -14,7 +14,7 @@ from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.furniture import PlacedPiece
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.plan import Plan
-from pbrs_farm.generate.programme import Wishes
+from pbrs_farm.generate.programme import Programme, Wishes
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,16 +24,26 @@ class Made:
     plan: Plan
     pieces: tuple[PlacedPiece, ...]
     data: bytes  # of its .sh3d
+    origin: str
 
 
-def made(home: MadeHome, catalogue: Catalogue) -> Made:
-    """The home of a seed; equal homes and catalogues give equal bytes.
+def made(home: MadeHome, catalogue: Catalogue, programme: Programme | None = None) -> Made:
+    """The home of a seed, or of a seed and a programme; equal arguments give equal bytes.
 
     Raises BadInput for wishes that no home meets.
     """
     wishes = Wishes(home.bedrooms, (float(home.area[0]), float(home.area[1])))
-    rng = np.random.default_rng(keys.seed("made", VERSION, home.word))
-    plan = drawn_plan(rng, wishes)
+    words = (home.word,) if programme is None else (home.word, repr(programme))
+    rng = np.random.default_rng(keys.seed("made", VERSION, *words))
+    plan = drawn_plan(rng, wishes, programme)
     shelf = catalogue if home.furniture else EMPTY
     pieces = furnished(plan, shelf, rng, home.style)
-    return Made(plan, pieces, home_file(plan, pieces, shelf, rng, name=home.name))
+    said = origin(home, shelf, programme)
+    data = home_file(plan, pieces, shelf, rng, name=home.name, origin=said)
+    return Made(plan, pieces, data, said)
+
+
+def origin(home: MadeHome, catalogue: Catalogue, programme: Programme | None = None) -> str:
+    """What tells a made home from every other, in its file: its word and a digest of the rest."""
+    shelf = catalogue if home.furniture else EMPTY
+    return f"{home.word} {keys.digest('made', VERSION, home.word, repr(programme), shelf.digest)}"

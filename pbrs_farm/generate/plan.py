@@ -6,6 +6,7 @@ draws its plans.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
@@ -86,7 +87,7 @@ class PlanWall:
     @property
     def length(self) -> float:
         """Of the middle line, metres."""
-        return abs(self.end[0] - self.start[0]) + abs(self.end[1] - self.start[1])
+        return math.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
 
     def at(self, along: float) -> Point:
         """The point of the middle line `along` metres from its start."""

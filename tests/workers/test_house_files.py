@@ -97,3 +97,24 @@ def test_a_worker_dresses_the_variant_that_its_task_names(monkeypatch: pytest.Mo
     )
     HouseRunner(store, n_threads=1).run(request, lambda _text: None)
     assert store.head(keys.house_key(entry.house_id, keys.DRESS)) is not None
+
+
+def test_made_homes_put_no_file_into_the_store(cache: Path):
+    # The package is in the cache of each machine, or goes into the store by itself.
+    words = [f"made:{seed},furniture=none" for seed in range(1, 4)]
+    found = entries_from_arguments(words)
+    assert [SourceRef.model_validate_json(e.source).location for e, _ref in found] == words
+    store = MemoryStore()
+    upload(store, [ref for _entry, ref in found])
+    assert list(store.list("")) == []
+
+
+def test_a_worker_makes_the_home_that_was_submitted(cache: Path, tmp_path: Path):
+    from pbrs_farm.core.recipe import Recipe
+    from pbrs_farm.run.house_of_source import house_of_source
+
+    ((entry, ref),) = entries_from_arguments(["made:2,furniture=none"])
+    here = house_of_source(ref, Recipe().read)
+    there = house_of_source(SourceRef.model_validate_json(entry.source), Recipe().read)
+    assert there.id == here.id == entry.house_id
+    assert [item.id for item in there.items] == [item.id for item in here.items]

@@ -1,0 +1,129 @@
+"""The verb homes: list and fetch the example homes, make new ones. Effects: prints; downloads; writes homes."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from pbrs_farm.commands.arguments import Verb, counted, echo, echo_json, warn
+from pbrs_farm.core.errors import BadInput, MachineFailed
+
+if TYPE_CHECKING:
+    from pbrs_farm.core.catalogue import Catalogue
+    from pbrs_farm.core.made_home import MadeHome
+    from pbrs_farm.generate.programme import Programme
+
+_SAY_EVERY_S: Final = 5.0
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add homes, and below it make."""
+    text = "list the example homes; fetch them from the Debian package; make new homes"
+    p = verb("homes", _homes, text)
+    p.add_argument("--fetch", action="store_true", help="download the package now")
+    text = "download the furniture to dress and to make homes with (120 MB), too"
+    p.add_argument("--furniture", action="store_true", help=text)
+    p.add_argument("--json", action="store_true", help="for machines")
+    parts = p.add_subparsers(metavar="make")
+    text = "generate furnished homes as .sh3d files, with plans.html to look at"
+    _add_make(parts.add_parser("make", help=text, description=text))
+
+
+def _add_make(p: argparse.ArgumentParser) -> None:
+    p.set_defaults(handler=_make)
+    add = p.add_argument
+    add("count", nargs="?", type=int, default=1, metavar="N", help="how many (default 1)")
+    add("--seed", type=int, default=1, help="of the first; the others follow (default 1)")
+    add("--out", type=Path, default=Path("homes"), help="folder (default homes/)")
+    add("--rooms", metavar="LOW..HIGH", help="bedrooms, 0 to 4, e.g. 2..4")
+    add("--area", metavar="LOW..HIGH", help="floor of all rooms in square metres, e.g. 60..90")
+    add("--style", metavar="NAME", help="of furniture and paints, e.g. nordic")
+    text = "leave the rooms without furniture; needs no package"
+    add("--empty", action="store_true", help=text)
+    add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")
+    add("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
+
+
+def _homes(args: argparse.Namespace) -> int:
+    from pbrs_farm.assets import furniture, homes
+
+    if args.fetch:
+        homes.fetch()
+    if args.furniture:
+        furniture.fetch()
+    rows = homes.example_homes()
+    if args.json:
+        echo_json([asdict(row) for row in rows])
+        return 0
+    # Listing fetches nothing: the list of homes is part of the program.
+    package = homes.cached()
+    for row in rows:
+        echo(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
+    echo()
+    echo(f"fetched: {package.label}" if package else "not fetched yet: pbrs-farm homes --fetch")
+    if package and package.note:
+        echo(package.note)
+    echo("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
+    return 0
+
+
+def _make(args: argparse.Namespace) -> int:
+    from pbrs_farm.gallery.made_homes import make_homes
+
+    if args.count < 1:
+        raise BadInput("homes make", str(args.count), "expected 1 home or more")
+    homes, programme = _asked_for(args)
+    if not args.empty:
+        catalogue_here()
+    started = said = time.monotonic()
+    n_new = 0
+    try:
+        args.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(args.out, "", error.strerror or "is no folder") from None
+    failed = []
+    for number, done in enumerate(make_homes(homes, args.out, programme, n_jobs=args.jobs), 1):
+        n_new += done.is_new
+        if done.fault:
+            failed.append(done)
+            warn(done.fault)
+        if time.monotonic() - said > _SAY_EVERY_S:
+            said = time.monotonic()
+            echo(f"{number} of {len(homes)} homes")
+    kept = len(homes) - n_new - len(failed)
+    text = f"{counted(n_new, 'home')} made in {time.monotonic() - started:.0f} s"
+    echo(text + (f", {kept} kept" if kept else "") + f": {args.out / 'plans.html'}")
+    return 1 if failed else 0
+
+
+def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | None]:
+    """The homes that the options name; raises BadInput as a word of `run` would."""
+    from pbrs_farm.core.made_home import made_homes
+    from pbrs_farm.generate.programme import Wishes
+    from pbrs_farm.generate.programme_file import programme_from_json
+
+    options = [f"{k}={v}" for k in ("rooms", "area", "style") if (v := getattr(args, k))]
+    options += ["furniture=none"] * args.empty
+    if args.programme and (args.rooms or args.area):
+        raise BadInput("--programme", str(args.programme), "leaves no choice of --rooms or --area")
+    first, last = args.seed, args.seed + args.count - 1
+    homes = made_homes(",".join((f"made:{first}..{last}", *options)))
+    # Say at once what no seed can meet.
+    bedrooms, area = homes[0].bedrooms, homes[0].area
+    Wishes(bedrooms, (float(area[0]), float(area[1])))
+    return homes, programme_from_json(args.programme) if args.programme else None
+
+
+def catalogue_here() -> Catalogue:
+    """The packages' furniture. Raises MachineFailed where it is not cached."""
+    from pbrs_farm.run.dress_catalogue import catalogue_of_words, has_furniture
+
+    if not has_furniture():
+        raise MachineFailed(
+            "made homes take their furniture from a package that is not fetched",
+            hint="`pbrs-farm homes --furniture` (120 MB), or --empty",
+        )
+    return catalogue_of_words("")

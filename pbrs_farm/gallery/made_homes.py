@@ -1,0 +1,104 @@
+"""Made homes as files of a folder, with a page of their plans. Effects: reads and writes that folder.
+
+A home that is there is kept: its file says what it was made from, so that a command that was
+interrupted goes on, and what a person changed in it since stays.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+from pbrs_farm.core.errors import BadInput, PbrsError
+from pbrs_farm.core.made_home import MadeHome
+from pbrs_farm.gallery.plan_picture import plan_svg
+from pbrs_farm.gallery.templates import page
+from pbrs_farm.generate.made import Made, made, origin
+from pbrs_farm.generate.programme import Programme
+from pbrs_farm.run.dress_catalogue import GENERATED, catalogue_of_words
+
+PAGE = "plans.html"
+_XML_BYTES = 4096  # of Home.xml: its properties come first
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What became of one home."""
+
+    home: MadeHome
+    is_new: bool
+    fault: str = ""
+
+
+def make_homes(
+    homes: Sequence[MadeHome], folder: Path, programme: Programme | None = None, *, n_jobs: int = 1
+) -> Iterator[Done]:
+    """Write <name>.sh3d and <name>.svg of each home, and plans.html at the end; tells of each."""
+    one = partial(_make, folder, programme)
+    try:
+        if n_jobs > 1:
+            with ProcessPoolExecutor(n_jobs, get_context("spawn")) as pool:
+                yield from pool.map(one, homes)
+        else:
+            yield from map(one, homes)
+    finally:
+        _write(folder / PAGE, plans_page(folder).encode())
+
+
+def _make(folder: Path, programme: Programme | None, home: MadeHome) -> Done:
+    path = folder / f"{home.name}.sh3d"
+    catalogue = catalogue_of_words("" if home.furniture else GENERATED)
+    try:
+        if path.exists() and path.with_suffix(".svg").exists():
+            _check_same(path, origin(home, catalogue, programme))
+            return Done(home, is_new=False)
+        found = made(home, catalogue, programme)
+        if path.exists():
+            _check_same(path, found.origin)
+        else:
+            _write(path, found.data)
+        _write(path.with_suffix(".svg"), plan_picture(found, home.name).encode())
+    except PbrsError as error:
+        return Done(home, is_new=False, fault=str(error))
+    return Done(home, is_new=True)
+
+
+def plan_picture(home: Made, name: str) -> str:
+    """The plan of a made home as the text of an SVG file."""
+    return plan_svg(home.plan, home.pieces, name)
+
+
+def plans_page(folder: Path) -> str:
+    """The HTML page of every plan in a folder, in the order of their seeds."""
+    names = [p.stem for p in folder.glob("*.svg") if p.with_suffix(".sh3d").exists()]
+    names.sort(key=lambda name: (len(name), name))
+    return page("pbrs_farm.gallery", "plans.html", names=names)
+
+
+def _check_same(path: Path, expected: str) -> None:
+    """Raise BadInput where a file was made from something else."""
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open("Home.xml") as file:
+            head = file.read(_XML_BYTES)
+    except (OSError, KeyError, zipfile.BadZipFile):
+        head = b""
+    if expected.encode() not in head:
+        raise BadInput(
+            path, "", "is there already and is not this home",
+            hint="another --out, or delete the file",
+        )  # fmt: skip
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all."""
+    scratch = path.with_name(f".{path.name}.part")
+    try:
+        scratch.write_bytes(data)
+        scratch.replace(path)
+    except OSError as error:
+        raise BadInput(path, "", f"cannot be written: {error.strerror}") from None

@@ -1,0 +1,142 @@
+"""A furnished plan as an SVG picture, drawn as an architect would; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from pbrs_farm.core.svg import Element, element, svg_file, svg_text
+from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, PlanWall, Point, RoomType
+
+_MARGIN_M: Final = 0.6
+_PX_PER_M: Final = 60.0
+_FLOOR: Final = {
+    RoomType.LIVING: "#f6eedd", RoomType.STUDIO: "#f6eedd", RoomType.BEDROOM: "#efe6f2",
+    RoomType.KITCHEN: "#fbe7d3", RoomType.BATHROOM: "#dcecf4", RoomType.WC: "#dcecf4",
+    RoomType.HALL: "#eeeeea", RoomType.STORE: "#e6e6e0", RoomType.WARDROBE: "#e9e2ea",
+    RoomType.BALCONY: "#e2efdd",
+}  # fmt: skip
+_RAISED_M: Final = 1.2  # what hangs higher is drawn dashed
+
+
+def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
+    """The text of an SVG file: rooms with names and areas, walls, doors, windows, furniture."""
+    points = [p for wall in plan.walls for p in wall_corners(wall)]
+    x0, z0 = (min(p[k] for p in points) - _MARGIN_M for k in (0, 1))
+    x1, z1 = (max(p[k] for p in points) + _MARGIN_M for k in (0, 1))
+    root = svg_file(
+        viewBox=f"{x0:.2f} {z0:.2f} {x1 - x0:.2f} {z1 - z0:.2f}",
+        width=round((x1 - x0) * _PX_PER_M), height=round((z1 - z0) * _PX_PER_M),
+        font_family="sans-serif",
+    )  # fmt: skip
+    element(root, "title", title)
+    for room in plan.rooms:
+        element(root, "polygon", points=_text(room.polygon), fill=_FLOOR[room.type])
+    for piece in sorted(pieces, key=lambda p: p.elevation + p.height):
+        _draw_piece(root, piece)
+    for wall in plan.walls:
+        fill = "#888" if wall.height else "#333"
+        element(root, "polygon", points=_text(wall_corners(wall)), fill=fill)
+    for opening in plan.openings:
+        _draw_opening(root, plan, opening)
+    for room in plan.rooms:
+        _label(root, room.name, room.area, room.polygon)
+    return svg_text(root)
+
+
+def wall_corners(wall: PlanWall) -> tuple[Point, Point, Point, Point]:
+    """The corners of a wall's ground, its ends drawn out by half of its thickness."""
+    (x0, z0), (x1, z1) = wall.start, wall.end
+    half = wall.thickness / 2
+    ux, uz = (x1 - x0) / wall.length * half, (z1 - z0) / wall.length * half
+    return (
+        (x0 - ux - uz, z0 - uz + ux), (x1 + ux - uz, z1 + uz + ux),
+        (x1 + ux + uz, z1 + uz - ux), (x0 - ux + uz, z0 - uz - ux),
+    )  # fmt: skip
+
+
+def _text(points: Sequence[Point]) -> str:
+    return " ".join(f"{x:.3f},{z:.3f}" for x, z in points)
+
+
+def _draw_piece(root: Element, piece: PlacedPiece) -> None:
+    is_high = piece.elevation >= _RAISED_M
+    element(
+        root, "polygon", points=_text(piece.corners), fill="none" if is_high else "#ffffff",
+        fill_opacity="0.75", stroke="#777", stroke_width="0.02",
+        stroke_dasharray="0.08 0.06" if is_high else "",
+    )  # fmt: skip
+    if not is_high:
+        # A line along the front says where it faces.
+        left, right = piece.corners[3], piece.corners[2]
+        element(
+            root, "line", x1=f"{left[0]:.3f}", y1=f"{left[1]:.3f}", x2=f"{right[0]:.3f}",
+            y2=f"{right[1]:.3f}", stroke="#333", stroke_width="0.035",
+        )  # fmt: skip
+
+
+def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
+    wall = plan.walls[opening.wall]
+    half = opening.width / 2
+    start, end = wall.at(opening.along - half), wall.at(opening.along + half)
+    hole = PlanWall(start, end, wall.thickness)
+    ux, uz = (end[0] - start[0]) / opening.width, (end[1] - start[1]) / opening.width
+    away = wall.thickness / 2 + 0.005
+    corners = [
+        (p[0] - uz * s * away, p[1] + ux * s * away)
+        for p, s in ((start, 1), (end, 1), (end, -1), (start, -1))
+    ]
+    is_window = opening.kind in (OpeningKind.WINDOW, OpeningKind.FRENCH_WINDOW)
+    element(
+        root, "polygon", points=_text(corners), fill="#cfe6f5" if is_window else "#ffffff",
+        stroke="#333" if is_window else "", stroke_width="0.02",
+    )  # fmt: skip
+    if is_window:
+        element(root, "polyline", points=_text((hole.start, hole.end)), stroke="#333",
+                stroke_width="0.03")  # fmt: skip
+        return
+    # The leaf stands open into its room; an arc shows its way.
+    hinge, other = (start, end) if opening.hinge_at_start else (end, start)
+    nx, nz = _into(plan, opening, wall)
+    open_at = (hinge[0] + nx * opening.width, hinge[1] + nz * opening.width)
+    turn = (other[0] - hinge[0]) * nz - (other[1] - hinge[1]) * nx
+    element(
+        root, "path", fill="none", stroke="#a03c2d" if opening.other is None else "#777",
+        stroke_width="0.025",
+        d=f"M{hinge[0]:.3f},{hinge[1]:.3f} L{open_at[0]:.3f},{open_at[1]:.3f} "
+        f"A{opening.width:g},{opening.width:g} 0 0 {0 if turn > 0 else 1} "
+        f"{other[0]:.3f},{other[1]:.3f}",
+    )  # fmt: skip
+
+
+def _into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> Point:
+    """The unit normal of the wall that looks into the opening's room."""
+    (x0, z0), (x1, z1) = wall.start, wall.end
+    nx, nz = -(z1 - z0) / wall.length, (x1 - x0) / wall.length
+    x, z = wall.at(opening.along)
+    reach = wall.thickness / 2 + 0.1
+    inside = contains(plan.rooms[opening.room].polygon, (x + nx * reach, z + nz * reach))
+    return (nx, nz) if inside else (-nx, -nz)
+
+
+def contains(polygon: Sequence[Point], point: Point) -> bool:
+    """Whether a point lies inside a polygon: a ray to the right crosses an odd number of sides."""
+    x, z = point
+    odd = False
+    for (xa, za), (xb, zb) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
+        if (za > z) != (zb > z) and x < xa + (z - za) / (zb - za) * (xb - xa):
+            odd = not odd
+    return odd
+
+
+def _label(root: Element, name: str, area: float, polygon: Sequence[Point]) -> None:
+    xs, zs = [p[0] for p in polygon], [p[1] for p in polygon]
+    x, z = (min(xs) + max(xs)) / 2, (min(zs) + max(zs)) / 2
+    size = min(0.3, (max(xs) - min(xs)) / max(len(name), 4) * 1.5)
+    for line, text in enumerate((name, f"{area:.1f} m²")):
+        element(
+            root, "text", text, x=f"{x:.2f}", y=f"{z + (line - 0.1) * size * 1.1:.2f}",
+            font_size=f"{size:.2f}", text_anchor="middle", fill="#222",
+            stroke="#ffffff", stroke_width="0.05", paint_order="stroke",
+        )  # fmt: skip

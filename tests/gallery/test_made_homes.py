@@ -1,0 +1,64 @@
+"""Made homes in a folder: whole, looked at, kept, never written over."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.made_home import MadeHome, made_homes
+from pbrs_farm.gallery.made_homes import make_homes
+from pbrs_farm.gallery.plan_picture import contains, plan_svg, wall_corners
+from pbrs_farm.generate.made import made
+from pbrs_farm.generate.plan import PlanRoom, PlanWall
+
+HOMES = made_homes("made:1..2,furniture=none")
+
+
+def of_seed(seed: int) -> MadeHome:
+    return MadeHome(seed, furniture=False)
+
+
+def test_homes_and_their_plans_lie_in_the_folder(tmp_path: Path) -> None:
+    assert [done.is_new for done in make_homes(HOMES, tmp_path)] == [True, True]
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"made-1.sh3d", "made-1.svg", "made-2.sh3d", "made-2.svg", "plans.html"}
+    assert (tmp_path / "plans.html").read_text().count("<figure>") == 2
+
+
+def test_a_second_call_keeps_what_is_there(tmp_path: Path) -> None:
+    list(make_homes(HOMES[:1], tmp_path))
+    before = (tmp_path / "made-1.sh3d").stat().st_mtime_ns
+    assert [done.is_new for done in make_homes(HOMES, tmp_path)] == [False, True]
+    assert (tmp_path / "made-1.sh3d").stat().st_mtime_ns == before
+
+
+def test_a_file_of_another_home_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "made-1.sh3d").write_bytes(b"a person's")
+    (done,) = make_homes(HOMES[:1], tmp_path)
+    assert "is not this home" in done.fault
+    assert (tmp_path / "made-1.sh3d").read_bytes() == b"a person's"
+
+
+def test_two_processes_write_what_one_does(tmp_path: Path) -> None:
+    for name in "ab":
+        (tmp_path / name).mkdir()
+    list(make_homes(HOMES, tmp_path / "a"))
+    list(make_homes(HOMES, tmp_path / "b", n_jobs=2))
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+
+
+def test_a_plan_shows_every_room_and_escapes_its_name() -> None:
+    plan = made(of_seed(1), EMPTY).plan
+    rooms = tuple(PlanRoom(r.type, "<b>&", r.polygon) for r in plan.rooms)
+    text = plan_svg(type(plan)(rooms, plan.walls, plan.openings, plan.height), (), "a<b")
+    root = ET.fromstring(text)
+    shown = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert shown.count("<b>&") == len(rooms)
+
+
+def test_a_skewed_wall_has_four_corners_around_its_middle() -> None:
+    corners = wall_corners(PlanWall((0.0, 0.0), (3.0, 4.0), 0.2))
+    assert contains(corners, (1.5, 2.0))
+    assert not contains(corners, (1.5, 2.3))

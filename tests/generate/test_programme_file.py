@@ -1,0 +1,64 @@
+"""A user's programme: what it may say, and one clear line for what it may not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.drawing import drawn_plan
+from pbrs_farm.generate.plan import RoomType
+from pbrs_farm.generate.programme_file import programme_from_json
+
+FLAT = [{"type": "bedroom", "name": "Ada"}, {"type": "living", "area": 24}, "kitchen", "bathroom"]
+
+
+def written(folder: Path, value: object) -> Path:
+    path = folder / "flat.json"
+    path.write_text(value if isinstance(value, str) else json.dumps(value))
+    return path
+
+
+def test_a_programme_is_drawn_with_its_rooms_and_a_hall(tmp_path: Path) -> None:
+    programme = programme_from_json(written(tmp_path, {"rooms": FLAT, "open_kitchen": True}))
+    assert programme.open_kitchen
+    plan = drawn_plan(np.random.default_rng(1), None, programme)
+    assert plan.rooms[0].type is RoomType.LIVING
+    assert {r.name for r in plan.rooms} >= {"Ada", "Hall", "Kitchen", "Bathroom"}
+
+
+def test_the_rooms_take_the_area_of_the_whole_home(tmp_path: Path) -> None:
+    programme = programme_from_json(written(tmp_path, {"rooms": FLAT, "area": 70}))
+    assert programme.area == pytest.approx(70, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("{", "is no JSON"),
+        ([], "is no programme"),
+        ({"rooms": [*FLAT, "cellar"]}, "cellar.*is no room type.*one of living"),
+        ({"rooms": [*FLAT, *["bedroom"] * 6], "area": 20}, "11 rooms in 20 m2.*take 1[0-9]{2} to"),
+        ({"rooms": [{"type": "bedroom", "area": 2}]}, "has 2 m2; 9 to 17 works.*nearest is 9 m2"),
+        ({"rooms": ["bedroom"]}, "0 rooms to live in"),
+        ({"rooms": FLAT[:3]}, "no bathroom"),
+        ({"rooms": FLAT, "garden": 1}, "garden.*no field.*open_kitchen"),
+        ({"rooms": FLAT, "balcony": 1}, "not true or false"),
+        ({"rooms": FLAT, "notch": "x"}, "is no number"),
+        ({"rooms": ["bedroom"] * 40}, "at most 14"),
+    ],
+)
+def test_a_programme_that_cannot_be_met_is_one_line(
+    tmp_path: Path, value: object, message: str
+) -> None:
+    with pytest.raises(BadInput, match=message) as caught:
+        programme_from_json(written(tmp_path, value))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"none\.json"):
+        programme_from_json(tmp_path / "none.json")
