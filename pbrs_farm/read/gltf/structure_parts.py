@@ -18,6 +18,7 @@ from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, room_parts
 from pbrs_farm.read.gltf.node_classes import class_of_node_name
 
 _STRUCTURE: Final[tuple[ItemKind, ...]] = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING)
+_THICKEST_OPENING_M: Final = 1.5  # a porch of glass has less
 UNMAPPED: Final = "unmapped"
 """Tag of an item of which nothing says what it is."""
 
@@ -32,15 +33,23 @@ def structure_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]
     """The items that a node's item is, where it is a wall, floor or ceiling, or is not known.
 
     others: centres_of all items. A room seen from inside is parted by how its faces look, what is
-    no room by the names of its materials; open walls are parted plane by plane.
+    no room by the names of its materials; open walls are parted plane by plane. A node whose name
+    holds the word window or door ("Room with windows") may be a room, too, where it is as large.
     """
     is_unknown = UNMAPPED in item.tags
-    if item.kind not in _STRUCTURE and not is_unknown:
+    if not (item.kind in _STRUCTURE or is_unknown or _is_too_large_for_an_opening(item)):
         return (item,)
     parts = room_parts(item, others)
     if parts[0] is item and (is_unknown or item.kind is ItemKind.WALL):
         parts = _by_materials(item)
     return tuple(p for part in parts for p in planar_parts(part))
+
+
+def _is_too_large_for_an_opening(item: Item) -> bool:
+    if item.kind not in (ItemKind.DOOR, ItemKind.WINDOW) or not item.n_faces:
+        return False
+    low, high = item.bounds
+    return bool((high - low)[[0, 2]].min() > _THICKEST_OPENING_M)
 
 
 def _by_materials(item: Item) -> tuple[Item, ...]:

@@ -24,6 +24,7 @@ from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom, plane_items, read_ro
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 from pbrs_farm.read.sweethome3d.piece_items import piece_item, piece_opening
 from pbrs_farm.read.sweethome3d.piece_models import PieceModels
+from pbrs_farm.read.sweethome3d.plan_bounds import check_plan_bounds
 from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
 from pbrs_farm.read.sweethome3d.wall_solids import wall_items
 
@@ -52,6 +53,7 @@ def read_home(
     container = open_container(data, file, resources)
     notes = Notes(file, strict=fields.strict)
     plan = _shown(parse_plan(container.root, file, fields.max_extent_m), fields, notes)
+    check_plan_bounds(plan, file)
     if package_note:
         notes.add("package-version", package, package_note)
     materials = HomeMaterials(container.contents, notes)
