@@ -90,7 +90,7 @@ class CameraFields(FieldGroup):
         "paper", description="whose rules and score; photo: as people photograph rooms"
     )
     n_sectors: int = Field(6, ge=1, le=360, description="per room, 60 degrees each")
-    cell_m: float = Field(0.25, ge=0.02, le=100, description="edge of the viewpoint grid")
+    cell_m: float = Field(0.25, ge=0.05, le=100, description="edge of the viewpoint grid")
     height_min_m: float = Field(1.5, gt=0, le=100, description="eye above the floor's surface")
     height_max_m: float = Field(1.6, gt=0, le=100)
     tilt_deg: float = Field(11.0, gt=-90, lt=90, description="downwards")

@@ -17,6 +17,7 @@ from pbrs_farm.read.sweethome3d.home_file.home_xml import Plan, PlanRoom, PlanWa
 
 MAX_ROOMS: Final = 500
 MAX_WALLS: Final = 3_000
+MAX_PIECES: Final = 10_000
 MAX_CROSSINGS: Final = 500
 """Pairs of walls of a level whose centre lines cross; a home has a dozen."""
 
@@ -29,10 +30,11 @@ _HINT: Final = "remove what is drawn over itself, or split the home into several
 
 
 def check_plan_bounds(plan: Plan, file: str) -> None:
-    """Raise BadHouse, naming the file, for a plan of too many rooms or walls, or drawn over itself."""
+    """Raise BadHouse, naming the file, for a plan of too many parts, or drawn over itself."""
     for name, n, most in (
         ("rooms", len(plan.rooms), MAX_ROOMS),
         ("walls", len(plan.walls), MAX_WALLS),
+        ("pieces", len(plan.pieces), MAX_PIECES),
     ):
         if n > most:
             raise BadHouse(file, "", f"{n} {name}, at most {most} are read", hint=_HINT)
