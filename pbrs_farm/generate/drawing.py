@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
-from pbrs_farm.generate.layout import layout
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.layout import Layout, layout
 from pbrs_farm.generate.openings import openings_of
 from pbrs_farm.generate.plan import Plan
 from pbrs_farm.generate.programme import Programme, Wishes, drawn_programme
 from pbrs_farm.generate.walls import rooms_of, runs_of, walls_of
+
+_PROGRAMMES: Final = 6  # that are tried before a wish is refused
 
 
 def drawn_plan(
     rng: np.random.Generator, wishes: Wishes | None = None, programme: Programme | None = None
 ) -> Plan:
     """A plan for a programme, or for one drawn by seed as wished. Raises BadInput if none fits."""
-    where = layout(programme or drawn_programme(rng, wishes), rng)
+    where = layout(programme, rng) if programme else _drawn_layout(rng, wishes)
     runs = runs_of(where)
     walls = walls_of(where, runs)
     rooms = rooms_of(where, walls)
     all_rooms, all_walls, openings = openings_of(where, runs, walls, rooms, rng)
     height = float(rng.choice([2.4, 2.5, 2.5, 2.5, 2.6, 2.7]))
     return Plan(all_rooms, all_walls, openings, height)
+
+
+def _drawn_layout(rng: np.random.Generator, wishes: Wishes | None) -> Layout:
+    """Rectangles for a programme by seed; for another one where it has none."""
+    for _ in range(_PROGRAMMES):
+        try:
+            return layout(drawn_programme(rng, wishes), rng)
+        except BadInput as error:
+            refused = error
+    raise refused

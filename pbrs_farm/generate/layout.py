@@ -29,9 +29,10 @@ _MIN_WIDTH: Final = {
 }  # fmt: skip
 _MAX_ASPECT: Final = {
     RoomType.LIVING: 1.7, RoomType.STUDIO: 1.7, RoomType.KITCHEN: 1.9, RoomType.BEDROOM: 1.6,
-    RoomType.BATHROOM: 1.8, RoomType.HALL: 8.0, RoomType.WC: 1.9, RoomType.STORE: 2.0,
-    RoomType.WARDROBE: 1.9,
+    RoomType.BATHROOM: 1.7, RoomType.HALL: 8.0, RoomType.WC: 1.9, RoomType.STORE: 1.8,
+    RoomType.WARDROBE: 1.8,
 }  # fmt: skip
+_STRIP_ASPECT: Final = 2.15  # of a small room along the whole side of another
 _DOOR_WALL_M: Final = 1.2  # a door of 0.9 m, 10 cm from the corner, and the walls' thickness
 _CUT_FROM: Final = {
     RoomType.WARDROBE: (RoomType.BEDROOM,),
@@ -184,7 +185,7 @@ def _strips(whole: IntRect, wish: RoomWish) -> list[tuple[IntRect, IntRect]]:
     least = _MIN_WIDTH[wish.type] + _WALL_M
 
     def width(side: float) -> int:
-        wide = max(wish.area / (side - _WALL_M) + _WALL_M, least, side / 2.1)
+        wide = max(wish.area / (side - _WALL_M) + _WALL_M, least, side / _STRIP_ASPECT)
         return math.ceil(wide / STEP_M)
 
     across, along = width((z1 - z0) * STEP_M), width((x1 - x0) * STEP_M)
@@ -204,12 +205,12 @@ def _strips(whole: IntRect, wish: RoomWish) -> list[tuple[IntRect, IntRect]]:
 def _guest_area(guest: RoomWish, host: RoomWish) -> float:
     # A strip along a side of the host is no more than twice as long as it is wide.
     side = math.sqrt(host.area)
-    return max(guest.area, side * side / 2.1) + _WALL_M * side
+    return max(guest.area, side * side / _STRIP_ASPECT) + _WALL_M * side
 
 
 def _fits(rect: IntRect, type_: RoomType) -> bool:
     sides = sorted(side * STEP_M - _WALL_M for side in (rect[2] - rect[0], rect[3] - rect[1]))
-    return sides[0] >= _MIN_WIDTH[type_] and sides[1] <= 1.3 * _MAX_ASPECT[type_] * sides[0]
+    return sides[0] >= _MIN_WIDTH[type_] and sides[1] <= 1.2 * _MAX_ASPECT[type_] * sides[0]
 
 
 def _arms(wish: RoomWish, programme: Programme) -> tuple[float, ...]:

@@ -22,6 +22,7 @@ _WINDOW_M, _WINDOW_HEIGHT_M, _SILL_M = 1.3, 1.3, 0.9
 _WIDEST_M: Final = 2.4
 _FRENCH_HEIGHT_M, _FRENCH_SILL_M = 2.1, 0.1
 _CLEAR_M: Final = 0.35  # between a window and a corner or another window
+_OPENS_OUT: Final = (RoomType.WC, RoomType.STORE)
 _GLASS_SHARE: Final = 1 / 8  # of the floor
 
 
@@ -159,6 +160,9 @@ def _add_door(drawing: _Drawing, run: Run, room: int, kind: OpeningKind, width: 
     if drawing.rng.random() < 0.5:
         places.reverse()
     other = next((r for r in run.rooms if r != room), OUTSIDE)
+    # The leaf of a small room's door would stand in all of it: it opens outwards.
+    opens_out = other != OUTSIDE and drawing.types[room] in _OPENS_OUT
+    into, behind = (other, room) if opens_out else (room, other)
     for at, hinge_at_start in places:
         span = (at - width / 2 - 0.02, at + width / 2 + 0.02)
         if any(a < span[1] and b > span[0] for a, b in drawing.taken(run)):
@@ -172,8 +176,8 @@ def _add_door(drawing: _Drawing, run: Run, room: int, kind: OpeningKind, width: 
                 width,
                 DOOR_HEIGHT_M,
                 0.0,
-                room,
-                None if other == OUTSIDE else other,
+                into,
+                None if behind == OUTSIDE else behind,
                 hinge_at_start,
             )
         )

@@ -41,7 +41,7 @@ AREA_RANGE: Final = {
 _SPREAD: Final = {RoomType.BEDROOM: 0.16, RoomType.LIVING: 0.20}  # of the logarithm; others .18
 _BEDROOMS: Final = (0, 1, 2, 3, 4)
 _BEDROOM_SHARES: Final = (0.10, 0.25, 0.35, 0.22, 0.08)
-_HALL_SHARE: Final = (0.08, 0.12)  # of all other rooms
+_HALL_SHARE: Final = (0.09, 0.13)  # of all other rooms
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int]) -> Programme:
     # Homes with few bedrooms have smaller living rooms and kitchens.
     if n <= 1:
         rooms = [
-            RoomWish(r.type, max(r.area * 0.8, AREA_RANGE[r.type][0]))
+            RoomWish(r.type, max(r.area * 0.9, AREA_RANGE[r.type][0]))
             if r.type in (RoomType.LIVING, RoomType.KITCHEN)
             else r
             for r in rooms
@@ -138,13 +138,14 @@ def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int]) -> Programme:
     total = sum(r.area for r in rooms)
     hall = max(total * rng.uniform(*_HALL_SHARE), 3.0 + 0.95 * len(rooms))
     rooms.append(RoomWish(RoomType.HALL, float(hall)))
-    blind = int(rng.choice([0, 1, 2], p=[0.45, 0.4, 0.15]))
+    # Many rooms need many sides with daylight.
+    blind = min(int(rng.choice([0, 1, 2], p=[0.45, 0.4, 0.15])), (2, 2, 2, 1, 0)[n])
     return Programme(
         tuple(rooms),
         open_kitchen=bool(rng.random() < (0.7 if n == 0 else 0.5)),
         n_blind_sides=blind,
         notch=float(total * rng.uniform(0.06, 0.12)) if n >= 1 and rng.random() < 0.3 else 0.0,
-        l_shaped=bool(n >= 2 and rng.random() < 0.25),
+        l_shaped=bool(n in (2, 3) and rng.random() < 0.25),
         balcony=bool(rng.random() < 0.4),
     )
 

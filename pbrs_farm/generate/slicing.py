@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 
 STEP_M: Final = 0.05
-N_MOVES: Final = 4000
+N_MOVES: Final = 3000
 N_TRIES: Final = 10
-_T_START, _T_END = 3.0, 0.5
+_T_START, _T_END = 6.0, 0.8
 _WALL_STEPS: Final = 3  # what walls take from a room's width, about
 _UNMET: Final = 1.5  # cost of a hard rule that is not met, beside how far it is from it
 
@@ -253,33 +253,43 @@ class _Rules:
 
     def __init__(self, brief: Brief) -> None:
         self._brief = brief
+        self._limits = [
+            (leaf.min_width, leaf.max_aspect, bool(leaf.outer or leaf.any_outer or leaf.is_corner))
+            for leaf in brief.leaves
+        ]
+        self._contacts = [(c.leaf, c.others, c.length, c.is_hard) for c in brief.contacts]
         self._notches = [i for i, leaf in enumerate(brief.leaves) if leaf.is_corner]
 
     def judge(self, rects: list[IntRect]) -> tuple[float, int]:
         """(cost, hard rules that are broken) of one rectangle for each leaf."""
         total, unmet = 0.0, 0
-        for leaf, rect in zip(self._brief.leaves, rects, strict=True):
+        for leaf, (min_width, max_aspect, has_outer), rect in zip(
+            self._brief.leaves, self._limits, rects, strict=True
+        ):
             width = rect[2] - rect[0] - _WALL_STEPS
             depth = rect[3] - rect[1] - _WALL_STEPS
             short, long = (width, depth) if width < depth else (depth, width)
             short_m = short * STEP_M
-            if short_m < leaf.min_width:
-                total += _UNMET + 4 * (leaf.min_width - short_m)
+            if short_m < min_width:
+                total += _UNMET + 4 * (min_width - short_m)
                 unmet += 1
-            aspect = long / short if short > 0 else 20.0
-            if aspect > leaf.max_aspect:
-                total += min(2 * (aspect - leaf.max_aspect), 6.0)
-                unmet += aspect > 1.3 * leaf.max_aspect
-            missing = self._missing_outside(leaf, rect, rects)
+            if long > max_aspect * short:
+                aspect = long / short if short > 0 else 20.0
+                total += min(2 * (aspect - max_aspect), 6.0)
+                unmet += aspect > 1.3 * max_aspect
+            missing = self._missing_outside(leaf, rect, rects) if has_outer else 0.0
             if missing > 0:
                 total += _UNMET + missing
                 unmet += 1
-        for contact in self._brief.contacts:
-            rect = rects[contact.leaf]
-            missing = min(_missing_contact(rect, rects[o], contact.length) for o in contact.others)
+        for leaf_number, others, length, is_hard in self._contacts:
+            rect, missing = rects[leaf_number], math.inf
+            for other in others:
+                missing = min(missing, _missing_contact(rect, rects[other], length))
+                if missing <= 0:
+                    break
             if missing > 0:
-                total += _UNMET + missing if contact.is_hard else 0.2 + 0.3 * min(missing, 2.0)
-                unmet += contact.is_hard
+                total += _UNMET + missing if is_hard else 0.2 + 0.3 * min(missing, 2.0)
+                unmet += is_hard
         return total, unmet
 
     def _missing_outside(self, leaf: Leaf, rect: IntRect, rects: list[IntRect]) -> float:
@@ -315,8 +325,10 @@ class _Rules:
 
 def _missing_contact(a: IntRect, b: IntRect, length: float) -> float:
     """Metres by which two rectangles miss `length` of common wall, the gap between them counted."""
-    overlap_x = min(a[2], b[2]) - max(a[0], b[0])
-    overlap_z = min(a[3], b[3]) - max(a[1], b[1])
+    ax0, az0, ax1, az1 = a
+    bx0, bz0, bx1, bz1 = b
+    overlap_x = (ax1 if ax1 < bx1 else bx1) - (ax0 if ax0 > bx0 else bx0)
+    overlap_z = (az1 if az1 < bz1 else bz1) - (az0 if az0 > bz0 else bz0)
     # Rectangles of a slicing tree never overlap: one of these is a gap, or 0.
     gap, along = (-overlap_x, overlap_z) if overlap_x <= overlap_z else (-overlap_z, overlap_x)
     return gap * STEP_M + max(length - max(along, 0) * STEP_M, 0.0)

@@ -68,7 +68,7 @@ def _bedroom(plan: Plan, space: RoomSpace, shelf: Shelf, rng: np.random.Generato
     ]  # fmt: skip
     if rng.random() < 0.4:
         fillers.insert(0, _group("desk", bedroom.desks(shelf, widest=1.3)))
-    return Brief(groups, tuple(fillers), 0.60, 0.38)
+    return Brief(groups, tuple(fillers), 0.54, 0.38)
 
 
 def _childs_room(beds: tuple[Template, ...], shelf: Shelf) -> Brief:
@@ -81,7 +81,7 @@ def _childs_room(beds: tuple[Template, ...], shelf: Shelf) -> Brief:
         _group("dresser", living.dressers(shelf)), _group("boxes", small_rooms.boxes(shelf)),
         _group("plant", living.plants(shelf)),
     )  # fmt: skip
-    return Brief(groups, fillers, 0.62, 0.36)
+    return Brief(groups, fillers, 0.56, 0.36)
 
 
 def _lower(template: Template, by: float) -> Template:
@@ -111,7 +111,7 @@ def _living(space: RoomSpace, shelf: Shelf, rng: np.random.Generator, *, sleeps:
     ]  # fmt: skip
     if space.area > 26 and rng.random() < 0.3:
         fillers.insert(0, _group("piano", living.pianos(shelf)))
-    return Brief(tuple(groups), tuple(fillers), 0.58, 0.42)
+    return Brief(tuple(groups), tuple(fillers), 0.54, 0.42)
 
 
 def _kitchen(space: RoomSpace, shelf: Shelf, rng: np.random.Generator) -> Brief:
@@ -145,7 +145,7 @@ def _bathroom(plan: Plan, space: RoomSpace, shelf: Shelf) -> Brief:
         _group("small things", bathroom.small_things(shelf)),
         _group("small things", bathroom.small_things(shelf)),
     )
-    return Brief(tuple(groups), fillers, 1.0, 0.22)
+    return Brief(tuple(groups), fillers, 0.9, 0.22)
 
 
 def _wc(space: RoomSpace, shelf: Shelf) -> Brief:
@@ -162,7 +162,7 @@ def _hall(space: RoomSpace, shelf: Shelf) -> Brief:
         _group("coats", small_rooms.coats(shelf)), _group("console", small_rooms.consoles(shelf)),
     )  # fmt: skip
     fillers = (_group("plant", living.plants(shelf)),) if space.area > 8 else ()
-    return Brief(groups, fillers, 0.35, 0.45)
+    return Brief(groups, fillers, 0.28, 0.45)
 
 
 def _store(space: RoomSpace, shelf: Shelf) -> Brief:
@@ -184,7 +184,7 @@ def _wardrobe(space: RoomSpace, shelf: Shelf) -> Brief:
         _group("dresser", living.dressers(shelf)), _group("shelves", small_rooms.stores(shelf)),
         _group("boxes", small_rooms.boxes(shelf)),
     )  # fmt: skip
-    return Brief((row,), fillers, 1.0, 0.2)
+    return Brief((row,), fillers, 0.8, 0.2)
 
 
 def _balcony(space: RoomSpace, shelf: Shelf) -> Brief:
