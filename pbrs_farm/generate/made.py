@@ -9,8 +9,6 @@ import numpy as np
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.made_home import VERSION, MadeHome
-from pbrs_farm.generate.drawing import drawn_plan
-from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.furniture import PlacedPiece
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.plan import Plan
@@ -35,9 +33,9 @@ def made(home: MadeHome, catalogue: Catalogue, programme: Programme | None = Non
     wishes = Wishes(home.bedrooms, (float(home.area[0]), float(home.area[1])))
     words = (home.word,) if programme is None else (home.word, repr(programme))
     rng = np.random.default_rng(keys.seed("made", VERSION, *words))
-    plan = drawn_plan(rng, wishes, programme)
     shelf = catalogue if home.furniture else EMPTY
-    pieces = furnished(plan, shelf, rng, home.style)
+    drawn = drawn_home(rng, shelf, wishes=wishes, programme=programme, style=home.style)
+    plan, pieces = drawn.plan, drawn.pieces
     said = origin(home, shelf, programme)
     data = home_file(plan, pieces, shelf, rng, name=home.name, origin=said)
     return Made(plan, pieces, data, said)
