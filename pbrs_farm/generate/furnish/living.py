@@ -129,7 +129,7 @@ def _free(table: Piece, chair: Piece, rank: float) -> Template:
         for u in _along(w, n // 2):
             slots += [slot(chair, u, -d / 2 - out), slot(chair, u, d / 2 + out, turns=2)]
         far = d / 2 + _BEHIND_CHAIR_M
-        clear = [(-w / 2, -far, w / 2, far)]
+        clear = [(-w / 2 - 0.3, -far, w / 2 + 0.3, far)]
     front = (-w / 2 - 0.6, -d / 2 - 0.8, w / 2 + 0.6, d / 2 + 0.8)
     return Template(
         f"table for {n}", tuple(slots), tuple(clear), (front,), Stand.FREE, rank=rank,
