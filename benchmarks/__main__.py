@@ -26,6 +26,7 @@ DEFAULT: Final = {
 OWN_TARGET: Final = {
     "house": "house",
     "dress": "dress.dress",
+    "made": "homes.made",
     "light": "light.equal_time",
     "presets": "light.presets",
     "cycles": "renderers.cycles",

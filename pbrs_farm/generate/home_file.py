@@ -1,7 +1,7 @@
 """A furnished plan as a Sweet Home 3D file: Home.xml, models, textures; no effects.
 
 The program writes the same names and units: centimetres, angles in radians, x to the right and y
-downwards on the plan (https://www.sweethome3d.com, SweetHome3D.dtd of version 7).
+downwards on the plan (https://www.sweethome3d.com, SweetHome3D.dtd of version 7.0).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, PlanRoom, Pl
 from pbrs_farm.images import png_from_array
 
 AUTHOR: Final = "pbrs_farm"
-VERSION: Final = "7200"
+VERSION: Final = "7000"
 _ZIP_TIME: Final = (2000, 1, 1, 0, 0, 0)  # of every entry: the same home has the same bytes
 _EYE_M: Final = 1.6
 _FIELD_OF_VIEW_RAD: Final = 1.1
@@ -76,7 +76,7 @@ def home_file(
     """
     placed = list(pieces)
     home = ET.Element("home", {
-        "version": VERSION, "name": f"{name}.sh3d", "camera": "observerCamera",
+        "version": VERSION, "name": f"{name}.sh3d", "camera": "topCamera",
         "wallHeight": _cm(plan.height),
     })  # fmt: skip
     contents = _Contents()

@@ -1,0 +1,111 @@
+"""Made homes, measured in a process of its own; prints a JSON line a home.
+
+`python -m benchmarks.homes.made_home PART FIRST LAST`, parts: plans (plan + furnish on one core, and
+what the plan is like), houses (read, repaired: leaks, contacts, bits), views (dressed: what is seen).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+from benchmarks.homes.made_plan import measured
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.core.made_home import VERSION, MadeHome
+from pbrs_farm.core.recipe import recipe_from_name
+
+DRESS_SEED = 1
+
+
+def of_plan(seed: int) -> dict[str, Any]:
+    """Plan and furniture of a seed: CPU seconds on one core, and what they are like."""
+    from pbrs_farm.generate.drawing import drawn_plan
+    from pbrs_farm.generate.furnish.furnished import furnished
+    from pbrs_farm.run.dress_catalogue import catalogue_of_words
+
+    catalogue = catalogue_of_words("")
+    word = MadeHome(seed).word
+    rng = np.random.default_rng(keys.seed("made", VERSION, word))
+    started = time.process_time()
+    plan = drawn_plan(rng)
+    planned = time.process_time()
+    pieces = furnished(plan, catalogue, rng)
+    seconds = time.process_time() - started
+    text = repr((plan, pieces)).encode()
+    return {
+        "seconds": round(seconds, 3), "plan_s": round(planned - started, 3),
+        "bits": hashlib.sha256(text).hexdigest(), **measured(plan, pieces),
+    }  # fmt: skip
+
+
+def of_house(seed: int) -> dict[str, Any]:
+    """The home as the ordinary reader and repair see it: leaks, contacts of meshes, bits of its file."""
+    from benchmarks.dress.contacts import blocked_doors, floating, penetrations, things_of
+    from pbrs_farm.generate.made import made
+    from pbrs_farm.read.source import resolve
+    from pbrs_farm.run.dress_catalogue import catalogue_of_words
+    from pbrs_farm.run.house_of_source import house_of_source
+    from pbrs_farm.run.steps import repaired_house
+
+    recipe = recipe_from_name("fast")
+    source = resolve(MadeHome(seed).word)
+    data = made(MadeHome(seed), catalogue_of_words("")).data
+    house = house_of_source(source, recipe.read)
+    _repaired, report = repaired_house(source, recipe)
+    # All furniture counts as new; walls, doors and windows came with the home.
+    bare = house.with_items(tuple(i for i in house.items if _is_structure(i.kind)))
+    ordered = house.with_items((*bare.items, *(i for i in house.items if i not in bare.items)))
+    things = things_of(ordered, bare)
+    name = {i.id: i.name for i in house.items}
+    return {
+        "leaks": report.leaks.n_sky if report.leaks else -1,
+        "bits": hashlib.sha256(data).hexdigest(),
+        "notes": [n.text for n in house.notes],
+        "penetrations": [
+            [name[a], name[b], d] for a, b, d in penetrations(things) if not _may(name[a], name[b])
+        ],
+        "floating": [[name[a], gap] for a, gap in floating(things)],
+        "doors_blocked": [[name[b]] for _a, b in blocked_doors(ordered, things)],
+    }
+
+
+def _is_structure(kind: ItemKind) -> bool:
+    return kind.is_structure or kind in (ItemKind.DOOR, ItemKind.WINDOW)
+
+
+def _may(a: str, b: str) -> bool:
+    # Seats may stand under tables and desks.
+    names = f"{a} | {b}".lower()
+    has_seat = any(word in names for word in ("chair", "stool", "seat"))
+    return has_seat and any(word in names for word in ("table", "desk"))
+
+
+def of_views(seed: int) -> dict[str, Any]:
+    """What fast cameras see of the home dressed by the first seed."""
+    from benchmarks.dress.dressed_home import _repaired
+
+    return _repaired(MadeHome(seed).word, DRESS_SEED, with_views=True)
+
+
+PARTS = {"plans": of_plan, "houses": of_house, "views": of_views}
+
+
+def main(part: str, first: int, last: int) -> None:
+    """A line for each seed of first..last."""
+    for seed in range(first, last + 1):
+        try:
+            row = PARTS[part](seed)
+        except (PbrsError, ArithmeticError, LookupError, ValueError, AssertionError) as error:
+            row = {"failed": f"{type(error).__name__}: {error}"}
+        print(json.dumps({"seed": seed, **row}), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
