@@ -7,6 +7,7 @@ screens and what has a picture already stay. Effects: those of textures.families
 
 from __future__ import annotations
 
+import colorsys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
@@ -41,6 +42,7 @@ PART: Final = "parts"
 _LEAST_BOARD_M2: Final = 0.05  # a part of no class that is smaller stays: knobs, feet
 _UPWARD: Final = 0.7  # cosine: what one sits or lies on
 _LEATHER_SHARE: Final = 0.25  # of sofas and armchairs
+_MAX_SATURATION, _MAX_VALUE = 0.5, 0.72  # of painted furniture, as people buy it
 _PAINT_STAYS: Final = 0.15  # of furniture painted in a colour that wood never has
 _GREY_STAYS: Final = 0.6
 _DARKEST: Final = 0.02  # linear: black wood still shows its grain, black paint some light
@@ -197,13 +199,15 @@ def _soft(
 def _lacquer(
     draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
 ) -> _Finish | None:
-    if (
-        material.specular != (0.0, 0.0, 0.0)
-        and material.shininess > 1
-        and max(material.diffuse) > 0.1
-    ):
+    has_sheen = material.specular != (0.0, 0.0, 0.0) and material.shininess > 1
+    own = material.diffuse
+    # Screen colours are mixed down to those that paint has.
+    if is_vivid(own):
+        hue, saturation, value = colorsys.rgb_to_hsv(*own)
+        own = colorsys.hsv_to_rgb(hue, min(saturation, _MAX_SATURATION), min(value, _MAX_VALUE))
+    if has_sheen and own == material.diffuse and max(own) > 0.1:
         return None
-    linear = np.maximum(linear_from_srgb(np.array(material.diffuse)), _DARKEST)
+    linear = np.maximum(linear_from_srgb(np.array(own)), _DARKEST)
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(linear))
     roughness = round(float(rng.uniform(0.25, 0.5)), 2)
     painted = replace(

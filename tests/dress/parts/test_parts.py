@@ -174,3 +174,10 @@ def test_colours_are_told_apart() -> None:
     assert is_white(WHITE)
     assert not is_white((0.9, 0.5, 0.5))
     assert is_dark((0.1, 0.1, 0.1))
+
+
+def test_no_furniture_keeps_a_screen_colour() -> None:
+    blue = Material("blue", diffuse=(0.1, 0.1, 1.0), specular=(0.3, 0.3, 0.3), shininess=30.0)
+    for seed in range(12):
+        made = _material(_dressed(_thing("cabinet"), materials=(blue,), seed=seed))
+        assert max(made.diffuse) - min(made.diffuse) < 0.6
