@@ -36,6 +36,7 @@ _UNFIT: Final = frozenset(
         "BlendSwap-CC-0#babyRockingBed",
         "BlendSwap-CC-0#technicalTable1",  # a drawing board
         "Scopia#chest-freezer",
+        "BlendSwap-CC-BY#bunkBed",  # its model cannot be read
     ]
 )
 """Pieces that templates cannot use, each looked at."""
