@@ -6,10 +6,10 @@ BIN := $(VENV)/bin
 NAME ?=
 HOME_NAME ?= Studio
 
-.PHONY: help setup demo check test test-farm test-infra test-slow bench bench-light bench-cycles bench-luxcore bench-farm format clean
+.PHONY: help setup demo check test test-farm test-infra test-slow test-sweethome3d bench bench-light bench-cycles bench-luxcore bench-farm format clean
 
 help: ## what can be made
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 14
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
 
 setup: ## system packages (through apt when it may) and the virtual environment; quick the second time
 	@bash scripts/setup.sh
@@ -25,7 +25,7 @@ check: setup ## lint, types, import contracts: under a minute
 
 test: check ## check, then the tests; fetches the example homes for those that need them
 	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
-	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra"
+	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra and not sweethome3d"
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow
@@ -37,7 +37,12 @@ test-farm: setup ## the farm's tests that really kill processes
 test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm.md)
 	$(BIN)/pytest -m infra -rs
 
-bench: setup ## measure everything but house, dress, light, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
+test-sweethome3d: export PBRS_SETUP_ALSO := sweethome3d Xvfb:xvfb javac:default-jdk-headless
+test-sweethome3d: setup ## the real program opens ten made homes and saves them: out/sweethome3d/*.png
+	@$(BIN)/pbrs-farm homes --fetch --furniture >/dev/null
+	$(BIN)/pytest -m sweethome3d tests/sweethome3d
+
+bench: setup ## measure everything but house, dress, made, light, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## light transport: path, metropolis, denoiser

@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks.report import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
-MARKERS = "not slow and not gpu and not chaos and not infra"
+MARKERS = "not slow and not gpu and not chaos and not infra and not sweethome3d"
 PRAGMAS = ("noqa", "type:", "fmt:", "pragma:")
 DRESSING = (Path("pbrs_farm/dress"), Path("pbrs_farm/read/catalogue"))
 LINE_KINDS = (

@@ -22,8 +22,8 @@ missing_packages() {
   [ -e /usr/share/fonts/truetype/dejavu/DejaVuSans.ttf ] || echo fonts-dejavu-core
   [ -e /usr/share/fonts/truetype/droid/DroidSansFallbackFull.ttf ] || echo fonts-droid-fallback
   command -v redis-server >/dev/null || echo redis-server
-  # Commands that a target of the Makefile wants beside the usual ones; each is its package's name.
-  for p in ${PBRS_SETUP_ALSO:-}; do command -v "$p" >/dev/null || echo "$p"; done
+  # Commands that a target of the Makefile wants beside the usual ones: COMMAND:PACKAGE, or a name that is both.
+  for p in ${PBRS_SETUP_ALSO:-}; do command -v "${p%%:*}" >/dev/null || echo "${p##*:}"; done
   [ -n "$(find_python)" ] || echo python3
   [ -x "$VENV/bin/python" ] || "$(find_python || echo false)" -c 'import ensurepip' 2>/dev/null || echo python3-venv
 }
