@@ -246,7 +246,9 @@ def _above(
     module: _Module, units: Units, arms: tuple[Arm, ...], space: RoomSpace, number: int
 ) -> list[Slot]:
     """The hood or the wall cabinet over a module."""
-    if module.kind == "fridge" or _below_window(module, arms, space) > 0.0:
+    # A run never puts its cooker below a window.
+    beside = _below_window(module, arms, space) <= (0.02 if module.kind == "cooker" else 0.0)
+    if module.kind == "fridge" or not beside:
         return []
     if module.kind == "cooker":
         if units.hood is None:

@@ -93,10 +93,6 @@ def _free(space: RoomSpace, wall: Wall) -> list[tuple[float, float]]:
         along = _along(rect, strip, wall)
         if along is not None:
             taken.append(along)
-    ends = [0.0]
-    for low, high in sorted(taken):
-        ends += [low, high]
-    ends.append(wall.length)
     found, start = [], 0.0
     for low, high in sorted(taken):
         if low - start > 0.6:

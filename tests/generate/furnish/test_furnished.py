@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.errors import BadInput
@@ -69,3 +70,22 @@ def test_an_unknown_style_is_refused() -> None:
     plan, _ = home(1)
     with pytest.raises(BadInput, match="no such style"):
         furnished(plan, EMPTY, np.random.default_rng(1), "baroque")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_every_cooker_has_its_hood_above(seed: int) -> None:
+    _, pieces = home(seed)
+    cookers = [p for p in pieces if p.piece.group == "cooker"]
+    assert cookers
+    for cooker in cookers:
+        hood = next(p for p in pieces if p.piece.group == "hood" and p.room == cooker.room)
+        assert np.hypot(hood.x - cooker.x, hood.z - cooker.z) < 0.2
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_units_of_a_kitchen_have_their_backs_at_walls(seed: int) -> None:
+    plan, pieces = home(seed)
+    for unit in (p for p in pieces if p.piece.group in ("cooker", "sink", "base_cabinet")):
+        back = Point(*(np.mean(unit.corners[:2], axis=0)))
+        outline = Polygon(plan.rooms[unit.room].polygon).exterior
+        assert outline.distance(back) < 0.02
