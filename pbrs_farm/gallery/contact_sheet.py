@@ -88,8 +88,8 @@ def _in_turn(lists: Iterable[Sequence[ViewEntry]]) -> list[ViewEntry]:
 
 
 def _row_height(tiles: Sequence[Tile]) -> int:
-    shown = [t.pixels.shape[0] for t in tiles if t.pixels is not None]
-    return 34 + max(shown, default=_TILE_PX * 3 // 4) + 12  # title above, gap below
+    heights = [_TILE_PX * 3 // 4 if t.pixels is None else t.pixels.shape[0] for t in tiles]
+    return 34 + max(heights) + 12  # title above, gap below
 
 
 def _classes(rows: Sequence[Sequence[Tile]]) -> list[int]:

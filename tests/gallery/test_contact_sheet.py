@@ -19,7 +19,7 @@ from pbrs_farm.gallery import contact_sheet as sheet
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.gallery import lettering
 from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
-from pbrs_farm.gallery.tiles import TILES
+from pbrs_farm.gallery.tiles import TILES, Tile
 
 
 def write_view(folder: Path, *, without: tuple[str, ...] = (), size: tuple[int, int] = (60, 80)):
@@ -218,3 +218,11 @@ def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:
     (root / "selection/nyu.jsonl").write_text("{")
     with pytest.raises(BadInput, match=r"nyu\.jsonl"):
         gallery(root)
+
+
+def test_the_frame_of_a_missing_tile_stays_in_its_row():
+    small = Tile(TILES[0], np.zeros((60, 80, 3), np.uint8))
+    assert sheet._row_height([small]) < sheet._row_height([small, Tile(TILES[1], None, "gone")])
+    assert sheet._row_height([Tile(TILES[1], None)]) == sheet._row_height(
+        [small, Tile(TILES[1], None)]
+    )
