@@ -13,7 +13,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.mesh import clipped_to_box
-from pbrs_farm.dress.gates.bodies import Body
+from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace, doors_are_joined, floor_bitmap
 from pbrs_farm.dress.space.passages import BEFORE_DOOR_M
 
@@ -24,6 +24,7 @@ _FACE_M: Final = 0.03  # before the wall: sockets and mouldings are no obstacle
 _BESIDE_M: Final = 0.01  # of a door's width, at either end
 _BEFORE_WINDOW_M: Final = 0.6
 _CELL_M: Final = 0.05
+_ROUNDING_M: Final = 1e-6
 _CURTAINS: Final = frozenset({13, 16, 20})  # NYU40: blinds, curtains, floor mats
 
 
@@ -42,6 +43,7 @@ def _counts(body: Body) -> bool:
 def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
     """How many sides of doors there are, and the new bodies in a swing or within 0.8 m of one."""
     n, found = 0, []
+    boxes = boxes_of(bodies)
     for door in space.passages:
         sides = [] if door.is_window else [s for s in (0, 1) if door.room_ids[s] is not None]
         for side in sides:
@@ -50,22 +52,27 @@ def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[
             depth = max(BEFORE_DOOR_M, min(door.width, 1.0))
             low = np.array([-door.width / 2 + _BESIDE_M, floor_y + _STEP_M, _FACE_M])
             high = np.array([door.width / 2 - _BESIDE_M, min(door.top_y, floor_y + _HEAD_M), depth])
-            for body in bodies:
-                if _counts(body) and _enters(body, door, side, low, high):
-                    found.append(Blocked(door.id, body.index))
+            for k in np.flatnonzero(_may_enter(boxes, door, side, low, high)).tolist():
+                if _counts(bodies[k]) and _enters(bodies[k], door, side, low, high):
+                    found.append(Blocked(door.id, bodies[k].index))
     return n, found
+
+
+def _may_enter(boxes: tuple[F64, F64], passage: Passage, side: int, low: F64, high: F64) -> Bools:
+    """(N,) whether boxes meet a box before a passage; some that do not are among them.
+
+    boxes: (N, 3) lowest and highest corners in the world. low, high: (3,) as in_front_of has them.
+    """
+    middle, half = (boxes[0] + boxes[1]) / 2, (boxes[1] - boxes[0]) / 2
+    axes = np.array([passage.along, [0.0, 1.0, 0.0], passage.inward(side)])
+    at = in_front_of(passage, side, middle)
+    reach = half @ np.abs(axes).T + _ROUNDING_M
+    return np.asarray(((at + reach >= low) & (at - reach <= high)).all(1))
 
 
 def _enters(body: Body, door: Passage, side: int, low: F64, high: F64) -> bool:
     """Whether a body's mesh enters a box before a door: along it, up, and out into the room."""
-    centre = (body.low + body.high) / 2
-    reach = float(np.linalg.norm(body.high - body.low)) / 2 + door.width + 2.0
-    if np.linalg.norm(centre - door.face_point(side)) > reach + 2.0:
-        return False
-    local = in_front_of(door, side, body.corners)
-    if (local.max((0, 1)) < low).any() or (local.min((0, 1)) > high).any():
-        return False
-    return bool(len(clipped_to_box(local, low, high)))
+    return bool(len(clipped_to_box(in_front_of(door, side, body.corners), low, high)))
 
 
 def in_front_of(passage: Passage, side: int, points: F64) -> F64:
@@ -95,12 +102,18 @@ def covered_windows(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
 def _covers(
     window: Passage, side: int, space: HouseSpace, bodies: Sequence[Body]
 ) -> dict[int, Bools]:
-    """New body -> (rows, columns) which cells of a window it covers, seen from the room."""
+    """New body -> (rows, columns) which cells of a window it covers, seen from the room.
+
+    Bodies that are not near are left out.
+    """
     columns = max(1, round(window.width / _CELL_M))
     rows = max(1, round((window.top_y - window.bottom_y) / _CELL_M))
+    low = np.array([-window.width / 2, window.bottom_y, 0.01])
+    high = np.array([window.width / 2, window.top_y, _BEFORE_WINDOW_M])
+    near_it = _may_enter((space.bounds[:, 0], space.bounds[:, 1]), window, side, low, high)
     found = {}
-    for number, body in enumerate(bodies):
-        if not _counts(body):
+    for number in np.flatnonzero(near_it).tolist():
+        if not _counts(bodies[number]):
             continue
         local = in_front_of(window, side, space.points[number])
         near = (local[:, 2] > 0.01) & (local[:, 2] < _BEFORE_WINDOW_M)
