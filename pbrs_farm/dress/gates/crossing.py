@@ -38,8 +38,10 @@ def crossing_m(a: Shell, b: Shell, least_m: float) -> float:
 def _edges_near(a: Shell, b: Shell, least_m: float) -> tuple[F64, F64]:
     """The ends of a's edges whose boxes meet b's, long ones alone."""
     pairs = np.sort(np.concatenate([a.faces[:, [0, 1]], a.faces[:, [1, 2]], a.faces[:, [2, 0]]]))
-    pairs = np.unique(pairs, axis=0)
-    start, end = a.vertices[pairs[:, 0]], a.vertices[pairs[:, 1]]
+    # Number the pairs: faster than comparing them column by column, and in the same order.
+    n = len(a.vertices)
+    first, last = np.divmod(np.unique(pairs[:, 0] * n + pairs[:, 1]), n)
+    start, end = a.vertices[first], a.vertices[last]
     meets = ((np.minimum(start, end) <= b.high) & (np.maximum(start, end) >= b.low)).all(1)
     meets &= np.linalg.norm(end - start, axis=1) > least_m
     return start[meets], end[meets]
