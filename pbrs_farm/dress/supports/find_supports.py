@@ -123,7 +123,8 @@ class Surroundings:
         stands = hits.high > height + np.where(self.is_own, _NEAR_M, -_NEAR_M)
         clear = np.full(self.grid.shape, MOST_FREE_M)
         free = np.maximum(hits.low[stands] - height, 0.0)
-        np.minimum.at(clear, (hits.row[stands], hits.column[stands]), free)
+        cell = hits.row[stands] * clear.shape[1] + hits.column[stands]
+        np.minimum.at(clear.reshape(-1), cell, free)  # one index: numpy's fast way
         clear[self.solid] = 0.0
         return clear
 
