@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -25,7 +25,7 @@ from pbrs_farm.dress.space.room_faces import (
 )
 from pbrs_farm.dress.space.room_kinds import RoomKind, room_kind
 from pbrs_farm.dress.space.surface_points import item_triangles, lowest_above, surface_points
-from pbrs_farm.dress.space.wall_faces import WallFace, wall_planes
+from pbrs_farm.dress.space.wall_faces import Hidden, WallFace, hidden_cells, wall_planes
 
 _ABOVE_FLOOR_M = 0.5  # structure lower than this above a floor is no ceiling
 _CHEST_M = 1.2  # above the floor, where walls are cut for their plan
@@ -95,12 +95,15 @@ class _EmptyRoom:
 
 @dataclass(slots=True)
 class _Kept:
-    # What stays as long as the items it came from stay the same objects.
+    # What stays as long as the items it came from stay the same objects. Items are held with
+    # their points, so ids stay theirs.
     rooms: tuple[_EmptyRoom, ...]
     passages: tuple[Passage, ...]
     items: dict[int, tuple[Item, F64, F64]]  # with points on it and their bounds
     faces: dict[int, tuple[tuple[int, ...], WallFace]]  # by the empty face, with the things near it
     space: tuple[tuple[int, ...], HouseSpace] | None = None
+    hidden: dict[tuple[int, int], Hidden | None] = field(default_factory=dict)  # by face and item
+    inside: dict[tuple[str, int], bool] = field(default_factory=dict)  # by room and item
 
 
 def house_space(draft: Draft) -> HouseSpace:
@@ -111,7 +114,9 @@ def house_space(draft: Draft) -> HouseSpace:
     key = tuple(id(item) for item in draft.items)
     if kept.space is None or kept.space[0] != key:
         # Spread points over new items; keep those of the others.
-        kept.items = {id(i): kept.items.get(id(i)) or _with_points(i) for i in draft.items}
+        for item in draft.items:
+            if id(item) not in kept.items:
+                kept.items[id(item)] = _with_points(item)
         kept.space = key, _house_space(draft.items, kept)
     return kept.space[1]
 
@@ -185,7 +190,7 @@ def _house_space(items: Sequence[Item], kept: _Kept) -> HouseSpace:
     bounds = np.array([kept.items[id(i)][2] for i in items]).reshape(-1, 2, 3)
     rooms = []
     for empty in kept.rooms:
-        inside = _items_in(items, points, bounds, empty)
+        inside = _items_in(items, points, bounds, empty, kept)
         own = [p for p in kept.passages if empty.room.id in p.room_ids]
         faces = [_filled(face, items, points, bounds, kept) for face in empty.faces]
         rooms.append(
@@ -212,12 +217,20 @@ def _filled(
     key = tuple(id(items[n]) for n in near)
     known = kept.faces.get(id(face))
     if known is None or known[0] != key:
-        known = kept.faces[id(face)] = key, with_things(face, [points[n] for n in near])
+        hidden = [_hidden_by(face, items[n], points[n], kept) for n in near]
+        known = kept.faces[id(face)] = key, with_things(face, hidden)
     return known[1]
 
 
+def _hidden_by(face: WallFace, item: Item, points: F64, kept: _Kept) -> Hidden | None:
+    key = id(face), id(item)
+    if key not in kept.hidden:
+        kept.hidden[key] = hidden_cells(face, points)
+    return kept.hidden[key]
+
+
 def _items_in(
-    items: Sequence[Item], points: Sequence[F64], bounds: F64, empty: _EmptyRoom
+    items: Sequence[Item], points: Sequence[F64], bounds: F64, empty: _EmptyRoom, kept: _Kept
 ) -> tuple[int, ...]:
     """Numbers of the items of which a good part is in the room; neighbours' poke through outlines."""
     room, area = empty.room, empty.area
@@ -230,7 +243,11 @@ def _items_in(
     for number in meeting(bounds, reach):
         if items[number].kind in (ItemKind.DOOR, ItemKind.WINDOW):
             continue
-        some = points[number][:: max(1, len(points[number]) // 200)]
-        if shapely.contains_xy(area, some[:, 0], some[:, 2]).mean() > _INSIDE_SHARE:
+        key = room.id, id(items[number])
+        if key not in kept.inside:
+            some = points[number][:: max(1, len(points[number]) // 200)]
+            share = shapely.contains_xy(area, some[:, 0], some[:, 2]).mean()
+            kept.inside[key] = bool(share > _INSIDE_SHARE)
+        if kept.inside[key]:
             found.append(number)
     return tuple(found)

@@ -13,7 +13,7 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.house import Room
 from pbrs_farm.dress.space.footprints import areal
 from pbrs_farm.dress.space.passages import Passage
-from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M, WallFace, WallPlane, runs, with_points
+from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M, Hidden, WallFace, WallPlane, runs
 
 _IN_FRONT_M = (0.1, 0.3, 0.02)  # of a wall's face, where its room is looked for
 _WALL_BEFORE_M = (0.02, 0.1, 0.2, 0.35, 0.5, 0.8)  # where another wall may stand in front
@@ -115,11 +115,15 @@ def with_structure(
     return replace(face, clear=clear)
 
 
-def with_things(face: WallFace, points: Sequence[F64]) -> WallFace:
-    """The face with its free space limited by things; points: (N, 3) on each one's surface."""
-    if not points:
+def with_things(face: WallFace, hidden: Sequence[Hidden | None]) -> WallFace:
+    """The face with its free space limited by things: what each of them hides, None = nothing."""
+    if not hidden:
         return face
-    return replace(face, clear=with_points(face.clear, face, np.concatenate(points)))
+    clear = face.clear.copy()
+    for thing in hidden:
+        if thing is not None:
+            thing.limit(clear)
+    return replace(face, clear=clear)
 
 
 def reach_of(face: WallFace) -> F64:

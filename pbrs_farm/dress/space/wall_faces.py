@@ -217,21 +217,40 @@ def runs(room_of_column: Sequence[int]) -> Iterator[tuple[int, int, int]]:
             yield int(values[start]), int(start), int(end)
 
 
-def with_points(clear: F32, face: WallFace, points: F64, *, grow: bool = True) -> F32:
-    """clear, limited by things: points (N, 3) on their surfaces; grow: by one cell all round."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Hidden:
+    """How far before a face a thing comes, in a window of its cells."""
+
+    row: int
+    column: int
+    out: F32  # (h, w) metres before the face, FAR_M where there is nothing
+
+    def limit(self, clear: F32) -> None:
+        """Limit the face's free space (H, S) by the thing, in place."""
+        h, w = self.out.shape
+        part = clear[self.row : self.row + h, self.column : self.column + w]
+        np.minimum(part, self.out, out=part)
+
+
+def hidden_cells(face: WallFace, points: F64) -> Hidden | None:
+    """What a thing hides of a face; points (N, 3): on its surface, grown by a cell."""
     out, s, y = face.out_of(points), face.s_of(points), points[:, 1] - face.low_y
-    n_rows, n_columns = clear.shape
+    n_rows, n_columns = face.clear.shape
     near = (out > -0.03) & (out < FAR_M)
     near &= (
         (s > -CELL_M) & (s < face.length + CELL_M) & (y > -CELL_M) & (y < n_rows * CELL_M + CELL_M)
     )
     if not near.any():
-        return clear
-    # Keep the nearest of each cell, on a bitmap one cell larger all round.
-    depth = np.full((n_rows + 2, n_columns + 2), FAR_M, np.float32)
-    i = np.floor(y[near] / CELL_M).astype(np.int64) + 1
-    j = np.floor(s[near] / CELL_M).astype(np.int64) + 1
-    np.minimum.at(depth, (i, j), np.maximum(out[near], 0.0).astype(np.float32))
-    if grow:
-        depth = ndimage.minimum_filter(depth, size=3)
-    return np.asarray(np.minimum(clear, depth[1:-1, 1:-1]))
+        return None
+    # Keep the nearest of each cell, on a bitmap two cells larger all round.
+    i = np.floor(y[near] / CELL_M).astype(np.int64)
+    j = np.floor(s[near] / CELL_M).astype(np.int64)
+    row, column = int(i.min()) - 2, int(j.min()) - 2
+    depth = np.full((int(i.max()) - row + 3, int(j.max()) - column + 3), FAR_M, np.float32)
+    cell = (i - row) * depth.shape[1] + (j - column)
+    np.minimum.at(depth.reshape(-1), cell, np.maximum(out[near], 0.0).astype(np.float32))
+    depth = ndimage.minimum_filter(depth, size=3)
+    # Cut off what is beyond the face.
+    above, left = max(-row, 0), max(-column, 0)
+    depth = depth[above : max(n_rows - row, 0), left : max(n_columns - column, 0)]
+    return Hidden(row + above, column + left, depth)
