@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
@@ -10,6 +11,7 @@ from pbrs_farm.core.mesh import area_vectors, triangle_corners
 
 SPACING_M = 0.03
 _MOST_POINTS = 200_000  # of one item: larger ones are spread more thinly
+_SPARSE = 32  # cubes for each point: with more, sorting the points is faster
 
 
 def item_triangles(item: Item) -> F64:
@@ -47,10 +49,18 @@ def surface_points(corners: F64, spacing_m: float = SPACING_M) -> F64:
     # Fine meshes have many points in one place.
     cube = np.floor((points - points.min(0)) / (spacing_m / 2)).astype(np.int64)
     size = cube.max(0) + 1
-    _, first = np.unique(
-        (cube[:, 0] * size[1] + cube[:, 1]) * size[2] + cube[:, 2], return_index=True
-    )
-    return np.asarray(points[first])
+    keys = (cube[:, 0] * size[1] + cube[:, 1]) * size[2] + cube[:, 2]
+    return np.asarray(points[_first_of_each(keys, int(size.prod()))])
+
+
+def _first_of_each(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """The first place of each key (0 to n), in the order of keys."""
+    if n > _SPARSE * len(keys):
+        return np.asarray(np.unique(keys, return_index=True)[1])
+    # Of places that are written twice the last one stays: write them from the last to the first.
+    first = np.full(n, -1, np.int64)
+    first[keys[::-1]] = np.arange(len(keys) - 1, -1, -1)
+    return np.asarray(first[first >= 0])
 
 
 def lowest_above(triangles: F64, places: F64, least_y: float) -> F64:
