@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from enum import StrEnum
+from functools import lru_cache
 
 from pbrs_farm.core.house import Item, Room
 
@@ -101,6 +102,7 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
     return RoomKind.HALL if area_m2 < _LARGE_M2 else RoomKind.OTHER
 
 
+@lru_cache(1024)
 def _named(said: str) -> RoomKind | None:
     words = set(re.findall(r"[^\W\d]+", _folded(said)))
     words |= {w.removesuffix("s") for w in words}
