@@ -44,6 +44,8 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     text = "leave the rooms without furniture; needs no package"
     add("--empty", action="store_true", help=text)
     add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")
+    text = "JSON or GeoJSON: a plan of your own in metres, furnished by the seed (docs/homes.md)"
+    add("--plan", type=Path, metavar="FILE", help=text)
     add("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
 
 
@@ -75,15 +77,14 @@ def _make(args: argparse.Namespace) -> int:
 
     if args.count < 1:
         raise BadInput("homes make", str(args.count), "expected 1 home or more")
+    if args.plan:
+        return _make_of_plan(args)
     homes, programme = _asked_for(args)
     if not args.empty:
         catalogue_here()
     started = said = time.monotonic()
     n_new = 0
-    try:
-        args.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(args.out, "", error.strerror or "is no folder") from None
+    _folder(args.out)
     failed = []
     for number, done in enumerate(make_homes(homes, args.out, programme, n_jobs=args.jobs), 1):
         n_new += done.is_new
@@ -97,6 +98,35 @@ def _make(args: argparse.Namespace) -> int:
     text = f"{counted(n_new, 'home')} made in {time.monotonic() - started:.0f} s"
     echo(text + (f", {kept} kept" if kept else "") + f": {args.out / 'plans.html'}")
     return 1 if failed else 0
+
+
+def _make_of_plan(args: argparse.Namespace) -> int:
+    """Furnish the user's own plan, once for each seed."""
+    from pbrs_farm.core.catalogue import EMPTY
+    from pbrs_farm.gallery.made_homes import write_home
+    from pbrs_farm.generate.made import made_of_plan
+    from pbrs_farm.generate.own_plan import plan_from_file
+
+    given = [f"--{k}" for k in ("rooms", "area", "programme") if getattr(args, k)]
+    if given:
+        raise BadInput("--plan", str(args.plan), f"leaves no choice of {given[0]}")
+    plan = plan_from_file(args.plan)
+    catalogue = EMPTY if args.empty else catalogue_here()
+    _folder(args.out)
+    for seed in range(args.seed, args.seed + args.count):
+        name = args.plan.stem if args.count == 1 else f"{args.plan.stem}-{seed}"
+        style = args.style or ""
+        home = made_of_plan(plan, catalogue, seed=seed, style=style, name=name)
+        write_home(args.out / f"{name}.sh3d", home)
+        echo(str(args.out / f"{name}.sh3d"))
+    return 0
+
+
+def _folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(path, "", error.strerror or "is no folder") from None
 
 
 def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | None]:

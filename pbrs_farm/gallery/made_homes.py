@@ -57,20 +57,20 @@ def _make(folder: Path, programme: Programme | None, home: MadeHome) -> Done:
         if path.exists() and path.with_suffix(".svg").exists():
             _check_same(path, origin(home, catalogue, programme))
             return Done(home, is_new=False)
-        found = made(home, catalogue, programme)
-        if path.exists():
-            _check_same(path, found.origin)
-        else:
-            _write(path, found.data)
-        _write(path.with_suffix(".svg"), plan_picture(found, home.name).encode())
+        write_home(path, made(home, catalogue, programme))
     except PbrsError as error:
         return Done(home, is_new=False, fault=str(error))
     return Done(home, is_new=True)
 
 
-def plan_picture(home: Made, name: str) -> str:
-    """The plan of a made home as the text of an SVG file."""
-    return plan_svg(home.plan, home.pieces, name)
+def write_home(path: Path, home: Made) -> None:
+    """Write a home's file and the picture of its plan. Raises BadInput where another home lies."""
+    if path.exists():
+        _check_same(path, home.origin)
+    else:
+        _write(path, home.data)
+    picture = plan_svg(home.plan, home.pieces, path.stem)
+    _write(path.with_suffix(".svg"), picture.encode())
 
 
 def plans_page(folder: Path) -> str:

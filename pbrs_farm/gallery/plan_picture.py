@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Final
 
@@ -31,13 +32,17 @@ def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
         font_family="sans-serif",
     )  # fmt: skip
     element(root, "title", title)
+    element(root, "rect", x=f"{x0:.2f}", y=f"{z0:.2f}", width="100%", height="100%", fill="#ffffff")
     for room in plan.rooms:
         element(root, "polygon", points=_text(room.polygon), fill=_FLOOR[room.type])
     for piece in sorted(pieces, key=lambda p: p.elevation + p.height):
         _draw_piece(root, piece)
+    ends = Counter(end for wall in plan.walls for end in (wall.start, wall.end))
     for wall in plan.walls:
-        fill = "#888" if wall.height else "#333"
-        element(root, "polygon", points=_text(wall_corners(wall)), fill=fill)
+        # Close the corners where two walls end at one point.
+        is_joined = ends[wall.start] > 1, ends[wall.end] > 1
+        points = wall_corners(wall, is_joined)
+        element(root, "polygon", points=_text(points), fill="#888" if wall.height else "#333")
     for opening in plan.openings:
         _draw_opening(root, plan, opening)
     for room in plan.rooms:
@@ -45,15 +50,17 @@ def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
     return svg_text(root)
 
 
-def wall_corners(wall: PlanWall) -> tuple[Point, Point, Point, Point]:
-    """The corners of a wall's ground, its ends drawn out by half of its thickness."""
+def wall_corners(
+    wall: PlanWall, is_joined: tuple[bool, bool] = (True, True)
+) -> tuple[Point, Point, Point, Point]:
+    """The corners of a wall's ground, its joined ends drawn out by half of its thickness."""
     (x0, z0), (x1, z1) = wall.start, wall.end
     half = wall.thickness / 2
-    ux, uz = (x1 - x0) / wall.length * half, (z1 - z0) / wall.length * half
-    return (
-        (x0 - ux - uz, z0 - uz + ux), (x1 + ux - uz, z1 + uz + ux),
-        (x1 + ux + uz, z1 + uz - ux), (x0 - ux + uz, z0 - uz - ux),
-    )  # fmt: skip
+    nx, nz = (c * half for c in wall.normal)
+    start, end = (half * is_end for is_end in is_joined)
+    ux, uz = (x1 - x0) / wall.length, (z1 - z0) / wall.length
+    x0, z0, x1, z1 = x0 - ux * start, z0 - uz * start, x1 + ux * end, z1 + uz * end
+    return (x0 + nx, z0 + nz), (x1 + nx, z1 + nz), (x1 - nx, z1 - nz), (x0 - nx, z0 - nz)
 
 
 def _text(points: Sequence[Point]) -> str:
@@ -112,22 +119,11 @@ def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
 
 def _into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> Point:
     """The unit normal of the wall that looks into the opening's room."""
-    (x0, z0), (x1, z1) = wall.start, wall.end
-    nx, nz = -(z1 - z0) / wall.length, (x1 - x0) / wall.length
+    nx, nz = wall.normal
     x, z = wall.at(opening.along)
     reach = wall.thickness / 2 + 0.1
-    inside = contains(plan.rooms[opening.room].polygon, (x + nx * reach, z + nz * reach))
+    inside = plan.rooms[opening.room].contains((x + nx * reach, z + nz * reach))
     return (nx, nz) if inside else (-nx, -nz)
-
-
-def contains(polygon: Sequence[Point], point: Point) -> bool:
-    """Whether a point lies inside a polygon: a ray to the right crosses an odd number of sides."""
-    x, z = point
-    odd = False
-    for (xa, za), (xb, zb) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
-        if (za > z) != (zb > z) and x < xa + (z - za) / (zb - za) * (xb - xa):
-            odd = not odd
-    return odd
 
 
 def _label(root: Element, name: str, area: float, polygon: Sequence[Point]) -> None:

@@ -209,10 +209,12 @@ def _add_opening(
 def _angle_into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> float:
     """The angle at which an opening's front looks into its room."""
     x, z = wall.at(opening.along)
-    x0, z0, x1, z1 = plan.rooms[opening.room].bounds
-    if wall.start[0] == wall.end[0]:
-        return -math.pi / 2 if (x0 + x1) / 2 > x else math.pi / 2
-    return 0.0 if (z0 + z1) / 2 > z else math.pi
+    nx, nz = wall.normal
+    away = wall.thickness / 2 + 0.05
+    if not plan.rooms[opening.room].contains((x + nx * away, z + nz * away)):
+        nx, nz = -nx, -nz
+    angle = math.atan2(-nx, nz)
+    return math.pi if angle < 1e-9 - math.pi else angle
 
 
 def _add_piece(
@@ -295,11 +297,9 @@ def _room_beside(plan: Plan, wall: PlanWall, side: int) -> PlanRoom | None:
     """The room on the left (-1) or right (1) of a wall's middle, looking from start to end."""
     x, z = wall.at(wall.length / 2)
     away = wall.thickness / 2 + 0.05
-    # Right of a wall that runs to +x is +z on the page; of one that runs to +z it is -x.
-    dx, dz = (-side * away, 0.0) if _is_upright(wall) else (0.0, side * away)
+    nx, nz = wall.normal
     for room in plan.rooms:
-        x0, z0, x1, z1 = room.bounds
-        if x0 <= x + dx <= x1 and z0 <= z + dz <= z1:
+        if room.contains((x + side * away * nx, z + side * away * nz)):
             return room
     return None
 

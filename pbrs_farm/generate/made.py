@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
+from shapely.geometry import Polygon
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.made_home import VERSION, MadeHome
 from pbrs_farm.generate.drawn_home import drawn_home
+from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.furniture import PlacedPiece
 from pbrs_farm.generate.home_file import home_file
-from pbrs_farm.generate.plan import Plan
+from pbrs_farm.generate.plan import Plan, Point
 from pbrs_farm.generate.programme import Programme, Wishes
 
 
@@ -46,3 +49,45 @@ def origin(home: MadeHome, catalogue: Catalogue, programme: Programme | None = N
     """What tells a made home from every other, in its file: its word and a digest of the rest."""
     shelf = catalogue if home.furniture else EMPTY
     return f"{home.word} {keys.digest('made', VERSION, home.word, repr(programme), shelf.digest)}"
+
+
+def made_of_plan(
+    plan: Plan, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
+) -> Made:
+    """A user's own plan, furnished by a seed: turned so that most of its walls run along x or z.
+
+    What would stand through a skewed wall is left out.
+    """
+    rng = np.random.default_rng(keys.seed("own plan", VERSION, seed, style, repr(plan)))
+    upright = turned(plan)
+    grounds = [Polygon(room.polygon).buffer(0.02) for room in upright.rooms]
+    pieces = tuple(
+        piece
+        for piece in furnished(upright, catalogue, rng, style)
+        if grounds[piece.room].contains(Polygon(piece.corners))
+    )
+    digest = keys.digest("own plan", VERSION, seed, style, repr(plan), catalogue.digest)
+    data = home_file(upright, pieces, catalogue, rng, name=name, origin=f"plan {digest}")
+    return Made(upright, pieces, data, f"plan {digest}")
+
+
+def turned(plan: Plan) -> Plan:
+    """The plan turned about its origin by less than 45 degrees, the longest way of its walls upright."""
+    ways: dict[float, float] = {}
+    for wall in plan.walls:
+        (x0, z0), (x1, z1) = wall.start, wall.end
+        angle = math.degrees(math.atan2(z1 - z0, x1 - x0)) % 90
+        tenth = round(angle, 1) % 90
+        ways[tenth] = ways.get(tenth, 0.0) + wall.length
+    main = max(ways, key=lambda angle: (ways[angle], -angle))
+    if main == 0:
+        return plan
+    back = math.radians(-main if main < 45 else 90 - main)
+    cos, sin = math.cos(back), math.sin(back)
+
+    def moved(p: Point) -> Point:
+        return round(p[0] * cos - p[1] * sin, 3), round(p[0] * sin + p[1] * cos, 3)
+
+    walls = tuple(replace(w, start=moved(w.start), end=moved(w.end)) for w in plan.walls)
+    rooms = tuple(replace(r, polygon=tuple(map(moved, r.polygon))) for r in plan.rooms)
+    return replace(plan, walls=walls, rooms=rooms)

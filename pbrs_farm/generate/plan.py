@@ -68,6 +68,15 @@ class PlanRoom:
         xs, zs = [p[0] for p in self.polygon], [p[1] for p in self.polygon]
         return min(xs), min(zs), max(xs), max(zs)
 
+    def contains(self, point: Point) -> bool:
+        """Whether a point lies inside: a ray to the right crosses an odd number of sides."""
+        x, z = point
+        crossed = [
+            (za > z) != (zb > z) and x < xa + (z - za) / (zb - za) * (xb - xa)
+            for (xa, za), (xb, zb) in self.edges
+        ]
+        return sum(crossed) % 2 == 1
+
     @property
     def edges(self) -> Iterator[tuple[Point, Point]]:
         """Each side of the polygon, from corner to corner."""
@@ -88,6 +97,12 @@ class PlanWall:
     def length(self) -> float:
         """Of the middle line, metres."""
         return math.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
+
+    @property
+    def normal(self) -> Point:
+        """The unit vector across it, to the right when looking from start to end on the page."""
+        (x0, z0), (x1, z1) = self.start, self.end
+        return (z0 - z1) / self.length, (x1 - x0) / self.length
 
     def at(self, along: float) -> Point:
         """The point of the middle line `along` metres from its start."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import pytest
+
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.made_home import MadeHome, made_homes
 from pbrs_farm.gallery.made_homes import make_homes
-from pbrs_farm.gallery.plan_picture import contains, plan_svg, wall_corners
+from pbrs_farm.gallery.plan_picture import plan_svg, wall_corners
 from pbrs_farm.generate.made import made
-from pbrs_farm.generate.plan import PlanRoom, PlanWall
+from pbrs_farm.generate.plan import PlanRoom, PlanWall, RoomType
 
 HOMES = made_homes("made:1..2,furniture=none")
 
@@ -60,5 +62,7 @@ def test_a_plan_shows_every_room_and_escapes_its_name() -> None:
 
 def test_a_skewed_wall_has_four_corners_around_its_middle() -> None:
     corners = wall_corners(PlanWall((0.0, 0.0), (3.0, 4.0), 0.2))
-    assert contains(corners, (1.5, 2.0))
-    assert not contains(corners, (1.5, 2.3))
+    ground = PlanRoom(RoomType.STORE, "", corners)
+    assert ground.contains((1.5, 2.0))
+    assert not ground.contains((1.5, 2.3))
+    assert ground.area == pytest.approx(5.2 * 0.2)

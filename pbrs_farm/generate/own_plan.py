@@ -1,0 +1,286 @@
+"""A plan of one's own: rooms, doors and windows in metres -> Plan with walls. Effects: reads the file.
+
+    {"height": 2.5,
+     "rooms": [{"type": "living", "name": "Salon", "polygon": [[0, 0], [5, 0], [5, 4], [0, 4]]}],
+     "doors": [{"at": [5, 2], "width": 0.9}, {"at": [0, 2], "entrance": true}],
+     "windows": [{"at": [2.5, 0], "width": 1.3, "height": 1.3, "sill": 0.9}]}
+
+GeoJSON says the same: polygons with the properties `type` and `name` are rooms, points with
+`kind` (door, entrance, window, french_window) and the sizes are openings. x runs to the right and
+the second coordinate downwards on the page. Rooms may touch or leave room for the walls between.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+from shapely.ops import unary_union
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plan import (
+    OpeningKind,
+    Plan,
+    PlanOpening,
+    PlanRoom,
+    PlanWall,
+    Point,
+    RoomType,
+)
+from pbrs_farm.generate.programme_file import json_from_file
+from pbrs_farm.generate.walls import INNER_M, OUTER_M, corners
+
+MAX_ROOMS: Final = 60
+_FAR_M: Final = 200.0
+_TOUCH_M: Final = 0.02  # rooms nearer than this share a side
+_THICKEST_M: Final = 0.6  # of a wall between rooms
+_LEAST_M2: Final = 0.5
+_REACH_M: Final = 0.6  # from an opening to its wall
+_SIZES: Final = {
+    OpeningKind.DOOR: (0.9, 2.1, 0.0), OpeningKind.ENTRANCE: (0.95, 2.1, 0.0),
+    OpeningKind.WINDOW: (1.3, 1.3, 0.9), OpeningKind.FRENCH_WINDOW: (1.6, 2.1, 0.1),
+}  # fmt: skip
+
+
+def plan_from_file(path: Path) -> Plan:
+    """The plan of a JSON or GeoJSON file. Raises BadInput, naming the room or opening."""
+    value = json_from_file(path)
+    if isinstance(value, dict) and value.get("type") == "FeatureCollection":
+        value = _from_geojson(path, value)
+    if not isinstance(value, dict) or not isinstance(value.get("rooms"), list):
+        raise BadInput(path, "", "is no plan", hint='{"rooms": [...], "doors": [...]}')
+    if not 0 < len(value["rooms"]) <= MAX_ROOMS:
+        raise BadInput(path, "", f"has {len(value['rooms'])} rooms; 1 to {MAX_ROOMS} work")
+    height = value.get("height", 2.5)
+    if not _is_number(height) or not 2.0 <= height <= 6.0:
+        raise BadInput(path, "height", "is no number from 2 to 6 metres")
+    drawn = [_room(path, k, row) for k, row in enumerate(value["rooms"])]
+    _check_apart(path, drawn)
+    walls, rooms = _walled(path, drawn)
+    openings = []
+    for key, kind in (("doors", OpeningKind.DOOR), ("windows", OpeningKind.WINDOW)):
+        rows = value.get(key, [])
+        if not isinstance(rows, list):
+            raise BadInput(path, key, "is no list")
+        for k, row in enumerate(rows):
+            place = f"{key[:-1]} {k + 1}"
+            openings.append(_opening(path, place, row, kind, walls, rooms, float(height)))
+    return Plan(rooms, walls, tuple(openings), float(height))
+
+
+def _from_geojson(path: Path, value: dict[str, Any]) -> dict[str, Any]:
+    plan: dict[str, Any] = {"rooms": [], "doors": [], "windows": []}
+    features = value.get("features")
+    for number, feature in enumerate(features if isinstance(features, list) else ()):
+        try:
+            row, form = dict(feature["properties"] or {}), feature["geometry"]
+            if form["type"] == "Polygon":
+                plan["rooms"].append(row | {"polygon": form["coordinates"][0]})
+            elif form["type"] == "Point":
+                kind = OpeningKind(str(row.get("kind")))
+                is_door = kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE)
+                plan["doors" if is_door else "windows"].append(row | {"at": form["coordinates"]})
+            else:
+                raise BadInput(path, f"feature {number + 1}", "is no Polygon and no Point")
+        except (TypeError, KeyError, IndexError, ValueError):
+            raise BadInput(path, f"feature {number + 1}", "is no room and no opening") from None
+    if _is_number(height := value.get("height")):
+        plan["height"] = height
+    return plan
+
+
+def _is_number(value: object) -> bool:
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number and math.isfinite(value)  # type: ignore[arg-type]
+
+
+def _points(value: object) -> list[Point] | None:
+    if not isinstance(value, list) or not all(
+        isinstance(p, list) and len(p) >= 2 and all(_is_number(c) for c in p[:2]) for p in value
+    ):
+        return None
+    return [(round(float(p[0]), 4), round(float(p[1]), 4)) for p in value]
+
+
+def _room(path: Path, number: int, row: object) -> tuple[RoomType, str, Polygon]:
+    place = f"room {number + 1}"
+    if not isinstance(row, dict):
+        raise BadInput(path, place, "is no object with a type and a polygon")
+    types = [t.value for t in RoomType]
+    if row.get("type") not in types:
+        text = f"has the type {str(row.get('type'))[:40]!r}, which is none"
+        raise BadInput(path, place, text, hint=f"one of {', '.join(types)}")
+    points = _points(row.get("polygon"))
+    if points is None or len(set(points)) < 3:
+        raise BadInput(path, place, "has no polygon: a list of three points [x, y] or more")
+    if max(abs(c) for p in points for c in p) > 1e5:
+        raise BadInput(path, place, "lies far from the origin", hint="metres from a corner")
+    shape = Polygon(points)
+    if not shape.is_valid or shape.area < _LEAST_M2:
+        why = "crosses itself" if not shape.is_valid else f"has {shape.area:.2f} m2"
+        raise BadInput(path, place, f"{why}; simple polygons of {_LEAST_M2} m2 or more work")
+    type_ = RoomType(row["type"])
+    name = row.get("name") or type_.value.capitalize()
+    return type_, str(name)[:60], _oriented(shape)
+
+
+def _oriented(shape: Polygon) -> Polygon:
+    """The polygon as PlanRoom has it, without corners on straight sides."""
+    return Polygon(corners(shape.simplify(1e-3)))
+
+
+def _check_apart(path: Path, drawn: list[tuple[RoomType, str, Polygon]]) -> None:
+    bounds = unary_union([d[2] for d in drawn]).bounds
+    if max(bounds[2] - bounds[0], bounds[3] - bounds[1]) > _FAR_M:
+        raise BadInput(path, "", f"is over {_FAR_M:g} m wide", hint="coordinates in metres")
+    for i, (_, name, shape) in enumerate(drawn):
+        for j in range(i):
+            shared = shape.intersection(drawn[j][2]).area
+            if shared > 0.05:
+                text = f"overlaps {drawn[j][1]!r} by {shared:.2f} m2"
+                raise BadInput(path, f"room {i + 1} ({name})", text)
+
+
+def _walled(
+    path: Path, drawn: list[tuple[RoomType, str, Polygon]]
+) -> tuple[tuple[PlanWall, ...], tuple[PlanRoom, ...]]:
+    """Walls between rooms and around them; rooms without what the walls stand on."""
+    shapes = [d[2] for d in drawn]
+    walls: list[PlanWall] = []
+    for number, shape in enumerate(shapes):
+        walls += _walls_of(number, shape, shapes)
+    ground = unary_union([_ground(wall) for wall in walls])
+    rooms = []
+    for number, (type_, name, shape) in enumerate(drawn):
+        polygon = corners(shape.difference(ground))
+        if len(polygon) < 3:
+            raise BadInput(path, f"room {number + 1} ({name})", "has no floor beside its walls")
+        rooms.append(PlanRoom(type_, name, polygon))
+    return tuple(walls), tuple(rooms)
+
+
+def _ground(wall: PlanWall) -> Polygon:
+    line = LineString([wall.start, wall.end])
+    return line.buffer(wall.thickness / 2, cap_style="flat")
+
+
+def _walls_of(number: int, shape: Polygon, shapes: list[Polygon]) -> list[PlanWall]:
+    """The walls that a room adds: to rooms of higher number, and outer ones."""
+    ring: list[Point] = [(x, z) for x, z, *_ in shape.exterior.coords[:-1]]
+    found = []
+    for k, a in enumerate(ring):
+        b, before, after = ring[(k + 1) % len(ring)], ring[k - 1], ring[(k + 2) % len(ring)]
+        side = _Side(a, b)
+        free = [(0.0, side.length)]
+        for other, theirs in enumerate(shapes):
+            if other == number:
+                continue
+            for low, high, gap in side.shared(theirs):
+                free = _without(free, low, high)
+                if other > number:
+                    found.append(side.wall(low, high, max(gap, INNER_M), gap / 2))
+        for low, high in free:
+            if high - low < _TOUCH_M:
+                continue
+            # Draw an outer wall out to where the next one's outer face is.
+            start = _mitre(before, a, b) if low == 0.0 else INNER_M / 2
+            end = _mitre(a, b, after) if high == side.length else INNER_M / 2
+            found.append(side.wall(low - start, high + end, OUTER_M, OUTER_M / 2, is_outer=True))
+    return found
+
+
+def _mitre(a: Point, b: Point, c: Point) -> float:
+    """How far a wall outside a..b goes on beyond b: none where the room turns inwards."""
+    turn = math.atan2(c[1] - b[1], c[0] - b[0]) - math.atan2(b[1] - a[1], b[0] - a[0])
+    turn = (turn + math.pi) % (2 * math.pi) - math.pi
+    return min(OUTER_M * math.tan(turn / 2), 2 * OUTER_M) if turn > 0 else 0.0
+
+
+def _without(
+    spans: list[tuple[float, float]], low: float, high: float
+) -> list[tuple[float, float]]:
+    left = [(a, min(b, low)) for a, b in spans] + [(max(a, high), b) for a, b in spans]
+    return sorted({(a, b) for a, b in left if b - a > 1e-6})
+
+
+class _Side:
+    """A side of a room: its direction and the normal that looks out of the room."""
+
+    def __init__(self, a: Point, b: Point) -> None:
+        self.start = np.array(a)
+        self.length = math.dist(a, b)
+        self.along = (np.array(b) - self.start) / self.length
+        self.out = np.array([self.along[1], -self.along[0]])
+
+    def shared(self, shape: Polygon) -> list[tuple[float, float, float]]:
+        """(from, to, gap) where a side of another room faces this one, metres along it."""
+        found = []
+        for p, q in pairwise(np.array(shape.exterior.coords)):
+            way = (q - p) / max(float(np.linalg.norm(q - p)), 1e-9)
+            gap = float(((p + q) / 2 - self.start) @ self.out)
+            if way @ self.along > -0.999 or not -_TOUCH_M <= gap <= _THICKEST_M:
+                continue
+            low, high = sorted(float((x - self.start) @ self.along) for x in (p, q))
+            low, high = max(low, 0.0), min(high, self.length)
+            if high - low > 0.05:
+                found.append((low, high, max(gap, 0.0) if gap > _TOUCH_M else 0.0))
+        return found
+
+    def wall(
+        self, low: float, high: float, thickness: float, out: float, *, is_outer: bool = False
+    ) -> PlanWall:
+        """The wall along low..high of this side, its middle line that far out."""
+        if not is_outer:
+            # Reach into the walls at its ends.
+            low, high = low - OUTER_M / 4, high + OUTER_M / 4
+        ends = [self.start + self.along * t + self.out * out for t in (low, high)]
+        a, b = ((round(float(x), 4), round(float(z), 4)) for x, z in ends)
+        return PlanWall(a, b, round(thickness, 4), is_outer)
+
+
+def _opening(
+    path: Path, place: str, row: object, kind: OpeningKind,
+    walls: tuple[PlanWall, ...], rooms: tuple[PlanRoom, ...], height: float,
+) -> PlanOpening:  # fmt: skip
+    """A door or window in the wall nearest to where it is said to be."""
+    points = _points([row.get("at")]) if isinstance(row, dict) else None
+    if not isinstance(row, dict) or points is None:
+        raise BadInput(path, place, 'has no place "at": [x, y]')
+    if row.get("entrance") or row.get("kind") == "entrance":
+        kind = OpeningKind.ENTRANCE
+    if row.get("kind") == "french_window":
+        kind = OpeningKind.FRENCH_WINDOW
+    at = shapely.Point(points[0])
+    lines = [LineString([w.start, w.end]) for w in walls]
+    wall = min(range(len(walls)), key=lambda k: (lines[k].distance(at), k))
+    if lines[wall].distance(at) > _REACH_M:
+        text = f"is {lines[wall].distance(at):.1f} m from the nearest wall"
+        raise BadInput(path, place, text, hint=f"within {_REACH_M} m of one")
+    sizes = [row.get(k, d) for k, d in zip(("width", "height", "sill"), _SIZES[kind], strict=True)]
+    if not all(_is_number(s) and 0 <= s < 20 for s in sizes) or min(sizes[:2]) < 0.3:
+        raise BadInput(path, place, "has no width, height and sill in metres")
+    width, tall, sill = (float(s) for s in sizes)
+    if sill + tall > height - 0.02:
+        raise BadInput(path, place, f"is higher than the room: {height - 0.02 - sill:.2f} m works")
+    along = min(
+        max(lines[wall].project(at), width / 2 + 0.02), walls[wall].length - width / 2 - 0.02
+    )
+    if walls[wall].length < width + 0.04:
+        text = f"is wider than its wall of {walls[wall].length:.2f} m"
+        raise BadInput(path, place, text, hint=f"{max(walls[wall].length - 0.05, 0.3):.2f} m works")
+    hole = shapely.Point(walls[wall].at(along)).buffer(walls[wall].thickness / 2 + 0.15)
+    beside = [k for k, r in enumerate(rooms) if Polygon(r.polygon).intersects(hole)]
+    if not beside:
+        raise BadInput(path, place, "touches no room")
+    # A door swings into the smaller need: out of halls, into rooms.
+    beside.sort(key=lambda k: (rooms[k].type is RoomType.HALL, -rooms[k].area))
+    other = beside[1] if len(beside) > 1 else None
+    return PlanOpening(
+        kind, wall, round(along, 4), width, tall, sill, beside[0], other,
+        hinge_at_start=along < walls[wall].length / 2,
+    )  # fmt: skip

@@ -1,0 +1,143 @@
+"""A plan of one's own: room polygons become walls that close, doors and windows find theirs."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import Enclosure, geometry_from_house
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.generate.made import made_of_plan, turned
+from pbrs_farm.generate.own_plan import plan_from_file
+from pbrs_farm.generate.plan import OpeningKind, Plan, PlanRoom, PlanWall, RoomType
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.read.sweethome3d.home import read_home
+from pbrs_farm.repair import repair
+
+
+def square(x: float, z: float, w: float, d: float) -> list[list[float]]:
+    return [[x, z], [x + w, z], [x + w, z + d], [x, z + d]]
+
+
+TOUCHING: dict[str, Any] = {
+    "rooms": [
+        {"type": "living", "name": "Salon", "polygon": square(0, 0, 5, 4)},
+        {"type": "bedroom", "polygon": square(5, 0, 3, 4)},
+        {"type": "hall", "polygon": square(0, 4, 8, 1.5)},
+    ],
+    "doors": [{"at": [0, 4.7], "entrance": True}, {"at": [2, 4]}, {"at": [6, 4]}],
+    "windows": [{"at": [2.5, 0], "width": 1.6}, {"at": [6.5, 0]}],
+}
+APART = TOUCHING | {
+    "rooms": [
+        {"type": "living", "polygon": square(0, 0, 4.9, 3.9)},
+        {"type": "bedroom", "polygon": square(5, 0, 3, 3.9)},
+        {"type": "hall", "polygon": square(0, 4, 8, 1.5)},
+    ]
+}
+SKEWED = TOUCHING | {
+    "rooms": [
+        *TOUCHING["rooms"][:1],
+        {"type": "bedroom", "polygon": [[5, 0], [8, 0], [9, 4], [5, 4]]},
+        {"type": "hall", "polygon": square(0, 4, 9, 1.5)},
+    ]
+}
+
+
+def plan(folder: Path, value: object) -> Plan:
+    path = folder / "plan.json"
+    path.write_text(value if isinstance(value, str) else json.dumps(value))
+    return plan_from_file(path)
+
+
+@pytest.mark.parametrize("value", [TOUCHING, APART, SKEWED], ids=["touching", "apart", "skewed"])
+def test_the_home_of_a_plan_is_closed(tmp_path: Path, value: object) -> None:
+    home = made_of_plan(plan(tmp_path, value), EMPTY, seed=1)
+    house = read_home(home.data, "home.sh3d")
+    assert len(house.openings) == 5
+    repaired, report = repair(
+        house, Recipe().repair, occluder_from=lambda some: Caster(geometry_from_house(some))
+    )
+    assert report.leaks is not None
+    assert report.leaks.n_sky == 0
+    assert all(room.enclosure is Enclosure.CLOSED for room in repaired.rooms)
+
+
+def test_doors_join_rooms_and_windows_look_out(tmp_path: Path) -> None:
+    found = plan(tmp_path, TOUCHING)
+    entrance, first, _second, window, _other = found.openings
+    assert (entrance.kind, entrance.other) == (OpeningKind.ENTRANCE, None)
+    assert {found.rooms[r or 0].type for r in (first.room, first.other)} == {
+        RoomType.LIVING, RoomType.HALL,
+    }  # fmt: skip
+    assert (window.other, found.walls[window.wall].is_outer) == (None, True)
+
+
+def test_walls_take_the_room_between_rooms(tmp_path: Path) -> None:
+    inner = [w for w in plan(tmp_path, APART).walls if not w.is_outer]
+    assert {round(w.thickness, 3) for w in inner} == {0.1}
+    rooms = plan(tmp_path, APART).rooms
+    assert rooms[0].area == pytest.approx(4.9 * 3.9, abs=0.01)
+
+
+def test_geojson_says_the_same(tmp_path: Path) -> None:
+    rooms = [
+        {"properties": {"type": r["type"], "name": r.get("name")},
+         "geometry": {"type": "Polygon", "coordinates": [[*r["polygon"], r["polygon"][0]]]}}
+        for r in TOUCHING["rooms"]
+    ]  # fmt: skip
+    points = [
+        {"properties": {"kind": kind}, "geometry": {"type": "Point", "coordinates": at}}
+        for kind, at in (("entrance", [0, 4.7]), ("door", [2, 4]), ("window", [6.5, 0]))
+    ]
+    found = plan(tmp_path, {"type": "FeatureCollection", "features": rooms + points})
+    assert found.walls == plan(tmp_path, TOUCHING).walls
+    assert [o.kind.value for o in found.openings] == ["entrance", "door", "window"]
+
+
+def test_a_turned_plan_is_turned_back(tmp_path: Path) -> None:
+    upright = plan(tmp_path, TOUCHING)
+    cos, sin = math.cos(0.5), math.sin(0.5)
+
+    def at(p: Any) -> Any:
+        return p[0] * cos - p[1] * sin, p[0] * sin + p[1] * cos
+
+    walls = tuple(PlanWall(at(w.start), at(w.end), w.thickness) for w in upright.walls)
+    rooms = tuple(PlanRoom(r.type, r.name, tuple(map(at, r.polygon))) for r in upright.rooms)
+    back = turned(Plan(rooms, walls, upright.openings, 2.5))
+    for one, other in zip(back.walls, upright.walls, strict=True):
+        np.testing.assert_allclose(one.start, other.start, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("[", "is no JSON"),
+        ({}, "is no plan"),
+        ({"rooms": []}, "has 0 rooms"),
+        ({"rooms": [{"type": "pool", "polygon": square(0, 0, 2, 2)}]}, "pool.*one of living"),
+        ({"rooms": [{"type": "hall", "polygon": [[0, 0], [1, "x"]]}]}, "room 1: has no polygon"),
+        ({"rooms": [{"type": "hall", "polygon": [[0, 0], [2, 2], [2, 0], [0, 2]]}]}, "crosses"),
+        ({"rooms": [{"type": "hall", "polygon": square(0, 0, 900, 2)}]}, "over 200 m wide"),
+        ({"rooms": [TOUCHING["rooms"][0]] * 2}, "overlaps 'Salon' by 20.00 m2"),
+        (TOUCHING | {"doors": [{"at": [2, 2]}]}, "door 1: is [0-9.]+ m from the nearest wall"),
+        (TOUCHING | {"doors": [{}]}, "door 1: has no place"),
+        (TOUCHING | {"windows": [{"at": [2, 0], "width": 9}]}, "window 1: is wider than its wall"),
+        (TOUCHING | {"windows": [{"at": [2, 0], "height": 3}]}, "higher than the room"),
+        (TOUCHING | {"height": 1}, "from 2 to 6 metres"),
+        ({"type": "FeatureCollection", "features": [1]}, "feature 1: is no room"),
+    ],
+)
+def test_a_plan_that_cannot_be_built_is_one_line(
+    tmp_path: Path, value: object, message: str
+) -> None:
+    with pytest.raises(BadInput, match=message) as caught:
+        plan(tmp_path, value)
+    assert "\n" not in str(caught.value)
