@@ -41,8 +41,8 @@ def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
     for wall in plan.walls:
         # Close the corners where two walls end at one point.
         is_joined = ends[wall.start] > 1, ends[wall.end] > 1
-        points = wall_corners(wall, is_joined)
-        element(root, "polygon", points=_text(points), fill="#888" if wall.height else "#333")
+        corners = _text(wall_corners(wall, is_joined))
+        element(root, "polygon", points=corners, fill="#888" if wall.height else "#333")
     for opening in plan.openings:
         _draw_opening(root, plan, opening)
     for room in plan.rooms:
