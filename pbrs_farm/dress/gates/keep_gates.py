@@ -24,7 +24,7 @@ from pbrs_farm.dress.gates.support import MOST_M as SUPPORT_M
 from pbrs_farm.dress.gates.support import held, held_as_drawn
 from pbrs_farm.dress.gates.ways import blocked_doors, closed_ways, covered_windows
 from pbrs_farm.dress.report import Gate
-from pbrs_farm.dress.space import HouseSpace, house_space
+from pbrs_farm.dress.space import HouseSpace, floor_space
 
 _ROUNDS: Final = 12
 _LARGE_M: Final = 0.35  # of the longest side
@@ -115,7 +115,7 @@ def _space(draft: Draft, bodies: list[Body]) -> tuple[HouseSpace, list[Body]]:
     ]
     some = copy(draft)
     some.items = [b.item for b in large]
-    return house_space(some), large
+    return floor_space(some), large
 
 
 def _bodies(draft: Draft, pieces: Mapping[str, Piece], memory: _Memory) -> list[Body]:
@@ -142,7 +142,7 @@ def _unsupported(bodies: list[Body], memory: _Memory) -> tuple[int, list[int]]:
     asked = [k for k in new if not there.intersection(memory.supports.get(id(bodies[k].item), ()))]
     if not asked:
         return len(new), []
-    plumb = Plumb(bodies)
+    plumb = Plumb(bodies, asked)
     found = held(bodies, asked, plumb)
     for number, by in found.items():
         memory.supports[id(bodies[number].item)] = tuple(id(bodies[b].item) for b in by.by)

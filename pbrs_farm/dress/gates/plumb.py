@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.dress.gates.bodies import Body
+from pbrs_farm.dress.gates.bodies import Body, boxes_of
 
 _CELLS_M: Final = (0.1, 1.0)
 _MANY_CELLS: Final = 400  # a triangle over more goes into the next larger cells
+_NEAR_M: Final = 0.5  # above and below a body
 _STEEP: Final = 1e-9  # square metres in plan: a triangle with less stands upright
 _EDGE: Final = 1e-6  # of a triangle's extent: a place on its edge is on it
 
@@ -30,11 +31,24 @@ class Hits:
 
 
 class Plumb:
-    """Upright lines through all faces of bodies that do not stand upright themselves."""
+    """Upright lines through all faces of bodies that do not stand upright themselves.
 
-    def __init__(self, bodies: Sequence[Body]) -> None:
-        corners = np.concatenate([np.zeros((0, 3, 3)), *(b.corners for b in bodies)])
-        owner = np.repeat(np.arange(len(bodies)), [len(b.corners) for b in bodies])
+    asked: numbers of bodies; what lies neither above nor below one of them is left out.
+    """
+
+    def __init__(self, bodies: Sequence[Body], asked: Sequence[int]) -> None:
+        low, high = boxes_of(bodies)
+        near = np.zeros(len(bodies), bool)
+        for number in asked:
+            near |= (
+                (low[:, [0, 2]] <= high[number, [0, 2]]).all(1)
+                & (high[:, [0, 2]] >= low[number, [0, 2]]).all(1)
+                & (low[:, 1] <= high[number, 1] + _NEAR_M)
+                & (high[:, 1] >= low[number, 1] - _NEAR_M)
+            )
+        numbers = np.flatnonzero(near).tolist()
+        corners = np.concatenate([np.zeros((0, 3, 3)), *(bodies[k].corners for k in numbers)])
+        owner = np.repeat(numbers, [len(bodies[k].corners) for k in numbers]).astype(np.int64)
         plan = corners[:, :, [0, 2]]
         ab, ac = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
         lies = np.abs(ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]) > 2 * _STEEP

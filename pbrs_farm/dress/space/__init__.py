@@ -2,7 +2,7 @@
 
 from pbrs_farm.dress.space.floor_bitmaps import FloorBitmap, doors_are_joined, floor_bitmap
 from pbrs_farm.dress.space.footprints import item_footprint
-from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
+from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, floor_space, house_space
 from pbrs_farm.dress.space.passages import Passage
 from pbrs_farm.dress.space.wall_faces import WallFace
 
@@ -14,6 +14,7 @@ __all__ = [
     "WallFace",
     "doors_are_joined",
     "floor_bitmap",
+    "floor_space",
     "house_space",
     "item_footprint",
 ]

@@ -121,6 +121,16 @@ def house_space(draft: Draft) -> HouseSpace:
     return kept.space[1]
 
 
+def floor_space(draft: Draft) -> HouseSpace:
+    """As house_space, without the faces of walls: doors, windows, floors and points cost less."""
+    kept = draft.kept.get("space")
+    if not isinstance(kept, _Kept):
+        kept = draft.kept["space"] = _empty_house(draft)
+    kept.items |= {id(i): _with_points(i) for i in draft.items if id(i) not in kept.items}
+    bare = replace(kept, rooms=tuple(replace(room, faces=()) for room in kept.rooms))
+    return _house_space(draft.items, bare)
+
+
 def _with_points(item: Item) -> tuple[Item, F64, F64]:
     if item.kind in _STRUCTURE:
         return item, np.zeros((0, 3)), np.full((2, 3), np.nan)

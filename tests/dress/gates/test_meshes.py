@@ -138,7 +138,7 @@ def test_an_open_body_is_measured_by_points():
 def test_upright_lines_meet_what_lies_above_and_below_and_edges_too():
     bodies = [body(solid("a", [0, 0, 0], [8, 0.5, 8])), body(solid("b", [1, 2, 1], [2, 3, 2]))]
     places = np.array([[1.5, 1.0, 1.5], [0.0, 1.0, 0.0], [9.0, 1.0, 9.0]])
-    hits = Plumb(bodies).hits(places, 2.1)
+    hits = Plumb(bodies, [0, 1]).hits(places, 2.1)
     found = [sorted({round(float(y), 6) for y in hits.y[hits.place == k]}) for k in range(3)]
     assert found == [[0.0, 0.5, 2.0, 3.0], [0.0, 0.5], []]
 
