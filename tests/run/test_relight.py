@@ -33,6 +33,7 @@ def small(**light: str) -> Recipe:
             "cameras.cell_m": "1.0",
             "cameras.score_width_px": "160",
             "cameras.score_height_px": "120",
+            "repair.lamp_in_every_room": "false",  # the home's own two lamps, by name
             **{f"light.{name}": value for name, value in light.items()},
         },
     )
