@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.report import write_report
+from benchmarks.figures import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
 MARKERS = "not slow and not gpu and not chaos and not infra and not sweethome3d"

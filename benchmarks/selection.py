@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.figures import write_report
 from benchmarks.memory import peak_mb
-from benchmarks.report import write_report
 from pbrs_farm.core import keys
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields

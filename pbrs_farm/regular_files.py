@@ -16,6 +16,8 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Final
 
+from pbrs_farm.core.errors import BadInput
+
 MAX_FILE_BYTES: Final = 512 * 2**20  # of a file that is read whole: a home, a scene, a picture
 MAX_SCENE_BYTES: Final = 1_000_000_000  # of a scene or model with the files beside it
 MAX_TEXT_BYTES: Final = 64 * 2**20  # of one that is parsed by hand: a list of houses or cameras
@@ -49,6 +51,26 @@ def read_regular(path: Path, max_bytes: int = MAX_FILE_BYTES) -> bytes:
     if len(data) > max_bytes:
         raise OSError(errno.EFBIG, f"grew above {max_bytes / 1e6:.0f} MB", str(path))
     return data
+
+
+def read_given(
+    path: Path, max_bytes: int = MAX_FILE_BYTES, *, error: type[BadInput] = BadInput, hint: str = ""
+) -> bytes:
+    """The bytes of a file that a user names; raises error, which says why it cannot be read."""
+    try:
+        return read_regular(path, max_bytes)
+    except OSError as fault:
+        raise error(path, "", fault_of(fault), hint=hint) from None
+
+
+def text_given(
+    path: Path, max_bytes: int = MAX_TEXT_BYTES, *, error: type[BadInput] = BadInput
+) -> str:
+    """The text of a file that a user names, as read_given; raises error where it is no UTF-8."""
+    try:
+        return read_given(path, max_bytes, error=error).decode("utf-8")
+    except UnicodeDecodeError:
+        raise error(path, "", "cannot be read: is no UTF-8 text") from None
 
 
 def digest_of_regular(path: Path) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from pbrs_farm.assets import homes
+from pbrs_farm.assets import homes_package
 
 
-def example_homes() -> homes.Package:
+def example_homes() -> homes_package.Package:
     """The fetched package; skips where it could not be fetched, which CI forbids."""
-    package = homes.cached()
+    package = homes_package.cached()
     if package is None:
         pytest.skip("the example homes are not fetched: pbrs-farm homes --fetch")
     return package

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from pbrs_farm.assets import furniture, homes
+from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import Recipe
@@ -61,9 +61,9 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
             store.put_if_absent(place, Path(path).read_bytes())
     # Homes take furniture from the examples' package: workers need it too.
     if any(ref.kind in ("example", "sweethome3d", "made") for ref in refs):
-        _upload_package(store, homes.PACKAGE)
+        _upload_package(store, homes_package.PACKAGE)
     if any(ref.kind == "made" for ref in refs):
-        _upload_package(store, furniture.PACKAGE)
+        _upload_package(store, furniture_package.PACKAGE)
 
 
 def _upload_package(store: Store, package: str) -> None:
@@ -97,7 +97,7 @@ def upload_catalogue(store: Store, recipe: Recipe) -> Recipe:
 
     catalogue_of(recipe.dress)
     if GENERATED not in recipe.dress.catalogue.split(":"):
-        _upload_package(store, furniture.PACKAGE)
+        _upload_package(store, furniture_package.PACKAGE)
     placed = placed_catalogue(recipe.dress.catalogue)
     for key, path in placed.items():
         if key != path:
@@ -141,9 +141,9 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
 
     The example homes' package, and the furniture's where a house is dressed.
     """
-    wanted = [homes.PACKAGE] if homes.cached() is None else []
+    wanted = [homes_package.PACKAGE] if homes_package.cached() is None else []
     if with_furniture and not has_furniture():
-        wanted.append(furniture.PACKAGE)
+        wanted.append(furniture_package.PACKAGE)
     for key in store.list(FOLDER) if wanted else ():
         name = key.removeprefix(FOLDER)
         if name.endswith(".deb") and name.partition("_")[0] in wanted:

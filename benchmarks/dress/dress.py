@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.report import write_report
+from benchmarks.figures import write_report
 from benchmarks.views.view_content import share_distance
-from pbrs_farm.assets import furniture, homes
+from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.core.classes import NYU13_NAMES
 
 FOLDER = Path("out/bench/dress")
@@ -31,10 +31,10 @@ Rows = list[dict[str, Any]]
 
 def main(parts: list[str] | None = None) -> None:
     """Measure the named parts, or all, and write out/bench/dress.json."""
-    homes.fetch()
-    furniture.fetch()
+    homes_package.fetch()
+    furniture_package.fetch()
     FOLDER.mkdir(parents=True, exist_ok=True)
-    names = [home.name for home in homes.example_homes()]
+    names = [home.name for home in homes_package.example_homes()]
     for part in parts or list(_PARTS):
         rows = _PARTS[part](names)
         (FOLDER / f"{part}.json").write_text(json.dumps(rows, indent=1) + "\n")

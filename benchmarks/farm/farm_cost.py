@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.farm.noop_runner import N_HOUSES, batches_of
-from benchmarks.report import write_report
+from benchmarks.figures import write_report
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.run.processes.child_process import die_with_parent

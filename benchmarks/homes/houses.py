@@ -11,18 +11,18 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.figures import write_report
 from benchmarks.memory import peak_mb
-from benchmarks.report import write_report
 
 SUNCG = "suncg300"
 
 
 def main() -> None:
     """Measure every home in a process of its own and write out/bench/houses.json."""
-    from pbrs_farm.assets import homes
+    from pbrs_farm.assets import homes_package
 
-    homes.fetch()
-    names = [home.name for home in homes.example_homes()]
+    homes_package.fetch()
+    names = [home.name for home in homes_package.example_homes()]
     print(
         f"{'home':<34}{'read s':>8}{'repair s':>9}{'all s':>7}{'MB':>6}{'triangles':>11}{'leaks':>7}{'closed':>8}"
     )

@@ -17,10 +17,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.figures import write_report
 from benchmarks.homes.made_plan import MEDIANS
-from benchmarks.report import write_report
 from benchmarks.views.view_content import share_distance
-from pbrs_farm.assets import furniture, homes
+from pbrs_farm.assets import furniture_package, homes_package
 
 FOLDER = Path("out/bench/made")
 N_SEEDS: Final = {"plans": 1000, "houses": 50, "views": 24}
@@ -32,8 +32,8 @@ Rows = list[dict[str, Any]]
 
 def main(words: list[str] | None = None) -> None:
     """Measure the named parts, or all, and write out/bench/made.json."""
-    homes.fetch()
-    furniture.fetch()
+    homes_package.fetch()
+    furniture_package.fetch()
     FOLDER.mkdir(parents=True, exist_ok=True)
     numbers = [int(w) for w in words or () if w.isdigit()]
     for part in [w for w in words or () if not w.isdigit()] or list(N_SEEDS):

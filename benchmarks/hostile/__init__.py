@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Final
 
+from benchmarks.figures import FOLDER, write_report
 from benchmarks.hostile import (
     arch_cases,
     command_cases,
@@ -37,7 +38,6 @@ from benchmarks.hostile.case import ONE_VIEW, Case, Place, unique
 from benchmarks.hostile.process_tree import watch
 from benchmarks.hostile.sound_inputs import sound_home
 from benchmarks.hostile.verdict import Verdict, judge
-from benchmarks.report import FOLDER, write_report
 
 MODULES: Final = (
     shape_cases, text_cases, file_cases, container_cases, plan_cases, model_cases, suncg_cases,

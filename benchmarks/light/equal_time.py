@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.report import FOLDER, write_report
+from benchmarks.figures import FOLDER, write_report
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.house import House, geometry_from_house

@@ -8,7 +8,7 @@ from __future__ import annotations
 import statistics
 from typing import Any
 
-from benchmarks.report import write_report
+from benchmarks.figures import write_report
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.read.source import resolve
 from pbrs_farm.run.house_cache import HouseCache
@@ -20,11 +20,11 @@ from pbrs_farm.transport.illuminance import DAYLIGHT_LX, LAMPS_LX
 
 def main() -> None:
     """Measure the nine homes and write out/bench/lux.json."""
-    from pbrs_farm.assets import homes
+    from pbrs_farm.assets import homes_package
 
-    homes.fetch()
+    homes_package.fetch()
     rows: list[dict[str, Any]] = []
-    for home in homes.example_homes():
+    for home in homes_package.example_homes():
         rows += _rooms_of(home.name)
     lamps = [r for r in rows if {"lamps", "fallback", "added"} & set(r["lit_by"])]
     day = [r for r in rows if "windows" in r["lit_by"]]

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.report import FOLDER, write_report
+from benchmarks.figures import FOLDER, write_report
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.images import jpeg_from_array
@@ -34,9 +34,9 @@ PRESETS: Final = {"preview": {}, "fast": {}, "paper": REDUCED, "released": REDUC
 
 def main() -> None:
     """Render, print cost and noise of each, write the sheet: a row a home, a column a preset."""
-    from pbrs_farm.assets import homes, skies
+    from pbrs_farm.assets import homes_package, skies
 
-    homes.fetch()
+    homes_package.fetch()
     skies.fetch_skies()
     figures: dict[str, Any] = {}
     units: dict[str, str] = {}

@@ -35,9 +35,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.figures import FOLDER, write_report
 from benchmarks.renderers.exchange import home_without_coats, write_scene
-from benchmarks.renderers.noise import blocks, relative_square
-from benchmarks.report import FOLDER, write_report
+from benchmarks.renderers.picture_noise import blocks, relative_square
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.house import House

@@ -36,9 +36,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.figures import FOLDER, write_report
 from benchmarks.renderers.exchange import home_without_coats, without_coats, write_scene
-from benchmarks.renderers.noise import blocks
-from benchmarks.report import FOLDER, write_report
+from benchmarks.renderers.picture_noise import blocks
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.house import House

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.figures import write_report
 from benchmarks.memory import peak_mb
-from benchmarks.report import write_report
 from benchmarks.views import view_content
-from pbrs_farm.assets import homes
+from pbrs_farm.assets import homes_package
 from pbrs_farm.assets.debian import cache_folder
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import Geometry, House, geometry_from_house
@@ -62,12 +62,12 @@ def main() -> None:
     print(f"{'Mitsuba, bare intersection':<28}{'':>14}{bare:>10.1f}")
     print(f"{'moderngl loop':<28}{gl_per_s:>14.1f}")
 
-    rows = {home.name: _home_in_a_process(home.name) for home in homes.example_homes()}
+    rows = {home.name: _home_in_a_process(home.name) for home in homes_package.example_homes()}
     print(f"\n{'home':<32}{'s':>7}{'candidates':>12}{'views':>7}{'peak MB':>9}")
     for name, row in rows.items():
         line = f"{row['seconds']:>7.1f}{row['candidates']:>12}{row['views']:>7}{row['peak_mb']:>9}"
         print(f"{name:<32}{line}")
-    content = _contents([home.name for home in homes.example_homes()])
+    content = _contents([home.name for home in homes_package.example_homes()])
     figures = {
         "cameras.candidates_per_s": round(per_s, 1),
         "cameras.vs_gl": round(per_s / gl_per_s, 1),

@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-from benchmarks.report import write_report
+from benchmarks.figures import write_report
 
 OUT = Path("out/bench/demo")
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.report import write_report
+from benchmarks.figures import write_report
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import rotation_y

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.report import write_report
+from benchmarks.figures import write_report
 from benchmarks.views.gl import turned_cameras
 from pbrs_farm import truth
 from pbrs_farm.check import Certificate, verify

@@ -6,7 +6,7 @@ import statistics
 import time
 from collections.abc import Callable
 
-from benchmarks.report import write_report
+from benchmarks.figures import write_report
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.read.source import resolve
 from pbrs_farm.run.house_cache import HouseCache

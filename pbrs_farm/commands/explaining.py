@@ -111,9 +111,9 @@ def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dic
     """The pictures of the home as it was and as it is, by file name."""
     from pbrs_farm.gallery.before_after import before_after_png
     from pbrs_farm.read.source import resolve
-    from pbrs_farm.run.before_after import pairs
     from pbrs_farm.run.processes.verb_process import doing
     from pbrs_farm.run.steps import repaired_house
+    from pbrs_farm.run.view_pairs import pairs
 
     undressed = recipe.model_copy(update={"dress": type(recipe.dress)()})
     bare, _report = repaired_house(resolve(args.home), undressed)

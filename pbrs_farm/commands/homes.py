@@ -50,18 +50,18 @@ def _add_make(p: argparse.ArgumentParser) -> None:
 
 
 def _homes(args: argparse.Namespace) -> int:
-    from pbrs_farm.assets import furniture, homes
+    from pbrs_farm.assets import furniture_package, homes_package
 
     if args.fetch:
-        homes.fetch()
+        homes_package.fetch()
     if args.furniture:
-        furniture.fetch()
-    rows = homes.example_homes()
+        furniture_package.fetch()
+    rows = homes_package.example_homes()
     if args.json:
         echo_json([asdict(row) for row in rows])
         return 0
     # Listing fetches nothing: the list of homes is part of the program.
-    package = homes.cached()
+    package = homes_package.cached()
     for row in rows:
         echo(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
     echo()

@@ -222,11 +222,11 @@ def _summary_line(summary: Any, seconds: float) -> str:
 def _demo(args: argparse.Namespace) -> int:
     home = args.home
     if home != "builtin" and not Path(home).exists():
-        from pbrs_farm.assets import homes
+        from pbrs_farm.assets import homes_package
 
         # Without a network the demo still shows something.
         try:
-            homes.fetch()
+            homes_package.fetch()
         except (MachineFailed, BadInput) as error:
             warn(f"the example homes cannot be fetched: {error}")
             warn("going on with the built-in home")

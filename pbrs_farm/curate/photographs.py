@@ -24,7 +24,7 @@ from pbrs_farm.regular_files import (
     digest_of_regular,
     fault_of,
     open_regular,
-    read_regular,
+    read_given,
 )
 from pbrs_farm.selection.depth_photographs import depth_mm_from_units, sun_rgbd_depth
 
@@ -45,7 +45,7 @@ class Photo:
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class PhotoFiles:
     """The two files of one photograph."""
 
     id: str
@@ -53,14 +53,14 @@ class Pair:
     depth: Path
 
 
-def pairs_in(folder: Path) -> tuple[Pair, ...]:
+def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
     """Every pair below folder, by id (its path below folder).
 
     Raises BadInput for a folder without pairs, and for a file whose other half is missing.
     """
     if not folder.is_dir():
         raise BadInput(folder, "", "no such folder")
-    pairs: list[Pair] = []
+    pairs: list[PhotoFiles] = []
     for inner in sorted({folder, *(p for p in folder.rglob("*") if p.is_dir())}):
         # Look for a folder of pictures beside one of depth.
         names = {p.name.lower(): p for p in inner.iterdir() if p.is_dir()}
@@ -77,12 +77,12 @@ def pairs_in(folder: Path) -> tuple[Pair, ...]:
     return tuple(sorted(pairs, key=lambda pair: pair.id))
 
 
-def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[Pair]:
+def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[PhotoFiles]:
     pictures, depths = _files(rgb, _RGB_FILES), _files(depth, _DEPTH_FILES)
     # Pair the only files of two folders whatever they are called (SUN RGB-D).
     if len(pictures) == len(depths) == 1 and pictures.keys() != depths.keys():
         (one,), (other,) = pictures.values(), depths.values()
-        return [Pair(inner.relative_to(root).as_posix(), one, other)]
+        return [PhotoFiles(inner.relative_to(root).as_posix(), one, other)]
     # Name the first file whose other half is missing.
     for name, path in (pictures | depths).items():
         if name not in pictures or name not in depths:
@@ -90,7 +90,7 @@ def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[P
             where = depth if name in pictures else rgb
             raise BadInput(path, "", f"only one half of a pair: {where} has no {lacks} {name}")
     place = inner.relative_to(root)
-    return [Pair((place / n).as_posix(), pictures[n], depths[n]) for n in pictures]
+    return [PhotoFiles((place / n).as_posix(), pictures[n], depths[n]) for n in pictures]
 
 
 def _files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
@@ -103,7 +103,7 @@ def _files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
     return found
 
 
-def _pairs_by_suffix(root: Path, inner: Path) -> list[Pair]:
+def _pairs_by_suffix(root: Path, inner: Path) -> list[PhotoFiles]:
     # Gather the halves of each name.
     halves: dict[str, dict[str, Path]] = {}  # name -> "rgb", "depth" -> file
     for path in sorted(p for p in inner.iterdir() if p.is_file()):
@@ -120,16 +120,16 @@ def _pairs_by_suffix(root: Path, inner: Path) -> list[Pair]:
             lacks = "rgb" if kind == "depth" else "depth"
             raise BadInput(path, "", f"only one half of a pair: no {lacks}")
         place = (inner.relative_to(root) / name).as_posix()
-        pairs.append(Pair(place, found["rgb"], found["depth"]))
+        pairs.append(PhotoFiles(place, found["rgb"], found["depth"]))
     return pairs
 
 
-def photo_from_pair(pair: Pair, *, depth_scale: float | None, sun_rgbd: bool) -> Photo:
+def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bool) -> Photo:
     """The photograph of two files; BadInput naming the file that is wrong.
 
     depth_scale: depth units per metre; None = 1000 for whole numbers, 1 for .npy and .exr.
     """
-    rgb = images.decode_photo(_read(pair.rgb), str(pair.rgb))
+    rgb = images.decode_photo(read_given(pair.rgb), str(pair.rgb))
     stored = _stored_depth(pair.depth)
     if stored.ndim != 2:
         raise BadInput(pair.depth, "", f"expected one channel of depth, got {stored.shape}")
@@ -146,21 +146,14 @@ def photo_from_pair(pair: Pair, *, depth_scale: float | None, sun_rgbd: bool) ->
     return Photo(pair.id, rgb, _depth_mm(stored, scale, str(pair.depth), ""))
 
 
-def _read(path: Path) -> bytes:
-    try:
-        return read_regular(path)
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
-
-
 def _stored_depth(path: Path) -> NDArray[Any]:
     if path.suffix.lower() == ".png":
-        return images.array_from_png(_read(path), str(path))
+        return images.array_from_png(read_given(path), str(path))
     if path.suffix.lower() == ".exr":
-        layers = images.layers_from_exr(_read(path), str(path))
+        layers = images.layers_from_exr(read_given(path), str(path))
         return layers.get("Z", next(iter(layers.values())))
     try:
-        return np.asarray(np.load(io.BytesIO(_read(path)), allow_pickle=False))
+        return np.asarray(np.load(io.BytesIO(read_given(path)), allow_pickle=False))
     except (ValueError, EOFError):
         raise BadInput(path, "", "cannot be read as a numpy array") from None
 

@@ -13,13 +13,13 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.curate.photographs import (
     NyuMat,
-    Pair,
     Photo,
+    PhotoFiles,
     pairs_in,
     photo_from_pair,
     sha256_of_files,
 )
-from pbrs_farm.regular_files import fault_of, read_regular
+from pbrs_farm.regular_files import read_given
 from pbrs_farm.selection.depth_photographs import registration_border
 from pbrs_farm.selection.histograms import Histogram, histogram
 from pbrs_farm.selection.reference_set import (
@@ -70,7 +70,7 @@ def build_reference(
     )
 
 
-def _photos(pairs: tuple[Pair, ...], options: PhotoOptions) -> Iterator[Photo]:
+def _photos(pairs: tuple[PhotoFiles, ...], options: PhotoOptions) -> Iterator[Photo]:
     for pair in pairs:
         yield photo_from_pair(pair, depth_scale=options.depth_scale, sun_rgbd=options.sun_rgbd)
 
@@ -95,9 +95,5 @@ def _counted(
 
 def read_reference(path: Path) -> Reference:
     """The reference in a file; BadInput naming it when it is missing or none."""
-    try:
-        data = read_regular(path)
-    except OSError as error:
-        hint = "`pbrs-farm reference build` makes one"
-        raise BadInput(path, "", fault_of(error), hint=hint) from None
-    return reference_from_bytes(data, str(path))
+    hint = "`pbrs-farm reference build` makes one"
+    return reference_from_bytes(read_given(path, hint=hint), str(path))

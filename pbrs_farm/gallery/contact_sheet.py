@@ -17,7 +17,7 @@ from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.gallery.gallery_page import attributions
 from pbrs_farm.gallery.label_colours import NYU40_COLOURS
 from pbrs_farm.gallery.lettering import draw_line
-from pbrs_farm.gallery.tiles import TILES, Tile, tiles_of
+from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 
 _TILE_PX: Final = 224
 _GAP_PX: Final = 6

@@ -21,7 +21,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.formats.output_folder import ViewEntry, reasons_of, views_of
 from pbrs_farm.gallery.label_colours import NYU40_COLOURS
 from pbrs_farm.gallery.templates import page
-from pbrs_farm.gallery.tiles import TILES, Tile, tiles_of
+from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 
 THUMBNAIL_PX: Final = 320  # longer edge
 # Of a thumbnail: 200 views of 9 tiles stay under 30 MB with base64's third on top.

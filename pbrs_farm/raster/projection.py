@@ -7,14 +7,14 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, Bools, Matrix4
 from pbrs_farm.core.camera import Camera
 
-NEAR_M = 0.02  # near plane: closer than any camera stands to a wall
+NEAR_PLANE_M = 0.02  # closer than any camera stands to a wall
 
 
 def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
     """(4, 4) world to clip space; pixel centres lie at +0.5 in the coordinates of K, row 0 on top."""
     # Shift the principal point: clip space runs from -1 to 1, upwards, across the picture.
     i = camera.intrinsics
-    w, h, n, f = i.width_px, i.height_px, NEAR_M, far_m
+    w, h, n, f = i.width_px, i.height_px, NEAR_PLANE_M, far_m
     clip_from_camera = np.array(
         [
             [2 * i.fx / w, 0, 1 - 2 * i.cx / w, 0],

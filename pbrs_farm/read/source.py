@@ -22,10 +22,10 @@ from pbrs_farm.core.record import Record
 from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, real_path
+from pbrs_farm.regular_files import fault_of, read_given, real_path, text_given
 
 if TYPE_CHECKING:
-    from pbrs_farm.assets.homes import Package
+    from pbrs_farm.assets.homes_package import Package
     from pbrs_farm.read.objects.model_folders import ObjectModel
 
 _MODEL_SUFFIXES: Final = (".obj", ".sh3f", ".mtl", ".fbx", ".dae", ".3ds", ".ply", ".stl")
@@ -131,14 +131,14 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef
     if kind == "object":
         return object_source(_object_model(location), files)
     if kind == "example":
-        from pbrs_farm.assets import homes
+        from pbrs_farm.assets import homes_package
 
-        package = homes.fetch()
+        package = homes_package.fetch()
         data, name = package.home(location)
         companions = _package_digest(package)
     else:
         path = Path(location)
-        data, name = _bytes(path), path.name
+        data, name = read_given(path, error=BadHouse), path.name
         companions = _companions(kind, path, data, files)
     # The house's id depends on its own file alone, so companions never rename a house.
     sha = keys.sha256(data)
@@ -150,12 +150,12 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef
 
 def _made(word: str) -> SourceRef:
     """The source of a home that its seed makes; its companion is the furniture's package."""
-    from pbrs_farm.assets import furniture
+    from pbrs_farm.assets import furniture_package
 
     homes = made_homes(word)
     if len(homes) != 1:
         raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
-    companions, package = "", furniture.cached() if homes[0].furniture else None
+    companions, package = "", furniture_package.cached() if homes[0].furniture else None
     if homes[0].furniture and package is None:
         raise MachineFailed(
             "made homes take their furniture from a package that is not fetched",
@@ -177,10 +177,10 @@ def _companions(kind: SourceKind, path: Path, data: bytes, files: SourceFiles) -
 
         names = [*side_files(path), *files_of_gltf(data, path.name)]
         return files.digest(RootFolder(path.parent), names)
-    from pbrs_farm.assets import homes
+    from pbrs_farm.assets import homes_package
     from pbrs_farm.read.sweethome3d.home_file.container import needs_program
 
-    return _package_digest(homes.cached()) if needs_program(data, path.name) else ""
+    return _package_digest(homes_package.cached()) if needs_program(data, path.name) else ""
 
 
 def _package_digest(package: Package | None) -> str:
@@ -194,13 +194,7 @@ def _package_digest(package: Package | None) -> str:
 
 def suncg_list(root: Path, list_file: Path) -> list[str]:
     """The words `ROOT/house/<id>` for every id in a list file, blank and # lines left out."""
-    try:
-        lines = read_regular(list_file, MAX_TEXT_BYTES).decode("utf-8").splitlines()
-    except OSError as error:
-        raise BadHouse(list_file, "", fault_of(error)) from None
-    except UnicodeDecodeError:
-        raise BadHouse(list_file, "", "cannot be read: is no UTF-8 text") from None
-    ids = [line.strip() for line in lines]
+    ids = [line.strip() for line in text_given(list_file, error=BadHouse).splitlines()]
     return [str(root / "house" / i) for i in ids if i and not i.startswith("#")]
 
 
@@ -249,19 +243,21 @@ def _house_of(source: SourceRef, fields: ReadFields) -> House:
 
 def _read_home(source: SourceRef, fields: ReadFields) -> House:
     """A Sweet Home 3D home, with the program's own models where they are cached."""
-    from pbrs_farm.assets import homes
+    from pbrs_farm.assets import homes_package
     from pbrs_farm.read.sweethome3d import read_home
 
     if source.kind == "example":
-        package = homes.fetch()
+        package = homes_package.fetch()
         data, file = package.home(source.location)
         return read_home(
             data, file, resources=package.resources(), fields=fields,
             package=package.label, package_note=package.note,
         )  # fmt: skip
-    path, cached = Path(source.location), homes.cached()
+    path, cached = Path(source.location), homes_package.cached()
     resources = cached.resources() if cached else None
-    return read_home(_bytes(path), path.name, resources=resources, fields=fields)
+    return read_home(
+        read_given(path, error=BadHouse), path.name, resources=resources, fields=fields
+    )
 
 
 def object_source(model: ObjectModel, files: SourceFiles | None = None) -> SourceRef:
@@ -347,12 +343,5 @@ def _folder_hint(folder: Path) -> str:
 def _sha256(path: Path, files: SourceFiles) -> str:
     try:
         return files.file_digest(path)
-    except OSError as error:
-        raise BadHouse(path, "", fault_of(error)) from None
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        return read_regular(path)
     except OSError as error:
         raise BadHouse(path, "", fault_of(error)) from None

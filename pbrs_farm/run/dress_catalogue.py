@@ -10,11 +10,11 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from pbrs_farm.assets import furniture, homes
+from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Note
-from pbrs_farm.read.catalogue.catalogue import catalogue_from
+from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
 NO_FURNITURE = "no-furniture"
 """The kind of the note that says that the packages' furniture is not there."""
@@ -41,15 +41,15 @@ def dress_catalogue(given: tuple[Path, ...] = (), *, fetch: bool = False) -> Cat
     for a given path that does not exist or is no catalogue.
     """
     if fetch:
-        furniture.fetch()
-        homes.fetch()
+        furniture_package.fetch()
+        homes_package.fetch()
     stamps = tuple((path, _stamp(path)) for path in given)
-    return _catalogue(stamps, furniture.PACKAGE in _cached_names())
+    return _catalogue(stamps, furniture_package.PACKAGE in _cached_names())
 
 
 def has_furniture() -> bool:
     """Whether the furniture package is cached, without reading it."""
-    return furniture.PACKAGE in _cached_names()
+    return furniture_package.PACKAGE in _cached_names()
 
 
 def _cached_names() -> frozenset[str]:
@@ -72,7 +72,7 @@ def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) ->
     # None: no package is wanted.
     if has_package is None:
         return catalogue_from((), given=[path for path, _ in given], store=_store())
-    package, program = furniture.cached() if has_package else None, homes.cached()
+    package, program = furniture_package.cached() if has_package else None, homes_package.cached()
     catalogue = catalogue_from(
         package.libraries if package else (),
         jar=program.jar if program else None,
@@ -80,7 +80,9 @@ def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) ->
         store=_store(),
     )
     if package is not None:
-        note = package.note and Note("package-version", furniture.PACKAGE, package.note)
+        note = package.note and Note("package-version", furniture_package.PACKAGE, package.note)
         return replace(catalogue, notes=(note, *catalogue.notes)) if note else catalogue
     text = "furniture package not fetched: `pbrs-farm homes --furniture` fetches it (120 MB)"
-    return replace(catalogue, notes=(Note(NO_FURNITURE, furniture.PACKAGE, text), *catalogue.notes))
+    return replace(
+        catalogue, notes=(Note(NO_FURNITURE, furniture_package.PACKAGE, text), *catalogue.notes)
+    )

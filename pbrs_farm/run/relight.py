@@ -18,7 +18,7 @@ from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import RadianceExr, radiance_from_exr
 from pbrs_farm.formats.view_json import lamps_from_view_json
-from pbrs_farm.regular_files import fault_of, read_regular
+from pbrs_farm.regular_files import read_given
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
@@ -50,7 +50,7 @@ def relit(
     """
     # OUT of OUT/houses/<house>/views/<view>.
     root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
-    radiance = radiance_from_exr(_read(view / RADIANCE_EXR), str(view / RADIANCE_EXR))
+    radiance = radiance_from_exr(read_given(view / RADIANCE_EXR), str(view / RADIANCE_EXR))
     aovs = linear_aovs(radiance)
     # Sum indoor light anew from the lamps' own layers.
     if lamps:
@@ -59,7 +59,7 @@ def relit(
         layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
         aovs = replace(aovs, indoor=indoor_from_lamps(layers, factors, aovs.indoor.shape))
     # Develop it as the run would have, with the recipe's tone.
-    tone = recipe_from_json(_read(root / "recipe.json"), str(root / "recipe.json")).tone
+    tone = recipe_from_json(read_given(root / "recipe.json"), str(root / "recipe.json")).tone
     images = develop(aovs, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
     credit = attribution(FolderStore(root), view.resolve().parents[1].name)
     return layer_bytes(Mode.MLT_IL_OL.value, images[Mode.MLT_IL_OL.value].rgb_srgb8, credit)
@@ -67,7 +67,7 @@ def relit(
 
 def lamps_of_view(view: Path) -> list[dict[str, Any]]:
     """The lamps' rows of a view's view.json (transport/lamp_layers.py); BadInput when it has none."""
-    return lamps_from_view_json(_read(view / "view.json"), view)
+    return lamps_from_view_json(read_given(view / "view.json"), view)
 
 
 def lamp_factors(
@@ -98,10 +98,3 @@ def _is_named(row: Mapping[str, Any], word: str) -> bool:
     item, name = str(row["item"]), str(row["name"])
     is_it = word in (str(row["number"]), item, name) or item.startswith(f"{word}/")
     return is_it or ("*" in word and (fnmatchcase(item, word) or fnmatchcase(name, word)))
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return read_regular(path)
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None

@@ -18,8 +18,8 @@ from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.sample.camera_report import RoomReport
-from pbrs_farm.sample.drawing import Drawing, Mark
 from pbrs_farm.sample.house_sampler import Sampling
+from pbrs_farm.sample.map_drawing import Drawing, Mark
 from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.rejection import Verdict
 

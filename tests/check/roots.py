@@ -1,11 +1,13 @@
 """A finished output root with labels of the small home, as a run writes it (no light, no GL)."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from pbrs_farm import truth
+from pbrs_farm.check import verify
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, geometry_from_house
@@ -107,3 +109,23 @@ def changed_pixel(file: Path, row: int, column: int, by: int) -> None:
     index = (row, column) if array.ndim == 2 else (row, column, 0)
     array[index] = np.array(int(array[index]) + by).astype(array.dtype)
     file.write_bytes(png_from_array(array))
+
+
+def house_of(root: Path) -> Path:
+    """The root's first house."""
+    return next((root / "houses").iterdir())
+
+
+def failed(root: Path, *, all_pixels: bool = True) -> set[str]:
+    """Names of the checks that fail."""
+    certificate = verify(root, all_pixels=all_pixels)
+    return {name for name, count in certificate.counts.items() if count.failed}
+
+
+def edit_table(root: Path, change: Callable[[dict], object]) -> None:
+    """Change the table of view v0 and make manifest and markers agree with it."""
+    file = house_of(root) / "views/v0/view.json"
+    table = json.loads(file.read_text())
+    change(table)
+    file.write_text(json.dumps(table))
+    sign(root, house_of(root))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm import doctor, images
-from pbrs_farm.assets import homes
+from pbrs_farm.assets import homes_package
 from pbrs_farm.cli import main
 from pbrs_farm.commands import explaining
 from pbrs_farm.core import keys
@@ -106,7 +106,7 @@ def test_homes_fetch_without_apt_says_where_to_put_the_package(tmp_path, monkeyp
 
 def test_homes_fetch_unpacks_the_package_and_notes_another_version(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
-    write_deb(tmp_path / "sweethome3d_9.9-1_all.deb", {homes.JAR: b"a jar"})
+    write_deb(tmp_path / "sweethome3d_9.9-1_all.deb", {homes_package.JAR: b"a jar"})
     text = printed(capsys, "homes", "--fetch")
     assert "fetched: sweethome3d 9.9-1" in text
     assert "not the tested version" in text

@@ -19,7 +19,7 @@ from pbrs_farm.gallery import contact_sheet as sheet
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.gallery import lettering
 from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
-from pbrs_farm.gallery.tiles import TILES, Tile
+from pbrs_farm.gallery.view_tiles import TILES, Tile
 
 
 def write_view(folder: Path, *, without: tuple[str, ...] = (), size: tuple[int, int] = (60, 80)):

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pbrs_farm.assets import homes
+from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.formats.glb import GlbWriter
@@ -150,19 +150,23 @@ def test_a_home_that_needs_the_programs_models_notices_another_package(
     needing.write_bytes(sh3d(body, {"1": BOX_OBJ}))
     whole.write_bytes(sh3d(home_xml(piece("")), {"1": BOX_OBJ}))
 
-    def use(package: homes.Package | None) -> None:
-        monkeypatch.setattr(homes, "cached", lambda: package)
+    def use(package: homes_package.Package | None) -> None:
+        monkeypatch.setattr(homes_package, "cached", lambda: package)
 
     found = []
-    for version in (homes.TESTED_VERSION, "9.9", None):
-        note = "" if version == homes.TESTED_VERSION else "another version"
-        use(None if version is None else homes.Package(version, "0" * 64, tmp_path / "jar", note))
+    for version in (homes_package.TESTED_VERSION, "9.9", None):
+        note = "" if version == homes_package.TESTED_VERSION else "another version"
+        use(
+            None
+            if version is None
+            else homes_package.Package(version, "0" * 64, tmp_path / "jar", note)
+        )
         found.append(resolve(str(needing)).fingerprint)
         assert resolve(str(whole)).companions == ""
     assert len(set(found)) == 3
     source = resolve(str(needing))
     assert found[0] == source.sha256, "the tested package leaves digests as they were"
-    use(homes.Package("9.9", "0" * 64, tmp_path / "jar", "another version"))
+    use(homes_package.Package("9.9", "0" * 64, tmp_path / "jar", "another version"))
     with pytest.raises(MachineFailed, match="package"):
         read_house(source, ReadFields())
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from pbrs_farm.assets import homes
+from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields, Recipe
@@ -101,7 +101,9 @@ def test_a_harmless_note_is_kept_and_passes_reader_and_step(tmp_path: Path) -> N
 @pytest.mark.homes
 def test_eight_of_the_nine_example_homes_are_accepted_strictly() -> None:
     example_homes()
-    rejected = [h.name for h in homes.example_homes() if not _reads_strictly(resolve(h.name))]
+    rejected = [
+        h.name for h in homes_package.example_homes() if not _reads_strictly(resolve(h.name))
+    ]
     assert rejected == ["2BedroomApartmentWithBowWindow"]
 
 

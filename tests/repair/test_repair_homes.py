@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pbrs_farm.assets import homes
+from pbrs_farm.assets import homes_package
 from pbrs_farm.core.house import House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, RepairFields
 from pbrs_farm.read.sweethome3d import read_home
@@ -13,7 +13,7 @@ from tests.example_homes import example_homes
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.shells import unpaired_edges
 
-NAMES = [h.name for h in homes.example_homes()]
+NAMES = [h.name for h in homes_package.example_homes()]
 QUICK = "Studio"
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.assets import debian, furniture
+from pbrs_farm.assets import debian, furniture_package
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.read.source import SourceRef
@@ -69,8 +69,8 @@ def test_a_users_library_travels_by_its_content_and_no_path_does(tmp_path: Path,
 def test_a_worker_takes_the_furniture_from_the_store_where_a_house_is_dressed(
     cache: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(house_files.homes, "cached", object)
-    name = f"{furniture.PACKAGE}_{furniture.TESTED_VERSION}_all.deb"
+    monkeypatch.setattr(house_files.homes_package, "cached", object)
+    name = f"{furniture_package.PACKAGE}_{furniture_package.TESTED_VERSION}_all.deb"
     store = MemoryStore()
     store.put(f"jobs/sources/{name}", b"deb")
     fill_cache(store)

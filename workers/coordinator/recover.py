@@ -6,10 +6,10 @@ left a record are tried again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from itertools import islice
+from itertools import groupby, islice
 from typing import Final
 
 from pbrs_farm.core import keys
@@ -86,22 +86,11 @@ def _enter(
     states: list[HouseState | None],
 ) -> None:
     """In the job's order: runs of fresh houses and of houses with a past, each in one go."""
-    for fresh, items in _runs(chunk, states):
-        if fresh:
+    # Cut where fresh houses and houses with a past meet.
+    rows = [(index, house, state) for (index, house), state in zip(chunk, states, strict=True)]
+    for is_fresh, run in groupby(rows, key=lambda row: row[2] is None):
+        items = list(run)
+        if is_fresh:
             ledger.add_houses(job, items[0][0], [house for _index, house, _state in items])
         else:
             ledger.load_houses(job, [state for _i, _h, state in items if state is not None])
-
-
-def _runs(
-    chunk: list[tuple[int, HouseEntry]], states: list[HouseState | None]
-) -> Iterator[tuple[bool, list[tuple[int, HouseEntry, HouseState | None]]]]:
-    # Cut where fresh houses and houses with a past meet.
-    current: list[tuple[int, HouseEntry, HouseState | None]] = []
-    for (index, house), state in zip(chunk, states, strict=True):
-        if current and (state is None) != (current[0][2] is None):
-            yield current[0][2] is None, current
-            current = []
-        current.append((index, house, state))
-    if current:
-        yield current[0][2] is None, current

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import redis
 from redis.backoff import ExponentialWithJitterBackoff
@@ -37,6 +38,7 @@ from workers.ledger.task_ledger import (
 if TYPE_CHECKING:
     from workers.job import HouseEntry, JobSpec
 
+T = TypeVar("T")
 _SCRIPTS: Final = (
     "claim", "heartbeat", "finish", "fail", "reap", "dispatch", "resend", "create", "load",
     "retry", "steer", "lead",
@@ -178,14 +180,8 @@ class RedisLedger:
                 members = self.client.zscan_iter(key, match=f"{job}|*")
                 for member, _score in members:
                     self.client.zrem(key, member)
-            batch: list[str] = []
-            for key in self.client.scan_iter(f"{self._p(job)}*", count=_CHUNK):
-                batch.append(key)
-                if len(batch) >= _CHUNK:
-                    self.client.unlink(*batch)
-                    batch = []
-            if batch:
-                self.client.unlink(*batch)
+            for own_keys in _chunks(self.client.scan_iter(f"{self._p(job)}*", count=_CHUNK)):
+                self.client.unlink(*own_keys)
 
     def steer(self, job: str, what: str, reason: str = "") -> str:
         """pause, resume, cancel or reduce; the state afterwards, "" for an unknown job."""
@@ -365,12 +361,7 @@ def _tasks(answer: object) -> list[str] | None:
     return [str(task) for task in answer] if isinstance(answer, list) else None
 
 
-def _chunks(items: Iterable[HouseState]) -> Iterator[list[HouseState]]:
-    chunk: list[HouseState] = []
-    for item in items:
-        chunk.append(item)
-        if len(chunk) == _CHUNK:
-            yield chunk
-            chunk = []
-    if chunk:
+def _chunks(items: Iterable[T]) -> Iterator[list[T]]:
+    rest = iter(items)
+    while chunk := list(islice(rest, _CHUNK)):
         yield chunk

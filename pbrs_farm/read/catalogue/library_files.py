@@ -77,28 +77,44 @@ def opened_archive(path: Path) -> tuple[ZipResources, str]:
         raise BadHouse(path, "", fault_of(error)) from None
 
 
-def furniture_library(
-    path: Path, notes: LibraryNotes, catalogue: str = FURNITURE
-) -> Library | None:
-    """The library in a .sh3f (or the program's jar); None, with a note, where it is damaged.
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenedLibrary:
+    """A library's archive, its entries unread, and what its catalogue says."""
+
+    contents: ZipResources
+    sha256: str
+    properties: dict[str, str]
+
+
+def opened_library(path: Path, catalogue: str, notes: LibraryNotes) -> OpenedLibrary | None:
+    """The library at path; None, with a note, where it is damaged or holds no such catalogue.
 
     catalogue: the property file in the archive. Raises BadInput for a path that does not exist.
     """
     try:
-        archive, sha256 = opened_archive(path)
-        data = archive.read(catalogue)
+        contents, sha256 = opened_archive(path)
+        data = contents.read(catalogue)
     except BadHouse as error:
         notes.add("damaged-library", path.name, error.message)
         return None
     if data is None:
         notes.add("damaged-library", path.name, f"holds no {catalogue}")
         return None
-    properties = parse_properties(data)
+    return OpenedLibrary(contents, sha256, parse_properties(data))
+
+
+def furniture_library(
+    path: Path, notes: LibraryNotes, catalogue: str = FURNITURE
+) -> Library | None:
+    """The library in a .sh3f (or the program's jar); None and BadInput as opened_library."""
+    opened = opened_library(path, catalogue, notes)
+    if opened is None:
+        return None
     # Call the library by its file: its own name changes with the language.
     name = path.stem if catalogue == FURNITURE else "eTeks"
-    held = set(archive.names())
+    held = set(opened.contents.names())
     entries = []
-    for row in numbered_entries(properties):
+    for row in numbered_entries(opened.properties):
         entry = _entry(row, name, notes)
         if entry is not None and entry.piece.model not in held:
             notes.add(
@@ -106,7 +122,9 @@ def furniture_library(
             )
         elif entry is not None:
             entries.append(entry)
-    return Library(name, licence_of(properties), tuple(entries), archive, sha256)
+    return Library(
+        name, licence_of(opened.properties), tuple(entries), opened.contents, opened.sha256
+    )
 
 
 def licence_of(properties: Mapping[str, str]) -> str:

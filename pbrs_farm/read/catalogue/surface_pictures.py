@@ -21,9 +21,9 @@ from PIL import Image
 from pbrs_farm.core.catalogue import Picture
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Texture
-from pbrs_farm.read.catalogue.library_files import LibraryNotes, licence_of, opened_archive
+from pbrs_farm.read.catalogue.library_files import LibraryNotes, licence_of, opened_library
 from pbrs_farm.read.catalogue.library_shapes import small_texture
-from pbrs_farm.read.catalogue.properties import numbered_entries, parse_properties
+from pbrs_farm.read.catalogue.properties import numbered_entries
 from pbrs_farm.read.common.furniture_classes import plain
 from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.read.common.textures import texture_from_bytes
@@ -82,28 +82,21 @@ def texture_library(
     At most MOST_OF_A_GROUP pictures of a kind are kept, in the library's order. What is no
     picture, or of no known kind, becomes a note or is passed over. BadInput: no such file.
     """
-    try:
-        archive, sha256 = opened_archive(path)
-        data = archive.read(catalogue)
-    except BadHouse as error:
-        notes.add("damaged-library", path.name, error.message)
+    opened = opened_library(path, catalogue, notes)
+    if opened is None:
         return None
-    if data is None:
-        notes.add("damaged-library", path.name, f"holds no {catalogue}")
-        return None
-    properties = parse_properties(data)
-    licence, count, found = licence_of(properties), Counter[str](), []
-    for row in numbered_entries(properties):
+    licence, count, found = licence_of(opened.properties), Counter[str](), []
+    for row in numbered_entries(opened.properties):
         group = surface_group(row.get("name", ""), row.get("category", ""))
         if not group or count[group] >= MOST_OF_A_GROUP:
             continue
-        picture = _picture(row, group, archive, path.stem, licence, notes)
+        picture = _picture(row, group, opened.contents, path.stem, licence, notes)
         if picture is not None:
             count[group] += 1
             found.append(picture)
     if not found:
         notes.add("no-classes", path.name, "no picture of the library is of a known kind")
-    return sha256, tuple(found)
+    return opened.sha256, tuple(found)
 
 
 def surface_group(name: str, category: str) -> str:

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -21,8 +19,9 @@ from typing import Final
 from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.read.catalogue.library_files import FURNITURE, opened_archive
+from pbrs_farm.read.catalogue.properties import numbered_entries, parse_properties
 from pbrs_farm.read.common.furniture_classes import nyu40_of
-from pbrs_farm.regular_files import fault_of, open_regular
 
 _MODEL_SUFFIXES: Final = (".obj", ".glb", ".gltf")
 _PLAIN_FOLDERS: Final = ("models", "")  # ShapeNet's, that say nothing
@@ -122,29 +121,14 @@ def _model(file: Path, root: Path) -> ObjectModel:
 
 def _library(path: Path) -> list[ObjectModel]:
     """The pieces of a Sweet Home 3D library whose model is an OBJ in it."""
-    try:
-        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
-            info = archive.getinfo("PluginFurnitureCatalog.properties")
-            if info.file_size > _MAX_CATALOGUE_BYTES:
-                raise BadInput(path, info.filename, "the catalogue is too large")
-            text = archive.read(info).decode("latin-1")
-            names = set(archive.namelist())
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError):
-        raise BadInput(path, "", "is no furniture library: a damaged zip archive") from None
-    except KeyError:
-        text = "is no furniture library: no PluginFurnitureCatalog.properties in it"
-        raise BadInput(path, "", text) from None
-    # Gather the numbered properties of each piece.
-    rows: dict[str, dict[str, str]] = {}
-    for line in text.splitlines():
-        key, equals, value = line.partition("=")
-        name, hash_mark, number = key.strip().partition("#")
-        if equals and hash_mark and number.isdigit():
-            text = value.strip().encode("latin-1").decode("unicode_escape", "replace")
-            rows.setdefault(number, {})[name] = text
-    return [m for row in rows.values() if (m := _piece(path, row, names)) is not None]
+    archive, _sha256 = opened_archive(path)
+    data = archive.read(FURNITURE)
+    if data is None:
+        raise BadInput(path, "", f"is no furniture library: no {FURNITURE} in it")
+    if len(data) > _MAX_CATALOGUE_BYTES:
+        raise BadInput(path, FURNITURE, "the catalogue is too large")
+    rows, names = numbered_entries(parse_properties(data)), set(archive.names())
+    return [m for row in rows if (m := _piece(path, row, names)) is not None]
 
 
 def _piece(path: Path, row: dict[str, str], names: set[str]) -> ObjectModel | None:

@@ -30,7 +30,7 @@ from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
 from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.objects.model_folders import ObjectModel
-from pbrs_farm.read.suncg.model_files import Models
+from pbrs_farm.read.suncg.model_files import ModelCache
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, open_regular
 
@@ -128,7 +128,7 @@ def _obj(
     folder: RootFolder, name: str, notes: Notes, fields: ReadFields
 ) -> tuple[list[Surface], MaterialLibrary]:
     materials = ModelMaterials(folder, notes)
-    model = Models(folder, notes, fields).model(name, material_library(folder, name))
+    model = ModelCache(folder, notes, fields).model(name, material_library(folder, name))
     if model is None:
         raise BadHouse(folder.root, name, "no such file")
     surfaces = []

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from pbrs_farm.core.classes import NYU40_NAMES
@@ -26,13 +27,12 @@ from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.suncg.house_json import JsonReader, Node, Override, world_from_house_of
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
-from pbrs_farm.read.suncg.wall_holes import box_between
+from pbrs_farm.read.suncg.wall_holes import CUTTER_REACH_M, box_between
 
 WALL_DEPTH_M: Final = 0.10
 SLAB_DEPTH_M: Final = 0.05
 MAX_ELEMENTS: Final = 100_000
 _EDGE: Final = ObjMaterial("edge", (0.50196, 0.50196, 0.50196))
-_REACH_M: Final = 0.02
 _BESIDE_M: Final = 0.15
 _MODEL_ROOM: Final = re.compile(r"fr_(\d+)(?:rm|gd)_(\d+)")
 _KINDS: Final = {
@@ -269,8 +269,11 @@ def _wall_frame(e: Element, outline: NDArray[np.float64] | None) -> _Frame | Non
     along /= length
     up = np.array([0.0, 1.0, 0.0])
     outward = np.cross(along, up)
-    if outline is not None and _is_inside(outline, (start + end) / 2 + 0.05 * outward):
-        outward = -outward
+    # Turn away from the room's floor.
+    if outline is not None:
+        x, _y, z = (start + end) / 2 + 0.05 * outward
+        if shapely.contains_xy(shapely.Polygon(outline[:, [0, 2]]), x, z):
+            outward = -outward
     return _Frame(start, np.stack([along, up, outward], 1), length)
 
 
@@ -288,16 +291,6 @@ def _wall(arch: Arch, e: Element, frame: _Frame, materials: ModelMaterials) -> t
             quads_surface("edge", quads[:4], materials.library.index(edge)),
         ],
     )
-
-
-def _is_inside(outline: NDArray[np.float64], point: NDArray[np.float64]) -> bool:
-    """Whether a point lies over the outline, by the crossings of a ray along x."""
-    a, b = outline[:, [0, 2]], np.roll(outline[:, [0, 2]], -1, axis=0)
-    x, z = point[[0, 2]]
-    crosses = (a[:, 1] > z) != (b[:, 1] > z)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = a[:, 0] + (z - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return bool((crosses & (at > x)).sum() % 2)
 
 
 def _opening(
@@ -318,7 +311,7 @@ def _opening(
     quad = np.array([frame.start + frame.axes @ [u, v, e.depth_m / 2] for u, v in corners])
     quad = quad @ arch.world_from_house[:3, :3].T
     local = quad @ world_axes
-    reach = np.array([0.0, 0.0, e.depth_m / 2 * scale + _REACH_M])
+    reach = np.array([0.0, 0.0, e.depth_m / 2 * scale + CUTTER_REACH_M])
     return Opening(
         id=opening_id,
         level_id=level_id,

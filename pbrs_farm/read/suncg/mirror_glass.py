@@ -13,7 +13,7 @@ import numpy as np
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.core.mesh import area_vectors, triangle_corners
-from pbrs_farm.read.suncg.model_files import Model
+from pbrs_farm.read.suncg.model_files import ParsedModel
 
 MIRROR: Final = NYU40_NAMES.index("mirror")
 _REFLECTANCE: Final = 0.9
@@ -22,7 +22,7 @@ _FLAT_SHARE: Final = 0.45  # of a material's area: a pane with a back and edges 
 _NAMES: Final = ("mirror", "spiegel", "glass")  # an MTL's names are material_0, material_1 mostly
 
 
-def mirror_slot(model: Model) -> int | None:
+def mirror_slot(model: ParsedModel) -> int | None:
     """The position in the MTL of a mirror's glass, -1 for meshes without one; None if none is flat.
 
     The glass faces away from the wall: of the materials that lie flat across the model's thinnest

@@ -16,7 +16,7 @@ _BYTES_PER_TRIANGLE = 150
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Model:
+class ParsedModel:
     """Meshes with their materials."""
 
     meshes: tuple[Mesh, ...]
@@ -33,23 +33,23 @@ class DamagedModel(BadHouse):
     """An OBJ of the library that cannot be read; one that an object places is left out."""
 
 
-class Models:
+class ModelCache:
     """Parses every model once and remembers it for the nodes that place it again."""
 
     def __init__(self, folder: RootFolder, notes: Notes, fields: ReadFields) -> None:
         self._folder = folder
         self._notes = notes
         self._max_triangles = fields.max_model_triangles
-        self._known: dict[tuple[str, str], Model | None] = {}
+        self._known: dict[tuple[str, str], ParsedModel | None] = {}
 
-    def model(self, obj_name: str, mtl_name: str) -> Model | None:
+    def model(self, obj_name: str, mtl_name: str) -> ParsedModel | None:
         """The model of an OBJ below the root; None if there is no such OBJ."""
         key = (obj_name, mtl_name)
         if key not in self._known:
             self._known[key] = self._parse(obj_name, mtl_name)
         return self._known[key]
 
-    def _parse(self, obj_name: str, mtl_name: str) -> Model | None:
+    def _parse(self, obj_name: str, mtl_name: str) -> ParsedModel | None:
         data = self._folder.read(
             obj_name,
             max_bytes=self._max_triangles * _BYTES_PER_TRIANGLE,
@@ -73,7 +73,7 @@ class Models:
             if mtl and name not in names:
                 text = f"usemtl {name[:60]!r} is not in {mtl_name}; it is grey"
                 self._notes.add("unknown-material", obj_name, text)
-        return Model(meshes, tuple(names.get(m.material, -1) for m in meshes), mtl)
+        return ParsedModel(meshes, tuple(names.get(m.material, -1) for m in meshes), mtl)
 
     def _mtl(self, name: str) -> tuple[ObjMaterial, ...]:
         materials = read_mtl(self._folder, name)

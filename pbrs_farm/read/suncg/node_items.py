@@ -23,7 +23,7 @@ from pbrs_farm.read.suncg.arch_json import Arch, arch_items
 from pbrs_farm.read.suncg.house_json import Node
 from pbrs_farm.read.suncg.metadata import LampMaterials, ModelClass, Tables
 from pbrs_farm.read.suncg.mirror_glass import MIRROR, as_mirror, mirror_slot
-from pbrs_farm.read.suncg.model_files import DamagedModel, Model, Models
+from pbrs_farm.read.suncg.model_files import DamagedModel, ModelCache, ParsedModel
 from pbrs_farm.read.suncg.model_lights import placed_light, separate_bulbs, with_emitting_bulbs
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
 
@@ -49,7 +49,7 @@ class ReaderContext:
     folder: RootFolder  # the SUNCG root
     tables: Tables
     materials: ModelMaterials
-    models: Models
+    models: ModelCache
     notes: Notes
     world_from_house: NDArray[np.float64]  # (4, 4) scale and axes
     arch: Arch | None = None
@@ -111,7 +111,7 @@ def _row(table: dict[str, _T], variant: str, model_id: str) -> _T | None:
     return None
 
 
-def _object_model(context: ReaderContext, node: Node) -> tuple[str, Model] | None:
+def _object_model(context: ReaderContext, node: Node) -> tuple[str, ParsedModel] | None:
     """The mesh of the node's state: state k > 0 is `<id>_<k-1>.obj` where that exists."""
     base = f"object/{node.model_id}/"
     names = [node.model_id]
@@ -127,7 +127,7 @@ def _object_model(context: ReaderContext, node: Node) -> tuple[str, Model] | Non
 
 
 def _surfaces(
-    context: ReaderContext, node: Node, model: Model, seen: ModelClass, lamp: LampMaterials
+    context: ReaderContext, node: Node, model: ParsedModel, seen: ModelClass, lamp: LampMaterials
 ) -> tuple[tuple[Surface, ...], list[int]]:
     """(surfaces in the model's order, the indices of those that are bulbs)."""
     world_from_model = context.world_from_house @ node.house_from_model

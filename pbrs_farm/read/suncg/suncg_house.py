@@ -24,7 +24,7 @@ from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.suncg.arch_json import Arch, arch_from_json, arch_openings
 from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
 from pbrs_farm.read.suncg.metadata import read_tables
-from pbrs_farm.read.suncg.model_files import Models
+from pbrs_farm.read.suncg.model_files import ModelCache
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
 from pbrs_farm.read.suncg.node_items import (
     ReaderContext,
@@ -72,7 +72,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
         folder=folder,
         tables=read_tables(folder, notes),
         materials=ModelMaterials(folder, notes),
-        models=Models(folder, notes, fields),
+        models=ModelCache(folder, notes, fields),
         notes=notes,
         world_from_house=record.world_from_house,
         arch=arch,

@@ -17,13 +17,14 @@ from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 from pbrs_farm.core.primitives import box
 
-_HOLE_MARGIN_M: Final = 0.10
-_OVERLAP_M: Final = 0.002
-_REACH_M: Final = 0.02
-_NEAR_M: Final = 0.15
-_PLANAR_M: Final = 0.01
-_THICKER_M: Final = 0.15
-_LEAST_SHARE: Final = 0.02
+CUTTER_REACH_M: Final = 0.02  # that a cutter stands out of either side of a wall without a hole
+_OVERLAP_M: Final = 0.002  # of a plug and the wall around it
+_HOLE_MARGIN_M: Final = 0.10  # a hole's rim lies no farther from the door's outline
+_RIM_M: Final = 0.02  # from a hole's rim to the wall's end, and the least size of a hole
+_BESIDE_M: Final = 0.15  # a wall's faces lie no farther from the door's own plane
+_PLANAR_M: Final = 0.01  # a wall that is thinner has one face
+_THICKER_M: Final = 0.15  # what such a wall's cutter reaches to either side
+_LEAST_SHARE: Final = 0.02  # of a wall's upright area, that faces of one direction have
 _UP: Final = np.array([0.0, 1.0, 0.0])
 
 
@@ -96,7 +97,7 @@ def _opening(item: Item, body: Box, frames: Sequence[_WallFrame]) -> Opening | N
         return None
     middle = (low[2] + high[2]) / 2
     quad = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
-    grown = np.array([_OVERLAP_M, _OVERLAP_M, 0.0] if holes else [0.0, 0.0, _REACH_M])
+    grown = np.array([_OVERLAP_M, _OVERLAP_M, 0.0] if holes else [0.0, 0.0, CUTTER_REACH_M])
     return Opening(
         id=f"{item.id}_hole",
         level_id=item.level_id,
@@ -120,14 +121,14 @@ def _wall(
         return []
     points = frame.points @ axes
     # Keep the points near the door's own plane.
-    beside = (points[:, 2] > low[2] - _NEAR_M) & (points[:, 2] < high[2] + _NEAR_M)
+    beside = (points[:, 2] > low[2] - _BESIDE_M) & (points[:, 2] < high[2] + _BESIDE_M)
     points = points[beside]
     if not len(points):
         return []
     wall_low, wall_high = points.min(0), points.max(0)
     # The wall holds the door where both overlap along the wall and upwards.
     overlap = np.minimum(wall_high - low, high - wall_low)[:2]
-    return [points] if (overlap > _NEAR_M).all() else []
+    return [points] if (overlap > _BESIDE_M).all() else []
 
 
 def _hole(
@@ -136,11 +137,11 @@ def _hole(
     """(low, high) along and up of the hole that a wall has where low..high stands; None if none."""
     s, y = points[:, 0], points[:, 1]
     # The rim of a hole lies near the door's outline and not at the wall's ends.
-    inner = (s > s.min() + _REACH_M) & (s < s.max() - _REACH_M)
+    inner = (s > s.min() + _RIM_M) & (s < s.max() - _RIM_M)
     near = (s > low[0] - _HOLE_MARGIN_M) & (s < high[0] + _HOLE_MARGIN_M)
     near &= (y > low[1] - _HOLE_MARGIN_M) & (y < high[1] + _HOLE_MARGIN_M)
     rim = points[inner & near, :2]
-    if len(rim) < 4 or np.ptp(rim, axis=0).min() < _REACH_M:
+    if len(rim) < 4 or np.ptp(rim, axis=0).min() < _RIM_M:
         return None
     return rim.min(0), rim.max(0)
 

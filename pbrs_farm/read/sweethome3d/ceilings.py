@@ -16,7 +16,7 @@ from pbrs_farm.read.sweethome3d.wall_solids import top_heights
 
 KINK_M = 0.01  # smaller bends of a ceiling are left out
 TIE_M = 1e-3  # walls are equally near within this
-NEAR_M = 0.10  # A wall's corner this near to a room's edge can bend the ceiling there
+CORNER_REACH_M = 0.10  # A wall's corner this near to a room's edge can bend the ceiling there
 
 
 class CeilingHeights:
@@ -87,7 +87,7 @@ class CeilingHeights:
             # Take the walls' corners that lie along this edge of the room.
             t = (corners - a) @ d / max(length**2, 1e-18)
             gap = np.linalg.norm(a + t[:, None] * d - corners, axis=1)
-            inside = (gap < NEAR_M) & (t * length > KINK_M) & ((1 - t) * length > KINK_M)
+            inside = (gap < CORNER_REACH_M) & (t * length > KINK_M) & ((1 - t) * length > KINK_M)
             # Keep a corner where the ceiling leaves the straight line between the edge's ends.
             ends = self.heights(level, np.stack([a, b]), False)
             last = 0.0

@@ -19,7 +19,7 @@ from pbrs_farm.read.sweethome3d.placement import PieceFrame
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
 MARGIN_M = 0.005
-REACH_M = 1.0
+WALL_REACH_M = 1.0
 MIN_HALF_M = 5e-4
 PARALLEL_SINE = math.sin(math.radians(20.0))
 
@@ -97,7 +97,7 @@ def _depth_span(
     if min(half_x, half_y) < MIN_HALF_M:
         return None
     piece = _rectangle(frame, half_x, max(half_z, MIN_HALF_M))
-    strip = _rectangle(frame, half_x * 0.98, half_z + REACH_M)
+    strip = _rectangle(frame, half_x * 0.98, half_z + WALL_REACH_M)
     spans = []
     for standing in walls:
         # Skip walls above or below the piece, and those its plan rectangle does not touch.

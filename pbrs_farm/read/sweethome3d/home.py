@@ -46,7 +46,7 @@ def read_home(
 
     name: the file's, for messages and the house's id. resources: the program's own models, for
     files that refer to them. package: where the file came from; package_note: what is odd about
-    it (homes.Package). Raises BadHouse, which names the file and the place.
+    it (homes_package.Package). Raises BadHouse, which names the file and the place.
     """
     fields = fields or ReadFields()
     file = PurePath(name).name

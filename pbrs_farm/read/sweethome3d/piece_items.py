@@ -28,7 +28,7 @@ from pbrs_farm.read.sweethome3d.placement import (
     placed_surface,
 )
 
-NEAR_M = 0.5  # A piece outside every room belongs to a room no farther than this
+MAX_BESIDE_ROOM_M = 0.5  # A piece outside every room belongs to a room no farther than this
 
 
 def piece_item(
@@ -112,7 +112,7 @@ def _label(
 
 def _room_of(frame: PieceFrame, level_id: str, rooms: list[ReadRoom]) -> str | None:
     point = shapely.Point(frame.origin[[0, 2]])
-    best, nearest = None, NEAR_M
+    best, nearest = None, MAX_BESIDE_ROOM_M
     for room in rooms:
         if room.level_id != level_id:
             continue

@@ -16,7 +16,7 @@ from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.scene_tables.material_rows import F0, KD, KIND, SURFACE, TAU
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables, bounding_spheres
 
-REACH_M: Final = 0.6  # faces farther from a bulb are outside its lamp's interior
+INTERIOR_REACH_M: Final = 0.6  # faces farther from a bulb are outside its lamp's interior
 
 # Of the lamp's flux, per m2: as much light as falls on a surface 40 cm from a bare bulb.
 MIN_EXITANCE: Final = 0.5
@@ -114,7 +114,7 @@ def _candidates(tables: SceneTables) -> tuple[NDArray[np.int64], NDArray[np.int6
     for k, sphere in enumerate(bounding_spheres(tables)):
         # Measure from the bulb to corners and centre, of the faces in its bounding box alone.
         centre, radius = sphere[:3], sphere[3]
-        reach = REACH_M + radius
+        reach = INTERIOR_REACH_M + radius
         in_box = (low >= centre - reach).all(1) & (high <= centre + reach).all(1)
         within = np.flatnonzero(in_box)
         places = np.concatenate([corners[within], corners[within].mean(1, keepdims=True)], 1)

@@ -8,7 +8,7 @@ import pytest
 from pbrs_farm.core.catalogue import Catalogue, Shape
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import MaterialKind
-from pbrs_farm.read.catalogue.catalogue import catalogue_from
+from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 from tests.read.catalogue.small_library import WEDGE_OBJ, entry, library
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.read.catalogue.catalogue import catalogue_from
+from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 from tests.read.catalogue.small_library import WEDGE_MTL, WEDGE_OBJ
 
 

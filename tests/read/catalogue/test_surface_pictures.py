@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from pbrs_farm.read.catalogue.catalogue import catalogue_from
+from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 from pbrs_farm.read.catalogue.surface_pictures import MOST_OF_A_GROUP, TEXTURES, surface_group
 from tests.read.catalogue.small_library import library_bytes
 

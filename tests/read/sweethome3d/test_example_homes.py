@@ -14,14 +14,14 @@ import pytest
 import shapely
 import trimesh
 
-from pbrs_farm.assets import homes
+from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.sweethome3d import read_home
 from tests.example_homes import example_homes
 
-NAMES = [h.name for h in homes.example_homes()]
+NAMES = [h.name for h in homes_package.example_homes()]
 
 
 def example(name: str, fields: ReadFields | None = None) -> House:
@@ -36,7 +36,7 @@ def example(name: str, fields: ReadFields | None = None) -> House:
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_home_is_read_whole(name: str) -> None:
     house = example(name, ReadFields(hidden_levels=True))
-    drawn = next(h for h in homes.example_homes() if h.name == name)
+    drawn = next(h for h in homes_package.example_homes() if h.name == name)
     assert len(house.rooms) == drawn.n_rooms
     assert len(house.levels) == drawn.n_levels
     assert house.source.attribution.startswith("home and models: E. and V. Puybaret / eTeks, CC-BY")
@@ -73,15 +73,15 @@ def test_the_authors_cameras_stand_in_rooms_and_look_at_something() -> None:
         assert np.linalg.norm(camera.towards) == pytest.approx(1.0)
 
 
-def deb(folder: Path, version: str = homes.TESTED_VERSION) -> Path:
+def deb(folder: Path, version: str = homes_package.TESTED_VERSION) -> Path:
     """A package of that version with a jar that holds one home."""
     jar = io.BytesIO()
     with zipfile.ZipFile(jar, "w") as archive:
-        archive.writestr(f"{homes.EXAMPLES}/Studio.xml", "<home/>")
+        archive.writestr(f"{homes_package.EXAMPLES}/Studio.xml", "<home/>")
         archive.writestr("model.obj", "v 0 0 0")
     tar = io.BytesIO()
     with tarfile.open(fileobj=tar, mode="w") as archive:
-        entry = tarfile.TarInfo("./" + homes.JAR)
+        entry = tarfile.TarInfo("./" + homes_package.JAR)
         entry.size = len(jar.getvalue())
         archive.addfile(entry, io.BytesIO(jar.getvalue()))
     data = b"!<arch>\n"
@@ -98,37 +98,37 @@ def deb(folder: Path, version: str = homes.TESTED_VERSION) -> Path:
 
 def test_a_package_in_the_cache_is_used_without_a_network(tmp_path: Path) -> None:
     deb(tmp_path)
-    package = homes.fetch(tmp_path)
-    assert package.version == homes.TESTED_VERSION
+    package = homes_package.fetch(tmp_path)
+    assert package.version == homes_package.TESTED_VERSION
     assert package.note == ""
     assert package.home("studio") == (b"<home/>", "Studio.xml")
     assert package.resources().read("model.obj") == b"v 0 0 0"
     assert package.resources().read("absent") is None
-    assert homes.cached(tmp_path) == package
+    assert homes_package.cached(tmp_path) == package
 
 
 def test_another_version_is_used_with_a_note(tmp_path: Path) -> None:
     deb(tmp_path, "7.5-1")
-    assert "7.5-1 is not the tested version" in homes.fetch(tmp_path).note
+    assert "7.5-1 is not the tested version" in homes_package.fetch(tmp_path).note
 
 
 def test_the_tested_version_is_taken_before_another(tmp_path: Path) -> None:
     deb(tmp_path, "9.0-1")
     deb(tmp_path)
-    assert homes.fetch(tmp_path).version == homes.TESTED_VERSION
+    assert homes_package.fetch(tmp_path).version == homes_package.TESTED_VERSION
 
 
 def test_an_unknown_home_is_refused_with_the_names(tmp_path: Path) -> None:
     deb(tmp_path)
     with pytest.raises(BadInput, match=r"no home 'Castle'.*Studio"):
-        homes.fetch(tmp_path).home("Castle")
+        homes_package.fetch(tmp_path).home("Castle")
 
 
 def test_a_damaged_package_says_to_fetch_it_again(tmp_path: Path) -> None:
     path = deb(tmp_path)
     path.write_bytes(path.read_bytes()[:200])
     with pytest.raises(MachineFailed, match="fetch it again"):
-        homes.fetch(tmp_path)
+        homes_package.fetch(tmp_path)
 
 
 def test_without_apt_lists_the_command_to_type_is_named(
@@ -140,13 +140,13 @@ def test_without_apt_lists_the_command_to_type_is_named(
     monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/apt-get")
     monkeypatch.setattr("subprocess.run", refuse)
     with pytest.raises(MachineFailed, match=r"Unable to locate.*apt-get update"):
-        homes.fetch(tmp_path)
+        homes_package.fetch(tmp_path)
 
 
 def test_a_cache_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(MachineFailed, match=r"file/cache.*PBRS_CACHE"):
-        homes.fetch(tmp_path / "file" / "cache")
+        homes_package.fetch(tmp_path / "file" / "cache")
 
 
 def test_without_apt_the_file_to_get_is_named(
@@ -154,4 +154,4 @@ def test_without_apt_the_file_to_get_is_named(
 ) -> None:
     monkeypatch.setattr("shutil.which", lambda _: None)
     with pytest.raises(MachineFailed, match="sweethome3d_7"):
-        homes.fetch(tmp_path)
+        homes_package.fetch(tmp_path)

@@ -12,7 +12,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-from pbrs_farm.assets import homes
+from pbrs_farm.assets import homes_package
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, ROOM, WALLS, home_xml, sh3d
 
 RECORD = Path(__file__).with_name("java_home.bin")
@@ -67,7 +67,7 @@ public class Record {
 
 def main() -> None:
     """Write java_home.bin."""
-    jar = str(homes.fetch().jar)
+    jar = str(homes_package.fetch().jar)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         (folder / "Record.java").write_text(_PROGRAM)

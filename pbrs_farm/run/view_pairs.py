@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pair:
+class ViewPair:
     """Two pictures of one view, (H, W, 3) sRGB each."""
 
     view: View
@@ -33,7 +33,7 @@ class Pair:
     after: Srgb8Image
 
 
-def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator[Pair]:
+def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator[ViewPair]:
     """The best views of the dressed home, one a room first, and the same of the bare home.
 
     Both houses are repaired. n_views: at most.
@@ -54,7 +54,7 @@ def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator
     for view in views:
         if view.id in chosen:
             before, after = (scene.picture(view) for scene in scenes)
-            yield Pair(view, before, after)
+            yield ViewPair(view, before, after)
 
 
 class _Lit:
