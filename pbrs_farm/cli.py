@@ -28,6 +28,7 @@ MODULES: Final = {
     "using": ("sheet", "verify", "relight"),
     "labelling": ("export", "classes", "label-sheet"),
     "selecting": ("reference", "select"),
+    "showing": ("board",),
     "submitting": ("submit",),
     "steering": (
         "status", "why", "logs", "failures", "retry", "pause", "resume", "cancel", "reduce",

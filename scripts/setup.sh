@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 
 VENV=.venv
 STAMP=$VENV/.setup.stamp
-EXTRAS=gl,transport,s3,workers,selection,dev
+EXTRAS=gl,transport,s3,workers,selection,board,dev
 
 has_lib() { PATH=$PATH:/sbin:/usr/sbin ldconfig -p | grep -q "$1"; }
 

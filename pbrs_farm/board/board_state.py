@@ -1,0 +1,62 @@
+"""What one running board is made of. Effects: opens the index, starts and ends its threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jinja2 import Environment
+
+from pbrs_farm.board.static_files import Asset, assets
+from pbrs_farm.board.index.queries import Queries
+from pbrs_farm.board.index.refresh import Refresher
+from pbrs_farm.board.index.view_index import ViewIndex
+from pbrs_farm.board.options import BoardOptions
+from pbrs_farm.board.pages.rendering import environment
+from pbrs_farm.board.pictures.picture_cache import PictureCache
+from pbrs_farm.board.root_reader import RootReader
+from pbrs_farm.board.security.sessions import Sessions
+from pbrs_farm.core import keys
+from pbrs_farm.store.object_store import Store
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Board:
+    """One running board: what its routes share."""
+
+    options: BoardOptions
+    reader: RootReader
+    index: ViewIndex
+    queries: Queries
+    refresher: Refresher
+    pictures: PictureCache
+    sessions: Sessions
+    templates: Environment
+    assets: dict[str, Asset]
+    farm: None = None
+
+    def start(self) -> None:
+        """Begin to look at the root."""
+        self.refresher.start()
+
+    def end(self) -> None:
+        """Stop what was started."""
+        self.refresher.end()
+
+
+def new_board(store: Store, options: BoardOptions) -> Board:
+    """A board of an output root; what it makes is kept below options.cache, by the root's URL."""
+    folder = options.cache / keys.digest(store.url)
+    reader = RootReader(store)
+    index = ViewIndex(folder / "index.sqlite")
+    found = assets()
+    return Board(
+        options=options,
+        reader=reader,
+        index=index,
+        queries=Queries(index),
+        refresher=Refresher(reader, index),
+        pictures=PictureCache(folder / "pictures"),
+        sessions=Sessions(options.token),
+        templates=environment(found),
+        assets=found,
+    )

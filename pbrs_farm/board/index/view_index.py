@@ -1,0 +1,148 @@
+"""The index of an output root: an SQLite file of houses and views. Effects: writes that file.
+
+It is a cache: a damaged or older file is thrown away and made anew. One writer, any readers: each
+thread has a connection of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from pbrs_farm.board.index.stored_houses import HouseRow
+from pbrs_farm.core.lighting import ALL_MODES
+
+_VERSION: Final = 1  # of the tables below
+_SCHEMA: Final = f"""
+PRAGMA journal_mode = WAL;
+CREATE TABLE IF NOT EXISTS house (
+    id TEXT PRIMARY KEY, name TEXT NOT NULL, credit TEXT NOT NULL, n_rooms INTEGER NOT NULL,
+    n_views INTEGER NOT NULL, n_warned INTEGER NOT NULL, cover TEXT NOT NULL,
+    fingerprint TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS view (
+    house TEXT NOT NULL, id TEXT NOT NULL, room TEXT NOT NULL, layers INTEGER NOT NULL,
+    classes INTEGER NOT NULL, warnings TEXT NOT NULL, reason TEXT,
+    PRIMARY KEY (house, id)
+) WITHOUT ROWID;
+CREATE INDEX IF NOT EXISTS view_of_room ON view (room, house, id);
+CREATE INDEX IF NOT EXISTS view_of_reason ON view (reason, house, id);
+CREATE TABLE IF NOT EXISTS fact (name TEXT PRIMARY KEY, text TEXT NOT NULL) WITHOUT ROWID;
+PRAGMA user_version = {_VERSION};
+"""
+
+
+class ViewIndex:
+    """Houses and views of one output root."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._local = threading.local()  # a connection per thread
+        self._writing = threading.Lock()
+        self._generation = 0
+        file.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            self._prepare()
+        except sqlite3.DatabaseError:
+            # Not ours, or damaged: it can be made again.
+            for path in file.parent.glob(f"{file.name}*"):
+                path.unlink()
+            self._local = threading.local()
+            self._prepare()
+
+    @property
+    def generation(self) -> int:
+        """Grows with every change, so that answers can be kept for as long as it stands."""
+        return self._generation
+
+    def rows(self, sql: str, values: Sequence[Any] = ()) -> list[sqlite3.Row]:
+        """What a SELECT finds."""
+        return self._connection().execute(sql, values).fetchall()
+
+    def fingerprints(self) -> dict[str, str]:
+        """House -> the fingerprint it was entered with."""
+        return {r["id"]: r["fingerprint"] for r in self.rows("SELECT id, fingerprint FROM house")}
+
+    def fact(self, name: str) -> str:
+        """A text kept under a name, "" if none."""
+        found = self.rows("SELECT text FROM fact WHERE name = ?", (name,))
+        return str(found[0]["text"]) if found else ""
+
+    def enter(self, houses: Iterable[tuple[HouseRow, str]]) -> None:
+        """Put houses with their fingerprints in place of what was known of them."""
+        with self._writing, self._connection() as connection:
+            for house, fingerprint in houses:
+                _enter_house(connection, house, fingerprint)
+        self._generation += 1
+
+    def remove(self, houses: Iterable[str]) -> None:
+        """Forget houses that are gone."""
+        with self._writing, self._connection() as connection:
+            for house in houses:
+                connection.execute("DELETE FROM view WHERE house = ?", (house,))
+                connection.execute("DELETE FROM house WHERE id = ?", (house,))
+        self._generation += 1
+
+    def set_verdicts(self, reasons: Mapping[tuple[str, str], str], fingerprint: str) -> None:
+        """Enter what a selection said of the views: "" kept, else why not."""
+        with self._writing, self._connection() as connection:
+            connection.execute("UPDATE view SET reason = NULL WHERE reason IS NOT NULL")
+            connection.executemany(
+                "UPDATE view SET reason = ? WHERE house = ? AND id = ?",
+                ((reason, house, view) for (house, view), reason in reasons.items()),
+            )
+            connection.execute("REPLACE INTO fact VALUES ('selection', ?)", (fingerprint,))
+        self._generation += 1
+
+    def _prepare(self) -> None:
+        connection = self._connection()
+        if connection.execute("PRAGMA user_version").fetchone()[0] not in (0, _VERSION):
+            raise sqlite3.DatabaseError("another version")
+        connection.executescript(_SCHEMA)
+
+    def _connection(self) -> sqlite3.Connection:
+        connection: sqlite3.Connection | None = getattr(self._local, "connection", None)
+        if connection is None:
+            connection = sqlite3.connect(self._file, timeout=30.0)
+            connection.row_factory = sqlite3.Row
+            # A cache that is lost is made again: do not wait for the disk.
+            connection.execute("PRAGMA synchronous = OFF")
+            connection.execute("PRAGMA cache_size = -8000")
+            self._local.connection = connection
+        return connection
+
+
+def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: str) -> None:
+    # Keep what the selection said: it changes by itself.
+    reasons = dict(
+        connection.execute(
+            "SELECT id, reason FROM view WHERE house = ? AND reason IS NOT NULL", (house.id,)
+        ).fetchall()
+    )
+    connection.execute("DELETE FROM view WHERE house = ?", (house.id,))
+    connection.executemany(
+        "INSERT INTO view VALUES (?, ?, ?, ?, ?, ?, ?)",
+        (
+            (house.id, v.id, v.room, v.layers, v.classes, json.dumps(v.warnings), reasons.get(v.id))
+            for v in house.views
+        ),
+    )
+    n_warned = sum(bool(view.warnings) for view in house.views)
+    row = (
+        house.id, house.name, house.credit, house.n_rooms, len(house.views), n_warned,
+        _cover(house), fingerprint,
+    )  # fmt: skip
+    connection.execute("REPLACE INTO house VALUES (?, ?, ?, ?, ?, ?, ?, ?)", row)
+
+
+def _cover(house: HouseRow) -> str:
+    """The view that stands for the house: the first with most lighting modes and no warning."""
+    modes = (1 << len(ALL_MODES)) - 1  # modes are the first layers
+    ranked = sorted(
+        house.views, key=lambda v: (-(v.layers & modes).bit_count(), bool(v.warnings), v.id)
+    )
+    return ranked[0].id if ranked else ""

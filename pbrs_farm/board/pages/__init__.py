@@ -1,0 +1,1 @@
+"""The routes of the board and what fills their templates."""

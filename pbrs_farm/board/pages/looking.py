@@ -1,0 +1,82 @@
+"""Pages that list: homes, views, a home. Effects: reads the index and the store."""
+
+from __future__ import annotations
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+
+from pbrs_farm.board.board_state import Board
+from pbrs_farm.board.index.queries import (
+    VERDICTS,
+    ListedHome,
+    ListedView,
+    filter_from_query,
+    page_number,
+)
+from pbrs_farm.board.pages.rendering import page
+from pbrs_farm.core.lighting import ALL_MODES
+
+
+def board_of(request: Request) -> Board:
+    """The board that a request is for."""
+    board: Board = request.app.state.board
+    return board
+
+
+def asked_home(request: Request) -> ListedHome:
+    """The home that the path names; 404 when the index has none of that id."""
+    home = board_of(request).queries.home(request.path_params["house"])
+    if home is None:
+        raise HTTPException(404, "There is no such home.")
+    return home
+
+
+def asked_view(request: Request) -> ListedView:
+    """The view that the path names; 404 when the index has none of these ids."""
+    words = request.path_params
+    view = board_of(request).queries.view(words["house"], words["view"])
+    if view is None:
+        raise HTTPException(404, "There is no such view.")
+    return view
+
+
+def homes(request: Request) -> Response:
+    """GET /: the homes of the root, a page at a time."""
+    words = request.query_params.get("words", "").strip()[:120]
+    queries = board_of(request).queries
+    found = queries.homes(words, page_number(request.query_params.get("page", "")))
+    return page(request, "homes.html", found=found, words=words, n_views=queries.n_views())
+
+
+def views(request: Request) -> Response:
+    """GET /views: thumbnails of the views that the address' filter lets through."""
+    queries = board_of(request).queries
+    wanted = filter_from_query(request.query_params)
+    found = queries.views(wanted)
+    # htmx asks for the results alone.
+    is_part = request.headers.get("hx-request") == "true"
+    answer = page(
+        request,
+        "views_part.html" if is_part else "views.html",
+        wanted=wanted,
+        found=found,
+        menus=queries.menus(),
+        modes=[mode.value for mode in ALL_MODES],
+        verdicts=VERDICTS,
+        credits=sorted(_credits(queries.home(h) for h in {v.house for v in found.rows})),
+    )
+    # The address leaves out what the form leaves empty.
+    answer.headers["HX-Push-Url"] = wanted.url(page=wanted.page)
+    return answer
+
+
+def _credits(homes: object) -> set[str]:
+    return {h.credit for h in homes if h is not None and h.credit}  # type: ignore[attr-defined]
+
+
+def home(request: Request) -> Response:
+    """GET /homes/HOUSE: a home in 3D, with its views beside it."""
+    found = asked_home(request)
+    views = board_of(request).queries.views_of(found.id)
+    return page(request, "home.html", home=found, views=views)

@@ -1,0 +1,85 @@
+"""HTML from the board's templates, every value escaped. Effects: reads the templates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+from urllib.parse import quote
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from starlette.requests import Request
+from starlette.responses import HTMLResponse
+
+import pbrs_farm
+from pbrs_farm.board.static_files import Asset
+from pbrs_farm.board.index.queries import ListedView
+from pbrs_farm.board.pictures.shown_layers import title_of
+from pbrs_farm.core.shown_text import printable, shown
+
+_MAX_PAGES_SHOWN: Final = 2  # before and after the one that is shown
+
+
+def environment(found: Mapping[str, Asset]) -> Environment:
+    """The templates; only markupsafe.Markup is not escaped, an unknown name is an error."""
+
+    def asset_url(name: str) -> str:
+        return f"/static/{name}?v={found[name].version}"
+
+    env = Environment(
+        loader=PackageLoader("pbrs_farm.board", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: printable(value) if type(value) is str else value,
+    )
+    env.globals |= {
+        "asset_url": asset_url, "home_url": home_url, "view_url": view_url, "thumb_url": thumb_url,
+        "page_numbers": page_numbers, "title_of": title_of, "program": pbrs_farm.__version__,
+    }  # fmt: skip
+    return env
+
+
+def page(request: Request, template: str, status: int = 200, **values: Any) -> HTMLResponse:
+    """The template filled with values and what every page shows."""
+    board = request.app.state.board
+    session = request.scope.get("session", "")
+    common = {
+        "request_path": request.url.path,
+        "root_name": shown(board.reader.url.removeprefix("file://"), 60),
+        "progress": board.refresher.progress,
+        "may_change": request.scope.get("may_change", False),
+        "is_readonly": board.options.is_readonly,
+        "has_session": bool(session),
+        "form_word": board.sessions.form_word(session) if session else "",
+        "has_farm": board.farm is not None,
+    }
+    html = board.templates.get_template(template).render(common | values)
+    return HTMLResponse(html, status)
+
+
+def home_url(house: str, rest: str = "") -> str:
+    """The address of a home's page, or of what lies below it."""
+    return f"/homes/{quote(house, safe='')}{rest}"
+
+
+def view_url(house: str, view: str, rest: str = "") -> str:
+    """The address of a view's page, or of what lies below it."""
+    return f"{home_url(house)}/views/{quote(view, safe='')}{rest}"
+
+
+def thumb_url(view: ListedView, layer: str) -> str:
+    """The address of a view's thumbnail; it changes with the house's files, so it can be kept."""
+    return view_url(view.house, view.id, f"/thumb/{layer}.jpg?v={quote(view.version, safe='')}")
+
+
+def page_numbers(number: int, n_pages: int) -> list[int]:
+    """The numbers of pages that a page links: first, last and those beside it; 0 = a gap."""
+    near = range(number - _MAX_PAGES_SHOWN, number + _MAX_PAGES_SHOWN + 1)
+    wanted = sorted({1, n_pages, *near} & set(range(1, n_pages + 1)))
+    numbers: list[int] = []
+    for k in wanted:
+        if numbers and k > numbers[-1] + 1:
+            numbers.append(0)
+        numbers.append(k)
+    return numbers

@@ -1,0 +1,1 @@
+"""What a browser shows of a view's stored files: thumbnails, coloured labels, pixels, light."""

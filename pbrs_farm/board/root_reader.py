@@ -1,0 +1,66 @@
+"""Reads the objects of an output root, of bounded size and never outside of it. Effects: the store's.
+
+Whatever a request names comes here as a key: the store refuses a key that could leave the root, and
+a link inside a folder that leads out of it is refused here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pbrs_farm.core.errors import ObjectMissing, PbrsError, StoreFailed
+from pbrs_farm.regular_files import real_path
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.object_store import Store, check_key
+
+MAX_JSON_BYTES = 64 * 2**20  # of a view.json, house.json, cameras.json
+MAX_PICTURE_BYTES = 256 * 2**20  # of a layer that is shown
+
+
+class RootReader:
+    """The store of an output root, to be read."""
+
+    def __init__(self, store: Store) -> None:
+        self.store = store
+        self._root = real_path(store.root) if isinstance(store, FolderStore) else None
+
+    @property
+    def url(self) -> str:
+        """Where the root is, without secrets."""
+        return self.store.url
+
+    def size(self, key: str) -> int | None:
+        """Bytes of the object, None when there is none that may be read."""
+        try:
+            self._check_inside(key)
+            head = self.store.head(key)
+        except StoreFailed:
+            return None
+        return None if head is None else head.n_bytes
+
+    def get(self, key: str, most_bytes: int = MAX_JSON_BYTES) -> bytes:
+        """The object's bytes. Raises StoreFailed, ObjectMissing where there is none of that size."""
+        self._check_inside(key)
+        head = self.store.head(key)
+        if head is None:
+            raise ObjectMissing(key, "no such object")
+        if head.n_bytes > most_bytes:
+            text = f"has {head.n_bytes / 1e6:.0f} MB, at most {most_bytes / 1e6:.0f} MB are read"
+            raise StoreFailed(key, text)
+        return self.store.get(key)
+
+    def get_or_none(self, key: str, most_bytes: int = MAX_JSON_BYTES) -> bytes | None:
+        """The object's bytes, None where they cannot be had."""
+        try:
+            return self.get(key, most_bytes)
+        except PbrsError:
+            return None
+
+    def list(self, prefix: str) -> Iterator[str]:
+        """Keys below the folder prefix."""
+        return self.store.list(prefix)
+
+    def _check_inside(self, key: str) -> None:
+        check_key(key)
+        if self._root is not None and not real_path(self._root / key).is_relative_to(self._root):
+            raise ObjectMissing(key, "a link that leads out of the folder")

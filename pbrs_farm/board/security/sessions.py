@@ -1,0 +1,76 @@
+"""Who has shown the token: sessions in cookies, and the words that forms must carry. No effects.
+
+A session is a random word that only its browser and this process know; it ends with the process.
+The form's word is a keyed digest of the session's, so that no other page can make a form that counts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import secrets
+import threading
+import time
+from collections import OrderedDict
+from typing import Final
+
+from pbrs_farm.store.secret import Secret
+
+COOKIE: Final = "pbrs_board"
+_MAX_SESSIONS: Final = 1000
+_LIFE_S: Final = 12 * 3600.0
+_MAX_WORD: Final = 200  # characters of a token or cookie that are looked at
+
+
+class Sessions:
+    """The sessions of one board."""
+
+    def __init__(self, token: Secret) -> None:
+        self._token = token
+        self._key = secrets.token_bytes(32)
+        self._ends: OrderedDict[str, float] = OrderedDict()  # digest of a session -> monotonic
+        self._lock = threading.Lock()
+
+    def knows(self, token: str) -> bool:
+        """Whether a word is the token; takes the same time for every wrong one."""
+        given = token[:_MAX_WORD].encode("utf-8", "replace")
+        expected = self._token.reveal().encode()
+        return bool(expected) and hmac.compare_digest(given, expected)
+
+    def open(self) -> str:
+        """A new session's word."""
+        session = secrets.token_urlsafe(32)
+        with self._lock:
+            self._ends[_digest(session)] = time.monotonic() + _LIFE_S
+            while len(self._ends) > _MAX_SESSIONS:
+                self._ends.popitem(last=False)
+        return session
+
+    def close(self, session: str) -> None:
+        """End a session."""
+        with self._lock:
+            self._ends.pop(_digest(session), None)
+
+    def is_open(self, session: str) -> bool:
+        """Whether the word is that of a session which has not ended."""
+        with self._lock:
+            ends = self._ends.get(_digest(session))
+        return ends is not None and time.monotonic() < ends
+
+    def form_word(self, session: str) -> str:
+        """What a form of this session must carry."""
+        return hmac.new(self._key, session.encode(), hashlib.sha256).hexdigest()
+
+    def is_form_word(self, session: str, word: str) -> bool:
+        """Whether a form carries the word of its session."""
+        expected = self.form_word(session).encode()
+        return hmac.compare_digest(word[:_MAX_WORD].encode("utf-8", "replace"), expected)
+
+
+def _digest(session: str) -> str:
+    return hashlib.sha256(session[:_MAX_WORD].encode("utf-8", "replace")).hexdigest()
+
+
+def new_token() -> Secret:
+    """A token for a board that was given none."""
+    return Secret(secrets.token_urlsafe(24))

@@ -1,0 +1,92 @@
+"""The verb that shows an output root and a farm in a browser. Effects: serves HTTP."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from importlib.util import find_spec
+from pathlib import Path
+
+from pbrs_farm.commands.arguments import Verb, echo, warn
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.store.secret import Secret
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add board."""
+    p = verb("board", _board, "a page in the browser: look at views, relight them, watch a farm")
+    add = p.add_argument
+    add("root", nargs="?", default="", help="output folder or store URL (default $PBRS_STORE)")
+    add("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
+    add("--port", type=int, default=8080, help="default 8080; 0 takes a free one")
+    text = "a name that browsers may call the board by, repeatable (behind a proxy)"
+    add("--allow-host", action="append", default=[], metavar="NAME", help=text)
+    text = (
+        "file that holds the token of changes, and of reading from elsewhere (default: a new one)"
+    )
+    add("--token-file", type=Path, metavar="FILE", help=text)
+    add("--readonly", action="store_true", help="nothing can be changed, by nobody")
+    text = "keeps the index and thumbnails (default ~/.cache/pbrs_farm/board)"
+    add("--cache", type=Path, metavar="FOLDER", help=text)
+    text = "price of a slot for an hour, for the cost of jobs"
+    add("--price", type=float, default=0.0, metavar="P", help=text)
+    add("--currency", default="EUR", help="of --price (default EUR)")
+
+
+def _board(args: argparse.Namespace) -> int:
+    missing = [name for name in ("starlette", "uvicorn") if find_spec(name) is None]
+    if missing:
+        hint = "pip install 'pbrs-farm[board]'"
+        raise MachineFailed(f"board needs {' and '.join(missing)}", hint=hint)
+    from pbrs_farm.board.board_state import new_board
+    from pbrs_farm.board.options import BoardOptions
+    from pbrs_farm.board.security.sessions import new_token
+    from pbrs_farm.board.serve import bound_socket, default_cache, server_of
+    from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.store import store_from_url
+
+    root = args.root or os.environ.get("PBRS_STORE", "")
+    if not root:
+        raise BadInput("board", "", "nothing to show", hint="pbrs-farm board OUT, or PBRS_STORE")
+    if "://" not in root and not Path(root).is_dir():
+        raise BadInput(root, "", "no such folder", hint="the folder of --out, or a store's URL")
+    token = _token(args.token_file) if args.token_file else new_token()
+    listening = bound_socket(args.host, args.port)
+    options = BoardOptions(
+        cache=args.cache or default_cache(),
+        host=args.host,
+        port=listening.getsockname()[1],
+        token=token,
+        is_readonly=args.readonly,
+        allowed_hosts=tuple(args.allow_host),
+        price_per_slot_hour=args.price,
+        currency=args.currency,
+    )
+    board = new_board(store_from_url(root, settings_from_environment().store), options)
+    _say(options, token, is_own_token=args.token_file is None)
+    server_of(board).run(sockets=[listening])
+    return 0
+
+
+def _say(options, token: Secret, *, is_own_token: bool) -> None:  # type: ignore[no-untyped-def]
+    host = f"[{options.host}]" if ":" in options.host else options.host
+    echo(f"http://{host}:{options.port}/")
+    if is_own_token and not (options.is_readonly and options.is_private):
+        echo(f"token: {token.reveal()}")
+    if not options.is_private:
+        warn(f"{options.host} is not this machine alone: put a proxy with TLS before the board")
+
+
+def _token(path: Path) -> Secret:
+    """The token in a file; BadInput where it cannot be read or is too short to keep anybody out."""
+    from pbrs_farm.regular_files import fault_of, read_regular
+
+    try:
+        text = read_regular(path, 4096).decode("utf-8").strip()
+    except OSError as error:
+        raise BadInput(path, "", fault_of(error)) from None
+    except UnicodeDecodeError:
+        raise BadInput(path, "", "is no text") from None
+    if len(text) < 16:
+        raise BadInput(path, "", "expected a token of 16 characters or more")
+    return Secret(text)

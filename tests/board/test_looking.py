@@ -1,0 +1,215 @@
+"""Homes and views are listed, filtered and shown as the root holds them."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import struct
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from pbrs_farm.board.index.queries import Queries, filter_from_query, page_number
+from pbrs_farm.board.index.refresh import Refresher
+from pbrs_farm.board.index.stored_houses import HouseRow, ViewRow
+from pbrs_farm.board.index.view_index import ViewIndex
+from pbrs_farm.board.root_reader import RootReader
+from pbrs_farm.images import array_from_png, decode_photo
+from pbrs_farm.store import MemoryStore
+from pbrs_farm.store.folder import FolderStore
+from tests.board.roots import HEIGHT, WIDTH, label_arrays, write_house, write_root, write_view
+
+VIEW = "/homes/a-1/views/0_0_1"
+
+
+def test_the_first_page_lists_homes_with_their_credit(client: httpx.Client) -> None:
+    html = client.get("/").text
+    assert "2 homes" in html
+    assert "Home a-1" in html
+    assert "3 views, 2 rooms" in html
+    assert html.count("by A. Person") == 1
+    assert "No home is called so" in client.get("/?words=zzz").text
+
+
+@pytest.mark.parametrize(
+    ("query", "n"),
+    [
+        ("", 4),
+        ("home=b-2", 1),
+        ("room=Bath", 1),
+        ("has=chair", 4),
+        ("has=bed", 0),
+        ("mode=mlt_il_ol", 4),
+        ("warned=1", 0),
+        ("verdict=unjudged", 4),
+        ("verdict=kept", 0),
+        ("words=0_0_4", 1),
+        ("words=%25", 0),
+        ("words=_", 4),
+        ("room=Kitchen&home=a-1", 2),
+        ("has=no-such-class&mode=x'--", 4),
+    ],
+)
+def test_a_filter_in_the_address_says_which_views_are_listed(
+    query: str, n: int, client: httpx.Client
+) -> None:
+    html = client.get(f"/views?{query}").text
+    assert f"<h1>{n} view" in html
+    assert html.count('class="card"') == n
+
+
+def test_htmx_gets_the_results_alone_and_a_tidy_address(client: httpx.Client) -> None:
+    answer = client.get("/views?home=&room=Bath&words=", headers={"HX-Request": "true"})
+    assert "<html" not in answer.text
+    assert answer.headers["hx-push-url"] == "/views?room=Bath"
+
+
+def test_a_selections_verdicts_are_filters(tmp_path: Path) -> None:
+    root = write_root(tmp_path / "root", {"a-1": ("0_0_1", "0_0_2", "0_1_0")})
+    (root / "selection").mkdir()
+    (root / "selection.json").write_text(json.dumps({"run": "r1"}))
+    lines = [{"house": "a-1", "view": "0_0_1", "reason": ""},
+             {"house": "a-1", "view": "0_0_2", "reason": "too dark"}]  # fmt: skip
+    (root / "selection/r1.jsonl").write_text("".join(json.dumps(x) + "\n" for x in lines))
+    queries = read_queries(root, tmp_path)
+    ids = {
+        query: [v.id for v in queries.views(filter_from_query({"verdict": query})).rows]
+        for query in ("kept", "refused", "unjudged")
+    }
+    assert ids == {"kept": ["0_0_1"], "refused": ["0_0_2"], "unjudged": ["0_1_0"]}
+    assert queries.menus()["reason"] == [("too dark", "too dark (1)")]
+
+
+def read_queries(root: Path, tmp_path: Path) -> Queries:
+    index = ViewIndex(tmp_path / "index.sqlite")
+    Refresher(RootReader(FolderStore(root)), index).refresh()
+    return Queries(index)
+
+
+def test_what_a_run_adds_or_removes_is_seen_at_the_next_look(tmp_path: Path) -> None:
+    root = write_root(tmp_path / "root", {"a-1": ("0_0_1",)})
+    index = ViewIndex(tmp_path / "index.sqlite")
+    refresher, queries = Refresher(RootReader(FolderStore(root)), index), Queries(index)
+    refresher.refresh()
+    write_view(root / "houses/a-1/views/0_0_9")
+    write_house(root, "c-3", ("0_0_1",))
+    refresher.refresh()
+    assert queries.n_views() == 3
+    for path in sorted((root / "houses/c-3").rglob("*"), reverse=True):
+        path.rmdir() if path.is_dir() else path.unlink()
+    (root / "houses/c-3").rmdir()
+    refresher.refresh()
+    assert queries.home("c-3") is None
+    assert queries.n_views() == 2
+
+
+def test_a_store_that_is_no_folder_is_listed_alike(root: Path, tmp_path: Path) -> None:
+    store = MemoryStore()
+    for path in sorted(root.rglob("*")):
+        if path.is_file():
+            store.put(path.relative_to(root).as_posix(), path.read_bytes())
+    index = ViewIndex(tmp_path / "index.sqlite")
+    Refresher(RootReader(store), index).refresh()
+    of_folder = read_queries(root, tmp_path / "folder")
+    key = {"house", "id", "room", "layers", "classes"}
+    rows = index.rows("SELECT house, id, room, layers, classes FROM view ORDER BY house, id")
+    assert len(rows) == 4
+    assert all(key == set(row.keys()) for row in rows)
+    assert Queries(index).menus() == of_folder.menus()
+
+
+def test_a_damaged_index_is_made_anew(root: Path, tmp_path: Path) -> None:
+    (tmp_path / "index.sqlite").write_bytes(b"this is no database" * 100)
+    assert read_queries(root, tmp_path).n_views() == 4
+
+
+def test_pages_cut_a_long_list_without_loss(tmp_path: Path) -> None:
+    index = ViewIndex(tmp_path / "index.sqlite")
+    views = tuple(ViewRow(f"0_0_{k:04}", "Hall", 1, 2, ()) for k in range(130))
+    index.enter([(HouseRow("a-1", "Home", "", 1, views), "x")])
+    queries = Queries(index)
+    found = [queries.views(filter_from_query({"page": str(k)})) for k in (1, 2, 3, 99)]
+    assert [len(page.rows) for page in found] == [48, 48, 34, 34]
+    ids = [v.id for page in found[:3] for v in page.rows]
+    assert ids == [v.id for v in views]
+    assert found[3].number == 3
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1", "x", "1e9", "99999999999", "²"])
+def test_a_page_that_is_no_number_is_the_first(text: str) -> None:
+    assert page_number(text) == 1
+
+
+def test_a_view_names_its_things_its_files_and_its_seconds(
+    root: Path, client: httpx.Client
+) -> None:
+    marker = {"step": "light", "seconds": 12.5, "worker": "w7"}
+    (root / "houses/a-1/done/light.0_0_1.json").write_text(json.dumps(marker))
+    html = client.get(VIEW).text
+    for text in (
+        "Chair",
+        "chair",
+        "50.0 %",
+        "12.50",
+        "w7",
+        "radiance.exr",
+        "depth.png",
+        "by A. Person",
+    ):
+        assert text in html
+    assert 'href="/homes/a-1/views/0_0_2"' in html
+
+
+def test_a_thumbnail_is_made_once_and_may_be_kept(root: Path, client: httpx.Client) -> None:
+    first = client.get(f"{VIEW}/thumb/mlt_il_ol.jpg")
+    assert decode_photo(first.content, "thumb").shape == (HEIGHT, WIDTH, 3)
+    assert "immutable" in first.headers["cache-control"]
+    assert client.get(f"{VIEW}/thumb/mlt_il_ol.jpg").content == first.content
+    assert client.get(f"{VIEW}/thumb/hha.jpg").status_code == 404
+
+
+def test_a_label_is_shown_in_colours_and_saved_as_it_is(root: Path, client: httpx.Client) -> None:
+    shown = array_from_png(client.get(f"{VIEW}/shown/instance.png").content)
+    assert len(np.unique(shown.reshape(-1, 3), axis=0)) == 2
+    stored = root / "houses/a-1/views/0_0_1/instance.png"
+    saved = client.get(f"{VIEW}/file/instance")
+    assert saved.content == stored.read_bytes()
+    assert saved.headers["content-disposition"] == 'attachment; filename="a-1-0_0_1-instance.png"'
+
+
+def test_the_probes_packet_holds_the_labels_of_every_pixel(client: httpx.Client) -> None:
+    answer = client.get(f"{VIEW}/pixels")
+    data = answer.content
+    assert data[:4] == b"PBPX"
+    assert struct.unpack_from("<III", data, 4) == (WIDTH, HEIGHT, 15)
+    labels, n = label_arrays(), WIDTH * HEIGHT
+    planes = [
+        ("instance", "<u2", n),
+        ("depth", "<u2", n),
+        ("normal", "<u2", 3 * n),
+        ("semantic", "<u1", n),
+    ]
+    at = 16
+    for name, dtype, count in planes:
+        plane = np.frombuffer(data, dtype, count, at)
+        np.testing.assert_array_equal(plane, labels[name].reshape(-1))
+        at += plane.nbytes
+    assert at == len(data)
+
+
+def test_scripts_are_sent_packed_and_kept_by_their_version(client: httpx.Client) -> None:
+    plain = client.get("/static/view.js", headers={"Accept-Encoding": "identity"})
+    assert b"import" in plain.content
+    with client.stream("GET", "/static/view.js") as packed:
+        assert gzip.decompress(b"".join(packed.iter_raw())) == plain.content
+    again = client.get("/static/view.js", headers={"If-None-Match": plain.headers["etag"]})
+    assert again.status_code == 304
+
+
+def test_what_is_not_there_is_told(client: httpx.Client) -> None:
+    for path in ("/homes/zzz", "/homes/a-1/views/zzz", "/nothing"):
+        answer = client.get(path)
+        assert answer.status_code == 404
+        assert "All homes" in answer.text
