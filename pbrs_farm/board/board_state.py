@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from jinja2 import Environment
 
-from pbrs_farm.board.static_files import Asset, assets
 from pbrs_farm.board.index.queries import Queries
 from pbrs_farm.board.index.refresh import Refresher
 from pbrs_farm.board.index.view_index import ViewIndex
@@ -15,6 +14,7 @@ from pbrs_farm.board.pages.rendering import environment
 from pbrs_farm.board.pictures.picture_cache import PictureCache
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.board.security.sessions import Sessions
+from pbrs_farm.board.static_files import Asset, assets
 from pbrs_farm.core import keys
 from pbrs_farm.store.object_store import Store
 

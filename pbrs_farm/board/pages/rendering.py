@@ -11,9 +11,9 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
 import pbrs_farm
-from pbrs_farm.board.static_files import Asset
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pictures.shown_layers import title_of
+from pbrs_farm.board.static_files import Asset
 from pbrs_farm.core.shown_text import printable, shown
 
 _MAX_PAGES_SHOWN: Final = 2  # before and after the one that is shown
