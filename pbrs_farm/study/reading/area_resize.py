@@ -1,0 +1,77 @@
+"""Arrays on another pixel grid, the same bits on every machine: by area, nearest, or any; no effects."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Pixels = TypeVar("Pixels", bound=NDArray[Any])
+
+
+def resized_by_area(picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """(height, width, C) uint8: each pixel the mean of what it covers of picture (H, W, C), rounded.
+
+    Values are averaged as they are encoded (sRGB), as usual loaders do. Enlarging gives areas of
+    one colour.
+    """
+    if picture.shape[:2] == (height, width):
+        return picture
+    # Average whole blocks in integers where the grid divides, else along one axis after the other.
+    rows, columns = picture.shape[0] / height, picture.shape[1] / width
+    if rows.is_integer() and columns.is_integer():
+        return _block_means(picture, int(rows), int(columns))
+    means = _axis_means(_axis_means(picture.astype(np.float64), 0, height), 1, width)
+    return np.asarray(np.rint(means), np.uint8)
+
+
+def resized_nearest(array: Pixels, width: int, height: int) -> Pixels:
+    """(height, width, ...) of array (H, W, ...): the pixel whose centre is nearest, values kept."""
+    if array.shape[:2] == (height, width):
+        return array
+    rows = _nearest(array.shape[0], height)
+    columns = _nearest(array.shape[1], width)
+    return np.ascontiguousarray(array[rows[:, None], columns])  # type: ignore[return-value]
+
+
+def resized_any(mask: NDArray[np.bool_], width: int, height: int) -> NDArray[np.bool_]:
+    """(height, width) bool: whether any pixel that is covered is set in mask (H, W): lines stay whole."""
+    if mask.shape == (height, width):
+        return mask
+    for axis, n in ((0, height), (1, width)):
+        size = mask.shape[axis]
+        first = np.arange(n) * size // n
+        # Take at least one pixel, where the grid grows.
+        last = np.maximum(-(-(np.arange(n) + 1) * size // n), first + 1)
+        counts = np.insert(np.cumsum(mask, axis=axis, dtype=np.int32), 0, 0, axis=axis)
+        mask = np.take(counts, last, axis=axis) > np.take(counts, first, axis=axis)
+    return mask
+
+
+def _nearest(size: int, n: int) -> NDArray[np.intp]:
+    return ((2 * np.arange(n) + 1) * size // (2 * n)).astype(np.intp)
+
+
+def _block_means(picture: NDArray[np.uint8], rows: int, columns: int) -> NDArray[np.uint8]:
+    # Sum the pixels of each block one by one: slices are quicker than a sum over short axes.
+    total = np.zeros((picture.shape[0] // rows, *picture.shape[1:]), np.uint32)
+    for row in range(rows):
+        total += picture[row::rows]
+    block = np.zeros((total.shape[0], total.shape[1] // columns, *picture.shape[2:]), np.uint32)
+    for column in range(columns):
+        block += total[:, column::columns]
+    # Round halves up, in integers.
+    area = rows * columns
+    return ((block + area // 2) // area).astype(np.uint8)
+
+
+def _axis_means(array: NDArray[np.float64], axis: int, n: int) -> NDArray[np.float64]:
+    # Sum up to each edge of the new grid; a mean is the difference of two sums.
+    size = array.shape[axis]
+    sums = np.insert(np.cumsum(array, axis=axis), 0, 0, axis=axis)
+    edges = np.arange(n + 1) * (size / n)
+    whole = np.minimum(edges.astype(np.intp), size - 1)
+    part = (edges - whole).reshape(-1, *(1,) * (array.ndim - 1 - axis))
+    at = np.take(sums, whole, axis=axis) + part * np.take(array, whole, axis=axis)
+    return np.asarray(np.diff(at, axis=axis) * (n / size))

@@ -1,0 +1,72 @@
+"""dataset.json of packed shards: what they hold, in which units, split and sizes; no effects."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.reading.house_split import Shares
+from pbrs_farm.study.reading.view_sample import LAYERS, MODES, Size
+
+DATASET_JSON: Final = "dataset.json"
+WHOLE: Final = "all"  # the split of shards that are not split
+_FORM: Final = "pbrs_farm shards 1"
+
+
+@dataclass(frozen=True, slots=True)
+class Shard:
+    """One tar of a dataset."""
+
+    file: str
+    split: str  # train, val, test, or all
+    n_views: int
+    n_bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class Dataset:
+    """What shards hold: the part of dataset.json that a reader needs."""
+
+    size: Size | None  # None: each view as large as it was rendered
+    modes: tuple[str, ...]
+    layers: tuple[str, ...]
+    shards: tuple[Shard, ...]
+    shares: Shares | None  # None: not split
+    classes: tuple[str, ...] = ()  # names of ids 0..40
+
+
+def dataset_json(dataset: Dataset, also: Mapping[str, Any]) -> bytes:
+    """The file. also: what a reader does not need: arrays, class colours, credits, card."""
+    row = {
+        "form": _FORM,
+        "size": dataset.size,
+        "modes": dataset.modes,
+        "layers": dataset.layers,
+        "split": dataset.shares and asdict(dataset.shares),
+        "classes": dataset.classes,
+        **also,
+        "shards": [asdict(shard) for shard in dataset.shards],
+    }
+    return (json.dumps(row, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def dataset_from_json(data: bytes, place: str) -> Dataset:
+    """The Dataset that dataset_json wrote; BadInput, naming place, for anything else."""
+    try:
+        row = json.loads(data)
+        if row["form"] != _FORM:
+            raise BadInput(place, "form", f"{row['form']!r}, expected {_FORM!r}")
+        size = None if row["size"] is None else (int(row["size"][0]), int(row["size"][1]))
+        shards = tuple(Shard(**shard) for shard in row["shards"])
+        modes, layers = tuple(row["modes"]), tuple(row["layers"])
+        shares = None if row["split"] is None else Shares(**row["split"])
+        if not set(modes) <= set(MODES) or not set(layers) <= set(LAYERS) or not shards:
+            raise ValueError
+        return Dataset(size, modes, layers, shards, shares, tuple(row["classes"]))
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError):
+        text = "not the dataset.json of shards"
+        raise BadInput(place, "", text, hint="`pbrs-farm pack` writes one") from None

@@ -1,0 +1,62 @@
+"""Which views train, which choose, which judge: by house, so that rooms of a home stay together; pure.
+
+The share of a home follows from its name alone: a new home moves no other one, a home drawn again
+(another digest) stays where it was, and all its dressed variants (-d3) stay with it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from pbrs_farm.core.errors import BadInput
+
+SPLITS: Final = ("train", "val", "test")
+# What keys.house_id and keys.dressed_id put behind a home's name.
+_DIGEST_AND_VARIANT: Final = re.compile(r"(-[0-9a-f]{8})?(-d[0-9]+)?")
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """How large each split is: shares of 1, together 1."""
+
+    train: float = 0.8
+    val: float = 0.1
+    test: float = 0.1
+
+    def __post_init__(self) -> None:
+        values = (self.train, self.val, self.test)
+        if min(values) < 0 or abs(sum(values) - 1) > 1e-9:
+            text = f"expected three shares that sum to 1, got {values}"
+            raise BadInput("split", "", text, hint="80/10/10")
+
+
+def shares_from_text(text: str) -> Shares:
+    """80/10/10 as Shares; raises BadInput."""
+    try:
+        train, val, test = (float(part) for part in text.split("/"))
+    except ValueError:
+        raise BadInput("--split", text, "expected train/val/test", hint="80/10/10") from None
+    total = train + val + test
+    if not 0 < total < float("inf"):
+        raise BadInput("--split", text, "expected shares above 0", hint="80/10/10")
+    return Shares(train / total, val / total, 1 - train / total - val / total)
+
+
+def home_of(house: str) -> str:
+    """The house's id without its digest and without its variant: `studio` of studio-1a2b3c4d-d3."""
+    match = re.fullmatch(r"(?P<home>.+?)" + _DIGEST_AND_VARIANT.pattern, house)
+    return match["home"] if match else house
+
+
+def split_of_house(house: str, shares: Shares | None = None) -> str:
+    """ "train", "val" or "test" of a house's id."""
+    shares = shares or Shares()
+    # Take a number of 0..1 from the home's name.
+    digest = hashlib.sha256(home_of(house).encode()).digest()
+    at = int.from_bytes(digest[:8], "big") / 2**64
+    if at < shares.train:
+        return "train"
+    return "val" if at < shares.train + shares.val else "test"

@@ -1,0 +1,30 @@
+"""Opens an output root or shards, wherever they lie. Effects: reads the store."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.store import Store, store_from_url
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.reading.views import Views
+
+
+def open_views(place: str | Path | Store) -> Views:
+    """The views of an output root, or of shards that `pbrs-farm pack` wrote.
+
+    place: a folder, file:///folder, s3://bucket/prefix, or a Store. Nothing but names is read
+    before a view is asked for. Raises BadInput where there is no view, StoreFailed where the store
+    does not answer.
+    """
+    store = place if not isinstance(place, str | Path) else store_from_url(str(place))
+    if isinstance(store, FolderStore) and not store.root.is_dir():
+        raise BadInput(place, "", "no such folder")
+    # Imported where needed: shards are read without pydantic and OpenImageIO.
+    if store.head("dataset.json") is not None:
+        from pbrs_farm.study.reading.shard_set import views_of_shards
+
+        return views_of_shards(store)
+    from pbrs_farm.study.reading.stored_root import views_of_root
+
+    return views_of_root(store)

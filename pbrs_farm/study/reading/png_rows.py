@@ -1,0 +1,98 @@
+"""PNG <-> arrays with zlib and numpy alone: of the filters rows may have, "up" and none; no effects.
+
+Shards are written and read so, and the labels of a view are stored so: each row as its difference
+from the row above, which compresses labels best and is undone a row at a time. 16 bits stay 16.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput
+
+_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
+_CHANNELS: Final = {0: 1, 2: 3}  # PNG's colour type: grey, RGB
+_NONE, _UP = 0, 2  # filters
+_LEVEL: Final = 6  # of zlib
+_MAX_PIXELS: Final = 16384 * 16384
+
+
+def png_of_rows(array: NDArray[np.uint8]) -> bytes:
+    """PNG bytes of (H, W) or (H, W, 3) uint8, or uint16; equal arrays give equal bytes."""
+    height, width = array.shape[:2]
+    kind = 0 if array.ndim == 2 else 2
+    big_endian = np.ascontiguousarray(array, array.dtype.newbyteorder(">"))
+    rows = big_endian.view(np.uint8).reshape(height, -1)
+    # Put the filter's number before each row's difference from the row above.
+    lines = np.empty((height, rows.shape[1] + 1), np.uint8)
+    lines[:, 0] = _UP
+    lines[0, 1:] = rows[0]
+    np.subtract(rows[1:], rows[:-1], out=lines[1:, 1:])
+    header = struct.pack(">IIBBBBB", width, height, 8 * array.itemsize, kind, 0, 0, 0)
+    data = zlib.compress(lines.tobytes(), _LEVEL)
+    chunks = (_chunk(b"IHDR", header), _chunk(b"IDAT", data), _chunk(b"IEND", b""))
+    return _SIGNATURE + b"".join(chunks)
+
+
+def array_of_rows(png: bytes, place: str) -> NDArray[Any] | None:
+    """(H, W) or (H, W, 3) uint8 or uint16 of a PNG; None where its rows are filtered otherwise.
+
+    Raises BadInput, naming place, where it is no PNG or is damaged.
+    """
+    width, height, bits, kind, interlaced, data = _parsed(png, place)
+    if bits not in (8, 16) or kind not in _CHANNELS or interlaced:
+        return None
+    n_row = width * _CHANNELS[kind] * bits // 8
+    lines = np.frombuffer(_inflated(data, height * (n_row + 1), place), np.uint8)
+    lines = lines.reshape(height, n_row + 1)
+    # Look at the filters: rows that take their left neighbour are left to others.
+    filters = lines[:, 0]
+    if not np.isin(filters, (_NONE, _UP)).all():
+        return None
+    rows = lines[:, 1:].copy()
+    for row in np.nonzero(filters[1:] == _UP)[0] + 1:
+        rows[row] += rows[row - 1]
+    pixels = rows if bits == 8 else rows.view(">u2").astype(np.uint16)
+    return pixels.reshape((height, width) if kind == 0 else (height, width, 3))
+
+
+def _chunk(name: bytes, data: bytes) -> bytes:
+    checksum = zlib.crc32(name + data)
+    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", checksum)
+
+
+def _parsed(png: bytes, place: str) -> tuple[int, int, int, int, int, bytes]:
+    """Width, height, bits, colour type, interlacing, and the compressed rows."""
+    if not png.startswith(_SIGNATURE) or png[12:16] != b"IHDR" or len(png) < 33:
+        raise BadInput(place, "", "not a PNG file")
+    width, height, bits, kind, _method, _filter, interlaced = struct.unpack(">IIBBBBB", png[16:29])
+    if not 0 < width * height <= _MAX_PIXELS:
+        raise BadInput(place, "", f"{width}x{height} pixels are too many")
+    parts, at = [], 33
+    while at + 12 <= len(png):
+        # A chunk: length, name, data, checksum.
+        end = at + 12 + int.from_bytes(png[at : at + 4], "big")
+        name = png[at + 4 : at + 8]
+        if name == b"IDAT":
+            parts.append(png[at + 8 : end - 4])
+        at = end
+        if name == b"IEND" and end <= len(png):
+            return width, height, bits, kind, interlaced, b"".join(parts)
+    raise BadInput(place, "", "cannot be read as a picture: damaged or truncated")
+
+
+def _inflated(data: bytes, n_bytes: int, place: str) -> bytes:
+    # Ask for one byte more than there may be, so that a bomb stays small.
+    inflate = zlib.decompressobj()
+    try:
+        raw = inflate.decompress(data, n_bytes + 1)
+    except zlib.error:
+        raw = b""
+    if len(raw) != n_bytes or not inflate.eof:
+        raise BadInput(place, "", "cannot be read as a picture: damaged or truncated")
+    return raw

@@ -1,0 +1,214 @@
+"""Views of packed shards, with numpy alone. Effects: reads a folder or a store, maps files."""
+
+from __future__ import annotations
+
+import json
+import mmap
+from collections import OrderedDict
+from typing import Any, Final
+
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.regular_files import fault_of, open_regular
+from pbrs_farm.store import Store, store_from_url
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.reading.dataset_json import (
+    DATASET_JSON,
+    WHOLE,
+    Dataset,
+    Shard,
+    dataset_from_json,
+)
+from pbrs_farm.study.reading.house_split import Shares, split_of_house
+from pbrs_farm.study.reading.packed_parts import array_of_part, part_of_array
+from pbrs_farm.study.reading.stored_layers import (
+    ViewFacts,
+    array_names,
+    checked_array,
+    facts_from_json,
+    sample_of_stored,
+)
+from pbrs_farm.study.reading.tar_members import Buffer, Member, members_of_tar
+from pbrs_farm.study.reading.view_sample import Request, Sample
+from pbrs_farm.study.reading.views import ViewRef, Views
+
+_N_OPEN: Final = 8  # shards that are kept open
+Parts = dict[str, Member]  # a view's parts by what follows its key
+
+
+class OpenShard:
+    """One tar, mapped or in memory, and where each view's parts lie."""
+
+    def __init__(self, tar: Buffer, place: str) -> None:
+        self._tar = tar
+        self.place = place
+        self.views: list[Parts] = []  # in the tar's order
+        key = None
+        for member in members_of_tar(tar, place):
+            # The parts of a view stand together; its key ends at the first dot.
+            own, _, part = member.name.partition(".")
+            if own != key:
+                self.views.append({})
+                key = own
+            self.views[-1][part] = member
+
+    def bytes_of(self, view: int, part: str) -> bytes:
+        """The bytes of a part of the view at that place; BadInput where it has none."""
+        member = self.views[view].get(part)
+        if member is None:
+            raise BadInput(self.place, f"view {view}", f"has no {part}")
+        return bytes(self._tar[member.at : member.at + member.n_bytes])
+
+
+class ShardSet:
+    """Packed shards in a folder or a store; a ViewSource, and readable by shard and place.
+
+    Files are mapped in a folder; from elsewhere a shard comes whole and some are kept.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._url = store.url
+        self._store: Store | None = store
+        self._place = str(store.root) if isinstance(store, FolderStore) else store.url
+        place = f"{self._place}/{DATASET_JSON}"
+        self.dataset: Dataset = dataset_from_json(store.get(DATASET_JSON), place)
+        self._open: OrderedDict[str, OpenShard] = OrderedDict()
+        self._at: dict[ViewRef, tuple[Shard, int]] = {}  # filled when views are asked for by name
+        for shard in self.dataset.shards:
+            self._check_size(shard)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Neither a map nor S3's client can be sent to a process: both are opened again there.
+        return {**self.__dict__, "_store": None, "_open": OrderedDict()}
+
+    @property
+    def url(self) -> str:
+        return self._place
+
+    def shards_of(self, split: str | None) -> tuple[Shard, ...]:
+        """The shards of a split, all for None; BadInput where there is none of that name."""
+        found = tuple(s for s in self.dataset.shards if split is None or s.split == split)
+        if not found:
+            splits = dict.fromkeys(s.split for s in self.dataset.shards)
+            raise BadInput(
+                self.url, "", f"no shard of split {split}", hint=f"of {', '.join(splits)}"
+            )
+        return found
+
+    def check(self, request: Request) -> None:
+        """Raise BadInput where the shards do not hold what request asks for."""
+        held = self.dataset
+        for layer in request.layers:
+            if layer != "colour" and layer not in held.layers:
+                hint = f"packed: {', '.join(held.layers)}"
+                raise BadInput(self.url, "", f"no layer {layer} in these shards", hint=hint)
+        if "colour" in request.layers and request.mode not in held.modes:
+            hint = f"packed: {', '.join(held.modes)}"
+            raise BadInput(self.url, "", f"no pictures in {request.mode} light", hint=hint)
+
+    def read_at(self, shard: Shard, view: int, request: Request) -> Sample:
+        """The Sample of a view by its place in a shard."""
+        opened = self._opened(shard)
+        if view >= len(opened.views):
+            text = f"{len(opened.views)} views, {shard.n_views} were packed"
+            raise BadInput(opened.place, "", text, hint="copy or pack it again")
+        facts = self._facts_at(opened, view)
+        arrays = {
+            name: self._array(opened, view, name, request, facts)
+            for name in array_names(request.layers)
+        }
+        return sample_of_stored(facts, arrays, request)
+
+    def refs(self) -> tuple[ViewRef, ...]:
+        """All views by name: opens every shard once."""
+        if not self._at:
+            for shard in self.dataset.shards:
+                opened = self._opened(shard)
+                for view in range(len(opened.views)):
+                    facts = self._facts_at(opened, view)
+                    self._at[ViewRef(facts.house, facts.view)] = (shard, view)
+        return tuple(sorted(self._at, key=lambda ref: (ref.is_object, ref)))
+
+    def lacks(self, ref: ViewRef, request: Request) -> str:
+        self.check(request)
+        return ""
+
+    def modes(self, ref: ViewRef) -> tuple[str, ...]:
+        return self.dataset.modes
+
+    def facts(self, ref: ViewRef) -> ViewFacts:
+        shard, view = self._at[ref]
+        return self._facts_at(self._opened(shard), view)
+
+    def table(self, ref: ViewRef) -> dict[str, Any]:
+        shard, view = self._at[ref]
+        return self._table_at(self._opened(shard), view)
+
+    def read(self, ref: ViewRef, request: Request) -> Sample:
+        self.check(request)
+        return self.read_at(*self._at[ref], request)
+
+    def split_of(self, ref: ViewRef, shares: Shares | None) -> str:
+        packed = self._at[ref][0].split
+        return split_of_house(ref.house, shares) if shares or packed == WHOLE else packed
+
+    def _array(
+        self, opened: OpenShard, view: int, name: str, request: Request, facts: ViewFacts
+    ) -> NDArray[Any]:
+        part = part_of_array(name, request.mode, opened.views[view])
+        place = f"{opened.place}: {facts.id}.{part}"
+        array = array_of_part(name, part, opened.bytes_of(view, part), place)
+        return checked_array(name, array, facts.size, place)
+
+    def _facts_at(self, opened: OpenShard, view: int) -> ViewFacts:
+        return facts_from_json(self._table_at(opened, view), f"{opened.place}: view {view}")
+
+    def _table_at(self, opened: OpenShard, view: int) -> dict[str, Any]:
+        try:
+            row: dict[str, Any] = json.loads(opened.bytes_of(view, "json"))
+        except (ValueError, RecursionError):
+            raise BadInput(opened.place, f"view {view}", "not JSON: damaged") from None
+        return row
+
+    def _opened(self, shard: Shard) -> OpenShard:
+        if shard.file in self._open:
+            self._open.move_to_end(shard.file)
+            return self._open[shard.file]
+        opened = OpenShard(self._bytes(shard), f"{self._place}/{shard.file}")
+        self._open[shard.file] = opened
+        # Let go of the one that was not used for longest.
+        if len(self._open) > _N_OPEN:
+            self._open.popitem(last=False)
+        return opened
+
+    def _bytes(self, shard: Shard) -> Buffer:
+        store = self._opened_store()
+        if not isinstance(store, FolderStore):
+            return store.get(shard.file)
+        path = store.root / shard.file
+        try:
+            with open_regular(path, 2**40) as file:
+                return memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+        except OSError as error:
+            raise BadInput(path, "", fault_of(error)) from None
+
+    def _check_size(self, shard: Shard) -> None:
+        head = self._opened_store().head(shard.file)
+        place = f"{self._place}/{shard.file}"
+        if head is None:
+            raise BadInput(place, "", "no such shard, though dataset.json names it")
+        if head.n_bytes != shard.n_bytes:
+            text = f"{head.n_bytes} of {shard.n_bytes} bytes: truncated or another file"
+            raise BadInput(place, "", text, hint="copy or pack it again")
+
+    def _opened_store(self) -> Store:
+        if self._store is None:
+            self._store = store_from_url(self._url)
+        return self._store
+
+
+def views_of_shards(store: Store) -> Views:
+    """The views of shards by name."""
+    shards = ShardSet(store)
+    return Views(shards, shards.refs(), {})

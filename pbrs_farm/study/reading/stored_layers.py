@@ -1,0 +1,149 @@
+"""A view's layers as they are stored (whole numbers) and as a Sample's arrays; no effects.
+
+Sizes change while the numbers are whole, so that what is read from a folder and resized has the
+same bits as what was packed at that size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.reading.area_resize import resized_any, resized_by_area, resized_nearest
+from pbrs_farm.study.reading.normal_axes import decoded_normal
+from pbrs_farm.study.reading.view_sample import Request, Sample, Size
+
+Stored = dict[str, NDArray[Any]]  # array name -> (H, W) or (H, W, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class StoredArray:
+    """How an array is stored: its type, unit, what a pixel without a value holds, the view's file."""
+
+    dtype: str
+    unit: str
+    nothing: str
+    file: str  # below the view's folder
+    channels: int = 1
+
+
+# By the names of Sample's arrays; colour is a picture by its mode's name.
+STORED: Final = {
+    "colour": StoredArray("uint8", "sRGB", "-", "{mode}.png", 3),
+    "normal": StoredArray(
+        "uint16", "round((n + 1) 65535 / 2), x right, y forward, z up", "32768", "normal.png", 3
+    ),
+    "valid": StoredArray("uint8", "255 where normal is known", "0", "valid.png"),
+    "depth": StoredArray("uint16", "mm along the axis; 65535: as much or more", "0", "depth.png"),
+    "class40": StoredArray("uint8", "NYU40 id", "0", "semantic.png"),
+    "instance": StoredArray("uint16", "instance id", "0", "instance.png"),
+    "boundary": StoredArray("uint8", "255 where instances meet", "0", "boundary.png"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ViewFacts:
+    """Which view it is and what its camera is, at the size it is stored in."""
+
+    house: str
+    view: str
+    room: str
+    size: Size
+    K: tuple[tuple[float, ...], ...]  # 3 x 3, pixels
+    world_from_camera_opencv: tuple[tuple[float, ...], ...]  # 4 x 4, metres, y up
+
+    @property
+    def id(self) -> str:
+        """<house>/<view>, one of its kind in a root."""
+        return f"{self.house}/{self.view}"
+
+    def k_at(self, size: Size) -> NDArray[np.float64]:
+        """(3, 3) K of the picture at another size (width, height)."""
+        scale = np.array([size[0] / self.size[0], size[1] / self.size[1], 1])
+        return np.asarray(np.array(self.K, np.float64) * scale[:, None])
+
+
+def facts_from_json(row: Any, place: str) -> ViewFacts:
+    """ViewFacts of view.json, or of a packed view's; BadInput, naming place, for anything else."""
+    try:
+        k, pose = (
+            tuple(tuple(float(x) for x in line) for line in row[name])
+            for name in ("K", "world_from_camera_opencv")
+        )
+        size = int(row["width_px"]), int(row["height_px"])
+        if [len(x) for x in (*k, *pose)] != [3] * 3 + [4] * 4 or min(size) < 1:
+            raise ValueError
+        room = row.get("room") or ""
+        return ViewFacts(str(row["house"]), str(row["view"]), str(room), size, k, pose)
+    except (KeyError, TypeError, ValueError, AttributeError):
+        hint = "does a run still write it? `pbrs-farm verify` says what is damaged"
+        raise BadInput(place, "", "not a view's camera", hint=hint) from None
+
+
+def array_names(layers: tuple[str, ...]) -> tuple[str, ...]:
+    """The arrays that layers are read from: valid comes with normal."""
+    names = [n for layer in layers for n in ((layer, "valid") if layer == "normal" else (layer,))]
+    return tuple(dict.fromkeys(names))
+
+
+def checked_array(name: str, array: NDArray[Any], size: Size, place: str) -> NDArray[Any]:
+    """array itself, where it has the type and size it must have; BadInput, naming place, if not.
+
+    What was stored in 16 bits and comes in 8, or as 8 bits spread over 16, was ruined by a program
+    on the way: never used.
+    """
+    want = STORED[name]
+    shape = (size[1], size[0], 3) if want.channels == 3 else (size[1], size[0])
+    hint = "a program has written the file again: take the original"
+    if array.dtype == np.uint8 and want.dtype == "uint16":
+        raise BadInput(place, "", "8 bits a value, 16 are stored", hint=hint)
+    if array.dtype != np.dtype(want.dtype) or array.shape != shape:
+        text = f"{array.dtype} {array.shape}, expected {want.dtype} {shape}"
+        raise BadInput(place, "", text, hint=hint)
+    if want.dtype == "uint16" and name != "instance" and _were_8_bits(array):
+        raise BadInput(place, "", "8 bits spread over 16", hint=hint)
+    return array
+
+
+def _were_8_bits(array: NDArray[np.uint16]) -> bool:
+    # 8 bits spread over 16 repeat the byte: every value is a multiple of 257.
+    some = array[::8, ::8]
+    if (some % 257).any():
+        return False
+    return bool((array % 257 == 0).all() and len(np.unique(some)) > 3)
+
+
+def resized_stored(stored: Stored, size: Size) -> Stored:
+    """The arrays on another grid: colour by area, boundaries where any is, all others nearest."""
+    return {name: _resized(name, array, *size) for name, array in stored.items()}
+
+
+def _resized(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
+    if name == "colour":
+        return resized_by_area(array, width, height)
+    if name == "boundary":
+        return resized_any(array > 0, width, height).astype(np.uint8) * np.uint8(255)
+    return resized_nearest(array, width, height)
+
+
+def sample_of_stored(facts: ViewFacts, stored: Stored, request: Request) -> Sample:
+    """The Sample of a view's stored arrays, at the size asked for."""
+    size = request.size or facts.size
+    stored = resized_stored(stored, size)
+    arrays: dict[str, Any] = {
+        n: stored[n] for n in ("colour", "class40", "instance") if n in stored
+    }
+    # Turn whole numbers into metres, unit vectors and yes or no.
+    if "depth" in stored:
+        arrays["depth"] = stored["depth"].astype(np.float32) / np.float32(1000)
+    if "boundary" in stored:
+        arrays["boundary"] = stored["boundary"] > 0
+    if "normal" in stored:
+        valid = stored["valid"] > 0
+        arrays |= {"normal": decoded_normal(stored["normal"], valid, request.axes), "valid": valid}
+    k = facts.k_at(size).astype(np.float32)
+    return Sample(facts.id, facts.house, facts.room, request.mode, k, request.axes, **arrays)

@@ -1,0 +1,157 @@
+"""Views of an output root in any store: a folder, memory, S3. Effects: reads the store."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from contextlib import suppress
+from typing import Any, Final
+
+from numpy.typing import NDArray
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadInput, ObjectMissing
+from pbrs_farm.images import array_from_png
+from pbrs_farm.run.output_root import attribution
+from pbrs_farm.store import Store, store_from_url
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.reading.house_split import Shares, split_of_house
+from pbrs_farm.study.reading.png_rows import array_of_rows
+from pbrs_farm.study.reading.stored_layers import (
+    STORED,
+    ViewFacts,
+    array_names,
+    checked_array,
+    facts_from_json,
+    sample_of_stored,
+)
+from pbrs_farm.study.reading.view_sample import MODES, Request, Sample
+from pbrs_farm.study.reading.views import ViewRef, Views
+
+_TABLE: Final = "view.json"  # written when all else of a view is there
+
+
+class StoredRoot:
+    """An output root as pbrs-farm writes it; a ViewSource.
+
+    The store is opened anew in each process, since S3's client cannot be sent to one.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store: Store | None = store
+        self._url = store.url
+        # A folder is named in messages as people write it.
+        self._place = str(store.root) if isinstance(store, FolderStore) else store.url
+        self._facts: dict[ViewRef, ViewFacts] = {}  # of views that were read
+        self._files = _files_of_views(store)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A folder or a bucket is opened again by its URL; a store in memory goes along by fork alone.
+        return {**self.__dict__, "_store": None}
+
+    @property
+    def url(self) -> str:
+        return self._place
+
+    @property
+    def refs(self) -> tuple[ViewRef, ...]:
+        """All finished views, houses before objects, by id."""
+        finished = (ref for ref, files in self._files.items() if _TABLE in files)
+        return tuple(sorted(finished, key=lambda ref: (ref.is_object, ref)))
+
+    @property
+    def unfinished(self) -> dict[str, str]:
+        """id -> why, of views that a run has begun only."""
+        return {r.id: f"no {_TABLE}" for r, files in self._files.items() if _TABLE not in files}
+
+    def lacks(self, ref: ViewRef, request: Request) -> str:
+        wanted = (_file(name, request.mode) for name in array_names(request.layers))
+        return next((file for file in wanted if file not in self._files[ref]), "")
+
+    def modes(self, ref: ViewRef) -> tuple[str, ...]:
+        return tuple(mode for mode in MODES if f"{mode}.png" in self._files[ref])
+
+    def facts(self, ref: ViewRef) -> ViewFacts:
+        if ref not in self._facts:
+            place = f"{self.url}/{keys.view_key(ref.house, ref.view, _TABLE)}"
+            self._facts[ref] = facts_from_json(self.table(ref), place)
+        return self._facts[ref]
+
+    def table(self, ref: ViewRef) -> dict[str, Any]:
+        key = keys.view_key(ref.house, ref.view, _TABLE)
+        try:
+            row: dict[str, Any] = json.loads(self._get(key))
+        except (ValueError, RecursionError):
+            raise BadInput(f"{self.url}/{key}", "", "not JSON: damaged") from None
+        return row
+
+    def read(self, ref: ViewRef, request: Request) -> Sample:
+        return sample_of_stored(self.facts(ref), self.arrays(ref, request), request)
+
+    def arrays(self, ref: ViewRef, request: Request) -> dict[str, NDArray[Any]]:
+        """The arrays of a request as they are stored, at their own size."""
+        size = self.facts(ref).size
+        arrays = {}
+        for name in array_names(request.layers):
+            key = keys.view_key(ref.house, ref.view, _file(name, request.mode))
+            place = f"{self.url}/{key}"
+            # Labels are undone here; other PNGs, by other filters, are left to OpenImageIO.
+            data = self._get(key)
+            array = array_of_rows(data, place)
+            array = array_from_png(data, place) if array is None else array
+            arrays[name] = checked_array(name, array, size, place)
+        return arrays
+
+    def credits(self, houses: Iterable[str]) -> tuple[str, ...]:
+        """The lines that every product of these houses must carry, each once."""
+        lines = [attribution(self._opened(), house) for house in houses]
+        # What dressed homes show is told in a file of its own.
+        with suppress(ObjectMissing):
+            lines += self._get(keys.ATTRIBUTION).decode("utf-8", "replace").splitlines()
+        return tuple(dict.fromkeys(line for line in lines if line))
+
+    def split_of(self, ref: ViewRef, shares: Shares | None) -> str:
+        return split_of_house(ref.house, shares)
+
+    def _get(self, key: str) -> bytes:
+        return self._opened().get(key)
+
+    def _opened(self) -> Store:
+        if self._store is None:
+            self._store = store_from_url(self._url)
+        return self._store
+
+
+def views_of_root(store: Store) -> Views:
+    """The finished views of an output root; those a run has begun only are in left_out."""
+    root = StoredRoot(store)
+    refs = root.refs
+    if not refs:
+        text = "no finished view of pbrs-farm" + (
+            ", though a run has begun" * bool(root.unfinished)
+        )
+        raise BadInput(root.url, "", text, hint="an output folder, or shards with dataset.json")
+    return Views(root, refs, root.unfinished)
+
+
+def _file(name: str, mode: str) -> str:
+    return STORED[name].file.format(mode=mode)
+
+
+def _files_of_views(store: Store) -> dict[ViewRef, set[str]]:
+    """View -> its files. A folder is looked at; elsewhere the root's manifest, where there is one."""
+    files: dict[ViewRef, set[str]] = {}
+    for key in _keys_of(store):
+        at = keys.parse_house_key(key)
+        if at is not None and at.view is not None and not at.step:
+            files.setdefault(ViewRef(at.house, at.view), set()).add(at.file)
+    return files
+
+
+def _keys_of(store: Store) -> Iterable[str]:
+    if isinstance(store, FolderStore) or store.head(keys.MANIFEST) is None:
+        return (key for folder in keys.FOLDERS for key in store.list(f"{folder}/"))
+    try:
+        return [str(json.loads(line)["key"]) for line in store.get(keys.MANIFEST).splitlines()]
+    except (ValueError, KeyError, TypeError):
+        raise BadInput(f"{store.url}/{keys.MANIFEST}", "", "not a manifest: damaged") from None
