@@ -26,7 +26,7 @@ MODULES: Final = {
     "making": ("demo", "run", "objects", "step"),
     "explaining": ("dress", "repair", "cameras"),
     "using": ("sheet", "verify", "relight"),
-    "labelling": ("export", "classes", "label-sheet"),
+    "labelling": ("export", "pack", "classes", "label-sheet"),
     "selecting": ("reference", "select"),
     "showing": ("board",),
     "submitting": ("submit",),

@@ -1,24 +1,37 @@
-"""Verbs that hand labels on: export, classes, label-sheet. Effects: read a folder, write files."""
+"""Verbs that hand labels on: export, pack, classes, label-sheet. Effects: read a folder, write files."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from pbrs_farm.commands.arguments import VIEW, Verb, echo, echo_json
+from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, warn
 from pbrs_farm.core.errors import BadInput
 
 FORMS = ("coco", "hdf5", "webdataset", "released")
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add export, classes and label-sheet."""
+    """Add export, pack, classes and label-sheet."""
     p = verb("export", _export, "finished views in the form another tool reads")
     add = p.add_argument
     add("folder", type=Path)
     add("--to", required=True, choices=FORMS, help="docs/formats.md describes the forms")
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
+
+    p = verb("pack", _pack, "finished views as shards to train from, or as Parquet")
+    add = p.add_argument
+    add("root", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
+    add("--out", type=Path, required=True, help="new folder")
+    add("--to", choices=("shards", "parquet"), default="shards", help="default shards")
+    add_choice(p)
+    text = "by homes: train/val/test (default 80/10/10); without it all views are one"
+    add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=text)
+    add("--shard-size", type=int, default=200, metavar="N", help="views a shard (default 200)")
+    text = "png keeps every bit and is read with numpy alone; jpeg:95 is a quarter as large"
+    add("--colour", default="png", metavar="FORM", help=text)
+    add("--seed", type=int, default=0, help="of the order of views (default 0)")
 
     p = verb("classes", _classes, "how often each class is seen, and by which rule")
     p.add_argument("folder", metavar="FOLDER|HOME", help="an output folder, or a home to read")
@@ -36,6 +49,56 @@ def _export(args: argparse.Namespace) -> int:
     n_views, n_files = export(args.folder, out, args.to, selection=args.selection)
     echo(f"{out}: {n_views} views, {n_files} files")
     return 0
+
+
+def add_choice(p: argparse.ArgumentParser) -> None:
+    """Which layers and lighting modes, and at which size."""
+    add = p.add_argument
+    layers = "colour normal depth class40 instance boundary (default all)"
+    add("--layers", nargs="+", metavar="LAYER", help=layers)
+    modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)"
+    add("--modes", nargs="+", metavar="MODE", help=modes)
+    add("--size", metavar="WxH", help="resize to, e.g. 320x240 (default as rendered)")
+
+
+def _pack(args: argparse.Namespace) -> int:
+    from pbrs_farm.study.packing.pack_shards import pack
+    from pbrs_farm.study.packing.packing_plan import Packing
+    from pbrs_farm.study.reading.house_split import shares_from_text
+    from pbrs_farm.study.reading.open_views import open_views
+    from pbrs_farm.study.reading.view_sample import LAYERS
+
+    colour, _, quality = args.colour.partition(":")
+    if quality and not quality.isdigit():
+        raise BadInput("--colour", args.colour, "expected png, jpeg or jpeg:QUALITY")
+    packing = Packing(
+        size=size_of(args.size),
+        layers=tuple(args.layers or LAYERS),
+        modes=tuple(args.modes or open_views(args.root)[:1].modes),
+        shares=shares_from_text(args.split) if args.split else None,
+        views_per_shard=args.shard_size,
+        colour=colour,
+        quality=int(quality or 95),
+        seed=args.seed,
+    )
+    packed = pack(args.root, args.out, packing, form=args.to, tell=echo)
+    # Say what was left out: a run may still go on.
+    if packed.left_out:
+        at, why = next(iter(packed.left_out.items()))
+        warn(f"{counted(len(packed.left_out), 'view')} left out, {at}: {why}")
+    said = ", ".join(f"{split} {n}" for split, n in packed.n_views.items())
+    echo(f"{args.out}: {said} views, {packed.n_files} files, {packed.n_bytes / 1e6:.1f} MB")
+    return 0
+
+
+def size_of(text: str | None) -> tuple[int, int] | None:
+    """(width, height) of WxH, None of None; BadInput for anything else."""
+    if text is None:
+        return None
+    width, _, height = text.partition("x")
+    if not all(n.isascii() and n.isdigit() and 1 <= int(n) <= 16384 for n in (width, height)):
+        raise BadInput("--size", text, "expected a width and a height", hint="e.g. 320x240")
+    return int(width), int(height)
 
 
 def _classes(args: argparse.Namespace) -> int:

@@ -7,9 +7,7 @@ a module here; docs/formats.md describes them.
 from __future__ import annotations
 
 import json
-import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -17,6 +15,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.coco import write_coco
 from pbrs_farm.export.hdf5 import write_hdf5
+from pbrs_farm.export.new_folder import new_folder
 from pbrs_farm.export.released_layout import write_released
 from pbrs_farm.export.webdataset import write_webdataset
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
@@ -49,7 +48,7 @@ def export(folder: Path, out: Path, form: str, *, selection: str | None = None) 
         views = [v for v in views if (v.house.id, v.id) in kept]
     if not views:
         raise BadInput(folder, "", "no finished view to export")
-    with _whole_folder(out) as scratch:
+    with new_folder(out) as scratch:
         return len(views), FORMS[form](views, scratch)
 
 
@@ -65,23 +64,3 @@ def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
         raise BadInput(file, "", fault_of(error)) from None
     except (ValueError, KeyError, TypeError):
         raise BadInput(file, "", "not a selection", hint="pbrs-farm select makes one") from None
-
-
-@contextmanager
-def _whole_folder(out: Path) -> Iterator[Path]:
-    """A folder beside out that becomes out at the end, and is removed on any error."""
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BadInput(out, "", "is there already", hint="name a new folder")
-    # Write beside it, on the same file system, then rename.
-    scratch = out.with_name(f".{out.name}.partial")
-    shutil.rmtree(scratch, ignore_errors=True)
-    try:
-        scratch.mkdir(parents=True)
-        yield scratch
-        if out.exists():
-            out.rmdir()  # empty, as checked above
-        scratch.rename(out)
-    except OSError as error:
-        raise BadInput(out, "", f"cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)

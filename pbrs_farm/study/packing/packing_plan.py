@@ -1,0 +1,74 @@
+"""What is packed and in which order: views by split, mixed by seed, cut into shards; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.reading.dataset_json import WHOLE
+from pbrs_farm.study.reading.house_split import SPLITS, Shares, split_of_house
+from pbrs_farm.study.reading.view_sample import LAYERS, MODES, Request, Size
+from pbrs_farm.study.reading.views import ViewRef
+
+COLOURS = ("png", "jpeg")
+
+
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """How views are packed. Raises BadInput for what cannot be.
+
+    size: (width, height), None as rendered. shares: how large each split is, None for one of all.
+    colour: "png" keeps every bit and needs zlib alone to be read, "jpeg" is a quarter as large.
+    """
+
+    size: Size | None = None
+    layers: tuple[str, ...] = LAYERS
+    modes: tuple[str, ...] = MODES
+    shares: Shares | None = None
+    views_per_shard: int = 200
+    colour: str = "png"
+    quality: int = 95  # of JPEG
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for mode in self.modes:
+            Request(self.layers, mode, size=self.size)  # says what is wrong
+        if self.colour not in COLOURS:
+            raise BadInput("--colour", self.colour, "no such form", hint=f"of {', '.join(COLOURS)}")
+        if self.views_per_shard < 1 or not 1 <= self.quality <= 100:
+            text = f"{self.views_per_shard} views a shard, quality {self.quality}"
+            raise BadInput("pack", "", text, hint="1 or more views, a quality of 1 to 100")
+
+    def requests(self) -> tuple[Request, ...]:
+        """A request for the labels, and one for each mode's colour."""
+        labels = tuple(layer for layer in self.layers if layer != "colour")
+        modes = self.modes if "colour" in self.layers else ()
+        return (Request(labels), *(Request(("colour",), mode) for mode in modes))
+
+
+@dataclass(frozen=True, slots=True)
+class ShardPlan:
+    """The views of one shard to write."""
+
+    split: str
+    number: int  # among those of its split, from 0
+    n_shards: int  # of its split
+    refs: tuple[ViewRef, ...]
+
+
+def shard_plans(refs: tuple[ViewRef, ...], packing: Packing) -> Iterator[ShardPlan]:
+    """The shards of all splits; each view is in one, views of a home lie far apart."""
+    by_split: dict[str, list[ViewRef]] = {name: [] for name in (WHOLE, *SPLITS)}
+    for ref in refs:
+        split = split_of_house(ref.house, packing.shares) if packing.shares else WHOLE
+        by_split[split].append(ref)
+    for split, own in by_split.items():
+        # Mix by an order that follows from the seed and the number of views.
+        mixed = [own[k] for k in np.random.default_rng(packing.seed).permutation(len(own))]
+        starts = range(0, len(mixed), packing.views_per_shard)
+        for number, start in enumerate(starts):
+            part = tuple(mixed[start : start + packing.views_per_shard])
+            yield ShardPlan(split, number, len(starts), part)

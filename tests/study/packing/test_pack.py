@@ -1,0 +1,190 @@
+import io
+import json
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import pbrs_farm
+from pbrs_farm.cli import main
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.images import decode_photo
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.packing.pack_shards import pack
+from pbrs_farm.study.packing.packing_plan import Packing
+from pbrs_farm.study.reading.house_split import Shares, split_of_house
+from pbrs_farm.study.reading.view_sample import LAYERS, Request
+from tests.study.small_roots import MODES, arrays_of_view, fill
+
+HOUSES = {f"home-{k}-00000000": 3 for k in range(8)}
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("root")
+    fill(FolderStore(root), HOUSES)
+    return root
+
+
+def test_equal_views_give_equal_bytes(root, tmp_path):
+    for name in "ab":
+        pack(
+            str(root),
+            tmp_path / name,
+            Packing((8, 6), modes=MODES, shares=Shares(), views_per_shard=5),
+        )
+    names = sorted(p.name for p in (tmp_path / "a").iterdir())
+    assert names == sorted(p.name for p in (tmp_path / "b").iterdir())
+    assert all(
+        (tmp_path / "a" / n).read_bytes() == (tmp_path / "b" / n).read_bytes() for n in names
+    )
+
+
+def test_shards_are_split_by_house_and_mixed(root, tmp_path):
+    shares = Shares(0.5, 0.25, 0.25)
+    packing = Packing(modes=MODES, shares=shares, views_per_shard=4)
+    packed = pack(str(root), tmp_path / "x", packing)
+    assert sum(packed.n_views.values()) == 24
+    views = pbrs_farm.open(tmp_path / "x")
+    for split, n in packed.n_views.items():
+        own = views.only(split=split)
+        assert len(own) == n
+        assert all(split_of_house(home, shares) == split for home in own.homes)
+    first = json.loads((tmp_path / "x/dataset.json").read_text())["shards"][0]
+    houses = {v.house for v in _facts(tmp_path / "x" / first["file"])}
+    assert len(houses) > 1
+    with pytest.raises(BadInput, match="no view in split"):
+        pbrs_farm.open(tmp_path / "x").only(split="train", shares=Shares(0, 1, 0))
+
+
+def _facts(shard: Path):
+    from types import SimpleNamespace
+
+    with tarfile.open(shard) as tar:
+        for member in tar:
+            if member.name.endswith(".json"):
+                yield SimpleNamespace(**json.load(tar.extractfile(member)))
+
+
+def test_other_programs_read_the_parts(root, tmp_path):
+    pack(str(root), tmp_path / "x", Packing(modes=MODES))
+    with tarfile.open(tmp_path / "x/all-000000.tar") as tar:
+        data = {m.name: tar.extractfile(m).read() for m in tar}
+    stored, key = arrays_of_view(1001), "home-1-00000000__0_0_1"
+    arrays = np.load(io.BytesIO(data[f"{key}.normal.npz"]))
+    assert arrays["normal"].dtype == np.uint16
+    assert (arrays["normal"] == stored["normal.png"]).all()
+    assert (decode_photo(data[f"{key}.mlt_il_ol.png"], "x") == stored["mlt_il_ol.png"]).all()
+    assert (np.load(io.BytesIO(data[f"{key}.depth.npz"]))["depth"] == stored["depth.png"]).all()
+
+
+def test_dataset_json_and_card_say_what_is_there(root, tmp_path):
+    pack(str(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=Shares()))
+    said = json.loads((tmp_path / "x/dataset.json").read_text())
+    assert said["classes"][1] == "wall"
+    assert len(said["class_colours_srgb"]) == 41
+    assert said["arrays"]["depth"]["unit"].startswith("mm")
+    assert said["size"] == [8, 6]
+    assert said["credits"] == [f"home {home}: a person" for home in HOUSES]
+    card = (tmp_path / "x/README.md").read_text()
+    assert "24 views of 8 homes, 8x6" in card
+    assert "home home-3-00000000: a person" in card
+
+
+def test_colour_may_be_packed_as_jpeg(root, tmp_path):
+    pack(str(root), tmp_path / "x", Packing(modes=MODES, colour="jpeg"))
+    sample = pbrs_farm.open(tmp_path / "x")[0].sample()
+    error = sample.colour.astype(int) - arrays_of_view(0)["mlt_il_ol.png"]
+    assert sample.colour.shape == error.shape
+    assert (sample.normal[sample.valid] != 0).any()
+
+
+def test_parquet_has_image_columns_and_every_bit_of_labels(root, tmp_path):
+    packed = pack(str(root), tmp_path / "x", Packing(modes=MODES, shares=Shares()), form="parquet")
+    files = sorted((tmp_path / "x/data").iterdir())
+    assert packed.n_files == len(files) + 1
+    table = pq.read_table(files[-1])
+    features = json.loads(table.schema.metadata[b"huggingface"])["info"]["features"]
+    assert features["mlt_il_ol"] == {"_type": "Image"}
+    assert features["house"] == {"dtype": "string", "_type": "Value"}
+    row = table.to_pylist()[0]
+    number, view = int(row["house"].split("-")[1]), int(row["id"].rpartition("_")[2])
+    stored = arrays_of_view(1000 * number + view)
+    assert (np.load(io.BytesIO(row["normal"]))["normal"] == stored["normal.png"]).all()
+    assert (decode_photo(row["mlt_il_ol"]["bytes"], "x") == stored["mlt_il_ol.png"]).all()
+    assert json.loads(row["camera"])["width_px"] == 16
+    assert "data/train-*.parquet" in (tmp_path / "x/README.md").read_text()
+
+
+def test_a_truncated_or_missing_shard_is_one_clear_line(root, tmp_path):
+    pack(str(root), tmp_path / "x", Packing(modes=MODES, views_per_shard=10))
+    shard = tmp_path / "x/all-000001.tar"
+    whole = shard.read_bytes()
+    shard.write_bytes(whole[:5000])
+    with pytest.raises(BadInput, match=rf"all-000001.tar: 5000 of {len(whole)} bytes: truncated"):
+        pbrs_farm.open(tmp_path / "x")
+    shard.write_bytes(whole[:5000] + b"?" * (len(whole) - 5000))
+    with pytest.raises(BadInput, match=r"all-000001.tar: .*damaged"):
+        pbrs_farm.open(tmp_path / "x")
+    shard.unlink()
+    with pytest.raises(BadInput, match=r"all-000001.tar: no such shard"):
+        pbrs_farm.open(tmp_path / "x")
+
+
+def test_what_was_not_packed_is_told(root, tmp_path):
+    pack(str(root), tmp_path / "x", Packing(layers=("colour", "normal"), modes=("mlt_il_ol",)))
+    view = pbrs_farm.open(tmp_path / "x")[0]
+    with pytest.raises(
+        BadInput, match=r"no layer depth in these shards \(packed: colour, normal\)"
+    ):
+        view.sample(Request(("depth",)))
+    with pytest.raises(BadInput, match=r"no pictures in opengl_dl light"):
+        view.sample(Request(("colour",), "opengl_dl"))
+    with pytest.raises(BadInput, match="is packed already"):
+        pack(str(tmp_path / "x"), tmp_path / "y", Packing())
+
+
+def test_the_verb_packs_and_says_what_it_left_out(tmp_path, capsys):
+    root, out = tmp_path / "root", tmp_path / "out"
+    fill(FolderStore(root), {"one-00000001": 3})
+    (root / "houses/one-00000001/views/0_0_2/mlt_il_ol.png").unlink()
+    words = ["pack", str(root), "--size", "8x6", "--split", "--out", str(out)]
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert "1 view left out, one-00000001/0_0_2: no mlt_il_ol.png" in said.err
+    assert "2 views, 3 files" in said.out
+    assert main(words) == 1
+    assert "is there already" in capsys.readouterr().err
+    for wrong in (["--size", "8"], ["--split", "1/2"], ["--layers", "x"], ["--colour", "bmp"]):
+        assert main(["pack", str(root), "--out", str(tmp_path / "y"), *wrong]) == 1
+    assert not (tmp_path / "y").exists()
+
+
+def test_shards_are_read_where_there_is_numpy_alone(root, tmp_path):
+    pack(str(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=Shares()))
+    code = f"""
+import sys
+for name in ("pydantic", "OpenImageIO", "torch", "scipy", "pyarrow", "PIL", "obstore", "mitsuba"):
+    sys.modules[name] = None
+import pbrs_farm
+from pbrs_farm.study.reading.view_sample import LAYERS, Request
+views = pbrs_farm.open({str(tmp_path / "x")!r})
+print(len(views), views[0].sample(Request(LAYERS)).normal.shape)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert done.stdout.split(maxsplit=1) == ["24", "(6, 8, 3)\n"]
+
+
+def test_all_layers_are_packed_and_no_radiance(root, tmp_path):
+    pack(str(root), tmp_path / "x", Packing(layers=LAYERS, modes=MODES))
+    with tarfile.open(tmp_path / "x/all-000000.tar") as tar:
+        parts = {name.partition(".")[2] for name in tar.getnames()}
+    assert parts == {
+        "json", "opengl_dl.png", "mlt_il_ol.png", "normal.npz", "depth.npz", "class40.png",
+        "instance.npz", "boundary.png",
+    }  # fmt: skip
