@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 NAME ?=
 HOME_NAME ?= Studio
 
-.PHONY: help setup demo check test test-farm test-infra test-slow test-sweethome3d bench bench-light bench-cycles bench-luxcore bench-farm format clean
+.PHONY: help setup demo check test test-farm test-infra test-slow test-sweethome3d test-study bench bench-light bench-cycles bench-luxcore bench-farm format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -25,7 +25,7 @@ check: setup ## lint, types, import contracts: under a minute
 
 test: check ## check, then the tests; fetches the example homes for those that need them
 	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
-	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra and not sweethome3d"
+	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra and not sweethome3d and not study"
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow
@@ -41,6 +41,11 @@ test-sweethome3d: export PBRS_SETUP_ALSO := sweethome3d Xvfb:xvfb javac:default-
 test-sweethome3d: setup ## the real program opens ten made homes and saves them: out/sweethome3d/*.png
 	@$(BIN)/pbrs-farm homes --fetch --furniture >/dev/null
 	$(BIN)/pytest -m sweethome3d tests/sweethome3d
+
+test-study: setup ## the study's tests that need torch; installs its CPU build (192 MB) the first time
+	@$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check "torch==2.13.0"
+	@$(BIN)/pip install -q --disable-pip-version-check -e ".[study]"
+	$(BIN)/pytest -m "study and not slow and not gpu"
 
 bench: setup ## measure everything but house, dress, made, light, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
 	$(BIN)/python -m benchmarks $(NAME)

@@ -1,0 +1,107 @@
+"""Batches of views, shuffled by seed and epoch, that go on where a state says. Effects: reads views."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from torch.utils.data import DataLoader
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.reading.epoch_order import view_order
+from pbrs_farm.study.samples.sharded_views import ShardedViews
+from pbrs_farm.study.samples.stored_views import StoredViews
+from pbrs_farm.study.samples.view_tensors import Tensors
+
+
+class ViewLoader:
+    """Iterate over it once for the batches of an epoch; again for those of the next one.
+
+    Batches are full: what is left at an epoch's end is dropped. state_dict says how many batches
+    were handed over; a loader that is made alike and given that state hands over the rest of the
+    epoch, the same batches as if it had never stopped. workers: processes that read; 0 for none.
+    rank, world: this process' number and the number of processes of a training (DDP).
+    """
+
+    def __init__(
+        self,
+        dataset: StoredViews | ShardedViews,
+        batch_size: int,
+        *,
+        workers: int = 0,
+        seed: int = 0,
+        rank: int = 0,
+        world: int = 1,
+    ) -> None:
+        self._dataset = dataset
+        self._made = {"batch_size": batch_size, "workers": workers, "seed": seed, "world": world}
+        self._rank = rank
+        self._epoch = 0
+        self._n_batches = 0  # of this epoch, handed over
+        if isinstance(dataset, ShardedViews):
+            dataset.seed, dataset.rank, dataset.world = seed, rank, world
+            self._n_views = dataset.n_views
+        else:
+            self._n_views = len(dataset)
+        if len(self) < 1:
+            text = f"{self._n_views} views make no batch of {batch_size}"
+            raise BadInput("batch size", "", text, hint=f"{world} ranks, {max(workers, 1)} workers")
+
+    def __len__(self) -> int:
+        """Batches of a whole epoch."""
+        batch_size, workers = self._made["batch_size"], max(self._made["workers"], 1)
+        if isinstance(self._dataset, ShardedViews):
+            n_parts = workers * self._made["world"]
+            return self._n_views // n_parts // batch_size * workers
+        return int(self._n_views // self._made["world"] // batch_size)
+
+    @property
+    def epoch(self) -> int:
+        """The epoch that the next batch is of, from 0."""
+        return self._epoch
+
+    def state_dict(self) -> dict[str, int]:
+        """How far it is, and how it was made."""
+        return {
+            "epoch": self._epoch,
+            "n_batches": self._n_batches,
+            "n_views": self._n_views,
+            **self._made,
+        }
+
+    def load_state_dict(self, state: dict[str, int]) -> None:
+        """Go on where state says; BadInput where its loader was made otherwise or had other views."""
+        for name, value in {**self._made, "n_views": self._n_views}.items():
+            if state[name] != value:
+                text = f"was {state[name]} when the run stopped, is {value}"
+                raise BadInput("resume", name, text, hint="go on with what it began with")
+        self._epoch, self._n_batches = state["epoch"], state["n_batches"]
+
+    def __iter__(self) -> Iterator[Tensors]:
+        for batch in self._rest_of_epoch():
+            # Count it before it is used: who has it has read it.
+            self._n_batches += 1
+            yield batch
+        self._epoch, self._n_batches = self._epoch + 1, 0
+
+    def _rest_of_epoch(self) -> Any:
+        dataset, made = self._dataset, self._made
+        batch_size = made["batch_size"]
+        options: dict[str, Any] = {"num_workers": made["workers"]}
+        if made["workers"] and _is_remote(dataset):
+            # S3's client does not survive a fork.
+            options["multiprocessing_context"] = "spawn"
+        if isinstance(dataset, ShardedViews):
+            dataset.start_at(self._epoch, self._n_batches, batch_size)
+            return DataLoader(dataset, batch_size=batch_size, drop_last=True, **options)
+        dataset.epoch = self._epoch
+        parts = {"part": self._rank, "n_parts": made["world"]}
+        order = view_order(len(dataset), seed=made["seed"], epoch=self._epoch, **parts).tolist()
+        starts = range(self._n_batches * batch_size, len(self) * batch_size, batch_size)
+        batches = [order[k : k + batch_size] for k in starts]
+        return DataLoader(dataset, batch_sampler=batches, **options)
+
+
+def _is_remote(dataset: StoredViews | ShardedViews) -> bool:
+    source = dataset.shards if isinstance(dataset, ShardedViews) else dataset.views.source
+    return source.url.startswith("s3:")
