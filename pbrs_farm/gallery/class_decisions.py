@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.record import Record
+from pbrs_farm.core.shown_text import shown
 
 _TAG: Final = "class:"
 _RULES: Final = ("source", "catalogue", "element", "name", "group", "id", "inner-word")  # by trust
@@ -69,8 +70,8 @@ def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
 
 
 def _cell(text: str) -> str:
-    # A stranger's text: one line, no bar, not endless.
-    return "".join(c if c.isprintable() and c != "|" else " " for c in text)[:60]
+    # A bar would end the cell.
+    return shown(text, 60).replace("|", " ")
 
 
 def _rule(item: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.record import Record
+from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.output_folder import ViewEntry, json_object, views_of
 from pbrs_farm.gallery.class_decisions import ClassDecision, class_decisions, decisions_text
 from pbrs_farm.images import array_from_png
@@ -33,7 +34,7 @@ class ClassStatistics(Record):
     n_views: int
     classes_per_image: float  # mean, id 0 not counted
     rows: tuple[ClassRow, ...]
-    unmapped: tuple[str, ...]  # "house: source class (items)" that became otherprop
+    unmapped: tuple[str, ...]  # "house: source class (items)" that became otherprop, as shown
     decisions: tuple[ClassDecision, ...] = ()  # by which rule, over all houses
 
     def text(self) -> str:
@@ -111,7 +112,7 @@ def _unmapped(items: dict[str, list[dict[str, Any]]]) -> tuple[str, ...]:
         names: dict[str, int] = {}
         for item in rows:
             if "unmapped" in item.get("tags", ()):
-                name = str(item.get("source_class") or item.get("name") or item.get("id"))
+                name = shown(item.get("source_class") or item.get("name") or item.get("id"))
                 names[name] = names.get(name, 0) + 1
         lines += [f"{house}: {name} ({n})" for name, n in sorted(names.items())]
     return tuple(lines)

@@ -112,3 +112,12 @@ def test_a_view_without_a_picture_has_no_label_sheet(tmp_path):
     (root / "houses/h/views/v0/opengl_dl.png").unlink()
     with pytest.raises(BadInput, match="no picture"):
         label_sheet(views_of(root)[0])
+
+
+def test_a_name_of_what_has_no_class_is_one_short_line(tmp_path):
+    root = finished(tmp_path, [half(1, 5)])
+    item = {"id": "a", "source_class": "vase\n| forged |" + "x" * 9000, "tags": ["unmapped"]}
+    (root / "houses/h/house.json").write_text(json.dumps({"items": [item]}))
+    lines = class_statistics(root).text().splitlines()
+    assert all(len(line) < 200 for line in lines)
+    assert not any(line.startswith("| forged") for line in lines)

@@ -29,6 +29,7 @@ from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
 from pbrs_farm.read.sweethome3d.wall_solids import wall_items
 
 _NO_ROOMS = "draw rooms (Plan > Create rooms) and save the home again"
+_HIDDEN_ROOMS = "every room is on a level saved as hidden: --set read.hidden_levels=true"
 SAME_LEVEL_M = 0.1  # levels no farther apart in height are versions of one
 ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
 
@@ -61,7 +62,9 @@ def read_home(
     outlines = outlines_of(plan.walls)
     rooms = read_rooms(plan, materials, house_level)
     if not rooms:
-        raise BadHouse(file, "", "no rooms", hint=_NO_ROOMS)
+        raise BadHouse(
+            file, "", "no rooms", hint=_HIDDEN_ROOMS if _hides_rooms(plan) else _NO_ROOMS
+        )
     # Walls, floors and ceilings; staircases cut the last two.
     ceilings = CeilingHeights(plan, outlines)
     floor_cuts, ceiling_cuts = staircase_cuts(plan, materials, house_level)
@@ -113,6 +116,10 @@ def _shown(plan: Plan, fields: ReadFields, notes: Notes) -> Plan:
             notes.add("hidden-level", _place_of(level), text)
         levels.append(replace(level, is_visible=level.is_visible or is_added))
     return replace(plan, levels=tuple(levels))
+
+
+def _hides_rooms(plan: Plan) -> bool:
+    return any(not level_of(plan, room.level).is_visible for room in plan.rooms)
 
 
 def _place_of(level: PlanLevel) -> str:

@@ -49,6 +49,12 @@ def refused(data: bytes, match: str, fields: ReadFields | None = None) -> None:
     assert str(caught.value).startswith("my home.sh3d")
 
 
+def test_a_home_whose_levels_are_all_hidden_is_told_how_to_read_them() -> None:
+    level = "<level id='0' elevation='0' floorThickness='12' height='250' viewable='false'/>"
+    room = ROOM.replace("<room ", "<room level='0' ")
+    refused(sh3d(home_xml(level, room=room)), "read.hidden_levels")
+
+
 @pytest.mark.parametrize("data", [b"", b"hello", b"\x00" * 100, b"%PDF-1.4"])
 def test_what_is_no_home_is_refused(data: bytes) -> None:
     refused(data, "neither a .sh3d archive")
