@@ -1,0 +1,70 @@
+"""The error of surface normals in degrees, pooled over the pixels of any number of views; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F64, Mask
+
+THRESHOLDS_DEG: Final = (11.25, 22.5, 30.0)  # of the shares that every paper reports
+_BIN_DEG: Final = 0.01  # of the histogram that medians are read from
+_N_BINS: Final = round(180 / _BIN_DEG) + 1
+
+
+def angles_deg(predicted: NDArray[Any], truth: NDArray[Any]) -> F64:
+    """(...) degrees 0..180 between the vectors of two arrays (..., 3), of any length.
+
+    A vector of no length stands at 90 degrees to everything. Raises ValueError for NaN.
+    """
+    a, b = np.asarray(predicted, np.float64), np.asarray(truth, np.float64)
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        raise ValueError("a normal is not finite")
+    lengths = np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1)
+    cosine = (a * b).sum(-1) / np.where(lengths > 0, lengths, 1.0)
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1, 1))), np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class NormalScore:
+    """What the field reports of normals: degrees, and shares 0..1 of pixels below a threshold."""
+
+    mean_deg: float
+    median_deg: float  # of pixels, not of views
+    below_11_25: float
+    below_22_5: float
+    below_30: float
+    n_pixels: int
+
+
+class AngularErrors:
+    """Errors of views that come one by one: sums, counts and a histogram, no pixels."""
+
+    def __init__(self) -> None:
+        self._histogram = np.zeros(_N_BINS, np.int64)
+        self._below = np.zeros(len(THRESHOLDS_DEG), np.int64)
+        self._sum = 0.0
+
+    def add(self, predicted: NDArray[Any], truth: NDArray[Any], valid: Mask) -> float:
+        """Count the pixels (H, W) where valid; the view's own mean in degrees, NaN without any."""
+        errors = angles_deg(predicted[valid], truth[valid])
+        self._histogram += np.bincount(
+            np.rint(errors / _BIN_DEG).astype(np.intp), minlength=_N_BINS
+        )
+        self._below += [int((errors < threshold).sum()) for threshold in THRESHOLDS_DEG]
+        self._sum += float(errors.sum())
+        return float(errors.mean()) if errors.size else float("nan")
+
+    def score(self) -> NormalScore:
+        """Over all pixels so far; the median to 0.005 degrees. All NaN without a pixel."""
+        n = int(self._histogram.sum())
+        if n == 0:
+            return NormalScore(*[float("nan")] * 5, n_pixels=0)
+        # Read the two middle pixels off the histogram: they are one where n is odd.
+        seen = np.cumsum(self._histogram)
+        middle = np.searchsorted(seen, [(n - 1) // 2, n // 2], side="right")
+        shares = (float(count / n) for count in self._below)
+        return NormalScore(self._sum / n, float(middle.mean() * _BIN_DEG), *shares, n_pixels=n)

@@ -1,0 +1,148 @@
+"""Boundaries against the truth: ODS, OIS, AP and R50 over any number of views; no effects.
+
+Conventions of the BSDS benchmark as Dollar and Zitnick 2015 use it: one truth a picture, counts at
+each threshold summed over all pictures, F interpolated between thresholds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F64, Mask
+from pbrs_farm.study.metrics.edge_matching import n_matched
+from pbrs_farm.study.metrics.edge_thinning import non_maxima_suppressed, thinned
+
+N_THRESHOLDS: Final = 33  # a third of the benchmark's, which is EXACT_THRESHOLDS
+EXACT_THRESHOLDS: Final = 99
+MAX_DISTANCE: Final = 0.011  # of the diagonal, on NYUv2 (0.0075 on BSDS)
+_STEPS: Final = 100  # between two thresholds, where the best F is looked for
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeScore:
+    """What the field reports of boundaries, as shares 0..1."""
+
+    ods: float  # best F at one threshold for all pictures
+    ois: float  # F with each picture's own best threshold
+    ap: float
+    r50: float  # recall at half precision
+    n_views: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EdgeCounts:
+    """Pixels of one picture at each threshold, (n,) int64."""
+
+    matched: NDArray[np.int64]
+    predicted: NDArray[np.int64]
+    n_truth: int
+
+    def f(self) -> F64:
+        """(n,) F at each threshold."""
+        return _f(*_precision_recall(self.matched, self.predicted, self.n_truth))
+
+
+def edge_counts(
+    strength: NDArray[Any], truth: Mask, n_thresholds: int = N_THRESHOLDS,
+    max_distance: float = MAX_DISTANCE,
+) -> EdgeCounts:  # fmt: skip
+    """Counts of one picture: strength (H, W) 0..1 as the network gives it, truth (H, W) lines.
+
+    Maxima of strength are cut at n_thresholds equal steps inside 0..1 and thinned; max_distance is
+    a share of the picture's diagonal.
+    """
+    maxima = non_maxima_suppressed(strength)
+    reach_px = max_distance * float(np.hypot(*truth.shape))
+    matched, predicted = np.zeros((2, n_thresholds), np.int64)
+    before: Mask | None = None
+    for k, threshold in enumerate(_thresholds(n_thresholds)):
+        cut = maxima >= threshold
+        # Keep the counts where no pixel fell below this threshold.
+        if before is not None and np.array_equal(cut, before):
+            matched[k], predicted[k] = matched[k - 1], predicted[k - 1]
+            continue
+        before, lines = cut, thinned(cut)
+        matched[k], predicted[k] = n_matched(lines, truth, reach_px), lines.sum()
+    return EdgeCounts(matched, predicted, int(truth.sum()))
+
+
+class EdgeScores:
+    """Counts of pictures that come one by one."""
+
+    def __init__(self) -> None:
+        self._views: list[EdgeCounts] = []
+
+    def add(self, counts: EdgeCounts) -> float:
+        """Take a picture; its own best F."""
+        self._views.append(counts)
+        return float(counts.f().max())
+
+    def score(self) -> EdgeScore:
+        """Over all pictures so far; all NaN without one."""
+        if not self._views:
+            return EdgeScore(*[float("nan")] * 4, n_views=0)
+        matched = np.sum([v.matched for v in self._views], axis=0)
+        predicted = np.sum([v.predicted for v in self._views], axis=0)
+        n_truth = sum(v.n_truth for v in self._views)
+        precision, recall = _precision_recall(matched, predicted, n_truth)
+        return EdgeScore(
+            ods=_best_f(precision, recall),
+            ois=self._ois(n_truth),
+            ap=_average_precision(precision, recall),
+            r50=_recall_at_half(precision, recall),
+            n_views=len(self._views),
+        )
+
+    def _ois(self, n_truth: int) -> float:
+        """Sum the counts at each picture's own best threshold, then take F."""
+        best = [int(view.f().argmax()) for view in self._views]
+        matched = sum(int(v.matched[k]) for v, k in zip(self._views, best, strict=True))
+        predicted = sum(int(v.predicted[k]) for v, k in zip(self._views, best, strict=True))
+        pair = _precision_recall(np.array([matched]), np.array([predicted]), n_truth)
+        return float(_f(*pair)[0])
+
+
+def _thresholds(n: int) -> F64:
+    return np.linspace(1 / (n + 1), 1 - 1 / (n + 1), n)
+
+
+def _precision_recall(
+    matched: NDArray[np.int64], predicted: NDArray[np.int64], n_truth: int
+) -> tuple[F64, F64]:
+    return matched / np.maximum(predicted, 1), matched / max(n_truth, 1)
+
+
+def _f(precision: F64, recall: F64) -> F64:
+    return 2 * precision * recall / np.maximum(precision + recall, 1e-12)
+
+
+def _best_f(precision: F64, recall: F64) -> float:
+    """The best F on straight lines between neighbouring thresholds."""
+    if len(precision) == 1:
+        return float(_f(precision, recall)[0])
+    share = np.linspace(0, 1, _STEPS)[:, None]
+    ps, rs = (share * x[1:] + (1 - share) * x[:-1] for x in (precision, recall))
+    return float(_f(ps, rs).max())
+
+
+def _average_precision(precision: F64, recall: F64) -> float:
+    """Precision at recalls 0, 0.01 .. 1 where the curve reaches, summed and divided by 100.
+
+    101 points are divided by 100, as every table has it.
+    """
+    recalls, first = np.unique(recall, return_index=True)
+    if len(recalls) < 2:
+        return 0.0
+    at = np.linspace(0, 1, 101)
+    inside = (at >= recalls[0]) & (at <= recalls[-1])
+    return float(np.interp(at[inside], recalls, precision[first]).sum() / 100)
+
+
+def _recall_at_half(precision: F64, recall: F64) -> float:
+    """Recall where precision is a half, or at the least precision where it is always above."""
+    precisions, first = np.unique(precision, return_index=True)
+    return float(np.interp(max(float(precisions[0]), 0.5), precisions, recall[first]))
