@@ -17,11 +17,13 @@ from typing import Final
 
 import pbrs_farm
 from pbrs_farm.commands.arguments import Handler, warn
+from pbrs_farm.commands.command_line import Parser, unknown_words, verb_first
 from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.near_names import did_you_mean
 
 # Module of pbrs_farm.commands -> the verbs it adds.
 MODULES: Final = {
-    "looking": ("doctor", "skies", "recipes", "layers"),
+    "looking": ("doctor", "skies", "recipes", "layers", "completion"),
     "homes": ("homes",),
     "making": ("demo", "run", "objects", "step"),
     "explaining": ("dress", "repair", "cameras"),
@@ -43,7 +45,7 @@ _OF_STRANGERS: Final = ("making", "explaining", "using", "labelling", "selecting
 
 def command() -> int:
     """Run the command of this process' words, in a child where it reads files of others."""
-    words = sys.argv[1:]
+    words = _verb_first(sys.argv[1:])
     if _module_of(words) not in _OF_STRANGERS:
         return main(words)
     from pbrs_farm.run.processes.verb_process import run_watched
@@ -55,17 +57,34 @@ def _module_of(words: Sequence[str]) -> str | None:
     return next((name for name, verbs in MODULES.items() if words[:1] and words[0] in verbs), None)
 
 
+def _verb_first(words: Sequence[str]) -> list[str]:
+    every = [verb for verbs in MODULES.values() for verb in verbs]
+
+    def parser_of(verb: str) -> argparse.ArgumentParser:
+        # A verb whose packages are not installed takes no option.
+        return build_parser(_module_of([verb])).verbs().get(verb, Parser())
+
+    return verb_first(words, every, parser_of)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command in this process; the exit code. Without words: those of this process."""
     if argv is None:
         return command()
-    words, module = argv, _module_of(argv)
-    verb = words[0] if words else ""
+    words = _verb_first(argv)
+    verb, module = words[0] if words else "", _module_of(words)
     if module in _OF_THE_FARM and not _has_farm():
         warn(f'{verb} needs celery and redis: pip install "pbrs-farm[workers]"')
         return 1
+    if verb and module is None and not verb.startswith("-"):
+        offer = did_you_mean(verb, [v for verbs in MODULES.values() for v in verbs])
+        warn(f"no verb {verb!r}{f', {offer}' if offer else ''} (pbrs-farm --help lists them)")
+        return 2
     parser = build_parser(module)
-    args = parser.parse_args(words)
+    args, unknown = parser.parse_known_args(words)
+    if unknown:
+        of_verb = parser.verbs().get(verb, parser)
+        of_verb.error(unknown_words(unknown, of_verb))
     if not hasattr(args, "handler"):
         parser.print_help()
         return 2
@@ -90,17 +109,17 @@ def _handled(args: argparse.Namespace) -> int:
         return 1
 
 
-def build_parser(module: str | None = None) -> argparse.ArgumentParser:
+def build_parser(module: str | None = None) -> Parser:
     """The verbs of one module, or all of them; the farm's where celery and redis are installed."""
     # Every verb takes --debug, before or after its own options.
-    common = argparse.ArgumentParser(add_help=False)
+    common = Parser(add_help=False)
     common.add_argument("--debug", action="store_true", help="show tracebacks")
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="pbrs-farm",
         description="Houses designed by people in, physically-based training images with exact labels out.",
     )
     parser.add_argument("--version", action="version", version=pbrs_farm.__version__)
-    parser.set_defaults(debug=False)
+    parser.set_defaults(debug=False, every_verb=build_parser)
     verbs = parser.add_subparsers(title="verbs", metavar="VERB")
 
     def verb(name: str, handler: Handler, text: str) -> argparse.ArgumentParser:

@@ -11,14 +11,7 @@ import time
 from abc import ABC, abstractmethod
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from pbrs_farm.core.shown_text import printable
 from pbrs_farm.run.processes.render_task import Event
@@ -41,7 +34,7 @@ def progress_reporter(n_homes: int, *, as_json: bool) -> ProgressReporter:
     """The reporter that fits standard output."""
     if as_json:
         return _JsonLines()
-    return _Bars(n_homes) if sys.stdout.isatty() else _PlainLines()
+    return _Bars(n_homes) if sys.stdout.isatty() else _PlainLines(n_homes)
 
 
 def _name(event: Event) -> str:
@@ -51,6 +44,69 @@ def _name(event: Event) -> str:
 def _write_line(line: str) -> None:
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
+
+
+class TimeLeft:
+    """How long a run will take yet, by its events. now_s: seconds that only grow.
+
+    Views of homes whose views are not known yet count as many as the known homes have on average.
+    """
+
+    def __init__(self, n_homes: int) -> None:
+        self._n_homes = n_homes
+        self._n_planned = 0  # homes whose views are known
+        self._n_views = 0  # of those
+        self._n_ended = 0  # views
+        self._n_made = 0  # views of them that were not there already
+        self._began_s: float | None = None  # when the first view that is made was begun
+        self._making: set[str] = set()
+
+    def hear(self, event: Event, now_s: float) -> None:
+        """Take an event into account."""
+        if event.kind == "planned":
+            self._n_planned += 1
+            self._n_views += len(event.facts["views"])
+        elif event.view_id is None:
+            # A home that failed before its views were known has none.
+            self._n_homes -= event.kind == "failed" and event.step in ("house", "cameras")
+        elif event.kind in ("begin", "done"):
+            self._began_s = now_s if self._began_s is None else self._began_s
+            if event.kind == "done":
+                self._making.add(_name(event))
+        elif event.kind == "end":
+            self._n_ended += 1
+            self._n_made += _name(event) in self._making
+            self._making.discard(_name(event))
+
+    @property
+    def views_text(self) -> str:
+        """ "3 of 12"; "3 of about 40" while homes are still unread."""
+        about = "about " if self._n_homes > self._n_planned else ""
+        return f"{self._n_ended} of {about}{self._expected_views()}"
+
+    def seconds(self, now_s: float) -> float | None:
+        """Seconds to the end; None while no view was made."""
+        if self._began_s is None or not self._n_made:
+            return None
+        return self._n_left() * (now_s - self._began_s) / self._n_made
+
+    def _n_left(self) -> int:
+        return max(0, self._expected_views() - self._n_ended)
+
+    def _expected_views(self) -> int:
+        unknown = max(0, self._n_homes - self._n_planned)
+        return round(self._n_views + unknown * self._n_views / max(1, self._n_planned))
+
+
+def seconds_text(seconds: float) -> str:
+    """ "40 s", "12 min", "3 h 20 min", "2 d 4 h"."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    if minutes < 90:
+        return f"{minutes} min"
+    hours = minutes // 60
+    return f"{hours} h {minutes % 60} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"
 
 
 class _JsonLines(ProgressReporter):
@@ -72,15 +128,17 @@ class _JsonLines(ProgressReporter):
 
 
 class _PlainLines(ProgressReporter):
-    """A line per house's step and per finished view; failures on standard error."""
+    """A line per house's step and per finished view, with the time left; failures on standard error."""
 
-    def __init__(self) -> None:
+    def __init__(self, n_homes: int) -> None:
+        self._left = TimeLeft(n_homes)
         self._started = time.monotonic()
         self._seconds: dict[str, float] = {}  # view -> seconds of its steps so far
         self._made: dict[str, int] = {}  # view -> steps made now, not kept
 
     def __call__(self, event: Event) -> None:
         name = _name(event)
+        self._left.hear(event, time.monotonic())
         clock = f"[{time.monotonic() - self._started:6.1f} s]"
         if event.kind == "failed":
             sys.stderr.write(f"{clock} {name} {event.step}: FAILED: {printable(event.message)}\n")
@@ -92,7 +150,10 @@ class _PlainLines(ProgressReporter):
                 _write_line(f"{clock} {name} {event.step}: {_how(event)}{_facts(event)}")
         elif event.kind == "end" and event.view_id is not None:
             seconds, made = self._seconds.pop(name, 0.0), self._made.pop(name, 0)
-            _write_line(f"{clock} {name}: {f'{seconds:.1f} s' if made else 'already there'}")
+            how = f"{seconds:.1f} s" if made else "already there"
+            left_s = self._left.seconds(time.monotonic())
+            left = f", {seconds_text(left_s)} left" if left_s else ""
+            _write_line(f"{clock} {name}: {how}; {self._left.views_text}{left}")
 
 
 def _how(event: Event) -> str:
@@ -117,12 +178,12 @@ class _Bars(ProgressReporter):
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
-            TimeRemainingColumn(),
             TextColumn("{task.fields[note]}"),
             console=Console(),
         )
         self._houses = self._progress.add_task("houses", total=n_homes, note="")
         self._views = self._progress.add_task("views", total=None, note="")
+        self._left = TimeLeft(n_homes)
         self._n_views = 0  # of all houses whose views are known
         self._n_ended = 0
         self._started = 0.0  # when the first view ended; 0 = not yet
@@ -135,6 +196,7 @@ class _Bars(ProgressReporter):
         self._progress.stop()
 
     def __call__(self, event: Event) -> None:
+        self._left.hear(event, time.monotonic())
         if event.kind == "failed":
             self._progress.console.print(
                 f"{_name(event)} {event.step}: FAILED: {printable(event.message)}",
@@ -157,4 +219,6 @@ class _Bars(ProgressReporter):
     def _rate(self) -> str:
         # Leave out the first view: its time includes the house's.
         seconds = time.monotonic() - self._started if self._started else 0.0
-        return f"{60 * (self._n_ended - 1) / seconds:.1f}/min" if self._n_ended > 1 else ""
+        rate = f"{60 * (self._n_ended - 1) / seconds:.1f}/min" if self._n_ended > 1 else ""
+        left_s = self._left.seconds(time.monotonic())
+        return rate if left_s is None else f"{rate} {seconds_text(left_s)} left"

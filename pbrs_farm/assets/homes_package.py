@@ -12,6 +12,7 @@ from typing import Final
 
 from pbrs_farm.assets.debian import Deb, cached_deb, fetched_deb, write_whole
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.near_names import hint_of_choice
 
 PACKAGE: Final = "sweethome3d"
 TESTED_VERSION: Final = "7.0.2+dfsg-3"
@@ -46,6 +47,16 @@ def example_homes() -> tuple[ExampleHome, ...]:
     return _HOMES
 
 
+def exact_name(word: str) -> str:
+    """The example home that a word names, letters' case apart; raises BadInput naming the nearest."""
+    known = {h.name.lower(): h.name for h in _HOMES}
+    exact = known.get(word.lower().removesuffix(".xml"))
+    if exact is None:
+        hint = hint_of_choice(word, [*known.values(), "builtin"])
+        raise BadInput(word, "", "no such file, and no example home of that name", hint=hint)
+    return exact
+
+
 @dataclass(frozen=True, slots=True)
 class Package:
     """A fetched package."""
@@ -62,10 +73,7 @@ class Package:
 
     def home(self, name: str) -> tuple[bytes, str]:
         """The XML of an example home and its file name; BadInput for an unknown name."""
-        known = {h.name.lower(): h.name for h in _HOMES}
-        exact = known.get(name.lower().removesuffix(".xml"))
-        if exact is None:
-            raise BadInput("example homes", "", f"no home {name!r}", hint=", ".join(known.values()))
+        exact = exact_name(name)
         with zipfile.ZipFile(self.jar) as jar:
             try:
                 return jar.read(f"{EXAMPLES}/{exact}.xml"), f"{exact}.xml"

@@ -114,7 +114,8 @@ def add_fields(p: argparse.ArgumentParser, default: str = "fast") -> None:
     from pbrs_farm.core.recipe import RECIPE_NAMES
 
     add = p.add_argument
-    add("--recipe", default=default, help=f"{', '.join(RECIPE_NAMES)} (default {default})")
+    text = f"{', '.join(RECIPE_NAMES)}, or your own FILE.toml (default {default})"
+    add("--recipe", default=default, help=text)
     add_set(p, "GROUP.FIELD=VALUE", "override a field")
     add("--size", metavar="WxH", help="picture size, e.g. 640x480")
     add("--strict", action="store_true", help="recoverable faults of a home are errors")
@@ -151,7 +152,15 @@ def add_output(p: argparse.ArgumentParser) -> None:
     add("--modes", nargs="+", default=[], metavar="MODE", help=modes)
     layers = "optional layers to write too"
     add("--layers", nargs="+", default=[], metavar="LAYER", help=layers)
-    add("--views", type=int, default=0, metavar="N", help="at most N views a house")
+    add("--views", type=int, metavar="N", help="at most N views a house (default: all)")
+
+
+def views_wanted(args: argparse.Namespace) -> int:
+    """The --views of a command, 0 where it is not given: all of them. Raises BadInput below 1."""
+    if args.views is not None and args.views < 1:
+        hint = "leave it out for all views"
+        raise BadInput("--views", str(args.views), "expected 1 or more", hint=hint)
+    return args.views or 0
 
 
 def home_arguments(homes: list[str], houses: str | None) -> list[str]:
@@ -193,6 +202,7 @@ def fields_set(
 def recipe_of(args: argparse.Namespace) -> Recipe:
     """The recipe that a command's options name; raises BadRecipe."""
     from pbrs_farm.core.recipe import recipe_from_name
+    from pbrs_farm.formats.recipe_toml import ENDING, recipe_from_toml
 
     overrides = fields_set(args.set, "group.field=value")
     # Let the options that are short forms of fields win over --set.
@@ -212,6 +222,8 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
         overrides["dress.catalogue"] = json.dumps(":".join(args.catalogue))
     if getattr(args, "exact", False):
         overrides["cameras.exact"] = "true"
+    if args.recipe.endswith(ENDING):
+        return recipe_from_toml(Path(args.recipe), overrides)
     return recipe_from_name(args.recipe, overrides)
 
 

@@ -1,4 +1,4 @@
-"""Verbs that look: doctor, skies, recipes, layers. Effects: print; skies downloads."""
+"""Verbs that tell: doctor, skies, recipes, layers, completion. Effects: print; skies downloads."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import os
 from dataclasses import asdict
 
 from pbrs_farm.commands.arguments import Verb, echo, echo_json
+from pbrs_farm.commands.completion import SHELLS, completion_script
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, recipe_from_name
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add doctor, skies, recipes and layers."""
+    """Add doctor, skies, recipes, layers and completion."""
     p = verb("doctor", _doctor, "what this machine can do, and what to do about what is missing")
     p.add_argument("--json", action="store_true", help="for machines")
     p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to try")
@@ -20,7 +21,11 @@ def add_verbs(verb: Verb) -> None:
     p = verb("skies", _skies, "fetch four outdoor panoramas (CC0) from Debian's blender-data")
     p = verb("recipes", _recipes, "every field of a recipe and its value")
     p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES)
+    p.add_argument("--toml", action="store_true", help="as a file for --recipe FILE.toml")
     p = verb("layers", _layers, "the table of the files of a view")
+    text = 'what makes the shell complete words: eval "$(pbrs-farm completion bash)"'
+    p = verb("completion", _completion, text)
+    p.add_argument("shell", choices=SHELLS)
 
 
 def _doctor(args: argparse.Namespace) -> int:
@@ -55,6 +60,11 @@ def _skies(_args: argparse.Namespace) -> int:
 
 def _recipes(args: argparse.Namespace) -> int:
     recipe = recipe_from_name(args.name)
+    if args.toml:
+        from pbrs_farm.formats.recipe_toml import toml_from_recipe
+
+        echo(toml_from_recipe(recipe))
+        return 0
     echo(f"# recipe {args.name}; --set group.field=value overrides any field")
     # Print the recipe as --set takes it, group by group.
     for group, info in Recipe.model_fields.items():
@@ -74,4 +84,9 @@ def _layers(_args: argparse.Namespace) -> int:
     from pbrs_farm.core.layers import table
 
     echo(table())
+    return 0
+
+
+def _completion(args: argparse.Namespace) -> int:
+    echo(completion_script(args.shell, args.every_verb().verbs()))
     return 0

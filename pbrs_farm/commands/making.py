@@ -24,10 +24,12 @@ from pbrs_farm.commands.arguments import (
     echo,
     home_arguments,
     recipe_of,
+    views_wanted,
     warn,
 )
 from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.near_names import hint_of_choice
 from pbrs_farm.core.recipe import recipe_from_json
 
 if TYPE_CHECKING:
@@ -121,7 +123,6 @@ def _run_homes(
     from pbrs_farm.run.local import run_local
 
     at_least("--jobs", args.jobs, 1)
-    at_least("--views", args.views, 0)
     at_least("--silence", args.silence, 0)
     at_least("--memory", args.memory, 0)
     run = replace(_described(args, homes, sources), refused=refused)
@@ -145,7 +146,7 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
         homes=homes,
         store_url=args.out,
         recipe=recipe_of(args),
-        want=wanted(args.modes, args.layers, args.views),
+        want=wanted(args.modes, args.layers, views_wanted(args)),
         n_jobs=args.jobs,
         update=args.update,
         step_timeout_s=args.step_timeout,
@@ -263,7 +264,7 @@ def _step(args: argparse.Namespace) -> int:
 
     # The recipe is the stored one, so that the step does what the run did.
     if args.step not in STEPS:
-        raise BadInput("step", args.step, "no such step", hint=f"of {', '.join(STEPS)}")
+        raise BadInput("step", args.step, "no such step", hint=hint_of_choice(args.step, STEPS))
     store = store_from_url(args.out, settings_from_environment().store)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     (source,) = variants(resolve(args.home), [args.dress or recipe.dress.seed])

@@ -21,6 +21,7 @@ from pbrs_farm.commands.arguments import (
     farm_of,
     home_arguments,
     recipe_of,
+    views_wanted,
     warn,
 )
 
@@ -105,9 +106,8 @@ def _spec(args: argparse.Namespace) -> JobSpec:
     from workers.client.farm_client import new_spec
     from workers.node.house_runner import batch_stages
 
-    at_least("--views", args.views, 0)
     at_least("--slots", args.slots, 1)
-    want = wanted(args.modes, args.layers, args.views)
+    want = wanted(args.modes, args.layers, views_wanted(args))
     recipe = recipe_of(args)
     return new_spec(
         recipe,

@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.near_names import hint_of_choice, near_names, question
 from pbrs_farm.core.recipe_fields import (
     CameraFields,
     DressFields,
@@ -47,7 +48,9 @@ __all__ = [
     "SelectionFields",
     "SkyFields",
     "ToneFields",
+    "changed_recipe",
     "differences",
+    "field_paths",
     "recipe_from_json",
     "recipe_from_name",
 ]
@@ -163,20 +166,56 @@ def recipe_from_name(name: str, overrides: Mapping[str, str] | None = None) -> R
     Raises BadRecipe for an unknown name or field, or a value that does not fit.
     """
     if name not in _PRESETS:
-        raise BadRecipe(f"no recipe {name!r}", hint=f"one of {', '.join(RECIPE_NAMES)}")
+        raise BadRecipe(f"no recipe {name!r}", hint=hint_of_choice(name, RECIPE_NAMES))
+    return changed_recipe(name, name, {}, overrides or {})
+
+
+def changed_recipe(
+    name: str, base: str, changes: Mapping[str, Any], overrides: Mapping[str, str]
+) -> Recipe:
+    """A recipe called name: the preset base, then changes (group -> field -> value), then overrides.
+
+    Raises BadRecipe for a field there is not, naming the nearest, or a value that does not fit.
+    """
     # Start from the preset, then override field by field; pydantic judges the whole.
     fields: dict[str, Any] = {"name": name}
-    for group, values in _PRESETS[name].items():
+    for group, values in _PRESETS[base].items():
         fields[group] = dict(values)
-    for path, text in (overrides or {}).items():
+    for group, value in changes.items():
+        held = fields.get(group)
+        both = isinstance(held, dict) and isinstance(value, Mapping)
+        fields[group] = {**held, **value} if both and held is not None else value
+    for path, text in overrides.items():
         _set(fields, path, text)
     try:
         return Recipe.model_validate(fields)
     except ValidationError as error:
-        lines = "; ".join(
-            f"{'.'.join(str(p) for p in e['loc'])}: {e['msg']}" for e in error.errors()
-        )
+        lines = "; ".join(_fault(e["loc"], e["type"], e["msg"], e["input"]) for e in error.errors())
         raise BadRecipe(lines, hint="`pbrs-farm recipes` lists every field") from None
+
+
+def _fault(place: tuple[int | str, ...], kind: str, text: str, value: object) -> str:
+    """What is wrong with a field; of one there is not, which it may have meant."""
+    path = ".".join(str(part) for part in place)
+    if kind != "extra_forbidden":
+        return f"{path}: {text}"
+    # Of a group there is not, the field that was set in it.
+    if isinstance(value, dict) and value:
+        path = f"{path}.{next(iter(value))}"
+    # A field without its group, or in another's, is found in every group that has it.
+    known = field_paths()
+    same = [p for p in known if p.endswith(f".{path.rpartition('.')[2]}")]
+    offer = question(near_names(path, same) or same[:2] or near_names(path, known))
+    return f"{path}: no such field" + (f", {offer}" if offer else "")
+
+
+def field_paths() -> list[str]:
+    """Every field as --set names it: "seed", "light.spp" ..."""
+    paths = []
+    for group, info in Recipe.model_fields.items():
+        fields = getattr(info.annotation, "model_fields", None)
+        paths += [group] if fields is None else [f"{group}.{name}" for name in fields]
+    return paths
 
 
 def recipe_from_json(data: bytes, place: str) -> Recipe:

@@ -133,8 +133,10 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef
     if kind == "example":
         from pbrs_farm.assets import homes_package
 
+        # A name that is none costs no download.
+        exact = homes_package.exact_name(location)
         package = homes_package.fetch()
-        data, name = package.home(location)
+        data, name = package.home(exact)
         companions = _package_digest(package)
     else:
         path = Path(location)

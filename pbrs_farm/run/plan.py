@@ -16,6 +16,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.core.lighting import ALL_MODES, Mode
+from pbrs_farm.core.near_names import hint_of_choice
 from pbrs_farm.core.recipe import Recipe
 
 
@@ -72,11 +73,13 @@ def wanted(modes: Iterable[str], layers: Iterable[str], n_views: int = 0) -> Wan
     names = [m.value for m in ALL_MODES]
     for mode in modes:
         if mode not in names:
-            raise BadInput("--modes", mode, "no such lighting mode", hint=f"of {', '.join(names)}")
+            raise BadInput(
+                "--modes", mode, "no such lighting mode", hint=hint_of_choice(mode, names)
+            )
     optional = [x.name for x in LAYERS if x.optional]
     for layer in layers:
         if layer not in LAYER:
-            raise BadInput("--layers", layer, "no such layer", hint=f"of {', '.join(optional)}")
+            raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, optional))
     chosen = tuple(m for m in ALL_MODES if m.value in set(modes)) or ALL_MODES
     return Wanted(chosen, tuple(x for x in optional if x in set(layers)), n_views)
 

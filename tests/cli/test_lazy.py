@@ -27,7 +27,7 @@ def test_the_help_names_every_verb() -> None:
     every = [verb for verbs in MODULES.values() for verb in verbs]
     assert verbs_of(build_parser()) == every
     text = build_parser().format_help()
-    assert all(f"\n    {verb}" in text for verb in every)
+    assert all(f"\n  {verb}" in text for verb in every)
 
 
 @pytest.mark.parametrize("words", ["status", "why h/0/gl", "pause", "workers"])

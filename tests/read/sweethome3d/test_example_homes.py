@@ -120,7 +120,7 @@ def test_the_tested_version_is_taken_before_another(tmp_path: Path) -> None:
 
 def test_an_unknown_home_is_refused_with_the_names(tmp_path: Path) -> None:
     deb(tmp_path)
-    with pytest.raises(BadInput, match=r"no home 'Castle'.*Studio"):
+    with pytest.raises(BadInput, match=r"no example home of that name.*Studio"):
         homes_package.fetch(tmp_path).home("Castle")
 
 

@@ -1,0 +1,98 @@
+"""The parser of the command line: verbs by what a user wants, near names for slips. Effects: prints.
+
+Options may stand before the verb or after it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from pbrs_farm.core.near_names import did_you_mean
+
+# What a user wants -> the verbs for it, in the order of the help.
+GROUPS: Final = {
+    "begin": ("demo", "doctor", "homes", "skies", "completion"),
+    "make pictures and labels": ("run", "objects", "step", "recipes", "layers"),
+    "look into one home": ("dress", "repair", "cameras"),
+    "look at what was made": ("board", "sheet", "label-sheet", "classes", "verify", "relight"),
+    "choose and hand on": ("reference", "select", "export", "study"),
+    "run on many machines": (
+        "submit", "jobs", "status", "why", "logs", "failures", "retry", "pause", "resume", "cancel",
+        "priority", "reduce", "workers", "drain", "recover", "coordinator", "worker",
+    ),
+}  # fmt: skip
+
+
+class Parser(argparse.ArgumentParser):
+    """An ArgumentParser whose help lists verbs in groups."""
+
+    def verbs(self) -> dict[str, argparse.ArgumentParser]:
+        """Verb -> its parser."""
+        found = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
+        return dict(found[0].choices) if found else {}
+
+    def format_help(self) -> str:
+        """The help: of a verb argparse's own, of the command its verbs in groups."""
+        found = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
+        if not found or found[0].metavar != "VERB":
+            return super().format_help()
+        lines = {action.dest: action for action in found[0]._choices_actions}
+        formatter = self._get_formatter()
+        formatter.add_usage(self.usage, self._actions, self._mutually_exclusive_groups)
+        formatter.add_text(self.description)
+        # A verb that stands in no group is listed all the same.
+        grouped = {verb for verbs in GROUPS.values() for verb in verbs}
+        others = tuple(verb for verb in lines if verb not in grouped)
+        for title, verbs in {**GROUPS, "more": others}.items():
+            if known := [lines[verb] for verb in verbs if verb in lines]:
+                formatter.start_section(title)
+                formatter.add_arguments(known)
+                formatter.end_section()
+        formatter.add_text("`pbrs-farm VERB --help` lists a verb's options.")
+        return formatter.format_help()
+
+
+def unknown_words(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
+    """What is wrong with words that a verb's parser does not take."""
+    options = [word for word in words if word.startswith("-")]
+    if not options:
+        return f"unexpected word {words[0]!r}: name all of a kind in one place"
+    name = options[0].partition("=")[0]
+    offer = did_you_mean(name, parser._option_string_actions)
+    return f"no such option {name}" + (f", {offer}" if offer else "")
+
+
+def verb_first(
+    words: Sequence[str], verbs: Sequence[str], parser_of: Callable[[str], argparse.ArgumentParser]
+) -> list[str]:
+    """The words with the verb in front, where options of the verb stand before it.
+
+    parser_of: a verb's parser, which says how many words each of its options takes.
+    """
+    if words and words[0].startswith("-"):
+        for at, word in enumerate(words):
+            if word in verbs and _are_options(words[:at], parser_of(word)):
+                return [word, *words[:at], *words[at + 1 :]]
+    return list(words)
+
+
+def _are_options(words: Sequence[str], parser: argparse.ArgumentParser) -> bool:
+    """Whether the words are options of the parser, each with its values."""
+    at = 0
+    while at < len(words):
+        name, equals, _value = words[at].partition("=")
+        action = parser._option_string_actions.get(name)
+        if action is None:
+            return False
+        at += 1
+        if equals or action.nargs == 0:
+            continue
+        # One value, or all up to the next option.
+        first = at
+        while at < len(words) and not words[at].startswith("-") and (at == first or action.nargs):
+            at += 1
+        if at == first:
+            return False
+    return True

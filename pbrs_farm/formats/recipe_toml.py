@@ -1,0 +1,57 @@
+"""recipe.toml: a recipe as a file of one's own, for --recipe. Effects: reads a file.
+
+recipe = "fast"   # the recipe whose values hold where the file says nothing
+seed = 3
+
+[light]
+spp = 128
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.near_names import hint_of_choice
+from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, changed_recipe
+from pbrs_farm.core.shown_text import shown
+from pbrs_farm.regular_files import fault_of, read_regular
+
+ENDING: Final = ".toml"
+_MAX_BYTES: Final = 2**20
+
+
+def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
+    """The recipe of a file, called by the file's name; raises BadRecipe naming file and field."""
+    try:
+        fields = tomllib.loads(read_regular(path, _MAX_BYTES).decode())
+    except OSError as error:
+        raise BadRecipe(f"{path}: {fault_of(error)}") from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise BadRecipe(f"{path}: is no TOML: {error}") from None
+    base = fields.pop("recipe", "fast")
+    if not isinstance(base, str) or base not in RECIPE_NAMES:
+        hint = hint_of_choice(str(base), RECIPE_NAMES)
+        raise BadRecipe(f"{path}: recipe: no recipe {base!r}", hint=hint)
+    try:
+        return changed_recipe(shown(path.stem), base, fields, overrides)
+    except BadRecipe as error:
+        raise BadRecipe(f"{path}: {error.message}", hint=error.hint) from None
+
+
+def toml_from_recipe(recipe: Recipe) -> str:
+    """The recipe as a file that recipe_from_toml reads as the same values."""
+    fields = recipe.model_dump(mode="json", exclude={"name"})
+    lines = [f'recipe = "{recipe.name}"']
+    # Values of the recipe itself stand above its groups.
+    groups = {name: value for name, value in fields.items() if isinstance(value, dict)}
+    lines += [f"{name} = {json.dumps(fields[name])}" for name in fields if name not in groups]
+    for name, values in groups.items():
+        lines += ["", f"[{name}]"]
+        # TOML has no null: what is not set is left out.
+        lines += [f"{field} = {json.dumps(v)}" for field, v in values.items() if v is not None]
+    return "\n".join(lines)

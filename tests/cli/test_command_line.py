@@ -1,0 +1,183 @@
+"""Slips are offered near names, options stand where they like, the help is grouped, shells complete."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.cli import MODULES, build_parser, main
+from pbrs_farm.commands.arguments import recipe_of
+from pbrs_farm.commands.command_line import GROUPS, verb_first
+from pbrs_farm.commands.completion import SHELLS, completion_script
+from pbrs_farm.core.recipe import RECIPE_NAMES, recipe_from_name
+from pbrs_farm.formats.recipe_toml import recipe_from_toml, toml_from_recipe
+
+EVERY_VERB = [verb for verbs in MODULES.values() for verb in verbs]
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
+    """What a command that ends with the code writes to standard error."""
+    try:
+        ended: object = main(list(words))
+    except SystemExit as ending:
+        ended = ending.code
+    assert ended == code
+    error = capsys.readouterr().err
+    assert "Traceback" not in error
+    return error
+
+
+@pytest.mark.parametrize(
+    ("words", "says", "code"),
+    [
+        (["rnu"], "no verb 'rnu', did you mean run?", 2),
+        (["zzzzz"], "no verb 'zzzzz' (pbrs-farm --help lists them)", 2),
+        (["layers", "--jsn"], "no such option --jsn", 2),
+        (["doctor", "--jsn"], "no such option --jsn, did you mean --json?", 2),
+        (["recipes", "fast", "paper"], "unexpected word 'paper'", 2),
+        (["cameras", "Studoi"], "did you mean Studio?", 1),
+        (["cameras", "builtn"], "did you mean builtin?", 1),
+        (["cameras", "builtin", "--recipe", "papr"], "did you mean paper?", 1),
+        (["cameras", "builtin", "--set", "light.sp=4"], "did you mean light.spp?", 1),
+        (["run", "builtin", "--out", "x", "--modes", "mltol"], "did you mean mlt_ol?", 1),
+        (["step", "develp", "builtin", "--out", "x"], "did you mean develop?", 1),
+    ],
+)
+def test_a_slip_is_offered_what_it_may_mean(
+    words: list[str], says: str, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert says in refusal(capsys, *words, code=code)
+
+
+@pytest.mark.parametrize("verb", ["run builtin --out x", "demo", "submit x"])
+def test_no_views_at_all_are_refused(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    error = refusal(capsys, *verb.split(), "--views", "0", code=1)
+    assert "--views: 0: expected 1 or more" in error
+
+
+def ordered(words: str) -> str:
+    def parser_of(verb: str):
+        return build_parser().verbs()[verb]
+
+    return " ".join(verb_first(words.split(), EVERY_VERB, parser_of))
+
+
+@pytest.mark.parametrize(
+    ("words", "means"),
+    [
+        ("--debug run A --out o", "run --debug A --out o"),
+        ("--recipe preview --out o run A", "run --recipe preview --out o A"),
+        ("--out run run A", "run --out run A"),  # a folder that has a verb's name
+        ("--out=run run A", "run --out=run A"),
+        ("--modes opengl_dl opengl_il run A --out o", "run --modes opengl_dl opengl_il A --out o"),
+        ("--help run", "run --help"),
+        ("run A --out o", "run A --out o"),
+        ("--version", "--version"),
+        ("--no-such run A", "--no-such run A"),
+        ("-", "-"),
+        ("", ""),
+    ],
+)
+def test_options_stand_before_the_verb_or_after_it(words: str, means: str) -> None:
+    assert ordered(words) == means
+
+
+def test_an_option_before_the_verb_works_as_behind_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--json", "homes"]) == 0
+    before = capsys.readouterr().out
+    assert main(["homes", "--json"]) == 0
+    assert capsys.readouterr().out == before
+
+
+def test_the_help_lists_each_verb_once_below_what_it_is_for() -> None:
+    text = build_parser().format_help()
+    for title in GROUPS:
+        assert f"\n{title}:" in text
+    for verb in EVERY_VERB:
+        assert len(re.findall(rf"^  {verb}\b", text, re.MULTILINE)) == 1, verb
+
+
+def test_a_recipe_file_changes_what_it_names(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('recipe = "preview"\nseed = 3\n\n[light]\nspp = 8\n')
+    words = ["cameras", "x", "--recipe", str(file), "--set", "image.width_px=64"]
+    recipe = recipe_of(build_parser().parse_args(words))
+    expected = recipe_from_name("preview", {"seed": "3", "light.spp": "8", "image.width_px": "64"})
+    assert recipe.digest() == expected.digest()
+    assert recipe.name == "mine"
+
+
+@pytest.mark.parametrize("name", RECIPE_NAMES)
+def test_a_recipe_written_as_a_file_is_read_as_itself(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "r.toml"
+    file.write_text(toml_from_recipe(recipe_from_name(name)))
+    assert recipe_from_toml(file, {}).digest() == recipe_from_name(name).digest()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (None, "no such file"),
+        ("[light", "is no TOML"),
+        ("\xff\xfe", "is no TOML"),
+        ('recipe = "fst"', "did you mean fast?"),
+        ("recipe = 3", "no recipe 3"),
+        ("[light]\nsp = 3", "light.sp: no such field, did you mean light.spp"),
+        ("light = 3", "light:"),
+        ("[light]\nspp = 2020-01-01", "light.spp"),
+    ],
+)
+def test_a_bad_recipe_file_is_named_with_its_place(
+    text: str | None, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "bad.toml"
+    if text is not None:
+        file.write_bytes(text.encode("latin-1"))
+    error = refusal(capsys, "cameras", "builtin", "--recipe", str(file), code=1)
+    assert f"{file}: " in error
+    assert says in error
+
+
+def completed(words: Sequence[str]) -> set[str]:
+    """What bash offers for the last of the words."""
+    script = completion_script("bash", build_parser().verbs())
+    array = " ".join(f"'{word}'" for word in words)
+    ask = f"{script}\nCOMP_WORDS=({array}); COMP_CWORD={len(words) - 1}; _pbrs_farm"
+    ask += '\nprintf "%s\\n" "${COMPREPLY[@]}"'
+    done = subprocess.run(["bash", "-c", ask], capture_output=True, text=True, check=True)
+    assert not done.stderr
+    return set(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "offers"),
+    [
+        ("pbrs-farm re", {"relight", "repair", "recipes", "reference"}),
+        ("pbrs-farm run Stu", {"Studio"}),
+        ("pbrs-farm run --recipe p", {"preview", "paper"}),
+        ("pbrs-farm run x --modes opengl_d", {"opengl_dl"}),
+        ("pbrs-farm export x --to c", {"coco"}),
+        ("pbrs-farm --debug verify --al", {"--all"}),
+    ],
+)
+def test_bash_completes_verbs_options_and_their_choices(words: str, offers: set[str]) -> None:
+    found = completed(words.split())
+    assert offers <= found
+    assert all(word.startswith(words.split()[-1]) for word in found)
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_every_shell_gets_a_script_of_every_verb(
+    shell: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(verb in script for verb in EVERY_VERB)
+    program = shutil.which(shell)
+    if program:
+        subprocess.run([program, "-n"], input=script, text=True, check=True)

@@ -1,0 +1,76 @@
+"""The time left of a run, from its events alone."""
+
+from __future__ import annotations
+
+import pytest
+
+from pbrs_farm.progress import TimeLeft, progress_reporter, seconds_text
+from pbrs_farm.run.processes.render_task import Event
+
+
+def planned(house: str, n: int) -> Event:
+    return Event("planned", house, None, "cameras", facts={"views": [str(k) for k in range(n)]})
+
+
+def view(left: TimeLeft, house: str, k: int, began_s: float, ended_s: float, how: str) -> None:
+    """A view from its first step to its end."""
+    left.hear(Event("begin", house, str(k), "truth"), began_s)
+    left.hear(Event(how, house, str(k), "truth"), ended_s)  # type: ignore[arg-type]
+    left.hear(Event("end", house, str(k), ""), ended_s)
+
+
+def test_nothing_is_told_before_a_view_was_made() -> None:
+    left = TimeLeft(1)
+    left.hear(planned("a", 4), 0)
+    assert left.seconds(9.0) is None
+
+
+def test_views_of_one_home_take_as_long_as_those_before() -> None:
+    left = TimeLeft(1)
+    left.hear(planned("a", 4), 0)
+    view(left, "a", 0, 10.0, 20.0, "done")
+    assert left.views_text == "1 of 4"
+    assert left.seconds(20.0) == pytest.approx(30.0)
+    view(left, "a", 1, 20.0, 40.0, "done")
+    assert left.seconds(40.0) == pytest.approx(30.0)
+
+
+def test_homes_not_read_yet_count_with_the_mean_of_the_others() -> None:
+    left = TimeLeft(3)
+    left.hear(planned("a", 4), 0)
+    view(left, "a", 0, 0.0, 10.0, "done")
+    assert left.views_text == "1 of about 12"
+    assert left.seconds(10.0) == pytest.approx(110.0)
+
+
+def test_a_home_that_cannot_be_read_has_no_views() -> None:
+    left = TimeLeft(2)
+    left.hear(Event("failed", "b", None, "house"), 0.0)
+    left.hear(planned("a", 2), 0)
+    assert left.views_text == "0 of 2"
+
+
+def test_views_that_are_there_already_do_not_make_the_rest_look_quick() -> None:
+    left = TimeLeft(1)
+    left.hear(planned("a", 4), 0)
+    left.hear(Event("kept", "a", "0", "truth"), 0.1)
+    left.hear(Event("end", "a", "0", ""), 0.1)
+    view(left, "a", 1, 0.1, 10.1, "done")
+    assert left.seconds(10.1) == pytest.approx(20.0)
+
+
+def test_plain_lines_tell_it(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_reporter(1, as_json=False) as report:
+        report(planned("a", 2))
+        report(Event("begin", "a", "0", "truth"))
+        report(Event("done", "a", "0", "truth", seconds=1.0))
+        report(Event("end", "a", "0", ""))
+    assert "a/0: 1.0 s; 1 of 2, 0 s left" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(40.4, "40 s"), (95, "2 min"), (5300, "88 min"), (12000, "3 h 20 min"), (190000, "2 d 4 h")],
+)
+def test_seconds_are_told_in_words(seconds: float, text: str) -> None:
+    assert seconds_text(seconds) == text

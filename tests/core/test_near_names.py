@@ -1,0 +1,50 @@
+"""A slip is offered the name it is nearest to, and nothing where none is near."""
+
+from __future__ import annotations
+
+import pytest
+
+from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.near_names import did_you_mean, hint_of_choice, near_names
+from pbrs_farm.core.recipe import Recipe, field_paths, recipe_from_name
+
+HOMES = ("Studio", "2BedroomApartment", "4BedroomHouse", "builtin")
+
+
+def test_the_nearest_name_comes_first_whatever_its_case() -> None:
+    assert near_names("studoi", HOMES) == ["Studio"]
+    assert near_names("4bedroomhose", HOMES)[0] == "4BedroomHouse"
+
+
+def test_a_word_like_none_is_offered_none() -> None:
+    assert near_names("zzz", HOMES) == []
+    assert did_you_mean("zzz", HOMES) == ""
+    assert hint_of_choice("zzz", ("a", "b")) == "of a, b"
+
+
+def test_a_long_strange_word_costs_nothing() -> None:
+    assert near_names("x" * 10_000_000, HOMES) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "offer"),
+    [
+        ("light.sp", "light.spp"),
+        ("spp", "light.spp"),
+        ("image.width", "image.width_px"),
+        ("camera.preset", "cameras.preset"),
+        ("sed", "seed"),
+    ],
+)
+def test_a_field_there_is_not_is_offered_the_one_it_is_near(path: str, offer: str) -> None:
+    with pytest.raises(BadRecipe, match=rf"no such field, did you mean.* {offer}\b"):
+        recipe_from_name("fast", {path: "1"})
+
+
+def test_every_field_is_named_as_set_takes_it() -> None:
+    recipe = Recipe()
+    for path in field_paths():
+        group, _, field = path.partition(".")
+        held = getattr(recipe, group)
+        assert hasattr(held, field) if field else True, path
+    assert {"seed", "light.spp", "dress.catalogue"} <= set(field_paths())
