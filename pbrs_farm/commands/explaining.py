@@ -102,6 +102,7 @@ def _dress(args: argparse.Namespace) -> int:
         files |= _before_after(args, house, recipe)
     for name, data in files.items():
         store.put(name, data)
+    store.tidy()
     echo(summary_of_dressing(report))
     echo(f"{args.out}: {' '.join(files)}")
     return 0 if report.is_sound else 1
@@ -152,6 +153,7 @@ def _repair(args: argparse.Namespace) -> int:
     cuts = {f"cut_{level.id}.svg": section_svg(before, house, level.id) for level in house.levels}
     for name, svg in cuts.items():
         store.put(name, svg.encode())
+    store.tidy()
     echo(summary_of_report(report))
     echo(f"{args.out}: house.glb house.json repair.json {' '.join(cuts)}")
     return 1 if report.is_leaking or report.structure.walls_lost else 0
@@ -178,7 +180,9 @@ def _cameras(args: argparse.Namespace) -> int:
     sampling = sample_cameras(house, recipe.cameras, seed, *counters)
     document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))
     if args.out is not None:
-        FolderStore(args.out.parent).put(args.out.name, json_bytes(document))
+        store = FolderStore(args.out.parent)
+        store.put(args.out.name, json_bytes(document))
+        store.tidy()
     if args.map is not None:
         _write_map(args.map, house, sampling)
     if args.json:

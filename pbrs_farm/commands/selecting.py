@@ -77,7 +77,9 @@ def _reference(args: argparse.Namespace) -> int:
 
     recipe = recipe_from_name("fast", _overrides(args.set))
     reference = _built(args, args.source, recipe.histogram, recipe.selection)
-    FolderStore(args.out.parent).put(args.out.name, bytes_from_reference(reference))
+    store = FolderStore(args.out.parent)
+    store.put(args.out.name, bytes_from_reference(reference))
+    store.tidy()
     echo(table_text(reference.facts.table, reference.facts.binning))
     echo(f"{args.out}: {len(reference.facts.ids)} photographs")
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import secrets
@@ -109,6 +110,11 @@ class FolderStore:
                 _unlink(path)
                 n_removed += 1
         return n_removed
+
+    def tidy(self) -> None:
+        """Remove the folder of unfinished files where there is none; the next write makes it again."""
+        with contextlib.suppress(OSError):
+            (self.root / TEMPORARY).rmdir()
 
     def _path(self, key: str) -> Path:
         return self.root / check_key(key)

@@ -92,3 +92,13 @@ def test_files_take_the_umask_not_a_private_mode(tmp_path: Path) -> None:
     finally:
         os.umask(old)
     assert (tmp_path / "a").stat().st_mode & 0o777 == 0o640
+
+
+def test_a_tidied_folder_holds_its_objects_alone(tmp_path: Path) -> None:
+    store = FolderStore(tmp_path)
+    store.put("a/b.txt", b"1")
+    store.tidy()
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+    # The next write works as before.
+    store.put("c.txt", b"2")
+    assert store.get("c.txt") == b"2"
