@@ -20,8 +20,13 @@ NYU40_NAMES: Final = (
     "lamp", "bathtub", "bag", "otherstructure", "otherfurniture", "otherprop",
 )  # fmt: skip
 
-# Ids that readers give by rule; "otherprop" is a thing of no class.
-DOOR, WINDOW, LAMP, OTHERPROP = map(NYU40_NAMES.index, ("door", "window", "lamp", "otherprop"))
+# Each id by its name; "otherprop" is a thing of no class.
+(
+    WALL, FLOOR, CABINET, BED, CHAIR, SOFA, TABLE, DOOR, WINDOW, BOOKSHELF, PICTURE, COUNTER, BLINDS,
+    DESK, SHELVES, CURTAIN, DRESSER, PILLOW, MIRROR, FLOOR_MAT, CLOTHES, CEILING, BOOKS, REFRIGERATOR,
+    TELEVISION, PAPER, TOWEL, SHOWER_CURTAIN, BOX, WHITEBOARD, PERSON, NIGHT_STAND, TOILET, SINK,
+    LAMP, BATHTUB, BAG, OTHERSTRUCTURE, OTHERFURNITURE, OTHERPROP,
+) = range(1, len(NYU40_NAMES))  # fmt: skip
 
 # Name of each NYU13 id, 0..13.
 NYU13_NAMES: Final = (

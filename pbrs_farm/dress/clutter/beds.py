@@ -12,7 +12,7 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.placing import Placing
-from pbrs_farm.dress.generated.made import Made
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.generated.soft import bed_pillow, cushion, folded_blanket
 from pbrs_farm.dress.generated.turned import smooth
 from pbrs_farm.dress.supports.exact_heights import heights_under

@@ -10,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.classes import BED, CHAIR, SOFA
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.dress.clutter.beds import dress_bed
 from pbrs_farm.dress.clutter.floors import fill_floor
@@ -28,7 +29,6 @@ from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
 
 _LEAST_SHELF_DEPTH_M = 0.12
 _DOOR_MARGIN_M = 0.02  # around where doors swing
-_BED, _SOFA, _CHAIR = 4, 6, 5
 _LAID = 0.3  # of the dining tables
 
 
@@ -80,9 +80,9 @@ def _fill_room(
             continue
         if can_hold(item):
             _fill_item(placing, scene, room, index, zone)
-        elif item.kind is ItemKind.OBJECT and item.nyu40 == _BED:
+        elif item.kind is ItemKind.OBJECT and item.nyu40 == BED:
             dress_bed(placing, scene, index)
-        elif item.kind is ItemKind.OBJECT and item.nyu40 in (_SOFA, _CHAIR):
+        elif item.kind is ItemKind.OBJECT and item.nyu40 in (SOFA, CHAIR):
             _dress_seat(placing, scene, index, item)
 
 
@@ -108,7 +108,7 @@ def _fill_item(
 
 def _chairs(scene: SceneTriangles, room: RoomSpace) -> list[F64]:
     """Plan points (2,) of the middles of the room's chairs."""
-    chairs = [k for k in room.items if scene.items[k].nyu40 == _CHAIR]
+    chairs = [k for k in room.items if scene.items[k].nyu40 == CHAIR]
     return [scene.bounds[k].mean(0)[[0, 2]] for k in chairs]
 
 
@@ -116,7 +116,7 @@ def _dress_seat(placing: Placing, scene: SceneTriangles, index: int, item: Item)
     low, high = item.bounds
     width = float(max(high[0] - low[0], high[2] - low[2]))
     # Chairs at tables carry none, armchairs one now and then.
-    if item.nyu40 == _SOFA:
+    if item.nyu40 == SOFA:
         dress_seat(placing, scene, index, 4 if width > 1.5 else 2)
     elif width > 0.72 and placing.rng.random() < 0.5:
         dress_seat(placing, scene, index, 1)

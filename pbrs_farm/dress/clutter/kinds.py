@@ -9,9 +9,9 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Place, Shape
 from pbrs_farm.core.house import ItemKind
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.generated.books import magazines, open_book, stack_of_books
 from pbrs_farm.dress.generated.covers import Covers
-from pbrs_farm.dress.generated.made import Made
 from pbrs_farm.dress.generated.things import GENERATORS
 from pbrs_farm.dress.style import Style
 

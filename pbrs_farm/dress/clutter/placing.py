@@ -12,7 +12,7 @@ from pbrs_farm.core.house import Room
 from pbrs_farm.dress.clutter.kinds import Stock
 from pbrs_farm.dress.clutter.worktop import Spot, Worktop, turned_size
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.made import Made
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.style import Style
 
 PART = "clutter"

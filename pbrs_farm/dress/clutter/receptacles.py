@@ -9,36 +9,30 @@ from functools import cache
 from importlib import resources
 from types import MappingProxyType
 
+from pbrs_farm.core.classes import (
+    BOOKSHELF,
+    CABINET,
+    COUNTER,
+    DESK,
+    DRESSER,
+    NIGHT_STAND,
+    OTHERFURNITURE,
+    OTHERPROP,
+    REFRIGERATOR,
+    SHELVES,
+    SINK,
+    TABLE,
+    TELEVISION,
+    TOILET,
+)
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.supports import Support
 
-_CABINET, _BED, _CHAIR, _SOFA, _TABLE, _BOOKSHELF, _COUNTER, _DESK, _SHELVES = (
-    3,
-    4,
-    5,
-    6,
-    7,
-    10,
-    12,
-    14,
-    15,
-)
-_DRESSER, _FRIDGE, _TV, _NIGHTSTAND, _TOILET, _SINK, _LAMP, _BATHTUB = (
-    17,
-    24,
-    25,
-    32,
-    33,
-    34,
-    35,
-    36,
-)
-_OTHER_FURNITURE, _OTHER_STRUCTURE, _OTHER_PROP = 39, 38, 40
 _MACHINES = ("cooker", "stove", "oven", "washer", "washing", "dryer", "dishwasher", "fridge")
 _HOLDERS = frozenset({
-    _CABINET, _TABLE, _BOOKSHELF, _COUNTER, _DESK, _SHELVES, _DRESSER, _FRIDGE, _TV, _NIGHTSTAND,
-    _TOILET, _SINK, _OTHER_FURNITURE, _OTHER_PROP,
+    CABINET, TABLE, BOOKSHELF, COUNTER, DESK, SHELVES, DRESSER, REFRIGERATOR, TELEVISION, NIGHT_STAND,
+    TOILET, SINK, OTHERFURNITURE, OTHERPROP,
 })  # fmt: skip
 
 # Square metres for which the table's shares hold; larger and smaller ones have more and less.
@@ -82,10 +76,10 @@ def receptacle_of(item: Item, support: Support, kind: RoomKind) -> str:
     """The table's name for a support of an item in a room of that kind; "" holds nothing."""
     at, name = support.above_floor, item.name.casefold()
     if kind is RoomKind.OUTDOOR:
-        return "outdoor_table" if item.nyu40 in (_TABLE, _NIGHTSTAND) and at > 0.25 else ""
+        return "outdoor_table" if item.nyu40 in (TABLE, NIGHT_STAND) and at > 0.25 else ""
     if kind is RoomKind.STORE and at < 1.6:
         return "store_top"
-    if item.nyu40 in (_BOOKSHELF, _SHELVES):
+    if item.nyu40 in (BOOKSHELF, SHELVES):
         return "bath_shelf" if kind is RoomKind.BATHROOM else "shelf"
     is_inner = float(item.bounds[1, 1]) - support.height > 0.1
     if is_inner and at < 0.8 and any(word in name for word in _MACHINES):
@@ -93,11 +87,11 @@ def receptacle_of(item: Item, support: Support, kind: RoomKind) -> str:
     if (
         is_inner
         and at < 1.9
-        and item.nyu40 in (_CABINET, _DRESSER, _TABLE, _NIGHTSTAND, _TV, _OTHER_FURNITURE)
+        and item.nyu40 in (CABINET, DRESSER, TABLE, NIGHT_STAND, TELEVISION, OTHERFURNITURE)
     ):
         # Boards inside what is no bookcase.
         free = float(support.clear[support.mask].max())
-        if item.nyu40 == _CABINET and free > 0.25 and kind is RoomKind.BEDROOM:
+        if item.nyu40 == CABINET and free > 0.25 and kind is RoomKind.BEDROOM:
             return "clothes_shelf"
         return "cubby" if at < 1.2 else "cabinet_top"
     return _top_of(item, name, at, kind)
@@ -105,17 +99,17 @@ def receptacle_of(item: Item, support: Support, kind: RoomKind) -> str:
 
 def _top_of(item: Item, name: str, at: float, kind: RoomKind) -> str:
     # Tops by class, height and the room.
-    if item.nyu40 == _TOILET:
+    if item.nyu40 == TOILET:
         return "toilet" if at > 0.55 else ""
-    if item.nyu40 == _SINK:
+    if item.nyu40 == SINK:
         return "sink" if kind is RoomKind.KITCHEN or kind is RoomKind.LIVING else "basin"
-    if item.nyu40 == _FRIDGE:
+    if item.nyu40 == REFRIGERATOR:
         return "fridge_top" if at > 1.0 else "counter"
     if any(word in name for word in ("cooker", "stove", "hob", "oven")):
         return "stove" if 0.75 < at < 1.0 else ""
     if any(word in name for word in ("washer", "washing", "dryer")):
         return "counter" if kind is RoomKind.KITCHEN else "washer"
-    if "dishwasher" in name or item.nyu40 == _COUNTER:
+    if "dishwasher" in name or item.nyu40 == COUNTER:
         return "counter" if 0.7 < at < 1.2 else ""
     if "piano" in name:
         return "piano" if at > 0.7 else ""
@@ -125,34 +119,34 @@ def _top_of(item: Item, name: str, at: float, kind: RoomKind) -> str:
         return ""
     if at > 1.45:
         return "upper_cabinet_top" if kind is RoomKind.KITCHEN else "cabinet_top"
-    if kind is RoomKind.KITCHEN and item.nyu40 in (_CABINET, _OTHER_FURNITURE, _DRESSER):
+    if kind is RoomKind.KITCHEN and item.nyu40 in (CABINET, OTHERFURNITURE, DRESSER):
         return "counter" if at > 0.6 else ""
     return _table_of(item, name, at, kind)
 
 
 def _table_of(item: Item, name: str, at: float, kind: RoomKind) -> str:
-    if item.nyu40 == _DESK or (
-        item.nyu40 == _TABLE and kind in (RoomKind.BEDROOM, RoomKind.OFFICE) and at > 0.6
+    if item.nyu40 == DESK or (
+        item.nyu40 == TABLE and kind in (RoomKind.BEDROOM, RoomKind.OFFICE) and at > 0.6
     ):
         return "desk" if at > 0.5 else ""
-    if item.nyu40 == _TV:
+    if item.nyu40 == TELEVISION:
         is_stand = any(word in name for word in ("unit", "stand", "cabinet"))
         return "tv_stand" if at < 0.75 and is_stand else ""
     if any(word in name for word in ("tv stand", "tv unit", "tv table", "television")) and at < 0.9:
         return "tv_stand"
-    if item.nyu40 in (_TABLE, _NIGHTSTAND):
+    if item.nyu40 in (TABLE, NIGHT_STAND):
         if at < 0.3:
             return ""
         low, high = item.bounds
         small = float((high[0] - low[0]) * (high[2] - low[2])) < 0.36
         if at < 0.6:
             return "side_table" if small else "coffee_table"
-        if small or item.nyu40 == _NIGHTSTAND:
+        if small or item.nyu40 == NIGHT_STAND:
             return "side_table" if small else "dresser"
         return "dining_table"
     if kind is RoomKind.BATHROOM:
         return "basin" if at < 1.2 else "bath_shelf"
-    if item.nyu40 in (_DRESSER, _CABINET):
+    if item.nyu40 in (DRESSER, CABINET):
         return "dresser" if at > 0.3 else ""
     return "other_top" if at > 0.3 else ""
 

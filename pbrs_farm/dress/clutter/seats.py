@@ -10,7 +10,7 @@ from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.dress.clutter.beds import TOUCH_M, put_as_it_is
 from pbrs_farm.dress.clutter.placing import Placing
-from pbrs_farm.dress.generated.made import Made
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.generated.soft import cushion
 from pbrs_farm.dress.generated.turned import smooth
 from pbrs_farm.dress.supports.exact_heights import heights_under

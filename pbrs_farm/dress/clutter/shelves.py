@@ -9,8 +9,8 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.worktop import Spot, Worktop
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.generated.books import leaning_book, run_of_books, stack_of_books
-from pbrs_farm.dress.generated.made import Made
 from pbrs_farm.dress.space.room_kinds import RoomKind
 
 _LEAST_BOOK_M = 0.14  # free height that upright books need

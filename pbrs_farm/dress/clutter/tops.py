@@ -11,7 +11,7 @@ from pbrs_farm.dress.clutter.kinds import is_round
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.receptacles import shares, usual_area
 from pbrs_farm.dress.clutter.worktop import Worktop
-from pbrs_farm.dress.generated.made import Made
+from pbrs_farm.dress.generated.assembly import Made
 
 _MOST_OF_A_KIND = 3
 _ANOTHER = 0.35  # chance of one more of the kind

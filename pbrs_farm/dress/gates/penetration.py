@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import BLINDS, CURTAIN, FLOOR_MAT
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.dress.gates.bodies import Body, Shell, boxes_of
 from pbrs_farm.dress.gates.crossing import crossing_m
@@ -22,7 +23,6 @@ from pbrs_farm.dress.space.surface_points import surface_points
 MOST_M: Final = 0.01
 _SPACING_M: Final = 0.015  # of points on open meshes
 _MOST_POINTS: Final = 500  # of one shell in another
-_FLOOR_MAT, _CURTAIN, _BLINDS = 20, 16, 13  # NYU40
 _UNMEASURED = (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.PERSON)
 _BEHIND_CURTAINS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
 
@@ -50,9 +50,9 @@ def _box_depth(low: F64, high: F64, lows: F64, highs: F64) -> F64:
 def is_allowed(a: Body, b: Body) -> bool:
     """Whether two things may share space: rugs under legs, curtains against walls and windows."""
     for one, other in ((a, b), (b, a)):
-        if one.is_new and one.item.nyu40 == _FLOOR_MAT:
+        if one.is_new and one.item.nyu40 == FLOOR_MAT:
             return True
-        if one.item.nyu40 in (_CURTAIN, _BLINDS) and other.item.kind in _BEHIND_CURTAINS:
+        if one.item.nyu40 in (CURTAIN, BLINDS) and other.item.kind in _BEHIND_CURTAINS:
             return True
     return False
 

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.classes import BLINDS, CURTAIN, FLOOR_MAT, SHOWER_CURTAIN
 from pbrs_farm.core.mesh import clipped_to_box
 from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace, doors_are_joined, floor_bitmap
@@ -25,7 +26,7 @@ _BESIDE_M: Final = 0.01  # of a door's width, at either end
 _BEFORE_WINDOW_M: Final = 0.6
 _CELL_M: Final = 0.05
 _ROUNDING_M: Final = 1e-6
-_CURTAINS: Final = frozenset({13, 16, 20})  # NYU40: blinds, curtains, floor mats
+_CURTAINS: Final = frozenset({BLINDS, CURTAIN, FLOOR_MAT, SHOWER_CURTAIN})
 
 
 @dataclass(frozen=True, slots=True)

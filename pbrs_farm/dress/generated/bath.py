@@ -6,7 +6,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.dress.generated.made import Made, Part, any_colour, made, plain, transformed
+from pbrs_farm.dress.generated.assembly import Made, Part, any_colour, made, plain, transformed
 from pbrs_farm.dress.generated.tableware import china
 from pbrs_farm.dress.generated.turned import bulged, slab, turned, vessel
 from pbrs_farm.dress.style import Rgb, Style

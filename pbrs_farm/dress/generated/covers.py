@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.house import Material, Texture
-from pbrs_farm.dress.generated.made import any_colour
+from pbrs_farm.dress.generated.assembly import any_colour
 from pbrs_farm.dress.style import Rgb, Style, shade
 
 _EDGE_PX = 1024

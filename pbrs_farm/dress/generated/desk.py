@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
-from pbrs_farm.dress.generated.made import Made, Part, any_colour, made, plain, transformed
+from pbrs_farm.dress.generated.assembly import Made, Part, any_colour, made, plain, transformed
 from pbrs_farm.dress.generated.turned import slab, turned, vessel
 from pbrs_farm.dress.style import Rgb, Style, shade
 
-PAPER = 26
 _LYING_PEN: F64 = np.array([[0.0, 1.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
 
 
@@ -131,4 +131,4 @@ def magazine_file(rng: np.random.Generator, style: Style) -> Made:
         label = slab((x + 0.008, 0.12, 0), (x + w - 0.008, 0.26, 0.0006))
         parts.append((label, plain("label", (0.92, 0.92, 0.9), 0.8)))
         x += w + 0.0005
-    return made("binders", parts, group="office_small", nyu40=23)
+    return made("binders", parts, group="office_small", nyu40=BOOKS)

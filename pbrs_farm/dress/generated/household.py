@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import BAG, BOX, CLOTHES, PICTURE
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.primitives import box
-from pbrs_farm.dress.generated.made import (
+from pbrs_farm.dress.generated.assembly import (
     Made,
     Part,
     any_colour,
@@ -20,8 +21,6 @@ from pbrs_farm.dress.generated.made import (
 from pbrs_farm.dress.generated.tableware import china
 from pbrs_farm.dress.generated.turned import slab, turned, vessel
 from pbrs_farm.dress.style import Rgb, Style, mix, shade
-
-BOX, PICTURE, BAG = 29, 11, 37
 
 
 def storage_box(rng: np.random.Generator, style: Style) -> Made:
@@ -79,15 +78,19 @@ def shelf_basket(rng: np.random.Generator, style: Style) -> Made:
     weave = plain(
         "wicker", mix((0.66, 0.52, 0.36), style.textiles[0], float(rng.choice([0.0, 0.8]))), 0.9
     )
-    t = 0.008
-    sides = [
+    sides = _open_box(w, h, d, 0.008)
+    return made("shelf_basket", [(s, weave) for s in sides], group="basket", nyu40=BOX)
+
+
+def _open_box(w: float, h: float, d: float, t: float) -> list[Surface]:
+    """A bottom and four sides of thickness t."""
+    return [
         slab((-w / 2, 0, -d / 2), (w / 2, t, d / 2)),
         slab((-w / 2, t, -d / 2), (-w / 2 + t, h, d / 2)),
         slab((w / 2 - t, t, -d / 2), (w / 2, h, d / 2)),
         slab((-w / 2 + t, t, -d / 2), (w / 2 - t, h, -d / 2 + t)),
         slab((-w / 2 + t, t, d / 2 - t), (w / 2 - t, h, d / 2)),
     ]
-    return made("shelf_basket", [(s, weave) for s in sides], group="basket", nyu40=BOX)
 
 
 def vase(rng: np.random.Generator, style: Style) -> Made:
@@ -275,13 +278,7 @@ def bag(rng: np.random.Generator, style: Style) -> Made:
     )
     cloth = plain("bag", any_colour(rng, style), 0.85)
     t = 0.004
-    sides = [
-        slab((-w / 2, 0, -d / 2), (w / 2, t, d / 2)),
-        slab((-w / 2, t, -d / 2), (-w / 2 + t, h, d / 2)),
-        slab((w / 2 - t, t, -d / 2), (w / 2, h, d / 2)),
-        slab((-w / 2 + t, t, -d / 2), (w / 2 - t, h, -d / 2 + t)),
-        slab((-w / 2 + t, t, d / 2 - t), (w / 2 - t, h, d / 2)),
-    ]
+    sides = _open_box(w, h, d, t)
     for z in (-d / 2, d / 2 - t):
         for x in (-0.075, 0.063):
             sides.append(slab((x, h, z), (x + 0.012, h + 0.11, z + t)))
@@ -300,7 +297,7 @@ def shoes(rng: np.random.Generator, style: Style) -> Made:
         rotation: F64 = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
         parts.append((transformed(_shoe_sole(), rotation, (side, 0, 0)), sole))
         parts.append((transformed(_shoe_upper(), rotation, (side, 0.022, 0)), upper))
-    return made("shoes", parts, group="shoes", nyu40=21)
+    return made("shoes", parts, group="shoes", nyu40=CLOTHES)
 
 
 def _shoe_sole() -> Surface:

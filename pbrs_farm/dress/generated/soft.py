@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from pbrs_farm.dress.generated.made import Made, Part, made, plain, transformed
+from pbrs_farm.core.classes import CLOTHES, PAPER, PILLOW, TOWEL
+from pbrs_farm.dress.generated.assembly import Made, Part, made, plain, transformed
 from pbrs_farm.dress.generated.turned import bulged, turned
 from pbrs_farm.dress.style import Rgb, Style, mix, shade
-
-PILLOW, TOWEL, CLOTHES = 18, 27, 21
 
 
 def cushion(rng: np.random.Generator, style: Style) -> Made:
@@ -66,7 +65,7 @@ def folded_blanket(rng: np.random.Generator, style: Style) -> Made:
     """A folded blanket."""
     colour = style.textiles[int(rng.integers(len(style.textiles)))]
     parts = folded(rng, (0.42, 0.03, 0.32), int(rng.integers(2, 4)), colour, "blanket")
-    return made("folded_blanket", parts, group="blanket", nyu40=40)
+    return made("folded_blanket", parts, group="blanket")
 
 
 def folded_clothes(rng: np.random.Generator, style: Style) -> Made:
@@ -100,6 +99,3 @@ def kitchen_roll(rng: np.random.Generator, style: Style) -> Made:
     )
     part = (replace(roll, name="roll"), plain("tissue", (0.92, 0.92, 0.9), 0.95))
     return made("kitchen_roll", [part], group="kitchen_tool", nyu40=PAPER)
-
-
-PAPER = 26

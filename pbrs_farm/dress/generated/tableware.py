@@ -8,7 +8,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.core.primitives import sphere
-from pbrs_farm.dress.generated.made import (
+from pbrs_farm.dress.generated.assembly import (
     Made,
     Part,
     any_colour,

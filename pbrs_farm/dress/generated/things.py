@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.dress.generated import bath, desk, household, soft, tableware
-from pbrs_farm.dress.generated.made import Made
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.style import Style
 
 Generator = Callable[[np.random.Generator, Style], Made]

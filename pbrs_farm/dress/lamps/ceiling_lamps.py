@@ -7,6 +7,7 @@ import shapely
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.classes import TABLE
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.lamps.generated_lamps import (
     ceiling_dome,
@@ -26,7 +27,6 @@ _TABLE_M = 1.45  # of a lamp over a table, above the floor
 _FROM_WALL_M = 0.25  # of a lamp's edge
 _MOST_ROOM_M = 3.6  # a higher ceiling is out of a cord's reach
 _GRID_M = 0.15
-_TABLE = 7  # NYU40
 _PLAIN = (RoomKind.BATHROOM, RoomKind.HALL, RoomKind.KITCHEN, RoomKind.STORE)
 # Pieces that suit every room, by words of their names; tubes are for rooms where people work.
 _TUBES, _NOWHERE = ("fluorescent",), ("spotlight",)
@@ -116,7 +116,7 @@ def _places(draft: Draft, space: HouseSpace, room: RoomSpace) -> list[tuple[F64,
     for number in room.items:
         item, (low, high) = draft.items[number], space.bounds[number]
         size = high - low
-        if item.nyu40 == _TABLE and size[1] > 0.6 and min(size[0], size[2]) > 0.7:
+        if item.nyu40 == TABLE and size[1] > 0.6 and min(size[0], size[2]) > 0.7:
             places.append(((low + high) / 2)[[0, 2]])
             lows.append(floor + _TABLE_M)
     grid = _grid(room)

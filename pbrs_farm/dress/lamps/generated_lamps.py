@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from pbrs_farm.core.catalogue import Piece, Place, Shape
+from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.house import ItemKind, LightPart, Material, MaterialKind, Surface
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.primitives import lathe, sphere
 from pbrs_farm.dress.style import Style
 
-_LAMP = 35  # NYU40
 _WARM = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
 _O = np.zeros(3)
 
@@ -98,7 +98,7 @@ def _lamp(
     group = {Place.CEILING: "ceiling_lamp", Place.FLOOR: "floor_lamp"}.get(place, "table_lamp")
     name = family.replace("_", " ").capitalize()
     piece = Piece(
-        f"generated#{family}", name, group, place, _LAMP, (w, d, h), ItemKind.LAMP,
+        f"generated#{family}", name, group, place, LAMP, (w, d, h), ItemKind.LAMP,
         library="generated",
     )  # fmt: skip
     return piece, shape

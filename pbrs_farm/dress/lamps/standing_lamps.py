@@ -7,6 +7,7 @@ import shapely
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.classes import NIGHT_STAND, SOFA
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.lamps.generated_lamps import floor_lamp, table_lamp, with_flux
@@ -16,7 +17,6 @@ from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import next_id
 
 PART = "lamps"
-_SOFA, _NIGHT_STAND = 6, 32  # NYU40
 _BY_SOFA, _BY_BED = 0.55, 0.7  # how often
 _FLOOR_LM, _TABLE_LM = 900.0, 400.0
 _UPSIDE_DOWN = np.array([1.0, -1.0, 1.0])
@@ -31,7 +31,7 @@ def stand_by_sofas(
     has_one = any(
         draft.items[n].kind is ItemKind.LAMP and _stands(space, room, n) for n in room.items
     )
-    sofas = [n for n in room.items if draft.items[n].nyu40 == _SOFA]
+    sofas = [n for n in room.items if draft.items[n].nyu40 == SOFA]
     if has_one or not sofas or rng.random() >= _BY_SOFA:
         return
     piece, shape = _drawn(catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
@@ -54,7 +54,7 @@ def stand_by_beds(
     """The same lamp on every nightstand of the room that is free."""
     space = house_space(draft)
     room = space.room(room_id)
-    stands = [n for n in room.items if draft.items[n].nyu40 == _NIGHT_STAND]
+    stands = [n for n in room.items if draft.items[n].nyu40 == NIGHT_STAND]
     if not stands or rng.random() >= _BY_BED:
         return
     piece, shape = _drawn(catalogue, "table_lamp", rng) or table_lamp(rng, style)

@@ -7,7 +7,28 @@ import re
 from enum import StrEnum
 from typing import Final
 
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import (
+    BATHTUB,
+    BED,
+    BOOKSHELF,
+    CABINET,
+    CHAIR,
+    COUNTER,
+    DESK,
+    DOOR,
+    DRESSER,
+    NIGHT_STAND,
+    OTHERFURNITURE,
+    OTHERPROP,
+    PILLOW,
+    REFRIGERATOR,
+    SHELVES,
+    SINK,
+    SOFA,
+    TABLE,
+    TOILET,
+    TOWEL,
+)
 from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind
 from pbrs_farm.dress.style import Rgb
 
@@ -22,19 +43,11 @@ class PartKind(StrEnum):
     OTHER = "other"  # stays as it is
 
 
-_WOODEN: Final = frozenset(
-    NYU40_NAMES.index(name)
-    for name in (
-        "cabinet", "bed", "chair", "sofa", "table", "desk", "bookshelf", "shelves", "dresser",
-        "night stand", "counter", "door",
-    )
-)  # fmt: skip
-_UPHOLSTERED: Final = frozenset(NYU40_NAMES.index(name) for name in ("bed", "sofa", "pillow"))
-_BED: Final = NYU40_NAMES.index("bed")
-_WET: Final = frozenset(
-    NYU40_NAMES.index(n)
-    for n in ("sink", "bathtub", "toilet", "refrigerator", "otherfurniture", "otherprop", "towel")
-)
+_WOODEN: Final = frozenset({
+    BED, BOOKSHELF, CABINET, CHAIR, COUNTER, DESK, DOOR, DRESSER, NIGHT_STAND, SHELVES, SOFA, TABLE,
+})  # fmt: skip
+_UPHOLSTERED: Final = frozenset({BED, SOFA, PILLOW})
+_WET: Final = frozenset({SINK, BATHTUB, TOILET, REFRIGERATOR, OTHERFURNITURE, OTHERPROP, TOWEL})
 _WOODEN_GROUPS: Final = frozenset(
     {"tv_stand", "wardrobe", "piano", "ottoman", "sink", "base_cabinet", "upper_cabinet"}
 )
@@ -89,7 +102,7 @@ def kind_by_name(name: str) -> PartKind | None:
 
 def is_bed(item: Item) -> bool:
     """Whether it is a bed."""
-    return item.nyu40 == _BED
+    return item.nyu40 == BED
 
 
 def has_taps(item: Item) -> bool:

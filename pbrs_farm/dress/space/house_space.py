@@ -10,6 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import FLOOR_MAT
 from pbrs_farm.core.house import Item, ItemKind, Room
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.dress.draft import Draft
@@ -30,7 +31,6 @@ from pbrs_farm.dress.space.wall_faces import Hidden, WallFace, hidden_cells, wal
 _ABOVE_FLOOR_M = 0.5  # structure lower than this above a floor is no ceiling
 _CHEST_M = 1.2  # above the floor, where walls are cut for their plan
 _INSIDE_SHARE = 0.34  # of a thing's points, in its room
-_RUG = 20  # NYU40
 _STRUCTURE = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND)
 
 
@@ -223,7 +223,7 @@ def _filled(
     face: WallFace, items: Sequence[Item], points: Sequence[F64], bounds: F64, kept: _Kept
 ) -> WallFace:
     """The empty face with what stands or hangs before it now; rugs do not count."""
-    near = [n for n in meeting(bounds, reach_of(face)) if items[n].nyu40 != _RUG]
+    near = [n for n in meeting(bounds, reach_of(face)) if items[n].nyu40 != FLOOR_MAT]
     key = tuple(id(items[n]) for n in near)
     known = kept.faces.get(id(face))
     if known is None or known[0] != key:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 from functools import lru_cache
 
+from pbrs_farm.core.classes import BATHTUB, BED, DESK, REFRIGERATOR, SINK, SOFA, TABLE, TOILET
 from pbrs_farm.core.house import Item, Room
 
 
@@ -77,7 +78,6 @@ _WITHIN = (
     (RoomKind.HALL, "走廊 玄关 玄關 过道 廊下 玄関"),
 )
 
-_BED, _SOFA, _TABLE, _DESK, _TOILET, _SINK, _BATHTUB, _FRIDGE = 4, 6, 7, 14, 33, 34, 36, 24
 _LARGE_M2 = 9.0
 
 
@@ -88,13 +88,13 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
         return named
     has = {item.nyu40 for item in items}
     for kind, classes in (
-        (RoomKind.BATHROOM, {_TOILET, _BATHTUB}),
-        (RoomKind.BEDROOM, {_BED}),
-        (RoomKind.KITCHEN, {_FRIDGE}),
-        (RoomKind.LIVING, {_SOFA}),
-        (RoomKind.OFFICE, {_DESK}),
-        (RoomKind.DINING, {_TABLE}),
-        (RoomKind.BATHROOM, {_SINK}),
+        (RoomKind.BATHROOM, {TOILET, BATHTUB}),
+        (RoomKind.BEDROOM, {BED}),
+        (RoomKind.KITCHEN, {REFRIGERATOR}),
+        (RoomKind.LIVING, {SOFA}),
+        (RoomKind.OFFICE, {DESK}),
+        (RoomKind.DINING, {TABLE}),
+        (RoomKind.BATHROOM, {SINK}),
     ):
         if has & classes:
             return kind

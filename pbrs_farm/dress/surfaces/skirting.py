@@ -10,6 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import WALL
 from pbrs_farm.core.house import House, Item, ItemKind, Room, Surface
 from pbrs_farm.dress.space.footprints import areal, plan_area
 
@@ -69,7 +70,7 @@ def skirting_board(
         return None
     return Item(
         id=f"dress-skirting-{room.id}", name=f"Skirting board of {room.name or room.id}",
-        kind=ItemKind.WALL, level_id=room.level_id, surfaces=tuple(surfaces), nyu40=1,
+        kind=ItemKind.WALL, level_id=room.level_id, surfaces=tuple(surfaces), nyu40=WALL,
         source_class=BASEBOARD, tags=(BASEBOARD, "dressed:generated#skirting board"),
     )  # fmt: skip
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece
+from pbrs_farm.core.classes import TABLE
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Item
 
 _UPRIGHT: Final = 0.999  # cosine to the vertical of what is not tilted
 _HIGH_PART: Final = 0.25  # of the height, at the top: where the back of a seat is
 _CLEAR: Final = 0.12  # of the depth: how far the top must lie behind the middle
-_TABLE: Final = 7  # nyu40
 _HIGH_TABLE_M: Final = 0.62  # one eats or works at what is higher
 _BACKED: Final = frozenset({"chair", "office_chair", "armchair", "sofa", "bed"})
 
@@ -124,7 +124,7 @@ def group_of_item(item: Item, catalogue: Mapping[str, Piece]) -> str:
     piece = catalogue.get(plain_id(item.source_class))
     if piece is not None and (piece.nyu40 == item.nyu40 or piece.group in HELD):
         return piece.group
-    if item.nyu40 == _TABLE:
+    if item.nyu40 == TABLE:
         low, high = item.bounds
         return "dining_table" if high[1] - low[1] > _HIGH_TABLE_M else "coffee_table"
     return _GROUP_OF_CLASS.get(item.nyu40, "")

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import Box, Item, LightPart, Surface
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.surface_points import item_triangles
@@ -35,7 +36,6 @@ FREE_CUBES: Final = 6  # of 2 cm, shared with neighbours beyond what the old one
 _TRIES: Final = 5  # pieces that are tried for a set
 _MOST_LIFT_M: Final = 0.3  # a thing that stands on it goes no farther up or down
 _UNDER_TABLES: Final = frozenset({"dining_table", "desk", "coffee_table"})
-_SEATS: Final = 5  # nyu40 of what is pushed under a table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,7 +90,7 @@ def _members(
             return None
         on, inside = things_on(around, index)
         if group in _UNDER_TABLES:
-            inside = [k for k in inside if draft.items[k].nyu40 != _SEATS]
+            inside = [k for k in inside if draft.items[k].nyu40 != CHAIR]
         if inside:
             draft.refused[f"{PART}: things stand in it or under it"] += 1
             return None

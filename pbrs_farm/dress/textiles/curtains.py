@@ -9,18 +9,19 @@ import shapely
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place, Shape
+from pbrs_farm.core.classes import BLINDS, CURTAIN
 from pbrs_farm.core.house import Item, ItemKind, Material, Surface
 from pbrs_farm.core.primitives import box, sphere
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.generated.assembly import metal, plain
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
 from pbrs_farm.dress.style import Style, mix, shade
 from pbrs_farm.dress.textiles.cloth import Folds, bar, panel
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
-from pbrs_farm.dress.walls.frames import made, metal_of, plain
 from pbrs_farm.dress.walls.hanging import GAP_M, next_id
+from pbrs_farm.dress.walls.hung_things import hung
 
 PART = "textiles"
-CURTAIN, BLINDS = 16, 13  # NYU40
 _FROM_FLOOR_M = 0.015
 _OVER_WINDOW_M = 0.12  # of the rod above the hole
 _UNDER_CEILING_M = 0.05
@@ -163,7 +164,7 @@ def room_cloth(draft: Draft, style: Style, room: RoomSpace, rng: np.random.Gener
     pattern = pattern_material(draft, Pattern(family, int(rng.integers(4)), (_rounded(tint),)))
     return Cloth(
         draft.materials[pattern.number], pattern.size_m[0], float(rng.uniform(0.12, 0.18)),
-        metal_of(style) if rng.random() < 0.6 else plain("rod", style.wood.mean, 0.4),
+        metal(style) if rng.random() < 0.6 else plain("rod", style.wood.mean, 0.4),
     )  # fmt: skip
 
 
@@ -187,7 +188,7 @@ def _curtain_set(
         parts.append((sphere("finial", np.array([sign * half, y, rod_z]), 0.022, 0), cloth.rod))
         arm = np.array([sign * (half - 0.06), y - _ROD_M - 0.004, rod_z / 2])
         parts.append((box("bracket", arm, np.array([0.008, 0.006, rod_z / 2]), 0), cloth.rod))
-    piece, shape = made("curtains", "curtain", CURTAIN, parts)
+    piece, shape = hung("curtains", "curtain", CURTAIN, parts)
     return piece, shape, middle
 
 
@@ -213,7 +214,7 @@ def hang_blind(
     for sign in (-1, 1):
         arm = np.array([sign * (half - 0.004), drop - 0.03, (z + 0.02) / 2])
         parts.append((box("holder", arm, np.array([0.004, 0.02, (z + 0.02) / 2]), 0), white))
-    piece, shape = made("blind", "blinds", BLINDS, parts)
+    piece, shape = hung("blind", "blinds", BLINDS, parts)
     _add(draft, room, piece, shape, seen, 0.0, top - drop)
     return True
 

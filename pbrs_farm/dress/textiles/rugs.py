@@ -10,21 +10,21 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.classes import BATHTUB, BED, FLOOR_MAT, SINK, SOFA, TABLE
 from pbrs_farm.core.house import Item, Material
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.generated.assembly import Made, plain
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textiles.rug_patterns import rug_pixels
-from pbrs_farm.dress.walls.frames import Made, jpeg_texture, made, plain, slab
 from pbrs_farm.dress.walls.hanging import next_id
+from pbrs_farm.dress.walls.hung_things import hung, jpeg_texture, slab
 
 PART = "textiles"
-RUG = 20  # NYU40 floor mat
 RUG_TAG = "rug"
 _FROM_WALL_M = 0.3
 _GAP_M = 0.0005  # between the floor and the rug's back
-_SOFA, _BED, _TABLE, _BATHTUB, _SINK = 6, 4, 7, 36, 34
 _SIZES = ((1.6, 2.3), (1.7, 2.4), (2.0, 3.0), (2.0, 2.9), (1.4, 2.0), (1.2, 1.7))
 # Turns a slab that hangs to one that lies, its picture up.
 _LYING = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]], np.float32)
@@ -43,7 +43,7 @@ def rug(
     r, g, b = (round(float(c) / 255, 2) for c in pixels.reshape(-1, 3).mean(0))
     parts = [(face, shown), (back, plain("rug edge", (r, g, b), 1.0))]
     lying = [(replace(s, positions=s.positions @ _LYING.T), m) for s, m in parts]
-    return made("rug", "rug", RUG, lying, [texture], Place.FLOOR)
+    return hung("rug", "rug", FLOOR_MAT, lying, [texture], Place.FLOOR)
 
 
 def lay_rugs(
@@ -66,7 +66,7 @@ def lay_rugs(
 def _by_sofa(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    sofas = _things(draft, room, _SOFA)
+    sofas = _things(draft, room, SOFA)
     if not sofas:
         if room.kind is RoomKind.LIVING:
             _by_table(draft, space, room, style, rng)
@@ -77,7 +77,7 @@ def _by_sofa(
     middle = box.centre + front * (float(box.half[2]) + 0.65)
     tables = [
         draft.items[n].oriented_box.centre
-        for n in _things(draft, room, _TABLE)
+        for n in _things(draft, room, TABLE)
         if np.linalg.norm((draft.items[n].oriented_box.centre - middle)[[0, 2]]) < 1.0
     ]
     if tables:
@@ -89,7 +89,7 @@ def _by_sofa(
 def _by_bed(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    beds = _things(draft, room, _BED)
+    beds = _things(draft, room, BED)
     if not beds:
         return
     box = max((draft.items[n].oriented_box for n in beds), key=lambda b: float(b.half[0]))
@@ -115,7 +115,7 @@ def _by_bed(
 def _by_table(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    boxes = [draft.items[n].oriented_box for n in _things(draft, room, _TABLE)]
+    boxes = [draft.items[n].oriented_box for n in _things(draft, room, TABLE)]
     large = [b for b in boxes if min(b.half[0], b.half[2]) > 0.35]
     if not large:
         return
@@ -133,7 +133,7 @@ def _by_table(
 def _bath_mat(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    for wanted in (_BATHTUB, _SINK):
+    for wanted in (BATHTUB, SINK):
         for number in _things(draft, room, wanted):
             box = draft.items[number].oriented_box
             for axis, sign in ((2, 1.0), (0, 1.0), (0, -1.0)):
@@ -251,7 +251,7 @@ def _floor_mats(draft: Draft, space: HouseSpace, room: RoomSpace) -> BaseGeometr
     shapes = []
     for n in room.items:
         low, high = space.bounds[n]
-        if draft.items[n].nyu40 == RUG or high[1] < room.room.floor_y + 0.05:
+        if draft.items[n].nyu40 == FLOOR_MAT or high[1] < room.room.floor_y + 0.05:
             shapes.append(shapely.box(low[0], low[2], high[0], high[2]))
     return shapely.union_all(shapes)
 

@@ -5,19 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Place
+from pbrs_farm.core.classes import SINK, TOWEL
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.generated.assembly import Made, metal
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style, mix
 from pbrs_farm.dress.textiles.cloth import bar, towel_over_bar
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
-from pbrs_farm.dress.walls.frames import Made, made, metal_of
 from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.dress.walls.hung_things import hung
 
 PART = "textiles"
-TOWEL, _SINK = 27, 34  # NYU40
 _RAIL_M = 1.25  # above the floor
 _FAR_M = 2.5  # from the basin
 
@@ -61,15 +62,15 @@ def towel_rail(draft: Draft, style: Style, rng: np.random.Generator) -> Made:
     tint = mix(style.textiles[int(rng.integers(len(style.textiles)))], (0.93, 0.92, 0.9), float(rng.choice([0.0, 0.4, 0.85])))  # fmt: skip
     r, g, b = (round(c, 2) for c in tint)
     pattern = pattern_material(draft, Pattern("loop carpet", int(rng.integers(3)), ((r, g, b),)))
-    metal = metal_of(style)
+    steel = metal(style)
     parts: list[tuple[Surface, Material]] = [
         (towel_over_bar(towel, drop, z, rng), draft.materials[pattern.number]),
-        (bar("rail", -width / 2, width / 2, drop, z, 0.009), metal),
+        (bar("rail", -width / 2, width / 2, drop, z, 0.009), steel),
     ]
     for sign in (-1, 1):
         arm = np.array([sign * (width / 2 - 0.01), drop, z / 2])
-        parts.append((box("arm", arm, np.array([0.008, 0.008, z / 2]), 0), metal))
-    return made("towel_rail", "towel", TOWEL, parts)
+        parts.append((box("arm", arm, np.array([0.008, 0.008, z / 2]), 0), steel))
+    return hung("towel_rail", "towel", TOWEL, parts)
 
 
 def _nearest(
@@ -77,7 +78,7 @@ def _nearest(
     heights: tuple[float, float], depth: float,
 ) -> tuple[int, float] | None:  # fmt: skip
     """(face, s) of the free place nearest to a basin of the room, within reach; None = none."""
-    basins = [space.bounds[n].mean(0) for n in room.items if draft.items[n].nyu40 == _SINK]
+    basins = [space.bounds[n].mean(0) for n in room.items if draft.items[n].nyu40 == SINK]
     best: tuple[float, int, float] | None = None
     for k, face in enumerate(hanging.faces):
         for s in face.starts(width + 0.06, heights[0], heights[1] + 0.05, depth + 0.15):

@@ -13,6 +13,16 @@ import numpy as np
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import WOODS, Rgb, Wood
+from pbrs_farm.dress.textures.laid_tiles import (
+    Glaze,
+    Laying,
+    brick_maps,
+    cut_from,
+    marble,
+    terracotta_maps,
+    tile_grid,
+    tile_maps,
+)
 from pbrs_farm.dress.textures.maps import SurfaceMaps, encoded
 from pbrs_farm.dress.textures.plain import (
     carpet_maps,
@@ -30,16 +40,6 @@ from pbrs_farm.dress.textures.planks import (
     herringbone,
     plank_maps,
     rows_of_planks,
-)
-from pbrs_farm.dress.textures.tiles import (
-    Glaze,
-    Laying,
-    brick_maps,
-    cut_from,
-    marble,
-    terracotta_maps,
-    tile_grid,
-    tile_maps,
 )
 from pbrs_farm.dress.textures.wallpaper import wallpaper_maps
 

@@ -44,6 +44,15 @@ class SurfaceMaps:
         return float(self.roughness.mean()) / 255.0
 
 
+def surface_maps(
+    colour: F32, roughness: F32 | float, height_m: F32, size_m: tuple[float, float], gloss: float
+) -> SurfaceMaps:
+    """The maps of a surface: sRGB-encoded colour (H, W, 3), roughness (h, w) or one, height (H, W)."""
+    rough = roughness if isinstance(roughness, float) else roughness_bytes(roughness)
+    normal = normals_from_height(np.asarray(height_m, np.float32), size_m)
+    return SurfaceMaps(colour_bytes(colour), rough, normal, size_m, gloss)
+
+
 def colour_bytes(colour: F32) -> Srgb8Image:
     """(H, W, 3) uint8 of an sRGB-encoded colour 0..1."""
     return np.asarray(np.clip(colour, 0.0, 1.0) * np.float32(255) + np.float32(0.5), np.uint8)

@@ -6,12 +6,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.dress.textures.maps import (
-    SurfaceMaps,
-    colour_bytes,
-    normals_from_height,
-    roughness_bytes,
-)
+from pbrs_farm.dress.textures.maps import SurfaceMaps, surface_maps
 from pbrs_farm.dress.textures.noise import Shape2, blurred, noise, smoothstep
 
 
@@ -24,7 +19,7 @@ def paint_maps(
     stipple = noise(rng, shape, slope=0.5, band=(size_m[0] * 50, min(size_m[0] * 220, per_metre)))
     colour = np.array(tint, np.float32) * (1.0 + 0.005 * clouds + 0.006 * stipple)[..., None]
     height = np.asarray(0.00009 * stipple + 0.0003 * clouds, np.float32)
-    return SurfaceMaps(colour_bytes(colour), 0.85, normals_from_height(height, size_m), size_m, 0.0)
+    return surface_maps(colour, 0.85, height, size_m, 0.0)
 
 
 def plaster_maps(
@@ -41,10 +36,7 @@ def plaster_maps(
     tone = 0.012 * clouds + 0.014 * (strokes - 0.56) + 0.008 * grain
     colour = np.array(tint, np.float32) * (1.0 + np.float32(depth) * tone)[..., None]
     height = depth * (0.00045 * strokes + 0.0006 * clouds + 0.00006 * grain)
-    return SurfaceMaps(
-        colour_bytes(colour), 0.9, normals_from_height(np.asarray(height, np.float32), size_m),
-        size_m, 0.0,
-    )  # fmt: skip
+    return surface_maps(colour, 0.9, height, size_m, 0.0)
 
 
 def concrete_maps(
@@ -59,10 +51,7 @@ def concrete_maps(
     tone = 0.045 * clouds + 0.02 * streaks + 0.014 * grain - 0.22 * pores
     colour = np.array(tint, np.float32) * (1.0 + tone)[..., None]
     height = np.asarray(0.0002 * streaks - 0.0015 * pores, np.float32)
-    return SurfaceMaps(
-        colour_bytes(colour), roughness_bytes(0.62 + 0.05 * clouds),
-        normals_from_height(height, size_m), size_m, 0.15,
-    )  # fmt: skip
+    return surface_maps(colour, 0.62 + 0.05 * clouds, height, size_m, 0.15)
 
 
 def carpet_maps(
@@ -82,10 +71,7 @@ def carpet_maps(
         pile = 1.4 * (loop.astype(np.float32) - 0.4) + 0.6 * pile
     tone = 0.075 * pile + 0.014 * brushed + 0.04 * fleck
     colour = np.array(tint, np.float32) * (1.0 + tone)[..., None]
-    return SurfaceMaps(
-        colour_bytes(colour), 1.0,
-        normals_from_height(np.asarray(0.0009 * pile, np.float32), size_m), size_m, 0.0,
-    )  # fmt: skip
+    return surface_maps(colour, 1.0, 0.0009 * pile, size_m, 0.0)
 
 
 def weave_maps(
@@ -114,10 +100,7 @@ def weave_maps(
     weft = first * np.float32(0.93) if second is None else np.array(second, np.float32)
     colour = np.where(on_top[..., None], first, weft) * light[..., None]
     height = np.asarray(0.25 * size_m[0] / n * (over + 0.15 * slub), np.float32)
-    return SurfaceMaps(
-        colour_bytes(np.asarray(colour, np.float32)), 0.95, normals_from_height(height, size_m),
-        size_m, 0.0,
-    )  # fmt: skip
+    return surface_maps(np.asarray(colour, np.float32), 0.95, height, size_m, 0.0)
 
 
 def leather_maps(
@@ -130,10 +113,7 @@ def leather_maps(
     clouds = noise(rng, shape, slope=2.6, band=(1.0, 40.0))
     colour = np.array(tint, np.float32) * (1.0 + 0.035 * clouds - 0.22 * creases)[..., None]
     height = np.asarray(-0.00035 * creases + 0.0004 * clouds, np.float32)
-    return SurfaceMaps(
-        colour_bytes(colour), roughness_bytes(0.46 + 0.05 * clouds + 0.2 * creases),
-        normals_from_height(height, size_m), size_m, 0.4,
-    )  # fmt: skip
+    return surface_maps(colour, 0.46 + 0.05 * clouds + 0.2 * creases, height, size_m, 0.4)
 
 
 def _cells(rng: np.random.Generator, shape: Shape2, n: int) -> tuple[F32, F32]:

@@ -12,13 +12,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.dress.style import Rgb, Wood, mix, shade
-from pbrs_farm.dress.textures.maps import (
-    SurfaceMaps,
-    colour_bytes,
-    normals_from_height,
-    ramp,
-    roughness_bytes,
-)
+from pbrs_farm.dress.textures.maps import SurfaceMaps, ramp, surface_maps
 from pbrs_farm.dress.textures.noise import Shape2, coverage, halved, noise, sampled, smoothstep
 from pbrs_farm.dress.textures.wood import WoodSheet, wood_sheet
 
@@ -162,10 +156,7 @@ def plank_maps(
     rough = halved(np.asarray(rough, np.float32))
     smudge = noise(rng, (rough.shape[0], rough.shape[1]), slope=2.5)
     rough = rough + 0.015 * np.clip(smudge, -2, 2)
-    return SurfaceMaps(
-        colour_bytes(colour), roughness_bytes(rough), normals_from_height(height, size_m),
-        size_m, look.gloss,
-    )  # fmt: skip
+    return surface_maps(colour, rough, height, size_m, look.gloss)
 
 
 def grain_maps(
@@ -176,12 +167,8 @@ def grain_maps(
     shape = (edge_px, edge_px)
     sheet = wood_sheet(rng, wood, shape, size_m / edge_px)
     colour = ramp(sheet.tone, wood.dark, wood.light)
-    return SurfaceMaps(
-        colour_bytes(colour),
-        roughness_bytes(roughness + 0.12 * (0.62 - sheet.tone)),
-        normals_from_height(0.00005 * sheet.tone, (size_m, size_m)),
-        (size_m, size_m),
-        0.5,
+    return surface_maps(
+        colour, roughness + 0.12 * (0.62 - sheet.tone), 0.00005 * sheet.tone, (size_m, size_m), 0.5
     )
 
 

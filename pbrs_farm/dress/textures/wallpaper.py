@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.dress.textures.maps import SurfaceMaps, colour_bytes, normals_from_height
+from pbrs_farm.dress.textures.maps import SurfaceMaps, surface_maps
 from pbrs_farm.dress.textures.noise import Shape2, noise, smoothstep
 
 WIDTH_M = 0.53  # of a roll
@@ -32,7 +32,7 @@ def wallpaper_maps(
     colour *= (1.0 + 0.010 * paper + 0.004 * clouds)[..., None]
     height = np.asarray(0.00006 * paper + 0.00012 * masks[0], np.float32)
     size_m = (WIDTH_M, WIDTH_M)
-    return SurfaceMaps(colour_bytes(colour), 0.8, normals_from_height(height, size_m), size_m, 0.0)
+    return surface_maps(colour, 0.8, height, size_m, 0.0)
 
 
 def inks(rng: np.random.Generator, ground: Rgb, accent: Rgb) -> tuple[Rgb, Rgb]:

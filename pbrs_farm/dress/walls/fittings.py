@@ -7,25 +7,22 @@ from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.classes import MIRROR, SINK
+from pbrs_farm.dress.generated.assembly import Made, metal, plain
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.walls.frames import (
-    MIRROR,
-    Made,
+from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
+from pbrs_farm.dress.walls.hung_things import (
     clock,
     frame_material,
     jpeg_texture,
-    metal_of,
     mirror,
-    plain,
     plate,
     round_mirror,
     wall_shelf,
 )
-from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
 
-_SINK = 34
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
 _CASING_M = 0.16  # from a door's hole to the middle of its switch
 _CLOCKS = {RoomKind.KITCHEN: 0.6, RoomKind.LIVING: 0.4, RoomKind.OFFICE: 0.5, RoomKind.DINING: 0.3}
@@ -41,7 +38,7 @@ def hang_mirrors(hanging: Hanging, space: HouseSpace, style: Style, share: float
         return
     if room.kind is RoomKind.BATHROOM and rng.random() < share:
         for number in room.items:
-            if hanging.draft.items[number].nyu40 == _SINK:
+            if hanging.draft.items[number].nyu40 == SINK:
                 _over_basin(hanging, space.bounds[number], rng, style)
     if room.kind in (RoomKind.HALL, RoomKind.BEDROOM):
         likely = 0.7 if room.kind is RoomKind.HALL else 0.3
@@ -122,7 +119,7 @@ def hang_shelf(hanging: Hanging, style: Style, share: float) -> None:
     width, depth = float(rng.uniform(0.6, 1.2)), float(rng.uniform(0.18, 0.24))
     wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
     board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
-    made = wall_shelf(width, depth, boards, board, metal_of(style))
+    made = wall_shelf(width, depth, boards, board, metal(style))
     # Boards at head height over free floor would be run into: hang them over furniture or high.
     room_above = 0.32
     low = 1.4 if boards > 1 else 1.5

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import BED, CABINET, CHAIR, DESK, DRESSER, OTHERFURNITURE, SOFA, TABLE
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Rgb, Style, room_style
-from pbrs_farm.dress.walls.frames import Made, canvas, frame_material, framed, jpeg_texture, poster
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
+from pbrs_farm.dress.walls.hung_things import canvas, frame_material, framed, jpeg_texture, poster
 from pbrs_farm.dress.walls.prints import print_pixels
 
 MOST_PICTURES = 6  # in a room
@@ -30,8 +32,11 @@ _GROUPS = {
     RoomKind.HALL: (1, 3), RoomKind.OFFICE: (1, 2), RoomKind.OTHER: (1, 2),
     RoomKind.KITCHEN: (0, 2), RoomKind.BATHROOM: (0, 1),
 }  # fmt: skip
-# Bed, sofa, table, cabinet, desk, dresser, television: pictures hang over them, and seat backs.
-_BENEATH = {4: 1.0, 6: 1.0, 7: 0.5, 3: 0.5, 14: 0.6, 17: 0.8, 39: 0.4, 5: 0.3}
+# Over what pictures hang, and how much it is liked.
+_BENEATH = {
+    BED: 1.0, SOFA: 1.0, DRESSER: 0.8, DESK: 0.6, TABLE: 0.5, CABINET: 0.5, OTHERFURNITURE: 0.4,
+    CHAIR: 0.3,
+}  # fmt: skip
 _LOWEST_M, _TALLEST_BENEATH_M = 0.35, 1.25
 
 

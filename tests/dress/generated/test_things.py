@@ -9,8 +9,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.mesh import closed_edge_share, signed_volume, triangle_corners
 from pbrs_farm.dress.generated import books
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.generated.covers import N_CELLS, book_covers
-from pbrs_farm.dress.generated.made import Made
 from pbrs_farm.dress.generated.things import GENERATORS
 from pbrs_farm.dress.style import style_for
 

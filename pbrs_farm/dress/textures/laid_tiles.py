@@ -9,13 +9,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.dress.textures.maps import (
-    SurfaceMaps,
-    colour_bytes,
-    normals_from_height,
-    ramp,
-    roughness_bytes,
-)
+from pbrs_farm.dress.textures.maps import SurfaceMaps, ramp, surface_maps
 from pbrs_farm.dress.textures.noise import Shape2, coverage, noise, sampled, smoothstep
 
 _INTS = NDArray[np.int64]
@@ -110,10 +104,7 @@ def tile_maps(
     colour += joint[..., None] * (grout * np.float32(0.93) - colour)
     height = -0.0007 * bevel - 0.0006 * joint + 0.00002 * clouds + 0.00002 * joint * grain
     rough = glaze.roughness + joint * (0.85 - glaze.roughness) + 0.012 * clouds
-    return SurfaceMaps(
-        colour_bytes(colour), roughness_bytes(rough),
-        normals_from_height(np.asarray(height, np.float32), size_m), size_m, glaze.gloss,
-    )  # fmt: skip
+    return surface_maps(colour, rough, height, size_m, glaze.gloss)
 
 
 def marble(rng: np.random.Generator, shape: Shape2, light: Rgb, vein: Rgb) -> F32:
@@ -158,10 +149,7 @@ def terracotta_maps(
     colour += joint[..., None] * (mortar * np.float32(0.95) - colour)
     height = -0.0016 * worn - 0.0010 * joint + 0.0003 * clouds + 0.00004 * grain
     rough = 0.48 + 0.05 * clouds + 0.40 * joint
-    return SurfaceMaps(
-        colour_bytes(colour), roughness_bytes(rough),
-        normals_from_height(np.asarray(height, np.float32), size_m), size_m, 0.35,
-    )  # fmt: skip
+    return surface_maps(colour, rough, height, size_m, 0.35)
 
 
 def brick_maps(
@@ -196,10 +184,7 @@ def brick_maps(
         mortar = np.array((0.67, 0.64, 0.59), np.float32) * (1 + 0.06 * grain)[..., None]
         colour = (mortar + brick[..., None] * (colour - mortar)) * (shade * 0.5 + 0.5)[..., None]
         rough = np.asarray(0.88 + 0.04 * grain, np.float32)
-    return SurfaceMaps(
-        colour_bytes(colour), roughness_bytes(rough),
-        normals_from_height(np.asarray(height, np.float32), size_m), size_m, 0.0,
-    )  # fmt: skip
+    return surface_maps(colour, rough, height, size_m, 0.0)
 
 
 def _picks(rng: np.random.Generator, grid: TileGrid, glaze: Glaze) -> _INTS:

@@ -13,27 +13,26 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import Piece, Place, Shape
+from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE, SHELVES
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
 from pbrs_farm.core.primitives import box, lathe, quads_surface
+from pbrs_farm.dress.generated.assembly import GENERATED, Made, metal, plain
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.images import jpeg_from_array
 
-Made = tuple[Piece, Shape]
 Parts = Sequence[tuple[Surface, Material]]
 
-PICTURE, MIRROR, SHELVES, OTHER_PROP = 11, 19, 15, 40
-GENERATED = "generated#"
 _UNIT = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
 _JPEG_QUALITY = 88
 # Turns what stands upright so that its top looks along +z.
 _LYING = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
-def made(
+def hung(
     family: str, group: str, nyu40: int, parts: Parts, textures: Sequence[Texture] = (),
     place: Place = Place.WALL,
 ) -> Made:  # fmt: skip
-    """A generated piece and its shape, from surfaces and the material of each."""
+    """A generated piece that hangs, and its shape: unlike what stands, it keeps its own origin."""
     materials = tuple(dict.fromkeys(m for _s, m in parts))
     surfaces = tuple(replace(s, material=materials.index(m)) for s, m in parts)
     shape = Shape(surfaces, materials, {t.id: t for t in textures})
@@ -48,19 +47,6 @@ def jpeg_texture(name: str, pixels: Srgb8Image) -> Texture:
     return Texture(hashlib.sha256(data).hexdigest()[:16], f"{name}.jpg", "image/jpeg", data)
 
 
-def plain(name: str, colour: Rgb, roughness: float) -> Material:
-    """An opaque material of one colour."""
-    return Material(name, diffuse=_rounded(colour), roughness=roughness)
-
-
-def metal_of(style: Style) -> Material:
-    """The metal of the home's fittings."""
-    dark = (0.03, 0.03, 0.03)
-    return Material(
-        style.metal.name, diffuse=dark, specular=style.metal.colour, roughness=style.metal.roughness
-    )
-
-
 def frame_material(rng: np.random.Generator, style: Style) -> Material:
     """Wood of the home, black, white or metal."""
     kind = rng.random()
@@ -71,7 +57,7 @@ def frame_material(rng: np.random.Generator, style: Style) -> Material:
     if kind < 0.82:
         return plain("frame white", (0.9, 0.9, 0.88), 0.35)
     if kind < 0.92:
-        return metal_of(style)
+        return metal(style)
     return plain("frame dark", shade(style.wood.dark, 0.6), 0.35)
 
 
@@ -121,7 +107,7 @@ def framed(
         inner_low, inner_high, at = inner_low + mat - 0.002, inner_high - mat + 0.002, at - 0.002
     face, back = slab("print", inner_low, inner_high, (0.001, at))
     parts += [(face, shown), (back, plain("card", (0.6, 0.52, 0.42), 0.9))]
-    return made("framed_picture", "picture_frame", PICTURE, parts, [print_])
+    return hung("framed_picture", "picture_frame", PICTURE, parts, [print_])
 
 
 def canvas(width: float, height: float, print_: Texture, edge: Rgb) -> Made:
@@ -129,7 +115,7 @@ def canvas(width: float, height: float, print_: Texture, edge: Rgb) -> Made:
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     face, back = slab("canvas", low, high, (0.0, 0.025 if max(width, height) < 0.8 else 0.035))
     parts = [(face, _printed(print_)), (back, plain("canvas edge", edge, 0.85))]
-    return made("canvas", "picture_frame", PICTURE, parts, [print_])
+    return hung("canvas", "picture_frame", PICTURE, parts, [print_])
 
 
 def poster(width: float, height: float, print_: Texture) -> Made:
@@ -137,7 +123,7 @@ def poster(width: float, height: float, print_: Texture) -> Made:
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     face, back = slab("poster", low, high, (0.0, 0.0015))
     parts = [(face, _printed(print_, 0.5)), (back, plain("paper", (0.92, 0.92, 0.9), 0.8))]
-    return made("poster", "picture_frame", PICTURE, parts, [print_])
+    return hung("poster", "picture_frame", PICTURE, parts, [print_])
 
 
 def mirror(width: float, height: float, frame: Material | None, bar: float = 0.02) -> Made:
@@ -151,7 +137,7 @@ def mirror(width: float, height: float, frame: Material | None, bar: float = 0.0
         low, high, depth = low + bar, high - bar, 0.014
     face, back = slab("mirror", low, high, (0.001 if frame else 0.0, depth))
     parts += [(face, glass), (back, plain("mirror edge", (0.35, 0.4, 0.4), 0.3))]
-    return made("mirror", "mirror", MIRROR, parts)
+    return hung("mirror", "mirror", MIRROR, parts)
 
 
 def round_mirror(diameter: float, frame: Material) -> Made:
@@ -161,7 +147,7 @@ def round_mirror(diameter: float, frame: Material) -> Made:
     rim = np.array([[0, 0], [r, 0], [r, 0.02], [r - 0.014, 0.02], [r - 0.014, 0.012]])
     pane = np.array([[r - 0.014, 0.012], [0, 0.012]])
     parts = [(_disc("rim", rim, r), frame), (_disc("mirror", pane, r), glass)]
-    return made("round_mirror", "mirror", MIRROR, parts)
+    return hung("round_mirror", "mirror", MIRROR, parts)
 
 
 def clock(diameter: float, dial: Texture, frame: Material) -> Made:
@@ -175,7 +161,7 @@ def clock(diameter: float, dial: Texture, frame: Material) -> Made:
         (_disc("rim", rim, r), frame),
         (replace(face, uvs=uv.astype(np.float32)), _printed(dial, 0.4)),
     ]
-    return made("clock", "clock", OTHER_PROP, parts, [dial])
+    return hung("clock", "clock", OTHERPROP, parts, [dial])
 
 
 def wall_shelf(width: float, depth: float, boards: int, board: Material, bracket: Material) -> Made:
@@ -189,7 +175,7 @@ def wall_shelf(width: float, depth: float, boards: int, board: Material, bracket
             x = side * (width / 2 - 0.12)
             arm = box("bracket", np.array([x, y - 0.02, depth * 0.4]), np.array([0.01, 0.008, depth * 0.4]), 0)  # fmt: skip
             parts.append((arm, bracket))
-    return made("wall_shelf", "shelves", SHELVES, parts)
+    return hung("wall_shelf", "shelves", SHELVES, parts)
 
 
 def plate(n_gangs: int, *, is_socket: bool, colour: Rgb) -> Made:
@@ -210,7 +196,7 @@ def plate(n_gangs: int, *, is_socket: bool, colour: Rgb) -> Made:
             half = np.array([0.029, 0.029, 0.002])
             parts.append((box("rocker", np.array([x, 0.0405, 0.0105]), half, 0), cover))
     name = "socket" if is_socket else "switch"
-    return made(f"wall_{name}", name, OTHER_PROP, parts)
+    return hung(f"wall_{name}", name, OTHERPROP, parts)
 
 
 def _moulding(rng: np.random.Generator, short: float) -> tuple[float, float]:
@@ -243,8 +229,3 @@ def _moved(surface: Surface, offset: tuple[float, float, float]) -> Surface:
 
 def _at(p: F64, z: float) -> list[float]:
     return [float(p[0]), float(p[1]), z]
-
-
-def _rounded(colour: Rgb) -> Rgb:
-    r, g, b = (round(float(np.clip(c, 0.02, 0.95)), 3) for c in colour)
-    return (r, g, b)

@@ -9,6 +9,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place, Shape
+from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
 from pbrs_farm.dress.style import Rgb, Style, mix, shade
 
@@ -16,11 +17,10 @@ Part = tuple[Surface, Material]
 Made = tuple[Piece, Shape]
 
 GENERATED = "generated#"  # before the family, in the id of a generated piece
-OTHER_PROP = 40
 
 
 def made(
-    family: str, parts: Sequence[Part], *, group: str = "", nyu40: int = OTHER_PROP,
+    family: str, parts: Sequence[Part], *, group: str = "", nyu40: int = OTHERPROP,
     place: Place = Place.SURFACE, textures: Iterable[Texture] = (),
 ) -> Made:  # fmt: skip
     """The parts as one piece, the middle of its base at the origin; one surface a material."""
