@@ -68,6 +68,10 @@ def add_catalogue(p: argparse.ArgumentParser) -> None:
         " `generated` leaves out the furniture package"
     )
     p.add_argument("--catalogue", action="append", default=[], metavar="LIBRARY", help=text)
+    text = "your own photographs as pictures on walls, repeatable: a folder of JPEG or PNG"
+    p.add_argument(
+        "--pictures", action="append", default=[], dest="catalogue", metavar="DIR", help=text
+    )
 
 
 def dress_seeds(text: str | None) -> tuple[int, ...]:

@@ -59,12 +59,16 @@ class Shape:
         return np.array([points.min(0), points.max(0)])
 
 
+PRINTS = "prints"
+"""The group of pictures that hang on walls; those of others repeat over surfaces."""
+
+
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A photographed surface that repeats: wood, cloth, tiles."""
+    """A photographed surface that repeats, wood, cloth or tiles, or a picture for a wall."""
 
     texture: Texture
-    group: str  # "wood", "cloth", "leather", "marble", "tiles", ...
+    group: str  # "wood", "cloth", "leather", "marble", "tiles", ..., PRINTS
     size: tuple[float, float]  # width and height of one repeat in metres
     creator: str = ""
     licence: str = ""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
 
 
-VERSION: Final = 1
+VERSION: Final = 2
 """Of the stage: part of a dressed house's digest. Raised when it makes another house."""
 
 

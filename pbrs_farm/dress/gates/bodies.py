@@ -13,8 +13,9 @@ from scipy.sparse.csgraph import connected_components
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corners
+from pbrs_farm.core.mesh import edges_are_paired, signed_volume
 from pbrs_farm.dress.draft import ADDED_TAG, Draft
+from pbrs_farm.dress.space.surface_points import item_triangles
 
 Faces = NDArray[np.int64]
 
@@ -78,7 +79,7 @@ def bodies_of(
             held.index = index
             found.append(held)
             continue
-        corners = corners_of(item)
+        corners = item_triangles(item)
         if not len(corners):
             continue
         points = corners.reshape(-1, 3)
@@ -92,13 +93,6 @@ def bodies_of(
 def piece_id(item: Item) -> str:
     """The id of the piece that an added item was made from; "" for an item of the source."""
     return next((t.removeprefix(ADDED_TAG) for t in item.tags if t.startswith(ADDED_TAG)), "")
-
-
-def corners_of(item: Item) -> F64:
-    """(F, 3, 3) all triangles of an item that are finite, metres."""
-    parts = [triangle_corners(s.positions, s.faces) for s in item.surfaces if len(s.faces)]
-    corners = np.concatenate([np.zeros((0, 3, 3)), *parts])
-    return np.asarray(corners[np.isfinite(corners).all((1, 2))])
 
 
 def has_same_mesh(a: Item, b: Item) -> bool:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.mesh import area_vectors
+from pbrs_farm.core.mesh import area_vectors, triangle_bounds
 from pbrs_farm.dress.gates.bodies import Shell
 
 _STEEP: Final = 0.5  # cosine of edge and normal: an edge that grazes a round thing crosses nothing
@@ -21,7 +21,7 @@ def crossing_m(a: Shell, b: Shell, least_m: float) -> float:
     """
     start, end = _edges_near(a, b, 2 * least_m)
     corners = b.corners
-    low, high = corners.min(1), corners.max(1)
+    low, high = triangle_bounds(corners)
     near = ((low <= a.high) & (high >= a.low)).all(1)
     corners, low, high = corners[near], low[near], high[near]
     best = 0.0

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.mesh import triangle_bounds
 
 _NUDGE: Final = np.array([1.7e-6, 2.9e-6])  # metres: rays pass beside edges that triangles share
 _CHUNK: Final = 2_000_000  # pairs of point and triangle at once
@@ -40,7 +41,7 @@ def _along(
     u, v = (k for k in range(3) if k != axis)
     plan = points[:, [u, v]] + _NUDGE
     # Keep triangles that some ray can meet.
-    low, high = corners[:, :, [u, v]].min(1), corners[:, :, [u, v]].max(1)
+    low, high = triangle_bounds(corners[:, :, [u, v]])
     meets = ((low <= plan.max(0)) & (high >= plan.min(0))).all(1)
     corners, low, high = corners[meets], low[meets], high[meets]
     n, far = len(points), np.full(len(points), np.inf)

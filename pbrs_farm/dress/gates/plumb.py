@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.mesh import triangle_bounds
 from pbrs_farm.dress.gates.bodies import Body, boxes_of
 
 _CELLS_M: Final = (0.1, 1.0)
@@ -54,7 +55,7 @@ class Plumb:
         lies = np.abs(ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]) > 2 * _STEEP
         self._corners, self._owner = corners[lies], owner[lies]
         y = self._corners[:, :, 1]
-        self._low, self._high = y.min(1), y.max(1)
+        self._low, self._high = triangle_bounds(y)
         # Enter each triangle into cells of a size that suits it.
         left, self._grids = np.arange(len(self._corners)), list[_Grid]()
         for cell_m in _CELLS_M:
@@ -99,8 +100,9 @@ def _grid(corners: F64, numbers: Ints, cell_m: float, *, is_last: bool) -> tuple
     """A grid of some of the triangles (F, 3, 3), and the numbers of those too large for it."""
     plan = corners[numbers][:, :, [0, 2]]
     origin = plan.min((0, 1)) if len(plan) else np.zeros(2)
-    first = np.floor((plan.min(1) - origin) / cell_m - _EDGE).astype(np.int64)
-    last = np.floor((plan.max(1) - origin) / cell_m + _EDGE).astype(np.int64)
+    low, high = triangle_bounds(plan)
+    first = np.floor((low - origin) / cell_m - _EDGE).astype(np.int64)
+    last = np.floor((high - origin) / cell_m + _EDGE).astype(np.int64)
     shape = last - first + 1
     n_cells = shape.prod(1)
     fits = (n_cells <= _MANY_CELLS) | is_last

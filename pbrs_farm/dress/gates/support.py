@@ -15,9 +15,10 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.core.mesh import distances_to_triangles
-from pbrs_farm.dress.gates.bodies import Body, boxes_of, corners_of
+from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds
+from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.gates.plumb import Plumb
+from pbrs_farm.dress.space.surface_points import item_triangles
 
 MOST_M: Final = 0.002
 _ROUNDING_M: Final = 1e-5  # of single precision
@@ -59,7 +60,7 @@ def held_as_drawn(bodies: Sequence[Body], number: int, plumb: Plumb) -> Held:
     """By what the thing of the source was held that a body has replaced, among the same bodies."""
     body = bodies[number]
     assert body.was is not None
-    corners = corners_of(body.was)
+    corners = item_triangles(body.was)
     points = corners.reshape(-1, 3)
     former = Body(body.index, body.was, corners, points.min(0), points.max(0), True, body.was, None)
     return held([*bodies[:number], former, *bodies[number + 1 :]], [number], plumb)[number]
@@ -157,9 +158,9 @@ def _near(a: Body, b: Body, reach: float, most: int) -> tuple[F64, F64]:
     points = np.unique(points, axis=0)
     points = points[:: max(1, len(points) // most)]
     corners = b.corners
-    near = (corners.min(1) < a.high + reach).all(1) & (corners.max(1) > a.low - reach).all(1)
-    corners = corners[near]
-    low, high = corners.min(1) - reach, corners.max(1) + reach
+    low, high = triangle_bounds(corners)
+    near = (low < a.high + reach).all(1) & (high > a.low - reach).all(1)
+    corners, low, high = corners[near], low[near] - reach, high[near] + reach
     found_i, found_j = [np.zeros((0, 3))], [np.zeros((0, 3, 3))]
     # Compare some vertices at a time: meshes of thousands have millions of pairs.
     step = max(1, _PAIRS // max(len(corners), 1))

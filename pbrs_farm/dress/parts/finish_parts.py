@@ -36,7 +36,7 @@ from pbrs_farm.dress.parts.part_kinds import (
     kind_of_part,
 )
 from pbrs_farm.dress.style import METALS, WOODS, Metal, Rgb, Style
-from pbrs_farm.dress.textures.families import Pattern, pattern_material
+from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
 
 PART: Final = "parts"
 _LEAST_BOARD_M2: Final = 0.05  # a part of no class that is smaller stays: knobs, feet
@@ -75,7 +75,7 @@ def parts(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
         group = groups.get(item.source_class, "")
         kinds = _kinds(draft, item, group)
         surfaces = tuple(
-            _finished(draft, style, share, item, group, surface, kind)
+            _finished(draft, catalogue, style, share, item, group, surface, kind)
             for surface, kind in zip(item.surfaces, kinds, strict=True)
         )
         if any(a is not b for a, b in zip(surfaces, item.surfaces, strict=True)):
@@ -128,8 +128,8 @@ def _may_be_board(surface: Surface, material: Material, item: Item, group: str) 
 
 
 def _finished(
-    draft: Draft, style: Style, share: float, item: Item, group: str, surface: Surface,
-    kind: PartKind,
+    draft: Draft, catalogue: Catalogue, style: Style, share: float, item: Item, group: str,
+    surface: Surface, kind: PartKind,
 ) -> Surface:  # fmt: skip
     material = draft.materials[surface.material]
     if kind is PartKind.OTHER:
@@ -141,7 +141,7 @@ def _finished(
     if rng.random() >= share:
         return surface
     make = {PartKind.WOOD: _wood, PartKind.SOFT: _soft, PartKind.METAL: _metal}.get(kind, _lacquer)
-    finish = make(draft, style, item, material, rng)
+    finish = make(draft, catalogue, style, item, material, rng)
     if finish is None:
         return surface
     if finish.size_m is None:
@@ -152,13 +152,14 @@ def _finished(
 
 
 def _wood(
-    draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
-) -> _Finish | None:
+    draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    rng: np.random.Generator,
+) -> _Finish | None:  # fmt: skip
     own, stays = material.diffuse, rng.random()
     # Paint may stay paint; so may grey.
     is_other = not (is_brown(own) or is_dark(own) or is_vivid(own))
     if (is_vivid(own) and stays < _PAINT_STAYS) or (is_other and stays < _GREY_STAYS):
-        return _lacquer(draft, style, item, material, rng)
+        return _lacquer(draft, catalogue, style, item, material, rng)
     mean = linear_from_srgb(np.array(style.wood.mean))
     mine = np.maximum(linear_from_srgb(np.array(own)), _DARKEST)
     # The stronger a brown, the less of it is of wood.
@@ -171,12 +172,13 @@ def _wood(
     is_pale = float(wanted @ LUMINANCE) > float(mean @ LUMINANCE)
     wood = WOODS[_PALE] if is_pale else style.wood
     pattern = Pattern("grain", int(draft.rng(PART, "grain", wood.name).integers(2**31)), wood=wood)
-    return _tinted(draft, pattern, wanted, is_grained=True)
+    return _tinted(draft, photographed(draft, catalogue, pattern), wanted, is_grained=True)
 
 
 def _soft(
-    draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
-) -> _Finish | None:
+    draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    rng: np.random.Generator,
+) -> _Finish | None:  # fmt: skip
     colours: Mapping[bool, tuple[Rgb, ...]] = {False: style.textiles, True: style.textiles[:3]}
     wanted = linear_from_srgb(
         np.array(colours[is_bed(item)][int(rng.integers(len(colours[is_bed(item)])))])
@@ -193,12 +195,14 @@ def _soft(
         hides = [(0.13, 0.1, 0.09), (0.42, 0.24, 0.14), (0.6, 0.4, 0.25), (0.78, 0.72, 0.63)]
         wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
     seed = int(draft.rng(PART, family).integers(2**31))
-    return _tinted(draft, Pattern(family, seed), wanted, is_grained=False)
+    pattern = photographed(draft, catalogue, Pattern(family, seed))
+    return _tinted(draft, pattern, wanted, is_grained=False)
 
 
 def _lacquer(
-    draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
-) -> _Finish | None:
+    draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    rng: np.random.Generator,
+) -> _Finish | None:  # fmt: skip
     has_sheen = material.specular != (0.0, 0.0, 0.0) and material.shininess > 1
     own = material.diffuse
     # Screen colours are mixed down to those that paint has.
@@ -218,8 +222,9 @@ def _lacquer(
 
 
 def _metal(
-    draft: Draft, style: Style, item: Item, material: Material, rng: np.random.Generator
-) -> _Finish | None:
+    draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    rng: np.random.Generator,
+) -> _Finish | None:  # fmt: skip
     if is_dark(material.diffuse) or (is_vivid(material.diffuse) and not is_brown(material.diffuse)):
         return None
     metal = _metal_of(material.name.lower(), METALS["chrome"] if has_taps(item) else style.metal)

@@ -8,7 +8,7 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import clipped_to_box
+from pbrs_farm.core.mesh import clipped_to_box, triangle_bounds
 from pbrs_farm.dress.space.surface_points import item_triangles, surface_points
 
 _GRID_M = 1e-4  # plan coordinates are rounded to this
@@ -49,7 +49,7 @@ def plan_area(corners: F64, *, upright: bool = True) -> BaseGeometry:
     # Give upright ones a width.
     standing = plan[twice_area <= 1e-7]
     if len(standing) and (upright or not shapes):
-        low, high = standing.min(1), standing.max(1)
+        low, high = triangle_bounds(standing)
         # The line goes from the leftmost corner to the rightmost; sign by the other axis.
         order = np.argsort(standing[:, :, 0] + 1e-3 * standing[:, :, 1], axis=1)
         rows = np.arange(len(standing))

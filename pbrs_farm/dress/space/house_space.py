@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import FLOOR_MAT
 from pbrs_farm.core.house import Item, ItemKind, Room
-from pbrs_farm.core.mesh import area_vectors
+from pbrs_farm.core.mesh import area_vectors, triangle_bounds
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.footprints import areal, plan_area
 from pbrs_farm.dress.space.passages import Passage, passages_of
@@ -182,7 +182,7 @@ def _near(triangles: F64, area: BaseGeometry) -> F64:
     if area.is_empty or not len(triangles):
         return triangles[:0]
     x0, z0, x1, z1 = area.bounds
-    low, high = triangles.min(1), triangles.max(1)
+    low, high = triangle_bounds(triangles)
     meets = (high[:, 0] > x0) & (low[:, 0] < x1) & (high[:, 2] > z0) & (low[:, 2] < z1)
     return np.asarray(triangles[meets])
 

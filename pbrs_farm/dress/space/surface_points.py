@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import area_vectors, triangle_corners
+from pbrs_farm.core.mesh import area_vectors, finite_triangles, triangle_bounds, triangle_corners
 
 SPACING_M = 0.03
 _MOST_POINTS = 200_000  # of one item: larger ones are spread more thinly
@@ -17,8 +17,7 @@ _SPARSE = 32  # cubes for each point: with more, sorting the points is faster
 def item_triangles(item: Item) -> F64:
     """(F, 3, 3) corners of all triangles of an item that are finite, metres."""
     parts = [triangle_corners(s.positions, s.faces) for s in item.surfaces if len(s.faces)]
-    corners = np.concatenate([np.zeros((0, 3, 3)), *parts])
-    return np.asarray(corners[np.isfinite(corners).all((1, 2))])
+    return finite_triangles(np.concatenate([np.zeros((0, 3, 3)), *parts]))
 
 
 def surface_points(corners: F64, spacing_m: float = SPACING_M) -> F64:
@@ -69,7 +68,7 @@ def lowest_above(triangles: F64, places: F64, least_y: float) -> F64:
     if not len(places) or not len(triangles):
         return found
     # Keep triangles above whose bounds meet the places'.
-    low, high = triangles[:, :, [0, 2]].min(1), triangles[:, :, [0, 2]].max(1)
+    low, high = triangle_bounds(triangles[:, :, [0, 2]])
     meets = (high >= places.min(0)).all(1) & (low <= places.max(0)).all(1)
     for p, q, r in triangles[meets & (triangles[:, :, 1].max(1) > least_y)]:
         # Solve for the place in the triangle's plan; upright ones have none.

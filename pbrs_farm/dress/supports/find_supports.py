@@ -14,7 +14,7 @@ from shapely import MultiPoint, Polygon, contains_xy, minimum_rotated_rectangle
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Item, ItemKind, Room
-from pbrs_farm.core.mesh import face_areas, unit_normals
+from pbrs_farm.core.mesh import face_areas, triangle_bounds, unit_normals
 from pbrs_farm.dress.supports.plan_grid import CellHits, PlanGrid, cells_over, covered
 from pbrs_farm.dress.supports.scene_triangles import SceneTriangles
 
@@ -87,7 +87,7 @@ def plan_turn(item: Item, points: F64) -> float:
 
 def _levels(faces: F64, room: Room) -> list[F64]:
     # Groups of flat faces whose heights agree, with enough area together, within reach.
-    low, high = faces[..., 1].min(1), faces[..., 1].max(1)
+    low, high = triangle_bounds(faces[..., 1])
     top = min(_OUT_OF_REACH_M, room.ceiling_y - room.floor_y - LEAST_FREE_M) + room.floor_y
     flat = (high - low < _FLAT_M) & (low > room.floor_y + 0.04) & (high < top)
     faces, high = faces[flat], high[flat]

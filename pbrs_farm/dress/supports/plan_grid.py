@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pbrs_farm.core.arrays import F64, Bools, Points2
 from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.mesh import triangle_bounds
 
 _FLAT = 1e-9  # square metres in plan: a triangle with less stands upright
 _MAX_SLOPE = 50.0  # height over distance; steeper faces take their whole height in every cell
@@ -74,8 +75,9 @@ def cells_over(grid: PlanGrid, corners: F64, *, touched: bool) -> CellHits:
     plan = local[..., [0, 2]]
     half = 0.5 if touched else 0.0
     # List the cells of each triangle's bounds that lie in the grid.
-    first = np.ceil(plan.min(1) - 0.5 - half).clip(0, None).astype(np.intp)
-    last = np.floor(plan.max(1) - 0.5 + half).astype(np.intp)
+    low, high = triangle_bounds(plan)
+    first = np.ceil(low - 0.5 - half).clip(0, None).astype(np.intp)
+    last = np.floor(high - 0.5 + half).astype(np.intp)
     last = np.minimum(last, np.array(grid.shape[::-1]) - 1)
     n_across, n_down = (np.maximum(last - first + 1, 0)).T
     count = n_across * n_down
@@ -85,7 +87,7 @@ def cells_over(grid: PlanGrid, corners: F64, *, touched: bool) -> CellHits:
     column, row = first[triangle, 0] + across, first[triangle, 1] + down
 
     # Keep the cells on the inner side of all three edges, or half a cell beyond them.
-    edges = np.roll(plan, -1, axis=1) - plan
+    edges = plan[:, [1, 2, 0]] - plan
     doubled = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     edges *= np.where(doubled < 0, -1.0, 1.0)[:, None, None]
     beyond = half * np.abs(edges).sum(-1) + 1e-9
@@ -128,7 +130,7 @@ def _heights(
     slope_x = (u[:, 1] * v[:, 2] - v[:, 1] * u[:, 2]) / safe
     slope_z = (v[:, 1] * u[:, 0] - u[:, 1] * v[:, 0]) / safe
     flat &= np.maximum(np.abs(slope_x), np.abs(slope_z)) < steepest
-    bottom, top = local[..., 1].min(1)[triangle], local[..., 1].max(1)[triangle]
+    bottom, top = (y[triangle] for y in triangle_bounds(local[..., 1]))
     sx, sz = np.where(flat, slope_x, 0.0)[triangle], np.where(flat, slope_z, 0.0)[triangle]
     start = local[triangle, 0]
     y = start[:, 1] + sx * (x - start[:, 0]) + sz * (z - start[:, 2])

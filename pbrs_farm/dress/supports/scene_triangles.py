@@ -8,7 +8,8 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.core.mesh import triangle_bounds
+from pbrs_farm.dress.space.surface_points import item_triangles
 
 
 class SceneTriangles:
@@ -19,14 +20,19 @@ class SceneTriangles:
         bounds = [item.bounds for item in self.items]
         self.bounds: F64 = np.array(bounds) if bounds else np.zeros((0, 2, 3))
         self._corners: dict[int, F64] = {}
+        self._of_faces: dict[int, tuple[F64, F64]] = {}
 
     def of_item(self, index: int) -> F64:
         """(F, 3, 3) corners of the faces of items[index] that have finite corners, metres."""
         if index not in self._corners:
-            parts = [triangle_corners(s.positions, s.faces) for s in self.items[index].surfaces]
-            corners = np.concatenate([np.zeros((0, 3, 3)), *parts])
-            self._corners[index] = corners[np.isfinite(corners).all((1, 2))]
+            self._corners[index] = item_triangles(self.items[index])
         return self._corners[index]
+
+    def _bounds_of(self, index: int) -> tuple[F64, F64]:
+        # (F, 3) lowest and highest corners of the boxes around the item's faces.
+        if index not in self._of_faces:
+            self._of_faces[index] = triangle_bounds(self.of_item(index))
+        return self._of_faces[index]
 
     def items_in(self, low: F64, high: F64) -> list[int]:
         """Indices of the items whose bounds meet the box low..high (3,)."""
@@ -38,7 +44,8 @@ class SceneTriangles:
         parts, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int32)]
         for index in self.items_in(low, high):
             corners = self.of_item(index)
-            meets = ((corners.max(1) >= low) & (corners.min(1) <= high)).all(1)
+            least, most = self._bounds_of(index)
+            meets = ((most >= low) & (least <= high)).all(1)
             parts.append(corners[meets])
             owners.append(np.full(int(meets.sum()), index, np.int32))
         return np.concatenate(parts), np.concatenate(owners)

@@ -28,7 +28,12 @@ from pbrs_farm.dress.surfaces.floor_materials import laid
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
 from pbrs_farm.dress.surfaces.wall_materials import RoomWalls, painted_wall
 from pbrs_farm.dress.surfaces.wall_sides import RoomFinder, SidedWall, sided_wall
-from pbrs_farm.dress.textures.families import Pattern, PatternMaterial, pattern_material
+from pbrs_farm.dress.textures.families import (
+    Pattern,
+    PatternMaterial,
+    pattern_material,
+    photographed,
+)
 
 PART = "surfaces"
 
@@ -46,18 +51,18 @@ class _RoomFinish:
 
 def surfaces(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Give a share of the rooms floors, walls and ceilings of the style, and skirting boards."""
-    del catalogue  # surfaces are made, not fetched
     rooms = house_space(draft).rooms
     home = home_finish(draft.rng(PART, "home"), style)
-    finishes = [_room_finish(draft, style, home, room, share) for room in rooms]
+    finishes = [_room_finish(draft, catalogue, style, home, room, share) for room in rooms]
     _lay_floors(draft, home, finishes)
     _paint_walls(draft, finishes)
     _set_boards(draft, home, finishes)
 
 
 def _room_finish(
-    draft: Draft, style: Style, home: HomeFinish, room: RoomSpace, share: float
-) -> _RoomFinish:
+    draft: Draft, catalogue: Catalogue, style: Style, home: HomeFinish, room: RoomSpace,
+    share: float,
+) -> _RoomFinish:  # fmt: skip
     # Streams of their own: what one room draws changes nothing in another.
     rng = draft.rng(PART, room.room.id)
     taste = room_style(style, rng)
@@ -68,6 +73,15 @@ def _room_finish(
     # Now and then a photographed floor stays.
     if rng.random() < _KEPT_SHARE and _is_photographed(draft, f"floor_{room.room.id}"):
         floor = None
+    # Libraries may hold pictures of what was drawn.
+    if floor is not None:
+        floor = replace(floor, pattern=photographed(draft, catalogue, floor.pattern))
+    if walls is not None:
+        main, accent, low = (
+            None if p is None else photographed(draft, catalogue, p)
+            for p in (walls.main, walls.accent, walls.low)
+        )
+        walls = replace(walls, main=main or walls.main, accent=accent, low=low)
     return _RoomFinish(room, floor, walls)
 
 

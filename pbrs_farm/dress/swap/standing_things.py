@@ -8,6 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind
+from pbrs_farm.core.mesh import triangle_bounds
 from pbrs_farm.dress.swap.surroundings import Surroundings
 
 _CONTACT_M: Final = 0.015  # how far a thing may hang above or sink into what it stands on
@@ -25,7 +26,7 @@ def heights_below(points: F64, corners: F64) -> F64:
     A triangle counts as below up to 1 mm above the point.
     """
     found = np.full(len(points), -np.inf)
-    plan_low, plan_high = corners[:, :, [0, 2]].min(1), corners[:, :, [0, 2]].max(1)
+    plan_low, plan_high = triangle_bounds(corners[:, :, [0, 2]])
     meets = (plan_high >= points[:, [0, 2]].min(0)).all(1)
     meets &= (plan_low <= points[:, [0, 2]].max(0)).all(1)
     corners = corners[meets]

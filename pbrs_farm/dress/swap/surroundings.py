@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import triangle_bounds
 from pbrs_farm.dress.space.surface_points import item_triangles, surface_points
 
 CUBE_M: Final = 0.02
@@ -56,7 +57,8 @@ class Surroundings:
         for k in self.near(low, high):
             if k not in without:
                 corners = self.triangles(self.items[k])
-                meets = ((corners.max(1) >= low) & (corners.min(1) <= high)).all(1)
+                least, most = triangle_bounds(corners)
+                meets = ((most >= low) & (least <= high)).all(1)
                 count += len(np.intersect1d(own, _cubes(corners[meets]), assume_unique=True))
         return count
 

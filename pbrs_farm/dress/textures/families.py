@@ -6,10 +6,11 @@ Effects: JPEGs are encoded through a temporary file; a draft keeps what was made
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import WOODS, Rgb, Wood
@@ -24,6 +25,7 @@ from pbrs_farm.dress.textures.laid_tiles import (
     tile_maps,
 )
 from pbrs_farm.dress.textures.maps import SurfaceMaps, encoded
+from pbrs_farm.dress.textures.photographs import photograph_for, photograph_material
 from pbrs_farm.dress.textures.plain import (
     carpet_maps,
     concrete_maps,
@@ -57,6 +59,7 @@ class Pattern:
     wood: Wood = WOODS["oak"]  # of wood
     variant: str = ""  # of tiles and wallpaper: how they are laid or printed
     darkness: float = 0.0  # of wood: -1 bleached .. 1 stained
+    photograph: str = ""  # id of a picture's texture that is shown instead: photographed()
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +85,20 @@ def pattern_material(draft: Draft, pattern: Pattern) -> PatternMaterial:
     kept = draft.kept.get(key)
     if isinstance(kept, PatternMaterial):
         return kept
-    maps = maps_of(pattern)
-    material, textures = material_from_maps(maps, f"{pattern.family}-{pattern.seed:08x}")
-    made = PatternMaterial(draft.material(material, textures), maps.size_m, maps.mean_rgb)
+    if pattern.photograph:
+        made = PatternMaterial(*photograph_material(draft, pattern.photograph, pattern.family))
+    else:
+        maps = maps_of(pattern)
+        material, textures = material_from_maps(maps, f"{pattern.family}-{pattern.seed:08x}")
+        made = PatternMaterial(draft.material(material, textures), maps.size_m, maps.mean_rgb)
     draft.kept[key] = made
     return made
+
+
+def photographed(draft: Draft, catalogue: Catalogue, pattern: Pattern) -> Pattern:
+    """The pattern, or a picture of the catalogue in its place, by its family and seed."""
+    found = photograph_for(draft, catalogue, pattern.family, pattern.seed)
+    return replace(pattern, photograph=found) if found else pattern
 
 
 def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Texture, ...]]:

@@ -33,8 +33,10 @@ class SurfaceMaps:
     def mean_rgb(self) -> Rgb:
         """The mean of the linear colour, what a surface's own colour is divided by to tint it."""
         table = linear_from_srgb(np.arange(256) / 255)
-        r, g, b = (float(table[self.colour[..., k]].mean()) for k in range(3))
-        return (r, g, b)
+        # Count the bytes instead of looking each up.
+        counts = [np.bincount(self.colour[..., k].reshape(-1), minlength=256) for k in range(3)]
+        r, g, b = (float(table @ count) / count.sum() for count in counts)
+        return (float(r), float(g), float(b))
 
     @property
     def mean_roughness(self) -> float:
@@ -55,7 +57,10 @@ def surface_maps(
 
 def colour_bytes(colour: F32) -> Srgb8Image:
     """(H, W, 3) uint8 of an sRGB-encoded colour 0..1."""
-    return np.asarray(np.clip(colour, 0.0, 1.0) * np.float32(255) + np.float32(0.5), np.uint8)
+    scaled = np.clip(colour, np.float32(0), np.float32(1))
+    scaled *= np.float32(255)
+    scaled += np.float32(0.5)
+    return scaled.astype(np.uint8)
 
 
 def ramp(tone: F32, dark: Rgb, light: Rgb) -> F32:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
@@ -23,6 +25,22 @@ def noise(
     longer features are along rows and along columns. band: cycles per texture that are let
     through, softly at the upper end.
     """
+    # Draw the half spectrum that a real picture has.
+    gain = _gain(shape, slope, stretch, band)
+    size = gain.shape
+    spectrum = np.empty(size, np.complex64)
+    spectrum.real = rng.standard_normal(size, np.float32)
+    spectrum.imag = rng.standard_normal(size, np.float32)
+    field = np.fft.irfft2(spectrum * gain, shape)
+    deviation = float(field.std())
+    return np.asarray(field / max(deviation, 1e-12), np.float32)
+
+
+@lru_cache(maxsize=32)
+def _gain(
+    shape: Shape2, slope: float, stretch: tuple[float, float], band: tuple[float, float]
+) -> F32:
+    """(H, W / 2 + 1) by what each frequency of a spectrum is multiplied; read only."""
     rows, columns = shape
     fy = np.fft.fftfreq(rows, 1.0 / rows).astype(np.float32)[:, None] * np.float32(stretch[0])
     fx = np.arange(columns // 2 + 1, dtype=np.float32)[None] * np.float32(stretch[1])
@@ -33,14 +51,9 @@ def noise(
     if band[1] < max(shape):
         gain *= np.exp(-k2 / np.float32(band[1] ** 2))
     gain[0, 0] = 0.0
-    # Draw the half spectrum that a real picture has.
-    size = (rows, columns // 2 + 1)
-    spectrum = np.empty(size, np.complex64)
-    spectrum.real = rng.standard_normal(size, np.float32)
-    spectrum.imag = rng.standard_normal(size, np.float32)
-    field = np.fft.irfft2(spectrum * gain.astype(np.float32), shape)
-    deviation = float(field.std())
-    return np.asarray(field / max(deviation, 1e-12), np.float32)
+    found: F32 = gain.astype(np.float32)
+    found.flags.writeable = False
+    return found
 
 
 def blurred(field: F32, sigma_px: float) -> F32:

@@ -20,7 +20,7 @@ def walls(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
     share: 0..1 of what a room would get.
     """
     space = house_space(draft)
-    gallery = Gallery(draft, style)
+    gallery = Gallery(draft, catalogue, style)
     for room in space.rooms:
         if not room.faces or room.kind is RoomKind.OUTDOOR:
             continue

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, Srgb8Image
+from pbrs_farm.core.catalogue import PRINTS, Catalogue, Picture
 from pbrs_farm.core.classes import BED, CABINET, CHAIR, DESK, DRESSER, OTHERFURNITURE, SOFA, TABLE
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
@@ -19,6 +20,7 @@ from pbrs_farm.dress.style import Rgb, Style, room_style
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import canvas, frame_material, framed, jpeg_texture, poster
 from pbrs_farm.dress.walls.prints import print_pixels
+from pbrs_farm.images import decode_photo
 
 MOST_PICTURES = 6  # in a room
 _MOST_PRINTS = 24  # drawn for a home; further pictures show one of them again
@@ -76,11 +78,17 @@ class Print:
 
 
 class Gallery:
-    """The prints of a home, drawn as they are needed; state: those drawn so far."""
+    """The prints of a home, drawn as they are needed; state: those drawn so far.
 
-    def __init__(self, draft: Draft, style: Style) -> None:
+    Pictures of the catalogue that are meant for walls come before drawn ones.
+    """
+
+    def __init__(self, draft: Draft, catalogue: Catalogue, style: Style) -> None:
         self._rng = draft.rng("prints")
         self._style = style
+        own = [p for p in catalogue.pictures if p.group == PRINTS]
+        order = draft.rng("prints", "own").permutation(len(own))
+        self._own = [own[int(k)] for k in order]
         self._prints: list[Print] = []
         self._families: Counter[str] = Counter()
 
@@ -89,9 +97,8 @@ class Gallery:
 
         besides: ids of textures that hang beside it: another is taken where there is one.
         """
-        if len(self._prints) < _MOST_PRINTS:
-            pixels, family = print_pixels(self._rng, aspect, self._style, self._families)
-            self._families[family] += 1
+        if self._own or len(self._prints) < _MOST_PRINTS:
+            pixels, family = self._new(aspect)
             r, g, b = (float(c) for c in pixels.reshape(-1, 3).mean(0) / 255)
             self._prints.append(Print(aspect, jpeg_texture(f"print {family}", pixels), (r, g, b)))
             return self._prints[-1]
@@ -100,6 +107,25 @@ class Gallery:
         likeness = [abs(np.log(p.aspect / aspect)) for p in free]
         near = [p for p, d in zip(free, likeness, strict=True) if d < min(likeness) + 0.15]
         return near[int(self._rng.integers(len(near)))]
+
+    def _new(self, aspect: float) -> tuple[Srgb8Image, str]:
+        """Pixels of a picture that does not hang yet, and what it is."""
+        if self._own:
+            likeness = [abs(np.log(p.size[0] / p.size[1] / aspect)) for p in self._own]
+            picture = self._own.pop(int(np.argmin(likeness)))
+            return _cropped(picture, aspect), "photograph"
+        pixels, family = print_pixels(self._rng, aspect, self._style, self._families)
+        self._families[family] += 1
+        return pixels, family
+
+
+def _cropped(picture: Picture, aspect: float) -> Srgb8Image:
+    """The middle of a picture in that width over height: a frame is filled, nothing is stretched."""
+    pixels = decode_photo(picture.texture.data, picture.texture.name)
+    rows, columns = pixels.shape[:2]
+    width, height = min(columns, round(rows * aspect)), min(rows, round(columns / aspect))
+    top, left = (rows - height) // 2, (columns - width) // 2
+    return pixels[top : top + height, left : left + width]
 
 
 def hang_pictures(

@@ -24,6 +24,7 @@ from pbrs_farm.read.catalogue.library_files import (
 )
 from pbrs_farm.read.catalogue.library_shapes import library_shape
 from pbrs_farm.read.catalogue.model_folder import model_folder
+from pbrs_farm.read.catalogue.picture_folder import picture_folder
 from pbrs_farm.read.catalogue.piece_groups import GroupRule, Verdict, group_rule, verdicts
 from pbrs_farm.read.catalogue.shape_store import ShapeStore
 from pbrs_farm.read.catalogue.surface_pictures import (
@@ -97,14 +98,25 @@ def _given(path: Path, notes: LibraryNotes) -> Found | None:
     if not path.exists():
         raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
     if path.is_dir():
-        sha256, pieces = model_folder(path, notes)
-        return Found(sha256, pieces)
+        return _folder(path, notes)
     if path.suffix.lower() == ".sh3t":
         return _textures(path, notes, TEXTURES)
     if path.suffix.lower() == ".sh3f":
         return _furniture(path, notes, FURNITURE)
-    hint = ".sh3f, .sh3t or a folder of OBJ and GLB is read"
+    hint = ".sh3f, .sh3t or a folder of OBJ and GLB, or of pictures, is read"
     raise BadInput(path, "", "is no catalogue", hint=hint)
+
+
+def _folder(path: Path, notes: LibraryNotes) -> Found:
+    """Models; pictures for the walls where there are no models."""
+    try:
+        sha256, pieces = model_folder(path, notes)
+    except BadInput:
+        sha256, pictures = picture_folder(path, notes)
+        if not pictures:
+            raise
+        return Found(sha256, pictures=pictures)
+    return Found(sha256, pieces)
 
 
 def _textures(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrs_farm.core.catalogue import EMPTY, Catalogue
-from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind
+from pbrs_farm.core.catalogue import EMPTY, PRINTS, Catalogue, Picture
+from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE, SHELVES
+from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Texture
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style, style_for
-from pbrs_farm.dress.walls import frames, walls
+from pbrs_farm.dress.walls import hung_things, walls
+from pbrs_farm.dress.walls.pictures import Gallery
 from pbrs_farm.dress.walls.prints import FAMILIES, palette_of, print_pixels
+from pbrs_farm.images import decode_photo, jpeg_from_array
 from tests.builders import builtin_home
 
 
@@ -80,9 +83,9 @@ def test_things_keep_clear_of_furniture_and_of_each_other(seed: int) -> None:
 def test_a_home_gets_pictures_and_every_thing_its_class_source_and_seed() -> None:
     draft = _dressed(3)
     classes = [i.nyu40 for i in _added(draft)]
-    assert classes.count(frames.PICTURE) >= 2
+    assert classes.count(PICTURE) >= 2
     for item in _added(draft):
-        assert item.nyu40 in (frames.PICTURE, frames.MIRROR, frames.SHELVES, frames.OTHER_PROP)
+        assert item.nyu40 in (PICTURE, MIRROR, SHELVES, OTHERPROP)
         assert item.tags[:2] == (f"dressed:{item.source_class}", "seed:3")
         assert item.room_id in ("0_0", "0_1")
     ids = [i.id for i in _added(draft)]
@@ -119,9 +122,9 @@ def test_prints_have_the_shape_that_is_asked_for() -> None:
 
 
 def test_a_framed_print_shows_its_picture_upright_and_its_faces_outward() -> None:
-    texture = frames.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
+    texture = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
     rng = np.random.default_rng(2)
-    piece, shape = frames.framed(rng, _style(), 0.5, 0.7, texture, Material("frame"))
+    piece, shape = hung_things.framed(rng, _style(), 0.5, 0.7, texture, Material("frame"))
     assert piece.size[0] == pytest.approx(0.5)
     assert piece.size[2] == pytest.approx(0.7)
     shown = next(s for s in shape.surfaces if shape.materials[s.material].texture_id)
@@ -139,10 +142,10 @@ def test_a_framed_print_shows_its_picture_upright_and_its_faces_outward() -> Non
 
 
 def test_a_round_thing_looks_away_from_the_wall() -> None:
-    dial = frames.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
+    dial = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
     for _piece, shape in (
-        frames.clock(0.3, dial, Material("rim")),
-        frames.round_mirror(0.5, Material("rim")),
+        hung_things.clock(0.3, dial, Material("rim")),
+        hung_things.round_mirror(0.5, Material("rim")),
     ):
         front = shape.surfaces[1]
         assert front.normals is not None
@@ -152,5 +155,30 @@ def test_a_round_thing_looks_away_from_the_wall() -> None:
 
 
 def test_a_mirror_is_a_mirror() -> None:
-    _piece, shape = frames.mirror(0.5, 0.8, None)
+    _piece, shape = hung_things.mirror(0.5, 0.8, None)
     assert any(m.kind is MaterialKind.MIRROR for m in shape.materials)
+
+
+def _photograph(width: int, height: int) -> Picture:
+    pixels = np.zeros((height, width, 3), np.uint8)
+    pixels[..., 0] = 200
+    data = jpeg_from_array(pixels, 95)
+    return Picture(
+        Texture("own", "own.jpg", "image/jpeg", data), PRINTS, (0.6, 0.6 * height / width)
+    )
+
+
+def test_the_users_own_photographs_hang_before_drawn_prints() -> None:
+    own = Catalogue((), lambda _piece: None, "own", pictures=(_photograph(90, 60),))
+    draft = _dressed(2, catalogue=own)
+    names = [t.name for t in draft.textures.values() if t.name.startswith("print")]
+    assert names.count("print photograph.jpg") == 1
+    # The rest is drawn, as without them.
+    assert len(names) > 1
+
+
+def test_a_photograph_fills_its_frame_and_is_not_stretched() -> None:
+    gallery = Gallery(Draft(builtin_home(), 1), Catalogue((), lambda _p: None, "own", pictures=(_photograph(90, 60),)), _style())  # fmt: skip
+    shown = gallery.print_for(0.5)
+    pixels = decode_photo(shown.texture.data, "print")
+    assert pixels.shape[:2] == (60, 30)
