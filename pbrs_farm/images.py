@@ -109,15 +109,11 @@ def resized(
 
 
 def exr_from_layers(
-    layers: Mapping[str, NDArray[np.float32]],
-    *,
-    half: bool = False,
-    compression: str = "zip",
-    attribution: str = "",
+    layers: Mapping[str, NDArray[np.float32]], *, half: bool = False, attribution: str = ""
 ) -> bytes:
     """OpenEXR bytes of named channels ("outdoor.R": (H, W) float32), all of one size.
 
-    half: 16-bit floats instead of 32. compression: OpenEXR's name ("zip", "zips", "piz", "none").
+    half: 16-bit floats instead of 32.
     attribution: the file's copyright. Not handled: channels of unequal type.
     """
     if not layers:
@@ -131,7 +127,7 @@ def exr_from_layers(
     height, width = pixels.shape[:2]
     spec = oiio.ImageSpec(width, height, len(names), "half" if half else "float")
     spec.channelnames = tuple(names)
-    spec["Compression"] = compression
+    spec["Compression"] = "zip"
     spec["DateTime"] = _FIXED_DATE
     if attribution:
         spec["Copyright"] = attribution

@@ -63,12 +63,10 @@ def read_given(
         raise error(path, "", fault_of(fault), hint=hint) from None
 
 
-def text_given(
-    path: Path, max_bytes: int = MAX_TEXT_BYTES, *, error: type[BadInput] = BadInput
-) -> str:
+def text_given(path: Path, *, error: type[BadInput] = BadInput) -> str:
     """The text of a file that a user names, as read_given; raises error where it is no UTF-8."""
     try:
-        return read_given(path, max_bytes, error=error).decode("utf-8")
+        return read_given(path, MAX_TEXT_BYTES, error=error).decode("utf-8")
     except UnicodeDecodeError:
         raise error(path, "", "cannot be read: is no UTF-8 text") from None
 

@@ -16,15 +16,15 @@ TESTED_VERSION: Final = "3.4.1+dfsg-2"
 NAMES: Final = ("city", "forest", "sunrise", "sunset")
 
 
-def fetch_skies(cache: Path | None = None) -> Path:
+def fetch_skies() -> Path:
     """The folder that holds the outdoor panoramas, filled through apt the first time.
 
     Raises MachineFailed where apt cannot give the package.
     """
-    folder = (cache or cache_folder()) / "skies"
+    folder = cache_folder() / "skies"
     if all((folder / f"{name}.exr").exists() for name in NAMES):
         return folder
-    deb = fetched_deb(PACKAGE, TESTED_VERSION, cache)
+    deb = fetched_deb(PACKAGE, TESTED_VERSION)
     wanted = {f"{name}.exr" for name in NAMES}
     files = deb.members(lambda path: "studiolights/world/" in path and Path(path).name in wanted)
     if {Path(path).name for path in files} != wanted:

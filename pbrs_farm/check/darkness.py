@@ -31,12 +31,8 @@ def check_darkness(
     nothing, so nobody can want it. A room below 1 lx may be what the house is like: its labels
     and its light are right.
     """
-    names = [f"{group}.{c}" for group in ("outdoor", "indoor") for c in "RGB"]
-    planes = [channels[name] for name in names if name in channels]
-    if len(planes) == len(names) and all(p.shape == valid.shape for p in planes) and valid.any():
-        level = np.zeros(valid.shape)
-        for plane, share in zip(planes, 2 * _LUMINANCE, strict=True):
-            level += _LM_PER_W * share * np.nan_to_num(plane)
+    level = _luminance(channels, valid.shape)
+    if level is not None and valid.any():
         what = f"all light together leaves nine tenths of it below {_BLACK_CD_M2:g} cd/m2"
         is_bright = _ninth_tenth(level, valid > 0) >= _BLACK_CD_M2
         tally.expect("black pictures", view.place, is_bright, what)
@@ -45,6 +41,20 @@ def check_darkness(
     if lux is not None and lux < _DARK_LX:
         text = f"stands in room {room}, which has {lux:.2g} lx by all light"
         tally.note(f"{view.place} {text}")
+
+
+def _luminance(
+    channels: dict[str, NDArray[Any]], shape: tuple[int, ...]
+) -> NDArray[np.float64] | None:
+    """(H, W) cd/m2 of all light together; None where a light group is not there at this size."""
+    names = [f"{group}.{c}" for group in ("outdoor", "indoor") for c in "RGB"]
+    planes = [channels[name] for name in names if name in channels]
+    if len(planes) < len(names) or any(p.shape != shape for p in planes):
+        return None
+    level = np.zeros(shape)
+    for plane, share in zip(planes, 2 * _LUMINANCE, strict=True):
+        level += _LM_PER_W * share * np.nan_to_num(plane)
+    return level
 
 
 def _ninth_tenth(level: NDArray[Any], valid: NDArray[Any]) -> float:

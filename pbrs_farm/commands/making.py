@@ -286,24 +286,32 @@ def _step(args: argparse.Namespace) -> int:
 
 def _objects(args: argparse.Namespace) -> int:
     from pbrs_farm.read.common.companion_files import SourceFiles
-    from pbrs_farm.read.objects.model_folders import find_models, pick_models
+    from pbrs_farm.read.objects.model_folders import pick_models
     from pbrs_farm.read.source import object_source
 
     if args.count < 1:
         raise BadInput("--count", str(args.count), "expected at least one model")
     categories = args.categories.split(",") if args.categories else []
+    models, refused = _models_at(args.models)
     # Pick at random by the recipe's seed: the same models each time.
+    files = SourceFiles()
+    chosen = pick_models(models, categories, args.count, recipe_of(args).seed)
+    sources = [object_source(model, files) for model in chosen]
+    return _run_homes(args, [], sources, refused)
+
+
+def _models_at(paths: Sequence[Path]) -> tuple[list[ObjectModel], list[tuple[str, str]]]:
+    """The models below paths, each once, and (path, why) of those that hold none."""
+    from pbrs_farm.read.objects.model_folders import find_models
+
     models: dict[str, ObjectModel] = {}
     refused = []
-    for path in args.models:
+    for path in paths:
         # A path without a model costs itself, unless it is the only one.
         try:
             models |= {model.id: model for model in find_models([path])}
         except BadInput as error:
-            if len(args.models) == 1:
+            if len(paths) == 1:
                 raise
             refused.append((str(path), str(error)))
-    files = SourceFiles()
-    chosen = pick_models(list(models.values()), categories, args.count, recipe_of(args).seed)
-    sources = [object_source(model, files) for model in chosen]
-    return _run_homes(args, [], sources, refused)
+    return list(models.values()), refused

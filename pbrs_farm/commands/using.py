@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -110,11 +111,15 @@ def _verify_light(args: argparse.Namespace) -> int:
         rows = [asdict(claim) for claim in claims]
         echo_json({"variant": variant, "claims": rows, "n_failed": n_failed})
     else:
-        seconds = sum(claim.seconds for claim in claims)
-        failed = f"{n_failed} FAILED" if n_failed else "all hold"
-        echo(f"{len(claims)} claims in {variant}, {failed}, {seconds:.0f} s")
+        echo(_claims_line(variant, claims, n_failed))
     # A claim that fails is the verb's failure.
     return 1 if n_failed else 0
+
+
+def _claims_line(variant: str, claims: Sequence[LightClaim], n_failed: int) -> str:
+    seconds = sum(claim.seconds for claim in claims)
+    failed = f"{n_failed} FAILED" if n_failed else "all hold"
+    return f"{len(claims)} claims in {variant}, {failed}, {seconds:.0f} s"
 
 
 def _claim_row(claim: LightClaim) -> str:
@@ -127,17 +132,15 @@ def _relight(args: argparse.Namespace) -> int:
     from pbrs_farm.store.folder import FolderStore
 
     if args.list:
-        if args.lamp or args.out is not None:
-            what = "lists the lamps and makes no picture: not with --lamp, --out"
-            raise BadInput("--list", "", what)
-        return _list_lamps(args.view)
+        return _list_lamps(args)
+    factors = {"indoor": args.indoor, "outdoor": args.outdoor}
     # Factors scale radiance: none may be negative.
-    for name, factor in (("--indoor", args.indoor), ("--outdoor", args.outdoor)):
+    for name, factor in factors.items():
         if not 0 <= factor < math.inf:
-            raise BadInput(name, str(factor), "expected a number that is finite and not negative")
+            text = "expected a number that is finite and not negative"
+            raise BadInput(f"--{name}", str(factor), text)
     out = args.out or Path(f"{args.view.resolve().name}_relit.png")
     lamps = [_lamp_factor(argument) for argument in args.lamp]
-    factors = {"indoor": args.indoor, "outdoor": args.outdoor}
     png = relit(args.view, **factors, denoise=not args.no_denoise, lamps=lamps)
     FolderStore(out.parent).put(out.name, png)
     # A factor of a lamp that the view does not see changes nothing: say so.
@@ -147,10 +150,13 @@ def _relight(args: argparse.Namespace) -> int:
     return 0
 
 
-def _list_lamps(view: Path) -> int:
+def _list_lamps(args: argparse.Namespace) -> int:
     from pbrs_farm.run.relight import lamps_of_view
 
-    rows = lamps_of_view(view)
+    if args.lamp or args.out is not None:
+        what = "lists the lamps and makes no picture: not with --lamp, --out"
+        raise BadInput("--list", "", what)
+    rows = lamps_of_view(args.view)
     echo(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
     for row in rows:
         # A lamp that brings no light to the view has no layer.

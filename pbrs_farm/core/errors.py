@@ -21,23 +21,17 @@ from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
 class PbrsError(Exception):
     """An error whose text says what, where, and what to do next, in one line that can be printed.
 
-    hint: what to do next, or "".  command: the shell line that reproduces it, or "".
+    hint: what to do next, or "".
     """
 
-    def __init__(self, message: str, *, hint: str = "", command: str = "") -> None:
+    def __init__(self, message: str, *, hint: str = "") -> None:
         message = shown(message, MAX_MESSAGE)
         super().__init__(message)
         self.message = message
         self.hint = shown(hint, MAX_MESSAGE)
-        self.command = command
 
     def __str__(self) -> str:
-        text = self.message
-        if self.hint:
-            text += f" ({self.hint})"
-        if self.command:
-            text += f" [reproduce: {self.command}]"
-        return text
+        return f"{self.message} ({self.hint})" if self.hint else self.message
 
     def __reduce__(self) -> tuple[object, ...]:
         # Exceptions cross process boundaries: rebuild without calling subclass constructors.
@@ -61,11 +55,9 @@ class BadInput(PbrsError):
     file: the file's path or name.  place: where inside it ("wall w3", "line 12"), or "".
     """
 
-    def __init__(
-        self, file: object, place: str, message: str, *, hint: str = "", command: str = ""
-    ) -> None:
+    def __init__(self, file: object, place: str, message: str, *, hint: str = "") -> None:
         where = shown(file, 2 * MAX_PLACE) + (f": {shown(place, MAX_PLACE)}" if place else "")
-        super().__init__(f"{where}: {message}", hint=hint, command=command)
+        super().__init__(f"{where}: {message}", hint=hint)
         self.file = str(file)
         self.place = place
 
@@ -81,12 +73,8 @@ class BadRecipe(PbrsError):
 class RenderFailed(PbrsError):
     """A picture could not be made; view, mode and seed reproduce it."""
 
-    def __init__(
-        self, message: str, *, view: str, mode: str, seed: int, hint: str = "", command: str = ""
-    ) -> None:
-        super().__init__(
-            f"{message} (view {view}, mode {mode}, seed {seed})", hint=hint, command=command
-        )
+    def __init__(self, message: str, *, view: str, mode: str, seed: int, hint: str = "") -> None:
+        super().__init__(f"{message} (view {view}, mode {mode}, seed {seed})", hint=hint)
         self.view = view
         self.mode = mode
         self.seed = seed

@@ -5,7 +5,7 @@ The reference holds histograms only, so it can be shared where the photographs c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,8 +28,6 @@ from pbrs_farm.selection.reference_set import (
     reference_from_histograms,
 )
 
-Progress = Callable[[int, int], None]  # (photographs done, photographs in all)
-
 
 @dataclass(frozen=True, slots=True)
 class PhotoOptions:
@@ -45,7 +43,6 @@ def build_reference(
     settings: HistogramFields,
     selection: SelectionFields,
     options: PhotoOptions | None = None,
-    progress: Progress | None = None,
 ) -> Reference:
     """The reference of a folder of RGB-D pairs, or of NYUv2's labelled .mat.
 
@@ -59,11 +56,11 @@ def build_reference(
     # Count the photographs of a .mat or of a folder of pairs, one at a time.
     if source.is_file():
         with NyuMat(source) as mat:
-            counted = _counted(mat.photos(), len(mat), settings, options, progress)
+            counted = _counted(mat.photos(), settings, options)
             digest = sha256_of_files([source])
     else:
         pairs = pairs_in(source)
-        counted = _counted(_photos(pairs, options), len(pairs), settings, options, progress)
+        counted = _counted(_photos(pairs, options), settings, options)
         digest = sha256_of_files([path for pair in pairs for path in (pair.rgb, pair.depth)])
     return reference_from_histograms(
         list(counted), list(counted.values()), settings, selection, source=(source.name, digest)
@@ -76,11 +73,7 @@ def _photos(pairs: tuple[PhotoFiles, ...], options: PhotoOptions) -> Iterator[Ph
 
 
 def _counted(
-    photos: Iterator[Photo],
-    n_photos: int,
-    settings: HistogramFields,
-    options: PhotoOptions,
-    progress: Progress | None,
+    photos: Iterator[Photo], settings: HistogramFields, options: PhotoOptions
 ) -> dict[str, Histogram]:
     counted: dict[str, Histogram] = {}
     for photo in photos:
@@ -88,8 +81,6 @@ def _counted(
         rows, columns = registration_border(photo.rgb) if options.crop else (slice(None),) * 2
         rgb, depth = photo.rgb[rows, columns], photo.depth_mm[rows, columns]
         counted[photo.id] = histogram(rgb, depth, settings)
-        if progress is not None:
-            progress(len(counted), n_photos)
     return counted
 
 

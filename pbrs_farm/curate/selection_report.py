@@ -38,18 +38,14 @@ from pbrs_farm.selection.reference_set import Reference
 from pbrs_farm.store.object_store import Store
 
 MAX_ROWS: Final = 40  # of a table of houses or room types
+_N_EXAMPLES: Final = 8  # views of either verdict
 _SHOWN_COLOURS: Final = 26  # fullest colour bins of a histogram
 
 
 def selection_report(
-    store: Store,
-    reference: Reference,
-    fields: SelectionFields,
-    *,
-    run: str = "default",
-    n_examples: int = 8,
+    store: Store, reference: Reference, fields: SelectionFields, *, run: str = "default"
 ) -> str:
-    """HTML of a run as it stands in the store; n_examples kept and as many rejected views are shown.
+    """HTML of a run as it stands in the store; _N_EXAMPLES kept and as many rejected views are shown.
 
     fields: the thresholds the run was judged with. Raises BadInput when there is no such run.
     """
@@ -57,7 +53,7 @@ def selection_report(
     summary = summary_of(table, run, fields, reference)
     # Draw scored views only; count all of them.
     scored = table.filter(table["colour_score"].is_valid())
-    shown = {"kept": _spread(scored, n_examples), "rejected": _rejected(scored, n_examples)}
+    shown = {"kept": _spread(scored, _N_EXAMPLES), "rejected": _rejected(scored, _N_EXAMPLES)}
     examples = _Examples(store, reference, fields)
     return page(
         "pbrs_farm.curate",

@@ -7,6 +7,7 @@ exactly the same House: the float32 geometry and the texture bytes are equal bit
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -121,24 +122,30 @@ def _item_with_arrays(gltf: glb.Gltf, item: dict[str, Any], index: int) -> dict[
     node = glb.entry(gltf, "nodes", index)
     mesh = glb.entry(gltf, "meshes", node["mesh"]) if "mesh" in node else {}
     primitives = iter(_dicts(mesh, "primitives") if mesh else [])
-    surfaces = []
-    for j, surface in enumerate(_dicts(item, "surfaces")):
-        # Only surfaces with vertices have a primitive: an empty one takes none.
-        place = f"items[{index}].surfaces[{j}]"
-        arrays: dict[str, Any] = {
-            "positions": np.zeros((0, 3), np.float32),
-            "faces": np.zeros((0, 3), np.int32),
-        }
-        if surface.get("n_vertices"):
-            primitive = next(primitives, None)
-            if primitive is None:
-                raise BadHouse("house.glb", place, "has no primitive")
-            arrays = _arrays_of_primitive(gltf, primitive, place)
-        got = {"n_vertices": len(arrays["positions"]), "n_faces": len(arrays["faces"])}
-        if not got.items() <= surface.items():
-            raise BadHouse("house.glb", place, f"has {got}, house.json says otherwise")
-        surfaces.append(surface | arrays)
+    surfaces = [
+        _surface_with_arrays(gltf, surface, primitives, f"items[{index}].surfaces[{j}]")
+        for j, surface in enumerate(_dicts(item, "surfaces"))
+    ]
     return item | {"surfaces": surfaces}
+
+
+def _surface_with_arrays(
+    gltf: glb.Gltf, surface: dict[str, Any], primitives: Iterator[dict[str, Any]], place: str
+) -> dict[str, Any]:
+    # Only surfaces with vertices have a primitive: an empty one takes none.
+    arrays: dict[str, Any] = {
+        "positions": np.zeros((0, 3), np.float32),
+        "faces": np.zeros((0, 3), np.int32),
+    }
+    if surface.get("n_vertices"):
+        primitive = next(primitives, None)
+        if primitive is None:
+            raise BadHouse("house.glb", place, "has no primitive")
+        arrays = _arrays_of_primitive(gltf, primitive, place)
+    got = {"n_vertices": len(arrays["positions"]), "n_faces": len(arrays["faces"])}
+    if not got.items() <= surface.items():
+        raise BadHouse("house.glb", place, f"has {got}, house.json says otherwise")
+    return surface | arrays
 
 
 def _arrays_of_primitive(gltf: glb.Gltf, primitive: dict[str, Any], place: str) -> dict[str, Any]:

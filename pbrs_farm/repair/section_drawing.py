@@ -12,21 +12,20 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 
+_CUT_M = 1.2  # above the level's floor
+_WIDTH_PX = 1600
 _GAP_M = 1.0  # between the two panels
 _TEXT_M = 0.25  # height of letters
 
 
-def section_svg(
-    before: House, after: House, level_id: str, *, height_m: float = 1.2, width_px: int = 1600
-) -> str:
+def section_svg(before: House, after: House, level_id: str) -> str:
     """Side by side: every wall of before with its outline, and the solid walls of after.
 
-    The cut lies height_m above the level's floor (1.2 m goes through doors and windows). What is
-    wrong shows before: walls that overlap, miss each other or have no thickness. SVG, plan with
+    The cut goes through doors and windows. What is wrong shows before: walls that overlap, miss each other or have no thickness. SVG, plan with
     x right and z down, one unit a metre.
     """
     # Cut wall by wall before repair, all of the structure at once after it.
-    y = before.level(level_id).elevation + height_m
+    y = before.level(level_id).elevation + _CUT_M
     parts = [section_of_items([i], y) for i in before.items if i.kind is ItemKind.WALL]
     solid = section_of_items([i for i in after.items if i.kind.is_structure], y)
     everything = np.concatenate([np.zeros((0, 2, 2)), *parts, solid]).reshape(-1, 2)
@@ -36,9 +35,9 @@ def section_svg(
     low, high = everything.min(0) - 0.5, everything.max(0) + 0.5
     size = high - low
     total = 2 * size[0] + _GAP_M
-    height_px = round(width_px * size[1] / total)
+    height_px = round(_WIDTH_PX * size[1] / total)
     box = f"0 0 {total:.3f} {size[1]:.3f}"
-    root = svg_file(width=width_px, height=height_px, viewBox=box)
+    root = svg_file(width=_WIDTH_PX, height=height_px, viewBox=box)
     element(root, "rect", width="100%", height="100%", fill="white")
     left = _panel(root, "before", low)
     for segments in parts:

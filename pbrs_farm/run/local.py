@@ -164,18 +164,7 @@ class _Schedule:
         summary = self._summary
         summary.peak_mb = max(summary.peak_mb, event.peak_mb)
         if event.kind in ("done", "kept"):
-            summary.n_done += event.kind == "done"
-            summary.n_kept += event.kind == "kept"
-            if event.step == "house":
-                self._take_house(event)
-            if event.step == "cameras":
-                self._cameras[event.house_id] = event.facts
-            if event.step == "illuminance":
-                self._floor_lux[event.house_id] = event.facts.get("floor_lux", {})
-            if "dark" in event.facts:
-                summary.dark.append(
-                    (f"{event.house_id}/{event.view_id}", "; ".join(event.facts["dark"]))
-                )
+            self._take_done(event)
         elif event.kind == "failed":
             what = "/".join(x for x in (event.house_id, event.view_id, event.step) if x)
             summary.failures.append((what, event.message, self._command(event)))
@@ -184,6 +173,19 @@ class _Schedule:
         elif event.view_id is None and event.kind == "end" and event.house_id in self._cameras:
             self._add_views(event.house_id, self._cameras.pop(event.house_id))
         self._observe(event)
+
+    def _take_done(self, event: Event) -> None:
+        summary, facts = self._summary, event.facts
+        summary.n_done += event.kind == "done"
+        summary.n_kept += event.kind == "kept"
+        if event.step == "house":
+            self._take_house(event)
+        if event.step == "cameras":
+            self._cameras[event.house_id] = facts
+        if event.step == "illuminance":
+            self._floor_lux[event.house_id] = facts.get("floor_lux", {})
+        if "dark" in facts:
+            summary.dark.append((f"{event.house_id}/{event.view_id}", "; ".join(facts["dark"])))
 
     def _take_house(self, event: Event) -> None:
         summary, facts = self._summary, event.facts

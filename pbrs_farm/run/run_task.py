@@ -6,8 +6,8 @@ Effects: the store's, and those of the libraries the steps use; a crash here cos
 from __future__ import annotations
 
 import atexit
-import importlib
 import os
+import pkgutil
 import resource
 import sys
 import time
@@ -64,9 +64,7 @@ def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Task) 
 
 
 def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
-    # Import the function that runs a step: tests name their own.
-    module, _, function = setting.runner.partition(":")
-    run_step = getattr(importlib.import_module(module), function)
+    run_step = pkgutil.resolve_name(setting.runner)  # tests name their own
     limit_threads(name, setting.n_threads)
     send(Message("step", name))
     started = time.perf_counter()

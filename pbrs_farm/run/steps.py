@@ -50,7 +50,6 @@ from pbrs_farm.run.view_histogram import view_histogram
 if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
     from pbrs_farm.repair import RepairReport
-    from pbrs_farm.sample import CameraReport
     from pbrs_farm.selection.view_record import ViewPlace
     from pbrs_farm.transport.light_result import LightResult
 
@@ -139,20 +138,7 @@ def _cameras(work: Work) -> StepOutput:
     caster = cached.caster
     views, report = cameras(house, fields, seed, caster.item_counts, caster.depth_pictures)
     made = _camera_output(views, report.model_dump(mode="json"))
-    return made if views else StepOutput(made.files, {**made.facts, "why_none": why_none(report)})
-
-
-def why_none(report: CameraReport) -> str:
-    """One line that says why no room of a house has a view."""
-    if not report.rooms:
-        return "; ".join(report.notes) or "the house has no rooms"
-    reasons = [
-        f"{room.room_id}: {room.reason or (room.sectors[0].reason if room.sectors else 'no sector')}"
-        for room in report.rooms
-    ]
-    # Name three rooms: a house of a hundred has one reason, mostly.
-    more = f" and {len(reasons) - 3} more rooms" if len(reasons) > 3 else ""
-    return "; ".join(reasons[:3]) + more
+    return made if views else StepOutput(made.files, {**made.facts, "why_none": report.why_none})
 
 
 def _object_cameras(work: Work, house: House, seed: int) -> StepOutput:

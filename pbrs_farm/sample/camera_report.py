@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from pbrs_farm.core.record import Record
 
 
@@ -39,12 +41,24 @@ class CameraReport(Record):
     rooms: tuple[RoomReport, ...]
     notes: tuple[str, ...] = ()  # what is not about one sector
 
+    @property
+    def why_none(self) -> str:
+        """One line that says why no room has a view."""
+        if not self.rooms:
+            return "; ".join(self.notes) or "the house has no rooms"
+        reasons = [
+            f"{room.room_id}: {room.reason or (room.sectors[0].reason if room.sectors else 'no sector')}"
+            for room in self.rooms
+        ]
+        # Name three rooms: a house of a hundred has one reason, mostly.
+        more = f" and {len(reasons) - 3} more rooms" if len(reasons) > 3 else ""
+        return "; ".join(reasons[:3]) + more
+
 
 def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
     """Rule -> rejected candidates over all sectors of all rooms."""
-    total: dict[str, int] = {}
+    total = Counter[str]()
     for room in rooms:
         for sector in room.sectors:
-            for rule, n in sector.refused.items():
-                total[rule] = total.get(rule, 0) + n
-    return total
+            total.update(sector.refused)
+    return dict(total)

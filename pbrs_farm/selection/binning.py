@@ -81,14 +81,14 @@ def binning_table(
     return tuple(rows)
 
 
-def finest_passing(rows: Sequence[BinningRow], min_passing: float = MIN_PASSING) -> Binning:
+def finest_passing(rows: Sequence[BinningRow]) -> Binning:
     """The finest colour bins and the finest depth bins, each by itself, that enough images pass.
 
     Where not even the coarsest passes, the coarsest.
     """
     # Rows run from coarse to fine, so the last that passes is the finest.
-    colour = [r.binning.colour for r in rows if r.colour_passing >= min_passing]
-    depth = [r.binning.depth for r in rows if r.depth_passing >= min_passing]
+    colour = [r.binning.colour for r in rows if r.colour_passing >= MIN_PASSING]
+    depth = [r.binning.depth for r in rows if r.depth_passing >= MIN_PASSING]
     coarsest = rows[0].binning
     return Binning(
         colour=colour[-1] if colour else coarsest.colour,

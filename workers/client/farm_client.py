@@ -65,12 +65,7 @@ class Farm:
         return store_from_url(self.config.store_url, self.config.store)
 
     def submit(
-        self,
-        houses: Sequence[HouseEntry],
-        spec: JobSpec,
-        *,
-        update: bool = False,
-        progress: Callable[[str], None] = lambda _line: None,
+        self, houses: Sequence[HouseEntry], spec: JobSpec, *, update: bool = False
     ) -> Submitted:
         """Put a job on the farm; a job that is there already is left alone.
 
@@ -96,7 +91,7 @@ class Farm:
         claim_root(self.store, spec.recipe, update=update)
         self.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
         self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
-        return Submitted(spec.job_id, len(houses), self._load(spec, list(houses), progress))
+        return Submitted(spec.job_id, len(houses), self._load(spec, list(houses)))
 
     def recover(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
         """Rebuild the ledger of a job from storage, whatever Redis held of it."""
@@ -209,17 +204,17 @@ class Farm:
             self.store.delete(failed_key(job, task))
         return again
 
-    def pause(self, job: str, reason: str = "by hand") -> str:
+    def pause(self, job: str) -> str:
         """Start nothing more; what runs, ends. The job's state afterwards."""
-        return self._steer(job, "pause", reason)
+        return self._steer(job, "pause", "by hand")
 
     def resume(self, job: str) -> str:
         """Go on with a paused job."""
         return self._steer(job, "resume")
 
-    def cancel(self, job: str, reason: str = "by hand") -> str:
+    def cancel(self, job: str) -> str:
         """Stop for good: what runs is killed. What is in storage stays; submit takes it up."""
-        return self._steer(job, "cancel", reason)
+        return self._steer(job, "cancel", "by hand")
 
     def reduce(self, job: str) -> str:
         """Merge what is there now, of a finished or a running job; its report says what lacks."""
@@ -238,7 +233,10 @@ class Farm:
         ]
 
     def _load(
-        self, spec: JobSpec, houses: list[HouseEntry], progress: Callable[[str], None]
+        self,
+        spec: JobSpec,
+        houses: list[HouseEntry],
+        progress: Callable[[str], None] = lambda _line: None,
     ) -> str:
         """Enter the job into the ledger, as far along as storage says it is."""
         from workers.coordinator.recover import rebuild

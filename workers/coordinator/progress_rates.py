@@ -78,20 +78,21 @@ def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
     counts = durations(view, stage)
     p50, p90 = quantile_s(counts, 0.5), quantile_s(counts, 0.9)
     rate = view.rates.get(stage, 0.0)
-    # From the measured rate; before there is one, from the typical task and the slots.
-    eta: float | None = None
-    if left == 0 and (total or view.state == "done"):
-        eta = 0.0
-    elif rate > _LEAST_RATE:
-        eta = left / rate
-    elif n_slots and p50:
-        eta = left * p50 / n_slots
+    is_over = left == 0 and (total > 0 or view.state == "done")
+    eta = 0.0 if is_over else _eta_s(left, rate, p50, n_slots)
     return StageView(
         stage=stage, done=done, running=running, queued=queued,
         waiting=max(0, left - running - queued), failed=failed, total=total, per_s=rate,
         mean_s=c.get(f"seconds:{stage}", 0.0) / max(1, sum(counts.values())),
         p50_s=p50, p90_s=p90, eta_s=eta,
     )  # fmt: skip
+
+
+def _eta_s(left: int, rate: float, p50_s: float, n_slots: int) -> float | None:
+    """From the measured rate; before there is one, from the typical task and the slots."""
+    if rate > _LEAST_RATE:
+        return left / rate
+    return left * p50_s / n_slots if n_slots and p50_s else None
 
 
 def expected_total(view: JobView, stage: str) -> int:

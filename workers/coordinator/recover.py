@@ -70,12 +70,9 @@ def _state(
     units: dict[str, tuple[str, str]] = {}
     for unit, stage in survey.missing.items():
         units[unit] = (stage, "l") if stage else (spec.batch_stages[-1], "d")
-    if survey.reduced:
-        units["-"] = (REDUCE, "d")
-    elif all(letter == "d" for _stage, letter in units.values()):
-        units["-"] = (REDUCE, "l")
-    else:
-        units["-"] = (GEOMETRY, "d")
+    are_done = all(letter == "d" for _stage, letter in units.values())
+    reduce = (REDUCE, "d" if survey.reduced else "l")
+    units["-"] = reduce if survey.reduced or are_done else (GEOMETRY, "d")
     return HouseState(index, house.house_id, survey.reduced, survey.batches, units)
 
 

@@ -56,11 +56,8 @@ def redis_client(config: FarmConfig) -> Any:
     """
     url = config.redis_url.reveal()
     # TLS with a checked certificate, or none at all.
-    options: dict[str, Any] = {}
-    if url.startswith("rediss:"):
-        options["ssl_cert_reqs"] = "required"
-        if config.redis_ca:
-            options["ssl_ca_certs"] = config.redis_ca
+    ca = {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
+    tls: dict[str, Any] = {"ssl_cert_reqs": "required", **ca} if url.startswith("rediss:") else {}
     return redis.Redis.from_url(
         url,
         decode_responses=True,
@@ -71,7 +68,7 @@ def redis_client(config: FarmConfig) -> Any:
         retry=Retry(ExponentialWithJitterBackoff(cap=2.0, base=0.05), 5),
         retry_on_error=[redis.ConnectionError, redis.TimeoutError],
         client_name="pbrs-ledger",
-        **options,
+        **tls,
     )
 
 

@@ -87,11 +87,11 @@ class Registry:
             key=lambda worker: worker.name,
         )
 
-    def slots(self, *, alive_s: float = ALIVE_S) -> dict[str, int]:
-        """Stage -> tasks that workers seen in the last alive_s seconds can run at once."""
+    def slots(self) -> dict[str, int]:
+        """Stage -> tasks that workers seen in the last ALIVE_S seconds can run at once."""
         slots: dict[str, int] = {}
         for worker in self.workers():
-            if worker.age_s <= alive_s:
+            if worker.age_s <= ALIVE_S:
                 for queue in worker.fields.get("queues", "").split(","):
                     for stage in stages_of_queue(queue):
                         slots[stage] = slots.get(stage, 0) + int(worker.fields.get("slots", 1))

@@ -22,8 +22,9 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def planks(size_px: int = 128, n: int = 8) -> NDArray[np.uint8]:
-    """A square metre of wooden floor, n boards along v; tiles in both directions."""
+def planks() -> NDArray[np.uint8]:
+    """A square metre of wooden floor, eight boards along v; tiles in both directions."""
+    size_px, n = 128, 8
     rng = np.random.default_rng(7)
     # Give each board its shade and the place of its joint.
     board = np.arange(size_px) * n // size_px

@@ -10,6 +10,7 @@ import csv
 import io
 import posixpath
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -21,7 +22,12 @@ from PIL import Image
 from pbrs_farm.core.catalogue import Picture
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Texture
-from pbrs_farm.read.catalogue.library_files import LibraryNotes, licence_of, opened_library
+from pbrs_farm.read.catalogue.library_files import (
+    LibraryNotes,
+    OpenedLibrary,
+    licence_of,
+    opened_library,
+)
 from pbrs_farm.read.catalogue.library_shapes import small_texture
 from pbrs_farm.read.catalogue.properties import numbered_entries
 from pbrs_farm.read.common.furniture_classes import plain
@@ -85,18 +91,22 @@ def texture_library(
     opened = opened_library(path, catalogue, notes)
     if opened is None:
         return None
-    licence, count, found = licence_of(opened.properties), Counter[str](), []
+    found = tuple(_pictures(opened, path.stem, notes))
+    if not found:
+        notes.add("no-classes", path.name, "no picture of the library is of a known kind")
+    return opened.sha256, found
+
+
+def _pictures(opened: OpenedLibrary, library: str, notes: LibraryNotes) -> Iterator[Picture]:
+    licence, count = licence_of(opened.properties), Counter[str]()
     for row in numbered_entries(opened.properties):
         group = surface_group(row.get("name", ""), row.get("category", ""))
         if not group or count[group] >= MOST_OF_A_GROUP:
             continue
-        picture = _picture(row, group, opened.contents, path.stem, licence, notes)
+        picture = _picture(row, group, opened.contents, library, licence, notes)
         if picture is not None:
             count[group] += 1
-            found.append(picture)
-    if not found:
-        notes.add("no-classes", path.name, "no picture of the library is of a known kind")
-    return opened.sha256, tuple(found)
+            yield picture
 
 
 def surface_group(name: str, category: str) -> str:

@@ -54,21 +54,22 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
     gltf = _parsed(data, file)
     if not isinstance(gltf.document.get("asset"), dict):
         raise BadHouse(file, "asset", "is missing; this is no glTF file")
-    # Reject what the file says it cannot be read without.
-    required = gltf.document.get("extensionsRequired", [])
-    for name in required if isinstance(required, list) else []:
-        if name not in UNDERSTOOD:
-            text, hint = (
-                f"{str(name)[:60]!r} is not understood",
-                "export again without mesh compression",
-            )
-            raise BadHouse(file, "extensionsRequired", text, hint=hint)
+    _check_extensions(gltf)
     # Load what the accessors read from.
     buffers = gltf.document.get("buffers", [])
     if not isinstance(buffers, list):
         raise BadHouse(file, "buffers", "expected a list")
     loaded = [_buffer(gltf, i, fetch) for i in range(len(buffers))]
     return Gltf(gltf.document, tuple(loaded), file)
+
+
+def _check_extensions(gltf: Gltf) -> None:
+    """Reject what the file says it cannot be read without."""
+    required = gltf.document.get("extensionsRequired", [])
+    for name in required if isinstance(required, list) else []:
+        if name not in UNDERSTOOD:
+            text, hint = f"{str(name)[:60]!r} is not understood", "export without mesh compression"
+            raise BadHouse(gltf.file, "extensionsRequired", text, hint=hint)
 
 
 def _parsed(data: bytes, file: str) -> Gltf:

@@ -31,14 +31,7 @@ def mirror_slot(model: ParsedModel) -> int | None:
     corners = np.concatenate([m.positions for m in model.meshes])
     extent = np.ptp(corners, axis=0)
     across = 0 if extent[0] < extent[2] else 2
-    areas: dict[int, list[float]] = {}  # slot: all of its area, what lies flat
-    for mesh, slot in zip(model.meshes, model.slots, strict=True):
-        normals = area_vectors(triangle_corners(mesh.positions, mesh.faces))
-        area = np.linalg.norm(normals, axis=1)
-        flat = np.abs(normals[:, across]) >= _FLAT_COS * area
-        found = areas.setdefault(slot, [0.0, 0.0])
-        found[0] += float(area.sum())
-        found[1] += float(area[flat].sum())
+    areas = _areas_of_slots(model, across)
     is_flat = [s for s, (whole, flat_area) in areas.items() if flat_area > _FLAT_SHARE * whole]
 
     def rank(slot: int) -> tuple[bool, float]:
@@ -46,6 +39,19 @@ def mirror_slot(model: ParsedModel) -> int | None:
         return any(word in name for word in _NAMES), areas[slot][1]
 
     return max(is_flat, key=rank, default=None)
+
+
+def _areas_of_slots(model: ParsedModel, across: int) -> dict[int, list[float]]:
+    """Position in the MTL -> all of its area, and what of it lies flat across an axis."""
+    areas: dict[int, list[float]] = {}
+    for mesh, slot in zip(model.meshes, model.slots, strict=True):
+        normals = area_vectors(triangle_corners(mesh.positions, mesh.faces))
+        area = np.linalg.norm(normals, axis=1)
+        flat = np.abs(normals[:, across]) >= _FLAT_COS * area
+        found = areas.setdefault(slot, [0.0, 0.0])
+        found[0] += float(area.sum())
+        found[1] += float(area[flat].sum())
+    return areas
 
 
 def as_mirror(material: Material) -> Material:

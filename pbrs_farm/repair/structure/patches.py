@@ -11,7 +11,7 @@ from pbrs_farm.repair.structure.booleans import Patch, Tag
 _MIN_AREA_M2 = 1e-12  # float32 holds no smaller face
 
 
-def patch_from_surface(surface: Surface, item: int, *, name: str | None = None) -> Patch:
+def patch_from_surface(surface: Surface, item: int) -> Patch:
     """The surface in double precision, tagged with its item; metric uv where it has none."""
     positions = surface.positions.astype(np.float64)
     uvs = surface.uvs.astype(np.float64) if surface.uvs is not None else positions[:, [0, 2]]
@@ -20,7 +20,7 @@ def patch_from_surface(surface: Surface, item: int, *, name: str | None = None) 
         if surface.normals is not None
         else np.zeros_like(positions)
     )
-    tag = Tag(item, surface.name if name is None else name, surface.material)
+    tag = Tag(item, surface.name, surface.material)
     return Patch(tag, positions, surface.faces.astype(np.int64), uvs, normals)
 
 

@@ -18,6 +18,8 @@ from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, solid_from
 UvMap = Callable[[F64], F64]
 """Texture coordinates (N, 2) of positions (N, 3)."""
 
+_ON_PLANE_M = 1e-3  # points of a plane lie no farther from it
+
 
 @dataclass(frozen=True, slots=True)
 class Plane:
@@ -41,7 +43,7 @@ def level_plane(y: float) -> Plane:
     return Plane(0.0, 0.0, y)
 
 
-def plane_of_points(points: F64, *, tolerance_m: float = 1e-3) -> Plane | None:
+def plane_of_points(points: F64) -> Plane | None:
     """The plane through points (N, 3), exactly level where they are; None if they are on none."""
     # Answer exactly for a level surface: least squares would tilt it.
     low, high = float(points[:, 1].min()), float(points[:, 1].max())
@@ -51,7 +53,7 @@ def plane_of_points(points: F64, *, tolerance_m: float = 1e-3) -> Plane | None:
     (a, b, c), _, rank, _ = np.linalg.lstsq(_affine_columns(points), points[:, 1], rcond=None)
     plane = Plane(float(a), float(b), float(c))
     off = np.abs(plane.at(points[:, [0, 2]]) - points[:, 1]).max()
-    return plane if rank == 3 and off <= tolerance_m else None
+    return plane if rank == 3 and off <= _ON_PLANE_M else None
 
 
 def affine_uv_map(positions: F64, uvs: F64) -> tuple[UvMap, float]:

@@ -129,6 +129,6 @@ def _events_in(worker: _Worker, task: Task, message: Message) -> Iterator[Event]
         yield event
 
 
-def last_lines(log: str, n: int = 3) -> str:
-    """The last lines a process' libraries printed, on one line."""
-    return " | ".join([line.strip() for line in log.splitlines() if line.strip()][-n:])
+def last_lines(log: str) -> str:
+    """The last three lines a process' libraries printed, on one line."""
+    return " | ".join([line.strip() for line in log.splitlines() if line.strip()][-3:])

@@ -8,10 +8,10 @@ messages leave on what was stdout; whatever libraries print goes to stderr, whic
 from __future__ import annotations
 
 import os
+import pkgutil
 import signal
 import sys
 import traceback
-from importlib import import_module
 from typing import BinaryIO
 
 from pbrs_farm.run.processes.child_process import die_with_parent
@@ -31,8 +31,7 @@ def main(target: str) -> int:
 
     try:
         # Make the handler once: what it keeps between tasks lives in it.
-        module, _, function = target.partition(":")
-        handle = getattr(import_module(module), function)(send)
+        handle = pkgutil.resolve_name(target)(send)
     except Exception as error:  # noqa: BLE001 - the parent learns why
         traceback.print_exc()
         send(Message("fault", f"{type(error).__name__}: {error}"))

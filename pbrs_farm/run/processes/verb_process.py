@@ -8,12 +8,12 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import pkgutil
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from contextvars import ContextVar
-from importlib import import_module
 from typing import Final
 
 from pbrs_farm.run.processes.child_process import PATH_FROM_PARENT, die_with_parent, ending
@@ -67,5 +67,4 @@ def main(telling: int, target: str, words: Sequence[str]) -> int:
     die_with_parent()
     os.set_inheritable(telling, False)
     _WATCHER.set(telling)
-    module, _, function = target.partition(":")
-    return int(getattr(import_module(module), function)(words))
+    return int(pkgutil.resolve_name(target)(words))

@@ -81,11 +81,9 @@ class DeviceScene:
         self._materials = device_array(mi.Float, tables.material_rows.ravel())
         self._texels = device_array(mi.UInt32, tables.texels)
 
-    def intersect(
-        self, o: Any, d: Any, active: Any, *, coherent: bool = False
-    ) -> SurfaceInteraction:
+    def intersect(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
         """The first surface along a ray."""
-        found = self._all.ray_intersect_preliminary(_ray(o, d, dr.inf), coherent, active)
+        found = self._all.ray_intersect_preliminary(_ray(o, d, dr.inf), False, active)
         valid = active & found.is_valid()
         return self._interaction(found.prim_index, found.prim_uv, d, valid, with_maps=True)
 

@@ -43,18 +43,22 @@ def material_rows(house: House, packed: TextureAtlas, recipe: Recipe) -> tuple[F
             row, was_scaled = _physical(material, recipe)
             if was_scaled:
                 scaled.append(material.name)
-        # Add the place of the texture in the atlas.
-        slot = packed.slots.get(material.texture_id or "")
-        if slot is not None:
-            row[FIRST_TEXEL], row[TEXTURE_SIZE] = _float_of_bits(slot[0]), slot[1:]
-            row[IS_CUTOUT] = float(material.alpha_cutout)
-        slot = packed.map_slots.get(map_key(material))
-        if slot is not None and material.shows_maps and int(row[KIND]) != NULL:
-            row[FIRST_MAP_TEXEL], row[MAP_SIZE] = _float_of_bits(slot[0]), slot[1:]
-            row[MAP_ROUGHNESS] = math.sqrt(row[ALPHA]) if row[ALPHA] > 0 else 1.0
+        _place_in_atlas(row, material, packed)
         rows[index] = row
     notes = [f"material {n!r}: Kd + Ks above 1, scaled to conserve energy" for n in scaled]
     return rows, notes
+
+
+def _place_in_atlas(row: F32, material: Material, packed: TextureAtlas) -> None:
+    """Write into a row where the material's texture and maps lie in the atlas."""
+    slot = packed.slots.get(material.texture_id or "")
+    if slot is not None:
+        row[FIRST_TEXEL], row[TEXTURE_SIZE] = _float_of_bits(slot[0]), slot[1:]
+        row[IS_CUTOUT] = float(material.alpha_cutout)
+    slot = packed.map_slots.get(map_key(material))
+    if slot is not None and material.shows_maps and int(row[KIND]) != NULL:
+        row[FIRST_MAP_TEXEL], row[MAP_SIZE] = _float_of_bits(slot[0]), slot[1:]
+        row[MAP_ROUGHNESS] = math.sqrt(row[ALPHA]) if row[ALPHA] > 0 else 1.0
 
 
 def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
