@@ -15,7 +15,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from pbrs_farm.board.board_state import Board
-from pbrs_farm.board.pages import entering, looking, viewing
+from pbrs_farm.board.pages import entering, looking, relighting, viewing
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.security.guard import Guard
 from pbrs_farm.core.errors import PbrsError
@@ -57,6 +57,8 @@ def _routes() -> list[Route]:
         Route(f"{_VIEW}/file/{{layer}}", viewing.file),
         Route(f"{_VIEW}/view.json", viewing.view_json),
         Route(f"{_VIEW}/pixels", viewing.pixels),
+        Route(f"{_VIEW}/relight", relighting.relight),
+        Route(f"{_VIEW}/light", relighting.light),
         Route("/login", entering.login),
         Route("/login", entering.log_in, methods=["POST"]),
         Route("/logout", entering.log_out, methods=["POST"]),

@@ -42,8 +42,8 @@ def add_verbs(verb: Verb) -> None:
     p = verb("relight", _relight, text)
     add = p.add_argument
     add("view", type=Path, help=VIEW)
-    add("--indoor", type=float, default=1.0, help="factor of the lamps (default 1)")
-    add("--outdoor", type=float, default=1.0, help="factor of the sky (default 1)")
+    add("--indoor", default="1", metavar="F", help="factor of the lamps, F or R,G,B (default 1)")
+    add("--outdoor", default="1", metavar="F", help="factor of the sky, F or R,G,B (default 1)")
     text = (
         "factor F, or R,G,B, of a lamp, repeatable: its number, item or name as --list prints"
         " them, * for any; needs a view rendered with --groups lamps"
@@ -133,15 +133,14 @@ def _relight(args: argparse.Namespace) -> int:
 
     if args.list:
         return _list_lamps(args)
-    factors = {"indoor": args.indoor, "outdoor": args.outdoor}
     # Factors scale radiance: none may be negative.
-    for name, factor in factors.items():
-        if not 0 <= factor < math.inf:
-            text = "expected a number that is finite and not negative"
-            raise BadInput(f"--{name}", str(factor), text)
+    expected = "expected F or R,G,B, numbers that are finite and not negative"
+    indoor = _factors("--indoor", args.indoor, expected, args.indoor)
+    outdoor = _factors("--outdoor", args.outdoor, expected, args.outdoor)
     out = args.out or Path(f"{args.view.resolve().name}_relit.png")
     lamps = [_lamp_factor(argument) for argument in args.lamp]
-    png = relit(args.view, **factors, denoise=not args.no_denoise, lamps=lamps)
+    denoise = not args.no_denoise
+    png = relit(args.view, indoor=indoor, outdoor=outdoor, denoise=denoise, lamps=lamps)
     FolderStore(out.parent).put(out.name, png)
     # A factor of a lamp that the view does not see changes nothing: say so.
     for row in unlit_lamps(args.view, lamps) if lamps else ():
@@ -171,13 +170,18 @@ def _lamp_factor(argument: str) -> LampFactor:
     from pbrs_farm.run.relight import LampFactor
 
     name, _, text = argument.rpartition("=")
+    expected = "expected LAMP=F or LAMP=R,G,B, numbers that are finite and not negative"
+    return LampFactor(name, _factors("--lamp", text if name else "", expected, argument))
+
+
+def _factors(option: str, text: str, expected: str, argument: str) -> tuple[float, float, float]:
+    """F or R,G,B as the factors of three channels; BadInput naming the option and its argument."""
     try:
         factors = [float(part) for part in text.split(",")]
     except ValueError:
         factors = []
-    if not name or len(factors) not in (1, 3) or not all(0 <= f < math.inf for f in factors):
-        expected = "expected LAMP=F or LAMP=R,G,B, numbers that are finite and not negative"
-        raise BadInput("--lamp", argument, expected)
+    if len(factors) not in (1, 3) or not all(0 <= f < math.inf for f in factors):
+        raise BadInput(option, argument, expected)
     # One number is the factor of all three channels.
     r, g, b = factors * (3 // len(factors))
-    return LampFactor(name, (r, g, b))
+    return r, g, b

@@ -21,8 +21,9 @@ from pbrs_farm.formats.view_json import lamps_from_view_json
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
-from pbrs_farm.transport.lamp_layers import indoor_from_lamps
+from pbrs_farm.transport.develop.denoiser import denoise_radiance
+from pbrs_farm.transport.develop.mode_pictures import Factor, LinearAovs, denoised, develop
+from pbrs_farm.transport.lamp_layers import indoor_from_lamps, lamp_shares, relit_indoor
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,30 +40,62 @@ def linear_aovs(radiance: RadianceExr) -> LinearAovs:
     return LinearAovs(image("outdoor"), image("indoor"), image("albedo"), image("normal"))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RelightLayers:
+    """The layers of light that relit views are sums of, (H, W, 3) float32 radiance each."""
+
+    aovs: LinearAovs  # its groups as they are developed
+    lamps: Mapping[int, NDArray[np.float32]]  # number -> its share of indoor light; they sum to it
+
+
+def relight_layers(
+    radiance: RadianceExr, rows: Sequence[Mapping[str, Any]], *, denoise: bool
+) -> RelightLayers:
+    """The layers whose sums `relit` tones. rows: the lamps of view.json, () where it has none."""
+    aovs = linear_aovs(radiance)
+    layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
+    if not denoise:
+        return RelightLayers(aovs, layers)
+    clean = denoised(aovs)
+    return RelightLayers(clean, lamp_shares(clean.indoor, _denoised_lamps(aovs, layers)))
+
+
 def relit(
-    view: Path, *, indoor: float, outdoor: float, denoise: bool, lamps: Sequence[LampFactor] = ()
+    view: Path, *, indoor: Factor, outdoor: Factor, denoise: bool, lamps: Sequence[LampFactor] = ()
 ) -> bytes:
     """PNG of mode mlt_il_ol with each light group and each lamp times its factor.
 
     view: the folder of a view in an output root, whose recipe tones the picture. lamps: the last
-    word that names a lamp counts; indoor multiplies all of them. Raises BadInput when a file is
-    missing, when the view has no light by lamp or none of a name.
+    word that names a lamp counts; indoor multiplies all of them. Denoising comes first, so that a
+    picture is linear in its factors. Raises BadInput when a file is missing, when the view has no
+    light by lamp or none of a name.
     """
     # OUT of OUT/houses/<house>/views/<view>.
     root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
     radiance = radiance_from_exr(read_given(view / RADIANCE_EXR), str(view / RADIANCE_EXR))
     aovs = linear_aovs(radiance)
+    clean = denoised(aovs) if denoise else aovs
     # Sum indoor light anew from the lamps' own layers.
     if lamps:
         rows = lamps_of_view(view)
         factors = lamp_factors(rows, lamps)
         layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
-        aovs = replace(aovs, indoor=indoor_from_lamps(layers, factors, aovs.indoor.shape))
+        if denoise:
+            relit_light = relit_indoor(clean.indoor, _denoised_lamps(aovs, layers), factors)
+        else:
+            relit_light = indoor_from_lamps(layers, factors, aovs.indoor.shape)
+        clean = replace(clean, indoor=relit_light)
     # Develop it as the run would have, with the recipe's tone.
     tone = recipe_from_json(read_given(root / "recipe.json"), str(root / "recipe.json")).tone
-    images = develop(aovs, tone, denoise=denoise, indoor=indoor, outdoor=outdoor)
+    images = develop(clean, tone, denoise=False, indoor=indoor, outdoor=outdoor)
     credit = attribution(FolderStore(root), view.resolve().parents[1].name)
     return layer_bytes(Mode.MLT_IL_OL.value, images[Mode.MLT_IL_OL.value].rgb_srgb8, credit)
+
+
+def _denoised_lamps(
+    aovs: LinearAovs, layers: Mapping[int, NDArray[np.float32]]
+) -> dict[int, NDArray[np.float32]]:
+    return {n: denoise_radiance(layer, aovs.albedo, aovs.normal) for n, layer in layers.items()}
 
 
 def lamps_of_view(view: Path) -> list[dict[str, Any]]:

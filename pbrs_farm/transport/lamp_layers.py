@@ -55,6 +55,35 @@ def indoor_from_lamps(
     return total
 
 
+def relit_indoor(
+    indoor: RadianceImage, layers: Mapping[int, RadianceImage], factors: Mapping[int, F32]
+) -> RadianceImage:
+    """Denoised indoor light with each lamp times its factor.
+
+    indoor: (H, W, 3), the lamps' light denoised as a whole. layers: each lamp's, denoised by itself;
+    they say whose share of a pixel is whose. With every factor 1 it is indoor to the bit.
+    """
+    total = indoor_from_lamps(layers, {}, indoor.shape)
+    scaled = indoor_from_lamps(layers, factors, indoor.shape)
+    # Where no layer has light, all lamps have equal shares.
+    unit = np.ones(3, np.float32)
+    mean = np.mean([factors.get(number, unit) for number in layers] or [unit], axis=0)
+    ratio = np.divide(scaled, total, out=np.zeros_like(total) + mean, where=total > 0)
+    return np.asarray(indoor * ratio, np.float32)
+
+
+def lamp_shares(
+    indoor: RadianceImage, layers: Mapping[int, RadianceImage]
+) -> dict[int, RadianceImage]:
+    """Number -> the lamp's part of denoised indoor light, so that relit_indoor is a sum of them."""
+    total = indoor_from_lamps(layers, {}, indoor.shape)
+    equal = np.float32(1 / max(1, len(layers)))
+    return {
+        number: indoor * np.divide(layer, total, out=np.full_like(total, equal), where=total > 0)
+        for number, layer in layers.items()
+    }
+
+
 def lamp_table(
     lamps: Sequence[AreaEmitter], layers: Mapping[int, RadianceImage], indoor: RadianceImage
 ) -> list[dict[str, Any]]:

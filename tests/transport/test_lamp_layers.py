@@ -15,7 +15,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import RECIPE_NAMES, LightFields, recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport import light_scene as scene_module
-from pbrs_farm.transport.lamp_layers import indoor_from_lamps, lamp_table
+from pbrs_farm.transport.lamp_layers import indoor_from_lamps, lamp_shares, lamp_table, relit_indoor
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import uniform_sky
@@ -179,3 +179,17 @@ def test_other_strengths_multiply_layers_by_number_and_colour() -> None:
     np.testing.assert_array_equal(lit, np.broadcast_to([1.5, 2.0, 3.0], (2, 3, 3)))
     assert not indoor_from_lamps({}, factors, (2, 3, 3)).any()
     assert lamp_table((), {}, np.zeros((2, 3, 3), np.float32)) == []
+
+
+def test_shares_of_denoised_light_sum_to_it_and_scale_as_relit_light_does() -> None:
+    rng = np.random.default_rng(5)
+    layers = {n: rng.random((4, 6, 3), np.float32) for n in (1, 4, 9)}
+    for layer in layers.values():
+        layer[0, 0] = 0.0  # a pixel that no lamp lights: shared equally
+    indoor = rng.random((4, 6, 3), np.float32)
+    factors = {1: np.float32([0.5, 0, 2]), 9: np.float32([3, 3, 3])}
+    shares = lamp_shares(indoor, layers)
+    np.testing.assert_allclose(sum(shares.values()), indoor, rtol=1e-5)
+    summed = indoor_from_lamps(shares, factors, indoor.shape)
+    np.testing.assert_allclose(summed, relit_indoor(indoor, layers, factors), rtol=1e-5)
+    np.testing.assert_array_equal(relit_indoor(indoor, layers, {}), indoor)

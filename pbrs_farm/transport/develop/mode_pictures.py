@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +13,9 @@ from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group
 from pbrs_farm.core.recipe import ToneFields
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
 from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
+
+# Of a light group: of all, or of R, G and B.
+Factor = float | tuple[float, float, float]
 
 _SATURATED: Final = 0.35  # (max - min) / max of an albedo from which it is a colour
 _SAME_HUE_COS: Final = 0.9  # of the angle between two chroma vectors
@@ -51,26 +54,19 @@ def develop(
     fields: ToneFields,
     *,
     denoise: bool,
-    indoor: float = 1.0,
-    outdoor: float = 1.0,
+    indoor: Factor = 1.0,
+    outdoor: Factor = 1.0,
 ) -> dict[str, ToneMappedImage]:
     """Mode name -> image of every mode that is a sum of light groups.
 
-    Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors.
+    Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors of
+    all, or of R, G and B; they scale what is denoised, so that every picture is linear in them.
     """
-    # Scale and denoise the light groups.
+    clean = denoised(aovs) if denoise else aovs
     groups = {
-        Group.OUTDOOR: aovs.outdoor * np.float32(outdoor),
-        Group.INDOOR: aovs.indoor * np.float32(indoor),
+        Group.OUTDOOR: clean.outdoor * np.asarray(outdoor, np.float32),
+        Group.INDOOR: clean.indoor * np.asarray(indoor, np.float32),
     }
-    if denoise:
-        # Keep pixels black that hit nothing: the denoiser would smear light over them.
-        light = aovs.outdoor + aovs.indoor
-        is_hit = np.any(light > 0, -1, keepdims=True) | np.any(aovs.albedo > 0, -1, keepdims=True)
-        groups = {
-            name: denoise_radiance(radiance, aovs.albedo, aovs.normal) * is_hit
-            for name, radiance in groups.items()
-        }
     # Sum the groups of each mode, balance white, expose, and apply the tone curve.
     images = {}
     for mode, names in GROUPS_OF_MODE.items():
@@ -81,6 +77,18 @@ def develop(
             rgb = tone(total * gains, fields, exposure=exposure)
             images[mode.value] = ToneMappedImage(rgb, gains, exposure)
     return images
+
+
+def denoised(aovs: LinearAovs) -> LinearAovs:
+    """The same view with each light group denoised by itself; what hits nothing stays black."""
+    # The denoiser would smear light over pixels without a surface.
+    light = aovs.outdoor + aovs.indoor
+    is_hit = np.any(light > 0, -1, keepdims=True) | np.any(aovs.albedo > 0, -1, keepdims=True)
+    outdoor, indoor = (
+        denoise_radiance(radiance, aovs.albedo, aovs.normal) * is_hit
+        for radiance in (aovs.outdoor, aovs.indoor)
+    )
+    return replace(aovs, outdoor=outdoor, indoor=indoor)
 
 
 def white_balance(radiance: RadianceImage, albedo: RadianceImage, strength: float) -> F32:

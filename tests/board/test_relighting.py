@@ -1,0 +1,82 @@
+"""The light that a browser sums is the stored light, as half floats, with the recipe's tone."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from pbrs_farm.board.pictures.light_layers import lamp_rows, packet, scale_of
+from tests.board.roots import HEIGHT, WIDTH, light_images, write_root
+from tests.board.served import served
+
+VIEW = "/homes/a-1/views/0_0_1"
+
+
+def unpacked(data: bytes) -> tuple[dict[str, object], dict[str, np.ndarray]]:
+    """The facts of a packet and its planes as float32."""
+    assert data[:4] == b"PBLT"
+    (length,) = struct.unpack_from("<I", data, 4)
+    facts = json.loads(data[8 : 8 + length])
+    shape = (facts["height"], facts["width"], 3)
+    size = 6 * facts["height"] * facts["width"]
+    assert len(data) == 8 + length + size * len(facts["planes"])
+    planes = {
+        name: np.frombuffer(data, "<f2", size // 2, 8 + length + k * size).reshape(shape)
+        for k, name in enumerate(facts["planes"])
+    }
+    return facts, {name: plane.astype(np.float32) for name, plane in planes.items()}
+
+
+def test_the_packet_holds_each_layer_of_light_to_a_half_floats_precision(
+    client: httpx.Client,
+) -> None:
+    facts, planes = unpacked(client.get(f"{VIEW}/light?denoise=0").content)
+    assert list(planes) == ["albedo", "outdoor", "lamp1", "lamp2"]
+    assert (facts["width"], facts["height"], facts["denoised"]) == (WIDTH, HEIGHT, False)
+    assert facts["tone"] == {"preset": "photo", "key": 0.18, "white_balance": 0.7}
+    assert [lamp["name"] for lamp in facts["lamps"]] == ["lamp 0", "lamp 1"]
+    stored = light_images(2)
+    np.testing.assert_allclose(planes["albedo"], stored["albedo"], rtol=1e-3)
+    for name in ("outdoor", "lamp1", "lamp2"):
+        np.testing.assert_allclose(planes[name] / facts["scale"], stored[name], rtol=1e-3)
+
+
+def test_a_page_says_the_command_that_makes_the_same_file(root: Path, client: httpx.Client) -> None:
+    html = client.get(f"{VIEW}/relight").text
+    assert f"pbrs-farm relight {root}/houses/a-1/views/0_0_1" in html
+
+
+def test_a_view_without_light_and_one_with_damaged_light_say_so(tmp_path: Path) -> None:
+    root = write_root(tmp_path / "root", {"a-1": ("0_0_1", "0_0_2")})
+    (root / "houses/a-1/views/0_0_1/radiance.exr").write_bytes(b"no picture")
+    (root / "houses/a-1/views/0_0_2/radiance.exr").unlink()
+    with served(str(root), tmp_path / "cache") as client:
+        damaged = client.get(f"{VIEW}/light?denoise=0")
+        assert damaged.status_code == 422
+        assert "not an OpenEXR file" in damaged.text
+        assert client.get("/homes/a-1/views/0_0_2/relight").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("exposure", "largest", "scale"), [(1.0, 100.0, 1.0), (0.3, 1.0, 0.25), (1024.0, 1e4, 4.0)]
+)
+def test_light_is_scaled_to_what_half_floats_hold(
+    exposure: float, largest: float, scale: float
+) -> None:
+    assert scale_of(exposure, largest) == scale
+
+
+def test_what_is_no_number_becomes_one() -> None:
+    plane = np.float32([[[np.nan, np.inf, -1.0]]])
+    _facts, planes = unpacked(packet({"outdoor": plane}, {}))
+    assert planes["outdoor"].reshape(-1).tolist() == [0.0, 60_000.0, 0.0]
+
+
+@pytest.mark.parametrize("text", [b"", b"[]", b"{}", b'{"modes": {"light": {"lamps": [1]}}}'])
+def test_a_view_json_without_lamps_has_none(text: bytes) -> None:
+    assert lamp_rows(text) == []
