@@ -8,7 +8,9 @@ from pathlib import Path
 from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, warn
 from pbrs_farm.core.errors import BadInput
 
-FORMS = ("coco", "hdf5", "webdataset", "released")
+FORMS = ("coco", "hdf5", "webdataset", "released", "yolo")
+
+SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
 
 
 def add_verbs(verb: Verb) -> None:
@@ -19,15 +21,21 @@ def add_verbs(verb: Verb) -> None:
     add("--to", required=True, choices=FORMS, help="docs/formats.md describes the forms")
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
+    text = "labels by name (`pbrs-farm layers`), default all there are but radiance"
+    add("--layers", nargs="+", metavar="LAYER", help=text)
+    add_modes_and_size(p)
+    add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
+    add("--shard-size", type=int, default=500, metavar="N", help="views a tar (webdataset)")
 
     p = verb("pack", _pack, "finished views as shards to train from, or as Parquet")
     add = p.add_argument
     add("root", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add("--out", type=Path, required=True, help="new folder")
     add("--to", choices=("shards", "parquet"), default="shards", help="default shards")
-    add_choice(p)
-    text = "by homes: train/val/test (default 80/10/10); without it all views are one"
-    add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=text)
+    layers = "colour normal depth class40 instance boundary (default all)"
+    add("--layers", nargs="+", metavar="LAYER", help=layers)
+    add_modes_and_size(p)
+    add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
     add("--shard-size", type=int, default=200, metavar="N", help="views a shard (default 200)")
     text = "png keeps every bit and is read with numpy alone; jpeg:95 is a quarter as large"
     add("--colour", default="png", metavar="FORM", help=text)
@@ -43,28 +51,37 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
+    from pbrs_farm.core.house_split import shares_from_text
+    from pbrs_farm.export.chosen_view import Choice
     from pbrs_farm.export.export_views import export
 
+    choice = Choice(
+        layers=tuple(args.layers) if args.layers else None,
+        modes=tuple(args.modes) if args.modes else None,
+        size=size_of(args.size),
+        views_per_shard=args.shard_size,
+    )
+    shares = shares_from_text(args.split) if args.split else None
     out = args.out or Path(f"{args.folder.resolve().name}_{args.to}")
-    n_views, n_files = export(args.folder, out, args.to, selection=args.selection)
+    n_views, n_files = export(
+        args.folder, out, args.to, selection=args.selection, choice=choice, shares=shares
+    )
     echo(f"{out}: {n_views} views, {n_files} files")
     return 0
 
 
-def add_choice(p: argparse.ArgumentParser) -> None:
-    """Which layers and lighting modes, and at which size."""
+def add_modes_and_size(p: argparse.ArgumentParser) -> None:
+    """Which lighting modes, and at which size."""
     add = p.add_argument
-    layers = "colour normal depth class40 instance boundary (default all)"
-    add("--layers", nargs="+", metavar="LAYER", help=layers)
     modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)"
     add("--modes", nargs="+", metavar="MODE", help=modes)
     add("--size", metavar="WxH", help="resize to, e.g. 320x240 (default as rendered)")
 
 
 def _pack(args: argparse.Namespace) -> int:
+    from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.study.packing.pack_shards import pack
     from pbrs_farm.study.packing.packing_plan import Packing
-    from pbrs_farm.study.reading.house_split import shares_from_text
     from pbrs_farm.study.reading.open_views import open_views
     from pbrs_farm.study.reading.view_sample import LAYERS
 

@@ -13,19 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import MachineFailed
-from pbrs_farm.export.coco import PICTURES
-from pbrs_farm.formats.output_folder import ViewEntry
-from pbrs_farm.images import array_from_png
-from pbrs_farm.regular_files import read_regular
+from pbrs_farm.export.chosen_view import PICTURES, Choice, ChosenView
 
 
-def write_hdf5(views: list[ViewEntry], out: Path) -> int:
+def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """<n>.hdf5 per view, n counted from 0, and index.jsonl; the number of files.
 
     colors (H, W, 3) uint8 (the first of PICTURES there is; every mode also by its name), depth
     (H, W) float32 planar metres (0 = nothing), normals (H, W, 3) float32 (n + 1) / 2 with OpenGL
     camera axes, category_id_segmaps uint8, instance_segmaps uint16, and as JSON text
-    instance_attribute_maps and campose (K and the OpenGL pose). Raises MachineFailed without h5py.
+    instance_attribute_maps and campose (the OpenGL pose, and cam_K as BlenderProc means it: the centre
+    of the first pixel is (0, 0), so that cx is (W - 1) / 2). Raises MachineFailed without h5py.
     """
     h5py = _h5py()
     index = []
@@ -52,26 +50,34 @@ def _h5py() -> Any:
     return h5py
 
 
-def _datasets(view: ViewEntry) -> dict[str, NDArray[Any] | str]:
-    def png(file: str) -> NDArray[Any]:
-        return array_from_png(read_regular(view.folder / file), f"{view.folder}/{file}")
-
+def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
     data: dict[str, NDArray[Any] | str] = {}
     # The last written is the first of PICTURES.
     for mode in reversed(PICTURES):
-        if view.file(f"{mode}.png"):
-            data[str(mode)] = data["colors"] = png(f"{mode}.png")
+        if view.has(mode):
+            data[str(mode)] = data["colors"] = view.array(mode)
     # Labels keep their numbers; depth is in metres, nothing is 0.
-    data["depth"] = png("depth.png").astype(np.float32) / np.float32(1000)
-    data["normals"] = _blenderproc_normals(png("normal.png"), png("valid.png") > 0)
-    data["category_id_segmaps"] = png("semantic.png")
-    data["instance_segmaps"] = png("instance.png")
+    if view.has("depth"):
+        data["depth"] = view.array("depth").astype(np.float32) / np.float32(1000)
+    if view.has("normal"):
+        data["normals"] = _blenderproc_normals(view.array("normal"), view.array("valid") > 0)
+    for layer, name in (("semantic", "category_id_segmaps"), ("instance", "instance_segmaps")):
+        if view.has(layer):
+            data[name] = view.array(layer)
     rows = view.facts["instances"]
     maps = [{"idx": r["id"], "name": r["name"], "category_id": r["nyu40"]} for r in rows]
     data["instance_attribute_maps"] = json.dumps(maps)
     pose = view.facts["world_from_camera_opengl"]
-    data["campose"] = json.dumps({"cam_K": view.facts["K"], "cam2world_matrix": pose})
+    data["campose"] = json.dumps(
+        {"cam_K": blenderproc_k(view.facts["K"]), "cam2world_matrix": pose}
+    )
     return data
+
+
+def blenderproc_k(k: list[list[float]]) -> list[list[float]]:
+    """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel."""
+    (fx, skew, cx), (_zero, fy, cy), last = k
+    return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
 
 
 def _blenderproc_normals(png: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -12,59 +12,57 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.formats.output_folder import ViewEntry
-from pbrs_farm.regular_files import read_regular
+from pbrs_farm.export.chosen_view import Choice, ChosenView
 
-# Stored file -> where the published data has it.
+# Layer -> where the published data has it.
 FILES: Final = {
-    "mlt_il_ol.png": "mlt_v2/{house}/{id}_mlt.png",
-    "opengl_il.png": "opengl_ver2/{house}/{id}_color.png",
-    "depth.png": "depth_v2/{house}/{id}_depth.png",
-    "normal.png": "normal_v2/{house}/{id}_norm_camera.png",
-    "valid.png": "normal_v2/{house}/{id}_valid.png",
-    "semantic.png": "category_v2/{house}/{id}_category40.png",
-    "boundary.png": "boundary_v2/{house}/{id}_instance_boundary.png",
+    "mlt_il_ol": "mlt_v2/{house}/{id}_mlt.png",
+    "opengl_il": "opengl_ver2/{house}/{id}_color.png",
+    "depth": "depth_v2/{house}/{id}_depth.png",
+    "normal": "normal_v2/{house}/{id}_norm_camera.png",
+    "valid": "normal_v2/{house}/{id}_valid.png",
+    "semantic": "category_v2/{house}/{id}_category40.png",
+    "boundary": "boundary_v2/{house}/{id}_instance_boundary.png",
 }
 
 
-def write_released(views: list[ViewEntry], out: Path) -> int:
+def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """Every view's files, camera_v2/<house>/room_camera*.txt and data_goodlist_v2.txt; the number.
 
     id is the view's number in its house, 0-based: its line in room_camera.txt.
     """
-    houses: dict[str, list[ViewEntry]] = defaultdict(list)
+    houses: dict[str, list[ChosenView]] = defaultdict(list)
     for view in views:
         houses[view.house.id].append(view)
     n_files, good = 0, []  # files written, lines of the list of good views
     for house, own in houses.items():
         for number, view in enumerate(own):
             place = {"house": house, "id": f"{number:06d}"}
-            for stored, published in FILES.items():
-                n_files += _copied(view.file(stored), out / published.format(**place))
+            for layer, published in FILES.items():
+                if view.has(layer):
+                    _write(out / published.format(**place), view.data(layer))
+                    n_files += 1
             good.append("{house}/{id}\n".format(**place))
         n_files += _write_cameras(out / "camera_v2" / house, own)
     (out / "data_goodlist_v2.txt").write_text("".join(good))
     return n_files + 1
 
 
-def _write_cameras(folder: Path, views: list[ViewEntry]) -> int:
+def _write_cameras(folder: Path, views: list[ChosenView]) -> int:
     # A line of both camera files for each view, in the order of the views' numbers.
     folder.mkdir(parents=True)
     (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views))
-    names = "".join(f"Room#{v.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
+    names = "".join(f"Room#{v.entry.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
     (folder / "room_camera_name.txt").write_text(names)
     return 2
 
 
-def _copied(file: Path | None, target: Path) -> int:
-    if file is None:
-        return 0
+def _write(target: Path, data: bytes) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(read_regular(file))
-    return 1
+    target.write_bytes(data)
 
 
-def camera_line(view: ViewEntry) -> str:
+def camera_line(view: ChosenView) -> str:
     """`vx vy vz  tx ty tz  ux uy uz  xf yf  value`: eye, towards, up, half angles in rad, score."""
     pose = np.array(view.facts["world_from_camera_opengl"], np.float64)
     width, height = view.facts["width_px"], view.facts["height_px"]

@@ -10,12 +10,11 @@ from typing import Final
 
 from PIL import Image, ImageDraw, ImageFont
 
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.gallery.gallery_page import attributions
-from pbrs_farm.gallery.label_colours import NYU40_COLOURS
 from pbrs_farm.gallery.lettering import draw_line
 from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 

@@ -17,9 +17,8 @@ from PIL import Image
 
 from pbrs_farm import images
 from pbrs_farm.core.arrays import Srgb8Image
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
 from pbrs_farm.formats.output_folder import ViewEntry, reasons_of, views_of
-from pbrs_farm.gallery.label_colours import NYU40_COLOURS
 from pbrs_farm.gallery.templates import page
 from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 

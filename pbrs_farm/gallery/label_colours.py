@@ -8,19 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import Srgb8Image
-
-_NYU40_HEX: Final = """
-0c0e12 cec8be 9c7654 9454c4 1c5c24 149cfc 8c1444 2c3cb4 ec6cc4 64bc34 fc8414
-148c14 ec5454 544c74 34c4c4 2c9c94 ecdc14 fca4fc 1c7494 8c4c14 9c84ac dcb414
-e8ecf0 aca474 7c249c aca4dc fc94a4 849414 8cd484 845c7c cc4ca4 5c744c c42c5c
-54e4fc 9c7cfc 2cfcac 2474e4 5c54b4 cc7c14 d4848c c44c14
-"""
-
-# (41, 3) sRGB of NYU40 ids 0..40. Structure is muted; each further class, the most frequent first,
-# is the colour farthest in Oklab from those before it, so any two differ by 0.085 at least.
-NYU40_COLOURS: Final[NDArray[np.uint8]] = np.array(
-    [list(bytes.fromhex(text)) for text in _NYU40_HEX.split()], np.uint8
-)
+from pbrs_farm.core.classes import NYU40_COLOURS
 
 _NEAR_TO_FAR: Final = np.array(
     [[253, 246, 214], [164, 216, 172], [64, 172, 172], [34, 112, 162], [42, 54, 122], [18, 14, 42]],

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.arrays import Srgb8Image
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.coco import PICTURES
+from pbrs_farm.export.chosen_view import PICTURES
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.gallery.contact_sheet import INK, PAPER
-from pbrs_farm.gallery.label_colours import NYU40_COLOURS, semantic_colours
+from pbrs_farm.gallery.label_colours import semantic_colours
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import read_regular
 

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.coco import run_lengths
+from pbrs_farm.core.house_split import Shares, split_of_house
+from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.export_views import export
+from pbrs_farm.export.run_lengths import compressed_runs, run_lengths
 from pbrs_farm.images import array_from_png, png_from_array
 from tests.check.roots import SIZE, make_root
 
@@ -18,6 +20,20 @@ def mask_from_run_lengths(runs: dict[str, list[int]]) -> np.ndarray:
     height, width = runs["size"]
     values = np.arange(len(runs["counts"])) % 2 == 1  # runs alternate, zeros first
     return np.repeat(values, runs["counts"]).reshape(width, height).T
+
+
+def uncompressed(runs: dict) -> dict[str, list[int]]:
+    """COCO's compressed run lengths as plain ones, read as its maskApi.c says."""
+    counts: list[int] = []
+    value = shift = 0
+    for code in (ord(c) - 48 for c in runs["counts"]):
+        value |= (code & 0x1F) << shift
+        shift += 5
+        if not code & 0x20:
+            value -= (1 << shift) if code & 0x10 else 0
+            counts.append(value + (counts[-2] if len(counts) > 2 else 0))
+            value = shift = 0
+    return {"size": runs["size"], "counts": counts}
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +55,14 @@ def png(file: Path) -> np.ndarray:
 
 
 def test_coco_masks_boxes_and_classes_are_those_of_the_labels(root, tmp_path):
-    assert export(root, tmp_path / "coco", "coco") == (2, 3)
+    assert export(root, tmp_path / "coco", "coco") == (2, 6)
     document = json.loads((tmp_path / "coco/annotations.json").read_text())
     names = {c["id"]: c["name"] for c in document["categories"]}
     assert len(names) == 40
     instance, semantic = (png(view_folder(root) / f"{x}.png") for x in ("instance", "semantic"))
     rebuilt = np.zeros_like(instance)
     for a in (a for a in document["annotations"] if a["image_id"] == 1):
-        mask = mask_from_run_lengths(a["segmentation"])
+        mask = mask_from_run_lengths(uncompressed(a["segmentation"]))
         rebuilt[mask] = a["instance_id"]
         assert (semantic[mask] == a["category_id"]).all()
         x, y, w, h = a["bbox"]
@@ -64,11 +80,135 @@ def test_run_lengths_go_there_and_back(mask):
     runs = run_lengths(mask)
     assert sum(runs["counts"]) == mask.size
     assert (mask_from_run_lengths(runs) == mask).all()
+    assert uncompressed(compressed_runs(mask)) == runs
 
 
 def test_run_lengths_are_column_by_column_and_begin_with_zeros():
     assert run_lengths(np.array([[True, False], [False, False]]))["counts"] == [0, 1, 3]
     assert run_lengths(np.array([[False, True], [False, False]]))["counts"] == [2, 1, 1]
+
+
+def test_compressed_run_lengths_are_cocos_text():
+    # By hand: counts 0, 1, 3 are characters 48 + n; 100 = 3 * 32 + 4 takes two.
+    assert compressed_runs(np.array([[True, False], [False, False]]))["counts"] == "013"
+    assert compressed_runs(np.zeros((10, 10), bool))["counts"] == chr(48 + 4 + 32) + chr(48 + 3)
+    # The fourth count is 2 - 3 = -1 above the last but one: 31 with a sign.
+    mask = np.array([0, 0, 1, 1, 1, 0, 1, 1], bool)[:, None]
+    assert run_lengths(mask)["counts"] == [2, 3, 1, 2]
+    assert compressed_runs(mask)["counts"] == "231" + chr(48 + 31)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_compressed_runs_of_any_mask_come_back(seed):
+    rng = np.random.default_rng(seed)
+    mask = rng.random((37, 41)) < rng.random()
+    mask[5:30] |= seed % 2 == 0
+    runs = compressed_runs(mask)
+    assert (mask_from_run_lengths(uncompressed(runs)) == mask).all()
+
+
+def test_panoptic_segments_are_the_instances(root, tmp_path):
+    export(root, tmp_path / "coco", "coco")
+    document = json.loads((tmp_path / "coco/panoptic.json").read_text())
+    first = document["annotations"][0]
+    ids = png(tmp_path / "coco/panoptic" / first["file_name"]).astype(int) @ [1, 256, 65536]
+    semantic = png(view_folder(root) / "semantic.png")
+    assert {s["id"] for s in first["segments_info"]} == set(np.unique(ids)) - {0}
+    for segment in first["segments_info"]:
+        assert (ids == segment["id"]).sum() == segment["area"]
+        assert (semantic[ids == segment["id"]] == segment["category_id"]).all()
+    assert (semantic[ids == 0] == 0).all()
+    kinds = {c["name"]: c["isthing"] for c in document["categories"]}
+    assert (kinds["wall"], kinds["chair"]) == (0, 1)
+
+
+def test_yolo_boxes_are_those_of_the_instances(root, tmp_path):
+    assert export(root, tmp_path / "yolo", "yolo") == (2, 5)
+    house = view_folder(root).parent.parent.name
+    lines = (tmp_path / f"yolo/labels/{house}__v0.txt").read_text().splitlines()
+    rows = json.loads((view_folder(root) / "view.json").read_text())["instances"]
+    rows = [r for r in rows if r["nyu40"] not in (0, 1, 2, 22)]
+    assert len(lines) == len(rows) > 0
+    number, x, y, w, h = map(float, lines[0].split())
+    x0, y0, x1, y1 = rows[0]["box2d"]
+    assert number == rows[0]["nyu40"] - 1
+    expected = [(x0 + x1) / 256, (y0 + y1) / 192, (x1 - x0) / 128, (y1 - y0) / 96]
+    assert [x, y, w, h] == pytest.approx(expected, abs=1e-6)
+    assert (tmp_path / f"yolo/images/{house}__v0.png").exists()
+    assert "\n  4: chair\n" in (tmp_path / "yolo/data.yaml").read_text()
+
+
+def test_at_another_size_labels_boxes_and_k_agree(root, tmp_path):
+    choice = Choice(size=(64, 48))
+    export(root, tmp_path / "small", "webdataset", choice=choice)
+    with tarfile.open(tmp_path / "small/shard-000000.tar") as tar:
+        own = [m for m in tar if "__v0." in m.name]
+        data = {m.name.partition(".")[2]: tar.extractfile(m).read() for m in own}
+    facts, large = (
+        json.loads(data["json"]),
+        json.loads((view_folder(root) / "view.json").read_text()),
+    )
+    instance = array_from_png(data["instance.png"])
+    assert instance.shape == (48, 64)
+    assert (facts["width_px"], facts["height_px"]) == (64, 48)
+    assert facts["K"][0][2] == large["K"][0][2] / 2
+    assert {r["id"] for r in facts["instances"]} == set(np.unique(instance)) - {0}
+    for row in facts["instances"]:
+        x0, y0, x1, y1 = row["box2d"]
+        mask = instance == row["id"]
+        assert mask[y0:y1, x0:x1].sum() == mask.sum() == row["pixels"]
+    assert array_from_png(data["normal.png"]).dtype == np.uint16
+    coco = export(root, tmp_path / "coco", "coco", choice=choice)
+    assert coco == (2, 6)
+    assert png(next((tmp_path / "coco/images").rglob("*.png"))).shape == (48, 64, 3)
+
+
+def parts_of(shard: Path) -> set[str]:
+    with tarfile.open(shard) as tar:
+        return {name.partition(".")[2] for name in tar.getnames()}
+
+
+def test_only_chosen_layers_and_modes_are_exported_and_radiance_when_named(root, tmp_path):
+    for folder in (view_folder(root), view_folder(root, "v1")):
+        (folder / "radiance.exr").write_bytes(b"any")
+    try:
+        export(root, tmp_path / "a", "webdataset")
+        assert "radiance.exr" not in parts_of(tmp_path / "a/shard-000000.tar")
+        choice = Choice(layers=("radiance", "normal"), modes=("opengl_dl",), views_per_shard=1)
+        assert export(root, tmp_path / "b", "webdataset", choice=choice) == (2, 2)
+        parts = {"json", "radiance.exr", "normal.png", "valid.png"}
+        assert parts_of(tmp_path / "b/shard-000001.tar") == parts
+    finally:
+        for folder in (view_folder(root), view_folder(root, "v1")):
+            (folder / "radiance.exr").unlink()
+    choice = Choice(layers=("depth",), modes=())
+    export(root, tmp_path / "h5", "hdf5", choice=choice)
+    with h5py.File(tmp_path / "h5/0.hdf5") as file:
+        assert set(file) == {"depth", "instance_attribute_maps", "campose"}
+
+
+def test_a_split_is_a_folder_of_its_own_for_each_form(root, tmp_path):
+    house = view_folder(root).parent.parent.name
+    shares = Shares(1, 0, 0)
+    assert split_of_house(house, shares) == "train"
+    export(root, tmp_path / "coco", "coco", shares=shares)
+    assert (tmp_path / "coco/train/annotations.json").exists()
+    export(root, tmp_path / "yolo", "yolo", shares=shares)
+    assert "\ntrain: train/images\n" in (tmp_path / "yolo/data.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("fields", "match"),
+    [
+        ({"layers": ("normals",)}, "--layers: normals: no such layer"),
+        ({"modes": ("mlt",)}, "--modes: mlt: no such lighting mode"),
+        ({"layers": ("radiance",), "size": (8, 6)}, "radiance.exr is not resized"),
+        ({"views_per_shard": 0}, "--shard-size: 0: expected 1 or more"),
+    ],
+)
+def test_a_choice_that_cannot_be_is_told(fields, match):
+    with pytest.raises(BadInput, match=match):
+        Choice(**fields)
 
 
 def test_hdf5_has_blenderprocs_keys_and_conventions(root, tmp_path):
@@ -82,7 +222,11 @@ def test_hdf5_has_blenderprocs_keys_and_conventions(root, tmp_path):
         normals = file["normals"][:] * 2 - 1
         assert np.abs(np.linalg.norm(normals, axis=-1) - 1).max() < 1e-3
         attributes = json.loads(file["instance_attribute_maps"][()])
-        pose = np.array(json.loads(file["campose"][()])["cam2world_matrix"])
+        camera = json.loads(file["campose"][()])
+        pose = np.array(camera["cam2world_matrix"])
+    # BlenderProc counts pixels from the centre of the first.
+    assert camera["cam_K"][0][2] == (SIZE[0] - 1) / 2
+    assert camera["cam_K"][1][2] == (SIZE[1] - 1) / 2
     by_id = {a["idx"]: a["category_id"] for a in attributes}
     assert set(by_id) == set(np.unique(png(folder / "instance.png"))) - {0}
     # A floor's normal, turned into the world, is up.
@@ -140,7 +284,7 @@ def test_only_what_a_selection_keeps_is_exported(root, tmp_path):
 
 
 def test_a_wrong_form_a_full_folder_and_an_empty_root_are_told(root, tmp_path):
-    with pytest.raises(BadInput, match="coco, hdf5, webdataset, released"):
+    with pytest.raises(BadInput, match="coco, hdf5, webdataset, released, yolo"):
         export(root, tmp_path / "x", "kitti")
     (tmp_path / "full").mkdir()
     (tmp_path / "full/file").write_text("mine")

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from pbrs_farm.cli import main
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.gallery.class_statistics import class_statistics
-from pbrs_farm.gallery.label_colours import NYU40_COLOURS
 from pbrs_farm.gallery.label_sheet import label_sheet, legend
 from pbrs_farm.images import png_from_array
 

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from pbrs_farm import images
+from pbrs_farm.core.classes import NYU40_COLOURS
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.gallery import contact_sheet as sheet
@@ -70,7 +71,7 @@ def test_sheet_is_a_png_with_a_row_for_each_view(root: Path) -> None:
 def test_sheet_shows_the_classes_colours(root: Path) -> None:
     pixels = images.array_from_png(sheet.contact_sheet(root)).reshape(-1, 3)
     for nyu40 in (1, 2):
-        assert np.all(pixels == colours.NYU40_COLOURS[nyu40], axis=1).sum() > 1000
+        assert np.all(pixels == NYU40_COLOURS[nyu40], axis=1).sum() > 1000
 
 
 def test_views_are_spread_over_houses_and_rooms(root: Path) -> None:
@@ -124,8 +125,8 @@ def test_small_labels_keep_their_colours_exactly(root: Path) -> None:
     view = gallery(root).split('data-layer="semantic"><')[1]
     data = base64.b64decode(re.search(r'base64,([^"]+)"', view)[1])
     pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
-    assert np.array_equal(pixels[0, 0], colours.NYU40_COLOURS[1])
-    assert np.array_equal(pixels[-1, 0], colours.NYU40_COLOURS[2])
+    assert np.array_equal(pixels[0, 0], NYU40_COLOURS[1])
+    assert np.array_equal(pixels[-1, 0], NYU40_COLOURS[2])
 
 
 def test_noise_is_made_small_enough() -> None:
@@ -146,7 +147,7 @@ def test_a_home_or_room_called_script_is_escaped_everywhere(tmp_path: Path) -> N
 
 
 def test_nyu40_colours_are_distinct() -> None:
-    table = colours.NYU40_COLOURS.astype(int)
+    table = NYU40_COLOURS.astype(int)
     apart = np.abs(table[:, None] - table[None]).sum(2) + 999 * np.eye(41, dtype=int)
     assert table.shape == (41, 3)
     assert apart.min() >= 48

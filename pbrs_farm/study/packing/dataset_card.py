@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from pbrs_farm.gallery.label_colours import NYU40_COLOURS
+from pbrs_farm.core.classes import NYU40_COLOURS
+from pbrs_farm.core.house_split import home_of
 from pbrs_farm.study.packing.packing_plan import Packing, shard_plans
-from pbrs_farm.study.reading.house_split import home_of
 from pbrs_farm.study.reading.stored_layers import STORED, array_names
 from pbrs_farm.study.reading.views import Views
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house_split import SPLITS, Shares, split_of_house
 from pbrs_farm.study.reading.dataset_json import WHOLE
-from pbrs_farm.study.reading.house_split import SPLITS, Shares, split_of_house
 from pbrs_farm.study.reading.view_sample import LAYERS, MODES, Request, Size
 from pbrs_farm.study.reading.views import ViewRef
 

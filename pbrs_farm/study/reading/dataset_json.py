@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.reading.house_split import Shares
+from pbrs_farm.core.house_split import Shares
 from pbrs_farm.study.reading.view_sample import LAYERS, MODES, Size
 
 DATASET_JSON: Final = "dataset.json"

@@ -35,11 +35,15 @@ def decoded_normal(
     stored: NDArray[np.uint16], valid: NDArray[np.bool_], axes: str
 ) -> NDArray[np.float32]:
     """(H, W, 3) float32 normals in the axes of that name, of unit length within 3e-5; 0 if not valid."""
-    normal = np.empty(stored.shape, np.float32)
-    # Scale each stored channel into the axis it becomes, turned round where the sign says.
-    for axis, (channel, sign) in enumerate(AXES[axes]):
-        np.multiply(stored[..., channel], np.float32(sign * 2 / 65535), out=normal[..., axis])
-        normal[..., axis] -= np.float32(sign)
+    published = stored.astype(np.float32)
+    published *= np.float32(2 / 65535)
+    published -= np.float32(1)
+    normal = published
+    if axes != "published":
+        # Each published channel becomes an axis, turned round where the sign says.
+        normal = np.empty_like(published)
+        for axis, (channel, sign) in enumerate(AXES[axes]):
+            np.multiply(published[..., channel], np.float32(sign), out=normal[..., axis])
     if not valid.all():
         normal[~valid] = 0
     return normal

@@ -10,6 +10,7 @@ from typing import Any, Final
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house_split import Shares, split_of_house
 from pbrs_farm.regular_files import fault_of, open_regular
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.folder import FolderStore
@@ -20,7 +21,6 @@ from pbrs_farm.study.reading.dataset_json import (
     Shard,
     dataset_from_json,
 )
-from pbrs_farm.study.reading.house_split import Shares, split_of_house
 from pbrs_farm.study.reading.packed_parts import array_of_part, part_of_array
 from pbrs_farm.study.reading.stored_layers import (
     ViewFacts,

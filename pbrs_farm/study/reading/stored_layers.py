@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.reading.area_resize import resized_any, resized_by_area, resized_nearest
+from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.study.reading.normal_axes import decoded_normal
 from pbrs_farm.study.reading.view_sample import Request, Sample, Size
 

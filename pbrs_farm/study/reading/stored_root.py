@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, ObjectMissing
+from pbrs_farm.core.house_split import Shares, split_of_house
 from pbrs_farm.images import array_from_png
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.reading.house_split import Shares, split_of_house
 from pbrs_farm.study.reading.png_rows import array_of_rows
 from pbrs_farm.study.reading.stored_layers import (
     STORED,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.reading.house_split import SPLITS, Shares
+from pbrs_farm.core.house_split import SPLITS, Shares
 from pbrs_farm.study.reading.stored_layers import ViewFacts
 from pbrs_farm.study.reading.view_sample import Request, Sample
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from torch.utils.data import Dataset
 
-from pbrs_farm.study.reading.house_split import Shares
+from pbrs_farm.core.house_split import Shares
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.reading.view_sample import Request, Sample
 from pbrs_farm.study.reading.views import Views

@@ -12,11 +12,11 @@ import pytest
 import pbrs_farm
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house_split import Shares, split_of_house
 from pbrs_farm.images import decode_photo
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.house_split import Shares, split_of_house
 from pbrs_farm.study.reading.view_sample import LAYERS, Request
 from tests.study.small_roots import MODES, arrays_of_view, fill
 

@@ -152,7 +152,7 @@ def test_transforms_follow_from_seed_epoch_and_view(places):
 
 
 def test_a_split_is_that_of_the_houses(places, tmp_path):
-    from pbrs_farm.study.reading.house_split import shares_from_text, split_of_house
+    from pbrs_farm.core.house_split import shares_from_text, split_of_house
     from pbrs_farm.study.samples.stored_views import StoredViews
 
     shares = shares_from_text("50/25/25")

@@ -1,7 +1,7 @@
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.reading.house_split import Shares, home_of, shares_from_text, split_of_house
+from pbrs_farm.core.house_split import Shares, home_of, shares_from_text, split_of_house
 
 
 @pytest.mark.parametrize(

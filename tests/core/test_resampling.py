@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.images import resized
-from pbrs_farm.study.reading.area_resize import resized_any, resized_by_area, resized_nearest
 
 SIZES = st.tuples(st.integers(1, 23), st.integers(1, 23))
 

@@ -1,0 +1,176 @@
+"""What of a view is exported, and at which size: its layers as bytes and arrays, its table. Effects: reads the view."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import LAYER, LAYERS, Layer
+from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
+from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
+from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
+from pbrs_farm.regular_files import fault_of, read_regular
+
+# The picture of a view is the first of these it has.
+PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
+
+_MODES: Final = tuple(str(mode) for mode in Mode)
+_RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: only when it is named
+_BY_AREA: Final = (*_MODES, "albedo")
+_LINES: Final = tuple(layer.name for layer in LAYERS if layer.name.startswith("boundary"))
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What is exported. Raises BadInput for a name that is no layer or mode.
+
+    layers: names of core/layers.py without the modes; None for all there are, radiance apart.
+    modes: None for all. size: (width, height), None as rendered.
+    """
+
+    layers: tuple[str, ...] | None = None
+    modes: tuple[str, ...] | None = None
+    size: tuple[int, int] | None = None
+    views_per_shard: int = 500  # of WebDataset
+
+    def __post_init__(self) -> None:
+        labels = [layer.name for layer in LAYERS if layer.name not in _MODES]
+        for name in self.layers or ():
+            if name not in labels:
+                raise BadInput("--layers", name, "no such layer", hint=f"of {', '.join(labels)}")
+        for mode in self.modes or ():
+            if mode not in _MODES:
+                hint = f"of {', '.join(_MODES)}"
+                raise BadInput("--modes", mode, "no such lighting mode", hint=hint)
+        if self.size is not None and _RADIANCE in (self.layers or ()):
+            raise BadInput(
+                "--size", "", "radiance.exr is not resized", hint="leave out one of them"
+            )
+        if self.views_per_shard < 1:
+            raise BadInput("--shard-size", str(self.views_per_shard), "expected 1 or more")
+
+    def takes(self, name: str) -> bool:
+        """Whether a layer is exported where a view has it; valid comes with normal."""
+        if name in _MODES:
+            return self.modes is None or name in self.modes
+        if self.layers is None:
+            return name != _RADIANCE
+        return name in self.layers or (name == "valid" and "normal" in self.layers)
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenView:
+    """A view as it is exported."""
+
+    entry: ViewEntry
+    choice: Choice
+
+    @property
+    def house(self) -> OutputHouse:
+        """Whose view it is."""
+        return self.entry.house
+
+    @property
+    def id(self) -> str:
+        """The view's id in its house."""
+        return self.entry.id
+
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """The layers that are exported and that the view has, in the order of core/layers.py."""
+        return tuple(layer for layer in LAYERS if self.has(layer.name))
+
+    @property
+    def picture(self) -> str | None:
+        """The mode of the view's picture, None without any."""
+        return next((str(mode) for mode in PICTURES if self.has(mode)), None)
+
+    def has(self, name: str) -> bool:
+        """Whether a layer is exported and there."""
+        return self.choice.takes(name) and self.entry.file(LAYER[name].file) is not None
+
+    @cached_property
+    def facts(self) -> dict[str, Any]:
+        """view.json, at the size of the export: K, boxes and pixels of instances, layout."""
+        return self.entry.facts if self.choice.size is None else self._resized_facts()
+
+    @property
+    def facts_json(self) -> bytes:
+        """facts as a file: the stored one where nothing is resized."""
+        if self.choice.size is None:
+            return _read(self.entry.folder / "view.json")
+        return json.dumps(self.facts, separators=(",", ":")).encode()
+
+    def data(self, name: str) -> bytes:
+        """The layer's file: as stored where nothing is resized."""
+        if self.choice.size is None:
+            return _read(self.entry.folder / LAYER[name].file)
+        return layer_bytes(name, self.array(name), self.house.attribution)
+
+    def array(self, name: str) -> NDArray[Any]:
+        """The layer's array (H, W) or (H, W, 3), also where it is not exported itself; BadInput."""
+        file = self.entry.folder / LAYER[name].file
+        array = layer_from_bytes(name, _read(file), str(file))
+        return array if self.choice.size is None else resized_layer(name, array, *self.choice.size)
+
+    def _resized_facts(self) -> dict[str, Any]:
+        facts = self.entry.facts
+        width, height = self.choice.size or (0, 0)
+        x, y = width / facts["width_px"], height / facts["height_px"]
+        scale = np.array([x, y, 1.0])
+        facts = facts | {
+            "width_px": width,
+            "height_px": height,
+            "K": (np.array(facts["K"], np.float64) * scale[:, None]).tolist(),
+            "instances": _instances_in(self.array("instance"), facts["instances"]),
+        }
+        if "layout" in facts:
+            facts["layout"] = [_moved(row, x, y) for row in facts["layout"]]
+        return facts
+
+
+def resized_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
+    """A layer on another grid: pictures by area, lines kept whole, all else the nearest pixel."""
+    if name in _BY_AREA:
+        return resized_by_area(array, width, height)
+    if name not in _LINES:
+        return resized_nearest(array, width, height)
+    # A line's stronger value wins.
+    lines = np.zeros((height, width), np.uint8)
+    for value in np.unique(array[array > 0]):
+        lines[resized_any(array == value, width, height)] = value
+    return lines
+
+
+def _instances_in(instance: NDArray[Any], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows of those instances that the map (H, W) still shows, with their pixels and boxes."""
+    seen = []
+    for row in rows:
+        mask = instance == row["id"]
+        if not mask.any():
+            continue
+        y, x = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
+        box = [int(x[0]), int(y[0]), int(x[-1]) + 1, int(y[-1]) + 1]
+        pixels = int(mask.sum())
+        seen.append(row | {"pixels": pixels, "fraction": pixels / mask.size, "box2d": box})
+    return seen
+
+
+def _moved(row: dict[str, Any], x: float, y: float) -> dict[str, Any]:
+    pixel = row.get("pixel")
+    return row if not pixel else row | {"pixel": [pixel[0] * x, pixel[1] * y]}
+
+
+def _read(file: Path) -> bytes:
+    try:
+        return read_regular(file)
+    except OSError as error:
+        raise BadInput(file, "", fault_of(error)) from None
