@@ -62,9 +62,11 @@ class AngularErrors:
         """Over all pixels so far; the median to 0.005 degrees. All NaN without a pixel."""
         n = int(self._histogram.sum())
         if n == 0:
-            return NormalScore(*[float("nan")] * 5, n_pixels=0)
+            nan = float("nan")
+            return NormalScore(nan, nan, nan, nan, nan, n_pixels=0)
         # Read the two middle pixels off the histogram: they are one where n is odd.
         seen = np.cumsum(self._histogram)
         middle = np.searchsorted(seen, [(n - 1) // 2, n // 2], side="right")
-        shares = (float(count / n) for count in self._below)
-        return NormalScore(self._sum / n, float(middle.mean() * _BIN_DEG), *shares, n_pixels=n)
+        small, medium, large = (float(count / n) for count in self._below)
+        median_deg = float(middle.mean() * _BIN_DEG)
+        return NormalScore(self._sum / n, median_deg, small, medium, large, n_pixels=n)

@@ -54,7 +54,8 @@ class Confusion:
         """Over all pixels so far; all NaN without a pixel."""
         n = int(self.counts.sum())
         if n == 0:
-            return ClassScore(*[float("nan")] * 4, n_pixels=0)
+            nan = float("nan")
+            return ClassScore(nan, nan, nan, nan, n_pixels=0)
         hits, truth, iou = np.diag(self.counts), self.counts.sum(1), self.iou()
         return ClassScore(
             pixel_accuracy=float(hits.sum() / n),

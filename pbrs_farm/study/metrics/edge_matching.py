@@ -22,7 +22,9 @@ def n_matched(predicted: Mask, truth: Mask, max_distance_px: float) -> int:
     if not len(ours) or not len(theirs):
         return 0
     # Join every two pixels that are near enough.
-    near = cKDTree(ours).query_ball_point(theirs, max_distance_px + 1e-9, return_sorted=False)
+    near: list[list[int]] = list(
+        cKDTree(ours).query_ball_point(theirs, max_distance_px + 1e-9, return_sorted=False)  # type: ignore[arg-type]
+    )
     degrees = np.array([len(row) for row in near], np.intp)
     if not degrees.any():
         return 0

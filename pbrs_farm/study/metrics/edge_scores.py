@@ -84,7 +84,8 @@ class EdgeScores:
     def score(self) -> EdgeScore:
         """Over all pictures so far; all NaN without one."""
         if not self._views:
-            return EdgeScore(*[float("nan")] * 4, n_views=0)
+            nan = float("nan")
+            return EdgeScore(nan, nan, nan, nan, n_views=0)
         matched = np.sum([v.matched for v in self._views], axis=0)
         predicted = np.sum([v.predicted for v in self._views], axis=0)
         n_truth = sum(v.n_truth for v in self._views)
