@@ -24,7 +24,7 @@ from pbrs_farm.assets import furniture_package, homes_package
 
 FOLDER = Path("out/bench/made")
 N_SEEDS: Final = {"plans": 1000, "houses": 50, "views": 24}
-_CHUNK = 10  # seeds a process
+_CHUNK = 50  # seeds a process
 _AGAIN = 20  # homes made again by another process
 
 Rows = list[dict[str, Any]]

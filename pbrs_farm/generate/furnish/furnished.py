@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
 from typing import Final
@@ -12,7 +13,7 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.generate.furnish.briefs import Brief, brief_of
 from pbrs_farm.generate.furnish.ceiling import ceiling_lamps
 from pbrs_farm.generate.furnish.places import Places, places_of
-from pbrs_farm.generate.furnish.room_space import RoomSpace, room_space
+from pbrs_farm.generate.furnish.room_space import RoomSpace, room_space, with_bodies
 from pbrs_farm.generate.furnish.search import Arrangement, arranged
 from pbrs_farm.generate.furnish.shelf import Shelf, style_of
 from pbrs_farm.generate.furnish.template import Group
@@ -26,19 +27,25 @@ _ON_FLOOR_M: Final = 0.05
 
 
 def furnished(
-    plan: Plan, catalogue: Catalogue, rng: np.random.Generator, style: str = ""
-) -> tuple[PlacedPiece, ...]:
-    """The furniture of every room; what the catalogue lacks is left out. Raises BadInput (style)."""
+    plan: Plan, catalogue: Catalogue, rng: np.random.Generator, style: str = "", *,
+    rooms: Collection[int] | None = None, standing: Mapping[int, Sequence[Rect]] | None = None,
+) -> tuple[PlacedPiece, ...]:  # fmt: skip
+    """The furniture of every room, or of some; what the catalogue lacks is left out.
+
+    standing: what stands in a room already, nothing comes there. Raises BadInput for a style.
+    """
     shelf = Shelf(catalogue, rng, style_of(style, rng))
     seeds = rng.integers(2**63, size=len(plan.rooms))
     found: dict[int, list[PlacedPiece]] = {}
-    numbers = sorted(range(len(plan.rooms)), key=lambda i: (_rank(plan.rooms[i].type), i))
+    wanted = range(len(plan.rooms)) if rooms is None else rooms
+    numbers = sorted(wanted, key=lambda i: (_rank(plan.rooms[i].type), i))
     for number in numbers:
         room_rng = np.random.default_rng(int(seeds[number]))
-        space = room_space(plan, number)
+        taken = list((standing or {}).get(number, ()))
+        space = with_bodies(room_space(plan, number), taken)
         others = [ground(p) for pieces in found.values() for p in pieces if p.elevation < 0.4]
         brief = brief_of(plan, space, shelf, room_rng)
-        placed = arrangement_of(brief, space, others, room_rng)
+        placed = arrangement_of(brief, space, [*others, *taken], room_rng)
         pieces = [p for s in placed.standing for p in s.pieces(number)]
         pieces += ceiling_lamps(space, plan.rooms[number].type, pieces, shelf)
         found[number] = pieces

@@ -15,7 +15,7 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.generate.furnish.kitchen_shapes import DEPTH_M, MODULE_M, Arm, run_shapes
-from pbrs_farm.generate.furnish.places import allowed
+from pbrs_farm.generate.furnish.places import allowed, frames_array
 from pbrs_farm.generate.furnish.room_space import RoomSpace
 from pbrs_farm.generate.furnish.shelf import Shelf
 from pbrs_farm.generate.furnish.template import Slot, Standing, Template
@@ -94,7 +94,7 @@ def kitchen_places(
             continue
         template, score = best
         frame = arms[0].wall.frame
-        if not allowed(template, [frame], space)[0]:
+        if not allowed(template, frames_array([frame]), space)[0]:
             continue
         score -= 0.8 * abs(length - wanted) - 0.4 * (len(arms) - 1)
         found.append(Standing(template, frame, score + 0.3 * float(rng.random())))

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.generate.furnish.room_space import RoomSpace, Wall
-from pbrs_farm.generate.furnish.template import Frame, Group, Stand, Standing, Template
-from pbrs_farm.generate.plan import Rect
+from pbrs_farm.generate.furnish.template import Frame, Group, Liking, Stand, Standing, Template
+from pbrs_farm.generate.plan import Point, Rect
+
+Ints = NDArray[np.int64]
 
 _STEP_M: Final = 0.10
 _FREE_STEP_M: Final = 0.15
@@ -20,6 +22,7 @@ _TOUCH_M: Final = 0.002
 _ABOVE_SILL_M: Final = 0.08
 _DEAD_GAP_M: Final = 0.35  # a gap that nobody can use
 _BESIDE_M: Final = 0.01  # between furniture and the wall at its end
+_APART_M: Final = 0.4  # of two places of one template that are both worth a try
 _NOISE: Final = 0.25
 _BEST: Final = 20
 
@@ -28,35 +31,52 @@ _BEST: Final = 20
 class Places:
     """Where a group can stand: rows are places; unused rectangles are nan."""
 
-    found: list[Standing]
+    templates: list[Template]
+    template_of: Ints  # (N,) index into templates
+    frames: F64  # (N, 4) as Frame has them
     bodies: F64  # (N, B, 4)
     clear: F64  # (N, C, 4)
     scores: F64  # (N,)
+
+    @property
+    def n(self) -> int:
+        """How many places there are."""
+        return len(self.scores)
+
+    def standing(self, k: int) -> Standing:
+        """The template of place k where it would stand."""
+        x, z, dx, dz = self.frames[k].tolist()
+        template = self.templates[int(self.template_of[k])]
+        return Standing(template, Frame(x, z, dx, dz), float(self.scores[k]))
 
     def free_of(self, alive: Bools, standing: Standing) -> Bools:
         """Which of the places stay possible when something stands."""
         bodies, clear = _array(standing.bodies), _array(standing.clear)
         taken = np.concatenate([bodies, clear])
-        hit = overlap(self.bodies, taken).any(1) | overlap(self.clear, bodies).any(1)
-        return np.asarray(alive & ~hit)
+        # Look again only at those that are possible still.
+        left = alive.copy()
+        rows = np.flatnonzero(alive)
+        hit = overlap(self.bodies[rows], taken).any(1) | overlap(self.clear[rows], bodies).any(1)
+        left[rows[hit]] = False
+        return left
 
     def best(self, alive: Bools, n: int = _BEST) -> list[Standing]:
         """The best places, no two of a wall closer than 0.4 m while others are there."""
         order = np.argsort(-self.scores, kind="stable")
-        chosen: list[Standing] = []
-        later: list[Standing] = []
-        for k in order[alive[order]]:
-            place = self.found[k]
-            near = any(
-                c.template.name == place.template.name
-                and abs(c.frame.x - place.frame.x) + abs(c.frame.z - place.frame.z) < 0.4
-                and (c.frame.dx, c.frame.dz) == (place.frame.dx, place.frame.dz)
-                for c in chosen
-            )
-            (later if near else chosen).append(place)
-            if len(chosen) >= n:
-                break
-        return (chosen + later)[:n]
+        rows = order[alive[order]]
+        names = [template.name for template in self.templates]
+        name = np.array([names.index(x) for x in names], np.int64)[self.template_of[rows]]
+        x, z, dx, dz = self.frames[rows].T
+        chosen: list[int] = []
+        left = np.ones(len(rows), bool)
+        while len(chosen) < n and left.any():
+            k = int(left.argmax())
+            chosen.append(k)
+            near = (name == name[k]) & (np.abs(x - x[k]) + np.abs(z - z[k]) < _APART_M)
+            left &= ~(near & (dx == dx[k]) & (dz == dz[k]))
+        # Where these are not enough, take those beside them.
+        others = np.setdiff1d(np.arange(len(rows)), chosen)[: n - len(chosen)].tolist()
+        return [self.standing(int(rows[k])) for k in (*chosen, *others)]
 
 
 def overlap(rects: F64, others: F64) -> Bools:
@@ -73,36 +93,50 @@ def overlap(rects: F64, others: F64) -> Bools:
 
 def places_of(group: Group, space: RoomSpace, rng: np.random.Generator) -> Places:
     """Every place of every template of a group that walls, doors and windows allow."""
-    found: list[Standing] = []
-    for template in group.templates:
-        for version in _versions(template):
-            found += _places(version, space, rng)
-    n_bodies = max((len(t.bodies) for t in group.templates), default=0)
-    n_clear = max((len(t.clear) for t in group.templates), default=0)
-    bodies = np.full((len(found), n_bodies, 4), np.nan)
-    clear = np.full((len(found), n_clear, 4), np.nan)
-    for k, place in enumerate(found):
-        for i, rect in enumerate(place.bodies):
-            bodies[k, i] = rect
-        for i, rect in enumerate(place.clear):
-            clear[k, i] = rect
-    scores = np.array([place.score for place in found])
-    return Places(found, bodies, clear, scores)
+    versions = [v for template in group.templates for v in _versions(template)]
+    frames, scores, template_of = [], [], []
+    for number, template in enumerate(versions):
+        here, walls = _frames(template, space)
+        ok = allowed(template, here, space)
+        noise = rng.random(len(here)) * _NOISE
+        frames.append(here[ok])
+        scores.append(_scores(template, here[ok], walls[ok], space) + noise[ok])
+        template_of.append(np.full(int(ok.sum()), number))
+    return _places(
+        versions, np.concatenate([np.zeros(0, int), *template_of]),
+        np.concatenate([np.zeros((0, 4)), *frames]), np.concatenate([np.zeros(0), *scores]),
+    )  # fmt: skip
 
 
 def fixed_places(found: Sequence[Standing]) -> Places:
     """Places that were found elsewhere."""
-    n_bodies = max((len(p.bodies) for p in found), default=0)
-    n_clear = max((len(p.clear) for p in found), default=0)
-    bodies = np.full((len(found), n_bodies, 4), np.nan)
-    clear = np.full((len(found), n_clear, 4), np.nan)
-    for k, place in enumerate(found):
-        bodies[k, : len(place.bodies)] = _array(place.bodies)
-        clear[k, : len(place.clear)] = _array(place.clear)
-    return Places(list(found), bodies, clear, np.array([p.score for p in found]))
+    frames = frames_array([p.frame for p in found])
+    scores = np.array([p.score for p in found], np.float64)
+    return _places([p.template for p in found], np.arange(len(found)), frames, scores)
 
 
-def allowed(template: Template, frames: Sequence[Frame], space: RoomSpace) -> Bools:
+def _places(templates: list[Template], template_of: Ints, frames: F64, scores: F64) -> Places:
+    n_bodies = max((len(t.bodies) for t in templates), default=0)
+    n_clear = max((len(t.clear) for t in templates), default=0)
+    bodies = np.full((len(frames), n_bodies, 4), np.nan)
+    clear = np.full((len(frames), n_clear, 4), np.nan)
+    for number, template in enumerate(templates):
+        rows = np.flatnonzero(template_of == number)
+        if len(rows):
+            grounds = np.array([s.rect for s in template.bodies])
+            bodies[rows, : len(template.bodies)] = _moved(grounds, frames[rows])
+        if len(rows) and template.clear:
+            clear[rows, : len(template.clear)] = _moved(np.array(template.clear), frames[rows])
+    return Places(templates, template_of, frames, bodies, clear, scores)
+
+
+def frames_array(frames: Sequence[Frame]) -> F64:
+    """(N, 4) frames as arrays have them."""
+    rows = [(f.x, f.z, f.dx, f.dz) for f in frames]
+    return np.array(rows, np.float64).reshape(-1, 4)
+
+
+def allowed(template: Template, frames: F64, space: RoomSpace) -> Bools:
     """(N,) which frames keep a template inside the room, off doors and below window sills."""
     bodies = _moved(np.array([s.rect for s in template.bodies]), frames)
     bad = overlap(bodies, np.concatenate([space.outside, space.doors])).any(1)
@@ -125,57 +159,57 @@ def _versions(template: Template) -> list[Template]:
     return [template] if same and set(template.clear) == set(turned.clear) else [template, turned]
 
 
-def _places(template: Template, space: RoomSpace, rng: np.random.Generator) -> list[Standing]:
-    framed = _free_frames(space) if template.stand is Stand.FREE else _wall_frames(template, space)
-    if not framed:
-        return []
-    ok = allowed(template, [frame for frame, _ in framed], space)
-    noise = rng.random(len(framed)) * _NOISE
-    return [
-        Standing(template, frame, _score(template, frame, wall, space) + float(noise[k]))
-        for k, (frame, wall) in enumerate(framed)
-        if ok[k]
-    ]
-
-
-def _wall_frames(template: Template, space: RoomSpace) -> list[tuple[Frame, Wall | None]]:
+def _frames(template: Template, space: RoomSpace) -> tuple[F64, Ints]:
+    """(N, 4) where a template could stand, and the wall of each, -1 for none."""
+    if template.stand is Stand.FREE:
+        frames = _free_frames(space)
+        return frames, np.full(len(frames), -1)
     u0, _, u1, _ = template.extent
-    found: list[tuple[Frame, Wall | None]] = []
-    for wall in space.walls:
-        low, high = _BESIDE_M - u0, wall.length - u1 - _BESIDE_M
-        if high < low - 1e-9:
-            continue
-        at: list[float] = []
-        if template.stand is Stand.CORNER:
-            if template.end < 0 and wall.is_left_corner:
-                at = [low]
-            if template.end > 0 and wall.is_right_corner:
-                at = [high]
-        else:
-            n = int((high - low) / _STEP_M + 1e-9)
-            at = [low + k * _STEP_M for k in range(n + 1)]
-            if high - at[-1] > 1e-6:
-                at.append(high)
-        for u in at:
-            x, z = wall.frame.point(u, 0.0)
-            found.append((Frame(x, z, wall.frame.dx, wall.frame.dz), wall))
-    return found
+    found, walls = [np.zeros((0, 4))], [np.zeros(0, int)]
+    for number, wall in enumerate(space.walls):
+        at = _along(template, wall, _BESIDE_M - u0, wall.length - u1 - _BESIDE_M)
+        f = wall.frame
+        rows = np.empty((len(at), 4))
+        rows[:] = f.x, f.z, f.dx, f.dz
+        rows[:, 0] += at * f.dx
+        rows[:, 1] += at * f.dz
+        found.append(rows)
+        walls.append(np.full(len(at), number))
+    return np.concatenate(found), np.concatenate(walls)
 
 
-def _free_frames(space: RoomSpace) -> list[tuple[Frame, Wall | None]]:
+def _along(template: Template, wall: Wall, low: float, high: float) -> F64:
+    """Where along a wall a template's origin can be, metres."""
+    at: list[float] = []
+    if high < low - 1e-9:
+        return np.zeros(0)
+    if template.stand is Stand.CORNER:
+        if template.end < 0 and wall.is_left_corner:
+            at = [low]
+        if template.end > 0 and wall.is_right_corner:
+            at = [high]
+    else:
+        n = int((high - low) / _STEP_M + 1e-9)
+        at = [low + k * _STEP_M for k in range(n + 1)]
+        if high - at[-1] > 1e-6:
+            at.append(high)
+    return np.array(at)
+
+
+def _free_frames(space: RoomSpace) -> F64:
+    """A grid over the room, at each of its points along x and along z."""
     x0, z0, x1, z1 = space.bounds
-    found: list[tuple[Frame, Wall | None]] = []
-    for i in range(1, int((x1 - x0) / _FREE_STEP_M)):
-        for k in range(1, int((z1 - z0) / _FREE_STEP_M)):
-            x, z = x0 + i * _FREE_STEP_M, z0 + k * _FREE_STEP_M
-            found += [(Frame(x, z, 1, 0), None), (Frame(x, z, 0, 1), None)]
-    return found
+    xs = x0 + np.arange(1, int((x1 - x0) / _FREE_STEP_M)) * _FREE_STEP_M
+    zs = z0 + np.arange(1, int((z1 - z0) / _FREE_STEP_M)) * _FREE_STEP_M
+    found = np.empty((len(xs), len(zs), 2, 4))
+    found[..., 0], found[..., 1] = xs[:, None, None], zs[:, None]
+    found[:, :, 0, 2:], found[:, :, 1, 2:] = (1, 0), (0, 1)
+    return found.reshape(-1, 4)
 
 
-def _moved(rects: F64, frames: Sequence[Frame]) -> F64:
+def _moved(rects: F64, frames: F64) -> F64:
     """(N, B, 4) rectangles of the template (B, 4) in each frame."""
-    place = np.array([(f.x, f.z, f.dx, f.dz) for f in frames])
-    x, z, dx, dz = (place[:, k, None, None] for k in range(4))
+    x, z, dx, dz = (frames[:, k, None, None] for k in range(4))
     u, v = rects[None, :, 0::2], rects[None, :, 1::2]
     xs, zs = x + u * dx - v * dz, z + u * dz + v * dx
     return np.stack([xs.min(2), zs.min(2), xs.max(2), zs.max(2)], -1)
@@ -185,48 +219,63 @@ def _array(rects: Sequence[Rect]) -> F64:
     return np.array(rects, np.float64).reshape(-1, 4)
 
 
-def _score(template: Template, frame: Frame, wall: Wall | None, space: RoomSpace) -> float:
-    like, score = template.liking, template.rank
+def _scores(template: Template, frames: F64, walls: Ints, space: RoomSpace) -> F64:
+    """(N,) how good each place is, by what the template likes."""
+    like, scores = template.liking, np.full(len(frames), template.rank)
     u0, v0, u1, v1 = template.extent
-    x, z = frame.point((u0 + u1) / 2, (v0 + v1) / 2)
-    if wall is not None:
-        along = (frame.x - wall.frame.x) * wall.frame.dx + (frame.z - wall.frame.z) * wall.frame.dz
-        left, right = along + u0, wall.length - along - u1
-        for gap, is_corner in ((left, wall.is_left_corner), (right, wall.is_right_corner)):
-            if is_corner:
-                score += like.corner * (gap < 0.02) - 0.25 * (0.03 < gap < _DEAD_GAP_M)
-        if like.window_wall:
-            score += like.window_wall * _window_share(space, wall, along + u0, along + u1)
+    x, z, dx, dz = frames.T
+    u, v = (u0 + u1) / 2, (v0 + v1) / 2
+    middles = np.stack([x + u * dx - v * dz, z + u * dz + v * dx], -1)
+    if template.stand is not Stand.FREE and len(frames):
+        scores += _wall_scores(like, (u0, u1), frames, walls, space)
     if like.daylight and space.windows:
-        near = min(math.dist((x, z), w.middle) for w in space.windows)
-        score -= like.daylight * near
+        scores -= like.daylight * _nearest(middles, [w.middle for w in space.windows])
     if like.door and len(space.doors):
-        near = min(math.dist((x, z), ((d[0] + d[2]) / 2, (d[1] + d[3]) / 2)) for d in space.doors)
-        score += like.door * min(near, 4.0)
+        doors = (space.doors[:, :2] + space.doors[:, 2:]) / 2
+        scores += like.door * np.minimum(_nearest(middles, doors.tolist()), 4.0)
     if like.middle:
         x0, z0, x1, z1 = space.bounds
-        score -= like.middle * math.dist((x, z), ((x0 + x1) / 2, (z0 + z1) / 2))
+        scores -= like.middle * _nearest(middles, [((x0 + x1) / 2, (z0 + z1) / 2)])
     if like.back:
-        score += like.back * _back_score(template, frame, space)
-    return score
+        scores += like.back * _back_scores(template, frames, space)
+    return scores
 
 
-def _window_share(space: RoomSpace, wall: Wall, low: float, high: float) -> float:
-    """Share of a stretch of wall that lies below windows."""
-    covered = 0.0
-    for window in space.windows:
-        if window.wall >= 0 and space.walls[window.wall] == wall:
-            covered += max(min(high, window.high) - max(low, window.low), 0.0)
-    return covered / max(high - low, 1e-6)
+def _nearest(points: F64, others: Sequence[Point]) -> F64:
+    """(N,) distance of each point to the nearest of others."""
+    apart = points[:, None] - np.array(others)[None]
+    return np.asarray(np.hypot(apart[..., 0], apart[..., 1]).min(1))
 
 
-def _back_score(template: Template, frame: Frame, space: RoomSpace) -> float:
-    """Of a seat whose back is its far end: 1 at a wall, .6 with a way behind it, else -1."""
+def _wall_scores(
+    like: Liking, span: tuple[float, float], frames: F64, walls: Ints, space: RoomSpace
+) -> F64:
+    """(N,) for ends at corners, against gaps that nobody can use and what stands below windows."""
+    start = frames_array([w.frame for w in space.walls])[walls]
+    length = np.array([w.length for w in space.walls])[walls]
+    along = ((frames[:, :2] - start[:, :2]) * start[:, 2:]).sum(1)
+    low, high = along + span[0], along + span[1]
+    scores = np.zeros(len(frames))
+    corners = [w.is_left_corner for w in space.walls], [w.is_right_corner for w in space.walls]
+    for gap, is_corner in zip((low, length - high), corners, strict=True):
+        here = np.array(is_corner)[walls]
+        scores += here * like.corner * (gap < 0.02)
+        scores -= here * 0.25 * ((gap > 0.03) & (gap < _DEAD_GAP_M))
+    if like.window_wall:
+        covered = np.zeros(len(frames))
+        for window in space.windows:
+            shared = np.minimum(high, window.high) - np.maximum(low, window.low)
+            covered += (walls == window.wall) * np.maximum(shared, 0.0)
+        scores += like.window_wall * covered / max(span[1] - span[0], 1e-6)
+    return scores
+
+
+def _back_scores(template: Template, frames: F64, space: RoomSpace) -> F64:
+    """(N,) of a seat whose back is its far end: 1 at a wall, .6 with a way behind it, else -1."""
     u0, _, u1, v1 = template.extent
-    depth = 0.0
-    for far in (0.06, 0.3, 0.75):
-        behind = np.array([[frame.rect((u0 + 0.3, v1, u1 - 0.3, v1 + far))]])
-        if overlap(behind, space.outside).any():
-            break
-        depth = far
-    return {0.0: 1.0, 0.06: 0.8, 0.3: -1.0}.get(depth, 0.6)
+    scores = np.full(len(frames), 0.6)
+    # From far to near: what is met first decides.
+    for far, score in ((0.75, -1.0), (0.3, 0.8), (0.06, 1.0)):
+        behind = _moved(np.array([(u0 + 0.3, v1, u1 - 0.3, v1 + far)]), frames)
+        scores[overlap(behind, space.outside).any(1)] = score
+    return scores

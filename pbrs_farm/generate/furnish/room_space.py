@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
+import shapely
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
@@ -106,6 +107,13 @@ def room_space(plan: Plan, number: int) -> RoomSpace:
     )  # fmt: skip
 
 
+def with_bodies(space: RoomSpace, bodies: Sequence[Rect]) -> RoomSpace:
+    """The space of a room where something stands already: nothing more fits there."""
+    if not bodies:
+        return space
+    return replace(space, outside=np.concatenate([space.outside, np.array(bodies)]))
+
+
 def outside_of(polygon: Polygon) -> F64:
     """(N, 4) rectangles: the rim around a rectilinear polygon, and what its bounds hold beyond it."""
     x0, z0, x1, z1 = polygon.bounds
@@ -171,10 +179,10 @@ def _solid(frame: Frame, length: float, near: BaseGeometry) -> list[tuple[float,
     n = max(int(length / 0.025), 2)
     at = np.linspace(0, length, n + 1)
     middles = (at[1:] + at[:-1]) / 2
-    probe = [box(*_around(frame.point(float(u), -0.0))) for u in middles]
-    is_open = [near.intersection(p).area > 0 for p in probe]
+    shapely.prepare(near)
+    is_open = shapely.contains_xy(near, frame.x + middles * frame.dx, frame.z + middles * frame.dz)
     found, start = [], None
-    for k, opened in enumerate([*is_open, True]):
+    for k, opened in enumerate([*is_open.tolist(), True]):
         if not opened and start is None:
             start = float(at[k])
         if opened and start is not None:
@@ -223,7 +231,7 @@ def _seen_from(plan: Plan, opening: PlanOpening, polygon: Polygon) -> Frame | No
     wall = plan.walls[opening.wall]
     x, z = wall.at(opening.along)
     half = wall.thickness / 2
-    is_vertical = wall.start[0] == wall.end[0]
+    is_vertical = abs(wall.end[0] - wall.start[0]) < abs(wall.end[1] - wall.start[1])
     for side in (1.0, -1.0):
         nx, nz = (side, 0.0) if is_vertical else (0.0, side)
         inner = box(*_around((x + nx * (half + 0.05), z + nz * (half + 0.05))))

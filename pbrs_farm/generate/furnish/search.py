@@ -107,7 +107,7 @@ def arranged(
 ) -> Arrangement:  # fmt: skip
     """The best arrangement found of groups in this order, added to what stands already."""
     before = start or Arrangement(score=0.0)
-    alive = [np.ones(len(p.found), bool) for p in places]
+    alive = [np.ones(p.n, bool) for p in places]
     for place in before.standing:
         alive = [p.free_of(mask, place) for p, mask in zip(places, alive, strict=True)]
     free = walk.with_bodies(walk.free, before.bodies)

@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import Bools
@@ -18,10 +17,12 @@ from pbrs_farm.generate.plan import Rect
 CELL_M: Final = 0.05
 WALK_M: Final = 0.6  # the width of a way
 _RADIUS: Final = WALK_M / 2 / CELL_M  # cells
+# (rows, columns) by which a rectangle grows, together all cells nearer to it than the radius.
+_NEAR: Final = ((3, 5), (4, 4), (5, 3))
 
 
 class WalkMap:
-    """The free floor of a room; furniture is marked on copies."""
+    """Where the middle of a man can be in a room; furniture is marked on copies."""
 
     def __init__(self, space: RoomSpace, standing: Iterable[Rect] = ()) -> None:
         x0, z0, x1, z1 = space.walk_polygon.bounds
@@ -32,24 +33,31 @@ class WalkMap:
             self._origin[1] + (np.arange(shape[0]) + 0.5) * CELL_M,
         )
         self._inside: Bools = np.asarray(shapely.contains_xy(space.polygon, xx, zz))
-        self._floor: Bools = np.asarray(shapely.contains_xy(space.walk_polygon, xx, zz))
-        self.free = self.with_bodies(self._floor, standing)
+        floor: Bools = np.asarray(shapely.contains_xy(space.walk_polygon, xx, zz))
+        clear = ndimage.distance_transform_edt(floor) >= _RADIUS - 1e-9
+        self.free = self.with_bodies(np.asarray(clear), standing)
         # A way that an empty room does not have is not asked for.
-        ways = self._ways(self.free)
         self._start = space.ways[0] if space.ways else None
-        region = self._region(ways, self._start)
+        region = self._region(self.free, self._start)
         self.joined_ways = [w for w in space.ways if region is not None and self._meets(region, w)]
 
     def with_bodies(self, free: Bools, rects: Iterable[Rect]) -> Bools:
-        """The free floor without what stands on rectangles."""
+        """The middles that are left where something stands on rectangles."""
         left = free.copy()
         for rect in rects:
-            left[self._cells(rect)] = False
+            rows, columns = self._cells(rect)
+            if rows.start >= rows.stop or columns.start >= columns.stop:
+                continue
+            for dz, dx in _NEAR:
+                left[
+                    max(rows.start - dz, 0) : rows.stop + dz,
+                    max(columns.start - dx, 0) : columns.stop + dx,
+                ] = False
         return left
 
     def reached(self, free: Bools, fronts: Iterable[Rect]) -> Bools | None:
         """(H, W) middles of a man who came in by the doors; None where a door or front is cut off."""
-        region = self._region(self._ways(free), self._start)
+        region = self._region(free, self._start)
         if region is None:
             return None
         if all(self._meets(region, r) for r in (*self.joined_ways, *fronts)):
@@ -72,13 +80,9 @@ class WalkMap:
 
         return span(rect[1], rect[3], self._origin[1]), span(rect[0], rect[2], self._origin[0])
 
-    def _ways(self, free: Bools) -> NDArray[np.int32]:
-        middles = ndimage.distance_transform_edt(free) >= _RADIUS - 1e-9
-        labels, _ = ndimage.label(middles)
-        return np.asarray(labels, np.int32)
-
-    def _region(self, ways: NDArray[np.int32], start: Rect | None) -> Bools | None:
+    def _region(self, free: Bools, start: Rect | None) -> Bools | None:
         """The way that begins at a rectangle; the largest where there is none."""
+        ways, _ = ndimage.label(free)
         area = ways[self._cells(start)] if start else ways
         counts = np.bincount(area.ravel(), minlength=1)
         counts[0] = 0
