@@ -10,12 +10,18 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 
 PREFIX: Final = "made:"
-VERSION: Final = 1
+VERSION: Final = 2
 """Of the generator: part of a made home's id. Raised when it makes another home of a seed."""
 
 MAX_SEED: Final = 2**31 - 1
 MAX_HOMES: Final = 1_000_000
 """Of one word."""
+
+STYLES: Final = ("classic", "mixed", "modern", "nordic", "vintage")
+"""Of furniture; none named: one of them by seed."""
+
+_AREA_OF_HOMES: Final = ((28, 60), (36, 85), (48, 115), (62, 150), (76, 180))
+"""Smallest and largest floor of all rooms, square metres, by the number of bedrooms."""
 
 _HINT: Final = "made:12, made:1..1000 or made:1..100,rooms=2..4,area=60..90"
 _RANGE: Final = re.compile(r"(\d{1,10})(?:\.\.(\d{1,10}))?")
@@ -75,13 +81,36 @@ def made_homes(word: str) -> list[MadeHome]:
             home = replace(home, bedrooms=_range(word, value, 4))
         elif key == "area":
             home = replace(home, area=_range(word, value, 1000))
-        elif key == "style" and re.fullmatch(r"[a-z][a-z0-9-]{0,30}", value):
+        elif key == "style":
+            if value not in STYLES:
+                raise BadInput(
+                    word, option[:60], "no such style", hint=f"one of {', '.join(STYLES)}"
+                )
             home = replace(home, style=value)
         elif key == "furniture" and value == "none":
             home = replace(home, furniture=False)
         else:
             raise BadInput(word, option, "is no option of made homes", hint=_HINT)
+    check_wishes(home.bedrooms, home.area)
     return [replace(home, seed=seed) for seed in range(first, last + 1)]
+
+
+def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float]) -> None:
+    """Raise BadInput for a number of bedrooms and an area that no home meets."""
+    low, high = bedrooms
+    if not 0 <= low <= high <= len(_AREA_OF_HOMES) - 1:
+        text = "homes have 0 to 4 bedrooms"
+        raise BadInput("rooms", f"{low}..{high}", text, hint="rooms=2..4")
+    if not 0 < area[0] <= area[1]:
+        raise BadInput("area", f"{area[0]:g}..{area[1]:g}", "is no range", hint="area=60..90")
+    least, most = _AREA_OF_HOMES[low][0], _AREA_OF_HOMES[high][1]
+    if area[1] < least or area[0] > most:
+        of = f"{low}" if low == high else f"{low} to {high}"
+        raise BadInput(
+            "area", f"{area[0]:g}..{area[1]:g}",
+            f"homes of {of} bedrooms have {least:g} to {most:g} m2",
+            hint=f"area={least:g}..{most:g}",
+        )  # fmt: skip
 
 
 def expanded(words: list[str]) -> list[str]:

@@ -20,7 +20,7 @@ def drawn_plan(
     rng: np.random.Generator, wishes: Wishes | None = None, programme: Programme | None = None
 ) -> Plan:
     """A plan for a programme, or for one drawn by seed as wished. Raises BadInput if none fits."""
-    where = layout(programme, rng) if programme else _drawn_layout(rng, wishes)
+    where = layout(programme, rng, is_fixed=True) if programme else _drawn_layout(rng, wishes)
     runs = runs_of(where)
     walls = walls_of(where, runs)
     rooms = rooms_of(where, walls)

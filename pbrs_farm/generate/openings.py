@@ -10,17 +10,27 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.plan import OpeningKind, PlanOpening, PlanRoom, PlanWall, RoomType
+from pbrs_farm.generate.plan import (
+    OpeningKind,
+    PlanOpening,
+    PlanRoom,
+    PlanWall,
+    Point,
+    Rect,
+    RoomType,
+)
 from pbrs_farm.generate.slicing import STEP_M
-from pbrs_farm.generate.walls import OUTSIDE, Run, balcony, open_rooms
+from pbrs_farm.generate.walls import OUTER_M, OUTSIDE, PARAPET_M, Run, balcony, open_rooms
 
 DOOR_HEIGHT_M: Final = 2.1
 _DOOR_M, _WET_DOOR_M, _ENTRANCE_M = 0.9, 0.8, 0.95
 _FROM_CORNER_M: Final = 0.10  # of a door's frame
 _LEAST_CORNER_M: Final = 0.03
+_LEAVES_M: Final = 0.1  # that the squares of two leaves may share
 _WINDOW_M, _WINDOW_HEIGHT_M, _SILL_M = 1.3, 1.3, 0.9
 _WIDEST_M: Final = 2.4
 _FRENCH_HEIGHT_M, _FRENCH_SILL_M = 2.1, 0.1
+_BALCONY_M: Final = 4.5
 _CLEAR_M: Final = 0.35  # between a window and a corner or another window
 _OPENS_OUT: Final = (RoomType.WC, RoomType.STORE)
 _GLASS_SHARE: Final = 1 / 8  # of the floor
@@ -34,6 +44,8 @@ class _Drawing:
     rooms: list[PlanRoom]
     rng: np.random.Generator
     openings: list[PlanOpening] = field(default_factory=list)
+    rims: list[Point] = field(default_factory=list)  # where parapets meet the wall
+    swings: list[tuple[int, Rect]] = field(default_factory=list)  # room, what a leaf sweeps there
 
     @property
     def types(self) -> list[RoomType]:
@@ -77,7 +89,40 @@ class _Drawing:
                 abs(here - run.line * STEP_M) < 1e-6
             ):
                 spans.append((along - opening.width / 2, along + opening.width / 2))
+        # Nothing opens where a parapet meets the wall.
+        half = PARAPET_M / 2
+        for x, z in self.rims:
+            here, along = (x, z) if run.is_vertical else (z, x)
+            if abs(here - run.line * STEP_M) < OUTER_M:
+                spans.append((along - half, along + half))
         return spans
+
+    def gaps(self, run: Run) -> list[tuple[float, float]]:
+        """What openings leave of a run between its corners, the longest first."""
+        low, high = self.free(run)
+        found = []
+        for a, b in sorted(self.taken(run)):
+            if a < high and b > low:
+                found.append((low, a))
+                low = b
+        return sorted([*found, (low, high)], key=lambda g: (g[0] - g[1], g[0]))
+
+    def swing(self, run: Run, at: float, width: float, room: int) -> Rect:
+        """The square in a room that a door's leaf can sweep."""
+        side = 1 if run.after == room else -1
+        line = run.line * STEP_M
+        across, along = sorted((line, line + side * width)), (at - width / 2, at + width / 2)
+        (x0, x1), (z0, z1) = (across, along) if run.is_vertical else (along, across)
+        return x0, z0, x1, z1
+
+    def meets_swing(self, room: int, rect: Rect) -> bool:
+        """Whether a leaf would hit another one of the room."""
+        return any(
+            other == room
+            and min(rect[2], r[2]) - max(rect[0], r[0]) > _LEAVES_M
+            and min(rect[3], r[3]) - max(rect[1], r[1]) > _LEAVES_M
+            for other, r in self.swings
+        )
 
 
 def openings_of(
@@ -119,7 +164,12 @@ def _add_doors(drawing: _Drawing, room: int) -> None:
         runs = [r for r in drawing.runs if room in r.rooms and r.rooms & set(others)]
         runs = [r for r in runs if r.rooms != open_rooms(drawing.layout)]
         runs.sort(key=lambda r: (-r.length, r.line, r.low))
-        if any(_add_door(drawing, run, room, OpeningKind.DOOR, width) for run in runs):
+        # Two leaves that hit each other are the last choice.
+        if any(
+            _add_door(drawing, run, room, OpeningKind.DOOR, width, may_meet=may_meet)
+            for may_meet in (False, True)
+            for run in runs
+        ):
             break
     # A closed kitchen often has a second door, to the living room.
     if type_ is RoomType.KITCHEN and not drawing.layout.programme.open_kitchen:
@@ -128,7 +178,7 @@ def _add_doors(drawing: _Drawing, room: int) -> None:
         joined = any({o.room, o.other} == {room, *living} for o in drawing.openings)
         if between and not joined and drawing.rng.random() < 0.6:
             longest = max(between, key=lambda r: (r.length, r.line, r.low))
-            _add_door(drawing, longest, room, OpeningKind.DOOR, width)
+            _add_door(drawing, longest, room, OpeningKind.DOOR, width, may_meet=False)
 
 
 def _doors_to(types: list[RoomType], type_: RoomType) -> Iterable[list[int]]:
@@ -148,8 +198,19 @@ def _numbers(types: list[RoomType], *wanted: RoomType) -> list[int]:
     return [i for i, t in enumerate(types) if t in wanted]
 
 
-def _add_door(drawing: _Drawing, run: Run, room: int, kind: OpeningKind, width: float) -> bool:
-    """A door at one end of a run, hinged towards the corner; False where there is no room."""
+def _add_door(
+    drawing: _Drawing,
+    run: Run,
+    room: int,
+    kind: OpeningKind,
+    width: float,
+    *,
+    may_meet: bool = True,
+) -> bool:
+    """A door at one end of a run, hinged towards the corner; False where there is no room.
+
+    may_meet: its leaf may swing where another one does.
+    """
     low, high = drawing.free(run)
     # Stand nearer to the corner where the wall is short.
     corner = min(_FROM_CORNER_M, (high - low - width) / 2)
@@ -167,6 +228,10 @@ def _add_door(drawing: _Drawing, run: Run, room: int, kind: OpeningKind, width: 
         span = (at - width / 2 - 0.02, at + width / 2 + 0.02)
         if any(a < span[1] and b > span[0] for a, b in drawing.taken(run)):
             continue
+        swing = drawing.swing(run, at, width, into)
+        if not may_meet and drawing.meets_swing(into, swing):
+            continue
+        drawing.swings.append((into, swing))
         wall, along = drawing.wall_of(run, at)
         drawing.openings.append(
             PlanOpening(
@@ -207,10 +272,15 @@ def _add_balcony(drawing: _Drawing) -> None:
         return
     run = max(lit, key=lambda r: (r.length, r.line, r.low))
     low, high = drawing.free(run)
-    room, parapet = balcony(run, low, min(high, low + 4.5))
+    high = min(high, low + _BALCONY_M)
+    room, parapet = balcony(run, low, high)
     drawing.rooms.append(room)
     drawing.walls.extend(parapet)
-    middle, width = (low + min(high, low + 4.5)) / 2, 1.8
+    drawing.rims += [parapet[0].start, parapet[-1].end]
+    # Its doors light a large room by themselves.
+    glass = 1.1 * drawing.rooms[living].area * _GLASS_SHARE
+    width = round(min(max(glass / _FRENCH_HEIGHT_M, 1.8), 3.0, high - low - 2 * _CLEAR_M), 2)
+    middle = (low + high) / 2
     wall, along = drawing.wall_of(run, middle)
     drawing.openings.append(
         PlanOpening(
@@ -251,8 +321,12 @@ def _add_windows(drawing: _Drawing, room: int) -> None:
         missing = wanted - glass
         if missing <= 0:
             break
-        n = min(max(math.ceil(missing / (_WINDOW_M * height)), 1), 3)
-        glass += _add_row(drawing, run, room, n, missing, height, sill)
+        for gap in drawing.gaps(run):
+            n = min(max(math.ceil(missing / (_WINDOW_M * height)), 1), 3)
+            added = _add_row(drawing, run, gap, room, (n, missing, height, sill))
+            glass, missing = glass + added, missing - added
+            if missing <= 0:
+                break
     if wanted - glass > 0.05 * wanted:
         _widen(drawing, room, here.area * _GLASS_SHARE)
 
@@ -263,10 +337,14 @@ def _is_window_of(opening: PlanOpening, room: int) -> bool:
 
 
 def _add_row(
-    drawing: _Drawing, run: Run, room: int, n: int, missing: float, height: float, sill: float
-) -> float:
-    """n windows of one size spread over a run; gives their glass in square metres."""
-    low, high = drawing.free(run)
+    drawing: _Drawing, run: Run, gap: tuple[float, float], room: int,
+    wish: tuple[int, float, float, float],
+) -> float:  # fmt: skip
+    """Windows of one size spread over a gap of a run; gives their glass in square metres.
+
+    wish: how many, their glass, height and sill.
+    """
+    (low, high), (n, missing, height, sill) = gap, wish
     for count in range(n, 0, -1):
         room_each = (high - low - _CLEAR_M * (count + 1)) / count
         width = min(max(missing / count / height, 0.8), _WIDEST_M, room_each)
@@ -274,10 +352,10 @@ def _add_row(
             continue
         # Round to the sizes that windows come in.
         width = math.floor(width * 10 + 0.999) / 10 if width + 0.1 <= room_each else width
-        gap = (high - low - count * width) / (count + 1)
+        apart = (high - low - count * width) / (count + 1)
         glass = 0.0
         for k in range(count):
-            middle = low + gap * (k + 1) + width * (k + 0.5)
+            middle = low + apart * (k + 1) + width * (k + 0.5)
             glass += _add_window(drawing, run, room, (width, height, sill), middle)
         if glass:
             return glass

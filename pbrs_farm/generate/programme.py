@@ -5,12 +5,12 @@ Medians and shares are those of nine homes drawn by people (65 rooms), docs/home
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.made_home import check_wishes
 from pbrs_farm.generate.plan import RoomType
 
 MEDIAN_AREA: Final = {
@@ -41,7 +41,7 @@ AREA_RANGE: Final = {
 _SPREAD: Final = {RoomType.BEDROOM: 0.16, RoomType.LIVING: 0.20}  # of the logarithm; others .18
 _BEDROOMS: Final = (0, 1, 2, 3, 4)
 _BEDROOM_SHARES: Final = (0.10, 0.25, 0.35, 0.22, 0.08)
-_HALL_SHARE: Final = (0.09, 0.13)  # of all other rooms
+_HALL_SHARE: Final = (0.11, 0.16)  # of all other rooms
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +63,7 @@ class Programme:
     notch: float = 0.0  # area of a corner that the outline leaves out, square metres
     l_shaped: bool = False  # the living room has a second arm
     balcony: bool = False
+    adjacent: tuple[tuple[int, tuple[int, ...]], ...] = ()  # room shares a wall with one of others
 
     @property
     def area(self) -> float:
@@ -79,24 +80,7 @@ class Wishes:
 
     def __post_init__(self) -> None:
         """Raise BadInput for ranges that no home can meet."""
-        low, high = self.bedrooms
-        if not 0 <= low <= high <= 4:
-            raise BadInput(
-                "--rooms", f"{low}..{high}", "homes have 0 to 4 bedrooms", hint="--rooms 2..4"
-            )
-        if not 0 < self.area[0] <= self.area[1]:
-            raise BadInput("--area", "", f"{self.area[0]:g}..{self.area[1]:g} is no range")
-        least = _AREA_OF_HOMES[low][0]
-        most = _AREA_OF_HOMES[high][1]
-        if self.area[1] < least or self.area[0] > most:
-            raise BadInput(
-                "--area", f"{self.area[0]:g}..{self.area[1]:g}",
-                f"homes of {low} to {high} bedrooms have {least:g} to {most:g} m2",
-                hint=f"--area {least:g}..{most:g}",
-            )  # fmt: skip
-
-
-_AREA_OF_HOMES: Final = ((28, 60), (36, 85), (48, 115), (62, 150), (76, 180))  # by bedrooms
+        check_wishes(self.bedrooms, self.area)
 
 
 def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> Programme:
@@ -162,7 +146,4 @@ def _scaled(programme: Programme, area: float) -> Programme:
         RoomWish(r.type, float(np.clip(r.area * factor, *AREA_RANGE[r.type])), r.name)
         for r in programme.rooms
     )
-    return Programme(
-        rooms, programme.open_kitchen, programme.n_blind_sides, programme.notch,
-        programme.l_shaped, programme.balcony,
-    )  # fmt: skip
+    return replace(programme, rooms=rooms)

@@ -1,7 +1,7 @@
 """A user's programme: JSON -> Programme, every fault one line. Effects: reads the file.
 
 {"rooms": [{"type": "living", "area": 24}, {"type": "bedroom", "name": "Ada"}],
- "open_kitchen": true, "balcony": false}
+ "open_kitchen": true, "balcony": false, "adjacent": [["Ada", "bathroom"]]}
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MAX_ROOMS: Final = 14
 _TYPES: Final = [t.value for t in AREA_RANGE]
 _NUMBERS: Final = ("n_blind_sides", "notch")
 _FLAGS: Final = ("open_kitchen", "l_shaped", "balcony")
-_HALL_SHARE: Final = 0.11  # of the other rooms, where the file names no hall
+_HALL_SHARE: Final = 0.135  # of the other rooms, where the file names no hall
 
 
 def json_from_file(path: Path) -> Any:
@@ -38,9 +38,10 @@ def programme_from_json(path: Path) -> Programme:
     value = json_from_file(path)
     if not isinstance(value, dict) or not isinstance(value.get("rooms"), list):
         raise BadInput(path, "", "is no programme", hint='{"rooms": [{"type": "bedroom"}, ...]}')
-    unknown = sorted(set(value) - {"rooms", "area", *_NUMBERS, *_FLAGS})
+    fields = ("rooms", "area", "adjacent", *_NUMBERS, *_FLAGS)
+    unknown = sorted(set(value) - set(fields))
     if unknown:
-        known = ", ".join(("rooms", "area", *_NUMBERS, *_FLAGS))
+        known = ", ".join(fields)
         raise BadInput(path, unknown[0], "is no field of a programme", hint=f"one of {known}")
     wishes = [_wish(path, k, row) for k, row in enumerate(value["rooms"])]
     wishes = _with_area(path, value.get("area"), _complete(path, wishes))
@@ -52,6 +53,7 @@ def programme_from_json(path: Path) -> Programme:
     return Programme(
         tuple(wishes), open_kitchen=value.get("open_kitchen", False), n_blind_sides=int(sides),
         notch=notch, l_shaped=value.get("l_shaped", False), balcony=value.get("balcony", False),
+        adjacent=_adjacent(path, value.get("adjacent", []), wishes),
     )  # fmt: skip
 
 
@@ -73,6 +75,37 @@ def _wish(path: Path, number: int, row: object) -> RoomWish:
     if not isinstance(name, str):
         raise BadInput(path, place, "has a name that is no text")
     return RoomWish(type_, float(area), name[:60])
+
+
+def _adjacent(
+    path: Path, rows: object, wishes: list[RoomWish]
+) -> tuple[tuple[int, tuple[int, ...]], ...]:
+    """Pairs of rooms by name or type: the first shares a wall with one that the second names."""
+    if not isinstance(rows, list):
+        raise BadInput(path, "adjacent", "is no list of pairs", hint='[["Ada", "bathroom"]]')
+    found = []
+    for number, row in enumerate(rows):
+        place = f"adjacent {number + 1}"
+        if not isinstance(row, list) or len(row) != 2 or not all(isinstance(x, str) for x in row):
+            raise BadInput(path, place, "is no pair of rooms", hint='["Ada", "bathroom"]')
+        firsts, seconds = (_called(path, place, word, wishes) for word in row)
+        if len(firsts) > 1:
+            text = f"{row[0]!r} is {len(firsts)} rooms"
+            raise BadInput(path, place, text, hint="name the room and write its name here")
+        others = tuple(k for k in seconds if k != firsts[0])
+        if not others:
+            raise BadInput(path, place, f"{row[0]!r} is one room")
+        found.append((firsts[0], others))
+    return tuple(found)
+
+
+def _called(path: Path, place: str, word: str, wishes: list[RoomWish]) -> list[int]:
+    found = [k for k, w in enumerate(wishes) if w.name == word]
+    found = found or [k for k, w in enumerate(wishes) if w.type.value == word]
+    if not found:
+        names = ", ".join(dict.fromkeys(w.name or w.type.value for w in wishes))
+        raise BadInput(path, place, f"no room is called {word[:40]!r}", hint=f"one of {names}")
+    return found
 
 
 def _number(

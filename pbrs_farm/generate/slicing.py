@@ -253,6 +253,7 @@ class _Rules:
 
     def __init__(self, brief: Brief) -> None:
         self._brief = brief
+        self._width, self._depth, self._lit = brief.width, brief.depth, brief.lit_sides
         self._limits = [
             (leaf.min_width, leaf.max_aspect, bool(leaf.outer or leaf.any_outer or leaf.is_corner))
             for leaf in brief.leaves
@@ -299,16 +300,17 @@ class _Rules:
         if not leaf.outer and not leaf.any_outer:
             return 0.0
         x0, z0, x1, z1 = rect
-        left, top, right, bottom = self._brief.lit_sides
+        left, top, right, bottom = self._lit
         # Measure the stretches on the outline, with daylight and without.
-        lengths = (
-            (z1 - z0 if x0 == 0 else 0, left),
-            (x1 - x0 if z0 == 0 else 0, top),
-            (z1 - z0 if x1 == self._brief.width else 0, right),
-            (x1 - x0 if z1 == self._brief.depth else 0, bottom),
-        )
-        daylight = max(length if is_lit else 0 for length, is_lit in lengths)
-        anywhere = max(length for length, _ in lengths)
+        daylight = anywhere = 0
+        for is_there, length, is_lit in (
+            (x0 == 0, z1 - z0, left), (z0 == 0, x1 - x0, top),
+            (x1 == self._width, z1 - z0, right), (z1 == self._depth, x1 - x0, bottom),
+        ):  # fmt: skip
+            if is_there and length > anywhere:
+                anywhere = length
+            if is_there and is_lit and length > daylight:
+                daylight = length
         # A notch is outside, too.
         for notch in self._notches:
             beside = shared_length(rect, rects[notch])
