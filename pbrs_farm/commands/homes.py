@@ -44,8 +44,11 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     text = "leave the rooms without furniture; needs no package"
     add("--empty", action="store_true", help=text)
     add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")
-    text = "JSON or GeoJSON: a plan of your own in metres, furnished by the seed (docs/homes.md)"
+    text = (
+        "JSON, GeoJSON or a CSV of WKT: a plan of your own, furnished by the seed (docs/homes.md)"
+    )
     add("--plan", type=Path, metavar="FILE", help=text)
+    add("--apartment", default="", metavar="ID", help="which one of a CSV with several")
     add("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
 
 
@@ -110,13 +113,15 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     given = [f"--{k}" for k in ("rooms", "area", "programme") if getattr(args, k)]
     if given:
         raise BadInput("--plan", str(args.plan), f"leaves no choice of {given[0]}")
-    plan = plan_from_file(args.plan)
+    own = plan_from_file(args.plan, args.apartment)
+    for line in own.left_out:
+        warn(f"left out: {line}")
     catalogue = EMPTY if args.empty else catalogue_here()
     _folder(args.out)
     for seed in range(args.seed, args.seed + args.count):
         name = args.plan.stem if args.count == 1 else f"{args.plan.stem}-{seed}"
         style = args.style or ""
-        home = made_of_plan(plan, catalogue, seed=seed, style=style, name=name)
+        home = made_of_plan(own.plan, catalogue, seed=seed, style=style, name=name)
         write_home(args.out / f"{name}.sh3d", home)
         echo(str(args.out / f"{name}.sh3d"))
     return 0
@@ -135,6 +140,8 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
     from pbrs_farm.generate.programme import Wishes
     from pbrs_farm.generate.programme_file import programme_from_json
 
+    if args.apartment:
+        raise BadInput("--apartment", args.apartment, "needs --plan FILE.csv")
     options = [f"{k}={v}" for k in ("rooms", "area", "style") if (v := getattr(args, k))]
     options += ["furniture=none"] * args.empty
     if args.programme and (args.rooms or args.area):

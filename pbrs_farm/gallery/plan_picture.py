@@ -12,18 +12,14 @@ from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, PlanWall, Po
 
 _MARGIN_M: Final = 0.6
 _PX_PER_M: Final = 60.0
-_FLOOR: Final = {
-    RoomType.LIVING: "#f6eedd", RoomType.STUDIO: "#f6eedd", RoomType.BEDROOM: "#efe6f2",
-    RoomType.KITCHEN: "#fbe7d3", RoomType.BATHROOM: "#dcecf4", RoomType.WC: "#dcecf4",
-    RoomType.HALL: "#eeeeea", RoomType.STORE: "#e6e6e0", RoomType.WARDROBE: "#e9e2ea",
-    RoomType.BALCONY: "#e2efdd",
-}  # fmt: skip
+_LIVING, _SLEEPING, _COOKING, _WATER = "#f6eedd", "#efe6f2", "#fbe7d3", "#dcecf4"
+_PASSING, _KEEPING, _OUTSIDE = "#eeeeea", "#e6e6e0", "#e2efdd"
 _RAISED_M: Final = 1.2  # what hangs higher is drawn dashed
 
 
 def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
     """The text of an SVG file: rooms with names and areas, walls, doors, windows, furniture."""
-    points = [p for wall in plan.walls for p in wall_corners(wall)]
+    points = [p for wall in plan.walls for p in wall.corners()]
     x0, z0 = (min(p[k] for p in points) - _MARGIN_M for k in (0, 1))
     x1, z1 = (max(p[k] for p in points) + _MARGIN_M for k in (0, 1))
     root = svg_file(
@@ -34,14 +30,13 @@ def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
     element(root, "title", title)
     element(root, "rect", x=f"{x0:.2f}", y=f"{z0:.2f}", width="100%", height="100%", fill="#ffffff")
     for room in plan.rooms:
-        element(root, "polygon", points=_text(room.polygon), fill=_FLOOR[room.type])
+        element(root, "polygon", points=_text(room.polygon), fill=_tint(room.type))
     for piece in sorted(pieces, key=lambda p: p.elevation + p.height):
         _draw_piece(root, piece)
     ends = Counter(end for wall in plan.walls for end in (wall.start, wall.end))
     for wall in plan.walls:
         # Close the corners where two walls end at one point.
-        is_joined = ends[wall.start] > 1, ends[wall.end] > 1
-        corners = _text(wall_corners(wall, is_joined))
+        corners = _text(wall.corners(to_start=ends[wall.start] > 1, to_end=ends[wall.end] > 1))
         element(root, "polygon", points=corners, fill="#888" if wall.height else "#333")
     for opening in plan.openings:
         _draw_opening(root, plan, opening)
@@ -50,17 +45,20 @@ def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
     return svg_text(root)
 
 
-def wall_corners(
-    wall: PlanWall, is_joined: tuple[bool, bool] = (True, True)
-) -> tuple[Point, Point, Point, Point]:
-    """The corners of a wall's ground, its joined ends drawn out by half of its thickness."""
-    (x0, z0), (x1, z1) = wall.start, wall.end
-    half = wall.thickness / 2
-    nx, nz = (c * half for c in wall.normal)
-    start, end = (half * is_end for is_end in is_joined)
-    ux, uz = (x1 - x0) / wall.length, (z1 - z0) / wall.length
-    x0, z0, x1, z1 = x0 - ux * start, z0 - uz * start, x1 + ux * end, z1 + uz * end
-    return (x0 + nx, z0 + nz), (x1 + nx, z1 + nz), (x1 - nx, z1 - nz), (x0 - nx, z0 - nz)
+def _tint(type_: RoomType) -> str:
+    """The colour of a room's floor, by what it is used for."""
+    match type_:
+        case RoomType.LIVING | RoomType.STUDIO:
+            return _LIVING
+        case RoomType.KITCHEN:
+            return _COOKING
+        case RoomType.BATHROOM | RoomType.WC:
+            return _WATER
+        case RoomType.HALL:
+            return _PASSING
+        case RoomType.BALCONY:
+            return _OUTSIDE
+    return _SLEEPING if type_ is RoomType.BEDROOM else _KEEPING
 
 
 def _text(points: Sequence[Point]) -> str:

@@ -8,11 +8,13 @@
 GeoJSON says the same: polygons with the properties `type` and `name` are rooms, points with
 `kind` (door, entrance, window, french_window) and the sizes are openings. x runs to the right and
 the second coordinate downwards on the page. Rooms may touch or leave room for the walls between.
+A .csv is a table of dwellings with WKT polygons (dwelling_rows.py).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -23,6 +25,7 @@ from shapely.geometry import LineString, Polygon
 from shapely.ops import unary_union
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.dwelling_rows import plan_value_of_rows
 from pbrs_farm.generate.plan import (
     OpeningKind,
     Plan,
@@ -33,7 +36,7 @@ from pbrs_farm.generate.plan import (
     RoomType,
 )
 from pbrs_farm.generate.programme_file import json_from_file
-from pbrs_farm.generate.walls import INNER_M, OUTER_M, corners
+from pbrs_farm.generate.walls import INNER_M, OUTER_M, PARAPET_HEIGHT_M, PARAPET_M, corners
 
 MAX_ROOMS: Final = 60
 _FAR_M: Final = 200.0
@@ -47,9 +50,27 @@ _SIZES: Final = {
 }  # fmt: skip
 
 
-def plan_from_file(path: Path) -> Plan:
-    """The plan of a JSON or GeoJSON file. Raises BadInput, naming the room or opening."""
-    value = json_from_file(path)
+@dataclass(frozen=True, slots=True)
+class OwnPlan:
+    """A plan that was read, and what of a table it leaves out, a line each."""
+
+    plan: Plan
+    left_out: tuple[str, ...] = ()
+
+
+def plan_from_file(path: Path, apartment: str = "") -> OwnPlan:
+    """The plan of a JSON or GeoJSON file, or of an apartment of a table of dwellings (.csv).
+
+    Raises BadInput, naming the room or opening. An opening of a table that fits no wall is left out.
+    """
+    if path.suffix.lower() == ".csv":
+        return _plan_of(path, plan_value_of_rows(path, apartment), is_table=True)
+    if apartment:
+        raise BadInput("--apartment", apartment, "names a row of a .csv", hint="leave it out")
+    return _plan_of(path, json_from_file(path))
+
+
+def _plan_of(path: Path, value: Any, *, is_table: bool = False) -> OwnPlan:
     if isinstance(value, dict) and value.get("type") == "FeatureCollection":
         value = _from_geojson(path, value)
     if not isinstance(value, dict) or not isinstance(value.get("rooms"), list):
@@ -62,15 +83,21 @@ def plan_from_file(path: Path) -> Plan:
     drawn = [_room(path, k, row) for k, row in enumerate(value["rooms"])]
     _check_apart(path, drawn)
     walls, rooms = _walled(path, drawn)
-    openings = []
+    openings: list[PlanOpening] = []
+    left_out = []
     for key, kind in (("doors", OpeningKind.DOOR), ("windows", OpeningKind.WINDOW)):
         rows = value.get(key, [])
         if not isinstance(rows, list):
             raise BadInput(path, key, "is no list")
         for k, row in enumerate(rows):
             place = f"{key[:-1]} {k + 1}"
-            openings.append(_opening(path, place, row, kind, walls, rooms, float(height)))
-    return Plan(rooms, walls, tuple(openings), float(height))
+            try:
+                openings.append(_opening(path, place, row, kind, walls, rooms, float(height)))
+            except BadInput as error:
+                if not is_table:
+                    raise
+                left_out.append(str(error))
+    return OwnPlan(Plan(rooms, walls, tuple(openings), float(height)), tuple(left_out))
 
 
 def _from_geojson(path: Path, value: dict[str, Any]) -> dict[str, Any]:
@@ -125,7 +152,7 @@ def _room(path: Path, number: int, row: object) -> tuple[RoomType, str, Polygon]
         why = "crosses itself" if not shape.is_valid else f"has {shape.area:.2f} m2"
         raise BadInput(path, place, f"{why}; simple polygons of {_LEAST_M2} m2 or more work")
     type_ = RoomType(row["type"])
-    name = row.get("name") or type_.value.capitalize()
+    name = row.get("name") or type_.label
     return type_, str(name)[:60], _oriented(shape)
 
 
@@ -153,7 +180,8 @@ def _walled(
     shapes = [d[2] for d in drawn]
     walls: list[PlanWall] = []
     for number, shape in enumerate(shapes):
-        walls += _walls_of(number, shape, shapes)
+        is_open_air = drawn[number][0] is RoomType.BALCONY
+        walls += _walls_of(number, shape, shapes, is_open_air=is_open_air)
     ground = unary_union([_ground(wall) for wall in walls])
     rooms = []
     for number, (type_, name, shape) in enumerate(drawn):
@@ -169,8 +197,11 @@ def _ground(wall: PlanWall) -> Polygon:
     return line.buffer(wall.thickness / 2, cap_style="flat")
 
 
-def _walls_of(number: int, shape: Polygon, shapes: list[Polygon]) -> list[PlanWall]:
-    """The walls that a room adds: to rooms of higher number, and outer ones."""
+def _walls_of(
+    number: int, shape: Polygon, shapes: list[Polygon], *, is_open_air: bool
+) -> list[PlanWall]:
+    """The walls that a room adds: to rooms of higher number, and outer ones (a balcony: parapets)."""
+    outer, height = (PARAPET_M, PARAPET_HEIGHT_M) if is_open_air else (OUTER_M, None)
     ring: list[Point] = [(x, z) for x, z, *_ in shape.exterior.coords[:-1]]
     found = []
     for k, a in enumerate(ring):
@@ -188,17 +219,18 @@ def _walls_of(number: int, shape: Polygon, shapes: list[Polygon]) -> list[PlanWa
             if high - low < _TOUCH_M:
                 continue
             # Draw an outer wall out to where the next one's outer face is.
-            start = _mitre(before, a, b) if low == 0.0 else INNER_M / 2
-            end = _mitre(a, b, after) if high == side.length else INNER_M / 2
-            found.append(side.wall(low - start, high + end, OUTER_M, OUTER_M / 2, is_outer=True))
+            start = outer * _mitre(before, a, b) if low == 0.0 else INNER_M / 2
+            end = outer * _mitre(a, b, after) if high == side.length else INNER_M / 2
+            wall = side.wall(low - start, high + end, outer, outer / 2, is_outer=True)
+            found.append(replace(wall, height=height))
     return found
 
 
 def _mitre(a: Point, b: Point, c: Point) -> float:
-    """How far a wall outside a..b goes on beyond b: none where the room turns inwards."""
+    """How far a wall outside a..b goes on beyond b, in thicknesses: 0 where the room turns inwards."""
     turn = math.atan2(c[1] - b[1], c[0] - b[0]) - math.atan2(b[1] - a[1], b[0] - a[0])
     turn = (turn + math.pi) % (2 * math.pi) - math.pi
-    return min(OUTER_M * math.tan(turn / 2), 2 * OUTER_M) if turn > 0 else 0.0
+    return min(math.tan(turn / 2), 2.0) if turn > 0 else 0.0
 
 
 def _without(

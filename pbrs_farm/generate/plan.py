@@ -39,6 +39,15 @@ class RoomType(StrEnum):
         """Whether water runs there."""
         return self in (RoomType.KITCHEN, RoomType.BATHROOM, RoomType.WC)
 
+    @property
+    def label(self) -> str:
+        """What such a room is called on a plan."""
+        if self in (RoomType.LIVING, RoomType.STUDIO):
+            return "Living room"
+        if self is RoomType.STORE:
+            return "Store room"
+        return "WC" if self is RoomType.WC else self.value.capitalize()
+
 
 class OpeningKind(StrEnum):
     """What an opening of a wall is."""
@@ -103,6 +112,20 @@ class PlanWall:
         """The unit vector across it, to the right when looking from start to end on the page."""
         (x0, z0), (x1, z1) = self.start, self.end
         return (z0 - z1) / self.length, (x1 - x0) / self.length
+
+    def corners(
+        self, *, to_start: bool = True, to_end: bool = True
+    ) -> tuple[Point, Point, Point, Point]:
+        """The corners of its ground; an end that meets a wall is drawn out by half of its thickness."""
+        (nx, nz), half = self.normal, self.thickness / 2
+        a, b = self.at(-half * to_start), self.at(self.length + half * to_end)
+        nx, nz = nx * half, nz * half
+        return (
+            (a[0] + nx, a[1] + nz),
+            (b[0] + nx, b[1] + nz),
+            (b[0] - nx, b[1] - nz),
+            (a[0] - nx, a[1] - nz),
+        )
 
     def at(self, along: float) -> Point:
         """The point of the middle line `along` metres from its start."""

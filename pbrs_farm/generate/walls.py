@@ -20,12 +20,6 @@ OUTSIDE: Final = -1
 OUTER_M, WET_M, INNER_M, PARAPET_M = 0.26, 0.16, 0.075, 0.10  # thickness, as people draw them
 PARAPET_HEIGHT_M: Final = 1.0
 BALCONY_DEPTH_M: Final = 1.5
-_NAMES: Final = {
-    RoomType.LIVING: "Living room", RoomType.KITCHEN: "Kitchen", RoomType.BEDROOM: "Bedroom",
-    RoomType.STUDIO: "Living room", RoomType.BATHROOM: "Bathroom", RoomType.WC: "WC",
-    RoomType.HALL: "Hall", RoomType.STORE: "Store room", RoomType.WARDROBE: "Wardrobe",
-    RoomType.BALCONY: "Balcony",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,16 +113,9 @@ def open_rooms(layout: Layout) -> frozenset[int]:
     return frozenset((living, types.index(RoomType.KITCHEN)))
 
 
-def wall_polygon(wall: PlanWall) -> Polygon:
-    """The ground of a wall, its ends drawn out by half of its thickness."""
-    half = wall.thickness / 2
-    (x0, z0), (x1, z1) = wall.start, wall.end
-    return box(min(x0, x1) - half, min(z0, z1) - half, max(x0, x1) + half, max(z0, z1) + half)
-
-
 def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...]:
     """The rooms: their rectangles without what the walls stand on."""
-    ground = unary_union([wall_polygon(wall) for wall in walls])
+    ground = unary_union([Polygon(wall.corners()) for wall in walls])
     count: dict[RoomType, int] = {}
     types = [wish.type for wish in layout.programme.rooms]
     rooms = []
@@ -138,7 +125,7 @@ def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...
         ]
         polygon = unary_union(rects).difference(ground)
         count[wish.type] = count.get(wish.type, 0) + 1
-        name = wish.name or _NAMES[wish.type]
+        name = wish.name or wish.type.label
         if not wish.name and types.count(wish.type) > 1:
             name = f"{name} {count[wish.type]}"
         rooms.append(PlanRoom(wish.type, name, corners(polygon)))
@@ -190,4 +177,4 @@ def balcony(run: Run, low: float, high: float) -> tuple[PlanRoom, tuple[PlanWall
         strict=True,
     )  # fmt: skip
     floor = box(min(xs), min(zs), max(xs), max(zs))
-    return PlanRoom(RoomType.BALCONY, _NAMES[RoomType.BALCONY], corners(floor)), parapet
+    return PlanRoom(RoomType.BALCONY, RoomType.BALCONY.label, corners(floor)), parapet

@@ -10,7 +10,7 @@ import pytest
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.made_home import MadeHome, made_homes
 from pbrs_farm.gallery.made_homes import make_homes
-from pbrs_farm.gallery.plan_picture import plan_svg, wall_corners
+from pbrs_farm.gallery.plan_picture import plan_svg
 from pbrs_farm.generate.made import made
 from pbrs_farm.generate.plan import PlanRoom, PlanWall, RoomType
 
@@ -61,7 +61,7 @@ def test_a_plan_shows_every_room_and_escapes_its_name() -> None:
 
 
 def test_a_skewed_wall_has_four_corners_around_its_middle() -> None:
-    corners = wall_corners(PlanWall((0.0, 0.0), (3.0, 4.0), 0.2))
+    corners = PlanWall((0.0, 0.0), (3.0, 4.0), 0.2).corners()
     ground = PlanRoom(RoomType.STORE, "", corners)
     assert ground.contains((1.5, 2.0))
     assert not ground.contains((1.5, 2.3))

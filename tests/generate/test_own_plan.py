@@ -54,7 +54,7 @@ SKEWED = TOUCHING | {
 def plan(folder: Path, value: object) -> Plan:
     path = folder / "plan.json"
     path.write_text(value if isinstance(value, str) else json.dumps(value))
-    return plan_from_file(path)
+    return plan_from_file(path).plan
 
 
 @pytest.mark.parametrize("value", [TOUCHING, APART, SKEWED], ids=["touching", "apart", "skewed"])

@@ -1,0 +1,122 @@
+"""Rows of a table of dwellings: an apartment becomes a plan by the door of plans of one's own."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.made import made_of_plan
+from pbrs_farm.generate.own_plan import OwnPlan, plan_from_file
+from pbrs_farm.generate.plan import OpeningKind, RoomType
+from pbrs_farm.read.sweethome3d.home import read_home
+
+COLUMNS = (
+    "apartment_id", "floor_id", "entity_type", "entity_subtype", "geometry", "elevation", "height",
+)  # fmt: skip
+
+
+def rect(x: float, y: float, w: float, d: float) -> str:
+    ring = [(x, y), (x + w, y), (x + w, y + d), (x, y + d), (x, y)]
+    return f"POLYGON (({', '.join(f'{a} {b}' for a, b in ring)}))"
+
+
+def area(kind: str, wkt: str, apartment: str = "a1", floor: str = "7") -> tuple[Any, ...]:
+    return apartment, floor, "area", kind, wkt, 404.0, 2.6
+
+
+# North of a corridor a large and a small room, a bathroom beside; walls of 0.2 m between.
+ROWS: list[tuple[Any, ...]] = [
+    area("ROOM", rect(10, 21.7, 5, 4)),
+    area("ROOM", rect(15.2, 21.7, 3, 4)),
+    area("CORRIDOR", rect(10, 20, 5.8, 1.5)),
+    area("BATHROOM", rect(16, 20, 2.2, 1.5)),
+    area("SHAFT", rect(18.3, 20, 0.4, 1.5)),
+    area("ROOM", rect(40, 20, 4, 4), apartment="a2"),
+    ("", "7", "separator", "WALL", rect(10, 21.5, 8, 0.2), 404.0, 2.6),
+    ("", "7", "opening", "ENTRANCE_DOOR", rect(9.8, 20.3, 0.2, 0.9), 404.0, 2.0),
+    ("", "7", "opening", "DOOR", rect(12, 21.5, 0.8, 0.2), 404.0, 2.0),
+    ("", "7", "opening", "WINDOW", rect(12, 25.7, 1.6, 0.3), 404.9, 1.4),
+    ("", "7", "opening", "WINDOW", rect(41, 24, 1.6, 0.3), 404.9, 1.4),
+    ("", "8", "opening", "WINDOW", rect(12, 25.7, 1.6, 0.3), 407.6, 1.4),
+]
+
+
+def written(folder: Path, rows: list[tuple[Any, ...]], columns: tuple[str, ...] = COLUMNS) -> Path:
+    path = folder / "geometries.csv"
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([columns, *rows])
+    return path
+
+
+def plan(folder: Path, rows: list[tuple[Any, ...]] | None = None, apartment: str = "a1") -> OwnPlan:
+    return plan_from_file(written(folder, ROWS if rows is None else rows), apartment)
+
+
+def test_an_apartments_areas_are_rooms_and_its_largest_plain_room_is_to_live_in(
+    tmp_path: Path,
+) -> None:
+    found = plan(tmp_path)
+    types = [room.type for room in found.plan.rooms]
+    assert types == [RoomType.LIVING, RoomType.BEDROOM, RoomType.HALL, RoomType.BATHROOM]
+    assert found.plan.rooms[0].area == pytest.approx(20, abs=0.05)
+    assert found.plan.height == 2.6
+    assert found.left_out == ()
+
+
+def test_north_is_up_on_the_page_and_only_openings_beside_the_apartment_count(
+    tmp_path: Path,
+) -> None:
+    entrance, door, window = plan(tmp_path).plan.openings
+    assert (entrance.kind, entrance.other) == (OpeningKind.ENTRANCE, None)
+    assert {door.room, door.other} == {0, 2}
+    wall = plan(tmp_path).plan.walls[window.wall]
+    assert wall.at(window.along)[1] < 0.0
+    assert (window.sill, window.height, window.width) == pytest.approx((0.9, 1.4, 1.6))
+
+
+def test_an_opening_that_fits_no_wall_is_left_out_and_told(tmp_path: Path) -> None:
+    wide = ("", "7", "opening", "WINDOW", rect(10.2, 25.7, 7.9, 0.3), 404.9, 1.4)
+    found = plan(tmp_path, [*ROWS, wide])
+    assert len(found.plan.openings) == 3
+    assert "wider than its wall" in found.left_out[0]
+
+
+def test_the_home_of_an_apartment_reads_as_a_house(tmp_path: Path) -> None:
+    house = read_home(made_of_plan(plan(tmp_path).plan, EMPTY, seed=1).data, "a1.sh3d")
+    assert [len(house.rooms), len(house.openings)] == [4, 3]
+
+
+@pytest.mark.parametrize(
+    ("rows", "apartment", "message"),
+    [
+        (ROWS, "", r"has 2 apartments: a1, a2.*--apartment a1"),
+        (ROWS, "b9", r"has no apartment 'b9'"),
+        ([], "", "has no row of the type area"),
+        ([*ROWS, area("ROOM", rect(10, 21, 5, 4), floor="8")], "a1", "2 floors; one storey works"),
+        ([area("ROOM", "POLYGON ((0 0, 1")], "a1", "line 2: has a geometry that is no WKT polygon"),
+        ([area("SHAFT", rect(0, 0, 1, 1))], "a1", "without rooms"),
+    ],
+)
+def test_a_table_without_such_an_apartment_is_one_line(
+    tmp_path: Path, rows: list[tuple[Any, ...]], apartment: str, message: str
+) -> None:
+    with pytest.raises(BadInput, match=message) as caught:
+        plan(tmp_path, rows, apartment)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_table_of_something_else_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="has no column entity_type"):
+        plan_from_file(written(tmp_path, [(1, 2)], ("price", "rent")))
+
+
+def test_an_apartment_is_asked_of_a_table_alone(tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text("{}")
+    with pytest.raises(BadInput, match=r"names a row of a \.csv"):
+        plan_from_file(path, "a1")
