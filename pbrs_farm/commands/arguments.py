@@ -58,6 +58,8 @@ def add_dress(p: argparse.ArgumentParser) -> None:
     add = p.add_argument
     text = "dress each home by each seed, a house of its own each: 3, 1..20 or 1,4,7"
     add("--dress", metavar="SEEDS", type=str, help=text)
+    text = "furnish rooms that have nothing in them before the home is dressed (docs/homes.md)"
+    add("--furnish", choices=("none", "empty"), help=text)
     add_catalogue(p)
 
 
@@ -224,6 +226,8 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
         overrides |= {"cameras.source": "file", "cameras.file": json.dumps(str(args.camera_file))}
     if getattr(args, "catalogue", None):
         overrides["dress.catalogue"] = json.dumps(":".join(args.catalogue))
+    if getattr(args, "furnish", None):
+        overrides["dress.furnish"] = args.furnish
     if getattr(args, "exact", False):
         overrides["cameras.exact"] = "true"
     if args.recipe.endswith(ENDING):

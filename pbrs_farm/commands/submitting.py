@@ -49,6 +49,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _submit(args: argparse.Namespace) -> int:
+    from pbrs_farm.run.dressed_house import uses_catalogue
     from workers.client.estimate import estimate
     from workers.client.farm_client import completed
     from workers.house_files import (
@@ -82,7 +83,7 @@ def _submit(args: argparse.Namespace) -> int:
     # Fail before anything is uploaded where Redis does not answer.
     farm = farm_of(args)
     farm.ledger.ping()
-    if any(seeds):
+    if any(uses_catalogue(ref, spec.recipe) for _entry, ref in found):
         recipe = upload_catalogue(farm.store, spec.recipe)
         spec = spec.model_copy(update={"recipe": recipe})
     upload(farm.store, [ref for _entry, ref in found])

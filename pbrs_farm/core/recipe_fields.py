@@ -51,6 +51,9 @@ class DressFields(FieldGroup):
     textiles: Share = Field(1.0, description="of curtains, blinds, rugs, pillows, blankets")
     lamps: Share = Field(1.0, description="of rooms without a lamp that get one")
     style: str = Field("", max_length=64, description="every home's; empty = drawn by the seed")
+    furnish: Literal["none", "empty"] = Field(
+        "none", description="rooms that get furniture first: `empty` = those that have none"
+    )
     catalogue: str = Field(
         "", max_length=4096,
         description="libraries beside the furniture package, ':' between; `generated` = no package",

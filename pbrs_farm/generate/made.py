@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from pbrs_farm.generate.drawn_home import drawn_home
 from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.furniture import PlacedPiece
 from pbrs_farm.generate.home_file import home_file
-from pbrs_farm.generate.plan import Plan, Point
+from pbrs_farm.generate.plan import Plan, PlanRoom, Point
 from pbrs_farm.generate.programme import Programme, Wishes
 
 
@@ -73,17 +74,25 @@ def made_of_plan(
 
 def turned(plan: Plan) -> Plan:
     """The plan turned about its origin by less than 45 degrees, the longest way of its walls upright."""
+    return turned_by(plan, upright_angle(plan.rooms))
+
+
+def upright_angle(rooms: Sequence[PlanRoom]) -> float:
+    """Radians by which rooms are turned about the origin so that most of their walls are upright."""
     ways: dict[float, float] = {}
-    for wall in plan.walls:
-        (x0, z0), (x1, z1) = wall.start, wall.end
+    for (x0, z0), (x1, z1) in (edge for room in rooms for edge in room.edges):
         angle = math.degrees(math.atan2(z1 - z0, x1 - x0)) % 90
         tenth = round(angle, 1) % 90
-        ways[tenth] = ways.get(tenth, 0.0) + wall.length
+        ways[tenth] = ways.get(tenth, 0.0) + math.hypot(x1 - x0, z1 - z0)
     main = max(ways, key=lambda angle: (ways[angle], -angle))
-    if main == 0:
+    return math.radians(-main if main < 45 else 90 - main)
+
+
+def turned_by(plan: Plan, angle_rad: float) -> Plan:
+    """The plan turned about its origin."""
+    if angle_rad == 0:
         return plan
-    back = math.radians(-main if main < 45 else 90 - main)
-    cos, sin = math.cos(back), math.sin(back)
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
 
     def moved(p: Point) -> Point:
         return round(p[0] * cos - p[1] * sin, 3), round(p[0] * sin + p[1] * cos, 3)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import House, ItemKind
+from pbrs_farm.core.made_home import VERSION as MADE_VERSION
 from pbrs_farm.core.recipe import DressFields, Recipe
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run.dress_catalogue import catalogue_of_words
@@ -28,6 +29,25 @@ def seed_of(source: SourceRef, recipe: Recipe) -> int:
     if source.kind == "object":
         return 0
     return source.dress_seed or recipe.dress.seed
+
+
+def uses_catalogue(source: SourceRef, recipe: Recipe) -> bool:
+    """Whether a source's house takes anything from the catalogue."""
+    return bool(seed_of(source, recipe)) or _is_furnished(source, recipe)
+
+
+def _is_furnished(source: SourceRef, recipe: Recipe) -> bool:
+    return recipe.dress.furnish != "none" and source.kind != "object"
+
+
+def furnished(house: House, source: SourceRef, recipe: Recipe) -> House:
+    """The house with its empty rooms furnished, where the recipe asks for it, by the dressing's seed."""
+    if not _is_furnished(source, recipe):
+        return house
+    from pbrs_farm.run.furnished_rooms import with_rooms_furnished
+
+    doing(source.location, "furnish")
+    return with_rooms_furnished(house, catalogue_of(recipe.dress), seed_of(source, recipe))
 
 
 def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, DressReport | None]:
@@ -54,13 +74,14 @@ def _kept(house: House, recipe: Recipe) -> House:
 
 
 def dressing_digest(source: SourceRef, recipe: Recipe) -> str:
-    """Digest of all that dressing depends on beside the house; "" where it is not dressed."""
-    seed = seed_of(source, recipe)
-    if not seed:
+    """Digest of all that dressing and furnishing depend on beside the house; "" where neither is done."""
+    seed, is_furnished = seed_of(source, recipe), _is_furnished(source, recipe)
+    if not seed and not is_furnished:
         return ""
     # Where the libraries lie is no matter: their content is.
-    fields = recipe.dress.model_dump(mode="json", exclude={"seed", "catalogue"})
-    return keys.digest(VERSION, seed, fields, catalogue_of(recipe.dress).digest)
+    fields = recipe.dress.model_dump(mode="json", exclude={"seed", "catalogue", "furnish"})
+    more = ["furnish", MADE_VERSION] if is_furnished else []
+    return keys.digest(VERSION, seed, fields, catalogue_of(recipe.dress).digest, *more)
 
 
 def fetch_catalogue(fields: DressFields) -> Catalogue:

@@ -20,7 +20,7 @@ from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan
 from pbrs_farm.run.attributions import write_attribution
-from pbrs_farm.run.dressed_house import fetch_catalogue, seed_of
+from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
 from pbrs_farm.run.plan import Wanted
 from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
@@ -81,7 +81,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     sources = _resolved(run, summary)
     if not sources:
         return summary
-    if any(seed_of(source, run.recipe) for source in sources):
+    if any(uses_catalogue(source, run.recipe) for source in sources):
         fetch_catalogue(run.recipe.dress)
     claim_root(store, run.recipe, update=run.update)
     n_jobs = max(1, run.n_jobs)

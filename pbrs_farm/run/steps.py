@@ -32,7 +32,7 @@ from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.formats.view_json import view_description, view_json
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
-from pbrs_farm.run.dressed_house import dressed
+from pbrs_farm.run.dressed_house import dressed, furnished
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.house_of_source import house_of_source
 from pbrs_farm.run.output_root import attribution
@@ -117,7 +117,7 @@ def made_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport, 
     def occluder_from(some: House) -> Caster:
         return Caster(geometry_from_house(some))
 
-    house, dressing = dressed(house, source, recipe)
+    house, dressing = dressed(furnished(house, source, recipe), source, recipe)
     doing(source.location, "repair")
     return *repair(house, recipe.repair, occluder_from=occluder_from), dressing
 

@@ -1,0 +1,215 @@
+"""Empty rooms of a home that was read, furnished as made homes are; no effects but the catalogue's.
+
+A room is empty where what stands on its floor covers less than 3 % of it. Its type follows from its
+name and size; a dining room, an office, a garage or an unnamed room is left as it is, with a note.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import shapely
+from shapely.geometry import Point, Polygon
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Place
+from pbrs_farm.core.house import House, ItemKind, Note
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, floor_space
+from pbrs_farm.dress.space.passages import Passage
+from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.generate.furnish.furnished import furnished
+from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.made import turned_by, upright_angle
+from pbrs_farm.generate.plan import (
+    OpeningKind,
+    Plan,
+    PlanOpening,
+    PlanRoom,
+    PlanWall,
+    Rect,
+    RoomType,
+)
+from pbrs_farm.generate.walls import corners
+
+_EMPTY_SHARE: Final = 0.03  # of a room's floor
+_STANDS_M: Final = 0.5  # what begins higher above the floor hangs
+_FLAT_M: Final = 0.12  # what ends lower can be walked on
+_SMALL_BATH_M2: Final = 2.6
+_LEAST_M2: Final = 1.2
+_TYPES: Final = {
+    RoomKind.LIVING: RoomType.LIVING, RoomKind.BEDROOM: RoomType.BEDROOM,
+    RoomKind.KITCHEN: RoomType.KITCHEN, RoomKind.BATHROOM: RoomType.BATHROOM,
+    RoomKind.HALL: RoomType.HALL,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Storey:
+    plan: Plan  # upright
+    angle_rad: float  # by which it was turned
+    rooms: tuple[RoomSpace, ...]
+    empty: tuple[int, ...]
+
+
+def with_rooms_furnished(house: House, catalogue: Catalogue, seed: int, style: str = "") -> House:
+    """The house with furniture in its empty rooms, the same for the same seed.
+
+    Raises BadInput for a style that there is none of.
+    """
+    draft = Draft(house, seed)
+    space = floor_space(draft)
+    rng = np.random.default_rng(keys.seed(house.id, "furnish", seed))
+    for level in house.levels:
+        storey = _storey(house, space, level.id, draft)
+        if storey.empty:
+            standing = {k: _standing(storey, k, draft) for k in storey.empty}
+            pieces = furnished(
+                storey.plan, catalogue, rng, style, rooms=storey.empty, standing=standing
+            )
+            _add(draft, storey, pieces, catalogue)
+    owed = sorted(
+        {(p.creator or p.library, p.licence) for p in draft.used.values() if "BY" in p.licence}
+    )
+    made = draft.house()
+    if not owed:
+        return made
+    credit = "; ".join(f"{creator}, {licence}" for creator, licence in owed)
+    line = "; ".join(x for x in (house.source.attribution, f"furniture: {credit}, modified") if x)
+    return replace(made, source=replace(made.source, attribution=line))
+
+
+def _storey(house: House, space: HouseSpace, level_id: str, draft: Draft) -> _Storey:
+    """The rooms of a level as a plan, and which of them are to be furnished."""
+    rooms, shapes = [], []
+    for room in space.rooms:
+        # Furniture stands at the walls' faces, wherever the outline was drawn.
+        ground = corners(room.area.difference(room.walls.buffer(0.002, join_style="mitre")))
+        if room.room.level_id == level_id and len(ground) >= 3:
+            rooms.append(room)
+            shapes.append(PlanRoom(_type_of(room), room.room.name, ground))
+    number = {room.room.id: k for k, room in enumerate(rooms)}
+    walls: list[PlanWall] = []
+    openings: list[PlanOpening] = []
+    for passage in space.passages:
+        sides = [number[r] for r in passage.room_ids if r in number]
+        if sides:
+            opening, wall = _opening(passage, sides, len(walls), rooms[sides[0]].room.floor_y)
+            openings.append(opening)
+            walls.append(wall)
+    height = min((r.room.ceiling_y - r.room.floor_y for r in rooms), default=2.5)
+    plan = Plan(tuple(shapes), tuple(walls), tuple(openings), max(height, 2.0))
+    empty = [k for k, room in enumerate(rooms) if _is_empty(room, shapes[k], draft)]
+    angle = upright_angle(plan.rooms) if plan.rooms else 0.0
+    return _Storey(turned_by(plan, angle), angle, tuple(rooms), tuple(empty))
+
+
+def _type_of(room: RoomSpace) -> RoomType:
+    if room.kind is RoomKind.BATHROOM and room.area.area < _SMALL_BATH_M2:
+        return RoomType.WC
+    return _TYPES.get(room.kind, RoomType.STORE)
+
+
+def _is_empty(room: RoomSpace, shape: PlanRoom, draft: Draft) -> bool:
+    if room.kind is RoomKind.OUTDOOR or shape.area < _LEAST_M2 or not room.room.has_floor:
+        return False
+    covered = sum(_ground(draft.items[n].bounds).area for n in _on_floor(room, draft))
+    if covered > _EMPTY_SHARE * shape.area:
+        return False
+    if room.kind not in _TYPES:
+        what = f"{room.room.name or 'a room without a name'} is empty and its use is not known"
+        draft.notes.append(Note("not-furnished", f"room {room.room.id}", what))
+        return False
+    return True
+
+
+def _on_floor(room: RoomSpace, draft: Draft) -> list[int]:
+    """Numbers of what stands in the way of a man in the room."""
+    floor = room.room.floor_y
+    return [
+        n
+        for n in room.items
+        if not draft.items[n].kind.is_structure
+        and draft.items[n].bounds[0, 1] < floor + _STANDS_M
+        and draft.items[n].bounds[1, 1] > floor + _FLAT_M
+    ]
+
+
+def _ground(bounds: F64) -> Polygon:
+    (x0, _, z0), (x1, _, z1) = bounds.tolist()
+    return Polygon([(x0, z0), (x1, z0), (x1, z1), (x0, z1)])
+
+
+def _standing(storey: _Storey, number: int, draft: Draft) -> list[Rect]:
+    """Rectangles of the upright plan around what stands in a room already."""
+    found = []
+    for n in _on_floor(storey.rooms[number], draft):
+        ground = shapely.affinity.rotate(
+            _ground(draft.items[n].bounds), storey.angle_rad, (0, 0), use_radians=True
+        )
+        x0, z0, x1, z1 = ground.bounds
+        found.append((x0, z0, x1, z1))
+    return found
+
+
+def _opening(
+    passage: Passage, sides: Sequence[int], wall: int, floor_y: float
+) -> tuple[PlanOpening, PlanWall]:
+    """A door or window with a wall of its own, as wide as itself."""
+    (x, _, z), along = passage.centre.tolist(), passage.along[[0, 2]] * passage.width / 2
+    start = round(x - float(along[0]), 4), round(z - float(along[1]), 4)
+    end = round(x + float(along[0]), 4), round(z + float(along[1]), 4)
+    sill, height = max(passage.bottom_y - floor_y, 0.0), passage.top_y - passage.bottom_y
+    kind = OpeningKind.DOOR
+    if passage.is_window:
+        kind = OpeningKind.WINDOW if sill > 0.3 else OpeningKind.FRENCH_WINDOW
+    other = sides[1] if len(sides) > 1 and sides[1] != sides[0] else None
+    return (
+        PlanOpening(kind, wall, passage.width / 2, passage.width, height, sill, sides[0], other),
+        PlanWall(start, end, max(2 * min(passage.half_wall), 0.02), other is None),
+    )
+
+
+def _add(
+    draft: Draft, storey: _Storey, pieces: Sequence[PlacedPiece], catalogue: Catalogue
+) -> None:
+    """Put the pieces into the house, turned back to where its walls stand."""
+    cos, sin = math.cos(-storey.angle_rad), math.sin(-storey.angle_rad)
+    lit = {k for k, room in enumerate(storey.rooms) if _has_lamp(room, draft)}
+    grounds = [Polygon(room.polygon).buffer(0.02) for room in storey.plan.rooms]
+    for piece in pieces:
+        shape = catalogue.shape(piece.piece)
+        hangs = piece.piece.place is Place.CEILING
+        skewed = not grounds[piece.room].contains(Polygon(piece.corners))
+        if shape is None or skewed or (hangs and piece.room in lit):
+            continue
+        room = storey.rooms[piece.room].room
+        size = np.ptp(shape.bounds, axis=0)
+        scale = np.array([piece.width, piece.height, piece.depth]) / np.maximum(size, 1e-6)
+        turn = -(piece.angle_rad - storey.angle_rad)
+        # Bring the middle of its box's base to where it was placed.
+        low, high = shape.bounds * scale
+        mx, mz = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
+        x, z = piece.x * cos - piece.z * sin, piece.x * sin + piece.z * cos
+        x -= mx * math.cos(turn) + mz * math.sin(turn)
+        z -= mz * math.cos(turn) - mx * math.sin(turn)
+        at = np.array([x, room.floor_y + piece.elevation - low[1], z])
+        item = draft.placed(
+            piece.piece, shape, at, turn, item_id=f"furnished_{len(draft.items)}",
+            room_id=room.id, level_id=room.level_id, scale=scale,
+        )  # fmt: skip
+        draft.add(item, "furnish", piece.piece)
+
+
+def _has_lamp(room: RoomSpace, draft: Draft) -> bool:
+    ground = room.area
+    return any(
+        item.kind is ItemKind.LAMP and ground.contains(Point(*item.bounds.mean(0)[[0, 2]]))
+        for item in draft.items
+        if item.n_faces and item.level_id == room.room.level_id
+    )

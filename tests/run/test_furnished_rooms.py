@@ -1,0 +1,121 @@
+"""Empty rooms of a home that was read get furniture; rooms with some keep theirs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapely.geometry import Point, Polygon
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Shape
+from pbrs_farm.core.house import House, Material, Surface
+from pbrs_farm.core.made_home import MadeHome
+from pbrs_farm.core.primitives import box_quads, quads_surface
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.generate.made import made
+from pbrs_farm.read.source import resolve
+from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.run.dressed_house import dressing_digest, uses_catalogue
+from pbrs_farm.run.furnished_rooms import with_rooms_furnished
+from tests.generate.furnish.shelves import plain_catalogue
+
+HOME = MadeHome(2, furniture=False)
+
+
+def boxes() -> Catalogue:
+    """The plain catalogue, each piece a box of its size."""
+
+    def box(piece: Piece) -> Shape:
+        w, d, h = piece.size
+        half = np.array([w, h, d]) / 2
+        quads = box_quads(np.array([0.0, h / 2, 0.0]), half)
+        return Shape((quads_surface("box", quads, 0),), (Material("grey"),))
+
+    return Catalogue(plain_catalogue().pieces, box, "boxes")
+
+
+def empty_house() -> House:
+    return read_home(made(HOME, EMPTY).data, "home.sh3d")
+
+
+def turned(house: House, angle: float) -> House:
+    """The house about its origin, walls and rooms askew."""
+    cos, sin = math.cos(angle), math.sin(angle)
+
+    def at(points: F64) -> F64:
+        x, z = points[..., 0], points[..., -1]
+        parts = [x * cos - z * sin, *([points[..., 1]] if points.shape[-1] == 3 else [])]
+        return np.stack([*parts, x * sin + z * cos], -1)
+
+    def surface(s: Surface) -> Surface:
+        return replace(s, positions=at(s.positions.astype(np.float64)).astype(np.float32))
+
+    items = [replace(i, surfaces=tuple(map(surface, i.surfaces)), box=None) for i in house.items]
+    openings = tuple(
+        replace(o, cutter=surface(o.cutter), quad=at(o.quad), normal=at(o.normal))
+        for o in house.openings
+    )
+    rooms = tuple(replace(r, polygon=at(r.polygon)) for r in house.rooms)
+    return replace(house.with_items(items), rooms=rooms, openings=openings)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_every_room_gets_what_it_must_have_inside_its_outline(angle: float) -> None:
+    house = turned(empty_house(), angle)
+    furnished = with_rooms_furnished(house, boxes(), 1)
+    added = furnished.items[len(house.items) :]
+    has = {room.name: {i.name for i in added if i.room_id == room.id} for room in house.rooms}
+    assert {"sink", "fridge", "cooker"} <= has["Kitchen"]
+    assert all("bed" in names for room, names in has.items() if room.startswith("Bedroom"))
+    for item in added:
+        room = house.room(item.room_id or "")
+        assert Polygon(room.polygon).buffer(0.01).contains(Point(*item.bounds.mean(0)[[0, 2]]))
+        assert item.bounds[0, 1] >= room.floor_y - 1e-3
+        assert item.bounds[1, 1] <= room.ceiling_y + 1e-3
+
+
+def test_a_room_that_has_furniture_keeps_it_and_gets_none() -> None:
+    once = with_rooms_furnished(empty_house(), boxes(), 1)
+    again = with_rooms_furnished(once, boxes(), 2)
+    rooms = [r for r in once.rooms if {"bed", "sofa", "sink"} & names_in(once, r.id)]
+    assert rooms
+    assert all(names_in(again, r.id) == names_in(once, r.id) for r in rooms)
+
+
+def names_in(house: House, room: str) -> set[str]:
+    return {i.name for i in house.items if i.room_id == room}
+
+
+def test_a_room_whose_use_is_not_known_is_left_and_noted() -> None:
+    house = empty_house()
+    rooms = tuple(
+        replace(r, name="Office", types=("Office",)) if r.name == "Kitchen" else r
+        for r in house.rooms
+    )
+    furnished = with_rooms_furnished(replace(house, rooms=rooms), boxes(), 1)
+    assert [n.kind for n in furnished.notes[len(house.notes) :]] == ["not-furnished"]
+    assert not any("sink" in i.name for i in furnished.items)
+
+
+def test_the_same_seed_furnishes_alike_and_another_one_otherwise() -> None:
+    bounds = [
+        np.concatenate([i.bounds for i in with_rooms_furnished(empty_house(), boxes(), s).items])
+        for s in (1, 1, 2)
+    ]
+    assert np.array_equal(bounds[0], bounds[1])
+    assert bounds[0].shape != bounds[2].shape or not np.array_equal(bounds[0], bounds[2])
+
+
+def test_furnishing_is_part_of_the_house_steps_digest() -> None:
+    source = resolve(HOME.word)
+    plain = recipe_from_name("fast", {"dress.catalogue": '"generated"'})
+    asked = recipe_from_name("fast", {"dress.catalogue": '"generated"', "dress.furnish": "empty"})
+    assert dressing_digest(source, plain) == ""
+    assert dressing_digest(source, asked) != ""
+    assert (uses_catalogue(source, plain), uses_catalogue(source, asked)) == (False, True)
+    assert plain.digest("dress") == recipe_from_name(
+        "preview", {"dress.catalogue": '"generated"'}
+    ).digest("dress")
