@@ -139,7 +139,7 @@ def local_catalogue(store: Store, recipe: Recipe) -> Recipe:
 def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
     """On a worker: take packages from the store that are not cached here.
 
-    The example homes' package, and the furniture's where a house is dressed.
+    The example homes' package, and the furniture's where a house is dressed or made.
     """
     wanted = [homes_package.PACKAGE] if homes_package.cached() is None else []
     if with_furniture and not has_furniture():

@@ -17,7 +17,7 @@ from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
-from pbrs_farm.run.dressed_house import fetch_catalogue, seed_of
+from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
 from pbrs_farm.run.plan import Wanted, view_steps, wanted
@@ -96,8 +96,8 @@ class HouseRunner:
     def _geometry(self, request: Request, spec: JobSpec, on_step: OnText) -> Result:
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
-            is_dressed = bool(seed_of(source, spec.recipe))
-            fill_cache(self._store, with_furniture=is_dressed)
+            is_dressed = uses_catalogue(source, spec.recipe)
+            fill_cache(self._store, with_furniture=is_dressed or source.kind == "made")
             here = spec
             if is_dressed:
                 # Look for the furniture before the house is read: another worker may have it.

@@ -1,0 +1,85 @@
+"""Homes by seed on a farm: a worker's tasks leave what a run on one machine leaves."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.assets import debian, furniture
+from pbrs_farm.core.recipe import Recipe, recipe_from_name
+from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.plan import wanted
+from pbrs_farm.store import MemoryStore, Store
+from workers import house_files
+from workers.client.farm_client import completed, new_spec
+from workers.house_files import entries_from_arguments
+from workers.ids import GEOMETRY, GL, LIGHT, REDUCE, job_key
+from workers.job import JobSpec
+from workers.node.house_runner import HouseRunner
+from workers.runner import Request
+
+WORDS = ["made:1,rooms=0..1,furniture=none", "made:2,rooms=0..1,furniture=none"]
+
+
+def small() -> Recipe:
+    fields = {
+        "image.width_px": "64", "image.height_px": "48", "light.spp": "2", "light.pilot_spp": "0",
+        "cameras.cell_m": "1.0", "cameras.score_width_px": "80", "cameras.score_height_px": "60",
+    }  # fmt: skip
+    return recipe_from_name("preview", fields)
+
+
+def farmed(store: Store, recipe: Recipe) -> JobSpec:
+    """Do every task of a job as two workers would, each house by another one."""
+    entries = [entry for entry, _ref in entries_from_arguments(WORDS)]
+    houses, spec = completed(entries, new_spec(recipe, n_views=1))
+    store.put(job_key(spec.job_id), spec.model_dump_json().encode())
+    for house in houses:
+        worker = HouseRunner(store, n_threads=1)
+        request = Request(job_id=spec.job_id, house=house.house_id, unit="-", stage=GEOMETRY)
+        first = request.model_copy(update={"source": house.source})
+        for number, views in enumerate(worker.run(first, lambda _text: None).batches):
+            for stage in (GL, LIGHT):
+                batch = {"unit": str(number), "stage": stage, "views": views}
+                worker.run(request.model_copy(update=batch), lambda _text: None)
+        worker.run(request.model_copy(update={"stage": REDUCE}), lambda _text: None)
+    return spec
+
+
+def products(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Houses, labels and pictures; not markers, which hold seconds and names."""
+    return {k: v for k, v in files.items() if k.startswith("houses/") and "/done/" not in k}
+
+
+def test_a_farms_pictures_of_homes_by_seed_are_the_same_bytes_as_a_runs(tmp_path: Path) -> None:
+    recipe, store = small(), MemoryStore()
+    farmed(store, recipe)
+    theirs = products({key: store.get(key) for key in store.list("houses/")})
+    summary = run_local(Run(WORDS, str(tmp_path), recipe, wanted([], [], 1)))
+    assert summary.failures == []
+    files = [p for p in tmp_path.rglob("*") if p.is_file()]
+    ours = products({str(p.relative_to(tmp_path)): p.read_bytes() for p in files})
+    assert sum(key.endswith("mlt_il_ol.png") for key in ours) == len(WORDS)
+    assert sorted(ours) == sorted(theirs)
+    assert [key for key in ours if ours[key] != theirs[key]] == []
+
+
+def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(house_files.homes, "cached", object)
+    ((entry, _ref),) = entries_from_arguments(["made:2,furniture=none"])
+    name = f"{furniture.PACKAGE}_{furniture.TESTED_VERSION}_all.deb"
+    store = MemoryStore()
+    store.put(f"jobs/sources/{name}", b"deb")
+    _houses, spec = completed([entry], new_spec(small(), modes=("opengl_dl",)))
+    store.put(job_key(spec.job_id), spec.model_dump_json().encode())
+    request = Request(
+        job_id=spec.job_id, house=entry.house_id, unit="-", stage=GEOMETRY, source=entry.source
+    )
+    HouseRunner(store, n_threads=1).run(request, lambda _text: None)
+    assert (debian.cache_folder() / name).read_bytes() == b"deb"
+    assert json.loads(store.get(f"houses/{entry.house_id}/house.json"))["source"]["kind"] == "made"
