@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.assets import debian, furniture
+from pbrs_farm.assets import debian, furniture_package
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.plan import wanted
@@ -70,9 +70,9 @@ def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(house_files.homes, "cached", object)
+    monkeypatch.setattr(house_files.homes_package, "cached", object)
     ((entry, _ref),) = entries_from_arguments(["made:2,furniture=none"])
-    name = f"{furniture.PACKAGE}_{furniture.TESTED_VERSION}_all.deb"
+    name = f"{furniture_package.PACKAGE}_{furniture_package.TESTED_VERSION}_all.deb"
     store = MemoryStore()
     store.put(f"jobs/sources/{name}", b"deb")
     _houses, spec = completed([entry], new_spec(small(), modes=("opengl_dl",)))
