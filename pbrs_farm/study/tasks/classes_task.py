@@ -1,0 +1,112 @@
+"""Semantic segmentation: NYU40's classes, judged by one confusion matrix; pure."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.metrics.confusion import Confusion
+from pbrs_farm.study.reading.view_sample import Sample
+from pbrs_farm.study.tasks.losses import class_loss
+from pbrs_farm.study.tasks.task import Arrays, Batch
+from pbrs_farm.study.training_plan import Plan
+
+
+class ClassesTask:
+    """Ids 1 to n_classes; 0 is no label and does not count."""
+
+    name: str = "segmentation"
+    layers: tuple[str, ...] = ("colour", "class40")
+    figures: tuple[str, ...] = ("mean_iou", "pixel_accuracy", "mean_accuracy", "weighted_iou")
+    truth: str = "rendered: NYU40 class of the surface seen, where it has one"
+
+    def n_out(self, plan: Plan) -> int:
+        """A score a class."""
+        return plan.n_classes
+
+    def targets(self, sample: Sample, plan: Plan) -> Arrays:
+        """labels (H, W) uint8."""
+        if sample.class40 is None:
+            raise BadInput(sample.id, "class40", "the view has no classes")
+        highest = int(sample.class40.max(initial=0))
+        if highest > plan.n_classes:
+            name = f" ({NYU40_NAMES[highest]})" if highest < len(NYU40_NAMES) else ""
+            text = f"holds class {highest}{name}; the network has {plan.n_classes}"
+            raise BadInput(sample.id, "class40", text)
+        return {"labels": sample.class40}
+
+    def loss(self, output: Tensor, batch: Batch, plan: Plan) -> Tensor:
+        """Cross entropy over labelled pixels."""
+        return class_loss(output, batch["labels"], over=plan.loss_over)
+
+    def mirrored(self, batch: Batch, flips: Tensor) -> Batch:
+        """Left and right change places."""
+        labels = batch["labels"]
+        turned = torch.where(flips[:, None, None], labels.flip(2), labels)
+        return batch | {"labels": turned}
+
+    def predictions(self, output: Tensor) -> NDArray[Any]:
+        """(B, H, W) uint8 ids of the highest score."""
+        return np.asarray((output.argmax(1) + 1).to(torch.uint8).numpy(force=True))
+
+    def baseline(self, targets: list[Arrays]) -> tuple[str, F32]:
+        """The class that most pixels of the training views have, everywhere."""
+        counts = np.zeros(256, np.int64)
+        for target in targets:
+            counts += np.bincount(target["labels"].ravel(), minlength=256)
+        counts[0] = 0
+        most = max(int(counts.argmax()), 1)
+        name = NYU40_NAMES[most] if most < len(NYU40_NAMES) else str(most)
+        return f"always {name}", np.full(targets[0]["labels"].shape, most, np.float32)
+
+    def scorer(self, plan: Plan) -> ClassScorer:
+        """One matrix over all views."""
+        return ClassScorer(plan.n_classes)
+
+    def error(self, figures: dict[str, float]) -> float:
+        """The share of pixels of another class."""
+        return 1 - figures["pixel_accuracy"]
+
+    def picture(self, prediction: NDArray[Any]) -> NDArray[np.uint8]:
+        """A colour a class, no class black."""
+        return np.asarray(_colours()[prediction.astype(np.intp)], np.uint8)
+
+    def prediction_of(self, truth: Arrays) -> NDArray[Any]:
+        """The labels."""
+        return truth["labels"]
+
+
+class ClassScorer:
+    """A confusion matrix of views that come one by one."""
+
+    def __init__(self, n_classes: int) -> None:
+        self._confusion = Confusion(n_classes)
+
+    def add(self, prediction: NDArray[Any], truth: Arrays) -> float:
+        """The view's share of wrong pixels."""
+        try:
+            return 1 - self._confusion.add(prediction, truth["labels"])
+        except ValueError as error:
+            raise BadInput("labels", "", str(error)) from None
+
+    def figures(self) -> dict[str, float]:
+        """Shares 0..1."""
+        return asdict(self._confusion.score())
+
+
+def _colours() -> NDArray[np.uint8]:
+    """(256, 3): hues a golden angle apart, so that neighbours in number differ."""
+    k = np.arange(256)
+    phase = (k[:, None] * 0.618034 + np.array([0, 1 / 3, 2 / 3])) % 1
+    light = 0.55 + 0.35 * ((k % 3) / 2)[:, None]
+    colours = 255 * light * (0.5 + 0.5 * np.cos(2 * np.pi * phase))
+    colours[0] = 0
+    return np.asarray(colours, np.uint8)

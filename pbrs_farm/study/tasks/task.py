@@ -1,0 +1,77 @@
+"""What training and judging ask of a task; a protocol, no effects."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from pbrs_farm.core.arrays import F32
+from pbrs_farm.study.reading.view_sample import Sample
+from pbrs_farm.study.training_plan import Plan
+
+Arrays = dict[str, NDArray[Any]]
+Batch = dict[str, Tensor]
+
+
+class Scorer(Protocol):
+    """Takes views one by one and says how good the predictions were."""
+
+    def add(self, prediction: NDArray[Any], truth: Arrays) -> float:
+        """Count a view; its own error, larger is worse, NaN where it has no truth."""
+        ...
+
+    def figures(self) -> dict[str, float]:
+        """What the field reports, by the names of Task.figures."""
+        ...
+
+
+class Task(Protocol):
+    """One of normals, segmentation and boundaries."""
+
+    name: str
+    layers: tuple[str, ...]  # of a Request
+    figures: tuple[str, ...]  # what a table shows, the first is what runs are told apart by
+    truth: str  # which truth and which mask, in words
+
+    def n_out(self, plan: Plan) -> int:
+        """Channels of the network's output."""
+        ...
+
+    def targets(self, sample: Sample, plan: Plan) -> Arrays:
+        """What of a view is trained and judged on, small; BadInput names what cannot be."""
+        ...
+
+    def loss(self, output: Tensor, batch: Batch, plan: Plan) -> Tensor:
+        """(B,) whose mean is the loss."""
+        ...
+
+    def mirrored(self, batch: Batch, flips: Tensor) -> Batch:
+        """The batch with the views where flips (B,) turned left to right."""
+        ...
+
+    def predictions(self, output: Tensor) -> NDArray[Any]:
+        """(B, ...) what the output says of each pixel, as Scorer.add takes it."""
+        ...
+
+    def baseline(self, targets: list[Arrays]) -> tuple[str, F32]:
+        """Its name, and the prediction that needs no picture, from the training views' targets."""
+        ...
+
+    def scorer(self, plan: Plan) -> Scorer:
+        """An empty one."""
+        ...
+
+    def error(self, figures: dict[str, float]) -> float:
+        """One number, 0 for perfect, that "underfit" is decided by."""
+        ...
+
+    def picture(self, prediction: NDArray[Any]) -> NDArray[np.uint8]:
+        """(H, W, 3) colours of a prediction or of a truth's prediction_of."""
+        ...
+
+    def prediction_of(self, truth: Arrays) -> NDArray[Any]:
+        """The truth in the form of a prediction."""
+        ...

@@ -1,0 +1,17 @@
+"""The task by its name; no effects."""
+
+from __future__ import annotations
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.tasks.classes_task import ClassesTask
+from pbrs_farm.study.tasks.edges_task import EdgesTask
+from pbrs_farm.study.tasks.normals_task import NormalsTask
+from pbrs_farm.study.tasks.task import Task
+
+
+def task_of(name: str) -> Task:
+    """Raises BadInput for a name that is none."""
+    tasks: dict[str, Task] = {t.name: t for t in (NormalsTask(), ClassesTask(), EdgesTask())}
+    if name not in tasks:
+        raise BadInput("task", name, "no such task", hint=f"of {', '.join(tasks)}")
+    return tasks[name]

@@ -1,0 +1,103 @@
+"""A training's state as one safetensors file: weights, optimiser, generator, position. Effects: files.
+
+The file is written beside and moved over the older one: a process killed meanwhile leaves the
+older one whole.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor, nn
+
+from pbrs_farm.core.errors import BadInput
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where a training stands, and of which plan, task and views it is."""
+
+    step: int  # steps done
+    task: str
+    plan_digest: str
+    views_digest: str
+    seed: int
+
+
+def save_checkpoint(
+    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, position: Position
+) -> None:
+    """Write all that a training needs to go on to the same weights."""
+    tensors = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
+    for number, state in optimiser.state_dict()["state"].items():
+        for key, value in state.items():
+            if value is not None:
+                tensors[f"optimiser.{number}.{key}"] = torch.as_tensor(value)
+    tensors["generator"] = torch.get_rng_state()
+    _write(path, tensors, position)
+
+
+def save_weights(path: Path, network: nn.Module, position: Position) -> None:
+    """Write the weights alone: what evaluation and fine-tuning read."""
+    named = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
+    _write(path, named, position)
+
+
+def load_checkpoint(
+    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer | None = None
+) -> Position:
+    """Take the state from a file into the network and, where given, the optimiser and torch's generator.
+
+    Raises BadInput where the file is damaged or of another network.
+    """
+    tensors, position = read_tensors(path)
+    _into(network, _below(tensors, "model."), path)
+    if optimiser is not None:
+        state: dict[int, dict[str, Tensor]] = {}
+        for name, tensor in _below(tensors, "optimiser.").items():
+            number, _, key = name.partition(".")
+            state.setdefault(int(number), {})[key] = tensor
+        groups = optimiser.state_dict()["param_groups"]
+        optimiser.load_state_dict({"state": state, "param_groups": groups})
+        torch.set_rng_state(tensors["generator"])
+    return position
+
+
+def read_tensors(path: Path) -> tuple[dict[str, Tensor], Position]:
+    """All tensors of a file, on the CPU, and the position it holds."""
+    try:
+        with safe_open(path, framework="pt", device="cpu") as file:
+            row = json.loads((file.metadata() or {})["position"])
+            return {name: file.get_tensor(name) for name in file.keys()}, Position(**row)  # noqa: SIM118
+    except FileNotFoundError:
+        raise BadInput(path, "", "no such file") from None
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError):
+        raise BadInput(path, "", "not a checkpoint of `train`, or damaged") from None
+
+
+def _into(network: nn.Module, weights: dict[str, Tensor], path: Path) -> None:
+    own = network.state_dict()
+    wrong = [n for n in own if n not in weights or weights[n].shape != own[n].shape]
+    if wrong or len(own) != len(weights):
+        name = (wrong or sorted(set(weights) - set(own)))[0]
+        raise BadInput(path, name, "a checkpoint of another network, task or plan")
+    network.load_state_dict(weights)
+
+
+def _below(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    return {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
+
+
+def _write(path: Path, tensors: dict[str, Tensor], position: Position) -> None:
+    row: dict[str, Any] = {name: getattr(position, name) for name in position.__slots__}
+    plain = {name: t.detach().to("cpu").contiguous() for name, t in tensors.items()}
+    beside = path.with_suffix(".part")
+    save_file(plain, beside, metadata={"position": json.dumps(row, sort_keys=True)})
+    beside.replace(path)

@@ -1,0 +1,87 @@
+"""A network's predictions of views, and what they score; torch, no other effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.study.networks.network_choice import encoded
+from pbrs_farm.study.tasks.task import Task
+from pbrs_farm.study.training.view_arrays import ViewArrays
+from pbrs_farm.study.training_plan import Plan
+
+_BATCH = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Figures over all views, and each view's own error in their order (NaN without truth)."""
+
+    figures: dict[str, float]
+    errors: tuple[float, ...]
+
+
+def device_of(plan: Plan) -> torch.device:
+    """Where the plan runs; MachineFailed where it asks for a GPU and there is none."""
+    has_gpu = torch.cuda.is_available()
+    if plan.device == "cuda" and not has_gpu:
+        text = f"plan {plan.name} asks for a GPU, and torch {torch.__version__} finds none"
+        raise MachineFailed(text, hint="--set device=cpu, or --plan tiny")
+    return torch.device("cuda" if has_gpu and plan.device != "cpu" else "cpu")
+
+
+def placed(network: nn.Module, plan: Plan) -> nn.Module:
+    """The network on the plan's device, in its memory format."""
+    network = network.to(device_of(plan))
+    return network.to(memory_format=torch.channels_last) if plan.channels_last else network
+
+
+def predicted(
+    network: nn.Module, colour: NDArray[np.uint8], task: Task, plan: Plan
+) -> Iterator[NDArray[Any]]:
+    """A prediction of each picture of colour (N, H, W, 3), in order. The network's mode is restored."""
+    was_training = network.training
+    network.eval()
+    device = next(network.parameters()).device
+    try:
+        for at in range(0, len(colour), _BATCH):
+            pictures = torch.from_numpy(colour[at : at + _BATCH]).to(device)
+            with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
+                output = network(encoded(as_colour(pictures), plan.encoding))
+            yield from task.predictions(output)
+    finally:
+        network.train(was_training)
+
+
+def as_colour(pictures: torch.Tensor) -> torch.Tensor:
+    """(B, 3, H, W) float 0..1, channels last in memory, of (B, H, W, 3) bytes."""
+    return pictures.permute(0, 3, 1, 2).float() / 255
+
+
+def judged(network: nn.Module, views: ViewArrays, task: Task, plan: Plan) -> Judged:
+    """How good the network is on views."""
+    return _score(predicted(network, views.colour, task, plan), views, task, plan)
+
+
+def baseline_judged(baseline: F32, views: ViewArrays, task: Task, plan: Plan) -> Judged:
+    """How good the same prediction for every view is."""
+    return _score((baseline for _ in views.ids), views, task, plan)
+
+
+def _score(
+    predictions: Iterator[NDArray[Any]], views: ViewArrays, task: Task, plan: Plan
+) -> Judged:
+    scorer = task.scorer(plan)
+    errors = tuple(
+        scorer.add(prediction, {name: array[k] for name, array in views.targets.items()})
+        for k, prediction in enumerate(predictions)
+    )
+    return Judged(scorer.figures(), errors)

@@ -1,0 +1,146 @@
+"""The folder of a training run: its record, metrics, checkpoint, weights and figures. Effects: files.
+
+    run.json                what was trained on what, by which plan, and whether it is finished
+    metrics.jsonl           a line each plan.log_every steps
+    checkpoint.safetensors  what a killed run goes on from; gone when it is finished
+    weights.safetensors     the trained weights
+    baseline.npy            the prediction that needs no picture
+    figures.json            how good it is, on training and held-out homes, beside the baseline
+    curves.svg              loss and error over the steps
+
+A run is finished when run.json says so; that is written last.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.training_plan import Plan, plan_as_json, plan_from_json
+
+RUNNING, FINISHED, FAILED = "running", "finished", "failed"
+_SAME: Final = ("task", "plan", "seed", "mode", "init", "views_digest")  # of a run that goes on
+
+
+@dataclass(frozen=True, slots=True)
+class RunFolder:
+    """The paths of a run, and its record."""
+
+    root: Path
+
+    @property
+    def checkpoint(self) -> Path:
+        """What a killed run goes on from."""
+        return self.root / "checkpoint.safetensors"
+
+    @property
+    def weights(self) -> Path:
+        """The trained weights."""
+        return self.root / "weights.safetensors"
+
+    @property
+    def baseline(self) -> Path:
+        """The prediction that needs no picture."""
+        return self.root / "baseline.npy"
+
+    def record(self) -> dict[str, Any]:
+        """run.json; BadInput where it is none."""
+        path = self.root / "run.json"
+        try:
+            row = json.loads(path.read_bytes())
+        except FileNotFoundError:
+            raise BadInput(self.root, "", "not a run of `train`: no run.json") from None
+        except (OSError, ValueError):
+            raise BadInput(path, "", "not JSON: damaged") from None
+        if not isinstance(row, dict) or not {"state", "task", "plan"} <= row.keys():
+            raise BadInput(path, "", "not the record of a run")
+        return row
+
+    def begin(self, row: dict[str, Any]) -> bool:
+        """Write the record of a run that begins or goes on; False where it is finished already.
+
+        Raises BadInput where the folder holds a run of another task, plan, seed, mode or views.
+        """
+        if (self.root / "run.json").exists():
+            older = self.record()
+            for name in _SAME:
+                if older.get(name) != json.loads(json.dumps(row[name])):
+                    was, now = _difference(older.get(name), row[name])
+                    text = f"holds a run with another {name}: {was}, now {now}"
+                    raise BadInput(self.root, "", text, hint="give another --out")
+            if older["state"] == FINISHED:
+                return False
+        self.root.mkdir(parents=True, exist_ok=True)
+        self.write("run.json", {**row, "state": RUNNING})
+        return True
+
+    def end(self, state: str, why: str = "") -> None:
+        """Say that the run is finished, or why it failed."""
+        self.write("run.json", {**self.record(), "state": state, "why": why})
+
+    def write(self, name: str, value: Any) -> None:
+        """A file of JSON, whole or not at all."""
+        self.write_text(name, json.dumps(value, indent=1, sort_keys=True) + "\n")
+
+    def write_text(self, name: str, text: str) -> None:
+        """A file of text, whole or not at all."""
+        beside = self.root / f"{name}.part"
+        beside.write_text(text)
+        beside.replace(self.root / name)
+
+    def figures(self) -> dict[str, Any]:
+        """figures.json; BadInput where the run has none."""
+        try:
+            row: dict[str, Any] = json.loads((self.root / "figures.json").read_bytes())
+        except (OSError, ValueError):
+            raise BadInput(self.root, "figures.json", "missing or damaged: train again") from None
+        return row
+
+    def metrics(self) -> list[dict[str, float]]:
+        """The rows of metrics.jsonl that are whole."""
+        path, rows = self.root / "metrics.jsonl", []
+        for line in path.read_text().splitlines() if path.exists() else []:
+            try:
+                rows.append(json.loads(line))
+            except ValueError:
+                break  # cut off by a kill
+        return rows
+
+    def keep_metrics_until(self, step: int) -> None:
+        """Drop rows of steps that are done again."""
+        rows = [row for row in self.metrics() if row["step"] <= step]
+        self.write_text("metrics.jsonl", "".join(json.dumps(row) + "\n" for row in rows))
+
+    def add_metrics(self, row: dict[str, float]) -> None:
+        """Append a row."""
+        with (self.root / "metrics.jsonl").open("a") as file:
+            file.write(json.dumps(row) + "\n")
+
+
+def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], Plan]:
+    """The folder, record and plan of a run that is finished; BadInput for any other."""
+    folder = RunFolder(root)
+    row = folder.record()
+    if row["state"] != FINISHED:
+        text = f"the run is {row['state']}" + (f": {row['why']}" if row.get("why") else "")
+        raise BadInput(root, "", text, hint="the same `train` goes on with it")
+    return folder, row, plan_from_json(row["plan"], str(root / "run.json"))
+
+
+def plan_digest(plan: Plan) -> str:
+    """First 16 hex of the sha256 over every field."""
+    text = json.dumps(plan_as_json(plan), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _difference(was: Any, now: Any) -> tuple[Any, Any]:
+    """The first field that differs, of plans; else the values."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        for name in now:
+            if was.get(name) != now[name]:
+                return f"{name} {was.get(name)}", f"{now[name]}"
+    return was, now

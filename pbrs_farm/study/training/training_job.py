@@ -1,0 +1,132 @@
+"""One training from views to figures, finished or to be gone on with. Effects: the run's folder."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+import pbrs_farm
+from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.study.networks.initial_weights import start_from
+from pbrs_farm.study.networks.network_choice import n_weights, network_of
+from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.training.curves import curves_svg, smoothed
+from pbrs_farm.study.training.prediction import baseline_judged, device_of, judged
+from pbrs_farm.study.training.run_folder import FAILED, FINISHED, RunFolder
+from pbrs_farm.study.training.training_loop import Observer, share_of_process, train_network
+from pbrs_farm.study.training.view_arrays import ViewArrays
+from pbrs_farm.study.training_plan import Plan, plan_as_json
+
+MAX_JUDGED = 400  # training views that figures are taken from, spread over all
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is trained, from what, and where it goes."""
+
+    plan: Plan
+    out: Path
+    seed: int = 0
+    mode: str = "mlt_il_ol"  # lighting of the pictures
+    source: str = ""  # where the views come from, in words
+    init: str = "none"  # none, vgg16.pth, hed, or a run's folder
+    card: str = ""  # whose homes they are
+    facts: dict[str, Any] = field(default_factory=dict)  # more of the record
+
+
+def train(
+    job: Job, views: ViewArrays, held_out: ViewArrays | None = None,
+    observe: Observer = lambda _row: None,
+) -> dict[str, Any]:  # fmt: skip
+    """Train, judge, and say so in the folder; the figures. A finished run is not trained again.
+
+    Raises what the loop raises; the folder then says that the run failed, and why.
+    """
+    folder, plan = RunFolder(job.out), job.plan
+    device_of(plan)
+    share = share_of_process()
+    if plan.threads > 0:
+        torch.set_num_threads(plan.threads)
+    # Draw the weights, then lay over them what the run starts from.
+    task = task_of(plan.task)
+    torch.manual_seed(job.seed)
+    network = network_of(plan.network, task.n_out(plan))
+    origin = start_from(network, job.init)
+    row = _record(job, views, held_out, origin) | {"weights": n_weights(network)}
+    if share.is_first and not folder.begin(row):
+        return folder.figures()
+    try:
+        network = train_network(
+            network, views, task, plan,
+            seed=job.seed, folder=folder, observe=observe, share=share,
+        )  # fmt: skip
+        if not share.is_first:
+            return {}
+        figures = _judge(network, views, held_out, plan, folder)
+    except PbrsError as error:
+        if share.is_first:
+            folder.end(FAILED, error.message)
+        raise
+    folder.write("figures.json", figures)
+    folder.write_text("curves.svg", _curves(folder, plan))
+    folder.checkpoint.unlink(missing_ok=True)
+    folder.end(FINISHED)
+    return figures
+
+
+def _record(
+    job: Job, views: ViewArrays, held_out: ViewArrays | None, origin: dict[str, str]
+) -> dict[str, Any]:
+    held = held_out.homes if held_out else ()
+    return {
+        "task": job.plan.task,
+        "plan": plan_as_json(job.plan),
+        "seed": job.seed,
+        "mode": job.mode,
+        "source": job.source,
+        "card": job.card,
+        "init": job.init,
+        "init_origin": origin,
+        "views": {"train": len(views), "held_out": len(held_out) if held_out else 0},
+        "homes": {"train": list(views.homes), "held_out": list(held)},
+        "views_digest": views.digest(),
+        "truth": task_of(job.plan.task).truth,
+        "versions": {
+            "pbrs_farm": pbrs_farm.__version__,
+            "torch": torch.__version__,
+            "python": platform.python_version(),
+        },
+        **job.facts,
+    }
+
+
+def _judge(
+    network: torch.nn.Module, views: ViewArrays, held_out: ViewArrays | None, plan: Plan,
+    folder: RunFolder,
+) -> dict[str, Any]:  # fmt: skip
+    """Figures on training and held-out views, of the network and of the baseline."""
+    task = task_of(plan.task)
+    n, seen = len(views), views.some(MAX_JUDGED)
+    name, baseline = task.baseline(
+        [{key: array[k] for key, array in views.targets.items()} for k in range(n)]
+    )
+    np.save(folder.baseline, baseline)
+    parts = {"train": seen} | ({"held_out": held_out} if held_out else {})
+    return {
+        "baseline_name": name,
+        "network": {at: judged(network, part, task, plan).figures for at, part in parts.items()},
+        "baseline": {
+            at: baseline_judged(baseline, part, task, plan).figures for at, part in parts.items()
+        },
+    }
+
+
+def _curves(folder: RunFolder, plan: Plan) -> str:
+    rows = folder.metrics()
+    loss = smoothed([(row["step"], row["loss"]) for row in rows])
+    return curves_svg(f"{plan.task}, plan {plan.name}: loss", {"loss": loss})

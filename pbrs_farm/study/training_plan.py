@@ -1,0 +1,196 @@
+"""Plans of training: every constant a field, and the plans by name; no effects, no torch.
+
+`tiny` is two cores and minutes, `paper` section 4 of the paper, `released` what its code does
+against its text, `h200` one large GPU and half an hour for four modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields, replace
+from math import cos, pi
+from typing import Any, Final, get_type_hints
+
+from pbrs_farm.core.errors import BadInput
+
+TASKS: Final = ("normals", "segmentation", "boundaries")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """All that a training depends on beside its views and its seed."""
+
+    name: str
+    task: str
+    network: str  # a name of networks.choice
+    # Pictures
+    width_px: int = 160
+    height_px: int = 120
+    n_classes: int = 40
+    encoding: str = (
+        "centred"  # of colour: centred (0..1 less 128/255), caffe (BGR less means), imagenet
+    )
+    # Steps
+    batch: int = 8  # views a step, over all processes
+    accumulate: int = 1  # steps whose gradients are summed before the weights move
+    steps: int = 1100
+    # Optimiser
+    optimiser: str = "adamw"  # adamw, rmsprop, sgd
+    rate: float = 3e-3  # learning rate, at its height
+    momentum: float = 0.9  # of sgd
+    alpha: float = 0.99  # of rmsprop
+    epsilon: float = 1e-8
+    weight_decay: float = 1e-2
+    clip_norm: float = 1.0  # longest gradient, 0 = any
+    schedule: str = "one_cycle"  # one_cycle, steps, constant
+    warm_up: float = 0.15  # of one_cycle: share of the steps in which the rate rises
+    rate_factor: float = 0.5  # of steps: the rate times this ...
+    rate_every: int = 300_000  # ... each time so many steps are done
+    released_rates: bool = False  # HED's rates of conv5, sides and fuse against the rest's
+    # Loss
+    loss: str = "cosine"  # of normals: cosine, or chord (the distance of the two unit vectors)
+    loss_over: str = "valid"  # normals and classes: mean over valid pixels, or over all
+    edge_sum: bool = False  # boundaries: the sum over pixels, as released, or their mean
+    # Augmentation
+    flip: bool = True
+    zoom: float = 1.0  # largest enlargement of a random part of the view, 1 = none
+    gain: float = 0.2  # brightness times 1 +- gain
+    gamma: float = 0.2  # brightness to the power of 1 +- gamma
+    tint: float = 0.08  # each channel times 1 +- tint
+    noise: float = 0.02  # sd of noise, of 1
+    # Machine
+    device: str = "auto"  # auto, cpu, cuda
+    threads: int = 0  # of torch, 0 = its own choice
+    bf16: bool = False  # the forward pass in bfloat16
+    channels_last: bool = True
+    # Records
+    checkpoint_every: int = 100  # steps
+    log_every: int = 10
+
+    def __post_init__(self) -> None:
+        for name, least in (("batch", 1), ("steps", 1), ("accumulate", 1), ("width_px", 32),
+                            ("height_px", 32), ("zoom", 1), ("checkpoint_every", 1),
+                            ("log_every", 1), ("rate_every", 1)):  # fmt: skip
+            if getattr(self, name) < least:
+                raise BadInput("plan", name, f"expected {least} or more, got {getattr(self, name)}")
+        for name, choices in _CHOICES.items():
+            if getattr(self, name) not in choices:
+                text = f"expected one of {', '.join(choices)}, got {getattr(self, name)}"
+                raise BadInput("plan", name, text)
+
+
+_CHOICES: Final = {
+    "task": TASKS,
+    "encoding": ("centred", "caffe", "imagenet"),
+    "optimiser": ("adamw", "rmsprop", "sgd"),
+    "schedule": ("one_cycle", "steps", "constant"),
+    "loss": ("cosine", "chord"),
+    "loss_over": ("valid", "all"),
+    "device": ("auto", "cpu", "cuda"),
+}
+
+_PLAIN: Final[dict[str, Any]] = {"gain": 0.0, "gamma": 0.0, "tint": 0.0, "noise": 0.0}
+_QVGA: Final[dict[str, Any]] = {"width_px": 320, "height_px": 240}
+# Section 4.1: RMSprop from 1e-3, halved every 300 k steps; batch and length as the code has them.
+_PAPER_NORMALS = Plan(
+    "paper", "normals", "paper", **_QVGA, **_PLAIN, batch=10, steps=1_137_000,
+    optimiser="rmsprop", rate=1e-3, weight_decay=0.0, clip_norm=0.0, schedule="steps",
+    loss_over="all", flip=False, checkpoint_every=2000, log_every=100,
+)  # fmt: skip
+# Section 4.2: SGD at 1e-5; the front end of Yu and Koltun with batch 14, momentum .9.
+_PAPER_CLASSES = Plan(
+    "paper", "segmentation", "dilated", **_QVGA, **_PLAIN, batch=14, steps=60_000,
+    optimiser="sgd", rate=1e-5, weight_decay=5e-4, clip_norm=0.0, schedule="constant",
+    encoding="caffe", checkpoint_every=1000, log_every=50,
+)  # fmt: skip
+# Section 4.3 with HED's released solver: batch 1 x 10, decay 2e-4, rates by layer.
+_PAPER_EDGES = Plan(
+    "paper", "boundaries", "hed", **_QVGA, **_PLAIN, batch=1, accumulate=10, steps=300_000,
+    optimiser="sgd", rate=1e-6, weight_decay=2e-4, clip_norm=0.0, schedule="steps",
+    rate_factor=0.1, released_rates=True, edge_sum=True, encoding="caffe",
+    checkpoint_every=2000, log_every=100,
+)  # fmt: skip
+_H200: Final[dict[str, Any]] = {
+    "name": "h200", "device": "cuda", "bf16": True, "checkpoint_every": 1000, "log_every": 100,
+}  # fmt: skip
+_TINY_NORMALS = Plan("tiny", "normals", "small")
+_TINY_CLASSES = Plan("tiny", "segmentation", "small", steps=1500)
+_TINY_EDGES = Plan(
+    "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01
+)
+
+PLANS: Final[dict[tuple[str, str], Plan]] = {
+    (plan.name, plan.task): plan
+    for plan in (
+        _TINY_NORMALS, _TINY_CLASSES, _TINY_EDGES,
+        _PAPER_NORMALS, _PAPER_CLASSES, _PAPER_EDGES,
+        # The released code divides by 5 every 150 k steps.
+        replace(_PAPER_NORMALS, name="released", rate_factor=0.2, rate_every=150_000),
+        replace(
+            _TINY_NORMALS, **_H200, **_QVGA, network="paper", batch=32, steps=15_000, rate=1e-3
+        ),
+        replace(
+            _TINY_CLASSES, **_H200, **_QVGA, network="dilated_small", encoding="caffe", batch=32,
+            steps=15_000, rate=5e-4,
+        ),
+        replace(
+            _TINY_EDGES, **_H200, **_QVGA, network="hed", batch=16, steps=10_000, rate=1e-4
+        ),
+    )
+}  # fmt: skip
+PLAN_NAMES: Final = tuple(dict.fromkeys(name for name, _ in PLANS))
+
+
+def plan_of(task: str, name: str, overrides: dict[str, str] | None = None) -> Plan:
+    """The plan by name for a task, with fields set from text. Raises BadInput."""
+    if task not in TASKS:
+        raise BadInput("train", task, "no such task", hint=f"of {', '.join(TASKS)}")
+    plan = PLANS.get((name, task))
+    if plan is None:
+        known = ", ".join(n for n, t in PLANS if t == task)
+        raise BadInput("--plan", name, f"no such plan for {task}", hint=f"of {known}")
+    hints = get_type_hints(Plan)
+    changed: dict[str, Any] = {}
+    for field, text in (overrides or {}).items():
+        if field not in hints or field in ("name", "task"):
+            known = ", ".join(f.name for f in fields(Plan)[2:])
+            raise BadInput("--set", field, "no such field of a plan", hint=f"of {known}")
+        changed[field] = _value(hints[field], field, text)
+    return replace(plan, **changed)
+
+
+def _value(kind: type, field: str, text: str) -> Any:
+    if kind is bool and text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    try:
+        if kind is not bool:
+            return kind(text)
+    except ValueError:
+        pass
+    raise BadInput("--set", f"{field}={text}", f"expected {kind.__name__}")
+
+
+def plan_as_json(plan: Plan) -> dict[str, Any]:
+    """Every field by its name."""
+    return asdict(plan)
+
+
+def plan_from_json(row: dict[str, Any], file: str) -> Plan:
+    """The plan that a run's record holds; BadInput names the file where it is none."""
+    try:
+        return Plan(**row)
+    except TypeError:
+        raise BadInput(file, "plan", "not a plan of this version") from None
+
+
+def rate_at(plan: Plan, step: int) -> float:
+    """The learning rate of a step, 0 the first: a function of the step alone."""
+    if plan.schedule == "constant":
+        return plan.rate
+    if plan.schedule == "steps":
+        return plan.rate * plan.rate_factor ** (step // plan.rate_every)
+    # Rise and fall along half waves of a cosine.
+    n_up = max(plan.warm_up * plan.steps, 1.0)
+    if step < n_up:
+        return plan.rate * (0.04 + 0.96 * (1 - cos(pi * step / n_up)) / 2)
+    share = (step - n_up) / max(plan.steps - n_up, 1.0)
+    return plan.rate * max((1 + cos(pi * min(share, 1.0))) / 2, 1e-4)

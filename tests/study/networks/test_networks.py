@@ -1,0 +1,108 @@
+"""Sizes of the networks, and what they do to pictures of any size."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.networks.dilated_vgg import DilatedVgg
+from pbrs_farm.study.networks.edge_hed import EdgeHed, edges_of_sides
+from pbrs_farm.study.networks.initial_weights import start_from
+from pbrs_farm.study.networks.network_choice import encoded, n_weights, network_of
+from pbrs_farm.study.networks.vgg import STAGES, vgg_stages
+
+pytestmark = pytest.mark.study
+
+
+def test_the_papers_network_has_26_421_021_weights() -> None:
+    assert n_weights(network_of("paper", 3)) == 26_421_021
+
+
+def test_vgg_has_14_714_688_weights() -> None:
+    assert n_weights(vgg_stages(STAGES, batch_norm=False)) == 14_714_688
+
+
+def test_hed_adds_a_score_a_stage_and_their_fusion() -> None:
+    assert n_weights(EdgeHed()) == 14_714_688 + (64 + 128 + 256 + 512 + 512) + 5 + 6
+
+
+def test_the_paper_dilated_network_has_134_million_weights() -> None:
+    with torch.device("meta"):
+        assert (
+            n_weights(DilatedVgg(40))
+            == 14_714_688 + 7 * 7 * 512 * 4096 + 4096 + 4097 * 4096 + 4097 * 40
+        )
+
+
+def test_the_small_network_has_about_1_2_million_weights() -> None:
+    assert 1.0e6 < n_weights(network_of("small", 3)) < 1.4e6
+
+
+@pytest.mark.parametrize(
+    "name", ["small", "paper_tiny", "dilated_tiny", "dilated_small", "hed_tiny"]
+)
+@pytest.mark.parametrize("size", [(48, 64), (50, 70)])
+def test_a_map_is_as_large_as_its_picture(name: str, size: tuple[int, int]) -> None:
+    torch.manual_seed(0)
+    network = network_of(name, 5).eval()
+    with torch.no_grad():
+        output = network(torch.rand(2, 3, *size))
+    assert output.shape == (2, 6 if name.startswith("hed") else 5, *size)
+    assert torch.isfinite(output).all()
+
+
+def test_the_context_module_starts_as_the_identity() -> None:
+    torch.manual_seed(0)
+    network = DilatedVgg(4, head="small", tiny=True, context=True).eval()
+    scores = torch.rand(1, 4, 9, 9)
+    with torch.no_grad():
+        assert torch.equal(network.context(scores), scores)
+
+
+def test_edges_are_the_mean_of_sides_two_to_four() -> None:
+    scores = torch.zeros(1, 6, 2, 2)
+    scores[:, [0, 4, 5]] = 99.0
+    assert torch.allclose(edges_of_sides(scores), torch.tensor(0.5))
+
+
+def test_caffes_colours_are_bgr_less_their_means() -> None:
+    red = torch.tensor([1.0, 0, 0]).view(1, 3, 1, 1)
+    assert encoded(red, "caffe").flatten().tolist() == pytest.approx(
+        [-104.007, -116.669, 255 - 122.679], abs=1e-3
+    )
+    assert encoded(red, "centred").flatten().tolist() == pytest.approx(
+        [127 / 255, -128 / 255, -128 / 255]
+    )
+
+
+def test_a_network_without_vgg_cannot_start_from_it() -> None:
+    with pytest.raises(BadInput, match="no such file"):
+        start_from(network_of("small", 3), "nowhere.pth")
+    with pytest.raises(BadInput, match="no such network"):
+        network_of("resnet", 3)
+
+
+def test_a_vgg_file_fills_the_thirteen_convolutions(tmp_path) -> None:
+    torch.manual_seed(1)
+    names = (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28)
+    shapes = [
+        tuple(c.weight.shape)
+        for c in vgg_stages(STAGES, batch_norm=False).modules()
+        if isinstance(c, torch.nn.Conv2d)
+    ]
+    state = {
+        f"features.{n}.weight": torch.full(shape, 0.1 * n)
+        for n, shape in zip(names, shapes, strict=True)
+    }
+    state |= {
+        f"features.{n}.bias": torch.full(shape[:1], float(n))
+        for n, shape in zip(names, shapes, strict=True)
+    }
+    torch.save(state, tmp_path / "vgg16.pth")
+    hed = EdgeHed()
+    origin = start_from(hed, str(tmp_path / "vgg16.pth"))
+    assert float(hed.stages[4][4].bias.detach()[0]) == 28.0
+    assert "CC BY 4.0" in origin["source"]
+    with pytest.raises(BadInput, match="does not begin with VGG-16"):
+        start_from(network_of("small", 3), str(tmp_path / "vgg16.pth"))

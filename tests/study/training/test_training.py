@@ -1,0 +1,169 @@
+"""Training learns, can be killed, stops at what is no number, and never looks finished when it is not."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.study.training.checkpoint import read_tensors
+from pbrs_farm.study.training.run_folder import RunFolder, finished_run
+from pbrs_farm.study.training.training_job import Job, train
+from pbrs_farm.study.training.training_loop import LossFailed
+from pbrs_farm.study.training.view_arrays import rows_of_step
+from pbrs_farm.study.training_plan import plan_of
+from tests.study.training.made_views import small_plan, views
+
+pytestmark = pytest.mark.study
+
+_KILLED = """
+import os, signal, sys
+from pathlib import Path
+from tests.study.training.made_views import small_plan, views
+from pbrs_farm.study.training.training_job import Job, train
+
+def killed(row):
+    if row["step"] == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+plan = small_plan(sys.argv[2])
+train(Job(plan, Path(sys.argv[1]), seed=3), views(5, plan), observe=killed)
+"""
+
+
+_ALONE = """
+import sys
+for name in ("pydantic", "pydantic_core", "OpenImageIO", "scipy", "h5py", "jinja2", "PIL", "cv2"):
+    sys.modules[name] = None
+from pathlib import Path
+from tests.study.training.made_views import small_plan, views
+from pbrs_farm.study.training.training_job import Job, train
+plan = small_plan(steps="2")
+train(Job(plan, Path(sys.argv[1])), views(3, plan), views(2, plan))
+"""
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+@pytest.mark.parametrize("task", ["normals", "boundaries"])
+def test_a_killed_run_goes_on_to_the_same_weights(task: str, tmp_path: Path) -> None:
+    plan = small_plan(task)
+    train(Job(plan, tmp_path / "whole", seed=3), views(5, plan))
+    words = [sys.executable, "-c", _KILLED, str(tmp_path / "killed"), task]
+    died = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert died.returncode == -signal.SIGKILL, died.stderr
+    folder = RunFolder(tmp_path / "killed")
+    assert folder.record()["state"] == "running"
+    assert read_tensors(folder.checkpoint)[1].step == 4
+    with pytest.raises(BadInput, match="the run is running"):
+        finished_run(folder.root)
+
+    train(Job(plan, tmp_path / "killed", seed=3), views(5, plan))
+    whole, _ = read_tensors(RunFolder(tmp_path / "whole").weights)
+    resumed, _ = read_tensors(folder.weights)
+    assert whole.keys() == resumed.keys()
+    assert all(torch.equal(whole[name], resumed[name]) for name in whole)
+    assert [row["step"] for row in folder.metrics()] == [1, 2, 3, 4, 5, 6]
+    assert finished_run(folder.root)[1]["state"] == "finished"
+
+
+def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
+    plan = small_plan(steps="2")
+    first = train(Job(plan, tmp_path), views(3, plan))
+    steps: list[dict[str, float]] = []
+    assert train(Job(plan, tmp_path), views(3, plan), observe=steps.append) == json.loads(
+        json.dumps(first)
+    )
+    assert steps == []
+
+
+def test_a_loss_that_is_no_number_names_the_view(tmp_path: Path) -> None:
+    plan = small_plan(steps="4", rate="1e18", clip_norm="0", noise="0")
+    with pytest.raises(LossFailed, match=r"not a finite number at step \d, at view home-"):
+        train(Job(plan, tmp_path), views(3, plan))
+    record = RunFolder(tmp_path).record()
+    assert record["state"] == "failed"
+    assert "home-" in record["why"]
+    assert not RunFolder(tmp_path).weights.exists()
+
+
+def test_a_folder_of_another_plan_or_task_is_refused(tmp_path: Path) -> None:
+    plan = small_plan(steps="2")
+    train(Job(plan, tmp_path), views(3, plan))
+    other = small_plan(steps="3")
+    with pytest.raises(BadInput, match="another plan: steps 2, now 3"):
+        train(Job(other, tmp_path), views(3, other))
+    edges = small_plan("boundaries", steps="2")
+    with pytest.raises(BadInput, match="another task"):
+        train(Job(edges, tmp_path), views(3, edges))
+    with pytest.raises(BadInput, match="another seed: 0, now 1"):
+        train(Job(plan, tmp_path, seed=1), views(3, plan))
+
+
+def test_another_network_does_not_start_from_a_run_it_shares_nothing_with(tmp_path: Path) -> None:
+    plan = small_plan(steps="2")
+    train(Job(plan, tmp_path / "a"), views(3, plan))
+    edges = small_plan("boundaries", steps="2")
+    with pytest.raises(BadInput, match="no weight of it fits"):
+        train(Job(edges, tmp_path / "b", init=str(tmp_path / "a")), views(3, edges))
+    tuned = train(Job(plan, tmp_path / "c", init=str(tmp_path / "a")), views(3, plan))
+    assert tuned["network"]["train"]["n_pixels"] > 0
+    assert "run of normals" in RunFolder(tmp_path / "c").record()["init_origin"]["source"]
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="says what happens without a GPU")
+def test_a_plan_for_a_gpu_says_that_there_is_none(tmp_path: Path) -> None:
+    with pytest.raises(MachineFailed, match="asks for a GPU"):
+        train(Job(small_plan(device="cuda"), tmp_path), views(3, small_plan()))
+    assert not (tmp_path / "run.json").exists()
+
+
+def test_a_damaged_checkpoint_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "checkpoint.safetensors").write_bytes(b"not a checkpoint")
+    plan = small_plan(steps="2")
+    with pytest.raises(BadInput, match="not a checkpoint"):
+        train(Job(plan, tmp_path), views(3, plan))
+    assert RunFolder(tmp_path).record()["state"] == "failed"
+
+
+def test_every_view_is_taken_once_a_round() -> None:
+    rows = np.concatenate([rows_of_step(7, 3, step, seed=5) for step in range(7)])
+    for k in range(3):
+        assert sorted(rows[7 * k : 7 * k + 7]) == list(range(7))
+    assert not np.array_equal(rows[:7], rows[7:14])
+
+
+def test_four_views_can_be_learnt_by_heart(tmp_path: Path) -> None:
+    plan = plan_of(
+        "normals", "tiny",
+        {"width_px": "80", "height_px": "60", "batch": "4", "steps": "60", "threads": "1",
+         "flip": "false", "gain": "0", "gamma": "0", "tint": "0", "noise": "0"},
+    )  # fmt: skip
+    figures = train(Job(plan, tmp_path), views(4, plan))
+    assert figures["network"]["train"]["mean_deg"] < 12
+
+
+def test_a_plans_fields_are_set_and_checked() -> None:
+    assert plan_of("normals", "paper", {"rate": "0.01", "bf16": "true"}).rate == 0.01
+    for name, text in (("rate", "fast"), ("colour", "1"), ("batch", "0"), ("device", "tpu")):
+        with pytest.raises(BadInput, match=name):
+            plan_of("normals", "tiny", {name: text})
+    with pytest.raises(BadInput, match="no such plan"):
+        plan_of("normals", "huge")
+
+
+def test_training_needs_torch_and_numpy_alone(tmp_path: Path) -> None:
+    words = [sys.executable, "-c", _ALONE, str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert finished_run(tmp_path)[1]["task"] == "normals"
