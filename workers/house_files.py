@@ -111,6 +111,7 @@ def placed_catalogue(words: str) -> dict[str, str]:
     for word in filter(None, words.split(":")):
         path = Path(word)
         if path.is_file():
+            # Name a library by its content: two of one name do not meet.
             digest = keys.sha256(path.read_bytes())
             placed[f"{_LIBRARIES}{digest[:16]}/{_key_name(path.name)}"] = word
         else:
@@ -128,6 +129,7 @@ def local_catalogue(store: Store, recipe: Recipe) -> Recipe:
     """On a worker: the recipe with libraries of the store as files of this machine's cache."""
     words = []
     for word in filter(None, recipe.dress.catalogue.split(":")):
+        # Fetch a library once; its name has the digest of its content.
         path = cache_folder() / "libraries" / word.removeprefix(_LIBRARIES)
         if word.startswith(_LIBRARIES) and not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -141,6 +143,7 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
 
     The example homes' package, and the furniture's where a house is dressed or made.
     """
+    # Take from the store only packages that are wanted and not here.
     wanted = [homes_package.PACKAGE] if homes_package.cached() is None else []
     if with_furniture and not has_furniture():
         wanted.append(furniture_package.PACKAGE)

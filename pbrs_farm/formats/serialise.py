@@ -156,6 +156,7 @@ def _hints(cls: type) -> dict[str, Any]:
 def _dataclass(cls: type, data: Any, file: str, place: str) -> Any:
     if not isinstance(data, dict):
         raise _misfit(file, place, "an object", data)
+    # Read field by field; one that is not there takes its default.
     hints = _hints(cls)
     found: dict[str, Any] = {}
     field: Field[Any]

@@ -86,6 +86,7 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
     path = Path(word)
     if not _is_utf8(word):
         raise BadHouse(word, "", "the path is no UTF-8", hint="rename the file or its folder")
+    # Go by the word's form first, then by what lies at the path.
     kind: SourceKind
     if word.startswith("{"):
         kind = "object"
@@ -157,6 +158,7 @@ def _made(word: str) -> SourceRef:
     homes = made_homes(word)
     if len(homes) != 1:
         raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
+    # Ask for the furniture before the run begins, where the home wants some.
     companions, package = "", furniture_package.cached() if homes[0].furniture else None
     if homes[0].furniture and package is None:
         raise MachineFailed(
@@ -214,6 +216,7 @@ def _with_far_noted(house: House, fields: ReadFields) -> House:
     if not house.rooms:
         return house
     notes = Notes(house.source.file, strict=fields.strict)
+    # Measure from the rectangle around all rooms.
     plans = np.concatenate([room.polygon for room in house.rooms])
     low, high = plans.min(0), plans.max(0)
     for item in house.items:
@@ -294,6 +297,7 @@ def _read_object(source: SourceRef, fields: ReadFields) -> House:
 
 def check_unchanged(source: SourceRef) -> None:
     """Raise BadHouse or MachineFailed where a file of the source is not what it was when the source was named."""
+    # Name the source again and compare the digests, where both are known.
     now = _reference(source.kind, source.location, SourceFiles())
     is_known = source.companions is not None
     if now.sha256 == source.sha256 and (not is_known or now.companions == source.companions):

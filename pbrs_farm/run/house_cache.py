@@ -94,6 +94,7 @@ class CachedHouse:
 
         cameras_digest: of the cameras step's marker; cameras.json is read again when it changes.
         """
+        # Parse the file once for all views of the house.
         key = keys.house_key(self.house_id, "cameras.json")
         if self._views is None or self._views[0] != cameras_digest:
             self._views = (cameras_digest, views_from_json(self.store.get(key), key))

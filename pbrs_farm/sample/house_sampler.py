@@ -54,6 +54,7 @@ def sample_cameras(
             raise ValueError("the preset photo needs depth_of")
         photographer = PhotoSampler(house, fields, seed, counter, depth_of, geometry)
         return _photographed(photographer)
+    # Sample room by room: each has random numbers of its own.
     views: list[View] = []
     rooms: list[RoomReport] = []
     traces: list[RoomTrace] = []
@@ -77,6 +78,7 @@ def sample_cameras(
 def _photographed(sampler: PhotoSampler) -> Sampling:
     """The views of the preset photo: all rooms' candidates are scored before any is chosen."""
     house, fields = sampler.house, sampler.fields
+    # Score the candidates of all rooms.
     reports: dict[str, RoomReport] = {}
     scored: list[RoomCandidates] = []
     for room in house.rooms:
@@ -86,6 +88,7 @@ def _photographed(sampler: PhotoSampler) -> Sampling:
             reports[room.id] = RoomReport(room_id=room.id, name=room.name, reason=reason)
         else:
             scored.append(sampler.room_candidates(room))
+    # Choose among all of them, so that of two twins the better one stays.
     chosen = sampler.choose(scored)
     views: list[View] = []
     for of_room in scored:

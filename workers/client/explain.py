@@ -56,6 +56,7 @@ def _row(
     at: str,
     batches: tuple[tuple[str, ...], ...],
 ) -> dict[str, Any]:
+    # Say the state, then what the ledger knows of the attempt.
     stage, _, letter = at.partition(":")
     task = str(TaskId(house, unit, stage))
     facts = ledger.task_facts(job, task)

@@ -30,6 +30,7 @@ def house_ids(store: Store, spec: JobSpec) -> list[str]:
 
 def merge_shard(store: Store, spec: JobSpec, shard: int, on_step: OnText) -> None:
     """Write the manifests of a shard's houses as one; houses without one are left out."""
+    # Read the shard's slice of the job's order.
     size = spec.rules.shard_size
     parts = []
     for house in house_ids(store, spec)[shard * size : (shard + 1) * size]:
@@ -61,6 +62,7 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
                 n_objects += part.count(b"\n") if house in own else 0  # a row an object
         _put_file(store, keys.MANIFEST, file)
     write_attribution_of(store, dressed)
+    # Say what is missing and what failed for good.
     report: dict[str, Any] = {
         "job": spec.job_id,
         "houses": len(houses),

@@ -71,6 +71,7 @@ def arch_from_json(data: bytes, file: str) -> Arch:
     if not isinstance(document, dict):
         raise BadHouse(file, "", "expected an object; this is no arch.json")
     reader = JsonReader(file)
+    # Bound the work before any element is looked at.
     raw_elements = reader.items(document, "elements", "")
     if len(raw_elements) > MAX_ELEMENTS:
         raise BadHouse(file, "elements", f"more than {MAX_ELEMENTS}")
@@ -90,6 +91,7 @@ def _element(reader: JsonReader, raw: Any, place: str, defaults: Any) -> Element
     if not isinstance(kind, str) or kind not in _KINDS:
         return None
     place = f"{place} ({kind} {str(raw.get('id', ''))[:40]})"
+    # Take what the element lacks from the defaults of its kind.
     usual = defaults.get(kind) if isinstance(defaults, dict) else None
     usual = usual if isinstance(usual, dict) else {}
     usual_depth = usual.get("depth", WALL_DEPTH_M if kind == "Wall" else SLAB_DEPTH_M)
@@ -97,6 +99,7 @@ def _element(reader: JsonReader, raw: Any, place: str, defaults: Any) -> Element
     room_id = str(raw.get("roomId", ""))[:60]
     overrides = reader.overrides(raw.get("materials"), place)
     if kind == "Wall":
+        # Read a wall by its two ends, its height above them and its holes.
         points = reader.items(raw, "points", place)
         if len(points) != 2:
             raise BadHouse(reader.file, f"{place}, points", "expected two ends")
@@ -132,6 +135,7 @@ def _hole(reader: JsonReader, raw: Any, place: str) -> tuple[float, float, float
 def _rings(reader: JsonReader, raw: dict[str, Any], place: str) -> tuple[NDArray[np.float64], ...]:
     """Outline and holes in house coordinates; points may be one ring or a list of rings."""
     points = reader.items(raw, "points", place)
+    # Tell one ring of corners from a list of rings by what the first entries hold.
     nested = bool(points) and all(
         isinstance(p, list) and p and isinstance(p[0], list) for p in points
     )
@@ -186,10 +190,12 @@ def _elements_of(
     arch: Arch, node: Node, room_id: str
 ) -> Iterator[tuple[str, Element, NDArray[np.float64] | None]]:
     """(item id, element, outline of the room's floor) of every element that is not hidden."""
+    # Find the node's elements by its id, else by the room its model names.
     known = _MODEL_ROOM.fullmatch(node.model_id)
     named = [node.id, *([f"{known[1]}_{known[2]}"] if known else [])]
     elements = next((arch.elements[n] for n in named if n in arch.elements), [])
     outline = next((e.points[0] for e in elements if e.kind == "Floor"), None)
+    # Leave out what the node hides; walls are numbered with those that are left.
     hides = {"Wall": "Walls", "Ground": "Floor"}
     n_walls = 0
     for e in elements:
@@ -229,10 +235,12 @@ def _kept(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
 def _slab(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, ...]:
     """A closed slab from the element's height upwards."""
     material = _material(materials, e, 0)
+    # Turn the outline counter-clockwise and its holes the other way.
     low = float(e.points[0][:, 1].min())
     high = low + e.depth_m
     plans = [counter_clockwise(ring[:, [0, 2]]) for ring in e.points]
     plans = [plans[0], *(p[::-1] for p in plans[1:])]
+    # Stand a side on each edge of each ring.
     sides = []
     for plan in plans:
         for a, b in zip(plan, np.roll(plan, -1, axis=0), strict=True):
@@ -261,6 +269,7 @@ def _wall_frame(e: Element, outline: NDArray[np.float64] | None) -> _Frame | Non
     """The frame of a wall with an extent, outward from the room's floor; None for all else."""
     if e.kind != "Wall":
         return None
+    # Span the wall by its level direction, and look outward.
     start, end = e.points[0]
     along = (end - start) * [1, 0, 1]
     length = float(np.linalg.norm(along))
@@ -279,6 +288,7 @@ def _wall_frame(e: Element, outline: NDArray[np.float64] | None) -> _Frame | Non
 
 def _wall(arch: Arch, e: Element, frame: _Frame, materials: ModelMaterials) -> tuple[Surface, ...]:
     """The wall's closed box, without its holes."""
+    # Turn a left-handed frame round: the box's faces must look outward.
     half = np.array([frame.length, e.height_m, e.depth_m]) / 2
     right_handed = frame.axes * [np.linalg.det(frame.axes), 1, 1]
     quads = box_quads(frame.start + frame.axes @ half, half, right_handed)
@@ -304,9 +314,11 @@ def _opening(
     u0, v0, u1, v1 = hole
     if u1 - u0 < 0.05 or v1 - v0 < 0.05:
         return None
+    # Bring the wall's axes into the world, right-handed.
     scale = np.linalg.norm(arch.world_from_house[:3, 0])
     world_axes = arch.world_from_house[:3, :3] / scale @ frame.axes
     world_axes = world_axes * [np.linalg.det(world_axes), 1, 1]
+    # Lay the quad in the wall's middle plane, and let the cutter reach through both faces.
     corners = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)]
     quad = np.array([frame.start + frame.axes @ [u, v, e.depth_m / 2] for u, v in corners])
     quad = quad @ arch.world_from_house[:3, :3].T

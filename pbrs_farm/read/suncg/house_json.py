@@ -82,6 +82,7 @@ def house_record(data: bytes, file: str) -> HouseRecord:
             raise BadHouse(file, place, "expected an object")
         if not _flag(level.get("valid", 1)):
             continue
+        # Number levels without an id; an id that comes twice would mix two storeys.
         level_id = str(level["id"])[:40] if isinstance(level.get("id"), (str, int)) else str(i)
         if level_id in {known for known, _ in levels}:
             raise BadHouse(file, place, f"second level with the id {level_id!r}")
@@ -108,6 +109,7 @@ def house_record(data: bytes, file: str) -> HouseRecord:
 
 def world_from_house_of(reader: JsonReader, document: dict[str, Any]) -> NDArray[np.float64]:
     """(4, 4) metres, y up, z front <- the file's scaleToMeters, up and front."""
+    # Check the scale and the two directions, whose lengths do not matter.
     scale = reader.numbers([document.get("scaleToMeters", 1)], 1, "scaleToMeters")[0]
     if not 1e-6 < scale < 1e6:
         raise BadHouse(reader.file, "scaleToMeters", f"{scale} is no scale")
@@ -117,6 +119,7 @@ def world_from_house_of(reader: JsonReader, document: dict[str, Any]) -> NDArray
     if not 1e-9 < norms < 1e9 or abs(up @ front) > 1e-6 * norms:
         raise BadHouse(reader.file, "up, front", "are not two directions at right angles")
     up, front = up / np.linalg.norm(up), front / np.linalg.norm(front)
+    # Make the third axis of the two, so that the frame is right-handed.
     world_from_house = np.eye(4)
     world_from_house[:3, :3] = scale * np.array([np.cross(up, front), up, front])
     return world_from_house
@@ -160,6 +163,7 @@ class JsonReader:
         kind = raw.get("type")
         if not _flag(raw.get("valid", 1)) or kind not in NODE_TYPES:
             return None
+        # Name nodes without an id by their place in the file.
         node_id = raw.get("id")
         node_id = node_id[:60] if isinstance(node_id, str) and node_id else f"{i}_{index}"
         place = f"{place} ({kind} {node_id})"

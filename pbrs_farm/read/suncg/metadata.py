@@ -186,6 +186,7 @@ _FORMS: Final = {
 def _light(entry_json: Any, file: str, place: str) -> LightPart:
     if not isinstance(entry_json, dict) or str(entry_json.get("type")) not in _FORMS:
         raise BadHouse(file, place, f"expected one of {', '.join(_FORMS)}")
+    # Only lines have another end, only spots and lines a direction.
     form = _FORMS[entry_json["type"]]
     end = entry_json.get("position2") if form is LightForm.LINE else None
     direction = entry_json.get("direction") if form is not LightForm.POINT else None

@@ -114,6 +114,7 @@ def _row(table: dict[str, _T], variant: str, model_id: str) -> _T | None:
 def _object_model(context: ReaderContext, node: Node) -> tuple[str, ParsedModel] | None:
     """The mesh of the node's state: state k > 0 is `<id>_<k-1>.obj` where that exists."""
     base = f"object/{node.model_id}/"
+    # Try the state's own mesh first, then the variants that the table lists, then the model's.
     names = [node.model_id]
     if node.state > 0:
         listed = context.tables.variants.get(node.model_id, ())
@@ -131,12 +132,14 @@ def _surfaces(
 ) -> tuple[tuple[Surface, ...], list[int]]:
     """(surfaces in the model's order, the indices of those that are bulbs)."""
     world_from_model = context.world_from_house @ node.house_from_model
+    # Call glass a pane where it stands in a wall: light is carried without panes.
     is_opening = seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     surfaces: list[Surface] = []
     bulbs: list[int] = []
     glass = mirror_slot(model) if seen.nyu40 == MIRROR else None
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
+        # Take the model's own material under what the node says of it.
         mtl = model.mtl[slot] if slot >= 0 else None
         override = node.overrides[slot] if 0 <= slot < len(node.overrides) else None
         material = context.materials.material(mtl, override, place=node.place, clear=clear)
@@ -154,6 +157,7 @@ def _surfaces(
         )
         if surface is None:
             continue
+        # Part bulbs that one mesh holds: each is a light source of its own.
         parts = separate_bulbs(surface) if is_bulb else (surface,)
         bulbs += range(len(surfaces), len(surfaces) + len(parts)) if is_bulb else ()
         surfaces += parts
@@ -163,6 +167,7 @@ def _surfaces(
 def _tags(
     context: ReaderContext, node: Node, seen: ModelClass, *, is_known: bool
 ) -> tuple[str, ...]:
+    # Believe the transform: it is what places the mesh.
     mirrored = bool(np.linalg.det(node.house_from_model[:3, :3]) < 0)
     if node.is_mirrored is not None and node.is_mirrored != mirrored:
         text = f"isMirrored says {node.is_mirrored}, the transform says {mirrored}; it is believed"
@@ -175,6 +180,7 @@ def _tags(
 
 def box_item(context: ReaderContext, node: Node, room_id: str | None) -> Item | None:
     """A Box node: six faces centred on its origin, uv in metres; None if it has no extent."""
+    # Make each face that has an extent, with the material at its own position.
     half = np.array(node.dimensions) / 2
     world_from_box = context.world_from_house @ node.house_from_model
     surfaces = []
@@ -198,6 +204,7 @@ def box_item(context: ReaderContext, node: Node, room_id: str | None) -> Item | 
 def _box_face(
     half: NDArray[np.float64], axis: int, sign: int, world_from_box: NDArray[np.float64], index: int
 ) -> Surface:
+    # Lay the corners around the face's two other axes.
     a, b = {0: (2, 1), 1: (0, 2), 2: (0, 1)}[axis]
     corners = np.zeros((4, 3))
     corners[:, axis] = sign * half[axis]
@@ -239,6 +246,7 @@ def room_surfaces(
     if model is None:
         context.notes.add("missing-room-part", node.place, f"{base}.obj does not exist")
         return []
+    # Place each mesh; one that has no area in single precision is left out.
     found = []
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         mtl = model.mtl[slot] if slot >= 0 else None
@@ -264,6 +272,7 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
     if context.arch is not None:
         yield from arch_items(context.arch, node, room_id, context.materials)
         return
+    # Take floor and ceiling, an item each, where the node does not hide them.
     parts = (("Floor", "f", ItemKind.FLOOR), ("Ceiling", "c", ItemKind.CEILING))
     for hidden, part, kind in parts:
         surfaces = [] if hidden in node.hidden else _part(context, node, part)

@@ -53,6 +53,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     naming file and place for everything else, for the first note when fields.strict, and for a
     root without its `room` archive.
     """
+    # Read house.json below the root; the id becomes part of paths.
     if not _is_id(house_id):
         raise BadHouse(root, "house", f"{house_id[:80]!r} is no house id")
     folder = RootFolder(root)
@@ -61,11 +62,13 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     if data is None:
         raise BadHouse(root, file, "does not exist", hint="pass ROOT/house/<id> of a SUNCG root")
     record = house_record(data, file)
+    # Note what is odd about the record, and go on.
     notes = Notes(file, strict=fields.strict)
     if record.id and record.id != house_id:
         notes.add("id-differs", "id", f"house.json calls itself {record.id[:64]!r}")
     for place, kind in record.unknown:
         notes.add("unknown-type", place, f"a node of the type {kind!r}; left out")
+    # Read what the nodes name: structure, tables, materials and models, each once.
     arch = _arch(folder, house_id, record)
     context = ReaderContext(
         house=house_id,
@@ -135,6 +138,7 @@ def _contents(
                 text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
                 raise BadHouse(file, node.place, text, hint="limit: read.max_triangles")
             items.append(replace(item, id=unique))
+    # Clear the room of items whose room was left out.
     known = {room.id for room in rooms}
     return rooms, [i if i.room_id in known else replace(i, room_id=None) for i in items]
 
@@ -151,6 +155,7 @@ def _level_contents(
     context: ReaderContext, number: int, nodes: tuple[Node, ...], rooms: list[Room]
 ) -> Iterator[tuple[Node, Item]]:
     """The items of a level in the order of its nodes; its rooms are added to rooms."""
+    # Make the item of each node; a room gives several, and is itself kept.
     room_of_index = _room_of_index(context, number, nodes)
     taken = {room.id for room in rooms}
     for node in nodes:
@@ -198,6 +203,7 @@ def _room_of_index(context: ReaderContext, number: int, nodes: tuple[Node, ...])
 
 
 def _check_extent(item: Item, node: Node, fields: ReadFields, file: str) -> None:
+    # Refuse numbers that are not finite, too: the comparison is false for them.
     farthest = float(np.abs(item.bounds).max())
     if not farthest <= fields.max_extent_m:
         text = f"stands {farthest:.6g} m from the origin; at most {fields.max_extent_m:g} m"
@@ -205,6 +211,7 @@ def _check_extent(item: Item, node: Node, fields: ReadFields, file: str) -> None
 
 
 def _room(context: ReaderContext, node: Node, room_id: str, parts: list[Item]) -> Room | None:
+    # Sort the room's surfaces by what they are.
     floor, ceiling, walls = (
         _surfaces(parts, kind) for kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.WALL)
     )
@@ -246,6 +253,7 @@ def _levels(record: HouseRecord, rooms: list[Room], items: list[Item]) -> tuple[
 
 
 def _level(level_id: str, rooms: list[Room], items: list[Item]) -> Level:
+    # Measure by the level's rooms, else by the lowest of its items.
     here = [r for r in rooms if r.level_id == level_id]
     if here:
         elevation = min(r.floor_y for r in here)

@@ -80,21 +80,25 @@ def _opening(item: Item, body: Box, frames: Sequence[_WallFrame]) -> Opening | N
         return None  # lies flat: a roof window, which no wall holds
     normal = normal / np.linalg.norm(normal)
     axes = _axes(normal)
+    # Bound the door in the axes along, up and across, and find the walls it stands in.
     corners = body.corners @ axes
     low, high = corners.min(0), corners.max(0)
     standing = [p for f in frames if f.level_id == item.level_id for p in _wall(f, axes, low, high)]
     if not standing:
         return None
+    # Take the size of the holes where walls have some, else the door's own.
     holes = [h for h in (_hole(points, low, high) for points in standing) if h is not None]
     if holes:
         low[:2] = np.max([h[0] for h in holes], 0)
         high[:2] = np.min([h[1] for h in holes], 0)
+    # Reach across all walls that it stands in.
     low[2] = min(p[:, 2].min() for p in standing)
     high[2] = max(p[:, 2].max() for p in standing)
     if high[2] - low[2] < _PLANAR_M:  # repair makes it a solid, to either side
         low[2], high[2] = low[2] - _THICKER_M, high[2] + _THICKER_M
     if (high - low)[:2].min() < 0.05:
         return None
+    # Lay the quad in the middle; a plug overlaps its hole, a cutter reaches out of the wall.
     middle = (low[2] + high[2]) / 2
     quad = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
     grown = np.array([_OVERLAP_M, _OVERLAP_M, 0.0] if holes else [0.0, 0.0, CUTTER_REACH_M])

@@ -49,6 +49,7 @@ def read_home(
     files that refer to them. package: where the file came from; package_note: what is odd about
     it (homes_package.Package). Raises BadHouse, which names the file and the place.
     """
+    # Read the plan: levels that are hidden go, what is absurd is refused.
     fields = fields or ReadFields()
     file = PurePath(name).name
     container = open_container(data, file, resources)
@@ -57,6 +58,7 @@ def read_home(
     check_plan_bounds(plan, file)
     if package_note:
         notes.add("package-version", package, package_note)
+    # Read walls and rooms in plan; without a room there is nothing to render.
     materials = HomeMaterials(container.contents, notes)
     house_level = _house_levels(plan, notes)
     outlines = outlines_of(plan.walls)
@@ -70,6 +72,7 @@ def read_home(
     floor_cuts, ceiling_cuts = staircase_cuts(plan, materials, house_level)
     structure = wall_items(plan, outlines, materials, house_level)
     structure += plane_items(rooms, ceilings, materials, floor_cuts, ceiling_cuts)
+    # Place the furniture last: it stands in rooms and cuts walls.
     pieces, openings = _furniture(plan, materials, outlines, rooms, house_level, file, fields)
     items = _numbered((*structure, *pieces), file)
     sha, stem = keys.sha256(data), PurePath(file).stem
@@ -155,6 +158,7 @@ def _furniture(
     file: str,
     fields: ReadFields,
 ) -> tuple[list[Item], tuple[Opening, ...]]:
+    # Keep models and walls that pieces share.
     models = PieceModels(materials, file, fields.max_model_triangles)
     walls = _standing_walls(plan, outlines)
     cutter_material = materials.painted(Paint(), "cut", "")
@@ -198,6 +202,7 @@ def _standing_walls(plan: Plan, outlines: dict[str, Outline]) -> list[StandingWa
         level = level_of(plan, wall.level)
         if wall.id not in outlines or not level.is_visible:
             continue
+        # Tell doors of the wall's plan, its heights and its baseboard.
         polygon = shapely.make_valid(shapely.Polygon(outlines[wall.id].polygon))
         board = max((b.thickness for b in wall.baseboards), default=0.0)
         top = level.elevation + max(wall.height, wall.height_end or 0.0)

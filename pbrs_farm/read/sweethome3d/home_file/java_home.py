@@ -116,6 +116,7 @@ class _Converter:
 
     def root(self) -> Element:
         """The element <home> with everything in it."""
+        # Write what stands on the element itself, then the properties.
         version = _plain(self._home.get("version"))
         root = Element("home", version=str(version or ""))
         _put(root, "name", self._home.get("name"))
@@ -124,6 +125,7 @@ class _Converter:
         texts = [t for t in _objects(properties) if isinstance(t, str)]
         for name, value in zip(texts[::2], texts[1::2], strict=False):
             SubElement(root, "property", name=name, value=value)
+        # Write cameras and levels first: furniture, walls and rooms refer to levels.
         for camera in self._all("storedCameras", "Camera", "ObserverCamera"):
             tag = "observerCamera" if _is(camera, "ObserverCamera") else "camera"
             _fields(SubElement(root, tag, attribute="storedCamera"), camera, _CAMERA)
@@ -154,6 +156,7 @@ class _Converter:
         names = ("furnitureWithGroups", "furnitureWithDoorsAndWindows", "furniture")
         lists = (self._home.get(n) for n in names)
         pieces = next((x for x in lists if x is not None), None)
+        # Walk the groups without recursion; an object that comes again is left out.
         stack = [(piece, root, 0) for piece in reversed(_objects(pieces))]
         seen: set[int] = set()
         while stack:
@@ -176,6 +179,7 @@ class _Converter:
         f = piece.fields
         self._refer(element, "level", f.get("level"))
         _put(element, "model", _content_name(f.get("model")))
+        # Leave out what says nothing: a height as the piece's own, a rotation by nothing.
         in_plan = f.get("heightInPlan")
         if in_plan and in_plan != f.get("height"):
             _put(element, "heightInPlan", in_plan)
@@ -183,6 +187,7 @@ class _Converter:
             _numbers(element, "modelRotation", f.get("modelRotation"))
         _colours(element, piece, "color")
         _texture(element, None, f.get("texture"))
+        # Write what the home changed of the model: materials, moved parts, light sources.
         for material in _objects(f.get("modelMaterials")):
             if _is(material, "HomeMaterial"):
                 inner = SubElement(element, "material")
@@ -208,6 +213,7 @@ class _Converter:
         f = wall.fields
         for name in ("wallAtStart", "wallAtEnd", "level"):
             self._refer(element, name, f.get(name))
+        # Write what each side wears.
         _colours(element, wall, "leftSideColor rightSideColor topColor")
         for side in ("leftSide", "rightSide"):
             _put(element, f"{side}Shininess", f.get(f"{side}Shininess") or None)

@@ -38,6 +38,7 @@ def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
     def open_(element: Element, place: str) -> Attributes:
         return Attributes(file, place, element, max_extent_m)
 
+    # Read each kind in the file's order, since ids and messages count by it.
     walls = tuple(
         _wall(open_(e, f"wall {e.get('id', f'#{k}')}"), k, wall_height)
         for k, e in enumerate(root.findall("wall"))
