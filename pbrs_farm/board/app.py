@@ -15,7 +15,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from pbrs_farm.board.board_state import Board
-from pbrs_farm.board.pages import entering, looking, relighting, viewing
+from pbrs_farm.board.pages import entering, house_scene, looking, relighting, viewing
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.security.guard import Guard
 from pbrs_farm.core.errors import PbrsError
@@ -51,6 +51,9 @@ def _routes() -> list[Route]:
         Route("/", looking.homes),
         Route("/views", looking.views),
         Route("/homes/{house}", looking.home),
+        Route("/homes/{house}/house.glb", house_scene.house_glb),
+        Route("/homes/{house}/scene.json", house_scene.scene),
+        Route("/homes/{house}/candidates.json", house_scene.candidates),
         Route(_VIEW, viewing.view),
         Route(f"{_VIEW}/thumb/{{layer}}.jpg", viewing.thumb),
         Route(f"{_VIEW}/shown/{{layer}}.png", viewing.shown),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
@@ -16,6 +18,8 @@ from pbrs_farm.board.index.queries import (
 )
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.core.lighting import ALL_MODES
+
+_MAX_VIEWS: Final = 120  # of a home that its own page lists
 
 
 def board_of(request: Request) -> Board:
@@ -79,4 +83,5 @@ def home(request: Request) -> Response:
     """GET /homes/HOUSE: a home in 3D, with its views beside it."""
     found = asked_home(request)
     views = board_of(request).queries.views_of(found.id)
-    return page(request, "home.html", home=found, views=views)
+    version = views[0].version if views else ""
+    return page(request, "home.html", home=found, views=views[:_MAX_VIEWS], version=version)
