@@ -75,6 +75,7 @@ class FarmConfig:
     store_url: str = ""
     store: StoreSettings = field(default_factory=StoreSettings)
     prefix: str = "pbrs:"  # of every key in Redis
+    store_id: str = ""  # of the store, as the worker's supervisor read it
     worker: str = ""  # its name in the ledger
     slots: int = _least(1, 1)  # tasks at once
     queues: tuple[str, ...] = ()  # () = all

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.commands.arguments import Handler, Verb, add_farm, echo, echo_json, farm_of
 from workers.client.text import explanation_text, failures_text, status_text, workers_text
+from workers.ledger.task_ledger import WITH_FAILURES
 
 if TYPE_CHECKING:
     from workers.client.farm_client import Farm
@@ -103,8 +104,8 @@ def _status(args: argparse.Namespace) -> int:
         else:
             _show(args, status, lambda s=status: status_text(s))  # type: ignore[misc]
         sys.stdout.flush()
-        if not args.watch or status["state"] in ("done", "cancelled"):
-            return 0
+        if not args.watch or status["state"] in ("done", WITH_FAILURES, "cancelled"):
+            return 1 if status["state"] == WITH_FAILURES else 0
         time.sleep(2.0)
 
 

@@ -80,9 +80,10 @@ def _submit(args: argparse.Namespace) -> int:
         else:
             echo("\n".join(f"{k:<14}{v}" for k, v in plan.items()))
         return 0
-    # Fail before anything is uploaded where Redis does not answer.
+    # Fail before anything is uploaded where Redis does not answer or no worker has the store.
     farm = farm_of(args)
     farm.ledger.ping()
+    farm.check_store()
     if any(uses_catalogue(ref, spec.recipe) for _entry, ref in found):
         recipe = upload_catalogue(farm.store, spec.recipe)
         spec = spec.model_copy(update={"recipe": recipe})

@@ -43,7 +43,7 @@ class MemoryLedger:
             self.n_away -= 1
             raise LedgerUnavailable("no Redis")
 
-    def create(self, spec: JobSpec) -> str:
+    def create(self, spec: JobSpec, store_id: str = "") -> str:
         raise NotImplementedError
 
     def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None:

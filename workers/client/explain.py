@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from pbrs_farm.core.errors import BadInput
-from workers.ids import WHOLE, TaskId, queue_of, task_from_text
+from workers.ids import LIGHT, LIGHT_GPU, WHOLE, TaskId, queue_of, task_from_text
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import ALIVE_S, STATES, JobView
 from workers.ledger.worker_registry import Registry
@@ -43,6 +43,8 @@ def explain(
         units = {u: at for u, at in units.items() if u == wanted}
     rows = [_row(ledger, view.job_id, house, u, at, batches) for u, at in sorted(units.items())]
     for row in rows:
+        if "worker" in row:
+            row |= _holder(ledger, registry, view, row)
         if row["state"] in _WAITING and (obstacle := _obstacle(registry, view, row["task"])):
             row["because"] = obstacle
     return rows
@@ -75,6 +77,21 @@ def _row(
     return row
 
 
+def _holder(
+    ledger: RedisLedger, registry: Registry, view: JobView, row: dict[str, Any]
+) -> dict[str, Any]:
+    """How long the lease of a running task lasts, and how long its holder has been silent."""
+    stage = task_from_text(row["task"]).stage
+    gpu = stage == LIGHT and view.fields.get("gpu") == "1"
+    left_s = ledger.lease_left_s(view.job_id, row["task"], LIGHT_GPU if gpu else stage)
+    seen = {w.name: w.age_s for w in registry.workers()}
+    found: dict[str, Any] = {} if left_s is None else {"lease_s": round(max(0.0, left_s), 1)}
+    age_s = seen.get(row["worker"])
+    if age_s is None or age_s > ALIVE_S:
+        found["silent_s"] = None if age_s is None else round(age_s, 1)
+    return found
+
+
 def _obstacle(registry: Registry, view: JobView, task: str) -> str:
     """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
     if view.state != "running":
@@ -90,6 +107,9 @@ def _obstacle(registry: Registry, view: JobView, task: str) -> str:
     ]
     if not takers:
         return f"no worker takes {queue}"
+    store = view.fields.get("store_id", "")
+    if store and all(w.fields.get("store_id", store) not in (store, "") for w in takers):
+        return f"every worker that takes {queue} has another store than the job"
     if all(w.fields.get("drain") == "1" for w in takers):
         return f"every worker that takes {queue} is leaving"
     return ""

@@ -19,11 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 import pbrs_farm
 from pbrs_farm.core.errors import BadInput, MachineFailed, ObjectMissing
+from pbrs_farm.core.near_names import did_you_mean
 from pbrs_farm.store import Store, store_from_url
 from workers.client.explain import explain
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
 from workers.ids import (
+    TaskId,
     attempts_from_log_keys,
     check_job_id,
     failed_key,
@@ -34,6 +36,7 @@ from workers.ids import (
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import ALIVE_S, JobView
 from workers.ledger.worker_registry import Registry
+from workers.store_identity import known_store_id, store_id
 
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe import Recipe
@@ -81,7 +84,8 @@ class Farm:
         self.ledger.ping()
         view = self.ledger.view(spec.job_id)
         if view is not None and view.state in ("running", "paused", "done"):
-            return Submitted(spec.job_id, len(houses), view.state)
+            return Submitted(spec.job_id, len(houses), view.outcome)
+        self.check_store()
         # Cut houses fine enough for the slots there are.
         n_slots = max(self.registry.slots().values(), default=_SLOTS_UNKNOWN)
         spec = spec.model_copy(
@@ -92,6 +96,19 @@ class Farm:
         self.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
         self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
         return Submitted(spec.job_id, len(houses), self._load(spec, list(houses)))
+
+    def check_store(self) -> None:
+        """Raises BadInput where workers live and none of them works on this farm's store."""
+        living = [w for w in self.registry.workers() if w.age_s <= ALIVE_S]
+        theirs = {
+            w.fields["store_id"]: w.fields["store"] for w in living if w.fields.get("store_id")
+        }
+        if theirs and known_store_id(self.store) not in theirs:
+            held = ", ".join(sorted(set(theirs.values()))[:3])
+            hint = "--store URL, or PBRS_STORE; or start workers on this store"
+            raise BadInput(
+                self.store.url, "", f"no worker has this store, they have {held}", hint=hint
+            )
 
     def recover(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
         """Rebuild the ledger of a job from storage, whatever Redis held of it."""
@@ -140,7 +157,7 @@ class Farm:
         stages = stage_views(view, self.registry.slots())
         return {
             "job": job,
-            "state": view.state,
+            "state": view.outcome,
             "reason": view.fields.get("reason", ""),
             "recipe": view.fields.get("recipe_name", ""),
             "houses": {
@@ -151,7 +168,8 @@ class Farm:
             "views_done": int(view.counts.get("views", 0)),
             "stages": [asdict(stage) for stage in stages],
             "eta_s": max((s.eta_s for s in stages if s.eta_s is not None), default=None),
-            "failures": _with_prefix(view.counts, "failures:"),
+            "failures": _with_prefix(view.counts, "failed:"),
+            "failed_attempts": _with_prefix(view.counts, "failures:"),
             "handed_back": _with_prefix(view.counts, "handed_back:"),
             "workers": len([w for w in workers if w.age_s <= ALIVE_S]),
             "refusing": [
@@ -178,7 +196,11 @@ class Farm:
         found = attempts_from_log_keys(job, str(task), self.store.list(folder))
         chosen = attempt if attempt is not None else max(found, default=0)
         if chosen not in found:
-            raise BadInput(text, "", "no log stored", hint="logs are kept of failed attempts")
+            self._check_task(job, task)
+            hint = "logs are kept of failed attempts and of tasks that run for a minute"
+            if found:
+                hint = f"of attempts {', '.join(map(str, sorted(found)))}"
+            raise BadInput(text, "", "no log stored", hint=hint)
         return self.store.get(found[chosen]).decode("utf-8", "replace")
 
     def failures(self, job: str) -> list[dict[str, Any]]:
@@ -223,12 +245,17 @@ class Farm:
     def drain(self, worker: str, *, undo: bool = False) -> None:
         """The worker finishes what it runs and leaves; BadInput when there is no such worker."""
         if not self.registry.drain(worker, undo=undo):
-            raise BadInput(worker, "", "no such worker", hint="`workers` lists them")
+            offer = did_you_mean(worker, [w.name for w in self.registry.workers()])
+            raise BadInput(worker, "", "no such worker", hint=offer or "`workers` lists them")
 
     def workers(self) -> list[dict[str, Any]]:
-        """Workers seen in the last hour."""
+        """Workers seen in the last hour, each with its state: alive, draining, drained, dead.
+
+        draining: finishes what it runs; drained: takes nothing until it is asked back; dead: gave
+        no sign of life, so its leases end or have ended.
+        """
         return [
-            {"worker": w.name, "age_s": round(w.age_s, 1), **w.fields}
+            {**w.fields, "worker": w.name, "age_s": round(w.age_s, 1), "state": w.state}
             for w in self.registry.workers()
         ]
 
@@ -250,13 +277,21 @@ class Farm:
             if was == "loading" and self.ledger.age_s(view) < _LOADING_S:
                 raise BadInput(spec.job_id, "", "is being submitted by somebody else", hint=_WAIT)
             self.ledger.forget(spec.job_id)
-        if self.ledger.create(spec) != "":
+        if self.ledger.create(spec, store_id(self.store)) != "":
             raise BadInput(spec.job_id, "", "is being submitted by somebody else", hint=_WAIT)
         # The runner says what the markers of a house mean; it renders nothing here.
         runner = runner_maker(self.config.runner)(self.config, lambda _reason: None)
         rebuild(self.ledger, self.store, runner, spec, houses, progress)
         self.ledger.open(spec.job_id, spec.priority)
         return was
+
+    def _check_task(self, job: str, task: TaskId) -> None:
+        """Raises BadInput, saying which part is unknown, where the job has no such task."""
+        units = self.ledger.unit_states(self.view(job).job_id, task.house)
+        if not units:
+            self._explain_not_admitted(job, task.house)
+        elif ":" not in units.get(task.unit, ""):
+            raise BadInput(str(task), "", "the job has no such task", hint=f"`why {task.house}`")
 
     def _steer(self, job: str, what: str, reason: str = "") -> str:
         state = self.ledger.steer(check_job_id(job), what, reason)
@@ -268,8 +303,9 @@ class Farm:
         from workers.job import houses_from_lines
 
         data = self.store.get(job_key(check_job_id(job), "houses.jsonl"))
-        if all(entry.house_id != house for entry in houses_from_lines(data)):
-            raise BadInput(house, "", "the job has no such house")
+        known = [entry.house_id for entry in houses_from_lines(data)]
+        if house not in known:
+            raise BadInput(house, "", "the job has no such house", hint=did_you_mean(house, known))
         return [{"task": house, "state": "its house is not admitted yet"}]
 
 
@@ -309,4 +345,4 @@ def new_spec(recipe: Recipe, **fields: Any) -> JobSpec:
 
 
 def _with_prefix(counts: Any, prefix: str) -> dict[str, int]:
-    return {k.removeprefix(prefix): int(n) for k, n in counts.items() if k.startswith(prefix)}
+    return {k.removeprefix(prefix): int(n) for k, n in counts.items() if k.startswith(prefix) and n}

@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
+
+from workers.ledger.task_ledger import WITH_FAILURES
+
+# Counts of a status by class of fault -> what they count.
+_COUNTS: Final = {
+    "failures": "tasks failed for good",
+    "failed_attempts": "attempts failed",
+    "handed_back": "handed back",
+}
 
 
 def status_text(status: Mapping[str, Any]) -> str:
@@ -26,10 +36,12 @@ def status_text(status: Mapping[str, Any]) -> str:
             f"{duration_text(stage['p50_s'] or None):>8}{duration_text(stage['p90_s'] or None):>8}"
             f"{duration_text(stage['eta_s']):>9}"
         )
-    for name in ("failures", "handed_back"):
+    for name, text in _COUNTS.items():
         if status[name]:
             counts = ", ".join(f"{n} {k}" for k, n in sorted(status[name].items()))
-            lines.append(f"{name.replace('_', ' ')}: {counts}")
+            lines.append(f"{text}: {counts}")
+    if status["state"] == WITH_FAILURES:
+        lines.append(f"`pbrs-farm failures {status['job']}` says what failed")
     lines += [f"refuses: {r['worker']}: {r['why']}" for r in status["refusing"]]
     if status["storage"] != "ok":
         lines.append(f"storage: {status['storage']}")
@@ -47,6 +59,13 @@ def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
             if name in row:
                 value = row[name]
                 lines.append(f"    {name}: {' '.join(value) if name == 'views' else value}")
+        if "silent_s" in row:
+            age = row["silent_s"]
+            silent = "left the farm" if age is None else f"has been silent for {duration_text(age)}"
+            lines.append(f"    the worker {silent}")
+        if "lease_s" in row:
+            then = ", then the task is given to another" if "silent_s" in row else ""
+            lines.append(f"    its lease ends in {duration_text(row['lease_s'])}{then}")
         if "because" in row:
             lines.append(f"    {row['because']}")
         if "fault" in row:
@@ -71,18 +90,18 @@ def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
 
 
 def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A worker a line."""
+    """A worker a line, whether it lives, and how many do."""
     if not rows:
         return "no workers"
-    lines = [f"{'worker':<32}{'seen':>8}{'slots':>6}  {'version':<9}queues"]
+    lines = [f"{'worker':<32}{'state':<10}{'seen':>8}{'slots':>6}  {'version':<9}queues"]
     for row in rows:
-        state = " draining" if row.get("drain") == "1" else ""
         refusal = f" refuses: {row['refuses']}" if row.get("refuses") else ""
         lines.append(
-            f"{row['worker']:<32}{duration_text(row['age_s']):>8}{row.get('slots', '?'):>6}  "
-            f"{row.get('version', '?'):<9}{row.get('queues', '')}{state}{refusal}"
+            f"{row['worker']:<32}{row['state']:<10}{duration_text(row['age_s']):>8}"
+            f"{row.get('slots', '?'):>6}  {row.get('version', '?'):<9}{row.get('queues', '')}{refusal}"
         )
-    return "\n".join(lines)
+    counts = Counter(row["state"] for row in rows)
+    return "\n".join([*lines, ", ".join(f"{n} {state}" for state, n in sorted(counts.items()))])
 
 
 def duration_text(seconds: float | None) -> str:

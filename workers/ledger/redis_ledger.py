@@ -104,14 +104,18 @@ class RedisLedger:
 
     # The job
 
-    def create(self, spec: JobSpec) -> str:
-        """Make the job unless it exists; its state before, "" when it was made now."""
+    def create(self, spec: JobSpec, store_id: str = "") -> str:
+        """Make the job unless it exists; its state before, "" when it was made now.
+
+        store_id: of the store that holds it; workers of another one refuse its tasks.
+        """
         # What scripts read of the job; the rest of the spec stays in storage.
         rules = spec.rules
         fields: dict[str, object] = {
             "version": spec.version,
             "recipe": spec.recipe.digest(),
             "recipe_name": spec.recipe.name,
+            "store_id": store_id,
             "stages": ",".join(spec.batch_stages),
             "priority": spec.priority,
             "gpu": int(spec.gpu),
@@ -195,8 +199,9 @@ class RedisLedger:
         config = self.config
         version = pbrs_farm.__version__
         verdict, detail, inputs = self._run(
-            "claim", job, task, token, config.worker, version, recipe, config.lease_s, int(direct)
-        )
+            "claim", job, task, token, config.worker, version, recipe, config.lease_s, int(direct),
+            config.store_id,
+        )  # fmt: skip
         return Claim(verdict, detail, inputs, token)
 
     def heartbeat(self, job: str, task: str, token: str) -> str:
@@ -308,6 +313,12 @@ class RedisLedger:
             values = pipe.execute()
         names = ("claim", "attempts", "tried", "fault", "not_before", "sent")
         return {n: str(v) for n, v in zip(names, values, strict=True) if v is not None}
+
+    def lease_left_s(self, job: str, task: str, lease: str) -> float | None:
+        """Seconds until the lease of a running task ends, by the queue's name; None without one."""
+        with self.errors():
+            end = self.client.zscore(f"{self._g}lease:{lease}", f"{job}|{task}")
+            return None if end is None else float(end) - self.now()
 
     def faults(self, job: str) -> Iterator[tuple[str, Fault]]:
         """Every task that failed for good."""

@@ -12,13 +12,14 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 from pbrs_farm.core.errors import PbrsError, Transient
+from workers.ids import STAGES
 
 if TYPE_CHECKING:
     from workers.job import HouseEntry, JobSpec
 
 ClaimAnswer = Literal[
     "run", "done", "failed", "leased", "early", "cancelled", "paused", "held", "version", "recipe",
-    "draining", "blocked", "elsewhere", "unknown",
+    "store", "draining", "blocked", "elsewhere", "unknown",
 ]  # fmt: skip
 FaultClass = Literal[
     "data", "bug", "crash", "resource", "machine", "timeout", "silent", "lost",
@@ -40,6 +41,9 @@ STATES: Final = {
     "FAILED": "f",  # for good
     "CANCELLED": "x",
 }
+
+
+WITH_FAILURES: Final = "done with failures"
 
 
 class LedgerUnavailable(PbrsError, Transient):
@@ -115,6 +119,16 @@ class JobView:
         """loading, running, paused, done, cancelled."""
         return self.fields.get("state", "")
 
+    @property
+    def outcome(self) -> str:
+        """The state, and of a job that is done whether tasks of it failed for good."""
+        return WITH_FAILURES if self.state == "done" and self.n_failed else self.state
+
+    @property
+    def n_failed(self) -> int:
+        """Tasks that failed for good."""
+        return int(sum(self.counts.get(f"{s}:{STATES['FAILED']}", 0) for s in STAGES))
+
 
 @dataclass(frozen=True, slots=True)
 class WorkerView:
@@ -124,12 +138,21 @@ class WorkerView:
     age_s: float  # since its last heartbeat
     fields: Mapping[str, str]
 
+    @property
+    def state(self) -> str:
+        """alive, draining, drained or dead."""
+        if self.age_s > ALIVE_S:
+            return "dead"
+        if self.fields.get("drain") != "1":
+            return "alive"
+        return "drained" if self.fields.get("slots") == "0" else "draining"
+
 
 class Ledger(Protocol):
     """Every method is atomic and may be called again after a lost answer."""
 
     # The job: submit and recover
-    def create(self, spec: JobSpec) -> str: ...
+    def create(self, spec: JobSpec, store_id: str = "") -> str: ...
     def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None: ...
     def load_houses(self, job: str, houses: Iterable[HouseState]) -> int: ...
     def open(self, job: str, priority: int) -> None: ...

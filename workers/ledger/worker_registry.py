@@ -9,11 +9,13 @@ import os
 from collections.abc import Mapping
 
 import pbrs_farm
+from workers.config import shown_url
 from workers.ids import QUEUES, stages_of_queue
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import ALIVE_S, WorkerView
 
 _GONE_S = 3600.0  # a worker not seen for so long is forgotten
+_DRAINED_S = 30 * 86400  # a drained worker that comes back within so long stays drained
 
 
 class Registry:
@@ -23,8 +25,11 @@ class Registry:
         self._ledger = ledger
         self._g = ledger.config.prefix
 
-    def heartbeat(self) -> bool:
-        """This worker is alive; True when it is asked to leave."""
+    def heartbeat(self, *, takes_work: bool = True) -> bool:
+        """This worker is alive; True when it is asked to leave.
+
+        takes_work: False while it is drained and waits to be asked back; it has no slot then.
+        """
         config, client = self._ledger.config, self._ledger.client
         key = f"{self._g}worker:{config.worker}"
         with self._ledger.errors():
@@ -32,18 +37,26 @@ class Registry:
             now = self._ledger.now()
             pipe = client.pipeline(transaction=False)
             pipe.zadd(f"{self._g}workers", {config.worker: now})
-            for stage in {s for q in config.queues or QUEUES for s in stages_of_queue(q)}:
+            queues = (config.queues or QUEUES) if takes_work else ()
+            for stage in {s for q in queues for s in stages_of_queue(q)}:
                 pipe.zadd(f"{self._g}workers:{stage}", {config.worker: now})
             fields: Mapping[str, str | int] = {
-                "slots": config.slots,
-                "queues": ",".join(config.queues or QUEUES),
+                "slots": config.slots if takes_work else 0,
+                "queues": ",".join(queues),
+                "store": shown_url(config.store_url),
+                "store_id": config.store_id,
                 "version": pbrs_farm.__version__,
                 "pid": os.getpid(),
             }
             pipe.hset(key, mapping=dict(fields))
             pipe.expire(key, int(2 * _GONE_S))
+            pipe.exists(self._drained(config.worker))
             pipe.hget(key, "drain")
-            return bool(pipe.execute()[-1] == "1")
+            *_, was_drained, drain = pipe.execute()
+            # The order outlives the worker's own fields, which go when it leaves.
+            if was_drained and drain != "1":
+                client.hset(key, "drain", "1")
+            return bool(was_drained)
 
     def leave(self) -> None:
         """This worker is gone on purpose."""
@@ -55,11 +68,27 @@ class Registry:
 
     def drain(self, worker: str, *, undo: bool = False) -> bool:
         """Ask a worker to finish what it runs and leave; False when there is no such worker."""
+        client, drained = self._ledger.client, self._drained(worker)
         with self._ledger.errors():
-            if self._ledger.client.zscore(f"{self._g}workers", worker) is None:
+            is_there = client.zscore(f"{self._g}workers", worker) is not None
+            # One that has left can be asked back before its machine starts it again.
+            if not is_there and not (undo and client.exists(drained)):
                 return False
-            self._ledger.client.hset(f"{self._g}worker:{worker}", "drain", "0" if undo else "1")
+            if undo:
+                client.delete(drained)
+            else:
+                client.set(drained, "1", ex=_DRAINED_S)
+            if is_there:
+                client.hset(f"{self._g}worker:{worker}", "drain", "0" if undo else "1")
         return True
+
+    def is_drained(self) -> bool:
+        """Whether this worker was asked to leave, in this life or an earlier one of its name."""
+        with self._ledger.errors():
+            return bool(self._ledger.client.exists(self._drained(self._ledger.config.worker)))
+
+    def _drained(self, worker: str) -> str:
+        return f"{self._g}drained:{worker}"
 
     def note_rejection(self, reason: str) -> None:
         """This worker rejected a task of another version; `workers` and `status` show it."""

@@ -16,8 +16,13 @@ from pbrs_farm.core.errors import (
 )
 from workers.ledger.task_ledger import FaultClass
 
-# Hex addresses, digests and ids, then any number.
-_NUMBERS: Final = re.compile(r"0x[0-9a-f]+|[0-9a-f]{8,}|\d+(\.\d+)?")
+# Hex addresses, digests and ids; then numbers, alone, before a unit or behind a name (wall w3). Digits
+# inside a word are part of it: broken.sh3d, Sweet Home 3D, 2BedroomApartment.
+_NUMBERS: Final = re.compile(
+    r"0x[0-9a-f]+|\b(?=[a-f]*\d)[0-9a-f]{8,}\b"
+    r"|(?<![A-Za-z0-9])\d+(\.\d+)?(?=(?:mm|cm|m|km|ms|s|kB|MB|GB|px|lx)?(?![A-Za-z0-9]))"
+    r"|(?<=[A-Za-z])\d+(?![A-Za-z0-9])"
+)
 _PATHS: Final = re.compile(r"(/[\w.\-+]+)+/?")
 
 

@@ -22,7 +22,7 @@ from pbrs_farm.core.errors import PbrsError, StoreFailed
 from pbrs_farm.run.processes.child_process import ChildProcess
 from pbrs_farm.run.processes.render_process import REPORTED, Ended, RenderProcess
 from pbrs_farm.store import Store, store_from_url
-from workers.config import FarmConfig
+from workers.config import FarmConfig, shown_url
 from workers.ids import GEOMETRY, WHOLE, TaskId, failed_key, log_key, task_from_text
 from workers.ledger.task_ledger import (
     UNCOUNTED,
@@ -43,7 +43,7 @@ _log = logging.getLogger("pbrs.slot")
 # Classes that say nothing of the task: no log of them is stored.
 _NO_LOG: Final = {*UNCOUNTED, "cancelled", "lost"}
 # Refusals that another worker may not meet: wait, so that it comes first.
-_WAIT_AFTER_REJECTION: Final = {"version", "recipe", "draining", "blocked", "elsewhere"}
+_WAIT_AFTER_REJECTION: Final = {"version", "recipe", "store", "draining", "blocked", "elsewhere"}
 _POLL_S: Final = 1.0
 _LOG_EVERY_S: Final = 60.0  # a long task's log is stored so often
 _RETRY_S: Final = 600.0  # how long Redis may be away
@@ -142,6 +142,7 @@ class Slot:
                 held.job, str(held.task), held.claim.token, end, sticky=sticky
             )
         )
+        _log.info("%s of job %s: done in %.1f s", held.task, held.job, ended.seconds)
         return task_from_text(more) if more else None
 
     def _render(self, held: _Claimed, request: Request) -> Ended:
@@ -227,8 +228,10 @@ class Slot:
         # A message came twice, or its holder died with the Celery child that took it.
         if claim.verdict == "leased":
             self._release_dead_sibling(job, task, claim.detail)
-        if claim.verdict in ("version", "recipe"):
+        if claim.verdict in ("version", "recipe", "store"):
             reason = f"job {job} wants {claim.verdict} {claim.detail}"
+            if claim.verdict == "store":
+                reason = f"job {job} lies in another store than {shown_url(self._config.store_url)}"
             with contextlib.suppress(LedgerUnavailable):
                 self._registry.note_rejection(reason)
         if claim.verdict in _WAIT_AFTER_REJECTION:

@@ -16,22 +16,28 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
 from typing import Final
 
 from pbrs_farm.core.errors import MachineFailed, PbrsError
 from pbrs_farm.run.processes.child_process import die_with_parent
+from pbrs_farm.store import store_from_url
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES
 from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import LedgerUnavailable
+from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
 from workers.logs import log_to_stderr
+from workers.store_identity import store_id
 
 _log = logging.getLogger("pbrs.supervisor")
 _PREEMPT_S: Final = 20.0  # what giving everything back may take
 _POLL_S: Final = 0.2
+_DRAINED_POLL_S: Final = 5.0  # between two looks of a drained worker whether it is wanted again
+_STORE_S: Final = 5.0  # how long the store may take to say which it is
 # On scratch when a signal made the worker leave: deploy/slurm/worker.sbatch asks for it.
 PREEMPTED_NOTE: Final = "preempted"
 
@@ -94,7 +100,14 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT):
         signal.signal(number, orders.on_signal)
     began = time.monotonic()
-    celery = subprocess.Popen(command(config), preexec_fn=lambda: die_with_parent(signal.SIGTERM))
+    if not _wait_while_drained(config, orders):
+        return 0
+    # Celery's parent process never touches storage: tell it which one this is.
+    celery = subprocess.Popen(
+        command(config),
+        env={**os.environ, "PBRS_FARM_STORE_ID": config.store_id},
+        preexec_fn=lambda: die_with_parent(signal.SIGTERM),
+    )
     while True:
         code = _reap(celery)
         if code is not None:
@@ -108,6 +121,44 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
         if orders.leave_at is not None:
             _leave(config, celery, orders, time.monotonic() - orders.leave_at)
         time.sleep(_POLL_S)
+
+
+def _wait_while_drained(config: FarmConfig, orders: _Orders) -> bool:
+    """Take no work while this worker is drained; False when a signal asks it to end meanwhile.
+
+    A container that ends is started again by Compose or Kubernetes under the same name: it stays,
+    seen as drained, until `drain --undo`.
+    """
+    registry, due, told = Registry(RedisLedger(config)), 0.0, False
+    while orders.leave_at is None:
+        if time.monotonic() >= due:
+            due = time.monotonic() + _DRAINED_POLL_S
+            touch(config.heartbeat_file)
+            try:
+                if not registry.is_drained():
+                    return True
+                registry.heartbeat(takes_work=False)
+            except LedgerUnavailable as error:
+                _log.warning("%s", error)
+            if not told:
+                told = True
+                _log.info(
+                    "drained: taking no work until `pbrs-farm drain --undo %s`", config.worker
+                )
+        time.sleep(_POLL_S)
+    with contextlib.suppress(LedgerUnavailable):
+        registry.leave()
+    return False
+
+
+def _with_store_id(config: FarmConfig) -> FarmConfig:
+    """The configuration with its store's id; without where the store does not answer now."""
+    settings = replace(config.store, s3=replace(config.store.s3, retry_timeout_s=_STORE_S))
+    try:
+        return replace(config, store_id=store_id(store_from_url(config.store_url, settings)))
+    except PbrsError as error:
+        _log.warning("the store is not known yet: %s", error)
+        return config
 
 
 def _leave(
@@ -156,6 +207,7 @@ def main(arguments: list[str] | None = None) -> int:
         config = config_from_environment()
         sweep(config)
         check_machine(config)
+        config = _with_store_id(config)
     except PbrsError as error:
         sys.stderr.write(f"pbrs-farm: {error}\n")
         return 1

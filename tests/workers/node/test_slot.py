@@ -59,6 +59,14 @@ def bench(tmp_path: Path) -> Bench:
     return Bench(tmp_path)
 
 
+def test_a_worker_logs_what_it_finished(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    bench.next.at(1, "ready")
+    bench.next.at(5, "done", batches=[], n_views=0)
+    with caplog.at_level("INFO", "pbrs.slot"):
+        bench.run()
+    assert f"{TASK} of job {JOB}: done in 5.0 s" in caplog.text
+
+
 def test_a_task_is_claimed_run_and_finished(bench: Bench) -> None:
     bench.next.at(1, "ready")
     bench.next.at(5, "done", batches=[], n_views=0)

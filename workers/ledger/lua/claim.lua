@@ -1,12 +1,13 @@
 -- May this worker run this task now? The attempt is counted before any work is done.
--- ARGV: task, token, worker, version, recipe digest, lease seconds, direct ("1": without a message)
+-- ARGV: task, token, worker, version, recipe digest, lease seconds, direct ("1": without a message),
+-- id of the worker's store ("" = not known)
 -- -> {verdict, detail, inputs}; verdict "run" carries the attempt as detail; inputs: the house's
 -- source before geometry, its batches of views afterwards.
 local task, token, worker = ARGV[1], ARGV[2], ARGV[3]
 local house, unit, stage = split(task)
 if not house then return { 'unknown', '', '' } end
 -- Answer what needs no claim: nothing there, past its stage, ended.
-local job = redis.call('HMGET', P .. 'job', 'state', 'version', 'recipe')
+local job = redis.call('HMGET', P .. 'job', 'state', 'version', 'recipe', 'store_id')
 local at_stage, letter = unit_at(house, unit)
 if not job[1] or not at_stage then return { 'unknown', '', '' } end
 if at_stage ~= stage or letter == DONE then return { 'done', '', '' } end
@@ -54,6 +55,8 @@ if job[1] ~= 'running' and stage ~= JOB_STAGE then return reject('paused', '', 0
 if redis.call('EXISTS', G .. 'breaker') == 1 then return reject('held', 'storage is unhealthy', 0) end
 if job[2] ~= ARGV[4] then return reject('version', job[2], 15) end
 if job[3] ~= ARGV[5] then return reject('recipe', job[3], 15) end
+local has_store = job[4] and job[4] ~= '' and ARGV[8] and ARGV[8] ~= ''
+if has_store and job[4] ~= ARGV[8] then return reject('store', job[4], 15) end
 local self = redis.call('HMGET', G .. 'worker:' .. worker, 'drain', 'blocked_until')
 if self[1] == '1' then return reject('draining', '', 0) end
 if self[2] and tonumber(self[2]) > t then return reject('blocked', self[2], 2) end

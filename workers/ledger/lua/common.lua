@@ -6,7 +6,8 @@
 --
 -- Keys of a job (P ..):
 --   job     hash: state, reason, version, recipe, stages, rules of failure, shard_size, shards_left
---   n       hash of counters: "<stage>:<letter>", "done:<stage>", "houses:<how>", "batches", "views"
+--   n       hash of counters: "<stage>:<letter>", "done:<stage>", "houses:<how>", "batches", "views",
+--           "failures:<class>" (attempts), "failed:<class>" (tasks, for good)
 --   order   list: "<index>|<house>" not yet admitted       sources  hash: house -> source
 --   h:<id>  hash: unit -> state; s: of the house, i: its index, n: batches, left: to end, nf: failed
 --   views   hash: house -> batches       shards  hash: shard -> houses still open
@@ -258,6 +259,7 @@ local function ended_badly(task, f)
   bump('failures:' .. f.class, 1)
   local most = tonumber(redis.call('HGET', P .. 'job', 'max_attempts'))
   if f.class == 'data' or attempts >= most then
+    bump('failed:' .. f.class, 1)
     fail_unit(house, unit, stage, f.entry, f.fingerprint)
     return 'failed'
   end

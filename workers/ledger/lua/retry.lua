@@ -4,6 +4,8 @@ local house, unit, stage = split(task)
 if not house then return 0 end
 local at_stage, letter = unit_at(house, unit)
 if at_stage ~= stage or letter ~= FAILED then return 0 end
+local entry = redis.call('HGET', P .. 'failed', task)
+if entry then bump('failed:' .. cjson.decode(entry).fault, -1) end
 redis.call('HDEL', P .. 'failed', task)
 local key = house_key(house)
 

@@ -1,0 +1,287 @@
+"""What an operator meets: stores that differ, drains that hold, failures that are told, names unknown."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.cli import main
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.store.folder import FolderStore
+from tests.workers.drive import Drive
+from workers.client.farm_client import Farm, new_spec
+from workers.client.text import explanation_text, status_text, workers_text
+from workers.config import FarmConfig
+from workers.ids import log_key
+from workers.job import HouseEntry
+from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import Fault
+from workers.ledger.worker_registry import Registry
+from workers.node import supervisor
+from workers.node.faults import without_numbers
+from workers.store_identity import known_store_id, store_id
+
+HOUSES = [HouseEntry(house_id=f"h{k}", source="{}") for k in range(3)]
+
+
+@pytest.fixture
+def farm(config: FarmConfig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Farm:
+    monkeypatch.setenv("PBRS_TEST_CONTROL", str(tmp_path))
+    url = (tmp_path / "store").as_uri()
+    return Farm(replace(config, runner="tests.workers.fake_runner:runner", store_url=url))
+
+
+def submit(farm: Farm) -> Drive:
+    job = farm.submit(HOUSES, new_spec(recipe_from_name("preview")))
+    return Drive(farm.ledger, farm.spec(job.job_id))
+
+
+def registry_of(farm: Farm, **changes: object) -> Registry:
+    """The registry as a worker with other settings sees it."""
+    return Registry(RedisLedger(replace(farm.config, **changes), farm.ledger.client))
+
+
+def environment(farm: Farm, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The farm as the command line finds it."""
+    monkeypatch.setenv("PBRS_REDIS_URL", farm.config.redis_url.reveal())
+    monkeypatch.setenv("PBRS_STORE", farm.config.store_url)
+    monkeypatch.setenv("PBRS_FARM_PREFIX", farm.config.prefix)
+
+
+def fail(d: Drive, task: str, kind: str = "data") -> str:
+    token = d.claim(task).token
+    fault = Fault(fault=kind, fingerprint=f"{kind}: x", message="x")  # type: ignore[arg-type]
+    return d.ledger.fail(d.job.job_id, task, token, fault, delay_s=0)
+
+
+# Stores
+
+
+def test_one_store_has_one_id_whatever_its_url(tmp_path: Path) -> None:
+    store = FolderStore(tmp_path / "a")
+    assert known_store_id(store) == ""
+    assert store_id(store) == store_id(FolderStore(tmp_path / "x" / ".." / "a")) != ""
+    assert store_id(FolderStore(tmp_path / "b")) != store_id(store)
+
+
+def test_submit_is_refused_where_no_worker_has_the_store(farm: Farm) -> None:
+    theirs = {"store_url": "file:///elsewhere", "store_id": "0123"}
+    registry_of(farm, worker="w7", **theirs).heartbeat()
+    with pytest.raises(BadInput, match=r"no worker has this store, they have file:///elsewhere"):
+        submit(farm)
+    assert farm.jobs() == []
+    # Nothing was written into the store that is none of theirs.
+    assert list(farm.store.list()) == []
+    # One worker that has it is enough.
+    registry_of(farm, worker="w8", store_id=store_id(farm.store)).heartbeat()
+    assert submit(farm).state == "running"
+
+
+def test_submit_goes_on_where_no_worker_is_there_yet_or_says_its_store(farm: Farm) -> None:
+    registry_of(farm, worker="old").heartbeat()
+    assert submit(farm).state == "running"
+
+
+def test_a_worker_of_another_store_refuses_the_task_and_says_so(farm: Farm) -> None:
+    d = submit(farm)
+    (task, *_others) = d.dispatch()
+    ledger = RedisLedger(replace(farm.config, store_id="ffff"), farm.ledger.client)
+    claim = ledger.claim(d.job.job_id, task, token="t", recipe=d.job.recipe.digest())
+    assert (claim.verdict, claim.detail) == ("store", store_id(farm.store))
+    assert farm.explain(d.job.job_id, task)[0]["state"] == "waits before it is tried again"
+    assert farm.status(d.job.job_id)["failures"] == {}
+
+
+def test_why_says_that_all_workers_have_another_store(farm: Farm) -> None:
+    d = submit(farm)
+    d.dispatch()
+    registry_of(farm, store_id="ffff").heartbeat()
+    (row,) = farm.explain(d.job.job_id, "h0")
+    assert row["because"] == "every worker that takes geometry has another store than the job"
+
+
+# Draining
+
+
+def test_a_drain_outlives_the_worker_that_left(farm: Farm) -> None:
+    registry = farm.registry
+    assert not registry.heartbeat()
+    farm.drain("w1")
+    assert registry.heartbeat()
+    registry.leave()
+    # The container is started again, under the same name.
+    assert registry.is_drained()
+    assert registry.heartbeat(takes_work=False)
+    assert registry.slots() == {}
+    (row,) = farm.workers()
+    assert row["state"] == "drained"
+    farm.drain("w1", undo=True)
+    assert not registry.is_drained()
+    assert not registry.heartbeat()
+    assert farm.workers()[0]["state"] == "alive"
+
+
+def test_a_worker_that_left_can_be_asked_back_before_it_is_there(farm: Farm) -> None:
+    farm.registry.heartbeat()
+    farm.drain("w1")
+    farm.registry.leave()
+    farm.drain("w1", undo=True)
+    assert not farm.registry.is_drained()
+
+
+def test_a_drained_worker_that_is_started_again_waits_until_it_is_asked_back(
+    farm: Farm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(supervisor, "_DRAINED_POLL_S", 0.1)
+    monkeypatch.setattr(supervisor, "_POLL_S", 0.02)
+    config = replace(farm.config, scratch=tmp_path)
+    farm.registry.heartbeat()
+    farm.drain("w1")
+    farm.registry.leave()
+    answers: list[bool] = []
+
+    orders = supervisor._Orders()
+
+    def wait() -> None:
+        answers.append(supervisor._wait_while_drained(config, orders))
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    try:
+        give_up = time.monotonic() + 10
+        while farm.workers() == [] or farm.workers()[0]["state"] != "drained":
+            assert time.monotonic() < give_up
+            time.sleep(0.02)
+        assert config.heartbeat_file.exists()
+        assert answers == []
+        farm.drain("w1", undo=True)
+        thread.join(10)
+    finally:
+        orders.leave_at = 1.0
+        thread.join(10)
+    assert answers == [True]
+
+
+def test_a_drained_worker_that_waits_ends_when_it_is_told_to(farm: Farm, tmp_path: Path) -> None:
+    farm.registry.heartbeat()
+    farm.drain("w1")
+    orders = supervisor._Orders(leave_at=1.0)
+    assert not supervisor._wait_while_drained(replace(farm.config, scratch=tmp_path), orders)
+    assert farm.workers() == []
+
+
+# Failures
+
+
+def test_a_job_with_failures_ends_as_such_and_status_ends_with_one(
+    farm: Farm, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    environment(farm, monkeypatch)
+    d = submit(farm)
+    job = d.job.job_id
+    bad, *good = d.dispatch()
+    assert fail(d, bad) == "failed"
+    for task in good:
+        d.run(task)
+    d.run_all()
+    assert farm.status(job)["state"] == "done with failures"
+    for words in (["status", job], ["status", job, "--watch"], ["status", "--json", job]):
+        assert main(words) == 1
+        assert "done with failures" in capsys.readouterr().out
+    assert farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).was == "done with failures"
+    # Retried and done, it is as if nothing had happened.
+    farm.retry(job)
+    d.run_all()
+    assert main(["status", job]) == 0
+    assert farm.status(job)["failures"] == {}
+
+
+def test_failures_are_counted_as_tasks_and_attempts_apart(farm: Farm) -> None:
+    d = submit(farm)
+    task = d.dispatch()[0]
+    for _attempt in range(3):
+        assert fail(d, task, "bug") in ("retry", "failed")
+        d.dispatch()
+    status = farm.status(d.job.job_id)
+    assert status["failures"] == {"bug": 1}
+    assert status["failed_attempts"] == {"bug": 3}
+    text = status_text(status)
+    assert "tasks failed for good: 1 bug" in text
+    assert "attempts failed: 3 bug" in text
+
+
+@pytest.mark.parametrize(
+    ("message", "headline"),
+    [
+        ("broken.sh3d: Home: is no home of Sweet Home 3D 7", "broken.sh3d: Home: is no home of Sweet Home 3D #"),
+        ("2BedroomApartment: wall w3 is 0.03 m thick", "2BedroomApartment: wall w# is # m thick"),
+        ("needs 1200MB, has 512 MB", "needs #MB, has # MB"),
+        ("room 4 of house 0123456789abcdef", "room # of house #"),
+        ("at 0x7f001234 in /tmp/x/y.py", "at # in PATH"),
+        ("the defaced facade", "the defaced facade"),
+    ],
+)  # fmt: skip
+def test_headlines_keep_their_words(message: str, headline: str) -> None:
+    assert without_numbers(message) == headline
+
+
+# Workers and names
+
+
+def test_workers_tells_the_dead_from_the_living(farm: Farm) -> None:
+    farm.registry.heartbeat()
+    gone = registry_of(farm, worker="w9")
+    gone.heartbeat()
+    farm.ledger.client.zadd(f"{farm.config.prefix}workers", {"w9": farm.ledger.now() - 300})
+    states = {row["worker"]: row["state"] for row in farm.workers()}
+    assert states == {"w1": "alive", "w9": "dead"}
+    assert workers_text(farm.workers()).splitlines()[-1] == "1 alive, 1 dead"
+
+
+def test_why_says_that_the_holder_is_silent_and_when_its_lease_ends(farm: Farm) -> None:
+    d = submit(farm)
+    task = d.dispatch()[0]
+    d.claim(task)
+    farm.registry.heartbeat()
+    (row,) = farm.explain(d.job.job_id, task)
+    assert 0 < row["lease_s"] <= farm.config.lease_s
+    assert "silent_s" not in row
+    farm.ledger.client.zadd(f"{farm.config.prefix}workers", {"w1": farm.ledger.now() - 100})
+    rows = farm.explain(d.job.job_id, task)
+    text = explanation_text(rows)
+    assert "the worker has been silent for 100s" in text
+    assert "then the task is given to another" in text
+
+
+@pytest.mark.parametrize(
+    ("task", "says"),
+    [
+        ("h7/-/geometry", "no such house"),
+        ("h0/7/gl", "no such task"),
+        ("h0/-/geometry", "no log stored"),
+    ],
+)
+def test_logs_says_which_name_is_unknown(farm: Farm, task: str, says: str) -> None:
+    d = submit(farm)
+    d.dispatch()
+    with pytest.raises(BadInput, match=says):
+        farm.logs(d.job.job_id, task)
+
+
+def test_logs_says_which_attempts_have_one(farm: Farm) -> None:
+    d = submit(farm)
+    d.dispatch()
+    farm.store.put(log_key(d.job.job_id, "h0/-/geometry", 2), b"text")
+    with pytest.raises(BadInput, match="of attempts 2"):
+        farm.logs(d.job.job_id, "h0/-/geometry", 1)
+
+
+def test_drain_offers_the_name_that_is_near(farm: Farm) -> None:
+    registry_of(farm, worker="worker-12").heartbeat()
+    with pytest.raises(BadInput, match=r"no such worker \(did you mean worker-12\?\)"):
+        farm.drain("worker12")
