@@ -40,6 +40,7 @@ class Deb:
     version: str
     path: Path  # of the .deb
     sha256: str  # of the .deb
+    note: str = ""  # what is odd about it
 
     def members(self, wanted: Callable[[str], bool]) -> dict[str, bytes]:
         """Path in the package -> bytes of every wanted file; MachineFailed if it is damaged."""
@@ -61,7 +62,7 @@ def cached_deb(package: str, tested_version: str, folder: Path | None = None) ->
     # The tested version goes last, where it is taken.
     debs = sorted((folder or cache_folder()).glob(f"{package}_*.deb"))
     debs.sort(key=lambda p: version_of(p) == tested_version)
-    return _deb(package, debs[-1]) if debs else None
+    return _deb(package, tested_version, debs[-1]) if debs else None
 
 
 def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb:
@@ -91,13 +92,15 @@ def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
             raise MachineFailed(f"apt-get download {package} left no file", hint=_HINT)
         target = folder / debs[0].name
         debs[0].replace(target)
-    return _deb(package, target)
+    return _deb(package, tested_version, target)
 
 
-def _deb(package: str, path: Path) -> Deb:
+def _deb(package: str, tested_version: str, path: Path) -> Deb:
     # Hash a file once a process: a job of many homes asks for its package with each.
-    held = path.stat()
-    return Deb(package, version_of(path), path, _sha256(path, held.st_size, held.st_mtime_ns))
+    held, version, note = path.stat(), version_of(path), ""
+    if version != tested_version:
+        note = f"{package} {version} is not the tested version {tested_version}"
+    return Deb(package, version, path, _sha256(path, held.st_size, held.st_mtime_ns), note)
 
 
 @lru_cache(maxsize=16)

@@ -55,7 +55,4 @@ def _unpacked(deb: Deb) -> FurniturePackage:
         folder.mkdir(exist_ok=True)
         for name, path in place.items():
             write_whole(path, files[f"{FOLDER}/{name}.sh3f"])
-    note = ""
-    if deb.version != TESTED_VERSION:
-        note = f"{PACKAGE} {deb.version} is not the tested version {TESTED_VERSION}"
-    return FurniturePackage(deb.version, deb.sha256, tuple(place.values()), note)
+    return FurniturePackage(deb.version, deb.sha256, tuple(place.values()), deb.note)

@@ -124,7 +124,4 @@ def _unpacked(deb: Deb) -> Package:
         if JAR not in files:
             raise deb.damaged(f"holds no {JAR}")
         write_whole(jar, files[JAR])
-    note = ""
-    if deb.version != TESTED_VERSION:
-        note = f"{PACKAGE} {deb.version} is not the tested version {TESTED_VERSION}"
-    return Package(deb.version, deb.sha256, jar, note)
+    return Package(deb.version, deb.sha256, jar, deb.note)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import shapely
 import trimesh
 from numpy.typing import NDArray
 
@@ -103,6 +104,13 @@ class IndependentLook:
         every = np.broadcast_to(point, (len(self.mesh.faces), 3))
         nearest = trimesh.triangles.closest_point(self.mesh.triangles, every)
         return float(np.linalg.norm(nearest - point, axis=1).min())
+
+    def hold_the_rules_of_place(self, room: Room, camera: Camera, fields: CameraFields) -> None:
+        """Assert that a camera stands in its room, at a height of the recipe, clear of everything."""
+        x, y, z = camera.eye
+        assert shapely.Polygon(room.polygon).contains(shapely.Point(x, z))
+        assert fields.height_min_m <= y - room.floor_y <= fields.height_max_m
+        assert self.clearance(camera.eye) > fields.clearance_m
 
     def pixels(self, camera: Camera) -> dict[int, int]:
         """Instance id -> pixels, from rays through the pixels' centres."""

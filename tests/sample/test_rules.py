@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -32,10 +31,7 @@ def hold_the_rules(house: House, fields: CameraFields, seed: int) -> int:
     objects = {k + 1 for k, item in enumerate(house.items) if not item.kind.is_structure}
     for view in sampling.views:
         room, camera = house.room(view.room_id), view.camera
-        x, y, z = camera.eye
-        assert shapely.Polygon(room.polygon).contains(shapely.Point(x, z))
-        assert fields.height_min_m <= y - room.floor_y <= fields.height_max_m
-        assert look.clearance(camera.eye) > fields.clearance_m
+        look.hold_the_rules_of_place(room, camera, fields)
 
         towards = camera.towards
         assert math.degrees(math.asin(-towards[1])) == pytest.approx(fields.tilt_deg)

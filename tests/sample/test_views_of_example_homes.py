@@ -3,7 +3,6 @@
 import functools
 
 import pytest
-import shapely
 
 from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, Recipe, recipe_from_name
@@ -58,10 +57,7 @@ def test_photos_of_an_example_home_show_furniture_from_where_people_stand() -> N
     }
     for view in sampling.views:
         room, camera = house.room(view.room_id), view.camera
-        x, y, z = camera.eye
-        assert shapely.Polygon(room.polygon).contains(shapely.Point(x, z))
-        assert fields.height_min_m <= y - room.floor_y <= fields.height_max_m
-        assert look.clearance(camera.eye) > fields.clearance_m
+        look.hold_the_rules_of_place(room, camera, fields)
         shown = sum(n for k, n in look.pixels(camera).items() if k in openings)
         n_pixels = camera.intrinsics.width_px * camera.intrinsics.height_px
         assert shown <= (fields.max_opening_fraction + 0.01) * n_pixels

@@ -11,6 +11,7 @@ import pytest
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.store.secret import Secret
 from tests.workers.redis_server import RedisServer
+from tests.workers.small_farm import SmallFarm
 from workers.config import FarmConfig
 from workers.job import JobRules, JobSpec
 from workers.ledger.redis_ledger import RedisLedger
@@ -21,6 +22,18 @@ def redis_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RedisServ
     server = RedisServer(tmp_path_factory.mktemp("redis"))
     server.start()
     yield server
+    server.end()
+
+
+@pytest.fixture
+def farm(tmp_path: Path) -> Iterator[SmallFarm]:
+    """Real processes around a Redis of their own; all of them are ended afterwards."""
+    (tmp_path / "redis").mkdir()
+    server = RedisServer(tmp_path / "redis")
+    server.start()
+    farm = SmallFarm(tmp_path, server)
+    yield farm
+    farm.close()
     server.end()
 
 

@@ -12,7 +12,6 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -22,17 +21,6 @@ from tests.workers.small_farm import SmallFarm
 from tests.workers.test_farm import renderers
 
 pytestmark = pytest.mark.chaos
-
-
-@pytest.fixture
-def farm(tmp_path: Path) -> Iterator[SmallFarm]:
-    (tmp_path / "redis").mkdir()
-    server = RedisServer(tmp_path / "redis")
-    server.start()
-    farm = SmallFarm(tmp_path, server)
-    yield farm
-    farm.close()
-    server.end()
 
 
 def note(fault: str, farm: SmallFarm, repeated: int, seconds: float) -> None:

@@ -10,28 +10,15 @@ import signal
 import subprocess
 import sys
 import uuid
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import SmallFarm, descendants
 from workers.config import config_from_environment
 from workers.logs import NoSecrets
 from workers.node.supervisor import command
-
-
-@pytest.fixture
-def farm(tmp_path: Path) -> Iterator[SmallFarm]:
-    (tmp_path / "redis").mkdir()
-    server = RedisServer(tmp_path / "redis")
-    server.start()
-    farm = SmallFarm(tmp_path, server)
-    yield farm
-    farm.close()
-    server.end()
 
 
 def test_a_job_ends_with_the_same_objects_as_a_single_run(farm: SmallFarm) -> None:
