@@ -7,18 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
-from pbrs_farm.curate.photographs import (
-    NyuMat,
-    Photo,
-    PhotoFiles,
-    pairs_in,
-    photo_from_pair,
-    sha256_of_files,
-)
+from pbrs_farm.curate.photographs import NyuMat, Photo, pairs_in, photo_from_pair, sha256_of_files
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.selection.depth_photographs import registration_border
 from pbrs_farm.selection.histograms import Histogram, histogram
@@ -60,16 +54,12 @@ def build_reference(
             digest = sha256_of_files([source])
     else:
         pairs = pairs_in(source)
-        counted = _counted(_photos(pairs, options), settings, options)
+        read = partial(photo_from_pair, depth_scale=options.depth_scale, sun_rgbd=options.sun_rgbd)
+        counted = _counted(map(read, pairs), settings, options)
         digest = sha256_of_files([path for pair in pairs for path in (pair.rgb, pair.depth)])
     return reference_from_histograms(
         list(counted), list(counted.values()), settings, selection, source=(source.name, digest)
     )
-
-
-def _photos(pairs: tuple[PhotoFiles, ...], options: PhotoOptions) -> Iterator[Photo]:
-    for pair in pairs:
-        yield photo_from_pair(pair, depth_scale=options.depth_scale, sun_rgbd=options.sun_rgbd)
 
 
 def _counted(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import platform
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Final
 
@@ -224,14 +225,6 @@ def _missed(cached: CachedHouse, camera: Camera) -> NDArray[np.bool_]:
     return np.asarray(cached.caster.item_buffer(camera) == 0)[..., None]
 
 
-def _opengl_dl(work: Work) -> StepOutput:
-    return _opengl(work, "opengl_dl")
-
-
-def _opengl_il(work: Work) -> StepOutput:
-    return _opengl(work, "opengl_il")
-
-
 def _light(work: Work) -> StepOutput:
     """radiance.exr: both light groups (and each lamp) as linear images, with the denoiser's guides."""
     from pbrs_farm.transport.lamp_layers import layer_name
@@ -373,8 +366,8 @@ _FUNCTIONS: Final[Mapping[str, Callable[[Work], StepOutput]]] = {
     "house": _house,
     "cameras": _cameras,
     "truth": _truth,
-    "opengl_dl": _opengl_dl,
-    "opengl_il": _opengl_il,
+    "opengl_dl": partial(_opengl, mode="opengl_dl"),
+    "opengl_il": partial(_opengl, mode="opengl_il"),
     "illuminance": _illuminance,
     "light": _light,
     "develop": _develop,

@@ -77,7 +77,8 @@ def _merged(
     store: Store, own: set[str], new: Iterator[tuple[str, bytes | None]]
 ) -> Iterator[tuple[str, bytes | None]]:
     """The job's rows and those of other houses of the root, by house, one house at a time."""
-    old = ((house, part) for house, part in _old_rows(store) if house not in own)
+    rows = lines_by_house(_get(store, keys.MANIFEST) or b"")
+    old = ((house, part) for house, part in rows if house not in own)
     return heapq.merge(old, new, key=lambda row: row[0])
 
 
@@ -104,10 +105,6 @@ def _new_rows(
         found = dict(lines_by_house(merged)) if merged is not None else {}
         for house in members:
             yield house, found.get(house) or _manifest(store, house)
-
-
-def _old_rows(store: Store) -> Iterator[tuple[str, bytes]]:
-    yield from lines_by_house(_get(store, keys.MANIFEST) or b"")
 
 
 def _manifest(store: Store, house: str) -> bytes | None:

@@ -275,7 +275,9 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
     # Take floor and ceiling, an item each, where the node does not hide them.
     parts = (("Floor", "f", ItemKind.FLOOR), ("Ceiling", "c", ItemKind.CEILING))
     for hidden, part, kind in parts:
-        surfaces = [] if hidden in node.hidden else _part(context, node, part)
+        if hidden in node.hidden:
+            continue
+        surfaces = room_surfaces(context, node, part, default_walls=False)
         if surfaces:
             yield _structure(node, room_id, part, kind, tuple(s for _, s in surfaces))
     # The inside and outside slabs of one wall share its number, so they are one item.
@@ -286,10 +288,6 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
             walls.setdefault(found[1] if found else "", []).append(surface)
     for number, parts_of_wall in walls.items():
         yield _structure(node, room_id, f"w{number}", ItemKind.WALL, tuple(parts_of_wall))
-
-
-def _part(context: ReaderContext, node: Node, part: str) -> list[tuple[str, Surface]]:
-    return room_surfaces(context, node, part, default_walls=False)
 
 
 def _structure(

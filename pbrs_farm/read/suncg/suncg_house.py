@@ -42,10 +42,6 @@ _STOREY_M: Final = 2.7
 _FLOOR_SLAB_M: Final = 0.05
 
 
-def _is_id(name: str) -> bool:
-    return _HOUSE_ID.fullmatch(name) is not None
-
-
 def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     """The house ROOT/house/<house_id>/house.json with the rooms, models and tables of its root.
 
@@ -54,7 +50,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     root without its `room` archive.
     """
     # Read house.json below the root; the id becomes part of paths.
-    if not _is_id(house_id):
+    if not _HOUSE_ID.fullmatch(house_id):
         raise BadHouse(root, "house", f"{house_id[:80]!r} is no house id")
     folder = RootFolder(root)
     file = f"house/{house_id}/house.json"
