@@ -93,6 +93,7 @@ class FarmConfig:
     window_per_slot: int = _least(4, 1)  # tasks in flight per stage and slot
     window_min: int = _least(128, 1)  # tasks in flight per stage, at least
     resend_s: float = _above(60.0)  # a message unclaimed for so long may be lost
+    webhook: Secret = field(default_factory=lambda: Secret(""))  # told when a job ends or pauses
     metrics_port: int = _least(0, 0)  # of the coordinator's Prometheus endpoint, 0 = off
     limits: Limits = field(default_factory=Limits)
 
@@ -133,6 +134,7 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
         redis_url=Secret(_with_password(settings.redis_url.reveal(), password)),
         store_url=env.get("PBRS_STORE", ""),
         store=settings.store,
+        webhook=Secret(value_or_file(env, "PBRS_WEBHOOK")),
         limits=Limits(**_read(Limits, of_limits, limits)),
     )
 
@@ -148,7 +150,7 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
 # Settings that had another name once -> their field.
 _FORMER_NAMES: Final = {"beat_s": "heartbeat_s", "forgive_s": "cooldown_s"}
 # Fields that other variables set.
-_ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits"}
+_ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits", "webhook"}
 
 
 def _read(cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str) -> dict[str, Any]:

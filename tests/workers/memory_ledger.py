@@ -131,6 +131,9 @@ class MemoryLedger:
         counts = Counter(f"{task.rpartition('/')[2]}:q" for task in self.queued)
         return JobView(job, self.fields, counts, {}, 0)
 
+    def set_told(self, job: str, outcome: str) -> None:
+        self.fields["told"] = outcome
+
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
         self.fields["rates"] = ",".join(rates)
 

@@ -35,6 +35,7 @@ _REDIS_AWAY_S: Final = 2.0
 _REAP_EVERY_S: Final = 5.0
 _RESEND_EVERY_S: Final = 15.0
 _RATES_EVERY_S: Final = 10.0
+_NOTICE_EVERY_S: Final = 10.0
 
 
 Send = Callable[[Iterable[tuple[str, str, str, str]]], None]
@@ -44,6 +45,7 @@ class Coordinator:
     """Leads the farm, or stands by until the leader is gone.
 
     send: puts messages on queues, each (queue, job, task, recipe digest). clock: monotonic, s.
+    notice: called now and then while it leads; tells others of jobs that ended.
     """
 
     def __init__(
@@ -53,12 +55,14 @@ class Coordinator:
         send: Send,
         *,
         registry: WorkerRegistry,
+        notice: Callable[[], None] = lambda: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._config = config
         self._ledger = ledger
         self._registry = registry
         self._send = send
+        self._notice = notice
         self._clock = clock
         self._token = f"{platform.node()}:{os.getpid()}:{secrets.token_hex(4)}"
         self._due: dict[str, float] = {}  # duty -> when it is due next
@@ -105,6 +109,8 @@ class Coordinator:
         if self._is_due("rates", _RATES_EVERY_S):
             for view in views:
                 self._ledger.set_rates(view.job_id, self._rates.update(view, self._clock()))
+        if self._is_due("notice", _NOTICE_EVERY_S):
+            self._notice()
         # While storage is unhealthy nothing is sent: it could only fail.
         if self._registry.breaker():
             return 0
@@ -202,6 +208,15 @@ def celery_sender(app: Any) -> Send:
     return send
 
 
+def _notice(config: FarmConfig, ledger: RedisLedger) -> Callable[[], None]:
+    """What tells the configured webhook; nothing where there is none."""
+    if not config.webhook.reveal():
+        return lambda: None
+    from workers.coordinator.webhook import Webhook, poster, watch_jobs
+
+    return watch_jobs(Webhook(ledger, poster(config.webhook)), ledger)
+
+
 def main() -> int:
     """`python -m workers.coordinator.leader`: lead, or stand by, until told to leave."""
     from workers.queue.celery_app import make_app
@@ -211,6 +226,7 @@ def main() -> int:
         config = config_from_environment()
         ledger = RedisLedger(config)
         ledger.ping()
+        notice = _notice(config, ledger)
     except PbrsError as error:
         sys.stderr.write(f"pbrs-farm: {error}\n")
         return 1
@@ -222,7 +238,7 @@ def main() -> int:
 
         serve_metrics(config, ledger)
     send = celery_sender(make_app(config))
-    Coordinator(config, ledger, send, registry=Registry(ledger)).run(stop)
+    Coordinator(config, ledger, send, registry=Registry(ledger), notice=notice).run(stop)
     return 0
 
 

@@ -17,10 +17,10 @@ from prometheus_client.core import (
 )
 
 from workers.config import FarmConfig
-from workers.coordinator.progress_rates import durations
+from workers.coordinator.progress_rates import durations, stage_views, views_per_hour
 from workers.ids import QUEUES, STAGES
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.task_ledger import ALIVE_S, STATES, JobView, LedgerUnavailable
+from workers.ledger.task_ledger import ALIVE_S, STATES, JobView, LedgerUnavailable, WorkerView
 from workers.ledger.worker_registry import Registry
 
 
@@ -52,7 +52,9 @@ class FarmCollector:
         for stage, n in self._registry.slots().items():
             slots.add_metric([stage], n)
         yield slots
-        alive = sum(w.age_s <= ALIVE_S for w in self._registry.workers())
+        workers = self._registry.workers()
+        yield from _workers(workers)
+        alive = sum(w.age_s <= ALIVE_S for w in workers)
         yield GaugeMetricFamily("pbrs_workers", f"workers seen in {ALIVE_S:.0f} s", value=alive)
         # Storage and Redis, without which nothing moves.
         is_open = bool(self._registry.breaker())
@@ -63,10 +65,37 @@ class FarmCollector:
     def _jobs(self) -> Iterator[Metric]:
         views = [v for j in self._ledger.active_jobs() if (v := self._ledger.view(j)) is not None]
         yield from (_tasks(views), _done(views), _faults(views), _houses(views), _seconds(views))
+        yield from self._progress(views)
         expired = CounterMetricFamily("pbrs_leases_expired", "leases that ran out", labels=["job"])
         for view in views:
             expired.add_metric([view.job_id], view.counts.get("expired", 0))
         yield expired
+
+    def _progress(self, views: list[JobView]) -> Iterator[Metric]:
+        """Views an hour and time left, as `status` tells them."""
+        slots = self._registry.slots()
+        rate = GaugeMetricFamily("pbrs_views_per_hour", "views finished an hour", labels=["job"])
+        left = GaugeMetricFamily("pbrs_eta_seconds", "time a job will take yet", labels=["job"])
+        paused = GaugeMetricFamily("pbrs_job_paused", "1 while a job is paused", labels=["job"])
+        for view in views:
+            rate.add_metric([view.job_id], views_per_hour(view))
+            etas = [s.eta_s for s in stage_views(view, slots) if s.eta_s is not None]
+            if etas:
+                left.add_metric([view.job_id], max(etas))
+            paused.add_metric([view.job_id], view.state == "paused")
+        yield from (rate, left, paused)
+
+
+def _workers(workers: list[WorkerView]) -> Iterator[Metric]:
+    """A row per worker seen in the last hour."""
+    age = GaugeMetricFamily("pbrs_worker_silence_seconds", "since its heartbeat", labels=["worker"])
+    slots = GaugeMetricFamily(
+        "pbrs_worker_slots", "tasks it runs at once", labels=["worker", "state"]
+    )
+    for worker in workers:
+        age.add_metric([worker.name], worker.age_s)
+        slots.add_metric([worker.name, worker.state], float(worker.fields.get("slots", 0)))
+    yield from (age, slots)
 
 
 def _tasks(views: list[JobView]) -> Metric:

@@ -58,6 +58,14 @@ class StageView:
     eta_s: float | None  # None while nothing is known
 
 
+def views_per_hour(view: JobView) -> float:
+    """Views finished an hour: the rate of the last stage of batches times the views of a batch."""
+    last = view.fields.get("stages", "").rpartition(",")[2]
+    n_batches = view.counts.get(f"done:{last}", 0.0)
+    per_batch = view.counts.get("views", 0.0) / n_batches if n_batches else 0.0
+    return 3600 * per_batch * view.rates.get(last, 0.0)
+
+
 def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
     """The stages of a job: counts, rate, and an ETA from the rate or, at first, from p50."""
     return [

@@ -253,6 +253,13 @@ class RedisLedger:
             with self.errors():
                 self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
 
+    def set_told(self, job: str, outcome: str) -> None:
+        """Keep which end or pause of the job the webhook was told, "" for none."""
+        with self.errors():
+            # A job that was forgotten meanwhile stays so.
+            if self.client.exists(f"{self._p(job)}job"):
+                self.client.hset(f"{self._p(job)}job", "told", outcome)
+
     def wait(self, seconds: float) -> None:
         """Wait so long at most, less when a task becomes ready meanwhile."""
         with self.errors():

@@ -146,8 +146,10 @@ def test_the_metrics_endpoint_counts_without_naming_houses(farm: Farm) -> None:
     assert f"pbrs_task_seconds_count{labels} 1.0" in text
     assert "pbrs_up 1.0" in text
     assert "h0" not in text
-    board = (Path(__file__).parents[3] / "deploy/grafana-dashboard.json").read_text()
-    asked = set(re.findall(r"pbrs_[a-z_]+", board)) - {"pbrs_farm"}
+    deploy = Path(__file__).parents[3] / "deploy"
+    files = ("grafana-dashboard.json", "prometheus-alerts.yaml")
+    shown = "".join((deploy / name).read_text() for name in files)
+    asked = set(re.findall(r"pbrs_[a-z_]+", shown)) - {"pbrs_farm"}
     told = set(re.findall(r"^# TYPE (pbrs_[a-z_]+)", text, re.MULTILINE)) | {
         "pbrs_task_seconds_bucket"
     }
