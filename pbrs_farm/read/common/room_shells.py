@@ -53,7 +53,9 @@ def room_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]:
         return (item,)
     # Take the connected shells that look inward, else closed ones that look outward.
     shell_of_face = _components(corners)
-    shells = [shell_of_face == k for k in range(int(shell_of_face.max()) + 1)]
+    bounds = _bounds_of_shells(corners, shell_of_face)
+    large = np.flatnonzero(_is_large(bounds[:, 0], bounds[:, 1]))  # a plant has 60,000 leaves
+    shells = [shell_of_face == k for k in large]
     facing = [_facing(corners[faces], others) for faces in shells]
     sign = min((f for f in facing if f), default=0)
     rooms = [faces for faces, f in zip(shells, facing, strict=True) if sign and f == sign]
@@ -63,7 +65,7 @@ def room_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]:
     if not rooms:
         return (item,)
     shown = np.any(rooms, axis=0)
-    rest = ~shown & ~_encloses(corners, shell_of_face, shown)
+    rest = ~shown & ~_encloses(corners, bounds, shown)[shell_of_face]
     parts = _parts(_turned(item, shown) if sign > 0 else item, shown)
     # Leave walls that stand around a room and are nothing else as they are.
     if sign < 0 and {p.kind for p in parts} == {item.kind}:
@@ -92,9 +94,7 @@ def _components(corners: NDArray[np.float64]) -> NDArray[np.int64]:
 def _facing(corners: NDArray[np.float64], others: NDArray[np.float64]) -> int:
     """-1: the faces show a room from inside; 1: they would if they were turned; 0: no room."""
     low, high = corners.min((0, 1)), corners.max((0, 1))
-    width = (high - low)[[0, 2]]
-    fits = high[1] - low[1] >= _LEAST_HEIGHT_M and width.min() >= _LEAST_SIDE_M
-    if not fits or width.max() > _LARGEST_SIDE_M:
+    if not _is_large(low, high):
         return 0
     # A room is made of level and upright faces.
     areas = face_areas(corners)
@@ -110,17 +110,31 @@ def _facing(corners: NDArray[np.float64], others: NDArray[np.float64]) -> int:
     return int(thickness_m > _THICKER_THAN_BLOCKS_M and is_closed and bool(inside.any()))
 
 
+def _is_large(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether bounds (..., 3) are those of a room: neither too small nor a sky."""
+    size = high - low
+    side = size[..., [0, 2]]
+    fits = (size[..., 1] >= _LEAST_HEIGHT_M) & (side.min(-1) >= _LEAST_SIDE_M)
+    return np.asarray(fits & (side.max(-1) <= _LARGEST_SIDE_M))
+
+
+def _bounds_of_shells(
+    corners: NDArray[np.float64], shell_of_face: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(S, 2, 3) lowest and highest corner of each shell."""
+    order = np.argsort(shell_of_face, kind="stable")
+    starts = np.searchsorted(shell_of_face[order], np.arange(int(shell_of_face.max()) + 1))
+    low = np.minimum.reduceat(corners.min(1)[order], starts)
+    high = np.maximum.reduceat(corners.max(1)[order], starts)
+    return np.stack([low, high], 1)
+
+
 def _encloses(
-    corners: NDArray[np.float64], shell_of_face: NDArray[np.int64], shown: NDArray[np.bool_]
+    corners: NDArray[np.float64], bounds: NDArray[np.float64], shown: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """(F,) faces of a shell whose box holds all that is shown: a hollow block's outer side."""
+    """(S,) shells whose box holds all that is shown: a hollow block's outer side."""
     low, high = corners[shown].min((0, 1)), corners[shown].max((0, 1))
-    found = np.zeros(len(corners), np.bool_)
-    for shell in np.unique(shell_of_face[~shown]):
-        faces = shell_of_face == shell
-        here = corners[faces]
-        found |= faces & bool((here.min((0, 1)) < low).all() and (here.max((0, 1)) > high).all())
-    return found
+    return np.asarray((bounds[:, 0] < low).all(1) & (bounds[:, 1] > high).all(1))
 
 
 def _split(item: Item, chosen: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:

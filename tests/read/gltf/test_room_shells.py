@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -156,3 +158,19 @@ def test_repair_makes_no_block_of_a_shell_that_looks_inward() -> None:
     )
     assert shells_from_item(inward, 0, TagTable()) is None
     assert shells_from_item(outward, 0, TagTable()) is not None
+
+
+def test_a_plant_of_many_loose_leaves_takes_little_memory() -> None:
+    scene = one_mesh("Room")
+    rng = np.random.default_rng(0)
+    leaves = rng.uniform((1, 0, 1), (2, 2, 2), (10_000, 1, 3)) + rng.uniform(
+        0, 0.02, (10_000, 4, 3)
+    )
+    scene.node("Object_7", mesh=scene.mesh(leaves.tolist()))
+    data = scene.glb()
+    tracemalloc.start()
+    house = read_gltf(data, "plant.glb", fields=ReadFields())
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 100e6
+    assert len(house.rooms) == 1
