@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, LightPart, Material, MaterialKind, Opening, Room
 from pbrs_farm.core.lighting import flux_lm
 from pbrs_farm.repair.lamps.ceiling_lamp import (
@@ -50,15 +51,17 @@ def with_room_lighting(
     areas = [plan.polygon_of_room(r.polygon) for r in house.rooms]
     glazed = {i.id for i in house.items if _has_pane(i, house.materials)}
     lamps = [i for i in house.items if any(_shines(light) for light in i.lights)]
+    boxes = _plan_boxes(house.items)
     for room, area in zip(house.rooms, areas, strict=True):
         lit_by = []
+        here = _items_near(house, boxes, area)
         own_lm = sum(_flux_in(lamp, room, area) for lamp in lamps)
         wanted_lm = flux_for_floor(area.area, lamp_lx)
         if own_lm > 0:
             lit_by.append("lamps")
         if any(_opens_on(o, room, area, glazed) for o in house.openings):
             lit_by.append("windows")
-        if not room.has_ceiling and _sees_sky(house, room, area):
+        if not room.has_ceiling and _sees_sky(here, room, area):
             lit_by.append("sky")
         # Hang a light where neither lamp nor daylight reaches, and where people live without one.
         tag = ""
@@ -69,7 +72,7 @@ def with_room_lighting(
         if tag:
             lit_by.append(tag)
             rest_lm = max(wanted_lm - own_lm, 0.0)
-            lights.append(ceiling_lamp(house, room, len(house.materials), tag, rest_lm))
+            lights.append(ceiling_lamp(here, room, len(house.materials), tag, rest_lm))
             given[tag].append(room.id)
         rooms.append(replace(room, lit_by=tuple(lit_by)))
     materials = house.materials
@@ -77,6 +80,23 @@ def with_room_lighting(
         materials = (*materials, Material("fallback_bulb", kind=MaterialKind.BULB))
     lighted = replace(house, rooms=tuple(rooms), items=(*house.items, *lights), materials=materials)
     return lighted, GivenLights(tuple(given[FALLBACK]), tuple(given[ADDED_LAMP]))
+
+
+def _plan_boxes(items: Sequence[Item]) -> F64:
+    """(N, 2, 2) bounds in plan, as much larger as a turned box may be; NaN of an item without faces."""
+    found = np.full((len(items), 2, 2), np.nan)
+    for k, item in enumerate(items):
+        if item.n_faces:
+            low, high = item.bounds[:, [0, 2]]
+            found[k] = low - (high - low).max(), high + (high - low).max()
+    return found
+
+
+def _items_near(house: House, boxes: F64, area: plan.Shape) -> House:
+    """The house with the items alone that may reach over a room's area."""
+    x0, z0, x1, z1 = area.bounds if area.area > 0 else (np.nan,) * 4
+    meets = (boxes[:, 0] <= [x1, z1]).all(1) & (boxes[:, 1] >= [x0, z0]).all(1)
+    return house.with_items([house.items[k] for k in np.flatnonzero(meets)])
 
 
 def _sees_sky(house: House, room: Room, area: plan.Shape) -> bool:

@@ -106,7 +106,8 @@ def _open_sides(
     ceiling = _ceiling_at(points, room, covers)
     bare = ~_walled(points + 0.01 * outward, floor, ceiling, walls)
     linked = []
-    for j, other in enumerate(rooms):
+    for j in plan.near_to(areas[i], range(len(rooms)), areas.__getitem__, 2 * max(_PROBES_M)):
+        other = rooms[j]
         if (
             j == i
             or other.floor_y > room.ceiling_y - GAP_M
@@ -149,8 +150,8 @@ def _ceiling_at(points: F64, room: Room, covers: Sequence[Cover]) -> F64:
     # Take the lowest ceiling above each point that belongs to this room's height.
     y = np.full(len(points), room.ceiling_y)
     own = plan.polygon_of_room(room.polygon)
-    for cover in covers:
-        if not cover.is_ceiling or not shapely.intersects(cover.area, own):
+    for cover in plan.near_to(own, covers, lambda c: c.area, 0.0):
+        if not cover.is_ceiling:
             continue
         heights = cover.plane.at(points)
         inside = shapely.contains_xy(plan.grown(cover.area, 0.01), points[:, 0], points[:, 1])
@@ -162,7 +163,8 @@ def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> NDArray[
     """Whether walls stand at each point from low to high, gaps up to GAP_M aside."""
     reached = low + 2 * GAP_M  # a wall may begin a little above the floor
     spans = []
-    for wall in walls:
+    around: plan.Shape = shapely.MultiPoint(points).envelope
+    for wall in plan.near_to(around, walls, lambda w: w.footprint, 4 * GAP_M):
         inside = shapely.contains_xy(plan.grown(wall.footprint, GAP_M), points[:, 0], points[:, 1])
         if inside.any():
             spans.append((inside, wall.bottom_y, wall.top.at(points)))
@@ -183,7 +185,8 @@ def _open_above_or_below(
 ) -> tuple[list[int], str]:
     """Rooms that room i opens into upwards (or downwards), and why it has no cover there, or ""."""
     # Take away what covers the room, then what opens into the next storey.
-    near = _covers_of(rooms[i], covers, above=above)
+    beside = plan.near_to(areas[i], covers, lambda c: c.area, 2 * GAP_M)
+    near = _covers_of(rooms[i], beside, above=above)
     bare = plan.without(areas[i], *(plan.grown(a, GAP_M) for a in near))
     linked = []
     for j in _storey_next(rooms[i], rooms, above=above):

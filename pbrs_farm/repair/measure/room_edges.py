@@ -14,6 +14,7 @@ from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of
 from pbrs_farm.repair.structure.walls import Wall
 
+_BESIDE_M = 0.1  # what stands farther from a room bounds nothing of it
 _SLIVER_M = 0.02  # narrower parts of a room hold no starts
 
 
@@ -38,15 +39,16 @@ def interiors_of_room(
     room: Room, uprights: Sequence[Wall], surfaces: Sequence[PlanarSurface]
 ) -> list[RoomInterior]:
     """Between the walls, above the floor, a part below each plane of the ceiling."""
+    outline = plan.polygon_of_room(room.polygon)
     near = [
-        # Take the walls that stand at the height of this room.
+        # Take the walls that stand at the height of this room, in it or beside it.
         w
-        for w in uprights
+        for w in plan.near_to(outline, uprights, lambda w: w.footprint, _BESIDE_M)
         if w.bottom_y < room.ceiling_y - 0.1 and w.high_y > room.floor_y + 0.01
     ]
     walls = plan.union(w.footprint for w in near if not w.is_board)
     boards = [w for w in near if w.is_board]
-    area = plan.without(plan.polygon_of_room(room.polygon), walls)
+    area = plan.without(outline, walls)
     foot = plan.union(w.footprint for w in boards)
     foot_m = max(
         (w.high_y - room.floor_y for w in boards if w.footprint.distance(area) < 0.05), default=0.0

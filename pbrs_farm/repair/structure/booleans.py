@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import manifold3d
@@ -173,11 +174,13 @@ def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
     triangles = np.asarray(mesh.tri_verts, np.int64)
     tags, tag_of_face = _tags_of_faces(mesh, table)
     vertices, triangles, tag_of_face = without_slivers(vertices, triangles, tag_of_face)
+    # Collect the faces of each tag, in their order, with the vertices they use.
+    order = np.argsort(tag_of_face, kind="stable")
+    starts = np.searchsorted(tag_of_face[order], np.arange(len(tags) + 1))
     found = [
-        # Collect the faces of each tag with the vertices they use.
-        _compact(tag, vertices, triangles[tag_of_face == k])
-        for k, tag in enumerate(tags)
-        if (tag_of_face == k).any()
+        _compact(tag, vertices, triangles[order[a:b]])
+        for tag, (a, b) in zip(tags, pairwise(starts), strict=True)
+        if a < b
     ]
     return sorted(found, key=lambda p: (p.tag.item, p.tag.surface, p.tag.material))
 

@@ -121,9 +121,7 @@ def joints_with_surface(
     depth_m = 0.5 * thickness_m
     away = 1.0 if surface.is_ceiling else -1.0  # out of the room
     found = []
-    for wall in walls:
-        if wall.footprint.distance(footprint) > 0:
-            continue
+    for wall in plan.near_to(footprint, walls, lambda w: w.footprint, 0.0):
         area = plan.common(plan.grown(wall.footprint, -_RECESS_M), footprint)
         if not surface.is_ceiling:
             area = plan.without(area, doors)

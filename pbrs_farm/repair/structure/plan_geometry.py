@@ -5,7 +5,8 @@ Plan points are (x, z) in metres, as Room.polygon.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -14,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64, Points2
 
+T = TypeVar("T")
 Shape = BaseGeometry
 """A plan area: a polygon, several, or none."""
 
@@ -74,6 +76,17 @@ def without(shape: Shape, *others: Shape) -> Shape:
         if not shapely.is_empty(other):
             shape = _areal(shapely.difference(shape, other, grid_size=GRID_M))
     return shape
+
+
+def near_to(
+    shape: Shape, things: Sequence[T], area: Callable[[T], Shape], within_m: float
+) -> list[T]:
+    """The things whose plan area comes within within_m of shape, in order."""
+    areas = np.array([area(x) for x in things], object)
+    if not len(areas):
+        return []
+    shapely.prepare(shape)
+    return [things[k] for k in np.flatnonzero(shapely.dwithin(shape, areas, within_m)).tolist()]
 
 
 def common(a: Shape, b: Shape) -> Shape:

@@ -12,7 +12,7 @@ from manifold3d import Manifold
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import Tag, TagTable, bounds, overlap_of_bounds, reduced
+from pbrs_farm.repair.structure.booleans import Tag, TagTable, bounds, reduced
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.slabs import SAME_HEIGHT_M
@@ -38,10 +38,11 @@ def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -
     What they cut ends inside walls, floor and ceiling, flush with none of them.
     """
     margin = _margin(rooms)
+    spans = _height_spans(surfaces)
     found = []
     for room in rooms:
         area = plan.polygon_of_room(room.polygon)
-        own = frozenset(s.item for s in surfaces if _bounds_room(s, room))
+        own = frozenset(s.item for s in _bounding(room, surfaces, spans))
         # Stand a part below each plane of the ceiling, one below the nominal height elsewhere.
         ceilings = [s for s in surfaces if s.is_ceiling and s.room_id == room.id]
         floor = level_plane(room.floor_y - margin)
@@ -54,13 +55,18 @@ def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -
     return found
 
 
-def _bounds_room(surface: PlanarSurface, room: Room) -> bool:
+def _height_spans(surfaces: Sequence[PlanarSurface]) -> F64:
+    """(N, 2) lowest and highest y of each surface."""
+    heights = [s.plane.at(shapely.get_coordinates(s.area)) for s in surfaces]
+    return np.array([(y.min(), y.max()) for y in heights]).reshape(-1, 2)
+
+
+def _bounding(room: Room, surfaces: Sequence[PlanarSurface], spans: F64) -> list[PlanarSurface]:
     # Count what lies at the room's own height: slabs.visible_areas settles it in plan.
-    if surface.room_id == room.id:
-        return True
-    nominal = room.ceiling_y if surface.is_ceiling else room.floor_y
-    heights = surface.plane.at(shapely.get_coordinates(surface.area))
-    return bool(np.abs(heights - nominal).max() < SAME_HEIGHT_M)
+    is_ceiling = np.array([s.is_ceiling for s in surfaces], np.bool_)
+    nominal = np.where(is_ceiling, room.ceiling_y, room.floor_y)[:, None]
+    is_level = np.abs(spans - nominal).max(1, initial=0.0) < SAME_HEIGHT_M
+    return [s for s, level in zip(surfaces, is_level, strict=True) if level or s.room_id == room.id]
 
 
 def _margin(rooms: Sequence[Room]) -> float:
@@ -89,10 +95,16 @@ def without_volumes(
     New faces get tag.
     """
     cutters = []
-    for volume in volumes:
-        overlap = overlap_of_bounds(bounds(solid), volume.bounds)
-        if item in volume.items or (overlap < _TOUCH_M).any():
+    for volume in _overlapping(bounds(solid), volumes):
+        if item in volume.items:
             continue
         # Cut with the volume, its faces tagged as the solid's own.
         cutters += solid_prisms([volume.area], volume.low, volume.high, (tag,) * 3, table)
     return reduced(solid, cutters)
+
+
+def _overlapping(box: F64, volumes: Sequence[RoomVolume]) -> list[RoomVolume]:
+    # Compare all bounds at once: a house has hundreds of joints and rooms.
+    boxes = np.array([v.bounds for v in volumes]).reshape(-1, 2, 3)
+    overlap = np.minimum(box[1], boxes[:, 1]) - np.maximum(box[0], boxes[:, 0])
+    return [volumes[k] for k in np.flatnonzero((overlap >= _TOUCH_M).all(1)).tolist()]

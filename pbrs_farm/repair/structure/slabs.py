@@ -42,22 +42,23 @@ def footprints_of_surfaces(
     footprints = []
     for surface in surfaces:
         # Close the gaps between neighbours at this height and the walls between them.
-        mates = [s.area for s in surfaces if _beside(surface, s)]
-        feet = [w.footprint for w in walls if _meets(surface, w)]
+        others = plan.near_to(surface.area, surfaces, lambda s: s.area, 1.0)
+        mates = [s.area for s in others if _beside(surface, s)]
+        near = plan.near_to(surface.area, walls, lambda w: w.footprint, 1.0)
+        feet = [w.footprint for w in near if _meets(surface, w)]
         whole = plan.closed(plan.union([*mates, *feet]), 2 * GAP_M)
         # Grow into walls, and for a floor through the thresholds of its doors.
         reach = plan.grown(surface.area, thickness_m)
         if not surface.is_ceiling:
             doors = plan.common(thresholds, plan.grown(surface.area, 1.0))
-            near = [d for d in polygons_of(doors) if d.distance(surface.area) < GAP_M]
-            reach = plan.union([reach, *near])
+            ways = [d for d in polygons_of(doors) if d.distance(surface.area) < GAP_M]
+            reach = plan.union([reach, *ways])
         footprints.append(plan.union([surface.area, plan.common(reach, whole)]))
     return footprints
 
 
 def _beside(a: PlanarSurface, b: PlanarSurface) -> bool:
-    near = a.is_ceiling == b.is_ceiling and a.area.distance(b.area) < 1.0
-    if not near:
+    if a.is_ceiling != b.is_ceiling:
         return False
     # Compare heights in the middle of the other one.
     middle = shapely.get_coordinates(b.area).mean(0)[None]
@@ -65,9 +66,7 @@ def _beside(a: PlanarSurface, b: PlanarSurface) -> bool:
 
 
 def _meets(surface: PlanarSurface, wall: Wall) -> bool:
-    # Ask whether the wall comes within GAP_M of the surface's plane where both are near in plan.
-    if wall.footprint.distance(surface.area) > 1.0:
-        return False
+    # Ask whether the wall comes within GAP_M of the surface's plane.
     corners = shapely.get_coordinates(wall.footprint)
     heights = surface.plane.at(corners)
     return bool((wall.bottom_y - GAP_M <= heights).any() and (heights <= wall.top.at(corners) + GAP_M).any())  # fmt: skip
@@ -82,7 +81,8 @@ def visible_areas(
     """
     own = []
     for i, surface in enumerate(surfaces):
-        same = [j for j, s in enumerate(surfaces) if j != i and _same_height(surface, s)]
+        near = plan.near_to(surface.area, range(len(surfaces)), lambda j: surfaces[j].area, 1.0)
+        same = [j for j in near if j != i and _same_height(surface, surfaces[j])]
         # Show the own area, save where a later surface lies.
         mine = plan.without(surface.area, *(surfaces[j].area for j in same if j > i))
         # Show the ring under the walls, save where an earlier footprint lies.
@@ -93,7 +93,7 @@ def visible_areas(
 
 
 def _same_height(a: PlanarSurface, b: PlanarSurface) -> bool:
-    if a.is_ceiling != b.is_ceiling or a.area.distance(b.area) > 1.0:
+    if a.is_ceiling != b.is_ceiling:
         return False
     corners = shapely.get_coordinates(b.area)
     return bool(abs(a.plane.at(corners) - b.plane.at(corners)).min() < SAME_HEIGHT_M)
