@@ -76,10 +76,16 @@ def floor_polygons(
     between = shapely.difference(between, _outline(_facing(walls, -1)))
     pieces = shapely.get_parts(shapely.difference(between, _traces(walls)))
     # Keep pieces that are large and wide enough; give back what the strips took.
-    fit = [p for p in pieces if p.area >= min_area_m2 and not p.buffer(-min_width_m / 2).is_empty]
+    narrow = shapely.is_empty(_grown(pieces, -min_width_m / 2))
+    fit = pieces[(shapely.area(pieces) >= min_area_m2) & ~narrow].tolist()
     fit.sort(key=lambda p: (-p.area, p.bounds))
-    found = [polygon_of(p.buffer(_TRACE_M, join_style="mitre")) for p in fit]
+    found = [polygon_of(p) for p in _grown(fit, _TRACE_M)]
     return [p for p in found if p is not None]
+
+
+def _grown(areas: Any, by_m: float) -> Any:
+    with np.errstate(invalid="ignore"):  # GEOS sets a flag that means nothing
+        return shapely.buffer(areas, by_m, join_style="mitre")
 
 
 def _traces(walls: Sequence[Surface]) -> Any:

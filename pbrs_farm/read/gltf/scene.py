@@ -17,6 +17,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Room, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.room_bounds import check_rooms
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.gltf.document import Fetch, gltf_document
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
@@ -93,6 +94,7 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
         raise BadHouse(name, "scene", "has no floor", hint=hint)
     # Sort rooms into levels and items into rooms.
     levels, numbered = levels_of(rooms)
+    check_rooms(numbered, name)
     items = [_placed(item, levels, numbered) for item in items]
     sha256 = keys.sha256(data)
     copyright_line = gltf.document["asset"].get("copyright", "")

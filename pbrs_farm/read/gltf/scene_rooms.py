@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Level, Room, Surface
 from pbrs_farm.formats.serialise import json_from_bytes
+from pbrs_farm.read.common.room_bounds import MAX_ROOMS, check_number
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,
     coverage,
@@ -27,7 +28,6 @@ from pbrs_farm.read.common.room_floors import (
 
 MIN_ROOM_M2: Final = 1.0  # smaller pieces of floor are gaps under doors and walls
 MIN_ROOM_WIDTH_M: Final = 0.5
-MAX_ROOMS: Final = 1000
 _STOREY_M: Final = 2.5  # height of a room that nothing tells the height of
 _SAME_LEVEL_M: Final = 0.5  # floors nearer in height than this are one level
 _SLACK_M: Final = 0.3  # a thing may stand so far outside its room's polygon or height
@@ -43,8 +43,9 @@ def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]
     """
     fields_json = json_from_bytes(data, file)
     rows = fields_json.get("rooms") if isinstance(fields_json, dict) else None
-    if not isinstance(rows, list) or not rows or len(rows) > MAX_ROOMS:
+    if not isinstance(rows, list) or not rows:
         raise BadHouse(file, "rooms", 'expected {"rooms": [{"polygon": [[x, z], ...]}, ...]}')
+    check_number(len(rows), file)
     return [_room(row, file, f"rooms[{i}]", items) for i, row in enumerate(rows)]
 
 
@@ -84,7 +85,7 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
     found: list[Room] = []
     for item in items:
         height = floor_height(item.surfaces) if item.kind is ItemKind.FLOOR else None
-        if height is None or len(found) >= MAX_ROOMS:
+        if height is None or len(found) > MAX_ROOMS:  # refused by room_bounds
             continue
         # Let walls part the floor where they stand 1 m above it.
         standing = [w for w in walls if w.positions[:, 1].max() > height + 1.0]
@@ -96,7 +97,7 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
         )
         given = {"floor_y": height, "ceiling_y": None}
         found += [_with_heights(p, "", (), given, items) for p in pieces]
-    return found[:MAX_ROOMS]
+    return found
 
 
 def _with_heights(

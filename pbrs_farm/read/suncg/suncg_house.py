@@ -14,6 +14,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.room_bounds import check_rooms
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,
     enclosed_polygon,
@@ -77,6 +78,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
         arch=arch,
     )
     rooms, items = _contents(context, record, fields, file)
+    check_rooms(rooms, file)
     if not rooms:
         raise BadHouse(root, file, "has no room with a floor or walls", hint="nothing to render")
     return House(

@@ -17,7 +17,7 @@ from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 MIN_AREA_M2 = 0.01  # smaller rooms are left out
 SLIVER_M2 = 1e-4  # smaller pieces come of rounding
-MAX_CORNERS = 1000  # of a room: what is more is a curve drawn too finely, and costs its square
+MAX_CORNERS = 300  # of a room: what is more is a curve drawn too finely, and costs its square
 
 
 @dataclass(frozen=True, slots=True, eq=False)

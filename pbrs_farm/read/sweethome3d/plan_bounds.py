@@ -6,65 +6,67 @@ is refused by a line before any of it is built.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Final, TypeVar
 
-import numpy as np
 import shapely
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.sweethome3d.home_file.home_xml import Plan, PlanRoom, PlanWall
+from pbrs_farm.core.shown_text import shown
+from pbrs_farm.read.common.room_bounds import HINT, check_outlines
+from pbrs_farm.read.sweethome3d.home_file.home_xml import (
+    Plan,
+    PlanPiece,
+    PlanRoom,
+    PlanWall,
+    level_of,
+)
 
-MAX_ROOMS: Final = 500
 MAX_WALLS: Final = 3_000
 MAX_PIECES: Final = 10_000
 MAX_CROSSINGS: Final = 500
 """Pairs of walls of a level whose centre lines cross; a home has a dozen."""
 
-MAX_OVERLAPS: Final = 500
-"""Pairs of rooms of a level that share some floor; a home has a few."""
-
-_MIN_SHARED_M2: Final = 0.05
-_Drawn = TypeVar("_Drawn", PlanRoom, PlanWall)
-_HINT: Final = "remove what is drawn over itself, or split the home into several"
+_Drawn = TypeVar("_Drawn", PlanRoom, PlanWall, PlanPiece)
 
 
 def check_plan_bounds(plan: Plan, file: str) -> None:
-    """Raise BadHouse, naming the file, for a plan of too many parts, or drawn over itself."""
-    for name, n, most in (
-        ("rooms", len(plan.rooms), MAX_ROOMS),
-        ("walls", len(plan.walls), MAX_WALLS),
-        ("pieces", len(plan.pieces), MAX_PIECES),
-    ):
-        if n > most:
-            raise BadHouse(file, "", f"{n} {name}, at most {most} are read", hint=_HINT)
-    n_crossings = sum(_crossings(walls) for walls in _by_level(plan.walls).values())
+    """Raise BadHouse, naming the file, for a plan of too many parts, or drawn over itself.
+
+    Levels that are left out count for nothing.
+    """
+    walls = _by_level(plan, plan.walls)
+    pieces = [p for found in _by_level(plan, plan.pieces).values() for p in found]
+    n_walls = sum(map(len, walls.values()))
+    if n_walls > MAX_WALLS:
+        raise BadHouse(file, "", f"{n_walls} walls, at most {MAX_WALLS} are read", hint=HINT)
+    if len(pieces) > MAX_PIECES:
+        text = f"{len(pieces)} pieces, at most {MAX_PIECES} are read{_commonest(pieces)}"
+        raise BadHouse(file, "", text, hint=HINT)
+    n_crossings = sum(_crossings(found) for found in walls.values())
     if n_crossings > MAX_CROSSINGS:
         text = f"walls cross {n_crossings} times, at most {MAX_CROSSINGS} crossings are built"
-        raise BadHouse(file, "walls", text, hint=_HINT)
-    n_overlaps = sum(_overlaps(rooms) for rooms in _by_level(plan.rooms).values())
-    if n_overlaps > MAX_OVERLAPS:
-        text = f"{n_overlaps} pairs of rooms overlap, at most {MAX_OVERLAPS} are taken apart"
-        raise BadHouse(file, "rooms", text, hint=_HINT)
+        raise BadHouse(file, "walls", text, hint=HINT)
+    rooms = _by_level(plan, plan.rooms)
+    check_outlines({level: [r.points for r in found] for level, found in rooms.items()}, file)
 
 
-def _by_level(drawn: Sequence[_Drawn]) -> dict[str, list[_Drawn]]:
+def _by_level(plan: Plan, drawn: Sequence[_Drawn]) -> dict[str, list[_Drawn]]:
+    """What is drawn on each level that is shown."""
     found: dict[str, list[_Drawn]] = {}
     for one in drawn:
         found.setdefault(one.level, []).append(one)
-    return found
+    return {level: ones for level, ones in found.items() if level_of(plan, level).is_visible}
+
+
+def _commonest(pieces: Sequence[PlanPiece]) -> str:
+    # What a program copied by the thousand bears one name.
+    name, n = max(Counter(p.name for p in pieces).items(), key=lambda row: row[1])
+    return f"; {n} of them are called {shown(name)!r}" if 2 * n > len(pieces) else ""
 
 
 def _crossings(walls: Sequence[PlanWall]) -> int:
     lines = [shapely.LineString([w.start, w.end]) for w in walls]
     pairs = shapely.STRtree(lines).query(lines, predicate="crosses")
     return int((pairs[0] < pairs[1]).sum())
-
-
-def _overlaps(rooms: Sequence[PlanRoom]) -> int:
-    outlines = [shapely.make_valid(shapely.Polygon(r.points)) for r in rooms if len(r.points) > 2]
-    areas = np.array(outlines, object)
-    first, second = shapely.STRtree(outlines).query(areas, predicate="intersects")
-    is_pair = first < second
-    shared = shapely.area(shapely.intersection(areas[first[is_pair]], areas[second[is_pair]]))
-    return int((shared > _MIN_SHARED_M2).sum())

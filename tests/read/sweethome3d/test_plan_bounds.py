@@ -6,8 +6,9 @@ import pytest
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.room_bounds import MAX_OVERLAPS
 from pbrs_farm.read.sweethome3d.home import read_home
-from pbrs_farm.read.sweethome3d.plan_bounds import MAX_CROSSINGS, MAX_OVERLAPS
+from pbrs_farm.read.sweethome3d.plan_bounds import MAX_CROSSINGS
 from tests.read.sweethome3d.sh3d_source import ROOM, home_xml
 
 
@@ -56,3 +57,19 @@ def test_walls_that_touch_and_rooms_side_by_side_are_no_crossings() -> None:
     )
     rooms = "".join(square(100 * i, 100 * k, 100) for i in range(6) for k in range(6))
     assert len(read_home(home_xml(body, room=rooms), "grid.xml", fields=ReadFields()).rooms) == 36
+
+
+def test_too_many_pieces_are_refused_by_their_commonest_name() -> None:
+    body = "<pieceOfFurniture name='Tile' model='1' x='1' y='1' width='1' depth='1' height='1'/>"
+    with pytest.raises(BadHouse, match="10001 of them are called 'Tile'"):
+        read_home(home_xml(body * 10_001), "vast.xml", fields=ReadFields())
+
+
+def test_a_hidden_level_is_not_counted() -> None:
+    levels = (
+        "<level id='up' elevation='0' floorThickness='12' height='250'/>"
+        "<level id='cellar' elevation='-300' floorThickness='12' height='250' visible='false'/>"
+    )
+    crossing = spokes(40).replace("<wall ", "<wall level='cellar' ")
+    room = ROOM.replace("<room ", "<room level='up' ")
+    assert read_home(home_xml(levels + crossing, room=room), "cellar.xml", fields=ReadFields())
