@@ -32,6 +32,7 @@ def add_verbs(verb: Verb) -> None:
     add("root", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add("--out", type=Path, required=True, help="new folder")
     add("--to", choices=("shards", "parquet"), default="shards", help="default shards")
+    add("--selection", metavar="RUN", help="only what this run keeps")
     layers = "colour normal depth class40 instance boundary (default all)"
     add("--layers", nargs="+", metavar="LAYER", help=layers)
     add_modes_and_size(p)
@@ -88,17 +89,20 @@ def _pack(args: argparse.Namespace) -> int:
     colour, _, quality = args.colour.partition(":")
     if quality and not quality.isdigit():
         raise BadInput("--colour", args.colour, "expected png, jpeg or jpeg:QUALITY")
+    views = open_views(args.root)
+    if args.selection is not None:
+        views = views.only(selection=args.selection)
     packing = Packing(
         size=size_of(args.size),
         layers=tuple(args.layers or LAYERS),
-        modes=tuple(args.modes or open_views(args.root)[:1].modes),
+        modes=tuple(args.modes or views[:1].modes),
         shares=shares_from_text(args.split) if args.split else None,
         views_per_shard=args.shard_size,
         colour=colour,
         quality=int(quality or 95),
         seed=args.seed,
     )
-    packed = pack(args.root, args.out, packing, form=args.to, tell=echo)
+    packed = pack(views, args.out, packing, form=args.to, tell=echo)
     # Say what was left out: a run may still go on.
     if packed.left_out:
         at, why = next(iter(packed.left_out.items()))

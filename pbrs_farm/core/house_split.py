@@ -42,7 +42,7 @@ def shares_from_text(text: str) -> Shares:
     total = train + val + test
     if not 0 < total < float("inf"):
         raise BadInput("--split", text, "expected shares above 0", hint="80/10/10")
-    return Shares(train / total, val / total, 1 - train / total - val / total)
+    return Shares(train / total, val / total, test / total)
 
 
 def home_of(house: str) -> str:

@@ -82,9 +82,14 @@ class S3Store:
             raise MachineFailed("s3:// needs the package obstore", hint=hint) from None
         self._bucket = bucket
         self._prefix = prefix.strip("/")
+        self._settings = settings
         self._retry_timeout_s = settings.retry_timeout_s
         self._obstore: Any = obstore
         self._client: Any = Client(bucket, **_client_options(self._prefix, settings))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # A process that is spawned makes a client of its own.
+        return S3Store, (self._bucket, self._prefix, self._settings)
 
     @property
     def url(self) -> str:

@@ -51,13 +51,13 @@ def card(views: Views, packing: Packing, credits: Sequence[str], *, form: str) -
     blocks = [
         _front_matter(views, packing) if form == "parquet" else "",
         "# Rendered rooms with exact labels",
-        f"{len(views)} views of {len(views.homes)} homes, {size}, rendered by pbrs_farm."
+        f"{len(views)} views, {len(views.homes)} homes or variants of homes, {size}, rendered by pbrs_farm."
         f" Lighting modes: {', '.join(packing.modes)}.",
         "\n".join(["| split | views | homes |", "|---|---|---|", *_split_rows(views, packing)]),
         f"Split {SPLIT_RULE}." if packing.shares else "",
         "\n".join(["| array | type | unit |", "|---|---|---|", *arrays]),
         f"Axes of normals as stored: {AXES}. Classes are the NYU40's; 0 is none.",
-        _loading(form),
+        _loading(form, next(shard_plans(views.refs, packing)).split),
         "\n".join(["Credits:", "", *(f"- {line.removeprefix('- ')}" for line in credits)])
         if credits
         else "",
@@ -80,15 +80,15 @@ def _front_matter(views: Views, packing: Packing) -> str:
     return f"---\nconfigs:\n- config_name: default\n  data_files:{files}\n---"
 
 
-def _loading(form: str) -> str:
+def _loading(form: str, split: str) -> str:
     if form == "shards":
         return (
             "```python\nfrom pbrs_farm.study.samples.sharded_views import ShardedViews\n\n"
-            "views = ShardedViews('.', split='train')  # dictionaries of torch tensors\n```\n\n"
+            f"views = ShardedViews('.', split='{split}')  # dictionaries of torch tensors\n```\n\n"
             "webdataset reads the same files; normals, depth and instances are `.npz` of uint16."
         )
     return (
         "```python\nimport io\n\nimport numpy as np\nfrom datasets import load_dataset\n\n"
-        "row = load_dataset('.', split='train')[0]\n"
+        f"row = load_dataset('.', split='{split}')[0]\n"
         "normal = np.load(io.BytesIO(row['normal']))['normal'] * (2 / 65535) - 1\n```"
     )

@@ -18,7 +18,6 @@ from pbrs_farm.study.packing.pack_parquet import write_parquet
 from pbrs_farm.study.packing.packed_view import packed_view
 from pbrs_farm.study.packing.packing_plan import Packing, ShardPlan, shard_plans
 from pbrs_farm.study.reading.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
-from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.reading.stored_root import StoredRoot
 from pbrs_farm.study.reading.tar_members import tar_end, tar_member
 from pbrs_farm.study.reading.views import Views
@@ -37,24 +36,23 @@ class Packed:
 
 
 def pack(
-    root: str,
+    views: Views,
     out: Path,
     packing: Packing,
     *,
     form: str = "shards",
     tell: Callable[[str], None] = lambda _line: None,
 ) -> Packed:
-    """Write the views of root that have all that packing asks for to the new folder out.
+    """Write the views of an output root that have all that packing asks for to the new folder out.
 
     tell: called with a line as each shard is written. Raises BadInput for a root that cannot be
     packed, a view that is damaged, or an out that holds something.
     """
     if form not in FORMS:
         raise BadInput("--to", form, "no such form", hint=f"of {', '.join(FORMS)}")
-    views = open_views(root)
     source, left_out = views.source, dict(views.left_out)
     if not isinstance(source, StoredRoot):
-        raise BadInput(root, "", "is packed already", hint="pack the output folder itself")
+        raise BadInput(source.url, "", "is packed already", hint="pack the output folder itself")
     # Leave out what lacks any of the pictures or labels.
     for request in packing.requests():
         views = views.only(request=request)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import Shares, split_of_house
 from pbrs_farm.regular_files import fault_of, open_regular
-from pbrs_farm.store import Store, store_from_url
+from pbrs_farm.store import Store
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.reading.dataset_json import (
     DATASET_JSON,
@@ -68,8 +68,7 @@ class ShardSet:
     """
 
     def __init__(self, store: Store) -> None:
-        self._url = store.url
-        self._store: Store | None = store
+        self._store = store
         self._place = str(store.root) if isinstance(store, FolderStore) else store.url
         place = f"{self._place}/{DATASET_JSON}"
         self.dataset: Dataset = dataset_from_json(store.get(DATASET_JSON), place)
@@ -79,8 +78,8 @@ class ShardSet:
             self._check_size(shard)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Neither a map nor S3's client can be sent to a process: both are opened again there.
-        return {**self.__dict__, "_store": None, "_open": OrderedDict()}
+        # A map cannot be sent to a process: shards are opened again there.
+        return {**self.__dict__, "_open": OrderedDict()}
 
     @property
     def url(self) -> str:
@@ -137,6 +136,17 @@ class ShardSet:
     def modes(self, ref: ViewRef) -> tuple[str, ...]:
         return self.dataset.modes
 
+    def layers(self, ref: ViewRef) -> tuple[str, ...]:
+        return (*self.dataset.modes, *(n for n in self.dataset.layers if n != "colour"))
+
+    def layer(self, ref: ViewRef, name: str) -> NDArray[Any]:
+        text = "shards hold samples: read them with sample()"
+        raise BadInput(self.url, "", text, hint="open the output folder itself for stored layers")
+
+    def kept_by(self, run: str) -> frozenset[ViewRef]:
+        hint = "pack them with --selection"
+        raise BadInput(self.url, "", f"shards know of no selection {run}", hint=hint)
+
     def facts(self, ref: ViewRef) -> ViewFacts:
         shard, view = self._at[ref]
         return self._facts_at(self._opened(shard), view)
@@ -183,7 +193,7 @@ class ShardSet:
         return opened
 
     def _bytes(self, shard: Shard) -> Buffer:
-        store = self._opened_store()
+        store = self._store
         if not isinstance(store, FolderStore):
             return store.get(shard.file)
         path = store.root / shard.file
@@ -194,18 +204,13 @@ class ShardSet:
             raise BadInput(path, "", fault_of(error)) from None
 
     def _check_size(self, shard: Shard) -> None:
-        head = self._opened_store().head(shard.file)
+        head = self._store.head(shard.file)
         place = f"{self._place}/{shard.file}"
         if head is None:
             raise BadInput(place, "", "no such shard, though dataset.json names it")
         if head.n_bytes != shard.n_bytes:
             text = f"{head.n_bytes} of {shard.n_bytes} bytes: truncated or another file"
             raise BadInput(place, "", text, hint="copy or pack it again")
-
-    def _opened_store(self) -> Store:
-        if self._store is None:
-            self._store = store_from_url(self._url)
-        return self._store
 
 
 def views_of_shards(store: Store) -> Views:

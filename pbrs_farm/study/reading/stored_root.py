@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.house_split import Shares, split_of_house
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.core.layers import LAYERS as ALL_LAYERS
+from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.images import array_from_png
 from pbrs_farm.run.output_root import attribution
-from pbrs_farm.store import Store, store_from_url
+from pbrs_farm.store import Store
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.reading.png_rows import array_of_rows
 from pbrs_farm.study.reading.stored_layers import (
@@ -32,22 +35,14 @@ _TABLE: Final = "view.json"  # written when all else of a view is there
 
 
 class StoredRoot:
-    """An output root as pbrs-farm writes it; a ViewSource.
-
-    The store is opened anew in each process, since S3's client cannot be sent to one.
-    """
+    """An output root as pbrs-farm writes it; a ViewSource."""
 
     def __init__(self, store: Store) -> None:
-        self._store: Store | None = store
-        self._url = store.url
+        self._store = store
         # A folder is named in messages as people write it.
         self._place = str(store.root) if isinstance(store, FolderStore) else store.url
         self._facts: dict[ViewRef, ViewFacts] = {}  # of views that were read
         self._files = _files_of_views(store)
-
-    def __getstate__(self) -> dict[str, Any]:
-        # A folder or a bucket is opened again by its URL; a store in memory goes along by fork alone.
-        return {**self.__dict__, "_store": None}
 
     @property
     def url(self) -> str:
@@ -102,9 +97,31 @@ class StoredRoot:
             arrays[name] = checked_array(name, array, size, place)
         return arrays
 
+    def layers(self, ref: ViewRef) -> tuple[str, ...]:
+        return tuple(layer.name for layer in ALL_LAYERS if layer.file in self._files[ref])
+
+    def layer(self, ref: ViewRef, name: str) -> NDArray[Any]:
+        if name not in self.layers(ref):
+            hint = f"of {', '.join(self.layers(ref))}"
+            raise BadInput(f"{self.url}: {ref.id}", "", f"no layer {name}", hint=hint)
+        key = keys.view_key(ref.house, ref.view, LAYER[name].file)
+        return layer_from_bytes(name, self._store.get(key), f"{self.url}/{key}")
+
+    def kept_by(self, run: str) -> frozenset[ViewRef]:
+        key = keys.selection_key(run, "jsonl")
+        try:
+            # A line per view says whether it is kept.
+            rows = [json.loads(line) for line in self._store.get(key).splitlines()]
+            return frozenset(ViewRef(row["house"], row["view"]) for row in rows if row["kept"])
+        except ObjectMissing:
+            hint = "`pbrs-farm select` makes one"
+            raise BadInput(f"{self.url}/{key}", "", "no such selection", hint=hint) from None
+        except (ValueError, KeyError, TypeError):
+            raise BadInput(f"{self.url}/{key}", "", "not a selection: damaged") from None
+
     def credits(self, houses: Iterable[str]) -> tuple[str, ...]:
         """The lines that every product of these houses must carry, each once."""
-        lines = [attribution(self._opened(), house) for house in houses]
+        lines = [attribution(self._store, house) for house in houses]
         # What dressed homes show is told in a file of its own.
         with suppress(ObjectMissing):
             lines += self._get(keys.ATTRIBUTION).decode("utf-8", "replace").splitlines()
@@ -114,12 +131,7 @@ class StoredRoot:
         return split_of_house(ref.house, shares)
 
     def _get(self, key: str) -> bytes:
-        return self._opened().get(key)
-
-    def _opened(self) -> Store:
-        if self._store is None:
-            self._store = store_from_url(self._url)
-        return self._store
+        return self._store.get(key)
 
 
 def views_of_root(store: Store) -> Views:

@@ -61,6 +61,18 @@ class ViewSource(Protocol):
         """The arrays asked for; BadInput where one is missing, damaged or of the wrong type."""
         ...
 
+    def layers(self, ref: ViewRef) -> tuple[str, ...]:
+        """The layers the view has, by the names of core/layers.py; of shards those packed."""
+        ...
+
+    def layer(self, ref: ViewRef, name: str) -> NDArray[Any]:
+        """A layer as it is stored; BadInput where there is none."""
+        ...
+
+    def kept_by(self, run: str) -> frozenset[ViewRef]:
+        """The views that a selection keeps; BadInput where there is no such run."""
+        ...
+
     def split_of(self, ref: ViewRef, shares: Shares | None) -> str:
         """The split the view's house falls into; shares None: as packed, else 80/10/10."""
         ...
@@ -107,6 +119,15 @@ class View:
     def table(self) -> dict[str, Any]:
         """view.json: instances with their boxes and classes, sky, seeds (docs/formats.md)."""
         return self.source.table(self.ref)
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """All layers it has, optional ones too; pbrs_farm.core.layers.LAYER says unit and axes of each."""
+        return self.source.layers(self.ref)
+
+    def layer(self, name: str) -> NDArray[Any]:
+        """A layer as it is stored, (H, W) or (H, W, C): "depth" in mm, "position" in metres, ..."""
+        return self.source.layer(self.ref, name)
 
     def sample(self, request: Request | None = None) -> Sample:
         """The arrays of a request: colour in mlt_il_ol light and normals in OpenCV's axes for None."""
@@ -156,19 +177,22 @@ class Views(Sequence[View]):
         shares: Shares | None = None,
         houses: Collection[str] | None = None,
         objects: bool | None = None,
+        selection: str | None = None,
         request: Request | None = None,
     ) -> Views:
         """The views of a split, of some houses, of rooms or of objects, with all that request needs.
 
-        A view that lacks a file of request (a run goes on, or was made without that mode) is left
+        selection: only what that run of `pbrs-farm select` keeps. A view that lacks a file of request (a run goes on, or was made without that mode) is left
         out and named in left_out. Raises BadInput where none is left.
         """
         if split is not None and split not in SPLITS:
             raise BadInput("split", split, "no such split", hint=f"of {', '.join(SPLITS)}")
+        chosen = None if selection is None else self.source.kept_by(selection)
         refs = [
             ref
             for ref in self.refs
-            if (houses is None or ref.house in houses)
+            if (chosen is None or ref in chosen)
+            and (houses is None or ref.house in houses)
             and (objects is None or ref.is_object == objects)
             and (split is None or self.source.split_of(ref, shares) == split)
         ]

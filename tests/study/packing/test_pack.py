@@ -33,7 +33,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_equal_views_give_equal_bytes(root, tmp_path):
     for name in "ab":
         pack(
-            str(root),
+            pbrs_farm.open(root),
             tmp_path / name,
             Packing((8, 6), modes=MODES, shares=Shares(), views_per_shard=5),
         )
@@ -47,7 +47,7 @@ def test_equal_views_give_equal_bytes(root, tmp_path):
 def test_shards_are_split_by_house_and_mixed(root, tmp_path):
     shares = Shares(0.5, 0.25, 0.25)
     packing = Packing(modes=MODES, shares=shares, views_per_shard=4)
-    packed = pack(str(root), tmp_path / "x", packing)
+    packed = pack(pbrs_farm.open(root), tmp_path / "x", packing)
     assert sum(packed.n_views.values()) == 24
     views = pbrs_farm.open(tmp_path / "x")
     for split, n in packed.n_views.items():
@@ -71,7 +71,7 @@ def _facts(shard: Path):
 
 
 def test_other_programs_read_the_parts(root, tmp_path):
-    pack(str(root), tmp_path / "x", Packing(modes=MODES))
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES))
     with tarfile.open(tmp_path / "x/all-000000.tar") as tar:
         data = {m.name: tar.extractfile(m).read() for m in tar}
     stored, key = arrays_of_view(1001), "home-1-00000000__0_0_1"
@@ -83,7 +83,7 @@ def test_other_programs_read_the_parts(root, tmp_path):
 
 
 def test_dataset_json_and_card_say_what_is_there(root, tmp_path):
-    pack(str(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=Shares()))
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=Shares()))
     said = json.loads((tmp_path / "x/dataset.json").read_text())
     assert said["classes"][1] == "wall"
     assert len(said["class_colours_srgb"]) == 41
@@ -91,12 +91,12 @@ def test_dataset_json_and_card_say_what_is_there(root, tmp_path):
     assert said["size"] == [8, 6]
     assert said["credits"] == [f"home {home}: a person" for home in HOUSES]
     card = (tmp_path / "x/README.md").read_text()
-    assert "24 views of 8 homes, 8x6" in card
+    assert "24 views, 8 homes or variants of homes, 8x6" in card
     assert "home home-3-00000000: a person" in card
 
 
 def test_colour_may_be_packed_as_jpeg(root, tmp_path):
-    pack(str(root), tmp_path / "x", Packing(modes=MODES, colour="jpeg"))
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES, colour="jpeg"))
     sample = pbrs_farm.open(tmp_path / "x")[0].sample()
     error = sample.colour.astype(int) - arrays_of_view(0)["mlt_il_ol.png"]
     assert sample.colour.shape == error.shape
@@ -104,7 +104,9 @@ def test_colour_may_be_packed_as_jpeg(root, tmp_path):
 
 
 def test_parquet_has_image_columns_and_every_bit_of_labels(root, tmp_path):
-    packed = pack(str(root), tmp_path / "x", Packing(modes=MODES, shares=Shares()), form="parquet")
+    packed = pack(
+        pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES, shares=Shares()), form="parquet"
+    )
     files = sorted((tmp_path / "x/data").iterdir())
     assert packed.n_files == len(files) + 1
     table = pq.read_table(files[-1])
@@ -121,7 +123,7 @@ def test_parquet_has_image_columns_and_every_bit_of_labels(root, tmp_path):
 
 
 def test_a_truncated_or_missing_shard_is_one_clear_line(root, tmp_path):
-    pack(str(root), tmp_path / "x", Packing(modes=MODES, views_per_shard=10))
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES, views_per_shard=10))
     shard = tmp_path / "x/all-000001.tar"
     whole = shard.read_bytes()
     shard.write_bytes(whole[:5000])
@@ -136,7 +138,11 @@ def test_a_truncated_or_missing_shard_is_one_clear_line(root, tmp_path):
 
 
 def test_what_was_not_packed_is_told(root, tmp_path):
-    pack(str(root), tmp_path / "x", Packing(layers=("colour", "normal"), modes=("mlt_il_ol",)))
+    pack(
+        pbrs_farm.open(root),
+        tmp_path / "x",
+        Packing(layers=("colour", "normal"), modes=("mlt_il_ol",)),
+    )
     view = pbrs_farm.open(tmp_path / "x")[0]
     with pytest.raises(
         BadInput, match=r"no layer depth in these shards \(packed: colour, normal\)"
@@ -145,7 +151,7 @@ def test_what_was_not_packed_is_told(root, tmp_path):
     with pytest.raises(BadInput, match=r"no pictures in opengl_dl light"):
         view.sample(Request(("colour",), "opengl_dl"))
     with pytest.raises(BadInput, match="is packed already"):
-        pack(str(tmp_path / "x"), tmp_path / "y", Packing())
+        pack(pbrs_farm.open(tmp_path / "x"), tmp_path / "y", Packing())
 
 
 def test_the_verb_packs_and_says_what_it_left_out(tmp_path, capsys):
@@ -165,7 +171,7 @@ def test_the_verb_packs_and_says_what_it_left_out(tmp_path, capsys):
 
 
 def test_shards_are_read_where_there_is_numpy_alone(root, tmp_path):
-    pack(str(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=Shares()))
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=Shares()))
     code = f"""
 import sys
 for name in ("pydantic", "OpenImageIO", "torch", "scipy", "pyarrow", "PIL", "obstore", "mitsuba"):
@@ -181,7 +187,7 @@ print(len(views), views[0].sample(Request(LAYERS)).normal.shape)
 
 
 def test_all_layers_are_packed_and_no_radiance(root, tmp_path):
-    pack(str(root), tmp_path / "x", Packing(layers=LAYERS, modes=MODES))
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing(layers=LAYERS, modes=MODES))
     with tarfile.open(tmp_path / "x/all-000000.tar") as tar:
         parts = {name.partition(".")[2] for name in tar.getnames()}
     assert parts == {

@@ -3,6 +3,8 @@ import pickle
 from pathlib import Path
 
 import numpy as np
+import obstore
+import obstore.store
 import pytest
 
 import pbrs_farm
@@ -10,10 +12,12 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import png_from_array
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.s3 import S3Settings, S3Store
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.reading.normal_axes import encoded_as_stored
 from pbrs_farm.study.reading.view_sample import LAYERS, Request
+from tests.check.roots import make_root
 from tests.study.small_roots import MODES, SIZE, arrays_of_view, fill, remove
 
 HOUSES = {"one-00000001": 3, "two-00000002-d4": 2}
@@ -62,7 +66,11 @@ def test_samples_have_the_same_bits_from_folder_memory_and_shards(root, tmp_path
     request = Request(LAYERS, "mlt_il_ol", axes="opengl", size=size)
     places = [pbrs_farm.open(root), pbrs_farm.open(memory)]
     for packed_size, name in ((size, "small"), (None, "large")):
-        pack(str(root), tmp_path / name, Packing(packed_size, modes=MODES, views_per_shard=2))
+        pack(
+            pbrs_farm.open(root),
+            tmp_path / name,
+            Packing(packed_size, modes=MODES, views_per_shard=2),
+        )
         places.append(pbrs_farm.open(tmp_path / name))
     kept = MemoryStore()
     for file in (tmp_path / "small").iterdir():
@@ -173,9 +181,77 @@ def test_a_request_that_cannot_be_is_told(fields, match):
 
 
 def test_views_can_be_sent_to_another_process(root, tmp_path):
-    pack(str(root), tmp_path / "shards", Packing(modes=MODES))
+    pack(pbrs_farm.open(root), tmp_path / "shards", Packing(modes=MODES))
     for place in (root, tmp_path / "shards"):
         views = pbrs_farm.open(place)
         views[0].sample()
         sent = pickle.loads(pickle.dumps(views))
         assert equal(sent[0].sample(), views[0].sample())
+
+
+def s3_like() -> S3Store:
+    """An S3 store whose client keeps its objects in memory."""
+    store = S3Store("bucket", "some/prefix", S3Settings())
+    store._client = obstore.store.MemoryStore()
+    return store
+
+
+def test_samples_have_the_same_bits_from_s3(root, tmp_path):
+    request = Request(LAYERS, "mlt_il_ol", size=(8, 6))
+    expected = [view.sample(request) for view in pbrs_farm.open(root)]
+    bucket, shards = s3_like(), s3_like()
+    fill(bucket, HOUSES)
+    pack(pbrs_farm.open(bucket), tmp_path / "x", Packing((8, 6), modes=MODES))
+    for file in (tmp_path / "x").iterdir():
+        shards.put(file.name, file.read_bytes())
+    for store in (bucket, shards):
+        views = pbrs_farm.open(store)
+        assert views.source.url == "s3://bucket/some/prefix"
+        assert all(equal(a, view.sample(request)) for a, view in zip(expected, views, strict=True))
+
+
+def test_an_s3_store_is_opened_anew_in_another_process():
+    sent = pickle.loads(pickle.dumps(s3_like()))
+    assert sent.url == "s3://bucket/some/prefix"
+    assert isinstance(sent._client, obstore.store.S3Store)
+
+
+def test_stored_layers_are_read_by_name(root):
+    view = pbrs_farm.open(root)[1]
+    assert view.layers == (
+        "opengl_dl",
+        "mlt_il_ol",
+        "depth",
+        "normal",
+        "valid",
+        "semantic",
+        "instance",
+        "boundary",
+    )
+    assert (view.layer("depth") == arrays_of_view(1)["depth.png"]).all()
+    with pytest.raises(BadInput, match=r"0_0_1: no layer albedo \(of opengl_dl, "):
+        view.layer("albedo")
+
+
+def test_only_what_a_selection_keeps_is_read(root):
+    rows = [{"house": "one-00000001", "view": f"0_0_{k}", "kept": k != 1} for k in range(3)]
+    (root / "selection").mkdir()
+    (root / "selection/run.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    views = pbrs_farm.open(root)
+    assert [v.id for v in views.only(selection="run")] == [
+        "one-00000001/0_0_0",
+        "one-00000001/0_0_2",
+    ]
+    with pytest.raises(BadInput, match="no such selection"):
+        views.only(selection="other")
+
+
+def test_normals_of_a_floor_point_up_in_the_world(tmp_path):
+    make_root(tmp_path)
+    for axes, to_opencv in (("opencv", (1, 1, 1)), ("opengl", (1, -1, -1))):
+        for view in pbrs_farm.open(tmp_path):
+            sample = view.sample(Request(("normal", "class40"), axes=axes))
+            floor = sample.normal[(sample.class40 == 2) & sample.valid] * np.array(to_opencv)
+            world = floor @ view.world_from_camera_opencv[:3, :3].T
+            assert len(world) > 100
+            assert world == pytest.approx(np.broadcast_to([0, 1, 0], world.shape), abs=1e-4)

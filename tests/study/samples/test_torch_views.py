@@ -26,7 +26,7 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A root of 24 views, and its shards of 5."""
     folder = tmp_path_factory.mktemp("study")
     fill(FolderStore(folder / "root"), HOUSES)
-    pack(str(folder / "root"), folder / "shards", Packing(modes=MODES, views_per_shard=5))
+    pack(open_views(folder / "root"), folder / "shards", Packing(modes=MODES, views_per_shard=5))
     return folder / "root", folder / "shards"
 
 
