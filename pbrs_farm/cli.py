@@ -33,7 +33,7 @@ MODULES: Final = {
     "showing": ("board",),
     "submitting": ("submit",),
     "steering": (
-        "status", "why", "logs", "failures", "retry", "pause", "resume", "cancel", "reduce",
+        "status", "jobs", "why", "logs", "failures", "retry", "pause", "resume", "cancel", "reduce",
         "drain", "workers", "recover", "coordinator", "worker",
     ),
 }  # fmt: skip

@@ -15,10 +15,10 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from pbrs_farm.board.board_state import Board
-from pbrs_farm.board.pages import entering, house_scene, looking, relighting, viewing
+from pbrs_farm.board.pages import entering, farming, house_scene, looking, relighting, viewing
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.security.guard import Guard
-from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.errors import BadInput, PbrsError
 
 _THREADS: Final = 8  # that answer at once: each holds a connection to the index
 _VIEW: Final = "/homes/{house}/views/{view}"
@@ -62,6 +62,12 @@ def _routes() -> list[Route]:
         Route(f"{_VIEW}/pixels", viewing.pixels),
         Route(f"{_VIEW}/relight", relighting.relight),
         Route(f"{_VIEW}/light", relighting.light),
+        Route("/farm", farming.farm),
+        Route("/farm/events", farming.events),
+        Route("/farm/confirm", farming.confirm),
+        Route("/farm/do", farming.steer, methods=["POST"]),
+        Route("/farm/jobs/{job}", farming.job),
+        Route("/farm/jobs/{job}/log", farming.log),
         Route("/login", entering.login),
         Route("/login", entering.log_in, methods=["POST"]),
         Route("/logout", entering.log_out, methods=["POST"]),
@@ -76,7 +82,8 @@ def _not_found(request: Request, error: Exception) -> Response:
 
 
 def _failed(request: Request, error: Exception) -> Response:
-    return page(request, "told.html", 502, text=str(error))
+    status = 404 if isinstance(error, BadInput) else 502
+    return page(request, "told.html", status, text=str(error))
 
 
 def _broken(_request: Request, _error: Exception) -> Response:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 from jinja2 import Environment
 
+from pbrs_farm.board.farm.audit import Audit
+from pbrs_farm.board.farm.live_farm import LiveFarm
 from pbrs_farm.board.index.queries import Queries
 from pbrs_farm.board.index.refresh import Refresher
 from pbrs_farm.board.index.view_index import ViewIndex
@@ -32,7 +35,9 @@ class Board:
     sessions: Sessions
     templates: Environment
     assets: dict[str, Asset]
-    farm: None = None
+    audit: Audit
+    streams: threading.Semaphore  # pages that listen
+    farm: LiveFarm | None = None  # None: a folder alone is shown
 
     def start(self) -> None:
         """Begin to look at the root."""
@@ -43,7 +48,7 @@ class Board:
         self.refresher.end()
 
 
-def new_board(store: Store, options: BoardOptions) -> Board:
+def new_board(store: Store, options: BoardOptions, farm: LiveFarm | None = None) -> Board:
     """A board of an output root; what it makes is kept below options.cache, by the root's URL."""
     folder = options.cache / keys.digest(store.url)
     reader = RootReader(store)
@@ -59,4 +64,7 @@ def new_board(store: Store, options: BoardOptions) -> Board:
         sessions=Sessions(options.token),
         templates=environment(found),
         assets=found,
+        audit=Audit(folder / "audit.jsonl"),
+        streams=threading.Semaphore(options.limits.streams),
+        farm=farm,
     )

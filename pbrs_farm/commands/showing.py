@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import argparse
 import os
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import Verb, echo, warn
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.store.secret import Secret
+
+if TYPE_CHECKING:
+    from pbrs_farm.board.farm.live_farm import LiveFarm
+    from pbrs_farm.board.options import BoardOptions
 
 
 def add_verbs(verb: Verb) -> None:
@@ -62,13 +68,27 @@ def _board(args: argparse.Namespace) -> int:
         price_per_slot_hour=args.price,
         currency=args.currency,
     )
-    board = new_board(store_from_url(root, settings_from_environment().store), options)
+    store = store_from_url(root, settings_from_environment().store)
+    board = new_board(store, options, _farm(store.url))
     _say(options, token, is_own_token=args.token_file is None)
     server_of(board).run(sockets=[listening])
     return 0
 
 
-def _say(options, token: Secret, *, is_own_token: bool) -> None:  # type: ignore[no-untyped-def]
+def _farm(store_url: str) -> LiveFarm | None:
+    """The farm that the environment names, None where it names none."""
+    if not (os.environ.get("PBRS_REDIS_URL") or os.environ.get("PBRS_REDIS_URL_FILE")):
+        return None
+    if find_spec("redis") is None:
+        raise MachineFailed("PBRS_REDIS_URL needs redis", hint="pip install 'pbrs-farm[workers]'")
+    from pbrs_farm.board.farm.live_farm import LiveFarm
+    from workers.client.farm_client import Farm
+    from workers.config import config_from_environment
+
+    return LiveFarm(Farm(replace(config_from_environment(), store_url=store_url)))
+
+
+def _say(options: BoardOptions, token: Secret, *, is_own_token: bool) -> None:
     host = f"[{options.host}]" if ":" in options.host else options.host
     echo(f"http://{host}:{options.port}/")
     if is_own_token and not (options.is_readonly and options.is_private):

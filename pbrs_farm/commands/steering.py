@@ -14,7 +14,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.commands.arguments import Handler, Verb, add_farm, echo, echo_json, farm_of
-from workers.client.text import explanation_text, failures_text, status_text, workers_text
+from workers.client.text import (
+    explanation_text,
+    failures_text,
+    jobs_text,
+    status_text,
+    workers_text,
+)
 from workers.ledger.task_ledger import WITH_FAILURES
 
 if TYPE_CHECKING:
@@ -33,6 +39,7 @@ def add_verbs(verb: Verb) -> None:
     _add_job(p)
     text = "again every two seconds, to the end (--json: a line each)"
     p.add_argument("--watch", action="store_true", help=text)
+    farm_verb("jobs", _jobs, "every job of the farm: state, views an hour, time left, slot-hours")
     p = farm_verb("why", _why, "what a task, a house or a view waits for")
     p.add_argument("task", help="HOUSE, HOUSE/VIEW or HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
@@ -107,6 +114,14 @@ def _status(args: argparse.Namespace) -> int:
         if not args.watch or status["state"] in ("done", WITH_FAILURES, "cancelled"):
             return 1 if status["state"] == WITH_FAILURES else 0
         time.sleep(2.0)
+
+
+def _jobs(args: argparse.Namespace) -> int:
+    from workers.client.job_rows import job_rows
+
+    rows = job_rows(farm_of(args))
+    _show(args, rows, lambda: jobs_text(rows))
+    return 0
 
 
 def _why(args: argparse.Namespace) -> int:

@@ -13,6 +13,7 @@ from typing import Any
 import httpx
 
 from pbrs_farm.board.board_state import new_board
+from pbrs_farm.board.farm.live_farm import LiveFarm
 from pbrs_farm.board.options import BoardOptions
 from pbrs_farm.board.serve import bound_socket, server_of
 from pbrs_farm.store import store_from_url
@@ -22,7 +23,9 @@ TOKEN = "a token that nobody guesses"
 
 
 @contextmanager
-def served(root: str, cache: Path, **options: Any) -> Iterator[httpx.Client]:
+def served(
+    root: str, cache: Path, farm: LiveFarm | None = None, **options: Any
+) -> Iterator[httpx.Client]:
     """A client of the board of a root, which has read all of it.
 
     options: of BoardOptions; host is what the board believes, it listens on 127.0.0.1.
@@ -30,7 +33,7 @@ def served(root: str, cache: Path, **options: Any) -> Iterator[httpx.Client]:
     listening = bound_socket("127.0.0.1", 0)
     port = listening.getsockname()[1]
     chosen = replace(BoardOptions(cache=cache, port=port, token=Secret(TOKEN)), **options)
-    board = new_board(store_from_url(root), chosen)
+    board = new_board(store_from_url(root), chosen, farm)
     board.refresher.refresh()
     server = server_of(board)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)

@@ -104,6 +104,24 @@ def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join([*lines, ", ".join(f"{n} {state}" for state, n in sorted(counts.items()))])
 
 
+def jobs_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A job a line, oldest first."""
+    if not rows:
+        return "no jobs"
+    lines = [
+        f"{'job':<14}{'state':<20}{'recipe':<10}{'houses':>13}{'views':>9}{'per h':>8}{'left':>8}"
+        f"{'failed':>8}{'slot-h':>8}"
+    ]
+    for row in rows:
+        houses = f"{row['houses_done']}/{row['houses']}"
+        lines.append(
+            f"{row['job']:<14}{row['state']:<20}{row['recipe']:<10}{houses:>13}{row['views']:>9}"
+            f"{row['views_per_h']:>8.0f}{duration_text(row['eta_s']):>8}{row['failed']:>8}"
+            f"{row['slot_hours']:>8.2f}"
+        )
+    return "\n".join(lines)
+
+
 def duration_text(seconds: float | None) -> str:
     """ "42s", "7m", "3.1h", "2.5d"; "-" when not known."""
     if seconds is None:

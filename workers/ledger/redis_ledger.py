@@ -333,6 +333,13 @@ class RedisLedger:
             for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
                 yield task, fault_from_json(text)
 
+    def claims(self, job: str) -> dict[str, tuple[str, float]]:
+        """Task that runs now -> its worker, and since when by Redis' clock."""
+        with self.errors():
+            found = self.client.hgetall(f"{self._p(job)}claims")
+        parts = {task: text.split("|") for task, text in found.items()}
+        return {task: (p[1], float(p[2])) for task, p in parts.items() if len(p) == 3}
+
     def ping(self) -> None:
         """Raises LedgerUnavailable when Redis does not answer or refuses us."""
         with self.errors():

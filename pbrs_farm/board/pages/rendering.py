@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, Final
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-import pbrs_farm
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pictures.shown_layers import title_of
 from pbrs_farm.board.static_files import Asset
 from pbrs_farm.core.shown_text import printable, shown
+from workers.client.text import duration_text
 
 _MAX_PAGES_SHOWN: Final = 2  # before and after the one that is shown
 
@@ -35,7 +35,7 @@ def environment(found: Mapping[str, Asset]) -> Environment:
     )
     env.globals |= {
         "asset_url": asset_url, "home_url": home_url, "view_url": view_url, "thumb_url": thumb_url,
-        "page_numbers": page_numbers, "title_of": title_of, "program": pbrs_farm.__version__,
+        "page_numbers": page_numbers, "title_of": title_of, "duration": duration_text, "confirm_url": confirm_url, "log_url": log_url,
     }  # fmt: skip
     return env
 
@@ -71,6 +71,16 @@ def view_url(house: str, view: str, rest: str = "") -> str:
 def thumb_url(view: ListedView, layer: str) -> str:
     """The address of a view's thumbnail; it changes with the house's files, so it can be kept."""
     return view_url(view.house, view.id, f"/thumb/{layer}.jpg?v={quote(view.version, safe='')}")
+
+
+def confirm_url(what: str, of: str) -> str:
+    """The address of the question before something is done to a job or worker."""
+    return f"/farm/confirm?{urlencode({'what': what, 'of': of})}"
+
+
+def log_url(job: str, task: str) -> str:
+    """The address of a task's log."""
+    return f"/farm/jobs/{job}/log?{urlencode({'task': task})}"
 
 
 def page_numbers(number: int, n_pages: int) -> list[int]:

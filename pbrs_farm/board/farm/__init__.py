@@ -1,0 +1,1 @@
+"""A farm as the board shows and steers it."""

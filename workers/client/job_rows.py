@@ -1,0 +1,51 @@
+"""Every job of a farm as a row: how far, how fast, what it cost. Effects: reads the ledger."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from workers.coordinator.progress_rates import StageView, stage_views
+from workers.ids import GL, LIGHT
+from workers.ledger.task_ledger import JobView
+
+if TYPE_CHECKING:
+    from workers.client.farm_client import Farm
+
+
+def job_rows(farm: Farm) -> list[dict[str, Any]]:
+    """A row per job in the ledger, oldest first; a few reads each, whatever its size."""
+    slots = farm.registry.slots()
+    return [job_row(view, slots) for view in farm.jobs()]
+
+
+def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
+    """A job's row. slot_hours: spent by tasks that are done; slot_hours_left: expected."""
+    stages = stage_views(view, slots)
+    left_s = sum(s.mean_s * max(0, s.total - s.done - s.failed) for s in stages)
+    seconds = sum(n for name, n in view.counts.items() if name.startswith("seconds:"))
+    return {
+        "job": view.job_id,
+        "state": view.outcome,
+        "reason": view.fields.get("reason", ""),
+        "recipe": view.fields.get("recipe_name", ""),
+        "houses": int(view.fields.get("n_houses", 0)),
+        "houses_done": int(view.counts.get("houses:done", 0)),
+        "views": int(view.counts.get("views", 0)),
+        "views_per_h": round(3600 * _views_per_s(view, stages), 1),
+        "eta_s": max((s.eta_s for s in stages if s.eta_s is not None), default=None),
+        "failed": view.n_failed,
+        "slot_hours": round(seconds / 3600, 4),
+        "slot_hours_left": round(left_s / 3600, 4),
+        "done": sum(s.done for s in stages),
+        "running": sum(s.running for s in stages),
+        "tasks": sum(s.total for s in stages),
+    }
+
+
+def _views_per_s(view: JobView, stages: list[StageView]) -> float:
+    """Batches a second of the last stage that makes views, times the views of a batch so far."""
+    if view.state != "running":
+        return 0.0
+    last = [s for s in stages if s.stage in (GL, LIGHT)][-1:]
+    return sum(s.per_s * view.counts.get("views", 0.0) / max(1, s.done) for s in last)
