@@ -30,6 +30,7 @@ MODULES: Final = {
     "using": ("sheet", "verify", "relight"),
     "labelling": ("export", "pack", "classes", "label-sheet"),
     "selecting": ("reference", "select"),
+    "studying": ("train", "evaluate", "ablation"),
     "showing": ("board",),
     "submitting": ("submit",),
     "steering": (

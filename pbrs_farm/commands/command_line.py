@@ -17,7 +17,8 @@ GROUPS: Final = {
     "make pictures and labels": ("run", "objects", "step", "recipes", "layers"),
     "look into one home": ("dress", "repair", "cameras"),
     "look at what was made": ("board", "sheet", "label-sheet", "classes", "verify", "relight"),
-    "choose and hand on": ("reference", "select", "export", "study"),
+    "choose and hand on": ("reference", "select", "export", "pack"),
+    "train and judge": ("train", "evaluate", "ablation"),
     "run on many machines": (
         "submit", "jobs", "status", "why", "logs", "failures", "retry", "pause", "resume", "cancel",
         "priority", "reduce", "workers", "drain", "recover", "coordinator", "worker",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,11 +10,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import nn
+from torch.nn import functional
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.study.networks.network_choice import encoded
-from pbrs_farm.study.tasks.task import Task
+from pbrs_farm.study.tasks.task import Arrays, Task
 from pbrs_farm.study.training.view_arrays import ViewArrays
 from pbrs_farm.study.training_plan import Plan
 
@@ -45,9 +46,13 @@ def placed(network: nn.Module, plan: Plan) -> nn.Module:
 
 
 def predicted(
-    network: nn.Module, colour: NDArray[np.uint8], task: Task, plan: Plan
-) -> Iterator[NDArray[Any]]:
-    """A prediction of each picture of colour (N, H, W, 3), in order. The network's mode is restored."""
+    network: nn.Module, colour: NDArray[np.uint8], task: Task, plan: Plan,
+    sizes: Sequence[tuple[int, int]] = (),
+) -> Iterator[NDArray[Any]]:  # fmt: skip
+    """A prediction of each picture of colour (N, H, W, 3), in order. The network's mode is restored.
+
+    sizes: (height, width) of each prediction, that outputs are interpolated to; none = as colour.
+    """
     was_training = network.training
     network.eval()
     device = next(network.parameters()).device
@@ -55,8 +60,17 @@ def predicted(
         for at in range(0, len(colour), _BATCH):
             pictures = torch.from_numpy(colour[at : at + _BATCH]).to(device)
             with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
-                output = network(encoded(as_colour(pictures), plan.encoding))
-            yield from task.predictions(output)
+                output = network(encoded(as_colour(pictures), plan.encoding)).float()
+            wanted = sizes[at : at + _BATCH]
+            if all(size == tuple(output.shape[-2:]) for size in wanted):
+                yield from task.predictions(output)
+                continue
+            # Enlarge one by one: photographs may differ in size.
+            for one, size in zip(output, wanted, strict=True):
+                large = functional.interpolate(
+                    one[None], size, mode="bilinear", align_corners=False
+                )
+                yield from task.predictions(large)
     finally:
         network.train(was_training)
 
@@ -68,20 +82,20 @@ def as_colour(pictures: torch.Tensor) -> torch.Tensor:
 
 def judged(network: nn.Module, views: ViewArrays, task: Task, plan: Plan) -> Judged:
     """How good the network is on views."""
-    return _score(predicted(network, views.colour, task, plan), views, task, plan)
+    predictions = predicted(network, views.colour, task, plan)
+    return scored(predictions, (views.target(k) for k in range(len(views))), task, plan)
 
 
 def baseline_judged(baseline: F32, views: ViewArrays, task: Task, plan: Plan) -> Judged:
     """How good the same prediction for every view is."""
-    return _score((baseline for _ in views.ids), views, task, plan)
+    targets = (views.target(k) for k in range(len(views)))
+    return scored((baseline for _ in views.ids), targets, task, plan)
 
 
-def _score(
-    predictions: Iterator[NDArray[Any]], views: ViewArrays, task: Task, plan: Plan
+def scored(
+    predictions: Iterable[NDArray[Any]], truths: Iterable[Arrays], task: Task, plan: Plan
 ) -> Judged:
+    """How good predictions are, each of the size of its truth."""
     scorer = task.scorer(plan)
-    errors = tuple(
-        scorer.add(prediction, {name: array[k] for name, array in views.targets.items()})
-        for k, prediction in enumerate(predictions)
-    )
+    errors = tuple(scorer.add(p, truth) for p, truth in zip(predictions, truths, strict=True))
     return Judged(scorer.figures(), errors)

@@ -35,7 +35,6 @@ class Job:
     mode: str = "mlt_il_ol"  # lighting of the pictures
     source: str = ""  # where the views come from, in words
     init: str = "none"  # none, vgg16.pth, hed, or a run's folder
-    card: str = ""  # whose homes they are
     facts: dict[str, Any] = field(default_factory=dict)  # more of the record
 
 
@@ -89,7 +88,6 @@ def _record(
         "seed": job.seed,
         "mode": job.mode,
         "source": job.source,
-        "card": job.card,
         "init": job.init,
         "init_origin": origin,
         "views": {"train": len(views), "held_out": len(held_out) if held_out else 0},
@@ -111,10 +109,8 @@ def _judge(
 ) -> dict[str, Any]:  # fmt: skip
     """Figures on training and held-out views, of the network and of the baseline."""
     task = task_of(plan.task)
-    n, seen = len(views), views.some(MAX_JUDGED)
-    name, baseline = task.baseline(
-        [{key: array[k] for key, array in views.targets.items()} for k in range(n)]
-    )
+    seen = views.some(MAX_JUDGED)
+    name, baseline = task.baseline([views.target(k) for k in range(len(views))])
     np.save(folder.baseline, baseline)
     parts = {"train": seen} | ({"held_out": held_out} if held_out else {})
     return {

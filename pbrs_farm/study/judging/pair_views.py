@@ -1,0 +1,120 @@
+"""Photographs with depth as views to judge normals on; their truth are planes fitted to depth. Effects: reads files.
+
+A folder of pairs in a layout of docs/selection.md, and the camera: intrinsics.json with fx, fy, cx,
+cy in pixels (depth_scale: units a metre), or intrinsics.txt with those four numbers or the nine of
+K, beside the pictures or in a folder above.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, F64, Mask
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.resampling import resized_by_area
+from pbrs_farm.curate.photographs import Photo, pairs_in, photo_from_pair
+from pbrs_farm.regular_files import fault_of, read_regular
+from pbrs_farm.study.judging.photo_views import JudgedViews
+from pbrs_farm.study.metrics.plane_normals import normals_of_depth
+from pbrs_farm.study.tasks.task import Arrays
+from pbrs_farm.study.training_plan import Plan
+
+PLANE_TRUTH: Final = (
+    "planes fitted to depth in windows of 1/40 of the width; mask: at least 60 % of the window on"
+    " one surface, within 0.6 % of its depth, not seen edge-on"
+)
+_FILES: Final = ("intrinsics.json", "intrinsics.txt")
+_MAX_BYTES: Final = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoCamera:
+    """The pinhole camera of photographs, pixels of the stored size."""
+
+    K: tuple[float, float, float, float]  # fx, fy, cx, cy
+    depth_scale: float | None  # units a metre; None = as the file's type says
+
+    def matrix(self) -> F64:
+        """(3, 3)."""
+        fx, fy, cx, cy = self.K
+        return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], np.float64)
+
+
+def pair_views(folder: Path, plan: Plan, name: str) -> JudgedViews:
+    """Every pair below a folder; BadInput for one without intrinsics, and for another task than normals."""
+    if plan.task != "normals":
+        text = f"photographs with depth say nothing of {plan.task}: normals alone"
+        raise BadInput(folder, "", text, hint="NYUv2's .mat holds classes and instances")
+    ids, colours, truths = [], [], []
+    for pair in pairs_in(folder):
+        camera = camera_of(pair.rgb.parent, folder)
+        photo = photo_from_pair(pair, depth_scale=camera.depth_scale, sun_rgbd=False)
+        colour, rows, columns = framed(photo.rgb, plan)
+        normal, valid = normals_of_photo(photo, camera.matrix())
+        ids.append(pair.id)
+        colours.append(colour)
+        truths.append(normal_truth(normal[rows, columns], valid[rows, columns]))
+    return JudgedViews(name, PLANE_TRUTH, tuple(ids), np.stack(colours), tuple(truths))
+
+
+def normals_of_photo(photo: Photo, K: F64) -> tuple[F32, Mask]:
+    """Normals and mask of a photograph's depth."""
+    return normals_of_depth(photo.depth_mm / np.float64(1000), K)
+
+
+def normal_truth(normal: F32, valid: Mask) -> Arrays:
+    """In the form of NormalsTask's targets."""
+    return {"normal": np.rint(normal * 32767).astype(np.int16), "valid": valid}
+
+
+def framed(rgb: NDArray[np.uint8], plan: Plan) -> tuple[NDArray[np.uint8], slice, slice]:
+    """The middle of a photograph in the plan's form, at the plan's size; the rows and columns taken."""
+    height, width = rgb.shape[:2]
+    share = plan.width_px / plan.height_px
+    new_width = min(width, round(height * share))
+    new_height = min(height, round(width / share))
+    top, left = (height - new_height) // 2, (width - new_width) // 2
+    rows, columns = slice(top, top + new_height), slice(left, left + new_width)
+    return resized_by_area(rgb[rows, columns], plan.width_px, plan.height_px), rows, columns
+
+
+def camera_of(folder: Path, top: Path) -> PhotoCamera:
+    """The nearest intrinsics file from a folder up to top and its parent; BadInput where there is none."""
+    above = [folder, *folder.parents]
+    last = above.index(top) if top in above else 0
+    for place in above[: last + 1]:
+        for name in _FILES:
+            if (place / name).is_file():
+                return _camera(place / name)
+    text = "photographs without intrinsics: normals cannot be taken from their depth"
+    hint = 'put intrinsics.json there: {"fx": 518.9, "fy": 519.5, "cx": 325.6, "cy": 253.7}'
+    raise BadInput(folder, "", text, hint=hint)
+
+
+def _camera(path: Path) -> PhotoCamera:
+    try:
+        text = read_regular(path)[:_MAX_BYTES].decode()
+    except (OSError, UnicodeDecodeError) as error:
+        why = fault_of(error) if isinstance(error, OSError) else "not text"
+        raise BadInput(path, "", why) from None
+    scale: float | None = None
+    try:
+        if path.suffix == ".json":
+            row = json.loads(text)
+            values = [float(row[key]) for key in ("fx", "fy", "cx", "cy")]
+            scale = float(row["depth_scale"]) if "depth_scale" in row else None
+        else:
+            values = [float(word) for word in text.replace(",", " ").split()]
+            values = [values[k] for k in (0, 4, 2, 5)] if len(values) == 9 else values
+    except (ValueError, KeyError, TypeError):
+        values = []
+    if len(values) != 4 or not np.isfinite(values).all() or min(values[:2]) <= 0:
+        raise BadInput(path, "", "expected fx, fy, cx and cy in pixels, or the nine numbers of K")
+    fx, fy, cx, cy = values
+    return PhotoCamera((fx, fy, cx, cy), scale)
