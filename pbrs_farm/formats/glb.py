@@ -177,8 +177,13 @@ def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
     place, accessor = f"accessors[{index}]", entry(gltf, "accessors", index)
     dtype = DTYPES.get(_hashable(accessor.get("componentType")))
     width = WIDTHS.get(_hashable(accessor.get("type")))
-    if dtype is None or width is None or "sparse" in accessor:
-        raise BadHouse(gltf.file, place, "is sparse or of a type that no mesh uses")
+    if dtype is None or width is None:
+        raise BadHouse(gltf.file, place, "is of a type that no mesh uses")
+    if "sparse" in accessor:
+        raise BadHouse(gltf.file, place, "is sparse, which is not read")
+    if "bufferView" not in accessor:
+        text, hint = "holds no data: its mesh is compressed", "export again without compression"
+        raise BadHouse(gltf.file, place, text, hint=hint)
     n = count(gltf, accessor, "count", place)
     # Elements may be interleaved with others: step over the bytes between them.
     data = view_bytes(gltf, accessor.get("bufferView"))

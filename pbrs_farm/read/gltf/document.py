@@ -68,7 +68,7 @@ def _check_extensions(gltf: Gltf) -> None:
     required = gltf.document.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else []:
         if name not in UNDERSTOOD:
-            text, hint = f"{str(name)[:60]!r} is not understood", "export without mesh compression"
+            text, hint = f"{str(name)[:60]!r} is not understood", "export again without it"
             raise BadHouse(gltf.file, "extensionsRequired", text, hint=hint)
 
 

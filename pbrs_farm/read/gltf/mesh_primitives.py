@@ -27,8 +27,8 @@ def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int |
     n_triangles = 0
     for k, primitive in enumerate(primitives):
         place = f"meshes[{index}].primitives[{k}]"
-        if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
-            continue  # points and lines have no surface
+        if not has_surface(primitive):
+            continue
         triangles = _mesh(gltf, primitive, place)
         if triangles is not None:
             n_triangles += len(triangles.faces)
@@ -37,6 +37,11 @@ def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int |
             text = f"more than {max_triangles} triangles"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_model_triangles")
     return found
+
+
+def has_surface(primitive: dict[str, Any]) -> bool:
+    """Whether a primitive is made of triangles: points and lines have no surface."""
+    return primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
 
 
 def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:

@@ -6,6 +6,7 @@ the file and what may lie beside it: `<stem>.classes.json` and `<stem>.rooms.jso
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,8 +31,11 @@ from pbrs_farm.read.gltf.scene_rooms import (
     rooms_from_floors,
     rooms_from_json,
 )
+from pbrs_farm.read.gltf.unread_parts import note_unread
 from pbrs_farm.read.suncg.wall_holes import openings
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
+
+_SMALL_M, _LARGE_M = 1.5, 150.0  # a scene beyond is in other units than metres
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,13 +88,14 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
     gltf = gltf_document(data, name, beside.fetch)
     materials = SceneMaterials(gltf, beside.fetch, notes)
     items = list(items_of_scene(gltf, mapping, materials, notes, fields))
+    note_unread(gltf, notes)
     if beside.rooms is None:
         rooms = rooms_from_floors(items)
     else:
         rooms = rooms_from_json(beside.rooms, f"{stem}.rooms.json", items)
     if not rooms:
         hint = f"name a node `floor`, map one in {stem}.classes.json, or give {stem}.rooms.json"
-        hint += "; `pbrs-farm objects` renders single models"
+        hint = f"{_of_its_size(items)}{hint}; `pbrs-farm objects` renders single models"
         raise BadHouse(name, "scene", "has no floor", hint=hint)
     # Sort rooms into levels and items into rooms.
     levels, numbered = levels_of(rooms)
@@ -110,6 +115,16 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
         openings=openings(items),
         notes=notes.all(),
     )
+
+
+def _of_its_size(items: Sequence[Item]) -> str:
+    """What to say of a scene that is no size of a house, as one exported in centimetres; or ""."""
+    bounds = np.array([i.bounds for i in items if i.n_faces]).reshape(-1, 2, 3)
+    if not len(bounds):
+        return ""
+    wide = float((bounds[:, 1].max(0) - bounds[:, 0].min(0)).max())
+    is_usual = _SMALL_M < wide < _LARGE_M
+    return "" if is_usual else f"it is {wide:.3g} m large, but glTF is in metres: scale it; or "
 
 
 def _placed(item: Item, levels: tuple[Level, ...], rooms: tuple[Room, ...]) -> Item:

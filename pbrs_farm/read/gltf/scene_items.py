@@ -10,6 +10,7 @@ import numpy as np
 
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import (
     MAX_INSTANCES,
     Box,
@@ -64,7 +65,8 @@ def items_of_scene(
         # Bound the extent, the triangles and the items.
         if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
             text = f"stands farther than {fields.max_extent_m:g} m from the origin"
-            raise BadHouse(gltf.file, place, text, hint="limit: read.max_extent_m")
+            hint = "glTF is in metres: scale it; limit: read.max_extent_m"
+            raise BadHouse(gltf.file, place, text, hint=hint)
         n_faces += item.n_faces
         if n_faces > fields.max_triangles or len(found) >= MAX_INSTANCES:
             text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
@@ -169,12 +171,29 @@ def _item(
     if not surfaces and not lights:
         return None
     lights += emitted(surfaces, luminance)
-    boxes = [
-        oriented_box([m for _, m in meshes], part.world_from_node)
-        for part, meshes in parts
-        if meshes
+    return _finished(thing, surfaces, lights, _box(thing, parts))
+
+
+def _box(thing: _Thing, parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]]) -> Box | None:
+    """The box of an item of one mesh in its node's frame; of a door or window all parts' box."""
+    filled = [(part, [m for _, m in meshes]) for part, meshes in parts if meshes]
+    if len(filled) == 1:
+        (part, meshes), *_ = filled
+        box = oriented_box(meshes, part.world_from_node)
+        return _across_last(box) if box else None
+    world = thing.root.world_from_node
+    is_opening = thing.seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
+    if not filled or not is_opening or abs(np.linalg.det(world[:3, :3])) < 1e-12:
+        return None
+    # Bring a frame and its panes into the frame of the node that holds them.
+    node_from_world = np.linalg.inv(world).astype(np.float64)
+    inner = [
+        replace(m, positions=transform_points(node_from_world @ p.world_from_node, m.positions))
+        for p, meshes in filled
+        for m in meshes
     ]
-    return _finished(thing, surfaces, lights, boxes)
+    box = oriented_box(inner, world)
+    return _across_last(box) if box else None
 
 
 def _lights(gltf: Gltf, thing: _Thing) -> list[LightPart]:
@@ -208,7 +227,7 @@ def _meshes(
 
 
 def _finished(
-    thing: _Thing, surfaces: list[Surface], lights: list[LightPart], boxes: list[Box | None]
+    thing: _Thing, surfaces: list[Surface], lights: list[LightPart], box: Box | None
 ) -> Item:
     seen = thing.seen
     if lights and not surfaces:
@@ -227,7 +246,7 @@ def _finished(
         nyu40=seen.nyu40,
         source_class=thing.name,
         lights=tuple(lights),
-        box=_across_last(boxes[0]) if len(boxes) == 1 and boxes[0] else None,
+        box=box,
         tags=tuple(tags),
     )
     if seen.kind is ItemKind.LAMP and not lights:
