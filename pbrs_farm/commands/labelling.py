@@ -38,7 +38,7 @@ def add_verbs(verb: Verb) -> None:
     add_modes_and_size(p)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
     add("--shard-size", type=int, default=200, metavar="N", help="views a shard (default 200)")
-    text = "png keeps every bit and is read with numpy alone; jpeg:95 is a quarter as large"
+    text = "png (default) keeps every bit; jpeg:95 is a quarter as large and loses a little"
     add("--colour", default="png", metavar="FORM", help=text)
     add("--seed", type=int, default=0, help="of the order of views (default 0)")
 

@@ -21,7 +21,7 @@ class Packing:
     """How views are packed. Raises BadInput for what cannot be.
 
     size: (width, height), None as rendered. shares: how large each split is, None for one of all.
-    colour: "png" keeps every bit and needs zlib alone to be read, "jpeg" is a quarter as large.
+    colour: "png" keeps every bit, "jpeg" is a quarter as large.
     """
 
     size: Size | None = None

@@ -13,7 +13,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.errors import BadInput, MachineFailed, PbrsError
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.reading.baseline_jpeg import array_of_jpeg
 from pbrs_farm.study.reading.npz_bytes import arrays_of_npz, npz_of_arrays
 from pbrs_farm.study.reading.png_rows import array_of_rows, png_of_rows
 from pbrs_farm.study.reading.stored_layers import Stored
@@ -61,19 +62,18 @@ def array_of_part(name: str, part: str, data: bytes, place: str) -> NDArray[Any]
 
 
 def _jpeg_array(data: bytes, place: str) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8 of a JPEG, by the first decoder there is: OpenCV, Pillow, OpenImageIO."""
-    for decoder in (_by_opencv, _by_pillow, _by_openimageio):
+    """(H, W, 3) uint8 of a JPEG, by the first decoder there is: OpenCV, Pillow, our own."""
+    for decoder in (_by_opencv, _by_pillow, array_of_jpeg):
         try:
             array = decoder(data)
         except ImportError:
             continue
-        except (OSError, ValueError, PbrsError):
+        except (OSError, ValueError):
             array = None
-        if array is None:
-            raise BadInput(place, "", "cannot be read as a JPEG: damaged")
-        return array
-    hint = "pip install pillow, or pack with --colour png"
-    raise MachineFailed(f"{place}: colour was packed as JPEG, which needs a decoder", hint=hint)
+        if array is not None:
+            return array
+        break
+    raise BadInput(place, "", "cannot be read as a JPEG: damaged")
 
 
 def _by_opencv(data: bytes) -> NDArray[np.uint8] | None:
@@ -88,9 +88,3 @@ def _by_pillow(data: bytes) -> NDArray[np.uint8]:
 
     with Image.open(io.BytesIO(data), formats=["JPEG"]) as picture:
         return np.asarray(picture.convert("RGB"))
-
-
-def _by_openimageio(data: bytes) -> NDArray[np.uint8]:
-    from pbrs_farm.images import decode_photo
-
-    return decode_photo(data, "colour.jpg")
