@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final
+
+import numpy as np
 
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind, Surface
+from pbrs_farm.core.mesh import face_areas
 
+_DECIMALS: Final = 5  # of metres
 _ENDINGS: Final = {"image/png": "png", "image/jpeg": "jpg"}
 # What Sweet Home 3D makes of a group by its name.
 _GROUPS: Final = {
@@ -30,11 +35,12 @@ def model_files(shape: Shape) -> dict[str, bytes]:
 
 def _obj_lines(shape: Shape) -> Iterator[str]:
     n_points = n_uvs = n_normals = 1
-    for number, surface in enumerate(shape.surfaces):
+    for number, given in enumerate(shape.surfaces):
+        surface = _seen(given)
         kind = shape.materials[surface.material].kind
         yield f"g {_GROUPS.get(kind, 'part')}_{number}"
         yield f"usemtl m{surface.material}"
-        yield from (f"v {x:.5g} {y:.5g} {z:.5g}" for x, y, z in surface.positions.tolist())
+        yield from (f"v {x:.{_DECIMALS}f} {y:.{_DECIMALS}f} {z:.{_DECIMALS}f}" for x, y, z in surface.positions.tolist())
         if surface.uvs is not None:
             yield from (f"vt {u:.5g} {v:.5g}" for u, v in surface.uvs.tolist())
         if surface.normals is not None:
@@ -43,6 +49,22 @@ def _obj_lines(shape: Shape) -> Iterator[str]:
         n_points += len(surface.positions)
         n_uvs += 0 if surface.uvs is None else len(surface.uvs)
         n_normals += 0 if surface.normals is None else len(surface.normals)
+
+
+def _seen(surface: Surface) -> Surface:
+    """The surface without faces that have no area once written, and without vertices of those alone.
+
+    The program, and every reader, fits the box of all vertices to the piece's size.
+    """
+    written = np.round(surface.positions.astype(np.float64), _DECIMALS)
+    faces = surface.faces[face_areas(written[surface.faces]) > 0]
+    used, faces = np.unique(faces, return_inverse=True)
+    return replace(
+        surface, positions=surface.positions[used],
+        faces=faces.reshape(-1, 3).astype(np.int32),
+        uvs=None if surface.uvs is None else surface.uvs[used],
+        normals=None if surface.normals is None else surface.normals[used],
+    )  # fmt: skip
 
 
 def _face_lines(surface: Surface, point: int, uv: int, normal: int) -> Iterator[str]:

@@ -12,6 +12,7 @@ from pbrs_farm.generate.furnish.template import Liking, Stand, Template
 _RIM_M: Final = 0.85  # of a washbasin that hangs
 _BESIDE_TOILET_M: Final = 0.18
 _GAP: Final = 0.01
+_HUNG_GAP: Final = 0.001
 
 
 def tubs(shelf: Shelf) -> tuple[Template, ...]:
@@ -59,7 +60,8 @@ def basins(shelf: Shelf, *, small: bool = False, before: float = 0.6) -> tuple[T
         hangs = piece.place is Place.WALL
         lift = max(_RIM_M - piece.size[2] * 0.85, 0.3) if hangs else 0.0
         w, d, _ = piece.size
-        slot = backed(piece, gap=_GAP, elevation=lift)
+        # What hangs touches its wall.
+        slot = backed(piece, gap=_HUNG_GAP if hangs else _GAP, elevation=lift)
         front = d + _GAP
         found.append(
             Template(

@@ -24,6 +24,7 @@ from pbrs_farm.generate.plan import Rect
 UPPER_M: Final = 1.45  # lower edge of wall cabinets
 _FRONT_M: Final = 0.8  # free before the run
 _GAP: Final = 0.005  # behind the units
+_HUNG_GAP: Final = 0.001  # and behind what touches the wall that it hangs on
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +266,8 @@ def _above(
 
 def _placed(slot: Slot, module: _Module, arms: tuple[Arm, ...]) -> Slot:
     """A unit with its back at its arm's wall, in the frame of the main arm's wall."""
-    along, across = (module.low + module.high) / 2, _GAP + slot.depth / 2
+    gap = _GAP if slot.elevation < UPPER_M else _HUNG_GAP
+    along, across = (module.low + module.high) / 2, gap + slot.depth / 2
     u, v = _in_main(along, across, arms[module.arm])
     return replace(slot, u=u, v=v, turns=arms[module.arm].turns)
 
