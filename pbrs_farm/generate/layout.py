@@ -26,6 +26,7 @@ from pbrs_farm.generate.plan import RoomType
 from pbrs_farm.generate.programme import Programme, RoomWish
 from pbrs_farm.generate.slicing import N_TRIES, Contact, IntRect, Leaf, solved
 
+_BESIDE_M: Final = 0.8  # of wall that rooms which lie beside each other share
 _FIXED_TRIES: Final = 4  # times as many for what a user wrote
 _PATIENCE: Final = 3  # plans that meet the rules but for a small room
 
@@ -171,7 +172,7 @@ def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> 
             contacts.append(Contact(i, others, 0.9, is_hard=False))
     for room, others in programme.adjacent:
         near = tuple(i for i, o in enumerate(owner) if o in others)
-        contacts.append(Contact(owner.index(room), near, DOOR_WALL_M))
+        contacts.append(Contact(owner.index(room), near, _BESIDE_M))
     return tuple(contacts)
 
 

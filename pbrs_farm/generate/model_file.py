@@ -40,7 +40,10 @@ def _obj_lines(shape: Shape) -> Iterator[str]:
         kind = shape.materials[surface.material].kind
         yield f"g {_GROUPS.get(kind, 'part')}_{number}"
         yield f"usemtl m{surface.material}"
-        yield from (f"v {x:.{_DECIMALS}f} {y:.{_DECIMALS}f} {z:.{_DECIMALS}f}" for x, y, z in surface.positions.tolist())
+        yield from (
+            f"v {x:.{_DECIMALS}f} {y:.{_DECIMALS}f} {z:.{_DECIMALS}f}"
+            for x, y, z in surface.positions.tolist()
+        )
         if surface.uvs is not None:
             yield from (f"vt {u:.5g} {v:.5g}" for u, v in surface.uvs.tolist())
         if surface.normals is not None:

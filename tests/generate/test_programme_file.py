@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shapely.geometry import Polygon
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.drawing import drawn_plan
@@ -62,3 +63,41 @@ def test_a_programme_that_cannot_be_met_is_one_line(
 def test_a_missing_file_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"none\.json"):
         programme_from_json(tmp_path / "none.json")
+
+
+def test_rooms_that_are_wished_adjacent_share_a_wall(tmp_path: Path) -> None:
+    value = {"rooms": FLAT, "adjacent": [["Ada", "kitchen"]]}
+    programme = programme_from_json(written(tmp_path, value))
+    for seed in (1, 2):
+        plan = drawn_plan(np.random.default_rng(seed), None, programme)
+        ada, kitchen = (
+            next(Polygon(r.polygon) for r in plan.rooms if r.name == name)
+            for name in ("Ada", "Kitchen")
+        )
+        shared = ada.buffer(0.1).intersection(kitchen.buffer(0.1))
+        assert max(np.ptp(shared.bounds[::2]), np.ptp(shared.bounds[1::2])) > 0.7
+
+
+def test_a_programme_without_a_plan_says_what_to_leave_out(tmp_path: Path) -> None:
+    # Every slicing of so few rooms parts them by the hall.
+    value = {"rooms": FLAT, "adjacent": [["Ada", "bathroom"]]}
+    programme = programme_from_json(written(tmp_path, value))
+    with pytest.raises(BadInput, match=r"no plan with these rooms adjacent.*leave it out"):
+        drawn_plan(np.random.default_rng(1), None, programme)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "message"),
+    [
+        ("Ada", "is no list of pairs"),
+        ([["Ada"]], "adjacent 1: is no pair"),
+        ([["Ada", "cellar"]], "no room is called 'cellar'.*one of living, Ada, kitchen"),
+        ([["Ada", "bedroom"]], "'Ada' is one room"),
+        ([["Ada", "Ada"]], "'Ada' is one room"),
+    ],
+)
+def test_adjacency_of_rooms_that_are_not_there_is_one_line(
+    tmp_path: Path, pairs: object, message: str
+) -> None:
+    with pytest.raises(BadInput, match=message):
+        programme_from_json(written(tmp_path, {"rooms": FLAT, "adjacent": pairs}))

@@ -89,8 +89,8 @@ def room_space(plan: Plan, number: int) -> RoomSpace:
             windows.append(_window(opening, frame, walls, _BEFORE_WINDOW_M))
             continue
         is_french = opening.kind is OpeningKind.FRENCH_WINDOW
-        swings = opening.room == number and not is_french
-        depth = max(BEFORE_DOOR_M, opening.width) if swings else BEFORE_DOOR_M
+        # As far as a leaf reaches, also where it swings to the other side.
+        depth = max(BEFORE_DOOR_M, opening.width)
         if is_french:
             windows.append(_window(opening, frame, walls, BEFORE_FRENCH_M))
             depth = BEFORE_FRENCH_M

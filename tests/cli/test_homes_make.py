@@ -1,0 +1,93 @@
+"""`homes make` as a user types it: files, a page of plans, one line for what cannot be made."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.cli import main
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
+    """What a command says that ends with a fault: one line."""
+    capsys.readouterr()
+    assert main(["homes", "make", *map(str, words)]) != 0
+    lines = [x for x in capsys.readouterr().err.splitlines() if x]
+    assert not [x for x in lines if "Traceback" in x]
+    return lines[0]
+
+
+def test_homes_and_their_plans_are_made_and_a_second_call_keeps_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["homes", "make", "2", "--empty", "--rooms", "0..1", "--out", str(tmp_path)]
+    assert main(words) == 0
+    names = {p.name for p in tmp_path.iterdir()}
+    assert names == {"made-1.sh3d", "made-1.svg", "made-2.sh3d", "made-2.svg", "plans.html"}
+    assert capsys.readouterr().out.startswith("2 homes made in ")
+    assert main(words) == 0
+    assert "0 homes made" in (said := capsys.readouterr().out)
+    assert "2 kept" in said
+
+
+def test_a_programme_file_names_the_rooms(tmp_path: Path) -> None:
+    flat = tmp_path / "flat.json"
+    rooms = [{"type": "bedroom", "name": "Ada"}, "living", "kitchen", "bathroom"]
+    flat.write_text(json.dumps({"rooms": rooms, "adjacent": [["Ada", "kitchen"]]}))
+    words = ["make", "--empty", "--programme", str(flat), "--out", str(tmp_path / "flats")]
+    assert main(["homes", *words]) == 0
+    assert "Ada" in (tmp_path / "flats/made-1.svg").read_text()
+
+
+def test_a_plan_of_ones_own_becomes_a_home_of_its_name(tmp_path: Path) -> None:
+    plan = tmp_path / "salon.json"
+    square = [[0, 0], [5, 0], [5, 4], [0, 4]]
+    plan.write_text(json.dumps({"rooms": [{"type": "living", "polygon": square}]}))
+    out = tmp_path / "own"
+    assert main(["homes", "make", "--empty", "--plan", str(plan), "--out", str(out)]) == 0
+    assert {p.name for p in out.iterdir()} == {"salon.sh3d", "salon.svg"}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--rooms", "4..2"], "runs downwards: try 2..4"),
+        (["--rooms", "4", "--area", "20..25"], "homes of 4 bedrooms have 76 to 180 m2"),
+        (["--style", "baroque"], "no such style: try one of classic"),
+        (["0"], "expected 1 home or more"),
+        (["--programme", "none.json"], "none.json"),
+        (["--apartment", "7"], "needs --plan FILE.csv"),
+        (["--plan", "none.json", "--rooms", "2"], "leaves no choice of --rooms"),
+    ],
+)
+def test_what_cannot_be_made_is_one_line_with_what_works(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = refused(capsys, *words, "--empty", "--out", tmp_path / "homes")
+    for part in said.split(": try "):
+        assert part in line
+    assert not (tmp_path / "homes").exists()
+
+
+def test_ten_rooms_in_twenty_square_metres_are_refused_with_what_they_take(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flat = tmp_path / "flat.json"
+    rooms = ["living", "kitchen", "bathroom", *["bedroom"] * 7]
+    flat.write_text(json.dumps({"rooms": rooms, "area": 20}))
+    line = refused(capsys, "--empty", "--programme", flat, "--out", tmp_path / "homes")
+    assert "11 rooms in 20 m2 cannot be met" in line
+    assert "rooms of these types take 101 to" in line
+
+
+def test_without_the_furniture_package_one_line_says_how_to_get_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
+    line = refused(capsys, "--out", tmp_path / "homes")
+    assert "`pbrs-farm homes --furniture` (120 MB), or --empty" in line
+    capsys.readouterr()
+    assert main(["run", "made:1", "--out", str(tmp_path / "out")]) != 0
+    assert "made:1,furniture=none" in capsys.readouterr().err
