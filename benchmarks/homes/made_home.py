@@ -90,7 +90,7 @@ def _off_the_ground(things: list[Any]) -> list[tuple[str, float]]:
             if thing.item.id in left:
                 mesh = thing.mesh.copy()
                 mesh.apply_translation([0.0, lift, 0.0])
-                bounds = thing.bounds + [0.0, lift, 0.0]
+                bounds = thing.bounds + np.array([0.0, lift, 0.0])
                 thing = replace(thing, mesh=mesh, bounds=bounds, _rays=None)
             moved.append(thing)
         if left:

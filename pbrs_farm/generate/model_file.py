@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas
@@ -59,9 +60,9 @@ def _seen(surface: Surface) -> Surface:
 
     The program, and every reader, fits the box of all vertices to the piece's size.
     """
-    written = np.round(surface.positions.astype(np.float64), _DECIMALS)
-    faces = surface.faces[face_areas(written[surface.faces]) > 0]
-    used, faces = np.unique(faces, return_inverse=True)
+    written: F64 = np.round(surface.positions.astype(np.float64), _DECIMALS)
+    seen = surface.faces[face_areas(written[surface.faces]) > 0]
+    used, faces = np.unique(seen, return_inverse=True)
     return replace(
         surface, positions=surface.positions[used],
         faces=faces.reshape(-1, 3).astype(np.int32),
