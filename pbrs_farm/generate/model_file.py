@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas
@@ -60,7 +59,7 @@ def _seen(surface: Surface) -> Surface:
 
     The program, and every reader, fits the box of all vertices to the piece's size.
     """
-    written: F64 = np.round(surface.positions.astype(np.float64), _DECIMALS)
+    written = np.asarray(surface.positions, np.float64).round(_DECIMALS)
     seen = surface.faces[face_areas(written[surface.faces]) > 0]
     used, faces = np.unique(seen, return_inverse=True)
     return replace(
