@@ -28,7 +28,11 @@ if TYPE_CHECKING:
     from pbrs_farm.assets.homes_package import Package
     from pbrs_farm.read.objects.model_folders import ObjectModel
 
-_MODEL_SUFFIXES: Final = (".obj", ".sh3f", ".mtl", ".fbx", ".dae", ".3ds", ".ply", ".stl")
+_MODEL_SUFFIXES: Final = (".obj", ".sh3f")  # what `objects` reads; a .glb may be a scene
+_UNREAD_SUFFIXES: Final = frozenset({
+    ".3dm", ".3ds", ".abc", ".blend", ".dae", ".dwg", ".dxf", ".fbx", ".ifc", ".max", ".mb", ".mtl",
+    ".ply", ".rvt", ".skp", ".stl", ".usd", ".usda", ".usdc", ".usdz",
+})  # fmt: skip
 _FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip of a unit
 
 SourceKind = Literal["builtin", "made", "example", "sweethome3d", "suncg", "gltf", "object"]
@@ -103,6 +107,9 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
     elif path.suffix.lower() in _MODEL_SUFFIXES:
         hint = f"`pbrs-farm objects {word} --out DIR` renders single models"
         raise BadHouse(word, "", "is a model or a library of models, no home", hint=hint)
+    elif path.suffix.lower() in _UNREAD_SUFFIXES:
+        hint = "export it as .glb; homes are .sh3d, .glb, .gltf and SUNCG's house folders"
+        raise BadHouse(word, "", f"{path.suffix} files are not read", hint=hint)
     else:
         kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
         word = str(real_path(path))
@@ -343,6 +350,8 @@ def _folder_hint(folder: Path) -> str:
         return "SUNCG's root: name ROOT/house/ID, or ROOT and --houses LIST"
     if list(folder.glob("*.json")):
         return _ROOT_HINT
+    if any(next(folder.glob(f"*{suffix}"), None) for suffix in _MODEL_SUFFIXES):
+        return f"`pbrs-farm objects {folder} --out DIR` renders single models"
     return "a SUNCG house folder, or .sh3d, .glb files"
 
 

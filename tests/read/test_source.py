@@ -39,3 +39,17 @@ def test_another_version_of_the_example_homes_is_the_machines_fault() -> None:
     source = resolve("Studio").model_copy(update={"sha256": "0" * 64})
     with pytest.raises(MachineFailed, match="another Studio"):
         read_house(source, ReadFields())
+
+
+@pytest.mark.parametrize("name", ["chair.fbx", "house.blend", "house.IFC", "room.usdz"])
+def test_a_file_of_another_program_says_what_is_read(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(b"bytes")
+    with pytest.raises(BadHouse, match="files are not read"):
+        resolve(str(path))
+
+
+def test_a_folder_of_models_names_the_verb_objects(tmp_path: Path) -> None:
+    (tmp_path / "chair.obj").write_bytes(b"")
+    with pytest.raises(BadHouse, match="pbrs-farm objects"):
+        resolve(str(tmp_path))

@@ -35,7 +35,7 @@ from pbrs_farm.read.gltf.unread_parts import note_unread
 from pbrs_farm.read.suncg.wall_holes import openings
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
-_SMALL_M, _LARGE_M = 1.5, 150.0  # a scene beyond is in other units than metres
+_SMALL_M, _LARGE_M = 0.3, 150.0  # a scene beyond is in other units than metres
 
 
 @dataclass(frozen=True, slots=True)
