@@ -18,6 +18,7 @@ import numpy as np
 import OpenImageIO as oiio  # noqa: N813
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput, MachineFailed
 
 MAX_FILE_PIXELS: Final = 16384 * 16384  # larger pictures are rejected before their pixels are read
@@ -109,7 +110,7 @@ def resized(
 
 
 def exr_from_layers(
-    layers: Mapping[str, NDArray[np.float32]], *, half: bool = False, attribution: str = ""
+    layers: Mapping[str, F32], *, half: bool = False, attribution: str = ""
 ) -> bytes:
     """OpenEXR bytes of named channels ("outdoor.R": (H, W) float32), all of one size.
 
@@ -134,7 +135,7 @@ def exr_from_layers(
     return _encoded(pixels, spec, ".exr")
 
 
-def layers_from_exr(data: bytes, name: str = "radiance.exr") -> dict[str, NDArray[np.float32]]:
+def layers_from_exr(data: bytes, name: str = "radiance.exr") -> dict[str, F32]:
     """Channel name -> (H, W) float32 of an OpenEXR file; BadInput if it cannot be read."""
     if _kind(data, name) != ".exr":
         raise BadInput(name, "", "not an OpenEXR file")
@@ -185,7 +186,7 @@ def decode_texture(data: bytes, name: str, media_type: str = "") -> NDArray[np.u
     return np.ascontiguousarray(pixels[..., :3])
 
 
-def decode_radiance(data: bytes, name: str) -> NDArray[np.float32]:
+def decode_radiance(data: bytes, name: str) -> F32:
     """(H, W, 3) float32 linear of a Radiance .hdr or OpenEXR panorama; BadInput if unreadable."""
     kind = _kind(data, name)
     if kind not in (".hdr", ".exr"):

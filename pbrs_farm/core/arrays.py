@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-F32 = NDArray[np.float32]  # of any shape, and so are the next three: docstrings say which
+F32 = NDArray[np.float32]  # of any shape, and so are the next four: docstrings say which
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
+I64 = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 # (H, W) uint32: instance id of the item seen through each pixel's centre, 0 = nothing.
@@ -25,6 +26,12 @@ Mask = NDArray[np.bool_]  # (H, W) bool
 Points = NDArray[np.float32]  # (N, 3) float32, metres, world frame
 Points2 = NDArray[np.float64]  # (N, 2) float64, metres, plan: columns are world x and world z
 Matrix4 = NDArray[np.float64]  # (4, 4) float64, affine, column vectors: p_a = a_from_b @ p_b
+
+
+def triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
+    """Three numbers as a value that can be compared and hashed; ValueError for more or fewer."""
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

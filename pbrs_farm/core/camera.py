@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Matrix4
+from pbrs_farm.core.arrays import F32, F64, Matrix4
 
 # Full horizontal field of view of the published cameras: half-angle 0.5534 rad (docs/spec/suncg.md section 3).
 PAPER_HFOV_RAD = 2 * 0.5534
@@ -47,7 +46,7 @@ class Intrinsics:
         return replace(self, fx=self.fx * factor, fy=self.fy * factor)
 
     @property
-    def k(self) -> NDArray[np.float64]:
+    def k(self) -> F64:
         """(3, 3) matrix K: pixel = K @ (x right, y down, z forward), divided by z."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
 
@@ -62,8 +61,8 @@ class Camera:
     @staticmethod
     def look(
         intrinsics: Intrinsics,
-        eye: NDArray[np.float64],
-        towards: NDArray[np.float64],
+        eye: F64,
+        towards: F64,
         up: tuple[float, float, float] = (0.0, 1.0, 0.0),
     ) -> Camera:
         """A camera at eye (3,) looking along towards (3,), any length; up must not be parallel to it."""
@@ -80,12 +79,12 @@ class Camera:
         return Camera(intrinsics, world_from_camera)
 
     @property
-    def eye(self) -> NDArray[np.float64]:
+    def eye(self) -> F64:
         """(3,) position in the world, metres."""
         return self.world_from_camera[:3, 3]
 
     @property
-    def towards(self) -> NDArray[np.float64]:
+    def towards(self) -> F64:
         """(3,) unit view direction in the world."""
         return np.asarray(-self.world_from_camera[:3, 2])
 
@@ -93,7 +92,7 @@ class Camera:
         """The same camera on another pixel grid."""
         return Camera(self.intrinsics.resized(width_px, height_px), self.world_from_camera)
 
-    def rays(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def rays(self) -> tuple[F32, F32]:
         """Rays through the pixels' centres: origin (3,) and directions (H, W, 3), float32, world.
 
         Directions have unit length along the optical axis, so that t along a ray is depth_z.
@@ -101,7 +100,7 @@ class Camera:
         origin, directions = self.exact_rays()
         return origin.astype(np.float32), directions.astype(np.float32)
 
-    def exact_rays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def exact_rays(self) -> tuple[F64, F64]:
         """As rays, in float64."""
         # A point of each pixel on the plane z = -1 of the camera: unit length along the axis.
         i = self.intrinsics

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Matrix4
+from pbrs_farm.core.arrays import F64, Matrix4
 
 M_FROM_CM = 0.01
 
@@ -17,9 +17,7 @@ M_FROM_CM = 0.01
 OPENCV_FROM_OPENGL: Matrix4 = np.diag([1.0, -1.0, -1.0, 1.0])
 
 # Published normal axes x right, y forward, z up  <-  OpenGL camera axes (docs/spec/suncg.md section 5).
-PUBLISHED_FROM_OPENGL: NDArray[np.float64] = np.array(
-    [[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], np.float64
-)
+PUBLISHED_FROM_OPENGL: F64 = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], np.float64)
 
 
 def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
@@ -27,27 +25,25 @@ def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
     return world_from_camera @ OPENCV_FROM_OPENGL
 
 
-def rotation_y(angle_rad: float) -> NDArray[np.float64]:
+def rotation_y(angle_rad: float) -> F64:
     """(3, 3) right-handed rotation about +y."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], np.float64)
 
 
-def transform_points(
-    a_from_b: NDArray[np.float64], points_b: NDArray[np.floating]
-) -> NDArray[np.float64]:
+def transform_points(a_from_b: F64, points_b: NDArray[np.floating]) -> F64:
     """(N, 3) points in frame a; a_from_b is (4, 4) affine."""
     p = np.asarray(points_b, np.float64)
     return np.asarray(p @ a_from_b[:3, :3].T + a_from_b[:3, 3])
 
 
-def linear_from_srgb(encoded: NDArray[np.floating]) -> NDArray[np.float64]:
+def linear_from_srgb(encoded: NDArray[np.floating]) -> F64:
     """Linear values from sRGB-encoded ones, both in 0..1 (IEC 61966-2-1)."""
     e = np.asarray(encoded, np.float64)
     return np.where(e <= 0.04045, e / 12.92, ((np.maximum(e, 0) + 0.055) / 1.055) ** 2.4)
 
 
-def srgb_from_linear(linear: NDArray[np.floating]) -> NDArray[np.float64]:
+def srgb_from_linear(linear: NDArray[np.floating]) -> F64:
     """sRGB-encoded values from linear ones, both in 0..1 (IEC 61966-2-1)."""
     v = np.asarray(linear, np.float64)
     return np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.maximum(v, 0) ** (1 / 2.4) - 0.055)

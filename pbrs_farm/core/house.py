@@ -15,8 +15,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Points, Points2
+from pbrs_farm.core.arrays import F32, F64, I32, Points, Points2
 from pbrs_farm.core.lighting import LightForm, PowerUnit
+from pbrs_farm.core.mesh import triangle_corners
 
 MAX_INSTANCES = 65535
 
@@ -103,22 +104,28 @@ class Surface:
 
     name: str
     positions: Points  # (V, 3) metres, world
-    faces: NDArray[np.int32]  # (F, 3) counter-clockwise seen from the front
+    faces: I32  # (F, 3) counter-clockwise seen from the front
     material: int  # index into House.materials
-    uvs: NDArray[np.float32] | None = None  # (V, 2) v up, repeat wrap
-    normals: NDArray[np.float32] | None = None  # (V, 3) unit shading normals; None = flat
+    uvs: F32 | None = None  # (V, 2) v up, repeat wrap
+    normals: F32 | None = None  # (V, 3) unit shading normals; None = flat
+
+
+def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
+    """(F, 3, 3) corners of all triangles of surfaces in their order, in double precision."""
+    found = [triangle_corners(s.positions, s.faces) for s in surfaces]
+    return np.concatenate([np.zeros((0, 3, 3)), *found])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
     """An oriented box."""
 
-    centre: NDArray[np.float64]  # (3,) metres, world
-    half: NDArray[np.float64]  # (3,) half extents, metres
-    axes: NDArray[np.float64]  # (3, 3), unit columns
+    centre: F64  # (3,) metres, world
+    half: F64  # (3,) half extents, metres
+    axes: F64  # (3, 3), unit columns
 
     @property
-    def corners(self) -> NDArray[np.float64]:
+    def corners(self) -> F64:
         """(8, 3) corners in the world; corner i has the sign of bit k of i along axis k."""
         signs = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
         return np.asarray(self.centre + (signs * self.half) @ self.axes.T)
@@ -160,7 +167,7 @@ class Item:
     tags: tuple[str, ...] = ()  # words of the source: "mirrored", "unmapped", "boundary_of:0_1"
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def bounds(self) -> F64:
         """(2, 3) axis-aligned minimum and maximum, metres; NaN for an item without vertices."""
         points = [s.positions for s in self.surfaces if len(s.positions)]
         if not points:
@@ -193,8 +200,8 @@ class Opening:
     item_id: str | None  # the door or window
     is_window: bool
     cutter: Surface  # closed solid that repair subtracts from every wall it touches
-    quad: NDArray[np.float64]  # (4, 3) corners in the wall's middle plane, in order around
-    normal: NDArray[np.float64]  # (3,) unit, across the wall, either way
+    quad: F64  # (4, 3) corners in the wall's middle plane, in order around
+    normal: F64  # (3,) unit, across the wall, either way
     is_cut: bool = False  # the source's walls have the hole already: the cutter is its plug
 
 
@@ -242,8 +249,8 @@ class StoredCamera:
     """A viewpoint kept in the source."""
 
     name: str
-    eye: NDArray[np.float64]  # (3,) world
-    towards: NDArray[np.float64]  # (3,) world
+    eye: F64  # (3,) world
+    towards: F64  # (3,) world
     hfov_rad: float  # horizontal, full angle
 
 
@@ -316,12 +323,12 @@ class Geometry:
     """All triangles of a house in one list: what rays and rasters see."""
 
     positions: Points  # (V, 3) metres, world
-    normals: NDArray[np.float32]  # (V, 3) unit, (0, 0, 0) = flat
-    uvs: NDArray[np.float32]  # (V, 2) v up
-    faces: NDArray[np.int32]  # (F, 3) indices into positions
+    normals: F32  # (V, 3) unit, (0, 0, 0) = flat
+    uvs: F32  # (V, 2) v up
+    faces: I32  # (F, 3) indices into positions
     face_item: NDArray[np.uint32]  # (F,) instance id
-    face_material: NDArray[np.int32]  # (F,) index into House.materials
-    face_surface: NDArray[np.int32]  # (F,) number of the surface in House.surfaces() order
+    face_material: I32  # (F,) index into House.materials
+    face_surface: I32  # (F,) number of the surface in House.surfaces() order
 
 
 def geometry_from_house(house: House, *, with_panes: bool = True) -> Geometry:

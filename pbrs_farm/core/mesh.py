@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, Bools
 
 _TINY = 1e-300  # divides a zero vector to zero
 
@@ -59,7 +59,7 @@ def unit_normals(corners: F64) -> F64:
     return np.asarray(n / np.maximum(np.linalg.norm(n, axis=1, keepdims=True), _TINY))
 
 
-def faces_with_area(corners: F64, least_m2: float) -> NDArray[np.bool_]:
+def faces_with_area(corners: F64, least_m2: float) -> Bools:
     """(F,) whether a triangle (F, 3, 3) has finite corners and an area above least_m2."""
     with np.errstate(invalid="ignore", over="ignore"):
         return np.asarray(np.isfinite(corners).all((1, 2)) & (face_areas(corners) > least_m2))

@@ -9,6 +9,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.svg import element, svg_picture, svg_text
 
 Rgb = tuple[int, int, int]  # 0..255
@@ -82,9 +83,7 @@ class PlotArea(SvgPicture):
         self.text(at, f"{value:g}", "end" if before else "start", 10)
 
 
-def distribution(
-    scores: NDArray[np.float64], kept: NDArray[np.bool_], threshold: float, title: str
-) -> Markup:
+def distribution(scores: F64, kept: Bools, threshold: float, title: str) -> Markup:
     """Scores 0..1 in 50 bars, the kept part of each apart, and the threshold."""
     # Count all views and the kept ones by the same bars.
     edges = np.linspace(0, 1, 51)
@@ -102,9 +101,7 @@ def distribution(
     return frame.svg()
 
 
-def joint(
-    colour: NDArray[np.float64], depth: NDArray[np.float64], limits: tuple[float, float]
-) -> Markup:
+def joint(colour: F64, depth: F64, limits: tuple[float, float]) -> Markup:
     """Colour score against depth score: a cell is darker the more views it holds (log scale)."""
     n = 50
     cells, _, _ = np.histogram2d(colour, depth, bins=n, range=[[0, 1], [0, 1]])

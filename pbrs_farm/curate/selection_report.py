@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm import images
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import Mode
@@ -129,12 +130,12 @@ def _credits(store: Store, *shown: Any) -> list[str]:
     return list(lines)
 
 
-def _worst(table: Any) -> NDArray[np.float64]:
+def _worst(table: Any) -> F64:
     colour, depth = (table[k].to_numpy() for k in ("colour_score", "depth_score"))
     return np.asarray(np.minimum(colour, depth), np.float64)
 
 
-def _is_kept(scored: Any) -> NDArray[np.bool_]:
+def _is_kept(scored: Any) -> Bools:
     return np.asarray(scored["kept"].to_numpy(zero_copy_only=False), np.bool_)
 
 

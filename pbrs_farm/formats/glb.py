@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, I32
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.serialise import json_from_bytes
 
@@ -60,7 +61,7 @@ class GlbWriter:
         self._views.append(view)
         return len(self._views) - 1
 
-    def add_vertices(self, array: NDArray[np.float32], *, with_bounds: bool = False) -> int:
+    def add_vertices(self, array: F32, *, with_bounds: bool = False) -> int:
         """Index of a new accessor over array (N, 2 or 3) float32, N >= 1."""
         accessor = {
             "bufferView": self.add_bytes(_little(array, "<f4"), target=_ARRAY_BUFFER),
@@ -74,7 +75,7 @@ class GlbWriter:
         self._accessors.append(accessor)
         return len(self._accessors) - 1
 
-    def add_faces(self, faces: NDArray[np.int32]) -> int:
+    def add_faces(self, faces: I32) -> int:
         """Index of a new accessor over the vertex numbers of faces (F, 3), F >= 1."""
         self._accessors.append(
             {

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import linear_from_srgb
@@ -21,7 +21,7 @@ from pbrs_farm.formats.serialise import json_from_value
 GLTF_IMAGES: Final = ("image/png", "image/jpeg")
 
 # (u, v up) times this is (u, v down), one texture higher; and back.
-V_DOWN: Final[NDArray[np.float32]] = np.array([1, -1], np.float32)
+V_DOWN: Final[F32] = np.array([1, -1], np.float32)
 
 _PANE_ALPHA: Final = 0.3  # of glass whose source says opaque
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.images import exr_from_layers, layers_from_exr
@@ -23,7 +23,7 @@ def _channels(image: str) -> str:
     return "XYZ" if image == "normal" else "RGB"
 
 
-def radiance_exr(images: Mapping[str, NDArray[np.float32]], *, attribution: str = "") -> bytes:
+def radiance_exr(images: Mapping[str, F32], *, attribution: str = "") -> bytes:
     """The file of images by name, (H, W, 3) float32 each. attribution: the file's copyright."""
     planes = {
         f"{name}.{channel}": image[..., k]
@@ -37,10 +37,10 @@ def radiance_exr(images: Mapping[str, NDArray[np.float32]], *, attribution: str 
 class RadianceExr:
     """The channels of a radiance.exr."""
 
-    planes: Mapping[str, NDArray[np.float32]]  # "indoor.R" -> (H, W)
+    planes: Mapping[str, F32]  # "indoor.R" -> (H, W)
     place: str  # of the file, for messages
 
-    def image(self, name: str) -> NDArray[np.float32]:
+    def image(self, name: str) -> F32:
         """(H, W, 3) float32 image of that name; BadInput when the file has none."""
         try:
             return np.stack([self.planes[f"{name}.{c}"] for c in _channels(name)], -1)

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64
-from pbrs_farm.core.house import House, Item, ItemKind, LightPart
+from pbrs_farm.core.arrays import F32, F64, I64
+from pbrs_farm.core.house import House, Item, ItemKind, LightPart, corners_of_surfaces
 from pbrs_farm.core.lighting import LightForm, flux_lm
-from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
+from pbrs_farm.core.mesh import face_areas, unit_normals
 
 SOFTENING_M = 0.35  # added in quadrature to every distance, so that a lampshade does not burn out
 FLOOR_LEVEL = 0.6  # linear brightness, before the tone curve, of a white floor in median lamp light
@@ -52,7 +51,7 @@ def _row(part: LightPart) -> list[float]:
     ]  # fmt: skip
 
 
-def best_lights(lights: F32, low: F64, high: F64, n_best: int) -> NDArray[np.int64]:
+def best_lights(lights: F32, low: F64, high: F64, n_best: int) -> I64:
     """(N, min(n_best, L)) indices of the lights with the largest I / d^2 at each box, best first.
 
     low, high: (N, 3) boxes. I: the largest channel. d: from the light (for a line: from the nearest
@@ -112,13 +111,12 @@ def brightness_scale(house: House, n_best: int) -> float:
     return float(FLOOR_LEVEL / np.median(reached)) if len(reached) else 0.0
 
 
-def _spread_points(items: list[Item]) -> tuple[F64, F64, NDArray[np.int64]]:
+def _spread_points(items: list[Item]) -> tuple[F64, F64, I64]:
     """Points stratified by area over items' triangles: positions, unit normals, number of the item."""
     corners, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
     for number, item in enumerate(items):
-        for s in item.surfaces:
-            corners.append(triangle_corners(s.positions, s.faces))
-            owners.append(np.full(len(s.faces), number))
+        corners.append(corners_of_surfaces(item.surfaces))
+        owners.append(np.full(item.n_faces, number))
     triangles, owner = np.concatenate(corners), np.concatenate(owners)
     area = np.nan_to_num(face_areas(triangles))
     if not area.sum() > 0:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64, Srgb8Image
+from pbrs_farm.core.arrays import F64, I64, Srgb8Image
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House
@@ -151,16 +151,14 @@ class Rasterizer:
     def _boxes(self) -> tuple[F64, F64]:
         return self._mesh.draw_low, self._mesh.draw_high
 
-    def _front_to_back(self, camera: Camera, clip: F64) -> NDArray[np.int64]:
+    def _front_to_back(self, camera: Camera, clip: F64) -> I64:
         """Numbers of the draws in the frustum, nearest box first, so that hidden pixels are not lit."""
         draws = np.nonzero(boxes_in_view(clip, *self._boxes))[0]
         low, high = self._boxes
         distance = distance_to_boxes(camera.eye, low[draws], high[draws])
         return draws[np.argsort(distance, kind="stable")]
 
-    def _visible_draws(
-        self, target: RenderTarget, draws: NDArray[np.int64], clip: F64
-    ) -> NDArray[np.int64]:
+    def _visible_draws(self, target: RenderTarget, draws: I64, clip: F64) -> I64:
         """The draws with a visible sample, by occlusion queries in a depth pre-pass.
 
         A software renderer lights every hidden sample of a multisampled picture.
@@ -204,7 +202,7 @@ class Rasterizer:
         count, first = int(self._mesh.draw_count[draw]), int(self._mesh.draw_first[draw])
         vao.render(vertices=3 * count, first=3 * first)
 
-    def _blend_transparent(self, mode: str, draws: NDArray[np.int64], camera: Camera) -> None:
+    def _blend_transparent(self, mode: str, draws: I64, camera: Camera) -> None:
         """Blend every transparent triangle in view, farthest first, without writing depth."""
         # List the triangles of all transparent draws and sort them by the depth of their middle.
         gl, mesh = self._context, self._mesh

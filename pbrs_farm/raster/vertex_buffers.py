@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, Bools
+from pbrs_farm.core.arrays import F32, F64, I64, Bools
 from pbrs_farm.core.house import House, Surface
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 
@@ -18,10 +18,10 @@ class DrawMesh:
 
     vertices: F32  # (V, 8) position (world, m), normal (unit), uv (v up)
     indices: NDArray[np.uint32]  # (F, 3)
-    draw_first: NDArray[np.int64]  # (D,) first triangle
-    draw_count: NDArray[np.int64]  # (D,) number of triangles
-    draw_item: NDArray[np.int64]  # (D,) instance id
-    draw_material: NDArray[np.int64]  # (D,) index into House.materials
+    draw_first: I64  # (D,) first triangle
+    draw_count: I64  # (D,) number of triangles
+    draw_item: I64  # (D,) instance id
+    draw_material: I64  # (D,) index into House.materials
     draw_low: F64  # (D, 3) corners of the bounding box in the world
     draw_high: F64
 
@@ -65,7 +65,7 @@ def mesh_from_house(house: House) -> DrawMesh:
     )  # fmt: skip
 
 
-def _vertices(surface: Surface) -> tuple[F32, NDArray[np.int64]]:
+def _vertices(surface: Surface) -> tuple[F32, I64]:
     """(V, 8) vertices and (F, 3) faces of a surface; flat ones get three vertices per face."""
     # Drop faces with a vertex that is not finite.
     points, faces = surface.positions, surface.faces.astype(np.int64)

@@ -72,7 +72,7 @@ class Caster:
             return counts
         return self._tracer.counts(cameras, self.geometry.face_item, self.n_items + 1)
 
-    def depth_pictures(self, cameras: Sequence[Camera]) -> NDArray[np.float32]:
+    def depth_pictures(self, cameras: Sequence[Camera]) -> F32:
         """(N, H, W) planar depth in metres at the pixels' centres, 0 = nothing.
 
         cameras: N of one size. For small pictures: all rays are made at once.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import I32, Bools
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import RepairFields
@@ -92,7 +92,7 @@ def _sound(surface: Surface) -> tuple[Surface, int, int]:
     return replace(surface, faces=np.ascontiguousarray(faces, np.int32)), n_dropped, n_turned
 
 
-def _against_normals(surface: Surface, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _against_normals(surface: Surface, faces: I32) -> Bools:
     if surface.normals is None or not len(faces):
         return np.zeros(len(faces), np.bool_)
     # Compare with the mean of the corner normals; its length does not matter.

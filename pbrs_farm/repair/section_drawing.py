@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 
@@ -112,7 +111,7 @@ def _inner_point(cell: shapely.Polygon) -> F64:
 def _is_odd(point: F64, segments: F64) -> bool:
     a, b = segments[:, 0] - point, segments[:, 1] - point
     # Count the segments that a ray towards +x crosses.
-    crosses: NDArray[np.bool_] = (a[:, 1] > 0) != (b[:, 1] > 0)
+    crosses: Bools = (a[:, 1] > 0) != (b[:, 1] > 0)
     a, b = a[crosses], b[crosses]
     x = a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
     return bool((x > 0).sum() % 2)

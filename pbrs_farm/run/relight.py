@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import recipe_from_json
@@ -45,7 +45,7 @@ class RelightLayers:
     """The layers of light that relit views are sums of, (H, W, 3) float32 radiance each."""
 
     aovs: LinearAovs  # its groups as they are developed
-    lamps: Mapping[int, NDArray[np.float32]]  # number -> its share of indoor light; they sum to it
+    lamps: Mapping[int, F32]  # number -> its share of indoor light; they sum to it
 
 
 def relight_layers(
@@ -92,9 +92,7 @@ def relit(
     return layer_bytes(Mode.MLT_IL_OL.value, images[Mode.MLT_IL_OL.value].rgb_srgb8, credit)
 
 
-def _denoised_lamps(
-    aovs: LinearAovs, layers: Mapping[int, NDArray[np.float32]]
-) -> dict[int, NDArray[np.float32]]:
+def _denoised_lamps(aovs: LinearAovs, layers: Mapping[int, F32]) -> dict[int, F32]:
     return {n: denoise_radiance(layer, aovs.albedo, aovs.normal) for n, layer in layers.items()}
 
 
@@ -103,11 +101,9 @@ def lamps_of_view(view: Path) -> list[dict[str, Any]]:
     return lamps_from_view_json(read_given(view / "view.json"), view)
 
 
-def lamp_factors(
-    rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor]
-) -> dict[int, NDArray[np.float32]]:
+def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor]) -> dict[int, F32]:
     """Lamp's number -> (3,) factors. BadInput for a word that names no lamp, saying which exist."""
-    factors: dict[int, NDArray[np.float32]] = {}
+    factors: dict[int, F32] = {}
     for asked in words:
         named = [int(row["number"]) for row in rows if _is_named(row, asked.word)]
         if not named:

@@ -13,10 +13,10 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import pbrs_farm
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import Bools
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Room, geometry_from_house
@@ -220,7 +220,7 @@ def _opengl(work: Work, mode: str) -> StepOutput:
     return StepOutput({LAYER[mode].file: png}, {"renderer": rasterizer.name})
 
 
-def _missed(cached: CachedHouse, camera: Camera) -> NDArray[np.bool_]:
+def _missed(cached: CachedHouse, camera: Camera) -> Bools:
     """(H, W, 1) bool: nothing is seen; of an object without context such pixels are 0."""
     return np.asarray(cached.caster.item_buffer(camera) == 0)[..., None]
 

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
@@ -193,7 +194,7 @@ def _room_lines(room: RoomReport) -> list[str]:
     return lines
 
 
-def _middle(polygon: NDArray[np.float64]) -> tuple[float, float]:
+def _middle(polygon: F64) -> tuple[float, float]:
     """Where a room's name begins: a little left of its box's middle."""
     x, z = (polygon.min(0) + polygon.max(0)) / 2
     return float(x) - 0.4, float(z)

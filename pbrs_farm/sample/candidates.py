@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.recipe import CameraFields
 
@@ -20,11 +21,11 @@ from pbrs_farm.core.recipe import CameraFields
 class Candidates:
     """N viewpoints of one room, sector by sector, cells in order of z, then x."""
 
-    eye: NDArray[np.float64]  # (N, 3) metres
-    towards: NDArray[np.float64]  # (N, 3) unit
-    sector: NDArray[np.int32]  # (N,)
-    cell: NDArray[np.int32]  # (N, 2) column along x, row along z
-    zoom: NDArray[np.float64]  # (N,) times the focal length
+    eye: F64  # (N, 3) metres
+    towards: F64  # (N, 3) unit
+    sector: I32  # (N,)
+    cell: I32  # (N, 2) column along x, row along z
+    zoom: F64  # (N,) times the focal length
 
     def __len__(self) -> int:
         return len(self.sector)
@@ -41,8 +42,8 @@ class Candidates:
 
 def cameras_looking(
     intrinsics: Intrinsics,
-    eyes: NDArray[np.float64],
-    towards: NDArray[np.float64],
+    eyes: F64,
+    towards: F64,
     up: tuple[float, float, float] = (0.0, 1.0, 0.0),
 ) -> list[Camera]:
     """Camera.look for many at once: eyes, towards (N, 3), neither parallel to up."""
@@ -116,7 +117,7 @@ def n_cells(grid: Grid, cell_m: float) -> tuple[int, int]:
     )
 
 
-def uniforms(key: int, cell: NDArray[np.int32], n: int) -> NDArray[np.float64]:
+def uniforms(key: int, cell: I32, n: int) -> F64:
     """(len(cell), n) float64 in [0, 1), hashed from key and cell.
 
     SplitMix64's finalizer (Steele et al. 2014) over key, column, row and the number's index.
@@ -130,7 +131,7 @@ def uniforms(key: int, cell: NDArray[np.int32], n: int) -> NDArray[np.float64]:
     return np.stack([(x >> np.uint64(11)).astype(np.float64) * 2.0**-53 for x in numbers], axis=1)
 
 
-def _normal(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normal(u: F64, v: F64) -> F64:
     """Standard normal numbers from two uniform ones (Box and Muller 1958), held to -2..2."""
     return np.asarray(np.clip(np.sqrt(-2 * np.log1p(-u)) * np.cos(2 * np.pi * v), -2.0, 2.0))
 

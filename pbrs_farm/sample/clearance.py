@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Geometry
 from pbrs_farm.core.mesh import distances_to_triangles
 
@@ -15,9 +15,7 @@ _PAIRS: Final = 1 << 19  # distances computed at once: bounds memory
 _POINTS: Final = 1 << 12  # points asked of the tree at once
 
 
-def near_any_triangle(
-    points: NDArray[np.float64], geometry: Geometry, distance_m: float
-) -> NDArray[np.bool_]:
+def near_any_triangle(points: F64, geometry: Geometry, distance_m: float) -> Bools:
     """(N,) bool: a triangle comes within distance_m of the point (paper section 3.1: 10 cm).
 
     points: (N, 3) metres. The exact point-to-triangle distance in float64; triangles whose box
@@ -45,9 +43,7 @@ def near_any_triangle(
     return near
 
 
-def _corners_around(
-    points: NDArray[np.float64], geometry: Geometry, margin: float
-) -> NDArray[np.float64]:
+def _corners_around(points: F64, geometry: Geometry, margin: float) -> F64:
     """(T, 3, 3) float64 corners of the triangles whose box meets the points' box grown by margin."""
     low, high = points.min(0) - margin, points.max(0) + margin
     corners = geometry.positions[geometry.faces]

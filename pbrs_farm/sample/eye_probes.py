@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, ItemKind
 from pbrs_farm.sample.candidates import cameras_looking
@@ -50,7 +51,7 @@ def counted(
         yield part, padded
 
 
-def not_above_floor(house: House, eyes: NDArray[np.float64], counter: Counter) -> NDArray[np.bool_]:
+def not_above_floor(house: House, eyes: F64, counter: Counter) -> Bools:
     """(N,) bool: straight below the eye (N, 3) the first thing is a wall or a ceiling.
 
     So it is above a low or sloped ceiling, above a wall, or inside one.
@@ -66,7 +67,7 @@ def not_above_floor(house: House, eyes: NDArray[np.float64], counter: Counter) -
     return above
 
 
-def enclosed(house: House, eyes: NDArray[np.float64], counter: Counter) -> NDArray[np.bool_]:
+def enclosed(house: House, eyes: F64, counter: Counter) -> Bools:
     """(N,) bool: one item all around the eye (N, 3): a wardrobe's inside, a solid wall's.
 
     Counts the pixels of the six faces of a cube around the eye.
@@ -85,7 +86,7 @@ def enclosed(house: House, eyes: NDArray[np.float64], counter: Counter) -> NDArr
     return inside
 
 
-def _cube_poses(eyes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cube_poses(eyes: F64) -> F64:
     """(6 N, 4, 4) poses that look from each eye along the six axes, their pictures a cube."""
     # Turn six cameras at the origin, then move copies to every eye.
     pencil, zero = Intrinsics.from_hfov(1, 1), np.zeros(3)
@@ -97,7 +98,7 @@ def _cube_poses(eyes: NDArray[np.float64]) -> NDArray[np.float64]:
     return poses.reshape(-1, 4, 4)
 
 
-def _enclosing(house: House) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _enclosing(house: House) -> tuple[F64, F64]:
     """Each item's bounds (I, 2, 3) and the share of all directions (I,) that makes it enclose."""
     bounds = np.array([item.bounds for item in house.items], np.float64).reshape(-1, 2, 3)
     structure = np.array([item.kind.is_structure for item in house.items], np.bool_)

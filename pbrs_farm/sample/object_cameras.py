@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 
 N_VIEWS: Final = 20  # per object, paper section 4.1
@@ -18,7 +19,7 @@ _UP, _UP_AT_POLES = (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)
 
 
 def object_views(
-    bounds: NDArray[np.float64],
+    bounds: F64,
     intrinsics: Intrinsics,
     seed: int,
     names: tuple[str | int, ...],
@@ -53,7 +54,7 @@ def object_views(
     return tuple(views)
 
 
-def icosphere_vertices(n_subdivisions: int) -> NDArray[np.float64]:
+def icosphere_vertices(n_subdivisions: int) -> F64:
     """(10 * 4^n + 2, 3) unit vertices of the icosahedron, each edge halved n times.
 
     Two of the icosahedron's vertices are the poles (0, 1, 0) and (0, -1, 0).
@@ -74,7 +75,7 @@ def icosphere_vertices(n_subdivisions: int) -> NDArray[np.float64]:
     return vertices
 
 
-def _icosahedron() -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+def _icosahedron() -> tuple[F64, NDArray[np.intp]]:
     """12 unit vertices, poles first and last, and 20 faces."""
     height, radius = 1 / np.sqrt(5), 2 / np.sqrt(5)  # of the two rings of five vertices
     turn = 2 * np.pi / 5 * np.arange(5)

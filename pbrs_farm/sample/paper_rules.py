@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.candidates import Candidates, Grid
@@ -50,7 +51,7 @@ def rejections(
     inside = shapely.contains_xy(room_shape(room), eye[:, 0], eye[:, 2])
     verdict[~inside] = Verdict.OUTSIDE_ROOM
 
-    rules: tuple[tuple[Verdict, Callable[[NDArray[np.float64]], NDArray[np.bool_]]], ...] = (
+    rules: tuple[tuple[Verdict, Callable[[F64], Bools]], ...] = (
         (Verdict.NEAR_OBSTACLE, lambda p: near_any_triangle(p, geometry, fields.clearance_m)),
         (Verdict.NOT_ABOVE_FLOOR, lambda p: not_above_floor(house, p, counter)),
         (Verdict.ENCLOSED, lambda p: enclosed(house, p, counter)),

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
@@ -44,7 +45,7 @@ class RoomCandidates:
     room: Room
     candidates: Candidates
     verdict: NDArray[np.uint8]
-    score: NDArray[np.float64]
+    score: F64
 
     def ranked(self, sector: int) -> NDArray[np.intp]:
         """Numbers of a sector's candidates that no rule rejected, best first."""
@@ -100,7 +101,7 @@ class PhotoSampler:
         ]
         turns.sort(key=lambda turn: turn[0])
         # Give each its views, compared with those of all rooms that are taken already.
-        taken: list[tuple[Camera, NDArray[np.float32]]] = []
+        taken: list[tuple[Camera, F32]] = []
         chosen: dict[tuple[str, int], list[int]] = {}
         with_view: set[str] = set()
         for _key, scored, sector in turns:
@@ -114,7 +115,7 @@ class PhotoSampler:
         self,
         scored: RoomCandidates,
         sector: int,
-        taken: list[tuple[Camera, NDArray[np.float32]]],
+        taken: list[tuple[Camera, F32]],
         *,
         is_first: bool,
     ) -> list[int]:

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64, I64, Bools
 from pbrs_farm.core.classes import DOOR, NYU13_FROM_NYU40, NYU40_NAMES, WINDOW
 from pbrs_farm.core.house import House, Item, ItemKind
 
@@ -40,11 +41,11 @@ class ItemRoles:
     furniture, opening, wall, floor: (n_items + 1,) bool. nyu13: (n_items + 1,) int64 class.
     """
 
-    furniture: NDArray[np.bool_]
-    opening: NDArray[np.bool_]
-    wall: NDArray[np.bool_]
-    floor: NDArray[np.bool_]
-    nyu13: NDArray[np.int64]
+    furniture: Bools
+    opening: Bools
+    wall: Bools
+    floor: Bools
+    nyu13: I64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,14 +56,14 @@ class PhotoShares:
     that cover the least share. n_classes: NYU13 classes seen. median_m: median planar depth.
     """
 
-    furniture: NDArray[np.float64]
-    opening: NDArray[np.float64]
-    largest: NDArray[np.float64]
-    wall: NDArray[np.float64]
-    floor: NDArray[np.float64]
-    n_objects: NDArray[np.int64]
-    n_classes: NDArray[np.int64]
-    median_m: NDArray[np.float64]
+    furniture: F64
+    opening: F64
+    largest: F64
+    wall: F64
+    floor: F64
+    n_objects: I64
+    n_classes: I64
+    median_m: F64
 
 
 def item_roles(house: House) -> ItemRoles:
@@ -78,7 +79,7 @@ def item_roles(house: House) -> ItemRoles:
 
 
 def photo_shares(
-    counts: NDArray[np.uint32], depth_m: NDArray[np.float32], roles: ItemRoles, least: float
+    counts: NDArray[np.uint32], depth_m: F32, roles: ItemRoles, least: float
 ) -> PhotoShares:
     """What each picture shows.
 
@@ -108,7 +109,7 @@ def photo_shares(
     )
 
 
-def photo_score(seen: PhotoShares) -> NDArray[np.float64]:
+def photo_score(seen: PhotoShares) -> F64:
     """(N,) score: furniture, things and classes count; doors, close-ups and bare walls cost."""
     # Reward what people photograph, up to what is enough.
     score = np.minimum(seen.furniture, MOST_FURNITURE)
@@ -134,5 +135,5 @@ def _is_furniture(item: Item) -> bool:
     return not (built_in or _is_opening(item) or item.nyu40 in NO_FURNITURE)
 
 
-def _flags(values: list[bool]) -> NDArray[np.bool_]:
+def _flags(values: list[bool]) -> Bools:
     return np.array([False, *values], np.bool_)

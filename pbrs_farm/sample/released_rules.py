@@ -7,6 +7,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Geometry, House, Item, ItemKind, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.candidates import Candidates, Grid
@@ -53,9 +54,7 @@ def rejections(
     return verdict
 
 
-def viewpoint_mask(
-    house: House, room: Room, clearance_m: float
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], float]:
+def viewpoint_mask(house: House, room: Room, clearance_m: float) -> tuple[Bools, Bools, float]:
     """(floor, allowed, cell): bool grids (n_z, n_x) of nodes every cell metres over room_grid.
 
     Floor: under it lies the room's floor. Allowed: floor without the plan projection of any
@@ -112,12 +111,12 @@ def _is_obstacle(item: Item, room: Room) -> bool:
     return item.room_id == room.id or loose
 
 
-def _triangles(items: list[Item]) -> NDArray[np.float64]:
+def _triangles(items: list[Item]) -> F64:
     parts = [s.positions[s.faces].astype(np.float64) for i in items for s in i.surfaces]
     return np.concatenate([np.zeros((0, 3, 3)), *parts])
 
 
-def _plan_shapes(triangles: NDArray[np.float64]) -> NDArray[np.object_]:
+def _plan_shapes(triangles: F64) -> NDArray[np.object_]:
     """Plan projections (x, z): triangles, or lines where they stand upright."""
     plan = triangles[:, :, [0, 2]]
     e, f = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
@@ -130,9 +129,7 @@ def _plan_shapes(triangles: NDArray[np.float64]) -> NDArray[np.object_]:
     return shapes
 
 
-def _near(
-    nodes: NDArray[np.float64], shapes: NDArray[np.object_], distance: float
-) -> NDArray[np.bool_]:
+def _near(nodes: F64, shapes: NDArray[np.object_], distance: float) -> Bools:
     near = np.zeros(len(nodes), np.bool_)
     if len(shapes):
         points = shapely.points(nodes)
@@ -141,9 +138,7 @@ def _near(
     return near
 
 
-def _bilinear(
-    mask: NDArray[np.bool_], x: NDArray[np.float64], z: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _bilinear(mask: Bools, x: F64, z: F64) -> F64:
     return np.asarray(
         ndimage.map_coordinates(mask.astype(np.float64), [z, x], order=1, mode="constant", cval=0.0)
     )

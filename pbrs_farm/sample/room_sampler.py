@@ -13,6 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.core.camera import Intrinsics, View
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
@@ -114,7 +115,7 @@ class RoomSampler:
         ]
         return views, self._report(sector, verdict[of_sector], full, views)
 
-    def _chosen(self, coarse: Coarse, share: NDArray[np.float32], full: FullScores) -> list[int]:
+    def _chosen(self, coarse: Coarse, share: F32, full: FullScores) -> list[int]:
         best = best_first(coarse, full, margin=None if self._exact else self._margin)
         chosen = [] if best is None else [best]
         # Add views that show what the chosen ones do not.
@@ -127,7 +128,7 @@ class RoomSampler:
 
     def _coarse(
         self, candidates: Candidates, which: NDArray[np.intp]
-    ) -> tuple[Coarse, NDArray[np.float32], NDArray[np.uint8]]:
+    ) -> tuple[Coarse, F32, NDArray[np.uint8]]:
         """Coarse scores, each object's share of the picture when several views are wanted, and
         the verdicts that the coarse pictures give."""
         columns, fraction = self._columns(), self.fields.min_object_fraction
@@ -151,7 +152,7 @@ class RoomSampler:
 
     def _full(
         self, candidates: Candidates, which: NDArray[np.intp]
-    ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.uint32]]:
+    ) -> tuple[Bools, F64, NDArray[np.uint32]]:
         cameras = candidates.cameras(which, self._intrinsics(coarse=False))
         parts = [rows for _part, rows in counted(self.counter, cameras, len(self.house.items))]
         rows = np.concatenate(parts)

@@ -14,6 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64, Bools
+
 # A coarse score may fall short of the full one by this over the coarse picture's width. Measured
 # on the built-in home: at 160x120 the difference has a standard deviation of 0.0005 of the
 # picture and was 0.0027 at most over 300 candidates; this allows 0.005.
@@ -23,9 +25,7 @@ COARSE_MARGIN_PX: Final = 0.8
 COARSE_SLACK: Final = 0.8
 _BATCH: Final = 4  # candidates rescored before the best is compared again
 
-Rescore = Callable[
-    [NDArray[np.intp]], tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.uint32]]
-]
+Rescore = Callable[[NDArray[np.intp]], tuple[Bools, F64, NDArray[np.uint32]]]
 """Of the candidates of those numbers, at full size: who keeps the rules, scores, item counts."""
 
 
@@ -33,8 +33,8 @@ Rescore = Callable[
 class Coarse:
     """Coarse pictures of a sector's N candidates."""
 
-    possible: NDArray[np.bool_]  # (N,) may keep the rules at full size
-    score: NDArray[np.float64]  # (N,)
+    possible: Bools  # (N,) may keep the rules at full size
+    score: F64  # (N,)
 
 
 @dataclass(slots=True, eq=False)
@@ -94,11 +94,7 @@ def best_first(coarse: Coarse, full: FullScores, *, margin: float | None) -> int
 
 
 def next_diverse(
-    coarse: Coarse,
-    share: NDArray[np.float32],
-    chosen: list[int],
-    full: FullScores,
-    min_fraction: float,
+    coarse: Coarse, share: F32, chosen: list[int], full: FullScores, min_fraction: float
 ) -> int | None:
     """The candidate that shows most that the chosen ones do not; None when none is left.
 

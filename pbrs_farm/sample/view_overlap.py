@@ -9,21 +9,19 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera
 
 DEPTH_SIZE: Final = (32, 24)
 TOLERANCE: Final = 0.05
 """Two depths of one direction are of one surface when they differ by less than this part."""
 
-DepthOf = Callable[[Sequence[Camera]], NDArray[np.float32]]
+DepthOf = Callable[[Sequence[Camera]], F32]
 """Planar depth at each pixel's centre of cameras of one size: (N, H, W) metres, 0 = nothing."""
 
 
-def shared_part(
-    a: Camera, depth_a: NDArray[np.float32], b: Camera, depth_b: NDArray[np.float32]
-) -> float:
+def shared_part(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
     """The part of a's pixels with a surface that b sees too; 0 where a sees nothing.
 
     depth_a, depth_b: (H, W) planar depth in metres of the cameras' own pictures, 0 = nothing.
@@ -50,8 +48,6 @@ def shared_part(
     return float(seen.sum() / len(points))
 
 
-def overlap(
-    a: Camera, depth_a: NDArray[np.float32], b: Camera, depth_b: NDArray[np.float32]
-) -> float:
+def overlap(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
     """The larger of both directions' shared parts: 1 = one view shows nothing the other does not."""
     return max(shared_part(a, depth_a, b, depth_b), shared_part(b, depth_b, a, depth_a))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import House, ItemKind, Room
 from pbrs_farm.core.recipe import CameraFields
 
@@ -18,8 +19,8 @@ from pbrs_farm.core.recipe import CameraFields
 class Scored:
     """Scores of N views."""
 
-    n_objects: NDArray[np.int64]  # (N,) objects large enough
-    score: NDArray[np.float64]  # (N,) 0 = no score
+    n_objects: I64  # (N,) objects large enough
+    score: F64  # (N,) 0 = no score
 
 
 def object_columns(house: House) -> NDArray[np.intp]:
@@ -57,9 +58,7 @@ def paper_score(
     return Scored(n_objects, objects.sum(1, dtype=np.int64) / np.maximum(pixels, 1))
 
 
-def overfill(
-    counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: CameraFields
-) -> NDArray[np.float64]:
+def overfill(counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: CameraFields) -> F64:
     """(N,) by how much of the picture one item covers more than it may; above 0 rejects the view.
 
     An object may cover max_item_fraction, a wall (floor, ceiling) max_wall_fraction. counts:

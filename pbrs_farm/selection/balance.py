@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, Bools
 from pbrs_farm.core.classes import NYU40_NAMES
 
 N_CLASSES: Final = len(NYU40_NAMES)
 _FLOOR: Final = 0.01  # of a picture: bounds the gain of the first view of a class
 
 
-def class_shares(texts: Sequence[str]) -> NDArray[np.float32]:
+def class_shares(texts: Sequence[str]) -> F32:
     """(n, 41) share of the picture of each NYU40 class, from "1:0.53 2:0.21" texts."""
     shares = np.zeros((len(texts), N_CLASSES), np.float32)
     for row, text in enumerate(texts):
@@ -25,7 +25,7 @@ def class_shares(texts: Sequence[str]) -> NDArray[np.float32]:
     return shares
 
 
-def balanced(shares: NDArray[np.float32], n_views: int) -> NDArray[np.bool_]:
+def balanced(shares: F32, n_views: int) -> Bools:
     """(n,) bool: n_views rows of shares (n, classes) that cover all classes well.
 
     Greedy for the sum over classes of the logarithm of the share gathered: what a class gains

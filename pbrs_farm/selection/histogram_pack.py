@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
@@ -44,7 +45,7 @@ class HistogramPack:
     classes: tuple[str, ...]  # "1:0.53 2:0.21": share of the picture of each NYU40 class
     colour: NDArray[np.uint32]  # (n, colour bins) counts, zero where there are none
     depth: NDArray[np.uint32]  # (n, depth bins) the same
-    quality: NDArray[np.float32]  # (n, len(QUALITIES)), NaN where not known
+    quality: F32  # (n, len(QUALITIES)), NaN where not known
 
 
 def pack_house(

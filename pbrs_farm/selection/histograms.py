@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.arrays import F32, Srgb8Image
 from pbrs_farm.core.recipe import HistogramFields
 
 Counts = NDArray[np.uint32]  # (bins,) pixels in each bin
@@ -99,7 +99,7 @@ def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generi
     return np.asarray(pairs.sum(axis=-1))
 
 
-def normalised(counts: NDArray[np.generic]) -> NDArray[np.float32]:
+def normalised(counts: NDArray[np.generic]) -> F32:
     """(..., bins) float32 shares that sum to 1; all zero where nothing was counted."""
     total = counts.sum(axis=-1, keepdims=True, dtype=np.float64)
     total[total == 0] = 1.0  # nothing counted: shares of 0

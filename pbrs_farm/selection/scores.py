@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.selection.histogram_pack import QUALITIES, HistogramPack
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.reference_set import Reference, check_comparable
@@ -106,11 +107,8 @@ class Scorer:
             yield self.score(held)
 
     def _best(
-        self,
-        counts: Sequence[NDArray[np.generic]],
-        references: NDArray[np.float32],
-        packs: Sequence[HistogramPack],
-    ) -> tuple[NDArray[np.float64], NDArray[Any]]:
+        self, counts: Sequence[NDArray[np.generic]], references: F32, packs: Sequence[HistogramPack]
+    ) -> tuple[F64, NDArray[Any]]:
         """(n,) scores, NaN where not scored, and (n,) reference ids, None there.
 
         counts: of the packs that have a scored view; n counts the views of all packs.
@@ -158,7 +156,7 @@ def merged(*tables: Any) -> Any:
     return joined.filter(pa.array(~again)).combine_chunks()
 
 
-def _same_as_before(table: Any, name: str) -> NDArray[np.bool_]:
+def _same_as_before(table: Any, name: str) -> Bools:
     """(n,) bool: the row's value equals that of the row before; nulls are equal."""
     column = table[name].combine_chunks()
     now, before = column[1:], column[:-1]

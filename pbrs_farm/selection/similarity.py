@@ -12,20 +12,22 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-Shares = NDArray[np.float32]  # (n, bins), rows sum to 1, or to 0 where nothing was counted
+from pbrs_farm.core.arrays import F32, F64, I64
+
+Shares = F32  # (n, bins), rows sum to 1, or to 0 where nothing was counted
 
 _BLOCK: Final = 32  # queries of numpy's search at once
 _CACHE_BYTES: Final = 512 * 1024  # references that are searched at once
 
 
-def intersection(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
+def intersection(a: NDArray[np.floating], b: NDArray[np.floating]) -> F64:
     """(...) sum over the last axis of bin-wise minima (paper section 3.3), in double precision."""
     return np.asarray(np.minimum(a, b).sum(axis=-1, dtype=np.float64))
 
 
 def best_match(
     queries: Shares, references: Shares, *, leave_out_self: bool = False, library: str | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[F64, I64]:
     """(n,) largest intersection of each query over all references, and (n,) that reference.
 
     leave_out_self: queries are the references, and none may match itself (needs two at least).
@@ -52,7 +54,7 @@ def _on_support(queries: Shares, references: Shares) -> tuple[Shares, Shares]:
     return np.ascontiguousarray(queries[:, used]), np.ascontiguousarray(references[:, used])
 
 
-def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int64]:
+def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> I64:
     import faiss
 
     # Nearest in L1 is best intersection where references hold equal shares; a column that the
@@ -80,7 +82,7 @@ def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int
     return nearest
 
 
-def _numpy_nearest(q: Shares, r: Shares, leave_out_self: bool) -> NDArray[np.int64]:
+def _numpy_nearest(q: Shares, r: Shares, leave_out_self: bool) -> I64:
     nearest = np.empty(len(q), np.int64)
     for start in range(0, len(q), _BLOCK):
         # Intersect a block of queries with all references at once.

@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.selection.balance import balanced, class_shares
 
@@ -52,7 +52,7 @@ def verdicts(scores: Any, fields: SelectionFields) -> Any:
     return scores
 
 
-def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, NDArray[np.bool_]]:
+def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, Bools]:
     number = {name: _floats(scores, name) for name in _NUMBERS}
     faults = scores["fault"].to_numpy()
     unscored = np.asarray(faults == "unscored", bool)
@@ -80,7 +80,7 @@ _NUMBERS: Final = (
 )  # fmt: skip
 
 
-def _floats(scores: Any, name: str) -> NDArray[np.float64]:
+def _floats(scores: Any, name: str) -> F64:
     """(n,) float64; NaN where null. float32 numbers are rounded back to what was stored."""
     values = scores[name].to_numpy()
     if values.dtype == np.float32:
@@ -88,7 +88,7 @@ def _floats(scores: Any, name: str) -> NDArray[np.float64]:
     return np.asarray(values, np.float64)
 
 
-def _beyond_cap(scores: Any, kept: NDArray[np.bool_], cap: int) -> NDArray[np.bool_]:
+def _beyond_cap(scores: Any, kept: Bools, cap: int) -> Bools:
     """(n,) bool: kept views of a room that already has cap better ones (0 = no limit).
 
     Better: the smaller of the two scores is larger; then the smaller view id.
@@ -109,7 +109,7 @@ def _beyond_cap(scores: Any, kept: NDArray[np.bool_], cap: int) -> NDArray[np.bo
     return beyond
 
 
-def _surplus(scores: Any, kept: NDArray[np.bool_], fields: SelectionFields) -> NDArray[np.bool_]:
+def _surplus(scores: Any, kept: Bools, fields: SelectionFields) -> Bools:
     """(n,) bool: kept views that are left out so that the classes of the others are balanced."""
     surplus = np.zeros(len(kept), bool)
     if fields.balance == "none" or not kept.any():
@@ -123,12 +123,12 @@ def _surplus(scores: Any, kept: NDArray[np.bool_], fields: SelectionFields) -> N
     return surplus
 
 
-def _ranks(column: Any) -> NDArray[np.int64]:
+def _ranks(column: Any) -> I64:
     """(n,) the place of each row's text among all texts in order; equal texts share a place."""
     return np.asarray(pc.rank(column.combine_chunks(), tiebreaker="dense"), np.int64)
 
 
-def _joined(table: NDArray[np.bool_]) -> list[str]:
+def _joined(table: Bools) -> list[str]:
     """(n,) the names of the reasons that hold, with commas."""
     # Number each combination of reasons, and write each number's text once.
     weights = 1 << np.arange(len(REASONS))

@@ -8,9 +8,8 @@ from typing import Any, Final
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import LightFields
@@ -121,7 +120,7 @@ def radiosity(
     spp: int,
     seed: int,
     *,
-    lamps: NDArray[np.int64] | None = None,
+    lamps: I64 | None = None,
     max_depth: int | None = None,
 ) -> tuple[F64, F64]:
     """(outdoor, indoor) radiance that white matte surfaces reflect: irradiance / pi, (N, 3) each.

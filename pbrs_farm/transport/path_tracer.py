@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.bsdf import luminance
@@ -39,14 +39,14 @@ from pbrs_farm.transport.kernels.sampler import SobolSampler, stream_key
 class SampleSums:
     """Sums over the samples of each lane, numpy, (N, 3) float32."""
 
-    outdoor: NDArray[np.float32]  # radiance
-    indoor: NDArray[np.float32]
-    outdoor_even: NDArray[np.float32]  # of every second sample
-    indoor_even: NDArray[np.float32]
-    albedo: NDArray[np.float32]  # of the first surface that is neither mirror nor glass
-    normal: NDArray[np.float32]  # the same surface's
+    outdoor: F32  # radiance
+    indoor: F32
+    outdoor_even: F32  # of every second sample
+    indoor_even: F32
+    albedo: F32  # of the first surface that is neither mirror nor glass
+    normal: F32  # the same surface's
     n_bad: int  # paths that were not finite, left out
-    lamps: NDArray[np.float32] | None = None  # (N, L, 3) indoor light by lamp, if asked for
+    lamps: F32 | None = None  # (N, L, 3) indoor light by lamp, if asked for
 
     def __add__(self, other: SampleSums) -> SampleSums:
         def total(name: str) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, I64
 
 
 def bilinear(pixels: NDArray[np.uint8], uv: F32, value_of_byte: F32 | None = None) -> F32:
@@ -24,7 +24,7 @@ def bilinear(pixels: NDArray[np.uint8], uv: F32, value_of_byte: F32 | None = Non
     left, right = (x0 % width).astype(np.int64), ((x0 + 1) % width).astype(np.int64)
     top, bottom = (y0 % height).astype(np.int64), ((y0 + 1) % height).astype(np.int64)
 
-    def at(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> F32:
+    def at(rows: I64, columns: I64) -> F32:
         found = pixels[rows, columns]
         return found.astype(np.float32) if value_of_byte is None else value_of_byte[found]
 

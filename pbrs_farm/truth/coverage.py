@@ -8,9 +8,8 @@ clipped and nothing is divided by depth. On one row of pixels that is an interva
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, I32, Mask
+from pbrs_farm.core.arrays import F32, F64, I32, I64, Mask
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import Item
 
@@ -50,7 +49,7 @@ def _add_triangles(starts: I32, corners: F64, i: Intrinsics) -> None:
         begin = stop
 
 
-def _rows_of_triangles(corners: F64, i: Intrinsics) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _rows_of_triangles(corners: F64, i: Intrinsics) -> tuple[I64, I64]:
     """(T,) first row whose pixel centres a triangle may cover, and how many rows follow from it."""
     # Project triangles that lie wholly before the camera; others may cover any row.
     z = corners[..., 2]
@@ -64,9 +63,7 @@ def _rows_of_triangles(corners: F64, i: Intrinsics) -> tuple[NDArray[np.int64], 
     return first.astype(np.int64), n_rows.astype(np.int64)
 
 
-def _add_spans(
-    starts: I32, corners: F64, first: NDArray[np.int64], n_rows: NDArray[np.int64], i: Intrinsics
-) -> None:
+def _add_spans(starts: I32, corners: F64, first: I64, n_rows: I64, i: Intrinsics) -> None:
     # List one interval for each triangle and row; y is the row's ray at z = 1.
     owner = np.repeat(np.arange(len(corners)), n_rows)
     row = np.arange(len(owner)) - np.repeat(np.cumsum(n_rows) - n_rows - first, n_rows)

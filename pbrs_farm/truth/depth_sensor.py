@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import HitRecord, Mask
+from pbrs_farm.core.arrays import F32, I64, HitRecord, Mask
 from pbrs_farm.core.camera import Camera
 
 FOCAL_PX = 580.0  # the sensor's infrared camera, Khoshelham and Elberink 2012
@@ -47,7 +47,7 @@ def _grazing(hit: HitRecord, camera: Camera) -> Mask:
     return np.asarray(cosine < np.cos(MAX_ANGLE_RAD) * np.linalg.norm(rays, axis=-1))
 
 
-def _in_projector_shadow(depth_z: NDArray[np.float32], camera: Camera) -> Mask:
+def _in_projector_shadow(depth_z: F32, camera: Camera) -> Mask:
     """(H, W) bool: a nearer surface on the same row hides the point from the projector.
 
     The projector stands BASELINE_M to the right of the camera: seen from there, column x moves
@@ -62,9 +62,7 @@ def _in_projector_shadow(depth_z: NDArray[np.float32], camera: Camera) -> Mask:
     return np.asarray(from_projector > leftmost + 0.5)
 
 
-def _laterally_moved(
-    shape: tuple[int, ...], rng: np.random.Generator
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _laterally_moved(shape: tuple[int, ...], rng: np.random.Generator) -> tuple[I64, I64]:
     """Rows and columns (H, W) of the pixel each pixel really measures."""
     # Draw a place around each pixel and hold it to the picture.
     grid = np.indices(shape) + rng.normal(0, LATERAL_PX, (2, *shape))

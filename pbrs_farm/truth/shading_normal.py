@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64, HitRecord, UnitVectors
+from pbrs_farm.core.arrays import F64, I32, HitRecord, UnitVectors
 from pbrs_farm.core.house import Geometry, House
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.normal_maps import normals_from_picture, perturbed_normals, tangents
@@ -40,7 +40,7 @@ def shading_normals(
     return normals
 
 
-def _bent(geometry: Geometry, faces: NDArray[np.int32], seen: F64, mapped: F64) -> F64:
+def _bent(geometry: Geometry, faces: I32, seen: F64, mapped: F64) -> F64:
     """(N, 3) normals seen at faces, bent by the map's; both turned to the camera."""
     corners = triangle_corners(geometry.positions, geometry.faces[faces])
     dp_du, side, is_defined = tangents(

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from pbrs_farm.core.arrays import ItemBuffer
+from pbrs_farm.core.arrays import F32, ItemBuffer
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
 from pbrs_farm.core.frames import opencv_world_from_camera
@@ -102,7 +101,7 @@ def is_truncated(item: Item, camera: Camera) -> bool:
     return any(not _inside(s.positions, camera) for s in item.surfaces if len(s.positions))
 
 
-def _inside(points: NDArray[np.float32], camera: Camera) -> bool:
+def _inside(points: F32, camera: Camera) -> bool:
     # Move into the camera's frame, in float32 as the mesh is.
     i = camera.intrinsics
     rotation = camera.world_from_camera[:3, :3].astype(np.float32)

@@ -9,14 +9,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Material, MaterialKind, Surface
+from pbrs_farm.core.house import (
+    House,
+    Item,
+    ItemKind,
+    LightPart,
+    Material,
+    MaterialKind,
+    Surface,
+    corners_of_surfaces,
+)
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.mesh import distances_to_triangles, face_areas, triangle_corners
 from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair, summary_of_report
-from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of, with_bulbs
+from pbrs_farm.repair.lamps.bulbs import icosphere, with_bulbs
 from pbrs_farm.repair.lamps.ceiling_lamp import place_of_lamp
 from pbrs_farm.repair.lamps.lived_in import is_lived_in
 from pbrs_farm.repair.lamps.room_lighting import GivenLights, with_room_lighting
@@ -74,7 +83,7 @@ def test_the_bulb_touches_nothing_of_its_lamp(
     lamp = _lamp(_ball(radius, centre))
     house, (source,) = with_bulbs(lamp, FIELDS)
     place = np.array(house.items[0].lights[0].position)
-    free = distances_to_triangles(place, triangles_of(lamp.items[0])).min()
+    free = distances_to_triangles(place, corners_of_surfaces(lamp.items[0].surfaces)).min()
     assert free > source.radius_m > 0.0005
     assert source.moved_m <= 0.03 + 1e-9
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Surface
 from pbrs_farm.core.lighting import PowerUnit
@@ -91,9 +91,7 @@ def place(
     return replace(item, box=_oriented_box(item, turn, origin))
 
 
-def _boxes(
-    part: Part, turn: NDArray[np.float64], origin: NDArray[np.float64], materials: dict[str, int]
-) -> Surface:
+def _boxes(part: Part, turn: F64, origin: F64, materials: dict[str, int]) -> Surface:
     quads = []
     for low, high in part.boxes:
         a, b = np.asarray(low, np.float64), np.asarray(high, np.float64)
@@ -102,7 +100,7 @@ def _boxes(
     return quads_surface(part.material, world, materials[part.material])
 
 
-def _oriented_box(item: Item, turn: NDArray[np.float64], origin: NDArray[np.float64]) -> Box:
+def _oriented_box(item: Item, turn: F64, origin: F64) -> Box:
     world = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
     local = (world - origin) @ turn
     low, high = local.min(0), local.max(0)

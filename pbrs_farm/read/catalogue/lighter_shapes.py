@@ -10,9 +10,8 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
@@ -22,8 +21,6 @@ _STEP: Final = 1.3
 _NORMAL_STEPS: Final = 2.0  # normals that round to the same multiple of 1/2 are one
 _UV_STEPS: Final = 16.0
 _MIN_AREA_M2: Final = 1e-10
-
-Int = NDArray[np.int64]
 
 
 def lighter_shape(shape: Shape, most: int, coarsest: float) -> Shape:
@@ -71,7 +68,7 @@ def _clustered(shape: Shape, cell: float) -> Shape:
     return replace(shape, surfaces=tuple(surfaces))
 
 
-def _surface(surface: Surface, cluster: Int, mean: F64) -> Surface | None:
+def _surface(surface: Surface, cluster: I64, mean: F64) -> Surface | None:
     # Drop faces that fell together, and the second of two equal ones.
     corners = cluster[surface.faces]
     is_whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64, I32
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Box, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
@@ -15,9 +15,7 @@ from pbrs_farm.read.mesh.obj import Mesh
 _MIN_AREA_M2 = 0.5e-12  # below it float32 cannot tell a triangle from a line
 
 
-def placed(
-    mesh: Mesh, world_from_model: NDArray[np.float64], *, name: str, material: int
-) -> Surface | None:
+def placed(mesh: Mesh, world_from_model: F64, *, name: str, material: int) -> Surface | None:
     """A mesh as a Surface in the world; None if no area is left.
 
     A mirroring transform turns the winding, so that fronts stay in front. Degenerate faces go.
@@ -40,19 +38,17 @@ def placed(
     )
 
 
-def _normals(
-    normals: NDArray[np.float64], world_from_model: NDArray[np.float64]
-) -> NDArray[np.float32] | None:
+def _normals(normals: F64, world_from_model: F64) -> F32 | None:
     """Unit normals by the inverse transpose, or None (flat) if one is zero."""
     n = normals @ np.linalg.inv(world_from_model[:3, :3])
     length = np.linalg.norm(n, axis=1, keepdims=True)
     if (length < 1e-12).any():
         return None
-    unit: NDArray[np.float32] = (n / length).astype(np.float32)
+    unit: F32 = (n / length).astype(np.float32)
     return unit
 
 
-def oriented_box(meshes: Sequence[Mesh], world_from_model: NDArray[np.float64]) -> Box | None:
+def oriented_box(meshes: Sequence[Mesh], world_from_model: F64) -> Box | None:
     """The model's own axis-aligned box in the world; None where the transform shears."""
     low = np.min([m.positions.min(0) for m in meshes], 0)
     high = np.max([m.positions.max(0) for m in meshes], 0)
@@ -68,7 +64,7 @@ def oriented_box(meshes: Sequence[Mesh], world_from_model: NDArray[np.float64]) 
     return Box(centre, scale * (high - low) / 2, axes)
 
 
-def part_of(surface: Surface, faces: NDArray[np.int32], name: str) -> Surface:
+def part_of(surface: Surface, faces: I32, name: str) -> Surface:
     """Some faces of a surface with the vertices they use, as a surface of its own."""
     used, numbers = np.unique(faces, return_inverse=True)
     return Surface(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.house import Item, ItemKind, Surface
-from pbrs_farm.core.mesh import area_vectors, closed_edge_share, triangle_corners
+from pbrs_farm.core.arrays import I64
+from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces
+from pbrs_farm.core.mesh import area_vectors, closed_edge_share
 from pbrs_farm.read.common.placed_mesh import part_of
 
 MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
@@ -42,19 +43,14 @@ def planar_parts(item: Item) -> tuple[Item, ...]:
     return (replace(found[0], lights=item.lights), *found[1:])
 
 
-def _corners(surfaces: tuple[Surface, ...]) -> NDArray[np.float64]:
-    found = [triangle_corners(s.positions, s.faces) for s in surfaces]
-    return np.concatenate([np.zeros((0, 3, 3)), *found])
-
-
-def _is_closed(surfaces: tuple[Surface, ...]) -> bool:
+def _is_closed(surfaces: Sequence[Surface]) -> bool:
     """Whether every edge has a face on either side, vertices within a tenth of a millimetre one."""
-    return closed_edge_share(np.rint(_corners(surfaces) / _WELD_M)) == 1
+    return closed_edge_share(np.rint(corners_of_surfaces(surfaces) / _WELD_M)) == 1
 
 
-def plane_of_faces(surfaces: tuple[Surface, ...]) -> NDArray[np.int64]:
+def plane_of_faces(surfaces: Sequence[Surface]) -> I64:
     """(F,) number of the plane each face lies in, either side up, in order of first appearance."""
-    p = _corners(surfaces)
+    p = corners_of_surfaces(surfaces)
     n = area_vectors(p)
     n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
     # Make the two sides of a plane one: the leading component of its normal is positive.

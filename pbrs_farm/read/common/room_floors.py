@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 
@@ -37,7 +37,7 @@ def ceiling_height(surfaces: Sequence[Surface]) -> float | None:
     return None if not len(corners) else float(corners[..., 1].mean(1).min())
 
 
-def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> NDArray[np.float64] | None:
+def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> F64 | None:
     """(N, 2) plan (x, z), counter-clockwise, of the largest piece of floor between the walls.
 
     None if the floor has no area.
@@ -53,7 +53,7 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> NDArray
     return polygon_of(between if not between.is_empty else area)
 
 
-def coverage(surface: Surface, polygon: NDArray[np.float64]) -> float:
+def coverage(surface: Surface, polygon: F64) -> float:
     """Share of a plan polygon (N, 2) that lies under or over the surface's level faces."""
     # A planar ceiling may look either way.
     both = np.concatenate([_facing([surface], 1), _facing([surface], -1)])
@@ -63,7 +63,7 @@ def coverage(surface: Surface, polygon: NDArray[np.float64]) -> float:
 
 def floor_polygons(
     floor: Sequence[Surface], walls: Sequence[Surface], *, min_area_m2: float, min_width_m: float
-) -> list[NDArray[np.float64]]:
+) -> list[F64]:
     """Every piece of floor between the walls, planar walls too, that is a room by its size.
 
     Each as floor_polygon gives it, largest first.
@@ -100,14 +100,14 @@ def _traces(walls: Sequence[Surface]) -> Any:
     return shapely.union_all(shapely.buffer(lines, _TRACE_M, cap_style="square"))
 
 
-def enclosed_polygon(walls: Sequence[Surface]) -> NDArray[np.float64] | None:
+def enclosed_polygon(walls: Sequence[Surface]) -> F64 | None:
     """The largest piece of plan between walls, for a room without a floor; None if there is none."""
     # What the walls' hull encloses and no wall covers lies between them.
     footprint = _outline(np.concatenate([_facing(walls, 1), _facing(walls, -1)]))
     return polygon_of(shapely.difference(footprint.convex_hull, footprint))
 
 
-def polygon_of(area: Any) -> NDArray[np.float64] | None:
+def polygon_of(area: Any) -> F64 | None:
     """The outline of the largest polygon of a shapely area: simple, counter-clockwise, no holes."""
     pieces = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon" and g.area > 1e-4]
     if not pieces:
@@ -125,7 +125,7 @@ def _largest(area: Any, otherwise: Any) -> Any:
     return max(pieces, key=lambda g: (g.area, g.bounds), default=otherwise)
 
 
-def _facing(surfaces: Sequence[Surface], sign: int) -> NDArray[np.float64]:
+def _facing(surfaces: Sequence[Surface], sign: int) -> F64:
     """(F, 3, 3) corners of the faces that look up (sign 1) or down (-1)."""
     found = [np.zeros((0, 3, 3))]
     for surface in surfaces:
@@ -134,7 +134,7 @@ def _facing(surfaces: Sequence[Surface], sign: int) -> NDArray[np.float64]:
     return np.concatenate(found)
 
 
-def _outline(corners: NDArray[np.float64]) -> Any:
+def _outline(corners: F64) -> Any:
     """The union of triangles seen from above, as a shapely area."""
     if not len(corners):
         return shapely.Polygon()

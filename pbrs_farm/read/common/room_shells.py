@@ -7,23 +7,16 @@ about their centre: it is negative where they look inward, also where a doorway 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pbrs_farm.core.house import Item, ItemKind, Surface
-from pbrs_farm.core.mesh import (
-    area_vectors,
-    closed_edge_share,
-    face_areas,
-    signed_volume,
-    triangle_corners,
-)
+from pbrs_farm.core.arrays import F64, I64, Bools
+from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces
+from pbrs_farm.core.mesh import area_vectors, closed_edge_share, face_areas, signed_volume
 from pbrs_farm.read.common.placed_mesh import part_of
 from pbrs_farm.read.common.planar_walls import plane_of_faces
 
@@ -40,7 +33,7 @@ _LEVEL: Final = 0.7  # least |y| of the normal of a floor, a ceiling or a roof
 CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: 1, ItemKind.FLOOR: 2, ItemKind.CEILING: 22}
 
 
-def room_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]:
+def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
     """The walls, floors and ceilings of a room that item shows from inside, a plane each.
 
     others: (N, 3) centres of other items; a closed block around some of them whose faces look
@@ -48,7 +41,7 @@ def room_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]:
     outer side, which hides the room from outside only, is left out. An item that is no room comes
     back as it is.
     """
-    corners = _corners(item.surfaces)
+    corners = corners_of_surfaces(item.surfaces)
     if not len(corners):
         return (item,)
     # Take the connected shells that look inward, else closed ones that look outward.
@@ -74,12 +67,7 @@ def room_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]:
     return (*parts, replace(item, surfaces=kept, lights=(), box=None)) if kept else parts
 
 
-def _corners(surfaces: Sequence[Surface]) -> NDArray[np.float64]:
-    found = [triangle_corners(s.positions, s.faces) for s in surfaces]
-    return np.concatenate([np.zeros((0, 3, 3)), *found])
-
-
-def _components(corners: NDArray[np.float64]) -> NDArray[np.int64]:
+def _components(corners: F64) -> I64:
     """(F,) number of the connected mesh each face belongs to, corners at one place joined."""
     keys = np.rint(corners.reshape(-1, 3) / _WELD_M)
     _, place = np.unique(keys, axis=0, return_inverse=True)
@@ -91,7 +79,7 @@ def _components(corners: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.asarray(np.unique(label, return_inverse=True)[1], np.int64)
 
 
-def _facing(corners: NDArray[np.float64], others: NDArray[np.float64]) -> int:
+def _facing(corners: F64, others: F64) -> int:
     """-1: the faces show a room from inside; 1: they would if they were turned; 0: no room."""
     low, high = corners.min((0, 1)), corners.max((0, 1))
     if not _is_large(low, high):
@@ -110,7 +98,7 @@ def _facing(corners: NDArray[np.float64], others: NDArray[np.float64]) -> int:
     return int(thickness_m > _THICKER_THAN_BLOCKS_M and is_closed and bool(inside.any()))
 
 
-def _is_large(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _is_large(low: F64, high: F64) -> Bools:
     """Whether bounds (..., 3) are those of a room: neither too small nor a sky."""
     size = high - low
     side = size[..., [0, 2]]
@@ -118,9 +106,7 @@ def _is_large(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np
     return np.asarray(fits & (side.max(-1) <= _LARGEST_SIDE_M))
 
 
-def _bounds_of_shells(
-    corners: NDArray[np.float64], shell_of_face: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _bounds_of_shells(corners: F64, shell_of_face: I64) -> F64:
     """(S, 2, 3) lowest and highest corner of each shell."""
     order = np.argsort(shell_of_face, kind="stable")
     starts = np.searchsorted(shell_of_face[order], np.arange(int(shell_of_face.max()) + 1))
@@ -129,25 +115,23 @@ def _bounds_of_shells(
     return np.stack([low, high], 1)
 
 
-def _encloses(
-    corners: NDArray[np.float64], bounds: NDArray[np.float64], shown: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def _encloses(corners: F64, bounds: F64, shown: Bools) -> Bools:
     """(S,) shells whose box holds all that is shown: a hollow block's outer side."""
     low, high = corners[shown].min((0, 1)), corners[shown].max((0, 1))
     return np.asarray((bounds[:, 0] < low).all(1) & (bounds[:, 1] > high).all(1))
 
 
-def _split(item: Item, chosen: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+def _split(item: Item, chosen: Bools) -> list[Bools]:
     return np.split(chosen, np.cumsum([len(s.faces) for s in item.surfaces])[:-1])
 
 
-def _picked(item: Item, chosen: NDArray[np.bool_]) -> tuple[Surface, ...]:
+def _picked(item: Item, chosen: Bools) -> tuple[Surface, ...]:
     """The item's surfaces with the chosen faces alone, empty ones left out."""
     pairs = zip(item.surfaces, _split(item, chosen), strict=True)
     return tuple(part_of(s, s.faces[own], s.name) for s, own in pairs if own.any())
 
 
-def _turned(item: Item, outward: NDArray[np.bool_]) -> Item:
+def _turned(item: Item, outward: Bools) -> Item:
     """The item with some faces turned round; normals with those of surfaces turned as a whole."""
     surfaces = []
     for s, own in zip(item.surfaces, _split(item, outward), strict=True):
@@ -159,9 +143,9 @@ def _turned(item: Item, outward: NDArray[np.bool_]) -> Item:
     return replace(item, surfaces=tuple(surfaces))
 
 
-def _parts(item: Item, shown: NDArray[np.bool_]) -> tuple[Item, ...]:
+def _parts(item: Item, shown: Bools) -> tuple[Item, ...]:
     """An item per plane of the faces shown: what looks up is a floor, what looks down a ceiling."""
-    corners = _corners(item.surfaces)
+    corners = corners_of_surfaces(item.surfaces)
     plane = plane_of_faces(item.surfaces)
     normal = area_vectors(corners)
     found: list[Item] = []

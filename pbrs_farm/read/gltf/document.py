@@ -13,8 +13,8 @@ from typing import Any, Final
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, entry, gltf_from_glb, view_bytes
 from pbrs_farm.formats.serialise import json_from_bytes
@@ -43,7 +43,7 @@ class Placed:
 
     index: int  # of the node
     path: tuple[int, ...]  # node indices from the root, its own last
-    world_from_node: NDArray[np.float64]  # (4, 4)
+    world_from_node: F64  # (4, 4)
 
 
 def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
@@ -162,7 +162,7 @@ def _indices(gltf: Gltf, holder: dict[str, Any], place: str, key: str) -> list[i
     return value
 
 
-def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> NDArray[np.float64]:
+def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> F64:
     place = f"nodes[{index}]"
     if "matrix" in node:
         m = numbers(gltf, node["matrix"], 16, f"{place}.matrix").reshape(4, 4).T  # column by column
@@ -186,7 +186,7 @@ def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> NDArray[n
     return m
 
 
-def numbers(gltf: Gltf, value: Any, n: int, place: str) -> NDArray[np.float64]:
+def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:
     """(n,) finite numbers; BadHouse otherwise."""
     fits = isinstance(value, list) and len(value) == n
     if not fits or not all(type(v) in (int, float) and abs(v) < 1e12 for v in value):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, accessor_array, entry
 from pbrs_farm.read.gltf.document import numbers, texture_slots
@@ -68,7 +68,7 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     return Mesh("", "", positions, faces, uvs, normals)
 
 
-def _floats(gltf: Gltf, accessor: Any, width: int, place: str) -> NDArray[np.float64]:
+def _floats(gltf: Gltf, accessor: Any, width: int, place: str) -> F64:
     raw = accessor_array(gltf, accessor)
     if raw.shape[1] != width:
         raise BadHouse(gltf.file, place, f"expected {width} components, got {raw.shape[1]}")
@@ -83,7 +83,7 @@ def _floats(gltf: Gltf, accessor: Any, width: int, place: str) -> NDArray[np.flo
     return values
 
 
-def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> NDArray[np.int32]:
+def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> I32:
     if "indices" in primitive:
         raw = accessor_array(gltf, primitive["indices"])
         if raw.shape[1] != 1 or raw.dtype.kind != "u":
@@ -106,9 +106,7 @@ def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> NDArray
     return corners.reshape(-1, 3).astype(np.int32)
 
 
-def _transformed(
-    gltf: Gltf, uvs: NDArray[np.float64], info: dict[str, Any], place: str
-) -> NDArray[np.float64]:
+def _transformed(gltf: Gltf, uvs: F64, info: dict[str, Any], place: str) -> F64:
     """uvs after KHR_texture_transform: translation x rotation x scale, v still down."""
     extensions = info.get("extensions")
     turn = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None

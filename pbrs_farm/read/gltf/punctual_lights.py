@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.house import Item, LightPart, Surface
+from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.house import Item, LightPart, Surface, corners_of_surfaces
 from pbrs_farm.core.lighting import LightForm, PowerUnit
-from pbrs_farm.core.mesh import face_areas, triangle_corners
+from pbrs_farm.core.mesh import face_areas
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.gltf.document import numbers
 
@@ -22,7 +22,7 @@ _RADIUS_M: Final = 0.0325  # of the bulb that stands for a point: 65 mm across
 
 
 def punctual_light(
-    gltf: Gltf, node: dict[str, Any], world_from_node: NDArray[np.float64], place: str
+    gltf: Gltf, node: dict[str, Any], world_from_node: F64, place: str
 ) -> LightPart | None:
     """The point or spot light of a node; None if it has none, or a directional one (the sun)."""
     # A node names its light by number; the lights stand at the file's top.
@@ -46,13 +46,13 @@ def punctual_light(
     solid_angle = 2 * math.pi * (1 - math.cos(cutoff))
     direction = -world_from_node[:3, 2] / max(float(np.linalg.norm(world_from_node[:3, 2])), 1e-12)
     return LightPart(
-        position=_triple(world_from_node[:3, 3]),
+        position=triple(world_from_node[:3, 3]),
         radius_m=_RADIUS_M,
         power=max(float(intensity), 0.0) * solid_angle,
         unit=PowerUnit.LUMEN,
-        rgb_linear=_triple(colour / max(float(colour.max()), 1e-6)),
+        rgb_linear=triple(colour / max(float(colour.max()), 1e-6)),
         form=LightForm.SPOT if fields_json["type"] == "spot" else LightForm.POINT,
-        direction=_triple(direction),
+        direction=triple(direction),
         cutoff_rad=cutoff,
     )
 
@@ -71,7 +71,7 @@ def emitted(surfaces: Sequence[Surface], luminance: dict[int, float]) -> tuple[L
         known = math.pi * value * area[k]  # a Lambertian emitter
         found.append(
             LightPart(
-                position=_triple((low + high) / 2),
+                position=triple((low + high) / 2),
                 radius_m=float(np.mean(high - low)) / 2,
                 power=known if value else ASSUMED_LM * area[k] / max(unknown, 1e-12),
                 unit=PowerUnit.LUMEN,
@@ -84,18 +84,13 @@ def emitted(surfaces: Sequence[Surface], luminance: dict[int, float]) -> tuple[L
 def assumed_light(item: Item) -> LightPart:
     """A light in the middle of a lamp about which the scene tells nothing."""
     centre = item.bounds.mean(0)
-    return LightPart(_triple(centre), _RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
+    return LightPart(triple(centre), _RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
 
 
 def _area(surface: Surface) -> float:
-    return float(face_areas(triangle_corners(surface.positions, surface.faces)).sum())
+    return float(face_areas(corners_of_surfaces([surface])).sum())
 
 
 def _at(holder: dict[str, Any], key: str) -> dict[str, Any]:
     value = holder.get(key)
     return value if isinstance(value, dict) else {}
-
-
-def _triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Room, Source
 from pbrs_farm.core.recipe import ReadFields
@@ -134,6 +134,6 @@ def _placed(item: Item, levels: tuple[Level, ...], rooms: tuple[Room, ...]) -> I
     return replace(item, level_id=level_of(levels, float(extent[0, 1])), room_id=room_id)
 
 
-def _extent(item: Item) -> NDArray[np.float64]:
+def _extent(item: Item) -> F64:
     """(2, 3) the item's bounds; those of its lights where it has no surfaces."""
     return item.bounds if item.surfaces else np.tile(item.lights[0].position, (2, 1))

@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Level, Room, Surface
 from pbrs_farm.formats.serialise import json_from_bytes
@@ -101,7 +101,7 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
 
 
 def _with_heights(
-    polygon: NDArray[np.float64],
+    polygon: F64,
     name: str,
     types: tuple[str, ...],
     given: dict[str, float | None],
@@ -142,16 +142,14 @@ def _surfaces(items: Sequence[Item], kind: ItemKind) -> list[Surface]:
 
 
 def _over(
-    items: Sequence[Item], kind: ItemKind, polygon: NDArray[np.float64], slack_m: float = 0.0
+    items: Sequence[Item], kind: ItemKind, polygon: F64, slack_m: float = 0.0
 ) -> list[Surface]:
     """The surfaces of a kind whose bounds meet the polygon's in plan."""
     low, high = polygon.min(0) - slack_m, polygon.max(0) + slack_m
     return _within(_surfaces(items, kind), low, high)
 
 
-def _within(
-    surfaces: Sequence[Surface], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> list[Surface]:
+def _within(surfaces: Sequence[Surface], low: F64, high: F64) -> list[Surface]:
     """The surfaces whose plan bounds meet low..high."""
     plans = [(s, s.positions[:, [0, 2]]) for s in surfaces]
     return [s for s, p in plans if (p.max(0) > low).all() and (p.min(0) < high).all()]
@@ -187,7 +185,7 @@ def level_of(levels: Sequence[Level], y: float) -> str:
     return below[-1] if below else levels[0].id
 
 
-def room_at(rooms: Sequence[Room], point: NDArray[np.float64]) -> str | None:
+def room_at(rooms: Sequence[Room], point: F64) -> str | None:
     """The room whose polygon and height hold a point (3,) of the world, or None.
 
     A point in a wall (of a door, a window) belongs to the nearest room on the other side of it.

@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.read.common.planar_walls import planar_parts
 from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, room_parts
@@ -23,13 +23,13 @@ UNMAPPED: Final = "unmapped"
 """Tag of an item of which nothing says what it is."""
 
 
-def centres_of(items: Sequence[Item]) -> NDArray[np.float64]:
+def centres_of(items: Sequence[Item]) -> F64:
     """(N, 3) centres of items that are no part of a room."""
     found = [i.bounds.mean(0) for i in items if i.n_faces and i.kind not in _STRUCTURE]
     return np.array(found, np.float64).reshape(-1, 3)
 
 
-def structure_parts(item: Item, others: NDArray[np.float64]) -> tuple[Item, ...]:
+def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
     """The items that a node's item is, where it is a wall, floor or ceiling, or is not known.
 
     others: centres_of all items. A room seen from inside is parted by how its faces look, what is

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import mapbox_earcut
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.arrays import I32, Points2
 from pbrs_farm.core.house import Surface
 
 
@@ -23,7 +22,7 @@ def counter_clockwise(polygon: Points2) -> Points2:
     return polygon if signed_area(polygon) >= 0 else polygon[::-1].copy()
 
 
-def triangulated(rings: Sequence[Points2]) -> tuple[Points2, NDArray[np.int32]]:
+def triangulated(rings: Sequence[Points2]) -> tuple[Points2, I32]:
     """Points (V, 2) and counter-clockwise triangles (F, 3) of an outline and its holes."""
     points = np.concatenate([np.asarray(r, np.float64) for r in rings])
     ends = np.cumsum([len(r) for r in rings]).astype(np.uint32)
@@ -44,7 +43,7 @@ def horizontal(
     """
     # Cut each polygon and number its corners after those before it.
     points: list[Points2] = []
-    faces: list[NDArray[np.int32]] = []
+    faces: list[I32] = []
     n = 0
     for rings in polygons:
         p, f = triangulated(rings)

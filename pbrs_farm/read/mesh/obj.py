@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, I32, I64, Bools
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.mesh import face_areas
 from pbrs_farm.core.shown_text import shown
@@ -27,10 +27,10 @@ class Mesh:
 
     group: str
     material: str
-    positions: NDArray[np.float64]  # (V, 3)
-    faces: NDArray[np.int32]  # (F, 3)
-    uvs: NDArray[np.float64] | None  # (V, 2); None = the file has none
-    normals: NDArray[np.float64]  # (V, 3) unit, creased where none are given
+    positions: F64  # (V, 3)
+    faces: I32  # (F, 3)
+    uvs: F64 | None  # (V, 2); None = the file has none
+    normals: F64  # (V, 3) unit, creased where none are given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,7 +143,7 @@ def _text(rest: bytes) -> str:
     return rest.strip().decode("utf-8", "replace")
 
 
-def _numbers(lines: list[bytes], n: int, file: str, what: str) -> NDArray[np.float64]:
+def _numbers(lines: list[bytes], n: int, file: str, what: str) -> F64:
     if not lines:
         return np.zeros((0, n))
     # Parse all lines at once where each has as many numbers; else pad or cut them.
@@ -182,7 +182,7 @@ def _word_at_fault(lines: list[bytes], what: str, kind: type[int] | type[float])
     return f"a `{what}` line", "a word is no number"
 
 
-def _indices(part: _Part, pools: tuple[NDArray[np.float64], ...], file: str) -> NDArray[np.int64]:
+def _indices(part: _Part, pools: tuple[F64, ...], file: str) -> I64:
     # (n corners, 3) vertex, uv and normal index from 0; -1 = none.
     # Parse all corners at once where they have one form: v, v/vt, v//vn or v/vt/vn.
     joined = b" ".join(part.lines).replace(b"//", b"/0/")
@@ -218,9 +218,7 @@ def _indices(part: _Part, pools: tuple[NDArray[np.float64], ...], file: str) -> 
     return indices - 1
 
 
-def _mesh(
-    part: _Part, pools: tuple[NDArray[np.float64], ...], file: str
-) -> tuple[Mesh | None, int]:
+def _mesh(part: _Part, pools: tuple[F64, ...], file: str) -> tuple[Mesh | None, int]:
     sizes = np.array([len(x.split()) for x in part.lines], np.int64)
     if not sizes.sum():
         return None, len(sizes)
@@ -239,7 +237,7 @@ def _mesh(
     points = pools[0]
     # Use a face's texture coordinates where every corner has them; (0, 0) for the mesh's others.
     uv_index, uv_pool = index[:, :, 1], pools[1]
-    is_textured: NDArray[np.bool_] = np.all(uv_index >= 0, axis=1)
+    is_textured: Bools = np.all(uv_index >= 0, axis=1)
     has_uvs = bool(is_textured.any())
     if has_uvs and not is_textured.all():
         uv_index = np.where(is_textured[:, None], uv_index, len(uv_pool))
@@ -266,7 +264,7 @@ def _mesh(
     return mesh, n_dropped
 
 
-def _first_of_each(v: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _first_of_each(v: I64) -> Bools:
     """(F,) bool: no face before has the same corners; all True where most faces are their own.
 
     A face repeated a million times looks like one and costs any tree of triangles its balance.
@@ -277,7 +275,7 @@ def _first_of_each(v: NDArray[np.int64]) -> NDArray[np.bool_]:
     return is_first
 
 
-def _unique_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _unique_rows(rows: I64) -> tuple[I64, I64]:
     # The distinct rows, in sorted order, and for each row its place among them.
     # Code a row as one number where that fits into 64 bits: sorting is faster.
     spans = rows.max(0) + 1

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from pbrs_farm.core.arrays import F64, I32, I64
 from pbrs_farm.core.mesh import unit_normals
 
 
-def crease_normals(
-    points: NDArray[np.float64], faces: NDArray[np.int64], crease_rad: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def crease_normals(points: F64, faces: I64, crease_rad: float) -> tuple[F64, I64]:
     """Unit normals (N, 3) and, for each face corner (F, 3), which of them it has.
 
     Two faces share a normal at a vertex if they meet in an edge there whose faces turn by less
@@ -33,9 +31,7 @@ def crease_normals(
     return normals, label.reshape(-1, 3).astype(np.int64)
 
 
-def _normal_of_corner(
-    points: NDArray[np.float64], faces: NDArray[np.int64], unit: NDArray[np.float64], min_cos: float
-) -> tuple[int, NDArray[np.int32]]:
+def _normal_of_corner(points: F64, faces: I64, unit: F64, min_cos: float) -> tuple[int, I32]:
     # How many normals there are, and which each of the 3 F corners has.
     _, welded = np.unique(points[faces.ravel()], axis=0, return_inverse=True)
     first, second = _smooth_links(welded.reshape(-1, 3), unit, min_cos)
@@ -46,7 +42,7 @@ def _normal_of_corner(
     return n_normals, label
 
 
-def _corner_angles(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _corner_angles(points: F64, faces: I64) -> F64:
     # (F, 3) radians.
     corners = points[faces]
     forward = np.roll(corners, -1, axis=1) - corners
@@ -56,9 +52,7 @@ def _corner_angles(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDA
     return np.asarray(np.arctan2(cross, (forward * backward).sum(-1)))
 
 
-def _smooth_links(
-    welded: NDArray[np.int64], unit: NDArray[np.float64], min_cos: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _smooth_links(welded: I64, unit: F64, min_cos: float) -> tuple[I64, I64]:
     # Pairs of corner numbers (3 face + k) at the ends of edges that two faces share smoothly.
     corner = np.arange(welded.size).reshape(-1, 3)
     start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()

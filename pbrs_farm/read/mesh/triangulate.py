@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import mapbox_earcut
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.mesh import area_vectors
 
 # Polygons of more corners become fans: ear cutting may take the square of their number.
 MAX_EAR_CUT = 5_000
 
 
-def triangulated_corners(
-    positions: NDArray[np.float64], sizes: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def triangulated_corners(positions: F64, sizes: I64) -> I64:
     """(T, 3) corner numbers of the triangles that polygons are cut into, in the polygons' order.
 
     positions: (C, 3) the polygons' corners one after the other; sizes: (P,) corners of each.
     Convex polygons become fans, others are ear-cut; polygons under three corners give nothing.
     """
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    triangles: list[NDArray[np.int64]] = []
-    owners: list[NDArray[np.int64]] = []
+    triangles: list[I64] = []
+    owners: list[I64] = []
     for n in np.unique(sizes):
         if n < 3:
             continue
@@ -50,13 +48,13 @@ def triangulated_corners(
     return np.concatenate(triangles)[order]
 
 
-def _newell(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
+def _newell(polygons: F64) -> F64:
     # Newell's normal: also of polygons that are neither convex nor quite flat.
     following = np.roll(polygons, -1, axis=1)
     return np.asarray(np.cross(polygons, following).sum(1))
 
 
-def _convex(polygons: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _convex(polygons: F64) -> Bools:
     # polygons: (P, n, 3); no corner turns against the polygon's own normal.
     local = polygons - polygons[:, :1]
     edges = np.roll(local, -1, axis=1) - local
@@ -65,7 +63,7 @@ def _convex(polygons: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray((along >= -1e-12 * np.abs(along).max(1, keepdims=True)).all(1))
 
 
-def _ear_cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
+def _ear_cut(polygon: F64) -> I64:
     # (T, 3) corners of one polygon; a fan where ear cutting finds nothing.
     n = len(polygon)
     # Flatten along the axis that the polygon faces most.

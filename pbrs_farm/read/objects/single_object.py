@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Box, House, Item, ItemKind, Level, MaterialKind, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
@@ -179,7 +179,7 @@ def _centred(surfaces: list[Surface], size_m: tuple[float, float, float] | None)
     return [_moved(surface, (low + high) / 2, scale) for surface in surfaces]
 
 
-def _moved(surface: Surface, origin: NDArray[np.float64], scale: NDArray[np.float64]) -> Surface:
+def _moved(surface: Surface, origin: F64, scale: F64) -> Surface:
     normals = surface.normals
     if normals is not None:
         turned = normals / scale  # by the inverse transpose

@@ -14,8 +14,8 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Opening, Surface
@@ -50,7 +50,7 @@ class Element:
     kind: str
     place: str  # for messages
     room_id: str
-    points: tuple[NDArray[np.float64], ...]  # a wall's two ends, or a slab's outline and holes
+    points: tuple[F64, ...]  # a wall's two ends, or a slab's outline and holes
     overrides: tuple[Override, ...]  # inside and outside of a wall
     depth_m: float  # thickness
     height_m: float = 0.0  # of a wall
@@ -61,7 +61,7 @@ class Element:
 class Arch:
     """arch.json as read."""
 
-    world_from_house: NDArray[np.float64]  # (4, 4)
+    world_from_house: F64  # (4, 4)
     elements: dict[str, list[Element]]  # by room or ground, in file order
 
 
@@ -132,7 +132,7 @@ def _hole(reader: JsonReader, raw: Any, place: str) -> tuple[float, float, float
     return (float(u0), float(v0), float(u1), float(v1))
 
 
-def _rings(reader: JsonReader, raw: dict[str, Any], place: str) -> tuple[NDArray[np.float64], ...]:
+def _rings(reader: JsonReader, raw: dict[str, Any], place: str) -> tuple[F64, ...]:
     """Outline and holes in house coordinates; points may be one ring or a list of rings."""
     points = reader.items(raw, "points", place)
     # Tell one ring of corners from a list of rings by what the first entries hold.
@@ -186,9 +186,7 @@ def arch_openings(
     return tuple(found)
 
 
-def _elements_of(
-    arch: Arch, node: Node, room_id: str
-) -> Iterator[tuple[str, Element, NDArray[np.float64] | None]]:
+def _elements_of(arch: Arch, node: Node, room_id: str) -> Iterator[tuple[str, Element, F64 | None]]:
     """(item id, element, outline of the room's floor) of every element that is not hidden."""
     # Find the node's elements by its id, else by the room its model names.
     known = _MODEL_ROOM.fullmatch(node.model_id)
@@ -260,12 +258,12 @@ def _slab(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, .
 class _Frame:
     """Where a wall stands: its start, and (3, 3) unit columns along, up, outward; its length."""
 
-    start: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    start: F64
+    axes: F64
     length: float
 
 
-def _wall_frame(e: Element, outline: NDArray[np.float64] | None) -> _Frame | None:
+def _wall_frame(e: Element, outline: F64 | None) -> _Frame | None:
     """The frame of a wall with an extent, outward from the room's floor; None for all else."""
     if e.kind != "Wall":
         return None

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.serialise import json_from_bytes
@@ -41,8 +41,8 @@ class Node:
     place: str  # where it stands, for messages
     index: int  # its position in the level
     model_id: str
-    house_from_model: NDArray[np.float64]  # (4, 4), identity for rooms and grounds
-    bbox: NDArray[np.float64] | None  # (2, 3)
+    house_from_model: F64  # (4, 4), identity for rooms and grounds
+    bbox: F64 | None  # (2, 3)
     overrides: tuple[Override, ...]  # by position in the model's MTL
     state: int  # of a door or curtain, 0 = as modelled
     is_mirrored: bool | None  # as written; the transform decides
@@ -58,7 +58,7 @@ class HouseRecord:
 
     id: str
     version: str
-    world_from_house: NDArray[np.float64]  # (4, 4) scale and axes
+    world_from_house: F64  # (4, 4) scale and axes
     levels: tuple[tuple[str, tuple[Node, ...]], ...]  # (level id, its nodes)
     unknown: tuple[tuple[str, str], ...] = ()  # (place, type) of valid nodes of no known type
 
@@ -107,7 +107,7 @@ def house_record(data: bytes, file: str) -> HouseRecord:
     )
 
 
-def world_from_house_of(reader: JsonReader, document: dict[str, Any]) -> NDArray[np.float64]:
+def world_from_house_of(reader: JsonReader, document: dict[str, Any]) -> F64:
     """(4, 4) metres, y up, z front <- the file's scaleToMeters, up and front."""
     # Check the scale and the two directions, whose lengths do not matter.
     scale = reader.numbers([document.get("scaleToMeters", 1)], 1, "scaleToMeters")[0]
@@ -144,7 +144,7 @@ class JsonReader:
             raise BadHouse(self.file, where, "expected a list; this is no SUNCG house.json")
         return value
 
-    def numbers(self, value: Any, n: int, place: str) -> NDArray[np.float64]:
+    def numbers(self, value: Any, n: int, place: str) -> F64:
         """(n,) finite numbers, or BadHouse."""
         fits = isinstance(value, list) and len(value) == n
         if not fits or not all(
@@ -194,7 +194,7 @@ class JsonReader:
             raise BadHouse(self.file, place, f"modelId {str(model_id)[:60]!r} is no model's name")
         return model_id
 
-    def _matrix(self, raw: dict[str, Any], kind: str, place: str) -> NDArray[np.float64]:
+    def _matrix(self, raw: dict[str, Any], kind: str, place: str) -> F64:
         if kind in ("Room", "Ground") or "transform" not in raw:
             return np.eye(4)
         m = self.numbers(raw["transform"], 16, f"{place}, transform").reshape(4, 4).T
@@ -204,7 +204,7 @@ class JsonReader:
             raise BadHouse(self.file, f"{place}, transform", "flattens the model (determinant 0)")
         return np.asarray(m)
 
-    def _bbox(self, raw: Any, place: str) -> NDArray[np.float64] | None:
+    def _bbox(self, raw: Any, place: str) -> F64 | None:
         if not isinstance(raw, dict) or "min" not in raw or "max" not in raw:
             return None
         return np.array([self.numbers(raw[k], 3, f"{place}, bbox.{k}") for k in ("min", "max")])

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import LightPart, Surface
 from pbrs_farm.core.lighting import PowerUnit
@@ -21,7 +21,7 @@ ASSUMED_WATT = 60.0
 _FALLBACK_RADIUS_M = 0.0325
 
 
-def placed_light(light: LightPart, world_from_model: NDArray[np.float64]) -> LightPart:
+def placed_light(light: LightPart, world_from_model: F64) -> LightPart:
     """A light of a model's frame in the world."""
     points = (
         [light.position] if light.position_end is None else [light.position, light.position_end]
@@ -31,9 +31,9 @@ def placed_light(light: LightPart, world_from_model: NDArray[np.float64]) -> Lig
     direction /= max(float(np.linalg.norm(direction)), 1e-12)
     return replace(
         light,
-        position=_triple(world[0]),
-        position_end=None if light.position_end is None else _triple(world[1]),
-        direction=_triple(direction),
+        position=triple(world[0]),
+        position_end=None if light.position_end is None else triple(world[1]),
+        direction=triple(direction),
     )
 
 
@@ -77,7 +77,7 @@ def with_emitting_bulbs(
         # Without lights every bulb is one, with an equal share of the assumed power.
         share = 1 / len(bulbs)
         return tuple(
-            LightPart(_triple(c), r, ASSUMED_WATT, PowerUnit.WATT, share, emitting=(b,))
+            LightPart(triple(c), r, ASSUMED_WATT, PowerUnit.WATT, share, emitting=(b,))
             for c, r, b in zip(centres, radii, bulbs, strict=True)
         )
     at = np.array([light.position for light in lights])
@@ -92,8 +92,3 @@ def with_emitting_bulbs(
         emitting = tuple(bulbs[int(m)] for m in mine)
         found.append(replace(light, radius_m=radii[int(mine[0])], emitting=emitting))
     return tuple(found)
-
-
-def _triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)

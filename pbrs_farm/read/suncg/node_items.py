@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
 from pbrs_farm.read.common.notes import Notes
@@ -51,7 +51,7 @@ class ReaderContext:
     materials: ModelMaterials
     models: ModelCache
     notes: Notes
-    world_from_house: NDArray[np.float64]  # (4, 4) scale and axes
+    world_from_house: F64  # (4, 4) scale and axes
     arch: Arch | None = None
 
 
@@ -201,9 +201,7 @@ def box_item(context: ReaderContext, node: Node, room_id: str | None) -> Item | 
     )  # fmt: skip
 
 
-def _box_face(
-    half: NDArray[np.float64], axis: int, sign: int, world_from_box: NDArray[np.float64], index: int
-) -> Surface:
+def _box_face(half: F64, axis: int, sign: int, world_from_box: F64, index: int) -> Surface:
     # Lay the corners around the face's two other axes.
     a, b = {0: (2, 1), 1: (0, 2), 2: (0, 1)}[axis]
     corners = np.zeros((4, 3))

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface
-from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface, corners_of_surfaces
+from pbrs_farm.core.mesh import area_vectors, face_areas
 from pbrs_farm.core.primitives import box
 
 CUTTER_REACH_M: Final = 0.02  # that a cutter stands out of either side of a wall without a hole
@@ -33,8 +33,8 @@ class _WallFrame:
     """The upright faces of a wall that look one way, or back."""
 
     level_id: str
-    normal: NDArray[np.float64]  # (3,) unit
-    points: NDArray[np.float64]  # (V, 3) world
+    normal: F64  # (3,) unit
+    points: F64  # (V, 3) world
 
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
@@ -51,7 +51,7 @@ def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
 
 def _frames(item: Item) -> list[_WallFrame]:
     """A frame for every direction that an item's larger upright faces have, to a degree."""
-    corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in item.surfaces])
+    corners = corners_of_surfaces(item.surfaces)
     n, area = area_vectors(corners), face_areas(corners)
     # Group upright faces by the direction they look in, to a degree, either way round.
     upright = (np.abs(n[:, 1]) < 0.01 * (2 * area)) & (area > 0)
@@ -69,7 +69,7 @@ def _frames(item: Item) -> list[_WallFrame]:
     return found
 
 
-def _axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+def _axes(normal: F64) -> F64:
     """(3, 3) columns: along the wall, up, across."""
     return np.stack([np.cross(_UP, normal), _UP, normal], 1)
 
@@ -114,12 +114,7 @@ def _opening(item: Item, body: Box, frames: Sequence[_WallFrame]) -> Opening | N
     )
 
 
-def _wall(
-    frame: _WallFrame,
-    axes: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-) -> list[NDArray[np.float64]]:
+def _wall(frame: _WallFrame, axes: F64, low: F64, high: F64) -> list[F64]:
     """The wall's points in axes, if it is the one (or one of those) that low..high stands in."""
     if abs(frame.normal @ axes[:, 2]) < 0.999:
         return []
@@ -135,9 +130,7 @@ def _wall(
     return [points] if (overlap > _BESIDE_M).all() else []
 
 
-def _hole(
-    points: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def _hole(points: F64, low: F64, high: F64) -> tuple[F64, F64] | None:
     """(low, high) along and up of the hole that a wall has where low..high stands; None if none."""
     s, y = points[:, 0], points[:, 1]
     # The rim of a hole lies near the door's outline and not at the wall's ends.
@@ -150,8 +143,6 @@ def _hole(
     return rim.min(0), rim.max(0)
 
 
-def box_between(
-    low: NDArray[np.float64], high: NDArray[np.float64], axes: NDArray[np.float64]
-) -> Surface:
+def box_between(low: F64, high: F64, axes: F64) -> Surface:
     """A closed box; low, high: (3,) along axes, the (3, 3) unit columns along, up, across."""
     return box("cutter", axes @ ((low + high) / 2), (high - low) / 2, 0, axes=axes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pbrs_farm.core.arrays import triple
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import LightPart
 from pbrs_farm.core.lighting import PowerUnit
@@ -57,7 +58,7 @@ def light_parts(
                 power=piece.power,
                 unit=PowerUnit.SWEETHOME3D,
                 share=strength[k] / total,
-                rgb_linear=(float(rgb[0]), float(rgb[1]), float(rgb[2])),
+                rgb_linear=triple(rgb),
                 emitting=emitting if not parts else (),
             )
         )

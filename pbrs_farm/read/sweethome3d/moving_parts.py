@@ -10,8 +10,8 @@ import re
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.read.mesh.obj import Mesh
 
 _JOINT = re.compile(r"(?:^|_)((?:hinge|rail)_\d+|unique_rail)(?:_|$)")
@@ -45,7 +45,7 @@ def _moved(mesh: Mesh, by_joint: dict[str, tuple[float, ...]]) -> Mesh:
     return mesh
 
 
-def _transformed(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
+def _transformed(mesh: Mesh, matrix: F64) -> Mesh:
     """The mesh moved by a 3 x 4 matrix; as it is where the matrix flattens it."""
     linear = matrix[:, :3]
     if abs(np.linalg.det(linear)) < 1e-9:

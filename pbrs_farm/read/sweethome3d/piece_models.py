@@ -6,8 +6,8 @@ import posixpath
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, ObjModel, parse_obj
@@ -30,8 +30,8 @@ class PieceModel:
     meshes: tuple[Mesh, ...]  # in the model's frame
     materials: dict[str, ObjMaterial]  # by name
     folder: str  # of its content, for its pictures
-    low: NDArray[np.float64]  # corner of its box
-    high: NDArray[np.float64]  # corner of its box
+    low: F64  # corner of its box
+    high: F64  # corner of its box
 
 
 def role_of(group: str) -> str:

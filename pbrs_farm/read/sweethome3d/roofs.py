@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from pbrs_farm.core.arrays import F64, Points2
+from pbrs_farm.core.arrays import F64, I32, I64, Points2
 from pbrs_farm.read.mesh.horizontal_polygons import triangulated
 
 FIT_M = 0.02  # how far a roof may lie above a given height
@@ -22,7 +21,7 @@ class Roof(NamedTuple):
 
     points: Points2
     heights: F64
-    faces: NDArray[np.int32]
+    faces: I32
 
 
 def roof_over(rings: Sequence[Points2], heights: F64) -> Roof:
@@ -40,7 +39,7 @@ def roof_over(rings: Sequence[Points2], heights: F64) -> Roof:
     return Roof(points, heights, triangulated(rings)[1])
 
 
-def _cloth(points: Points2, heights: F64) -> NDArray[np.int64] | None:
+def _cloth(points: Points2, heights: F64) -> I64 | None:
     # Triangles of the upper side of the convex hull of the points in space.
     # Add a point far below: the faces without it are the upper side.
     n = len(points)
@@ -56,9 +55,7 @@ def _cloth(points: Points2, heights: F64) -> NDArray[np.int64] | None:
     return faces[np.lexsort(faces.T[::-1])] if len(faces) else None
 
 
-def _spanned(
-    rings: Sequence[Points2], points: Points2, heights: F64, cloth: NDArray[np.int64]
-) -> Roof | None:
+def _spanned(rings: Sequence[Points2], points: Points2, heights: F64, cloth: I64) -> Roof | None:
     # The cloth cut along the outline; None if a given height lies too far under it.
     outline = shapely.Polygon(rings[0], list(rings[1:]))
     all_points, all_heights, all_faces, n = [], [], [], 0

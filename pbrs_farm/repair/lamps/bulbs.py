@@ -9,15 +9,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, Surface
-from pbrs_farm.core.mesh import area_vectors, distances_to_triangles, triangle_corners
+from pbrs_farm.core.arrays import F64, I64, triple
+from pbrs_farm.core.house import (
+    House,
+    Item,
+    ItemKind,
+    Material,
+    MaterialKind,
+    Surface,
+    corners_of_surfaces,
+)
+from pbrs_farm.core.mesh import area_vectors, distances_to_triangles
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.repair_report import SourceRepair
-
-Faces = NDArray[np.int64]
 
 _CLEARANCE = 0.97  # of the free distance that a bulb fills
 _LEAST_RADIUS_M = 0.004  # a smaller bulb is moved instead
@@ -68,7 +73,7 @@ def _with_bulbs(
     item: Item, materials: _BulbMaterials, fields: RepairFields
 ) -> tuple[Item, list[SourceRepair]]:
     surfaces = list(item.surfaces)
-    corners = triangles_of(item)
+    corners = corners_of_surfaces(item.surfaces)
     lights, done = [], []
     for number, light in enumerate(item.lights):
         given = light.radius_m if light.radius_m > 0 else fields.bulb_radius_m
@@ -86,8 +91,8 @@ def _with_bulbs(
             moved = float(np.linalg.norm(centre - np.array(light.position)))
             emitting = (len(surfaces),)
             surfaces.append(icosphere("bulb", centre, radius, materials.bulb(light.rgb_linear)))
-            light = replace(light, position=_triple(centre), radius_m=radius)
-            bulb = triangle_corners(surfaces[-1].positions, surfaces[-1].faces)
+            light = replace(light, position=triple(centre), radius_m=radius)
+            bulb = corners_of_surfaces(surfaces[-1:])
             corners = np.concatenate([corners, bulb])
         done.append(
             SourceRepair(
@@ -122,12 +127,6 @@ def _fitting_sphere(position: F64, radius: float, corners: F64) -> tuple[F64, fl
 
 def _free(point: F64, corners: F64) -> float:
     return float(distances_to_triangles(point, corners).min()) if len(corners) else np.inf
-
-
-def triangles_of(item: Item) -> F64:
-    """(F, 3, 3) corners of all the item's triangles, in double precision."""
-    parts = [triangle_corners(s.positions, s.faces) for s in item.surfaces if len(s.faces)]
-    return np.concatenate(parts) if parts else np.zeros((0, 3, 3))
 
 
 def icosphere(
@@ -165,7 +164,7 @@ def icosphere(
     )
 
 
-def _split(unit: F64, faces: Faces) -> tuple[F64, Faces]:
+def _split(unit: F64, faces: I64) -> tuple[F64, I64]:
     # Make one middle vertex for the two faces of an edge, on the sphere.
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     pairs, inverse = np.unique(edges, axis=0, return_inverse=True)
@@ -176,10 +175,6 @@ def _split(unit: F64, faces: Faces) -> tuple[F64, Faces]:
     a, b, c = faces.T
     parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     return np.concatenate([unit, middle]), np.concatenate([np.stack(p, 1) for p in parts])
-
-
-def _triple(v: F64) -> tuple[float, float, float]:
-    return float(v[0]), float(v[1]), float(v[2])
 
 
 def _rounded(value: float) -> float:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room
+from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room, corners_of_surfaces
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.core.mesh import distances_to_triangles, triangle_corners
-from pbrs_farm.repair.lamps.bulbs import icosphere, triangles_of
+from pbrs_farm.core.mesh import distances_to_triangles
+from pbrs_farm.repair.lamps.bulbs import icosphere
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of
 
@@ -46,10 +46,10 @@ def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: flo
     near = [i for i in house.items if _within(i, centre, 2 * radius)]
     # Shrink it until it touches nothing.
     for item in near:
-        free = distances_to_triangles(centre, triangles_of(item)).min()
+        free = distances_to_triangles(centre, corners_of_surfaces(item.surfaces)).min()
         radius = max(min(radius, 0.9 * float(free)), 0.01)
     light = LightPart(
-        position=(float(centre[0]), float(centre[1]), float(centre[2])),
+        position=triple(centre),
         radius_m=radius,
         power=min(max(flux_lm, _LEAST_LM), _MOST_LM) if flux_lm else _POWER,
         unit=PowerUnit.LUMEN if flux_lm else PowerUnit.SWEETHOME3D,
@@ -99,8 +99,7 @@ def place_of_lamp(house: House, room: Room) -> F64:
 def heights_above(house: House, room: Room, places: F64) -> F64:
     """(N,) y of the lowest structure above the room's floor at places (N, 2); inf = none."""
     surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
-    corners = [triangle_corners(s.positions, s.faces) for s in surfaces if len(s.faces)]
-    triangles = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    triangles = corners_of_surfaces(surfaces)
     # Keep those above the room whose bounds meet the places'.
     least_y = room.floor_y + _ABOVE_FLOOR_M
     a, b = triangles[:, :, [0, 2]].min(1), triangles[:, :, [0, 2]].max(1)

@@ -11,11 +11,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House, Item, MaterialKind, Surface
-from pbrs_farm.core.mesh import clipped_to_box, face_areas, triangle_corners, unit_normals
+from pbrs_farm.core.arrays import F64, I64
+from pbrs_farm.core.house import House, Item, MaterialKind, Surface, corners_of_surfaces
+from pbrs_farm.core.mesh import clipped_to_box, face_areas, unit_normals
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.structure.closed_shells import components
 from pbrs_farm.repair.structure.patches import patch_from_surface
@@ -42,11 +41,11 @@ class LampScene:
     house: House
     occluder: Occluder | None  # None where no lamp has a face that stops light
     parts: tuple[Part, ...]
-    part_of_face: NDArray[np.int64]  # (F,) index into parts, of each face; _STRUCTURE = of none
+    part_of_face: I64  # (F,) index into parts, of each face; _STRUCTURE = of none
     normals: F64  # (F, 3) unit
     offset_of: dict[int, F64]  # item -> (3,) translation of that lamp
     bounds_of: dict[int, F64]  # item -> (2, 3) bounds of that lamp in the scene
-    labels: dict[tuple[int, int], NDArray[np.int64]]  # (item, surface) -> (F,) part of each face
+    labels: dict[tuple[int, int], I64]  # (item, surface) -> (F,) part of each face
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,11 +62,11 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
     side = max(int(np.ceil(np.sqrt(len(lamps)))), 1)
     items: list[Item] = []
     parts: list[Part] = []
-    numbers: list[NDArray[np.int64]] = []
+    numbers: list[I64] = []
     offset_of: dict[int, F64] = {}
     bounds_of: dict[int, F64] = {}
     structure = _structure_corners(house)
-    labels: dict[tuple[int, int], NDArray[np.int64]] = {}
+    labels: dict[tuple[int, int], I64] = {}
     for n, k in enumerate(lamps):
         item = house.items[k]
         # Stand the lamp in its cell of a square grid, the first bulb in the middle.
@@ -96,8 +95,7 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
     part_of_face = np.concatenate([np.zeros(0, np.int64), *numbers])
     if not len(part_of_face):
         return LampScene(house, None, (), part_of_face, np.zeros((0, 3)), offset_of, bounds_of, labels)  # fmt: skip
-    corners = [triangle_corners(s.positions, s.faces) for _, _, _, s in scene.surfaces()]
-    normals = unit_normals(np.concatenate(corners))
+    normals = unit_normals(corners_of_surfaces(s for _, _, _, s in scene.surfaces()))
     occluder = occluder_from(scene)
     return LampScene(
         house, occluder, tuple(parts), part_of_face, normals, offset_of, bounds_of, labels
@@ -106,9 +104,9 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
 
 def _structure_corners(house: House) -> F64:
     """(F, 3, 3) corners of all walls, floors and ceilings."""
-    surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
-    parts = [triangle_corners(s.positions, s.faces) for s in surfaces]
-    return np.concatenate([np.zeros((0, 3, 3)), *parts])
+    return corners_of_surfaces(
+        s for item in house.items if item.kind.is_structure for s in item.surfaces
+    )
 
 
 def _surface_of(corners: F64) -> Surface:
@@ -179,8 +177,7 @@ def _rays_of_source(
 
 def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) -> tuple[F64, F64]:
     """n rays (origins, unit directions) that leave the surfaces' fronts as a diffuse emitter's."""
-    sound = [s for s in surfaces if len(s.faces)]
-    corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in sound])
+    corners = corners_of_surfaces(surfaces)
     areas, normals = face_areas(corners), unit_normals(corners)
     # Choose faces by area, points uniformly on them.
     chosen = rng.choice(len(areas), n, p=areas / areas.sum())

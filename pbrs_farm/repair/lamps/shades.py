@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import Bools
 from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.lamps.light_output_ratio import (
@@ -107,7 +107,7 @@ def _shade_of(material: int, materials: list[Material]) -> int:
     return materials.index(shade)
 
 
-def _split_off(item: Item, j: int, is_shade: NDArray[np.bool_], material: int) -> Item:
+def _split_off(item: Item, j: int, is_shade: Bools, material: int) -> Item:
     """The item with those faces of its surface j in the shade's material.
 
     A surface that is split keeps its place, its shade comes last: LightPart.emitting still holds.

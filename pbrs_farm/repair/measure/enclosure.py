@@ -12,11 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.planar_surfaces import Cover
@@ -159,7 +158,7 @@ def _ceiling_at(points: F64, room: Room, covers: Sequence[Cover]) -> F64:
     return y
 
 
-def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> NDArray[np.bool_]:
+def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> Bools:
     """Whether walls stand at each point from low to high, gaps up to GAP_M aside."""
     reached = low + 2 * GAP_M  # a wall may begin a little above the floor
     spans = []

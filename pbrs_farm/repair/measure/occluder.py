@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from pbrs_farm.core.arrays import F32, I32
 
 
 class Occluder(Protocol):
     """First hits of rays with the triangles of one house (faces as in geometry_from_house)."""
 
     def first_hit(
-        self,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        max_distance: float = ...,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        self, origins: F32, directions: F32, max_distance: float = ...
+    ) -> tuple[F32, I32]:
         """Distance (N,) in metres, inf = a miss, and face index (N,), -1 = a miss.
 
         origins, directions: (N, 3) float32, directions unit.

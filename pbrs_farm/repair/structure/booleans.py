@@ -18,7 +18,7 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.mesh import edges_are_paired, signed_volume
 from pbrs_farm.repair.structure.sliver_removal import without_slivers
 
@@ -41,7 +41,7 @@ class Patch:
 
     tag: Tag
     positions: F64  # (V, 3) metres
-    faces: NDArray[np.int64]  # (F, 3) anticlockwise seen from outside
+    faces: I64  # (F, 3) anticlockwise seen from outside
     uvs: F64  # (V, 2)
     normals: F64  # (V, 3) unit, or zeros where faces are flat
 
@@ -103,7 +103,7 @@ def _solid(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold
     return solid
 
 
-def faces_of_patches(patches: Sequence[Patch]) -> NDArray[np.int64]:
+def faces_of_patches(patches: Sequence[Patch]) -> I64:
     """(F, 3) faces of all patches, corners numbered through the concatenated vertices."""
     starts = np.cumsum([0, *(len(p.positions) for p in patches)])
     return np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
@@ -113,7 +113,7 @@ class _Welded(NamedTuple):
     """The patches as one mesh."""
 
     vertices: F64  # (V, 8) x y z u v, normal
-    faces: NDArray[np.int64]  # (F, 3)
+    faces: I64  # (F, 3)
     merge_from: NDArray[np.uint64]  # vertices that are one with
     merge_to: NDArray[np.uint64]  # these
 
@@ -185,7 +185,7 @@ def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
     return sorted(found, key=lambda p: (p.tag.item, p.tag.surface, p.tag.material))
 
 
-def _tags_of_faces(mesh: manifold3d.Mesh64, table: TagTable) -> tuple[list[Tag], NDArray[np.int64]]:
+def _tags_of_faces(mesh: manifold3d.Mesh64, table: TagTable) -> tuple[list[Tag], I64]:
     # Number the tags; several runs may have one: a wall cut by two openings has two of reveals.
     run_index = np.asarray(mesh.run_index, np.int64) // 3
     tags: dict[Tag, int] = {}
@@ -193,7 +193,7 @@ def _tags_of_faces(mesh: manifold3d.Mesh64, table: TagTable) -> tuple[list[Tag],
     return list(tags), np.repeat(np.array(of_run, np.int64), np.diff(run_index)[: len(of_run)])
 
 
-def _compact(tag: Tag, vertices: F64, faces: NDArray[np.int64]) -> Patch:
+def _compact(tag: Tag, vertices: F64, faces: I64) -> Patch:
     used, inverse = np.unique(faces, return_inverse=True)
     v = vertices[used]
     return Patch(tag, v[:, :3], inverse.reshape(-1, 3), v[:, 3:5], v[:, 5:8])

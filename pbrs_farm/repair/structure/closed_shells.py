@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from manifold3d import Manifold
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import face_areas, signed_volume, unit_normals
 from pbrs_farm.repair.structure.booleans import (
@@ -72,7 +71,7 @@ def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
     return [s for s in solids if s is not None]
 
 
-def components(patches: Sequence[Patch]) -> list[NDArray[np.int64]]:
+def components(patches: Sequence[Patch]) -> list[I64]:
     """For each patch the shell (F,) of each face; shells are faces joined at their corners."""
     positions = np.concatenate([p.positions for p in patches])
     # Number the places of corners through all patches.
@@ -90,7 +89,7 @@ def components(patches: Sequence[Patch]) -> list[NDArray[np.int64]]:
     return [np.asarray(part, np.int64) for part in np.split(label, ends[:-1])]
 
 
-def _split(patches: Sequence[Patch], labels: Sequence[NDArray[np.int64]]) -> list[list[Patch]]:
+def _split(patches: Sequence[Patch], labels: Sequence[I64]) -> list[list[Patch]]:
     every = np.unique(np.concatenate(labels))
     # Keep the patches of a single shell as they are.
     if len(every) == 1:

@@ -13,8 +13,8 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House, Item, ItemKind
-from pbrs_farm.core.mesh import area_vectors, triangle_corners, unit_normals
+from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
+from pbrs_farm.core.mesh import area_vectors, unit_normals
 
 MOVED_M = 5e-4
 """How far a frame is moved out of its wall's face."""
@@ -75,8 +75,7 @@ def _apart(item: Item, walls: Sequence[Item]) -> Item:
 
 def _faces(items: Sequence[Item], low: F64, high: F64) -> _Faces:
     # Leave out faces without area, and those outside the box low..high and its reach.
-    found = [triangle_corners(s.positions, s.faces) for i in items for s in i.surfaces]
-    corners = np.concatenate([np.zeros((0, 3, 3)), *found])
+    corners = corners_of_surfaces(s for i in items for s in i.surfaces)
     corners = corners[np.linalg.norm(area_vectors(corners), axis=1) > 1e-8]
     near = (corners.min(1) < high + 2 * MOVED_M) & (corners.max(1) > low - 2 * MOVED_M)
     corners = corners[near.all(1)]

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from manifold3d import Manifold
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
@@ -117,7 +116,7 @@ def _planar_surfaces(item: Item, index: int) -> Iterator[PlanarSurface]:
             )
 
 
-def _facets(positions: F64, faces: NDArray[np.int32]) -> list[NDArray[np.int32]]:
+def _facets(positions: F64, faces: I32) -> list[I32]:
     # Group faces by their plane, in order of first face; leave out upright ones.
     normals = unit_normals(positions[faces])
     normals = normals * np.where(normals[:, 1:2] < 0, -1.0, 1.0)
@@ -133,7 +132,7 @@ def _facets(positions: F64, faces: NDArray[np.int32]) -> list[NDArray[np.int32]]
     return [faces[members] for _, _, members in groups]
 
 
-def _uv_map(surface: Surface, faces: NDArray[np.int32]) -> UvMap | None:
+def _uv_map(surface: Surface, faces: I32) -> UvMap | None:
     # Fit the texture by an affine map of the plan, so that it carries on where the slab grows.
     if surface.uvs is None:
         return None

@@ -9,9 +9,8 @@ import manifold3d
 import numpy as np
 import shapely
 from manifold3d import Manifold
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, solid_from_patches
 
@@ -141,5 +140,5 @@ def _sides(tag: Tag, rings: list[F64], lows: F64, highs: F64) -> Patch:
     return _patch(tag, corners.reshape(-1, 3), faces.reshape(-1, 3), np.concatenate(uvs).reshape(-1, 2))  # fmt: skip
 
 
-def _patch(tag: Tag, positions: F64, faces: NDArray[np.int64], uvs: F64) -> Patch:
+def _patch(tag: Tag, positions: F64, faces: I64, uvs: F64) -> Patch:
     return Patch(tag, positions, faces, uvs, np.zeros_like(positions))

@@ -8,22 +8,19 @@ each is dissolved instead: the triangle across its longest edge is split at that
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.mesh import face_areas
-
-Faces = NDArray[np.int64]
 
 MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver
 _MERGE_M = 4e-6  # a few steps of float32 ten metres from the origin
 _MAX_ROUNDS = 8  # splitting may leave new slivers
 
 
-def without_slivers(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Faces, Faces]:
+def without_slivers(vertices: F64, faces: I64, labels: I64) -> tuple[F64, I64, I64]:
     """The mesh with float32 positions and no face without area, its edges still in pairs.
 
     Points nearer than a few micrometres, which differ by noise, become one.
@@ -43,7 +40,7 @@ def without_slivers(vertices: F64, faces: Faces, labels: Faces) -> tuple[F64, Fa
     return mesh.result()
 
 
-def _representatives(positions: F64) -> NDArray[np.int64]:
+def _representatives(positions: F64) -> I64:
     # Take for each point the first of those linked to it by steps below _MERGE_M.
     n = len(positions)
     pairs = KDTree(positions).query_pairs(_MERGE_M, output_type="ndarray").reshape(-1, 2)
@@ -55,7 +52,7 @@ def _representatives(positions: F64) -> NDArray[np.int64]:
 class _Mesh:
     """Faces that can be replaced, with the faces at each directed edge between positions."""
 
-    def __init__(self, vertices: F64, place: Faces, faces: Faces, labels: Faces) -> None:
+    def __init__(self, vertices: F64, place: I64, faces: I64, labels: I64) -> None:
         self._vertices = list(vertices)  # (P,) position and properties each
         self._place = place.tolist()  # vertex -> number of its position
         self._faces: list[tuple[int, int, int]] = [(a, b, c) for a, b, c in faces.tolist()]
@@ -73,7 +70,7 @@ class _Mesh:
                 self._dissolve_one(f)
         return len(slivers)
 
-    def result(self) -> tuple[F64, Faces, Faces]:
+    def result(self) -> tuple[F64, I64, I64]:
         """Vertices, living faces, their labels."""
         kept = [f for f, alive in enumerate(self._alive) if alive]
         faces = np.array([self._faces[f] for f in kept], np.int64).reshape(-1, 3)

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.transport.kernels.alias_table import alias_rows, sample_alias_table
 from pbrs_farm.transport.kernels.device_scene import DeviceScene, offset_ray_origin
 from pbrs_farm.transport.kernels.sampler import device_array
@@ -23,11 +24,11 @@ class GuidingTargets:
     """Face sides that reflect a lamp's light, lamp by lamp: S sides, L lamps."""
 
     sides: NDArray[np.uint32]  # (S,) face, + BACK_SIDE for its back
-    probabilities: NDArray[np.float64]  # (S,) of each among its lamp's sides, sum 1
-    pdfs: NDArray[np.float64]  # (S,) per m2
-    first: NDArray[np.int64]  # (L + 1,) first side of each lamp
-    shares: NDArray[np.float64]  # (L,) of the lamp's light that its sides send out, 0..1
-    interiors: NDArray[np.float64]  # (L, 4) centre, radius in m around the bulb; radius 0 = none
+    probabilities: F64  # (S,) of each among its lamp's sides, sum 1
+    pdfs: F64  # (S,) per m2
+    first: I64  # (L + 1,) first side of each lamp
+    shares: F64  # (L,) of the lamp's light that its sides send out, 0..1
+    interiors: F64  # (L, 4) centre, radius in m around the bulb; radius 0 = none
 
 
 class TargetSample(NamedTuple):

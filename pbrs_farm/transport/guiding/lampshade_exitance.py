@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64, I64
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
 from pbrs_farm.transport.guiding.guiding_targets import BACK_SIDE, GuidingTargets, no_targets
@@ -61,12 +62,7 @@ def guiding_targets(
     )
 
 
-def _lamp_interiors(
-    tables: SceneTables,
-    faces: NDArray[np.int64],
-    lamps: NDArray[np.int64],
-    probabilities: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _lamp_interiors(tables: SceneTables, faces: I64, lamps: I64, probabilities: F64) -> F64:
     """(L, 4) spheres around each bulb that hold INTERIOR_SHARE of what its faces send out."""
     spheres = bounding_spheres(tables)
     reach = np.linalg.norm(_corners(tables, faces) - spheres[lamps, None, :3], axis=2).max(1)
@@ -83,8 +79,8 @@ class FacePdfs(NamedTuple):
     """How often guided rays aim at each face, a row a face."""
 
     faces: NDArray[np.uint32]
-    front: NDArray[np.float32]  # per m2
-    back: NDArray[np.float32]
+    front: F32  # per m2
+    back: F32
     lamps: NDArray[np.uint32]
 
 
@@ -98,11 +94,11 @@ def pdfs_by_face(targets: GuidingTargets) -> FacePdfs:
     return FacePdfs(faces, values[0], values[1], lamps)
 
 
-def _corners(tables: SceneTables, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _corners(tables: SceneTables, faces: I64) -> F64:
     return triangle_corners(tables.positions, tables.faces[faces])
 
 
-def _candidates(tables: SceneTables) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _candidates(tables: SceneTables) -> tuple[I64, I64]:
     """(faces that scatter and lie near a lamp, the nearest lamp of each)."""
     tag = tables.face_tags
     scatters = tables.material_rows[tag & 0xFFFF, KIND] == SURFACE
@@ -132,13 +128,8 @@ def _candidates(tables: SceneTables) -> tuple[NDArray[np.int64], NDArray[np.int6
 
 
 def _exitance(
-    scene: DeviceScene,
-    emitters: Emitters,
-    tables: SceneTables,
-    faces: NDArray[np.int64],
-    lamps: NDArray[np.int64],
-    seed: int,
-) -> NDArray[np.float64]:
+    scene: DeviceScene, emitters: Emitters, tables: SceneTables, faces: I64, lamps: I64, seed: int
+) -> F64:
     """(2, K) W m-2 of luminance that the fronts and the backs of faces send out, by their lamp."""
     # Choose points uniform over each face, the same for front and back.
     rng = np.random.default_rng(seed)

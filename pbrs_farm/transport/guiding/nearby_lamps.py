@@ -14,8 +14,8 @@ from typing import Any, Final, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, no_targets
 from pbrs_farm.transport.kernels.packets import point
 from pbrs_farm.transport.kernels.sampler import device_array
@@ -68,7 +68,7 @@ class NearbyLampSampler:
         self._weights = np.zeros(self._n)
         self.set_targets(no_targets(self._n))
 
-    def set_weights(self, weights: NDArray[np.float64]) -> None:
+    def set_weights(self, weights: F64) -> None:
         """Set the weights of another view, (L,)."""
         self._weights = weights
         self._update()
@@ -177,6 +177,6 @@ def cone_pdf(cones: Cones, d: Any) -> Any:
     return pdf / dr.maximum(cones.total, 1e-30)
 
 
-def _rows(rows: NDArray[np.float64]) -> Any:
+def _rows(rows: F64) -> Any:
     """(L + 1, 4) rows on the device: one more, so that a house without lamps has a row, too."""
     return device_array(mi.Float, np.append(rows, np.zeros((1, 4)), 0).astype(np.float32).ravel())

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields
@@ -32,9 +33,7 @@ def uniform_weights(n_lamps: int, n_portals: int) -> EmitterWeights:
     return EmitterWeights(np.full(n_lamps, 1 / max(n_lamps, 1)), np.full(n_outdoor, 1 / n_outdoor))
 
 
-def weights_by_distance(
-    spheres: NDArray[np.float64], place: NDArray[np.float64], n_portals: int
-) -> EmitterWeights:
+def weights_by_distance(spheres: F64, place: F64, n_portals: int) -> EmitterWeights:
     """Lamps by 1 / distance squared (1 m at least) from a place (3,), outdoor techniques alike.
 
     spheres: (L, 4) centre and radius of each lamp.
@@ -72,9 +71,7 @@ def pilot_weights(
     return EmitterWeights(lamps, outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0)))
 
 
-def outdoor_weights(
-    strength: NDArray[np.float64], brought: NDArray[np.floating]
-) -> NDArray[np.float64]:
+def outdoor_weights(strength: F64, brought: NDArray[np.floating]) -> F64:
     """Shares of sun, dome and portals from each one's strength and mean contribution.
 
     Dome and portals are techniques for one emitter, the sky: the better of the two tells how
@@ -93,7 +90,7 @@ def outdoor_weights(
     return _with_floors(raw, np.array([_SUN_FLOOR, _DOME_FLOOR, *[LAMP_FLOOR] * len(portal)]))
 
 
-def _with_floors(strength: NDArray[np.float64], floors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _with_floors(strength: F64, floors: F64) -> F64:
     if not len(strength):
         return strength
     total = strength.sum()

@@ -9,6 +9,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
+
 
 def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) -> tuple[Any, Any]:
     """(index, u made uniform again) of an alias table's part [first, first + count)."""
@@ -24,7 +26,7 @@ def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) 
     return dr.select(stay, i, other), dr.clip(again, 0, 1 - 1e-7)
 
 
-def alias_rows(weights: NDArray[np.floating]) -> NDArray[np.float32]:
+def alias_rows(weights: NDArray[np.floating]) -> F32:
     """(N, 2) rows (chance to stay, bits of the other index) of Vose's alias method."""
     w = np.asarray(weights, np.float64)
     n = len(w)

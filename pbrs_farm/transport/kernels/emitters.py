@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, TargetSampler, no_targets
@@ -47,8 +48,8 @@ _PORTAL_PACKETS = 3  # corner, first edge, second edge
 class EmitterWeights:
     """How often each lamp and each outdoor technique is chosen; each sums to 1 (or is empty)."""
 
-    lamps: NDArray[np.float64]  # (L,)
-    outdoor: NDArray[np.float64]  # (2 + number of portals,)
+    lamps: F64  # (L,)
+    outdoor: F64  # (2 + number of portals,)
 
 
 class DirectionSample(NamedTuple):
@@ -70,7 +71,7 @@ class Emitters:
     """
 
     def __init__(
-        self, tables: SceneTables, sky: Sky, portals: NDArray[np.float64], weights: EmitterWeights
+        self, tables: SceneTables, sky: Sky, portals: F64, weights: EmitterWeights
     ) -> None:
         self.nearby = NearbyLampSampler(tables)
         self.targets = TargetSampler(no_targets(len(tables.lamps)))
@@ -87,7 +88,7 @@ class Emitters:
         """Whether anything of a group shines at all."""
         return self._has_group[group]
 
-    def set_view(self, portals: NDArray[np.float64], weights: EmitterWeights) -> None:
+    def set_view(self, portals: F64, weights: EmitterWeights) -> None:
         """Set the portals and weights of another view; lamps and sky stay."""
         self._set_portals(portals)
         self.set_weights(weights)
@@ -269,7 +270,7 @@ class Emitters:
             total += weight * colour(texel)
         return total, pdf
 
-    def _set_lamps(self, tables: SceneTables, weights: NDArray[np.float64]) -> None:
+    def _set_lamps(self, tables: SceneTables, weights: F64) -> None:
         # One lamp more than there are, so that a house without lamps has a row, too.
         def padded(kind: Any, rows: NDArray[Any], last: NDArray[Any]) -> Any:
             return device_array(kind, np.concatenate([rows, last]).ravel())
@@ -287,20 +288,20 @@ class Emitters:
         self._triangle_alias = padded(mi.Float, np.concatenate(alias), np.ones((1, 2), np.float32))
         self._set_lamp_weights(weights)
 
-    def _set_portals(self, portals: NDArray[np.float64]) -> None:
+    def _set_portals(self, portals: F64) -> None:
         rows = np.zeros((MAX_PORTALS, 4 * _PORTAL_PACKETS), np.float32)
         rows[: len(portals), 0:3] = portals[:, 0]
         rows[: len(portals), 4:7] = portals[:, 1] - portals[:, 0]
         rows[: len(portals), 8:11] = portals[:, 3] - portals[:, 0]
         self._portals = device_array(mi.Float, rows.ravel())
 
-    def _set_lamp_weights(self, weights: NDArray[np.float64]) -> None:
+    def _set_lamp_weights(self, weights: F64) -> None:
         padded = weights if len(weights) else np.ones(1)
         self.nearby.set_weights(weights)
         self._lamp_weights = device_array(mi.Float, padded.astype(np.float32))
         self._lamp_alias = device_array(mi.Float, alias_rows(padded).ravel())
 
-    def _set_outdoor_weights(self, weights: NDArray[np.float64]) -> None:
+    def _set_outdoor_weights(self, weights: F64) -> None:
         self._n_outdoor = dr.opaque(mi.UInt32, len(weights))
         self._outdoor_alias = device_array(mi.Float, alias_rows(weights).ravel())
         portal = np.zeros(MAX_PORTALS, np.float32)
@@ -342,7 +343,7 @@ def _cone(uv: Any, cos_max: Any) -> Any:
     return warp(uv, cos_max)
 
 
-def dome_probabilities(dome: NDArray[np.float32]) -> NDArray[np.float64]:
+def dome_probabilities(dome: F32) -> F64:
     """(H, W) probability of each texel: brightness (of it and its neighbours) times solid angle."""
     height, width = dome.shape[:2]
     luminance = np.asarray(dome, np.float64) @ LUMINANCE

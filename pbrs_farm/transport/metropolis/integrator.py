@@ -28,6 +28,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
@@ -71,7 +72,7 @@ _MIN_BOOTSTRAP, _MAX_BOOTSTRAP = 1 << 14, 1 << 18  # paths
 class Estimate:
     """Light beyond direct of one group by Metropolis."""
 
-    halves: tuple[NDArray[np.float32], NDArray[np.float32]]  # (H, W, 3) of independent chains
+    halves: tuple[F32, F32]  # (H, W, 3) of independent chains
     mean_luminance: float  # of the picture
     acceptance: float  # of small and large steps together
     n_mutations: int
@@ -215,9 +216,7 @@ def _with_importance(
     return context._replace(film=context.film._replace(importance=on_device))
 
 
-def pixel_importance(
-    shape: tuple[int, int], pixels: NDArray[np.uint32], luminances: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def pixel_importance(shape: tuple[int, int], pixels: NDArray[np.uint32], luminances: F32) -> F32:
     """(H, W) what a unit of luminance counts: about 1 / the light expected at a pixel.
 
     Without it chains go where the picture is bright; with it every pixel gets its share (Veach's
@@ -239,7 +238,7 @@ def pixel_importance(
     return np.asarray(mean / (light + _MIN_RELATIVE_LIGHT * mean), np.float32)
 
 
-def _between(n: int, side: int, n_tiles: int) -> NDArray[np.float64]:
+def _between(n: int, side: int, n_tiles: int) -> F64:
     """(n, n_tiles) linear weights of tiles of `side` pixels at each of n pixels."""
     at = np.clip((np.arange(n) + 0.5) / side - 0.5, 0, n_tiles - 1)
     return np.asarray(np.maximum(1 - np.abs(at[:, None] - np.arange(n_tiles)[None]), 0))

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.arrays import F64, I64, Bools, triple
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import Geometry, House, Item, LightPart, MaterialKind
 from pbrs_farm.core.lighting import flux_lm
@@ -30,7 +29,7 @@ class AreaEmitter:
     name: str  # of the item, with the number of the source where it has several
     item: int  # index into House.items
     room_id: str | None
-    faces: NDArray[np.int64]  # (T,) of the geometry
+    faces: I64  # (T,) of the geometry
     face_areas: F64  # (T,) m2
     radiance: tuple[float, float, float]  # W m-2 sr-1, linear RGB, from both sides of every face
     area_m2: float  # the sum of face_areas
@@ -75,7 +74,7 @@ def area_emitters_of_house(
 _NONE = np.zeros(0, np.int64)
 
 
-def _faces_by_surface(geometry: Geometry, keep: Bools) -> dict[int, NDArray[np.int64]]:
+def _faces_by_surface(geometry: Geometry, keep: Bools) -> dict[int, I64]:
     """Number of a surface -> its faces that are kept; a surface's faces follow one another."""
     numbers, starts = np.unique(geometry.face_surface, return_index=True)
     runs = np.split(np.arange(len(geometry.face_surface)), starts[1:])
@@ -114,7 +113,7 @@ def _bulb_emitter(
     house: House,
     geometry: Geometry,
     place: tuple[int, int],
-    faces: NDArray[np.int64],
+    faces: I64,
     flux_and_rgb: tuple[float, F64],
     recipe: Recipe,
 ) -> AreaEmitter:
@@ -133,11 +132,11 @@ def _bulb_emitter(
         radiance = np.full(3, recipe.emission.released_bulb)
         flux = LM_PER_W * math.pi * outside * recipe.emission.released_bulb
     name = f"{item.id}/{k}" if len(item.lights) > 1 else item.id
-    return AreaEmitter(name, index, item.room_id, faces, areas, _triple(radiance), area, flux)
+    return AreaEmitter(name, index, item.room_id, faces, areas, triple(radiance), area, flux)
 
 
 def _shade_emitter(
-    item: Item, geometry: Geometry, index: int, faces: NDArray[np.int64], recipe: Recipe
+    item: Item, geometry: Geometry, index: int, faces: I64, recipe: Recipe
 ) -> AreaEmitter:
     areas = face_areas(_corners(geometry, faces))
     area, level = float(areas.sum()), recipe.emission.released_shade
@@ -146,9 +145,5 @@ def _shade_emitter(
     return AreaEmitter(name, index, item.room_id, faces, areas, radiance, area, flux)
 
 
-def _corners(geometry: Geometry, faces: NDArray[np.int64]) -> F64:
+def _corners(geometry: Geometry, faces: I64) -> F64:
     return triangle_corners(geometry.positions, geometry.faces[faces])
-
-
-def _triple(v: F64) -> tuple[float, float, float]:
-    return float(v[0]), float(v[1]), float(v[2])

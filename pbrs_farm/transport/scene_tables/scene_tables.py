@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, I32, Bools
+from pbrs_farm.core.arrays import F32, F64, I32, I64, Bools
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Geometry, House, MaterialKind, geometry_from_house
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
@@ -128,7 +128,7 @@ def _face_rows(geometry: Geometry, faces: I32) -> F32:
 
 
 def _lamp_triangles(
-    lamps: tuple[AreaEmitter, ...], new_number: NDArray[np.int64]
+    lamps: tuple[AreaEmitter, ...], new_number: I64
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], F32]:
     """(first, faces, areas) as in SceneTables; new_number: of each face of the geometry."""
     first = np.cumsum([0, *(len(lamp.faces) for lamp in lamps)]).astype(np.uint32)

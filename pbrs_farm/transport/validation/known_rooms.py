@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import (
     House,
@@ -130,7 +130,7 @@ def house(
     *,
     lamps: Sequence[Item] = (),
     size: Triple = (4.0, 2.5, 4.0),
-    openings: Sequence[NDArray[np.float64]] = (),
+    openings: Sequence[F64] = (),
 ) -> House:
     """A house of one item with those surfaces, and lamps."""
     x, _y, z = size

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, Bools
+from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
@@ -187,7 +187,7 @@ def _texels(
     return texels[begin : begin + width * height].reshape(height, width)
 
 
-def _bitmap(mi: Any, values: NDArray[np.float64]) -> dict[str, Any]:
+def _bitmap(mi: Any, values: F64) -> dict[str, Any]:
     picture = mi.Bitmap(np.ascontiguousarray(values, np.float32))
     return {"type": "bitmap", "bitmap": picture, "raw": True, "wrap_mode": "repeat"}
 
