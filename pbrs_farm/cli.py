@@ -20,6 +20,7 @@ from pbrs_farm.commands.arguments import Handler, warn
 from pbrs_farm.commands.command_line import Parser, unknown_words, verb_first
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.near_names import did_you_mean
+from pbrs_farm.installation import EXTRA_OF, install_command
 
 # Module of pbrs_farm.commands -> the verbs it adds.
 MODULES: Final = {
@@ -75,7 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = _verb_first(argv)
     verb, module = words[0] if words else "", _module_of(words)
     if module in _OF_THE_FARM and not _has_farm():
-        warn(f'{verb} needs celery and redis: pip install "pbrs-farm[workers]"')
+        warn(f"{verb} needs celery and redis: {install_command('workers')}")
         return 1
     if verb and module is None and not verb.startswith("-"):
         offer = did_you_mean(verb, [v for verbs in MODULES.values() for v in verbs])
@@ -100,6 +101,12 @@ def _handled(args: argparse.Namespace) -> int:
         if args.debug:
             traceback.print_exc()
         warn(str(error))
+        return 1
+    except ModuleNotFoundError as error:
+        # A package of an extra that is not installed is no fault of ours.
+        if error.name not in EXTRA_OF or args.debug:
+            raise
+        warn(f"this needs {error.name}: {install_command(EXTRA_OF[error.name])}")
         return 1
     except KeyboardInterrupt:
         warn("interrupted; the same command goes on where it stopped")

@@ -14,6 +14,8 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Final, Literal
 
+from pbrs_farm.installation import EXTRA_OF, install_command, is_installed, system_command
+
 State = Literal["ok", "degraded", "missing"]
 PROBE_TIMEOUT_S: Final = 120
 
@@ -21,13 +23,7 @@ _PACKAGES: Final = (
     "numpy", "pydantic", "mitsuba", "drjit", "moderngl", "trimesh", "manifold3d", "pyoidn",
     "OpenImageIO", "shapely",
 )  # fmt: skip
-_GL_PACKAGES: Final = "libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri"
-# Mitsuba's variants -> what to do where one does not work.
-_VARIANTS: Final = {
-    "cuda_ad_rgb": "only with an NVIDIA GPU and its driver; not needed",
-    "llvm_ad_rgb": "sudo apt-get install -y libllvm19",
-    "scalar_rgb": "pip install 'pbrs-farm[transport]'",
-}
+_VARIANTS: Final = ("cuda_ad_rgb", "llvm_ad_rgb", "scalar_rgb")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +40,13 @@ class Finding:
 def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
     """Every part, in the order a house meets it."""
     # What to install where a library is missing.
-    oidn, oiio = "pip install 'pbrs-farm[transport]'", "pip install OpenImageIO"
+    oidn, oiio = install_command("transport"), install_command()
     return [
         _python(),
         _packages(),
         _llvm(),
         *_variants(),
-        _probe("GL", check_gl, f"sudo apt-get install -y {_GL_PACKAGES}", needed=True),
+        _probe("GL", check_gl, _gl_remedy(), needed=True),
         _probe("denoiser", check_denoiser, oidn, needed=True),
         _probe("pictures", check_pictures, oiio, needed=True),
         _redis(redis_url),
@@ -75,10 +71,10 @@ def _packages() -> Finding:
             found.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             missing.append(package)
-    # The extras gl and transport install all of them.
     if missing:
         text = "not installed: " + ", ".join(missing)
-        return Finding("packages", "missing", text, "pip install -e '.[gl,transport]'", True)
+        extras = sorted({EXTRA_OF[name] for name in missing if name in EXTRA_OF})
+        return Finding("packages", "missing", text, install_command(*extras), True)
     return Finding("packages", "ok", ", ".join(found))
 
 
@@ -92,19 +88,32 @@ def _llvm() -> Finding:
     old = ", ".join(".".join(map(str, v)) for v, _path in llvm_libraries())
     text = f"only {old}; 14 to 16 crash inside Dr.Jit" if old else "no libLLVM found"
     text += f"; {MIN_LLVM} or later is needed (19 is what we test); running with scalar_rgb, several times slower"
-    return Finding("LLVM", "degraded", text, _VARIANTS["llvm_ad_rgb"])
+    return Finding("LLVM", "degraded", text, system_command("llvm"))
 
 
 def _variants() -> list[Finding]:
     findings = [
-        _probe(f"mitsuba {name}", check_variant, remedy, argument=name, state="degraded")
-        for name, remedy in _VARIANTS.items()
+        _probe(f"mitsuba {n}", check_variant, _variant_remedy(n), argument=n, state="degraded")
+        for n in _VARIANTS
     ]
     # One variant is enough; without any nothing can be rendered.
     if not any(f.state == "ok" for f in findings):
         last = findings[-1]
         findings[-1] = Finding(last.part, "missing", last.text, last.remedy, True)
     return findings
+
+
+def _variant_remedy(name: str) -> str:
+    """What to do where a variant of Mitsuba does not work."""
+    if name == "cuda_ad_rgb":
+        return "only with an NVIDIA GPU and its driver; not needed"
+    if not is_installed("mitsuba"):
+        return install_command("transport")
+    return system_command("llvm") if name == "llvm_ad_rgb" else "reinstall mitsuba and drjit"
+
+
+def _gl_remedy() -> str:
+    return system_command("gl") if is_installed("moderngl") else install_command("gl")
 
 
 def _redis(url: str) -> Finding:
@@ -114,7 +123,7 @@ def _redis(url: str) -> Finding:
     server = shutil.which("redis-server")
     if server is not None:
         return Finding("redis", "ok", f"{server} (only the farm needs it)")
-    remedy = "sudo apt-get install -y redis-server"
+    remedy = system_command("redis")
     return Finding("redis", "degraded", "no redis-server (only the farm needs it)", remedy)
 
 

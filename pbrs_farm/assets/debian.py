@@ -1,7 +1,7 @@
-"""Debian packages as a source of data: downloaded once through apt, read without installing.
+"""Debian packages as a source of data: downloaded once, through apt where it is, read without installing.
 
-Effects: runs `apt-get download` (no root; apt's signed index vouches for the file) and keeps
-packages in a cache folder. Nothing of a package is committed or shipped.
+Effects: runs `apt-get download` (no root; apt's signed index vouches for the file), or downloads the
+pinned file where apt is missing (its sha256 vouches for it), and keeps packages in a cache folder. Nothing of a package is committed or shipped.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from pbrs_farm.assets.debian_pins import PINS, download_pinned
 from pbrs_farm.core.errors import MachineFailed
 
 APT_TIMEOUT_S: Final = 600  # of one download
@@ -66,9 +67,9 @@ def cached_deb(package: str, tested_version: str, folder: Path | None = None) ->
 
 
 def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb:
-    """The package from the cache, else downloaded through apt.
+    """The package from the cache, else downloaded: through apt, or as the pinned file without apt.
 
-    Raises MachineFailed, with the command to type, where apt cannot give it.
+    Raises MachineFailed, with what to do, where neither can give it.
     """
     folder = folder or cache_folder()
     try:
@@ -81,12 +82,15 @@ def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -
 
 def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
     folder.mkdir(parents=True, exist_ok=True)
-    if shutil.which("apt-get") is None:
-        hint = f"put Debian's {package}_{tested_version}_all.deb into {folder}"
-        raise MachineFailed(f"no apt-get here to fetch {package}", hint=hint)
     # Download beside the cache, then move: a package is there whole or not at all.
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        _download(package, Path(scratch))
+        if shutil.which("apt-get") is None and package in PINS:
+            download_pinned(PINS[package], Path(scratch))
+        elif shutil.which("apt-get") is None:
+            hint = f"put Debian's {package}_{tested_version}_all.deb into {folder}"
+            raise MachineFailed(f"no apt-get here to fetch {package}", hint=hint)
+        else:
+            _download(package, Path(scratch))
         debs = sorted(Path(scratch).glob(f"{package}_*.deb"))
         if not debs:
             raise MachineFailed(f"apt-get download {package} left no file", hint=_HINT)

@@ -22,6 +22,7 @@ from pbrs_farm.commands.arguments import (
 )
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
+from pbrs_farm.installation import need
 
 if TYPE_CHECKING:
     from pbrs_farm.core.house import House
@@ -79,6 +80,7 @@ def _dress(args: argparse.Namespace) -> int:
     from pbrs_farm.store.folder import FolderStore
 
     at_least("--views", args.views, 0)
+    need("mitsuba", "drjit", *(["moderngl"] if args.views else []))
     seeds = dress_seeds(args.dress)
     if len(seeds) != 1:
         raise BadInput("--seed", args.dress, "expected one seed")

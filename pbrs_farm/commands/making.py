@@ -31,6 +31,7 @@ from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.near_names import hint_of_choice
 from pbrs_farm.core.recipe import recipe_from_json
+from pbrs_farm.installation import need, system_command
 
 if TYPE_CHECKING:
     from pbrs_farm.read.objects.model_folders import ObjectModel
@@ -126,6 +127,8 @@ def _run_homes(
     at_least("--silence", args.silence, 0)
     at_least("--memory", args.memory, 0)
     run = replace(_described(args, homes, sources), refused=refused)
+    # Say at once which extra is missing, not once a step.
+    need("mitsuba", "drjit", "pyoidn", "moderngl")
     # Run it, reporting progress as standard output suits.
     _warn_of_slowness()
     started = time.monotonic()
@@ -166,7 +169,7 @@ def _warn_of_slowness() -> None:
     if find_llvm() is None and not Path("/proc/driver/nvidia").exists():
         warn(
             f"no LLVM of version {MIN_LLVM} or later: going on with Mitsuba's scalar_rgb, several"
-            " times slower (sudo apt-get install -y libllvm19)"
+            f" times slower ({system_command('llvm')})"
         )
 
 

@@ -101,7 +101,10 @@ def test_homes_lists_the_nine_homes_and_how_to_fetch_them(tmp_path, monkeypatch,
 def test_homes_fetch_without_apt_says_where_to_put_the_package(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
     monkeypatch.setenv("PATH", "")
-    assert "put Debian's sweethome3d_" in printed(capsys, "homes", "--fetch", code=1)
+    monkeypatch.setenv("PBRS_DEBIAN_MIRROR", "http://127.0.0.1:1")
+    assert "get sweethome3d_7.0.2+dfsg-3_all.deb and put it" in printed(
+        capsys, "homes", "--fetch", code=1
+    )
 
 
 def test_homes_fetch_unpacks_the_package_and_notes_another_version(tmp_path, monkeypatch, capsys):

@@ -153,5 +153,6 @@ def test_without_apt_the_file_to_get_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("shutil.which", lambda _: None)
+    monkeypatch.setenv("PBRS_DEBIAN_MIRROR", "http://127.0.0.1:1")
     with pytest.raises(MachineFailed, match="sweethome3d_7"):
         homes_package.fetch(tmp_path)

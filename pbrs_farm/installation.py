@@ -1,0 +1,104 @@
+"""How this program was installed, and the command that adds what it lacks. Effects: reads /etc/os-release.
+
+A wheel takes its extras by name, a checkout from its own folder; each system has its own packages.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.core.errors import MachineFailed
+
+EXTRA_OF: Final = {
+    "moderngl": "gl", "glcontext": "gl", "mitsuba": "transport", "drjit": "transport",
+    "pyoidn": "transport", "obstore": "s3", "celery": "workers", "kombu": "workers",
+    "redis": "workers", "prometheus_client": "workers", "h5py": "selection", "faiss": "selection",
+    "starlette": "board", "uvicorn": "board", "torch": "study", "skimage": "study",
+    "safetensors": "study",
+}  # fmt: skip
+"""Module -> the extra of pyproject.toml that installs it."""
+
+# System -> what is needed -> the command that installs it.
+_COMMANDS: Final = {
+    "debian": {
+        "llvm": "sudo apt-get install -y libllvm19",
+        "gl": "sudo apt-get install -y libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri",
+        "redis": "sudo apt-get install -y redis-server",
+    },
+    "ubuntu": {
+        "llvm": "sudo apt-get install -y libllvm18",
+        "gl": "sudo apt-get install -y libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri",
+        "redis": "sudo apt-get install -y redis-server",
+    },
+    "fedora": {
+        "llvm": "sudo dnf install -y llvm-libs",
+        "gl": "sudo dnf install -y mesa-libEGL mesa-libGL mesa-dri-drivers",
+        "redis": "sudo dnf install -y valkey",
+    },
+    "arch": {
+        "llvm": "sudo pacman -S --needed llvm-libs",
+        "gl": "sudo pacman -S --needed mesa libglvnd",
+        "redis": "sudo pacman -S --needed valkey",
+    },
+    "macos": {
+        "llvm": "brew install llvm",
+        "gl": "macOS brings OpenGL; run in a session that has a screen",
+        "redis": "brew install redis",
+    },
+}
+_WHAT: Final = {
+    "llvm": "install LLVM 17 or later (its shared library)",
+    "gl": "install EGL and OpenGL (Mesa, or the driver of the GPU)",
+    "redis": "install Redis",
+}
+
+
+def install_command(*extras: str) -> str:
+    """The pip command that adds extras to this installation; without any, that repairs it."""
+    names = f"[{','.join(extras)}]" if extras else ""
+    checkout = checkout_folder()
+    if checkout is not None:
+        return f"pip install -e '{checkout}{names}'"
+    return f"pip install {'--force-reinstall ' * (not extras)}'pbrs-farm{names}'"
+
+
+def checkout_folder(package: Path | None = None) -> Path | None:
+    """The checkout that this program runs from, None where it was installed from a wheel."""
+    folder = (package or Path(__file__).parent).parent
+    return folder if (folder / "pyproject.toml").is_file() else None
+
+
+def system_command(what: str, system: str = "") -> str:
+    """The command that installs "llvm", "gl" or "redis" on this system (or the one named)."""
+    return _COMMANDS.get(system or this_system(), _WHAT)[what]
+
+
+def this_system(os_release: Path = Path("/etc/os-release")) -> str:
+    """debian, ubuntu, fedora, arch, macos, or "" for one we know no command of."""
+    if sys.platform == "darwin":
+        return "macos"
+    try:
+        lines = os_release.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    fields = dict(line.partition("=")[::2] for line in lines)
+    # A system that is none of ours names those it is like.
+    words = f"{fields.get('ID', '')} {fields.get('ID_LIKE', '')}".replace('"', "").split()
+    alike = {"rhel": "fedora", "centos": "fedora"}
+    return next((s for w in words if (s := alike.get(w, w)) in _COMMANDS), "")
+
+
+def is_installed(module: str) -> bool:
+    """Whether a module could be imported; nothing is."""
+    return find_spec(module) is not None
+
+
+def need(*modules: str) -> None:
+    """Raises MachineFailed, naming the extras to install, where one of the modules is missing."""
+    missing = [name for name in modules if not is_installed(name)]
+    if missing:
+        extras = sorted({EXTRA_OF[name] for name in missing})
+        raise MachineFailed(f"this needs {', '.join(missing)}", hint=install_command(*extras))

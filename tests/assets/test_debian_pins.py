@@ -1,0 +1,92 @@
+"""Without apt a package is its pinned file: the right one, whole, or a line that says what to do."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.assets import debian, debian_pins, furniture_package, homes_package, skies
+from pbrs_farm.assets.debian import fetched_deb, version_of
+from pbrs_farm.assets.debian_pins import PINS, Pin, download_pinned
+from pbrs_farm.core.errors import MachineFailed
+
+DATA = b"a Debian package" * 1000
+PIN = Pin(
+    "sweethome3d",
+    "pool/main/s/x/sweethome3d_1.0_all.deb",
+    len(DATA),
+    hashlib.sha256(DATA).hexdigest(),
+)
+
+
+@pytest.fixture
+def mirror(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, bytes]]:
+    """A mirror of its own, path -> bytes, named in the environment; no apt on the PATH."""
+    files: dict[str, bytes] = {}
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            data = files.get(self.path)
+            self.send_response(200 if data is not None else 404)
+            self.end_headers()
+            self.wfile.write(data or b"")
+
+        def log_message(self, *_words: object) -> None:
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    monkeypatch.setenv("PBRS_DEBIAN_MIRROR", f"http://127.0.0.1:{server.server_port}/debian/")
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(debian_pins.PINS, PIN.package, PIN)
+    yield files
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_the_pinned_file_is_fetched_into_the_cache(
+    mirror: dict[str, bytes], tmp_path: Path
+) -> None:
+    mirror[f"/debian/{PIN.path}"] = DATA
+    deb = fetched_deb(PIN.package, "1.0", tmp_path)
+    assert deb.path == tmp_path / PIN.file_name
+    assert (deb.version, deb.sha256, deb.note) == ("1.0", PIN.sha256, "")
+    # The second time nobody is asked.
+    mirror.clear()
+    assert fetched_deb(PIN.package, "1.0", tmp_path).sha256 == PIN.sha256
+
+
+@pytest.mark.parametrize("data", [DATA[:-1], DATA + b"x", b"x" * len(DATA), b""])
+def test_another_file_is_refused_and_not_kept(
+    data: bytes, mirror: dict[str, bytes], tmp_path: Path
+) -> None:
+    mirror[f"/debian/{PIN.path}"] = data
+    with pytest.raises(MachineFailed, match="is not the file that was asked for"):
+        fetched_deb(PIN.package, "1.0", tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_mirror_without_it_says_what_to_do(mirror: dict[str, bytes], tmp_path: Path) -> None:
+    assert mirror == {}
+    with pytest.raises(MachineFailed, match=r"404.*put it into.*PBRS_DEBIAN_MIRROR"):
+        download_pinned(PIN, tmp_path)
+
+
+def test_what_is_pinned_is_what_is_tested() -> None:
+    tested = {m.PACKAGE: m.TESTED_VERSION for m in (homes_package, furniture_package, skies)}
+    assert {name: version_of(Path(pin.file_name)) for name, pin in PINS.items()} == tested
+
+
+def test_a_package_that_apt_gave_here_is_the_pinned_one() -> None:
+    for name, pin in PINS.items():
+        path = debian.cache_folder() / pin.file_name
+        if path.exists():
+            assert debian._sha256(path, 0, 0) == pin.sha256, name
+            assert path.stat().st_size == pin.n_bytes

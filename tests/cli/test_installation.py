@@ -1,0 +1,99 @@
+"""The remedy fits how the program was installed and the system it runs on."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm import installation
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.installation import (
+    EXTRA_OF,
+    checkout_folder,
+    install_command,
+    need,
+    system_command,
+    this_system,
+)
+
+REPO = Path(__file__).parents[2]
+
+
+def test_every_extra_named_is_one_of_pyproject() -> None:
+    extras = tomllib.loads((REPO / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
+    assert set(EXTRA_OF.values()) <= set(extras)
+    # `all` is every extra that a user may want; those of developers and of studies are apart.
+    of_all = extras["all"][0].partition("[")[2].strip("]").split(",")
+    assert set(of_all) == set(extras) - {"all", "dev", "docs", "study"}
+
+
+def test_a_checkout_and_a_wheel_are_told_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert checkout_folder() == REPO
+    assert checkout_folder(tmp_path / "site-packages" / "pbrs_farm") is None
+    assert install_command("gl", "transport") == f"pip install -e '{REPO}[gl,transport]'"
+    monkeypatch.setattr(installation, "checkout_folder", lambda: None)
+    assert install_command("gl") == "pip install 'pbrs-farm[gl]'"
+    assert install_command() == "pip install --force-reinstall 'pbrs-farm'"
+
+
+@pytest.mark.parametrize(
+    ("release", "system", "command"),
+    [
+        ('ID=debian\nVERSION_ID="12"', "debian", "sudo apt-get install -y libllvm19"),
+        ("ID=ubuntu\nID_LIKE=debian", "ubuntu", "sudo apt-get install -y libllvm18"),
+        ("ID=fedora", "fedora", "sudo dnf install -y llvm-libs"),
+        ('ID="rocky"\nID_LIKE="rhel centos fedora"', "fedora", "sudo dnf install -y llvm-libs"),
+        ("ID=manjaro\nID_LIKE=arch", "arch", "sudo pacman -S --needed llvm-libs"),
+        ("ID=plan9", "", "install LLVM 17 or later (its shared library)"),
+    ],
+)
+def test_each_system_has_its_own_command(
+    release: str, system: str, command: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "os-release"
+    file.write_text(release)
+    assert this_system(file) == system
+    assert system_command("llvm", system or "none") == command
+
+
+def test_what_is_needed_and_missing_is_named_with_its_extra(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    need("numpy")
+    monkeypatch.setattr(installation, "is_installed", lambda name: name == "drjit")
+    with pytest.raises(
+        MachineFailed, match=r"this needs mitsuba, moderngl \(pip install.*gl,transport"
+    ):
+        need("mitsuba", "drjit", "moderngl")
+
+
+@pytest.mark.parametrize("words", ["run builtin --out x", "cameras builtin", "verify x", "layers"])
+def test_a_base_installation_says_in_one_line_what_a_verb_needs(words: str, tmp_path: Path) -> None:
+    # Hide the packages from the import system of a process of its own.
+    code = (
+        "import sys\n"
+        "hidden = {'mitsuba', 'drjit', 'pyoidn', 'moderngl'}\n"
+        "class Hide:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name.split('.')[0] in hidden: raise ModuleNotFoundError(name, name=name)\n"
+        "sys.meta_path.insert(0, Hide())\n"
+        "from pbrs_farm import installation\n"
+        "installation.is_installed = lambda name: name not in hidden\n"
+        f"from pbrs_farm.cli import main; sys.exit(main({words.split()!r}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert "Traceback" not in done.stderr
+    if words in ("run builtin --out x", "cameras builtin"):
+        assert done.returncode == 1
+        assert len(done.stderr.splitlines()) == 1
+        assert "[gl,transport]" in done.stderr or "[transport]" in done.stderr
