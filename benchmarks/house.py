@@ -23,7 +23,9 @@ import numpy as np
 from benchmarks.figures import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
-MARKERS = "not slow and not gpu and not chaos and not infra and not sweethome3d and not study"
+MARKERS = (
+    "not slow and not gpu and not chaos and not infra and not web and not sweethome3d and not study"
+)
 PRAGMAS = ("noqa", "type:", "fmt:", "pragma:")
 DRESSING = (Path("pbrs_farm/dress"), Path("pbrs_farm/read/catalogue"))
 LINE_KINDS = (

@@ -37,6 +37,7 @@ class Board:
     assets: dict[str, Asset]
     audit: Audit
     streams: threading.Semaphore  # pages that listen
+    ending: threading.Event  # set when the board is told to end
     farm: LiveFarm | None = None  # None: a folder alone is shown
 
     def start(self) -> None:
@@ -66,5 +67,6 @@ def new_board(store: Store, options: BoardOptions, farm: LiveFarm | None = None)
         assets=found,
         audit=Audit(folder / "audit.jsonl"),
         streams=threading.Semaphore(options.limits.streams),
+        ending=threading.Event(),
         farm=farm,
     )

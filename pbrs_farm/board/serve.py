@@ -15,9 +15,22 @@ from pbrs_farm.core.errors import BadInput
 _BACKLOG = 256
 
 
+class _Server(uvicorn.Server):
+    """A server that tells the board's streams to end before it waits for them."""
+
+    def __init__(self, board: Board, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._board = board
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._board.ending.set()
+        await super().shutdown(sockets)
+
+
 def server_of(board: Board) -> uvicorn.Server:
     """The server of a board; `run` or `serve` it. It believes no forwarded address."""
-    return uvicorn.Server(
+    return _Server(
+        board,
         uvicorn.Config(
             application(board),
             host=board.options.host,
@@ -28,9 +41,9 @@ def server_of(board: Board) -> uvicorn.Server:
             proxy_headers=False,
             limit_concurrency=256,
             timeout_keep_alive=15,
-            timeout_graceful_shutdown=3,
+            timeout_graceful_shutdown=5,
             h11_max_incomplete_event_size=32_768,
-        )
+        ),
     )
 
 

@@ -64,6 +64,8 @@ def test_htmx_gets_the_results_alone_and_a_tidy_address(client: httpx.Client) ->
     answer = client.get("/views?home=&room=Bath&words=", headers={"HX-Request": "true"})
     assert "<html" not in answer.text
     assert answer.headers["hx-push-url"] == "/views?room=Bath"
+    back = {"HX-Request": "true", "HX-History-Restore-Request": "true"}
+    assert "<html" in client.get("/views", headers=back).text
 
 
 def test_a_selections_verdicts_are_filters(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import AsyncIterator, Callable
 from functools import partial
 from typing import Any, Final
@@ -76,7 +77,7 @@ async def events(request: Request) -> Response:
     if not board.streams.acquire(blocking=False):
         raise HTTPException(503, "Too many pages listen already.")
     answer = StreamingResponse(
-        _stream(partial(_parts, request, farm, name), board.streams.release),
+        _stream(partial(_parts, request, farm, name), board.ending, board.streams.release),
         media_type="text/event-stream",
     )
     answer.headers["Cache-Control"] = "no-store"
@@ -84,14 +85,14 @@ async def events(request: Request) -> Response:
 
 
 async def _stream(
-    parts: Callable[[], dict[str, str]], release: Callable[[], None]
+    parts: Callable[[], dict[str, str]], ending: threading.Event, release: Callable[[], None]
 ) -> AsyncIterator[bytes]:
     """An event whenever what parts() says has changed, a comment when long nothing has."""
     said: dict[str, str] = {}
     silent_s = lived_s = 0.0
     try:
         yield b"retry: 3000\n\n"
-        while lived_s < _LIFE_S:
+        while lived_s < _LIFE_S and not ending.is_set():
             now = await anyio.to_thread.run_sync(parts)
             changed = {k: v for k, v in now.items() if said.get(k) != v}
             said = now

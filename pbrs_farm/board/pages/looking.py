@@ -58,8 +58,10 @@ def views(request: Request) -> Response:
     queries = board_of(request).queries
     wanted = filter_from_query(request.query_params)
     found = queries.views(wanted)
-    # htmx asks for the results alone.
-    is_part = request.headers.get("hx-request") == "true"
+    # htmx asks for the results alone, but for the whole page when a reader goes back to it.
+    headers = request.headers
+    is_back = headers.get("hx-history-restore-request") == "true"
+    is_part = headers.get("hx-request") == "true" and not is_back
     answer = page(
         request,
         "views_part.html" if is_part else "views.html",

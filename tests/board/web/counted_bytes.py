@@ -1,0 +1,18 @@
+"""How much a page loads: bytes as they came over the wire."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+@contextmanager
+def loaded_kb(tab: Any) -> Iterator[Callable[[], float]]:
+    """Inside, everything the tab loads is counted; a call gives kilobytes so far."""
+    session = tab.context.new_cdp_session(tab)
+    session.send("Network.enable")
+    sizes: list[float] = []
+    session.on("Network.loadingFinished", lambda event: sizes.append(event["encodedDataLength"]))
+    yield lambda: sum(sizes) / 1000
+    session.detach()
