@@ -289,6 +289,20 @@ def test_the_added_lamp_hangs_clear_of_what_reaches_the_ceiling() -> None:
     assert place_of_lamp(home.with_items([*home.items, tall]), room)[0] > middle + 0.5
 
 
+def test_the_added_lamp_hangs_in_no_wall_that_stands_inside_the_room() -> None:
+    home = builtin_home()
+    room = home.rooms[0]
+    x, y, z = place_of_lamp(home, room)
+    low, high = room.floor_y, room.ceiling_y
+    part = box(
+        "part", np.array([x, (low + high) / 2, z]), np.array([0.06, (high - low) / 2, 9.0]), 0
+    )
+    wall = Item("partition", "partition", ItemKind.WALL, room.level_id, (part,))
+    there = place_of_lamp(home.with_items([*home.items, wall]), room)
+    assert abs(there[0] - x) > 0.3
+    assert there[1] == y
+
+
 def test_the_added_lamp_hangs_below_a_sloped_ceiling_where_it_is_high() -> None:
     home = builtin_home()
     room = home.rooms[0]

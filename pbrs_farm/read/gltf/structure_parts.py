@@ -34,10 +34,12 @@ def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
 
     others: centres_of all items. A room seen from inside is parted by how its faces look, what is
     no room by the names of its materials; open walls are parted plane by plane. A node whose name
-    holds the word window or door ("Room with windows") may be a room, too, where it is as large.
+    holds the word window or door ("Room with windows") may be a room, too, where it is as large,
+    and so may one called "Ground" or "Ground floor".
     """
     is_unknown = UNMAPPED in item.tags
-    if not (item.kind in _STRUCTURE or is_unknown or _is_too_large_for_an_opening(item)):
+    may_be_room = item.kind in (*_STRUCTURE, ItemKind.GROUND) or is_unknown
+    if not (may_be_room or _is_too_large_for_an_opening(item)):
         return (item,)
     parts = room_parts(item, others)
     if parts[0] is item and (is_unknown or item.kind is ItemKind.WALL):

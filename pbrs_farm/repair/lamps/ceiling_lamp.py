@@ -21,6 +21,7 @@ LAMP_NYU40 = 35  # class "lamp" of NYU40
 ADDED_LAMP = "added"  # tag of every lamp that repair adds
 _BELOW_CEILING_M = 0.2  # centre of the lamp
 _TALL_M = 0.5  # what reaches this near the ceiling takes part of it
+_OWN_WALL_M = 0.2  # a room's own walls may stand so far inside its outline
 _HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
 _RADIUS_M = 0.1
 _POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
@@ -71,7 +72,8 @@ def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: flo
 
 
 def place_of_lamp(house: House, room: Room) -> F64:
-    """(3,) middle of the largest circle in the room's ceiling that nothing tall takes part of.
+    """(3,) middle of the largest circle in the room's ceiling that nothing tall takes part of:
+    no cupboard, and no wall that stands inside the room's outline, as of a bathroom drawn in it.
 
     Below the ceiling that is really there; where that is too low for a head, below its highest
     place.
@@ -79,6 +81,7 @@ def place_of_lamp(house: House, room: Room) -> F64:
     # Take what reaches the ceiling out of the room's plan, unless nothing would be left.
     area = plan.polygon_of_room(room.polygon)
     free = plan.without(area, *(f for i in house.items if (f := _tall_footprint(i, room))))
+    free = plan.without(free, *_walls_inside(house, room, area))
     largest = max(polygons_of(free) or polygons_of(area), key=lambda p: p.area)
     circle = shapely.get_coordinates(shapely.maximum_inscribed_circle(largest, 0.05))
     # Measure how high it is there, and look for a higher place if it is low.
@@ -126,6 +129,22 @@ def _tall_footprint(item: Item, room: Room) -> plan.Shape | None:
         return None
     corners = item.oriented_box.corners[:, [0, 2]]
     return plan.on_grid(shapely.convex_hull(shapely.MultiPoint(corners)))
+
+
+def _walls_inside(house: House, room: Room, area: plan.Shape) -> list[plan.Shape]:
+    """The plan areas of walls as high as the room that stand farther inside it than its own."""
+    inner = plan.grown(area, -_OWN_WALL_M)
+    found = []
+    for item in house.items:
+        if item.kind is not ItemKind.WALL or not item.n_faces or inner.is_empty:
+            continue
+        (x0, low, z0), (x1, high, z1) = item.bounds
+        is_tall = low < room.floor_y + _HEAD_M and high > room.ceiling_y - _TALL_M
+        if is_tall and inner.intersects(shapely.box(x0, z0, x1, z1)):
+            found += [
+                plan.polygon_of_triangles(s.positions.astype(float), s.faces) for s in item.surfaces
+            ]
+    return found
 
 
 def _within(item: Item, point: F64, by_m: float) -> bool:

@@ -174,3 +174,12 @@ def test_a_plant_of_many_loose_leaves_takes_little_memory() -> None:
     tracemalloc.stop()
     assert peak < 100e6
     assert len(house.rooms) == 1
+
+
+@pytest.mark.parametrize("name", ["Ground", "Ground floor", "Erdgeschoss"])
+def test_a_room_called_ground_is_no_ground(name: str) -> None:
+    house = read_gltf(one_mesh(name).glb(), "ground.glb", fields=ReadFields())
+    assert len(house.rooms) == 1
+    kinds = {i.kind for i in house.items}
+    assert {ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING} <= kinds
+    assert ItemKind.GROUND not in kinds
