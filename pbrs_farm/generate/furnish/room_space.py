@@ -21,6 +21,7 @@ from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, Point, Rect
 BEFORE_DOOR_M: Final = 0.8
 BEFORE_FRENCH_M: Final = 0.6
 _BEFORE_WINDOW_M: Final = 0.4
+_SPARE_M: Final = 0.03  # behind an open leaf
 _OPEN_M: Final = 0.9  # kept free along the middle of a side without a wall
 _EPSILON: Final = 1e-3
 
@@ -90,7 +91,7 @@ def room_space(plan: Plan, number: int) -> RoomSpace:
             continue
         is_french = opening.kind is OpeningKind.FRENCH_WINDOW
         # As far as a leaf reaches, also where it swings to the other side.
-        depth = max(BEFORE_DOOR_M, opening.width)
+        depth = max(BEFORE_DOOR_M, opening.width) + _SPARE_M
         if is_french:
             windows.append(_window(opening, frame, walls, BEFORE_FRENCH_M))
             depth = BEFORE_FRENCH_M
