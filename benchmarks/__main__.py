@@ -33,6 +33,7 @@ OWN_TARGET: Final = {
     "luxcore": "renderers.luxcore",
     "farm": "farm.farm_cost",
     "hostile": "hostile",
+    "loading": "study.loading",
 }
 
 

@@ -52,11 +52,14 @@ def array_of_rows(png: bytes, place: str) -> NDArray[Any] | None:
     lines = lines.reshape(height, n_row + 1)
     # Look at the filters: rows that take their left neighbour are left to others.
     filters = lines[:, 0]
-    if not np.isin(filters, (_NONE, _UP)).all():
+    is_up = filters == _UP
+    if not (is_up | (filters == _NONE)).all():
         return None
-    rows = lines[:, 1:].copy()
-    for row in np.nonzero(filters[1:] == _UP)[0] + 1:
-        rows[row] += rows[row - 1]
+    # Add each row to the one above it, where it is a difference.
+    rows = np.empty((height, n_row), np.uint8)
+    above = np.zeros(n_row, np.uint8)
+    for differs, row, line in zip(is_up.tolist(), rows, lines[:, 1:], strict=True):
+        above = np.add(above if differs else 0, line, out=row)
     pixels = rows if bits == 8 else rows.view(">u2").astype(np.uint16)
     return pixels.reshape((height, width) if kind == 0 else (height, width, 3))
 

@@ -1,0 +1,1 @@
+"""What the study's parts cost and reach."""
