@@ -23,6 +23,7 @@ from pbrs_farm.study.training.view_sources import Source, held_out_views, traini
 from pbrs_farm.study.training_plan import Plan
 
 Tell = Callable[[str], None]
+_ONE_SEED = "one seed: how far others would differ is not known"
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +125,9 @@ def ablation_table(result: dict[str, Any]) -> str:
             underfit.append(name)
     rows.append(_baseline_row(result, figure, others))
     text = markdown([*head, "paper, NYUv2"], rows)
-    said = [f"{title_of(figure)}; ± is the standard deviation of {_n_seeds(result)} seeds."]
+    n = _n_seeds(result)
+    spread = f"± is the standard deviation of {n} seeds" if n > 1 else _ONE_SEED
+    said = [f"{title_of(figure)}; {spread}."]
     if underfit:
         said.append(f"underfit, rank nothing by it: {', '.join(underfit)}.")
     said += [f"Truth of {name}: {on['truth']}." for name, on in result["judged_on"].items()]

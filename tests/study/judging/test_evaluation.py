@@ -1,0 +1,255 @@
+"""Runs judged on homes and photographs, the verbs, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from pbrs_farm.cli import main
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.images import png_from_array
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.judging.ablation import training_sets
+from pbrs_farm.study.judging.figure_table import is_underfit, markdown, spread_text
+from pbrs_farm.study.judging.judged_places import judged_place
+from pbrs_farm.study.judging.pair_views import camera_of, framed
+from pbrs_farm.study.judging.paper_numbers import PAPER, paper_row
+from pbrs_farm.study.packing.pack_shards import pack
+from pbrs_farm.study.packing.packing_plan import Packing
+from pbrs_farm.study.reading.open_views import open_views
+from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views
+from tests.study.small_roots import fill
+from tests.study.training.made_views import small_plan
+
+pytestmark = pytest.mark.study
+SIZE = (40, 32)
+HOMES = {f"home-{k}-00000000": 3 for k in range(3)}
+TINY = [
+    word
+    for field in ("width_px=40", "height_px=32", "batch=2", "steps=3", "threads=1", "log_every=1")
+    for word in ("--set", field)
+]  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Nine views of three homes."""
+    folder = tmp_path_factory.mktemp("study") / "root"
+    fill(FolderStore(folder), HOMES, SIZE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(root: Path) -> Path:
+    """A run of three steps; home-2 is held out."""
+    out = root.parent / "run"
+    words = ["train", "normals", str(root), "--out", str(out), "--hold-out", "home-2", *TINY]
+    assert main(words) == 0
+    return out
+
+
+@pytest.fixture
+def pairs(tmp_path: Path) -> Path:
+    """A photograph of a wall straight ahead, with depth and intrinsics."""
+    rng = np.random.default_rng(0)
+    rgb = rng.integers(0, 256, (60, 90, 3)).astype(np.uint8)
+    (tmp_path / "wall_rgb.png").write_bytes(png_from_array(rgb))
+    depth = np.full((60, 90), 2000, np.uint16)
+    depth[:10] = 0
+    (tmp_path / "wall_depth.png").write_bytes(png_from_array(depth))
+    (tmp_path / "intrinsics.json").write_text('{"fx": 80, "fy": 80, "cx": 45, "cy": 30}')
+    return tmp_path
+
+
+def test_homes_are_held_out_whole(root: Path) -> None:
+    plan, source = small_plan(), Source((str(root),), hold_out=frozenset({"home-2"}))
+    assert training_views(source, plan).homes == ("home-0-00000000", "home-1-00000000")
+    held_out = held_out_views(source, plan)
+    assert held_out is not None
+    assert held_out.homes == ("home-2-00000000",)
+    assert len(training_views(Source((str(root),), hold_out=frozenset()), plan)) == 9
+    assert len(training_views(Source((str(root),), hold_out=frozenset(), most=4), plan)) == 4
+    with pytest.raises(BadInput, match="no such home"):
+        training_views(Source((str(root),), hold_out=frozenset({"villa"})), plan)
+
+
+def test_shards_train_as_their_root_does(root: Path, tmp_path: Path) -> None:
+    pack(open_views(root), tmp_path / "shards", Packing(modes=("mlt_il_ol",), views_per_shard=4))
+    plan, held = small_plan(), frozenset({"home-2"})
+    whole, packed = (
+        training_views(Source((str(place),), hold_out=held), plan)
+        for place in (root, tmp_path / "shards")
+    )
+    assert whole.digest() == packed.digest()
+
+
+def test_the_table_shows_homes_baseline_and_paper_side_by_side(
+    run: Path, root: Path, pairs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["evaluate", str(run), "--on", f"home={root}", "--on", f"photos={pairs}"]
+    assert main([*words, "--out", str(run / "e")]) == 0
+    said = capsys.readouterr().out
+    for column in (
+        "training homes (6)",
+        "held-out homes (3)",
+        "home (3)",
+        "photos (1)",
+        "mean normal",
+    ):
+        assert column in said
+    assert "paper: MLT-IL/OL, on NYUv2" in said
+    assert "27.90" in said
+    assert "underfit" in said
+    assert "planes fitted to depth" in said
+    # Colours by chance teach nothing, so that the held-out home may be judged alone.
+    figures = json.loads((run / "e" / "evaluation.json").read_text())
+    assert [one["n_views"] for one in figures["evaluations"]] == [3, 1]
+    assert set(figures["evaluations"][1]["errors"]) == {"wall"}
+    page = (run / "e" / "index.html").read_text()
+    assert page.count("<figure>") == 4 * 4
+    assert "home home-2-00000000: a person" in page
+
+
+def test_photographs_are_judged_at_their_own_size(pairs: Path) -> None:
+    views = judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+    # The middle of 90x60 in the form 40:32.
+    assert views.sizes == [(60, 75)]
+    assert views.colour.shape == (1, 32, 40, 3)
+    truth = views.truths[0]
+    np.testing.assert_allclose(
+        truth["normal"][truth["valid"]], [[0, 0, -32767]] * truth["valid"].sum(), atol=40
+    )
+    assert not truth["valid"][:10].any()
+    assert truth["valid"][20:].all()
+
+
+def test_photographs_without_intrinsics_are_one_line(pairs: Path) -> None:
+    (pairs / "intrinsics.json").unlink()
+    with pytest.raises(BadInput, match="photographs without intrinsics"):
+        judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+    (pairs / "intrinsics.txt").write_text("80 0 45\n0 81 30\n0 0 1\n")
+    assert camera_of(pairs, pairs).K == (80, 81, 45, 30)
+    (pairs / "intrinsics.txt").write_text("80 zero")
+    with pytest.raises(BadInput, match="expected fx, fy, cx and cy"):
+        camera_of(pairs, pairs)
+
+
+def test_depth_says_nothing_of_classes(pairs: Path) -> None:
+    with pytest.raises(BadInput, match="normals alone"):
+        judged_place(str(pairs), small_plan("segmentation"), mode="mlt_il_ol")
+
+
+def test_a_mat_that_is_none_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "nyu.mat").write_bytes(b"no matrix at all")
+    with pytest.raises(BadInput, match="not a MATLAB"):
+        judged_place(str(tmp_path / "nyu.mat"), small_plan(), mode="mlt_il_ol")
+
+
+@pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries"])
+def test_nyu_is_cut_to_its_crop_and_its_test_split(task: str, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    from scipy.io import savemat
+
+    rng = np.random.default_rng(0)
+    with h5py.File(tmp_path / "nyu.mat", "w") as file:
+        file["images"] = rng.integers(0, 256, (3, 3, 640, 480)).astype(np.uint8)
+        file["depths"] = np.full((3, 640, 480), 2.5, np.float32)
+        file["labels"] = np.full((3, 640, 480), 5, np.uint16)
+        instances = np.ones((3, 640, 480), np.uint8)
+        instances[:, 320:] = 2
+        file["instances"] = instances
+    savemat(tmp_path / "splits.mat", {"testNdxs": [[1], [3]]})
+    savemat(tmp_path / "classMapping40.mat", {"mapClass": [np.arange(894) % 40 + 1]})
+    plan = small_plan(task, width_px="160", height_px="120")
+    views = judged_place(str(tmp_path / "nyu.mat"), plan, mode="mlt_il_ol")
+    assert views.ids == ("0001", "0003")
+    assert "2 test pictures" in views.truth
+    # The crop is 561x427: wider than 4:3 by a few pixels of height.
+    assert views.sizes == [(421, 561)] * 2
+    seen = task_of(task).prediction_of(views.truths[0])
+    if task == "normals":
+        assert views.truths[0]["valid"].mean() > 0.9
+        np.testing.assert_allclose(seen[200, 200], [0, 0, -1], atol=1e-3)
+    elif task == "segmentation":
+        assert (seen == 5).all()
+    else:
+        assert (np.nonzero(seen.any(0))[0] == 279).all()
+
+
+def test_a_home_that_trained_may_not_judge(root: Path) -> None:
+    plan = small_plan()
+    trained = frozenset(HOMES)
+    with pytest.raises(BadInput, match=r"has trained|all its homes trained"):
+        judged_place(str(root), plan, mode="mlt_il_ol", trained_on=trained, hold_out=frozenset())
+    with pytest.raises(BadInput, match="home home-2 has trained"):
+        judged_place(
+            str(root), plan, mode="mlt_il_ol", trained_on=trained, hold_out=frozenset({"home-2"})
+        )
+
+
+def test_a_run_that_is_not_finished_is_not_judged(run: Path, tmp_path: Path) -> None:
+    record = json.loads((run / "run.json").read_text())
+    (tmp_path / "run.json").write_text(json.dumps({**record, "state": "running"}))
+    assert main(["evaluate", str(tmp_path)]) == 1
+    assert main(["evaluate", str(tmp_path / "nothing")]) == 1
+
+
+def test_rows_of_a_comparison_are_named_by_root_and_light() -> None:
+    sets = training_sets(["a=x", "b=y+z@opengl_dl"], ["mlt_ol", "opengl_il"], Source(()))
+    assert [each.name for each in sets] == ["a_mlt_ol", "a_opengl_il", "b"]
+    assert sets[2].source.places == ("y", "z")
+    assert sets[2].source.modes == ("opengl_dl",)
+    with pytest.raises(BadInput, match="a second row"):
+        training_sets(["x", "y"], ["mlt_ol"], Source(()))
+
+
+def test_a_comparison_shows_the_spread_of_its_seeds(
+    root: Path, pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["ablation", str(root), "--modes", "mlt_il_ol", "opengl_dl", "--seeds", "2"]
+    words += ["--on", f"photos={pairs}", "--on", f"bare={root}", "--hold-out", "home-2", *TINY]
+    assert main([*words, "--out", str(tmp_path / "a")]) == 0
+    table = (tmp_path / "a" / "table.md").read_text()
+    assert table.count("±") >= 8
+    assert "baseline: mean normal" in table
+    assert "34.02" in table  # the paper's number of OpenGL-DL
+    assert "photos (1)" in table
+    assert "bare (3)" in table
+    result = json.loads((tmp_path / "a" / "ablation.json").read_text())
+    assert [len(row["seeds"]) for row in result["rows"].values()] == [2, 2]
+    # The same command goes on: nothing is trained twice.
+    capsys.readouterr()
+    assert main([*words, "--out", str(tmp_path / "a")]) == 0
+    assert (tmp_path / "a" / "table.md").read_text() == table
+
+
+def test_of_several_seeds_mean_and_deviation_are_shown() -> None:
+    assert spread_text("mean_deg", [28.0, 30.0]) == "29.00 ± 1.41"
+    assert spread_text("ods", [0.7]) == "70.0 %"
+    assert spread_text("mean_deg", [float("nan")]) == "-"
+    assert is_underfit(34.1, 36.8)
+    assert not is_underfit(21.0, 36.8)
+    assert markdown(["a", "long"], [["xyz", "1"]]).splitlines()[1] == "|-----|------|"
+
+
+def test_the_papers_rows_have_as_many_figures_as_ours() -> None:
+    assert paper_row("normals", "mlt_il_ol").figures[:2] == (27.90, 21.29)
+    assert paper_row("normals", "opengl_dl").figures[0] == 34.02
+    for task, rows in PAPER.items():
+        assert all(len(row.figures) <= len(task_of(task).figures) for row in rows)
+
+
+def test_a_photograph_of_another_form_is_cut_in_its_middle() -> None:
+    colour, rows, columns = framed(np.zeros((100, 300, 3), np.uint8), small_plan())
+    assert colour.shape == (32, 40, 3)
+    assert (rows, columns) == (slice(0, 100), slice(87, 212))
