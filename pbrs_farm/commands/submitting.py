@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,12 +67,8 @@ def _submit(args: argparse.Namespace) -> int:
     found = entries_from_arguments(home_arguments(args.homes, args.houses), seeds)
     reference = placed_reference(args.reference) if args.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
-    houses = [entry for entry, _ref in found]
-    in_place = [ref for _entry, ref in found if is_left_in_place(ref)]
-    if in_place:
-        where = f"{in_place[0].location}{' ...' if len(in_place) > 1 else ''}"
-        count = counted(len(in_place), "house")
-        warn(f"{count} not uploaded: {where}; workers must see that path")
+    houses, refs = [entry for entry, _ref in found], [ref for _entry, ref in found]
+    _warn_of_paths([ref.location for ref in refs if is_left_in_place(ref)])
     # Estimate, and touch neither the store nor Redis.
     if args.dry_run:
         plan = estimate(completed(houses, spec)[1], args.slots)
@@ -84,10 +81,10 @@ def _submit(args: argparse.Namespace) -> int:
     farm = farm_of(args)
     farm.ledger.ping()
     farm.check_store()
-    if any(uses_catalogue(ref, spec.recipe) for _entry, ref in found):
+    if any(uses_catalogue(ref, spec.recipe) for ref in refs):
         recipe = upload_catalogue(farm.store, spec.recipe)
         spec = spec.model_copy(update={"recipe": recipe})
-    upload(farm.store, [ref for _entry, ref in found])
+    upload(farm.store, refs)
     if reference[0]:
         farm.store.put_if_absent(*reference)
     job = farm.submit(houses, spec, update=args.update)
@@ -99,6 +96,14 @@ def _submit(args: argparse.Namespace) -> int:
         warn(f"this job is there already, {job.was}")
     echo(job.job_id)
     return 0
+
+
+def _warn_of_paths(in_place: Sequence[str]) -> None:
+    """Warn of sources that are read where they lie."""
+    if in_place:
+        where = f"{in_place[0]}{' ...' if len(in_place) > 1 else ''}"
+        count = counted(len(in_place), "house")
+        warn(f"{count} not uploaded: {where}; workers must see that path")
 
 
 def _spec(args: argparse.Namespace) -> JobSpec:

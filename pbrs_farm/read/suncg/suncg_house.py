@@ -50,21 +50,9 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     naming file and place for everything else, for the first note when fields.strict, and for a
     root without its `room` archive.
     """
-    # Read house.json below the root; the id becomes part of paths.
-    if not _HOUSE_ID.fullmatch(house_id):
-        raise BadHouse(root, "house", f"{house_id[:80]!r} is no house id")
-    folder = RootFolder(root)
     file = f"house/{house_id}/house.json"
-    data = folder.read(file, max_bytes=MAX_HOUSE_BYTES)
-    if data is None:
-        raise BadHouse(root, file, "does not exist", hint="pass ROOT/house/<id> of a SUNCG root")
-    record = house_record(data, file)
-    # Note what is odd about the record, and go on.
-    notes = Notes(file, strict=fields.strict)
-    if record.id and record.id != house_id:
-        notes.add("id-differs", "id", f"house.json calls itself {record.id[:64]!r}")
-    for place, kind in record.unknown:
-        notes.add("unknown-type", place, f"a node of the type {kind!r}; left out")
+    folder, notes = RootFolder(root), Notes(file, strict=fields.strict)
+    record = _record(folder, house_id, file, notes)
     # Read what the nodes name: structure, tables, materials and models, each once.
     arch = _arch(folder, house_id, record)
     context = ReaderContext(
@@ -81,6 +69,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
     check_rooms(rooms, file)
     if not rooms:
         raise BadHouse(root, file, "has no room with a floor or walls", hint="nothing to render")
+    holes = openings(items) if arch is None else arch_openings(arch, _room_nodes(record), items)
     return House(
         id=house_id,
         name=house_id,
@@ -90,11 +79,26 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
         items=tuple(items),
         materials=context.materials.library.materials,
         textures=context.materials.library.textures,
-        openings=openings(items)
-        if arch is None
-        else arch_openings(arch, _room_nodes(record), items),
+        openings=holes,
         notes=notes.all(),
     )
+
+
+def _record(folder: RootFolder, house_id: str, file: str, notes: Notes) -> HouseRecord:
+    """house.json below the root, with notes on what is odd about it."""
+    # Check the id first: it becomes part of paths.
+    if not _HOUSE_ID.fullmatch(house_id):
+        raise BadHouse(folder.root, "house", f"{house_id[:80]!r} is no house id")
+    data = folder.read(file, max_bytes=MAX_HOUSE_BYTES)
+    if data is None:
+        hint = "pass ROOT/house/<id> of a SUNCG root"
+        raise BadHouse(folder.root, file, "does not exist", hint=hint)
+    record = house_record(data, file)
+    if record.id and record.id != house_id:
+        notes.add("id-differs", "id", f"house.json calls itself {record.id[:64]!r}")
+    for place, kind in record.unknown:
+        notes.add("unknown-type", place, f"a node of the type {kind!r}; left out")
+    return record
 
 
 def _arch(folder: RootFolder, house_id: str, record: HouseRecord) -> Arch | None:

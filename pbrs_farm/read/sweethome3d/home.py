@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import PurePath
+from xml.etree.ElementTree import Element
 
 import shapely
 
@@ -49,13 +50,10 @@ def read_home(
     files that refer to them. package: where the file came from; package_note: what is odd about
     it (homes_package.Package). Raises BadHouse, which names the file and the place.
     """
-    # Read the plan: levels that are hidden go, what is absurd is refused.
-    fields = fields or ReadFields()
-    file = PurePath(name).name
+    fields, file = fields or ReadFields(), PurePath(name).name
     container = open_container(data, file, resources)
     notes = Notes(file, strict=fields.strict)
-    plan = _shown(parse_plan(container.root, file, fields.max_extent_m), fields, notes)
-    check_plan_bounds(plan, file)
+    plan = _plan(container.root, file, fields, notes)
     if package_note:
         notes.add("package-version", package, package_note)
     # Read walls and rooms in plan; without a room there is nothing to render.
@@ -64,21 +62,19 @@ def read_home(
     outlines = outlines_of(plan.walls)
     rooms = read_rooms(plan, materials, house_level)
     if not rooms:
-        raise BadHouse(
-            file, "", "no rooms", hint=_HIDDEN_ROOMS if _hides_rooms(plan) else _NO_ROOMS
-        )
-    # Walls, floors and ceilings; staircases cut the last two.
+        raise BadHouse(file, "", "no rooms", hint=_why_no_rooms(plan))
+    # Build walls, floors and ceilings; staircases cut the last two.
     ceilings = CeilingHeights(plan, outlines)
-    floor_cuts, ceiling_cuts = staircase_cuts(plan, materials, house_level)
+    cuts = staircase_cuts(plan, materials, house_level)  # of floors, of ceilings
     structure = wall_items(plan, outlines, materials, house_level)
-    structure += plane_items(rooms, ceilings, materials, floor_cuts, ceiling_cuts)
+    structure += plane_items(rooms, ceilings, materials, *cuts)
     # Place the furniture last: it stands in rooms and cuts walls.
     pieces, openings = _furniture(plan, materials, outlines, rooms, house_level, file, fields)
     items = _numbered((*structure, *pieces), file)
     sha, stem = keys.sha256(data), PurePath(file).stem
     return House(
         id=keys.house_id(stem, sha),
-        name=PurePath(plan.name).stem if plan.name else stem,
+        name=PurePath(plan.name).stem or stem,
         source=_source(plan, file, sha, package),
         levels=_levels(plan, house_level),
         rooms=room_nouns(rooms, ceilings),
@@ -89,6 +85,13 @@ def read_home(
         cameras=stored_cameras(plan),
         notes=notes.all(),
     )
+
+
+def _plan(root: Element, file: str, fields: ReadFields, notes: Notes) -> Plan:
+    """The plan: levels that are hidden go, what is absurd is refused."""
+    plan = _shown(parse_plan(root, file, fields.max_extent_m), fields, notes)
+    check_plan_bounds(plan, file)
+    return plan
 
 
 def _numbered(items: tuple[Item, ...], file: str) -> tuple[Item, ...]:
@@ -121,8 +124,9 @@ def _shown(plan: Plan, fields: ReadFields, notes: Notes) -> Plan:
     return replace(plan, levels=tuple(levels))
 
 
-def _hides_rooms(plan: Plan) -> bool:
-    return any(not level_of(plan, room.level).is_visible for room in plan.rooms)
+def _why_no_rooms(plan: Plan) -> str:
+    is_hidden = any(not level_of(plan, room.level).is_visible for room in plan.rooms)
+    return _HIDDEN_ROOMS if is_hidden else _NO_ROOMS
 
 
 def _place_of(level: PlanLevel) -> str:
