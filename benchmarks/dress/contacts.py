@@ -35,6 +35,7 @@ class Thing:
     is_new: bool
     bounds: Floats
     _rays: Any = field(default=None)
+    _parts: list[Any] | None = field(default=None)
 
     @property
     def rays(self) -> Any:
@@ -42,6 +43,13 @@ class Thing:
         if self._rays is None:
             self._rays = trimesh.ray.ray_pyembree.RayMeshIntersector(self.mesh, scale_to_box=False)
         return self._rays
+
+    @property
+    def parts(self) -> list[Any]:
+        """Its connected parts, closed or not."""
+        if self._parts is None:
+            self._parts = list(self.mesh.split(only_watertight=False)) or [self.mesh]
+        return self._parts
 
 
 def things_of(house: House, source: House) -> list[Thing]:
@@ -83,9 +91,21 @@ def penetrations(things: Sequence[Thing]) -> list[tuple[str, str, float]]:
             if i == j or (b.is_new and j > i) or b.item.kind in _STRUCTURE or _allowed(a, b):
                 continue
             depth = max(_deep(a, b), _deep(b, a), _crossing(a, b), _crossing(b, a))
-            if depth > DEEP_M:
+            if depth > DEEP_M and _parts_meet(a, b):
                 found.append((a.item.id, b.item.id, round(depth, 4)))
     return found
+
+
+def _parts_meet(a: Thing, b: Thing) -> bool:
+    """Whether connected parts of both must be moved by more than 1 cm along an axis to be apart.
+
+    An edge that lies in another's face crosses it along its whole length, however shallow that is.
+    """
+    low, high = (np.array([p.bounds[k] for p in a.parts]) for k in (0, 1))
+    return any(
+        bool((np.minimum(high - p.bounds[0], p.bounds[1] - low).min(1) > DEEP_M).any())
+        for p in b.parts
+    )
 
 
 def _allowed(a: Thing, b: Thing) -> bool:
@@ -172,33 +192,42 @@ def _ways_of(thing: Thing) -> list[Floats]:
 
 
 class _Scene:
-    # All triangles and whose they are.
+    # All things, and the triangles near one of them.
     def __init__(self, things: Sequence[Thing]) -> None:
         self._things = things
-        counts = [len(t.mesh.faces) for t in things]
-        self._owner = np.repeat(np.arange(len(things)), counts)
-        corners = np.concatenate([t.mesh.triangles for t in things])
-        faces = np.arange(3 * len(corners)).reshape(-1, 3)
-        mesh = trimesh.Trimesh(corners.reshape(-1, 3), faces, process=False)
-        self._rays = trimesh.ray.ray_pyembree.RayMeshIntersector(mesh, scale_to_box=False)
+        self._low = np.array([t.bounds[0] for t in things])
+        self._high = np.array([t.bounds[1] for t in things])
 
     def gap(self, k: int, ways: Floats) -> float:
         """The least distance from a thing's outermost vertices, along any of ways, to another's face."""
+        others = self._others(k)
+        if others is None:
+            return float("inf")
         vertices = self._things[k].mesh.vertices
-        best = np.inf
-        back = 0.03
+        best, back = np.inf, 0.03
         for way in ways:
             reach = vertices @ way
             outer = vertices[reach > reach.max() - 0.003]
             outer = outer[:: max(1, len(outer) // 40)]
-            face, ray, where = self._rays.intersects_id(
+            _face, ray, where = others.intersects_id(
                 outer - back * way, np.tile(way, (len(outer), 1)), multiple_hits=True,
                 return_locations=True,
             )  # fmt: skip
-            other = self._owner[face] != k
-            distance = np.abs(((where - outer[ray]) * way).sum(1))[other]
+            distance = np.abs(((where - outer[ray]) * way).sum(1))
             best = min(best, float(distance.min(initial=np.inf)))
         return best
+
+    def _others(self, k: int) -> Any:
+        """Embree over what is near the thing, without it: a second hit within 1 mm would be lost."""
+        low, high = self._things[k].bounds[0] - 0.05, self._things[k].bounds[1] + 0.05
+        near = ((self._low < high) & (self._high > low)).all(1)
+        near[k] = False
+        corners = [self._things[int(j)].mesh.triangles for j in np.flatnonzero(near)]
+        if not corners:
+            return None
+        points = np.concatenate(corners).reshape(-1, 3)
+        mesh = trimesh.Trimesh(points, np.arange(len(points)).reshape(-1, 3), process=False)
+        return trimesh.ray.ray_pyembree.RayMeshIntersector(mesh, scale_to_box=False)
 
 
 def blocked_doors(house: House, things: Sequence[Thing]) -> list[tuple[str, str]]:
@@ -242,11 +271,20 @@ def _half_wall(
     best = 0.05
     for x in (-width / 2 - 0.08, width / 2 + 0.08):
         place = centre + along * x
-        for wall in walls:
-            t = _first(wall, place[None], out)
-            if t[0] < 0.6:
-                best = max(best, float(t[0]))
+        # The wall that the place lies in is left through a face that looks out.
+        reach = [t for wall in walls if 0 < (t := _way_out(wall, place, out)) < 0.6]
+        best = max(best, min(reach, default=0.0))
     return best
+
+
+def _way_out(wall: Thing, place: Floats, way: Floats) -> float:
+    """How far the wall's first face along the way is, 0 where it is met from outside."""
+    face, _ray, where = wall.rays.intersects_id(
+        place[None], way[None], multiple_hits=False, return_locations=True
+    )
+    if not len(face) or float(wall.mesh.face_normals[face[0]] @ way) <= 0:
+        return 0.0
+    return float((where[0] - place) @ way)
 
 
 def _first(thing: Thing, places: Floats, way: Floats) -> Floats:

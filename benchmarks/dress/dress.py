@@ -158,7 +158,7 @@ _FIGURES: dict[str, Callable[[Rows], dict[str, Any]]] = {
 }  # fmt: skip
 
 UNITS = {
-    "dress.seconds": "s on one core, of the worst home and seed, all parts and gates",
+    "dress.seconds": "CPU-s on one core, of the worst home and seed, all parts and gates",
     "dress.catalogue_s": "s, reading the catalogue's listing, once a process",
     "dress.penetrations": "pairs of things that share more than 1 cm, by Embree",
     "dress.floating": "things that touch nothing within 2 mm, by Embree",

@@ -9,16 +9,16 @@ import json
 import sys
 import time
 
+from benchmarks.dress.dressed_home import house_as_a_run_has_it
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.dressing import dress
-from pbrs_farm.read.source import read_house, resolve
 from pbrs_farm.run.dressed_house import catalogue_of
 
 
 def failures(name: str, seeds: range) -> dict[str, object]:
     """Of one home: how many seeds, those that fail with why, and the longest time."""
     recipe = recipe_from_name("fast")
-    source = read_house(resolve(name), recipe.read)
+    source = house_as_a_run_has_it(name)
     catalogue = catalogue_of(recipe.dress)
     failed, longest = [], 0.0
     for seed in seeds:

@@ -62,10 +62,10 @@ def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, Dre
     from pbrs_farm.dress.dressing import dress
 
     doing(source.location, "dress")
-    return dress(_kept(house, recipe), catalogue_of(recipe.dress), recipe.dress, seed)
+    return dress(kept(house, recipe), catalogue_of(recipe.dress), recipe.dress, seed)
 
 
-def _kept(house: House, recipe: Recipe) -> House:
+def kept(house: House, recipe: Recipe) -> House:
     """The house without the people and plants that repair will take out: nothing makes way for them."""
     gone = {ItemKind.PERSON} if recipe.repair.remove_persons else set()
     if recipe.repair.remove_plants:

@@ -28,13 +28,13 @@ _RUG_M = 0.03  # what is lower may lie anywhere, but carries nothing
 
 # What stands on floors: kind, chance in a room.
 _USUAL: dict[RoomKind, tuple[tuple[str, float], ...]] = {
-    RoomKind.HALL: (("shoes", 0.8), ("shoes", 0.6), ("bag", 0.35), ("basket", 0.15)),
-    RoomKind.LIVING: (("basket", 0.5), ("magazines", 0.4), ("toy", 0.35), ("bag", 0.2), ("storage_box", 0.2), ("book", 0.25)),
-    RoomKind.BEDROOM: (("basket", 0.4), ("shoes", 0.45), ("toy", 0.3), ("bag", 0.3), ("book", 0.25), ("storage_box", 0.25), ("bin", 0.2)),
+    RoomKind.HALL: (("shoes", 0.8), ("shoes", 0.6), ("bag", 0.35), ("suitcase", 0.2), ("basket", 0.15)),
+    RoomKind.LIVING: (("armchair", 0.7), ("basket", 0.5), ("pouf", 0.55), ("magazines", 0.4), ("toy", 0.35), ("bag", 0.2), ("storage_box", 0.2), ("book", 0.25)),
+    RoomKind.BEDROOM: (("armchair", 0.3), ("laundry_basket", 0.4), ("suitcase", 0.25), ("pouf", 0.25), ("basket", 0.4), ("shoes", 0.45), ("toy", 0.3), ("bag", 0.3), ("book", 0.25), ("storage_box", 0.25), ("bin", 0.2)),
     RoomKind.KITCHEN: (("bin", 0.75), ("bag", 0.25), ("bottle", 0.25), ("carton", 0.12)),
     RoomKind.DINING: (("basket", 0.25), ("toy", 0.2), ("bag", 0.2)),
-    RoomKind.BATHROOM: (("basket", 0.55), ("bin", 0.5), ("shoes", 0.15)),
-    RoomKind.OFFICE: (("bin", 0.8), ("carton", 0.4), ("bag", 0.4), ("book", 0.5), ("storage_box", 0.3)),
+    RoomKind.BATHROOM: (("laundry_basket", 0.5), ("basket", 0.4), ("bin", 0.5), ("shoes", 0.15)),
+    RoomKind.OFFICE: (("armchair", 0.25), ("bin", 0.8), ("carton", 0.4), ("bag", 0.4), ("book", 0.5), ("storage_box", 0.3)),
     RoomKind.STORE: (("cartons", 0.8), ("carton", 0.8), ("storage_box", 0.6), ("basket", 0.3), ("bag", 0.3), ("shoes", 0.4)),
     RoomKind.OTHER: (("carton", 0.3), ("basket", 0.4), ("bag", 0.2)),
     RoomKind.OUTDOOR: (("plant_pot", 0.5), ("plant_pot", 0.3)),

@@ -15,7 +15,7 @@ from pbrs_farm.dress.generated.covers import Covers
 from pbrs_farm.dress.generated.things import GENERATORS
 from pbrs_farm.dress.style import Style
 
-_MOST_FACES: Final = 1500  # of a small thing from a catalogue
+_MOST_FACES: Final = 1500  # of a small thing from a catalogue, and of most kinds
 _GENERATED_SHARE: Final = 0.5  # where there are both
 _DESIGNS: Final = 1  # of a kind in one home
 _MOST_TRIES: Final = 2  # models that are loaded to find them
@@ -29,17 +29,20 @@ class Kind:
     made: str = ""  # generator's name
     most_m: float = 0.6  # the longest side
     is_round: bool = False  # it may face anywhere
+    place: Place = Place.SURFACE  # of the catalogue's pieces
+    most_faces: int = _MOST_FACES
 
 
 _MADE_ONLY = (
     "bag", "binders", "brush_cup", "carton", "cartons", "folded_blanket", "folded_clothes", "jar",
-    "kitchen_roll", "mills", "notebook", "papers", "pen_pot", "plant_pot", "shelf_basket",
-    "soap_bar", "soap_dispenser", "sponge", "spray_bottle", "storage_box", "table_frame",
+    "kitchen_roll", "laundry_basket", "mills", "notebook", "papers", "pen_pot", "plant_pot", "pouf", "shelf_basket",
+    "soap_bar", "soap_dispenser", "sponge", "spray_bottle", "storage_box", "suitcase", "table_frame",
     "tissue_box", "toilet_rolls", "toiletries",
 )  # fmt: skip
 
 _KINDS: Final[dict[str, Kind]] = {
     **{name: Kind(made=name) for name in _MADE_ONLY},
+    "armchair": Kind(("armchair",), most_m=1.1, place=Place.FLOOR, most_faces=12_000),
     "ball": Kind(("ball",), most_m=0.3, is_round=True),
     "bath_small": Kind(("bath_small",), "toiletries", 0.3),
     "bin": Kind(("bin",), "bin", 0.6, True),
@@ -111,7 +114,7 @@ class Stock:
             fitting = [
                 p
                 for p in self._catalogue.of(*found.groups)
-                if p.place is Place.SURFACE
+                if p.place is found.place
                 and max(p.size) <= found.most_m
                 and p.kind in (ItemKind.OBJECT, ItemKind.LAMP)
             ]
@@ -139,7 +142,7 @@ def is_known(kind: str) -> bool:
 
 def _is_usable(shape: Shape, kind: Kind) -> bool:
     n_faces = sum(len(s.faces) for s in shape.surfaces)
-    if not 0 < n_faces <= _MOST_FACES:
+    if not 0 < n_faces <= kind.most_faces:
         return False
     low, high = shape.bounds
     return bool(np.isfinite([low, high]).all() and (high - low).max() <= kind.most_m + 0.05)

@@ -29,6 +29,9 @@ from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.supports import Support
 
+_HOLDS_NOTHING = (
+    "shower", "bathtub", "bath tub", "radiator", "fireplace", "pool", "treadmill",
+)  # fmt: skip
 _MACHINES = ("cooker", "stove", "oven", "washer", "washing", "dryer", "dishwasher", "fridge")
 _HOLDERS = frozenset({
     CABINET, TABLE, BOOKSHELF, COUNTER, DESK, SHELVES, DRESSER, REFRIGERATOR, TELEVISION, NIGHT_STAND,
@@ -74,7 +77,9 @@ def can_hold(item: Item) -> bool:
 
 def receptacle_of(item: Item, support: Support, kind: RoomKind) -> str:
     """The table's name for a support of an item in a room of that kind; "" holds nothing."""
-    at, name = support.above_floor, item.name.casefold()
+    at, name = support.above_floor, f"{item.name} {item.source_class}".casefold()
+    if any(word in name for word in _HOLDS_NOTHING):
+        return ""
     if kind is RoomKind.OUTDOOR:
         return "outdoor_table" if item.nyu40 in (TABLE, NIGHT_STAND) and at > 0.25 else ""
     if kind is RoomKind.STORE and at < 1.6:
@@ -113,10 +118,6 @@ def _top_of(item: Item, name: str, at: float, kind: RoomKind) -> str:
         return "counter" if 0.7 < at < 1.2 else ""
     if "piano" in name:
         return "piano" if at > 0.7 else ""
-    if any(
-        word in name for word in ("shower", "bath", "radiator", "fireplace", "pool", "treadmill")
-    ):
-        return ""
     if at > 1.45:
         return "upper_cabinet_top" if kind is RoomKind.KITCHEN else "cabinet_top"
     if kind is RoomKind.KITCHEN and item.nyu40 in (CABINET, OTHERFURNITURE, DRESSER):

@@ -21,8 +21,8 @@ _Kinds = tuple[tuple[str, float], ...]
 
 # What else stands on shelves, and how often.
 _DECOR: _Kinds = (
-    ("vase", 0.2), ("ornament", 0.2), ("table_frame", 0.2), ("candle", 0.12), ("storage_box", 0.1),
-    ("shelf_basket", 0.1), ("clock", 0.08), ("bowl", 0.08), ("magazines", 0.08), ("toy", 0.04),
+    ("vase", 0.2), ("ornament", 0.2), ("table_frame", 0.2), ("candle", 0.12), ("storage_box", 0.25),
+    ("shelf_basket", 0.25), ("clock", 0.08), ("bowl", 0.08), ("magazines", 0.08), ("toy", 0.04),
     ("plant_pot", 0.06),
 )  # fmt: skip
 _KITCHEN: _Kinds = (
@@ -58,13 +58,13 @@ class ShelfPlan:
 def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
     """How the shelves of one bookcase are filled, by the room it stands in."""
     rng = placing.rng
-    others, books = _DECOR, float(rng.uniform(0.5, 0.85))
+    others, books = _DECOR, float(rng.uniform(0.2, 0.5))
     if kind is RoomKind.KITCHEN or (kind is RoomKind.DINING and rng.random() < 0.4):
         others, books = _KITCHEN, 0.15
     elif kind is RoomKind.OFFICE:
-        others, books = _OFFICE, float(rng.uniform(0.5, 0.8))
+        others, books = _OFFICE, float(rng.uniform(0.3, 0.55))
     elif kind is RoomKind.BEDROOM and rng.random() < 0.35:
-        others, books = _CHILD, float(rng.uniform(0.3, 0.6))
+        others, books = _CHILD, float(rng.uniform(0.15, 0.4))
     fullness = float(np.clip(rng.uniform(0.55, 1.0) + placing.bias, 0.2, 1.0))
     return ShelfPlan(
         books, fullness * min(placing.share, 1.0), others, float(rng.uniform(0.01, 0.04))

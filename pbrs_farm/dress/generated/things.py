@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.dress.generated import bath, desk, household, soft, tableware
+from pbrs_farm.dress.generated import bath, desk, floor_things, household, soft, tableware
 from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.style import Style
 
@@ -37,6 +37,7 @@ GENERATORS: Final[Mapping[str, Generator]] = {
     "kettle": tableware.kettle,
     "kitchen_roll": soft.kitchen_roll,
     "laptop": desk.laptop,
+    "laundry_basket": floor_things.laundry_basket,
     "mills": tableware.mills,
     "one_plate": tableware.one_plate,
     "notebook": desk.notebook,
@@ -48,6 +49,7 @@ GENERATORS: Final[Mapping[str, Generator]] = {
     "plant_pot": household.plant_pot,
     "plates": tableware.plates,
     "pot": tableware.pot,
+    "pouf": floor_things.pouf,
     "remote": desk.remote,
     "shelf_basket": household.shelf_basket,
     "shoes": household.shoes,
@@ -56,6 +58,7 @@ GENERATORS: Final[Mapping[str, Generator]] = {
     "sponge": bath.sponge,
     "spray_bottle": bath.spray_bottle,
     "storage_box": household.storage_box,
+    "suitcase": floor_things.suitcase,
     "table_frame": household.table_frame,
     "tissue_box": household.tissue_box,
     "toilet_rolls": soft.toilet_rolls,

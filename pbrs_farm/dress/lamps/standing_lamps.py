@@ -17,7 +17,7 @@ from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import next_id
 
 PART = "lamps"
-_BY_SOFA, _BY_BED = 0.55, 0.7  # how often
+_BY_SOFA, _BY_BED = 0.75, 0.75  # how often
 _FLOOR_LM, _TABLE_LM = 900.0, 400.0
 _UPSIDE_DOWN = np.array([1.0, -1.0, 1.0])
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -19,6 +19,8 @@ from pbrs_farm.core.house import Item
 _UPRIGHT: Final = 0.999  # cosine to the vertical of what is not tilted
 _HIGH_PART: Final = 0.25  # of the height, at the top: where the back of a seat is
 _CLEAR: Final = 0.12  # of the depth: how far the top must lie behind the middle
+_BOARD_M: Final = 0.04  # a thicker one is no skirting board
+_APART_M: Final = 0.0005
 _HIGH_TABLE_M: Final = 0.62  # one eats or works at what is higher
 _BACKED: Final = frozenset({"chair", "office_chair", "armchair", "sofa", "bed"})
 
@@ -98,6 +100,23 @@ def old_place(item: Item, group: str) -> OldPlace | None:
         if quarter:
             place = _boxed(points, turn_rad + quarter * np.pi / 2)
     return place
+
+
+def before_boards(place: OldPlace, boards: Sequence[F64]) -> OldPlace:
+    """The place drawn in so far that its back stands before skirting boards, which homes draw into it.
+
+    boards: (N, 3) points of each in the world.
+    """
+    back, low = float(place.low[2]), place.low.copy()
+    for points in boards:
+        local = place.local(points)
+        first, last = local.min(0), local.max(0)
+        runs_along = last[2] - first[2] < _BOARD_M
+        behind = back - _BOARD_M < first[2] and back < last[2] < back + _BOARD_M
+        beside = last[0] > place.low[0] and first[0] < place.high[0] and first[1] < place.high[1]
+        if runs_along and behind and beside and last[1] > place.low[1]:
+            low[2] = max(low[2], last[2] + _APART_M)
+    return replace(place, low=low)
 
 
 def _boxed(points: F64, turn_rad: float) -> OldPlace:

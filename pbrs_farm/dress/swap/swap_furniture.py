@@ -12,17 +12,20 @@ from typing import Final
 
 import numpy as np
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import Box, Item, LightPart, Surface
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.surface_points import item_triangles
 from pbrs_farm.dress.style import Style
+from pbrs_farm.dress.surfaces.skirting import BASEBOARD
 from pbrs_farm.dress.swap.fits import Scale, common_scale, is_lit_alike
 from pbrs_farm.dress.swap.old_places import (
     HELD,
     Held,
     OldPlace,
+    before_boards,
     group_of_item,
     old_place,
     pieces_by_plain_id,
@@ -94,8 +97,24 @@ def _members(
         if inside:
             draft.refused[f"{PART}: things stand in it or under it"] += 1
             return None
+        if HELD[group] is Held.BACK:
+            place = before_boards(place, _boards_near(draft, item))
         found.append(_Member(index, item, place, tuple(on)))
     return found
+
+
+def _boards_near(draft: Draft, item: Item) -> list[F64]:
+    """(N, 3) points of each skirting board that the item's bounds meet."""
+    low, high = item.bounds
+    boards = []
+    for board in draft.items:
+        if BASEBOARD not in board.tags or not board.n_faces:
+            continue
+        least, most = board.bounds
+        if (least < high).all() and (most > low).all():
+            points = np.concatenate([s.positions for s in board.surfaces])
+            boards.append(points.astype(np.float64))
+    return boards
 
 
 def _swap_set(

@@ -128,7 +128,7 @@ def _panel_place(
     sill = seen.window.bottom_y
     without = [n for n, i in enumerate(draft.items) if i.kind is ItemKind.WINDOW]
     free = shapely.difference(room.area, room.walls)
-    for beyond in (0.17, 0.12, 0.07):
+    for beyond in (0.34, 0.25, 0.17, 0.12, 0.07):
         inner, outer = sign * (half - cover), sign * (half + beyond)
         x0, x1 = min(inner, outer), max(inner, outer)
         corner = seen.origin + seen.along * (outer + sign * 0.04) + seen.inward * out / 2

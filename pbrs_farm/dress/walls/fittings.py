@@ -27,6 +27,7 @@ _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
 _CASING_M = 0.16  # from a door's hole to the middle of its switch
 _CLOCKS = {RoomKind.KITCHEN: 0.6, RoomKind.LIVING: 0.4, RoomKind.OFFICE: 0.5, RoomKind.DINING: 0.3}
 _SHELVES = {RoomKind.LIVING: 0.45, RoomKind.BEDROOM: 0.4, RoomKind.OFFICE: 0.6, RoomKind.KITCHEN: 0.4, RoomKind.OTHER: 0.4}  # fmt: skip
+_MIRRORS = {RoomKind.HALL: 0.8, RoomKind.BEDROOM: 0.5, RoomKind.LIVING: 0.25}
 _SOCKETS = {RoomKind.HALL: 1, RoomKind.BATHROOM: 1, RoomKind.KITCHEN: 2}
 
 
@@ -40,10 +41,8 @@ def hang_mirrors(hanging: Hanging, space: HouseSpace, style: Style, share: float
         for number in room.items:
             if hanging.draft.items[number].nyu40 == SINK:
                 _over_basin(hanging, space.bounds[number], rng, style)
-    if room.kind in (RoomKind.HALL, RoomKind.BEDROOM):
-        likely = 0.7 if room.kind is RoomKind.HALL else 0.3
-        if rng.random() < likely * share:
-            _tall_mirror(hanging, rng, style)
+    if rng.random() < _MIRRORS.get(room.kind, 0.0) * share:
+        _tall_mirror(hanging, rng, style)
 
 
 def _over_basin(hanging: Hanging, bounds: F64, rng: np.random.Generator, style: Style) -> None:

@@ -15,6 +15,7 @@ from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.draft import ADDED_TAG, Draft
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.swap import swap
+from pbrs_farm.dress.swap.old_places import OldPlace, before_boards
 from tests.dress.furniture import house, solid
 
 Size = tuple[float, float, float]  # width, depth, height
@@ -199,3 +200,13 @@ def test_a_model_that_cannot_be_used_leaves_the_old_one() -> None:
     draft = _swapped(broken, _item("d", DRESSER, [2, 0, 1], 17))
     assert draft.items[0].source_class == "T#old"
     assert draft.refused["swap: no other model can be used"] == 1
+
+
+def test_a_swapped_cabinet_stands_before_the_skirting_board_that_the_old_one_stood_in() -> None:
+    place = OldPlace(0.0, np.array([0.0, 0.0, 0.0]), np.array([1.0, 2.0, 0.4]))
+    along = np.array([[x, y, z] for x in (-1, 2) for y in (0, 0.07) for z in (-0.002, 0.012)])
+    beside = np.array([[x, y, z] for x in (0.99, 1.002) for y in (0, 0.07) for z in (-1, 1)])
+    drawn_in = before_boards(place, [along, beside])
+    assert drawn_in.low[2] == pytest.approx(0.0125)
+    assert (drawn_in.high == place.high).all()
+    assert before_boards(place, [beside]).low[2] == 0.0

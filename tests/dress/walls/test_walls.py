@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import EMPTY, PRINTS, Catalogue, Picture
-from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE, SHELVES
+from pbrs_farm.core.classes import (
+    CLOTHES,
+    MIRROR,
+    OTHERFURNITURE,
+    OTHERPROP,
+    PICTURE,
+    SHELVES,
+    WHITEBOARD,
+)
 from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Texture
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
@@ -17,6 +25,8 @@ from pbrs_farm.dress.walls.pictures import Gallery
 from pbrs_farm.dress.walls.prints import FAMILIES, palette_of, print_pixels
 from pbrs_farm.images import decode_photo, jpeg_from_array
 from tests.builders import builtin_home
+
+_HUNG = (PICTURE, MIRROR, SHELVES, CLOTHES, WHITEBOARD, OTHERFURNITURE, OTHERPROP)
 
 
 def _style(seed: int = 1) -> Style:
@@ -85,7 +95,7 @@ def test_a_home_gets_pictures_and_every_thing_its_class_source_and_seed() -> Non
     classes = [i.nyu40 for i in _added(draft)]
     assert classes.count(PICTURE) >= 2
     for item in _added(draft):
-        assert item.nyu40 in (PICTURE, MIRROR, SHELVES, OTHERPROP)
+        assert item.nyu40 in _HUNG
         assert item.tags[:2] == (f"dressed:{item.source_class}", "seed:3")
         assert item.room_id in ("0_0", "0_1")
     ids = [i.id for i in _added(draft)]

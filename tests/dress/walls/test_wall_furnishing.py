@@ -1,0 +1,80 @@
+"""Radiators below windows, coats in halls, pin boards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import signed_volume, triangle_corners
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.generated.assembly import Made
+from pbrs_farm.dress.space import house_space
+from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.walls import walls
+from pbrs_farm.dress.walls.coat_racks import coat_rack
+from pbrs_farm.dress.walls.pin_boards import pin_board
+from pbrs_farm.dress.walls.radiators import radiator, wants_radiators
+from tests.builders import builtin_home
+
+
+def _style() -> Style:
+    return style_for(np.random.default_rng(1))
+
+
+def _drafts(n: int = 8) -> list[Draft]:
+    drafts = [Draft(builtin_home(), seed) for seed in range(1, n)]
+    for draft in drafts:
+        walls(draft, EMPTY, _style(), 1.0)
+    return drafts
+
+
+def _named(draft: Draft, name: str) -> list[Item]:
+    return [i for i in draft.items if i.name == name]
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        radiator(1.0, 0.5),
+        coat_rack(np.random.default_rng(1), _style(), 3, is_bath=False),
+        pin_board(np.random.default_rng(1), _style(), 0.8, 0.5),
+    ],
+)
+def test_what_hangs_begins_at_its_wall_and_faces_outwards(made: Made) -> None:
+    _piece, shape = made
+    assert shape.bounds[0, 2] == pytest.approx(0.0, abs=1e-6)
+    for surface in shape.surfaces:
+        corners = triangle_corners(surface.positions, surface.faces)
+        assert signed_volume(corners, corners[0, 0]) > 0
+
+
+def test_radiators_hang_below_windows_in_most_homes_and_not_in_all() -> None:
+    drafts = _drafts()
+    wanted = [wants_radiators(draft) for draft in drafts]
+    assert len(set(wanted)) == 2
+    for draft, wants in zip(drafts, wanted, strict=True):
+        found = _named(draft, "Panel radiator")
+        assert bool(found) <= wants
+        for item in found:
+            windows = [w for r in house_space(draft).rooms for w in r.windows]
+            middle = item.bounds.mean(0)
+            nearest = min(windows, key=lambda w, m=middle: float(np.linalg.norm((w.centre - m)[[0, 2]])))  # fmt: skip
+            assert item.bounds[1, 1] < nearest.bottom_y
+            assert abs(float((middle - nearest.centre) @ nearest.along)) < 0.05
+
+
+def test_a_home_that_has_a_radiator_gets_none() -> None:
+    house = builtin_home()
+    drawn = replace(house.items[-1], id="drawn", name="Radiator", source_class="radiator")
+    assert not wants_radiators(Draft(house.with_items((*house.items, drawn)), 3))
+
+
+def test_coats_hang_free_of_the_floor() -> None:
+    coats = [i for draft in _drafts() for i in _named(draft, "Coat rack")]
+    assert coats
+    for item in coats:
+        assert item.bounds[0, 1] > 0.3
