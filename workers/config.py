@@ -155,6 +155,7 @@ _ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits", "webhook"}
 
 def _read(cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str) -> dict[str, Any]:
     """Field -> its value from its variable's text; BadInput for what is none."""
+    # Read each variable by the type of its field; an unknown one is an error: no slip passes.
     kinds = {f.name: str(f.type) for f in fields(cls) if f.name not in _ELSEWHERE}
     values = {}
     for name, text in given.items():
@@ -183,6 +184,7 @@ def _with_password(url: str, password: str) -> str:
     parts = urlsplit(url)
     if not password or parts.password:
         return url
+    # Put it between the user's name and the host.
     host = parts.netloc.rpartition("@")[2]
     netloc = f"{parts.username or ''}:{quote(password, safe='')}@{host}"
     return urlunsplit(parts._replace(netloc=netloc))

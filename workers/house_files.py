@@ -35,6 +35,7 @@ def entries_from_arguments(
     Each is dressed by each seed, a house of its own. Touches no store. Raises BadHouse for one that
     names no house.
     """
+    # Take each house once, whatever arguments name it.
     found: dict[str, tuple[HouseEntry, SourceRef]] = {}
     files = SourceFiles()
     for argument in arguments:

@@ -146,6 +146,7 @@ def version_of(deb: Path) -> str:
 def _files(tar: bytes, wanted: Callable[[str], bool]) -> dict[str, bytes]:
     found = {}
     with tarfile.open(fileobj=io.BytesIO(tar)) as archive:
+        # Read the wanted files alone; links and folders are passed over.
         for member in archive:
             name = member.name.removeprefix("./")
             stream = archive.extractfile(member) if member.isfile() and wanted(name) else None

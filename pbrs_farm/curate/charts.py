@@ -157,6 +157,7 @@ def mirrored(
     colours: of each bin; the page's own where None.
     """
     width, half = 260, 44  # pixels; the axis lies at half
+    # Scale both histograms alike, so that they can be compared.
     drawing = SvgPicture(width, 2 * half, label)
     top = max(float(above.max(initial=0)), float(below.max(initial=0)), 1e-9)
     step = width / max(len(above), 1)  # pixels from bar to bar

@@ -94,6 +94,7 @@ def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[P
 
 
 def _files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
+    # Know pictures by their name without ending.
     found: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
         if path.is_file() and path.suffix.lower() in endings:

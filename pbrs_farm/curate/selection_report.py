@@ -108,6 +108,7 @@ def _charts(scored: Any, summary: SelectionSummary, fields: SelectionFields) -> 
 
 def _tally_table(tallies: Sequence[KeptCount]) -> dict[str, Any]:
     """shown: the MAX_ROWS largest tallies; rest: the sum of the others; most: views of the largest."""
+    # Show the largest, and sum up the others.
     ordered = sorted(tallies, key=lambda t: (-t.views, t.name))
     rest = ordered[MAX_ROWS:]
     sums = {"n": len(rest), "kept": sum(t.kept for t in rest), "views": sum(t.views for t in rest)}

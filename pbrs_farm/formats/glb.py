@@ -63,6 +63,7 @@ class GlbWriter:
 
     def add_vertices(self, array: F32, *, with_bounds: bool = False) -> int:
         """Index of a new accessor over array (N, 2 or 3) float32, N >= 1."""
+        # Give bounds where glTF asks for them: of positions.
         accessor = {
             "bufferView": self.add_bytes(_little(array, "<f4"), target=_ARRAY_BUFFER),
             "componentType": 5126,
@@ -160,6 +161,7 @@ def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int
 
 def view_bytes(gltf: Gltf, index: Any) -> bytes:
     """The bytes of buffer view index; BadHouse if it reaches outside its buffer."""
+    # Check every number: the file may be a stranger's.
     place = f"bufferViews[{index}]"
     view = entry(gltf, "bufferViews", index)
     buffer = count(gltf, view, "buffer", place)

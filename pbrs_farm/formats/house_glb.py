@@ -123,6 +123,7 @@ def _write_textures(
 
 def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
     alpha, mode = _alpha(material)
+    # Say what glTF knows of the material: colour, metal or not, roughness.
     look: dict[str, Any] = {
         "baseColorFactor": [*_linear(material.diffuse), alpha],
         "metallicFactor": 1.0 if material.kind is MaterialKind.MIRROR else 0.0,

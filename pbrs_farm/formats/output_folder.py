@@ -50,6 +50,7 @@ def views_of(root: Path) -> tuple[ViewEntry, ...]:
 
     Raises BadInput if root is no output folder or a JSON file in it cannot be read.
     """
+    # Homes first, then objects without context.
     roots = [root / name for name in keys.FOLDERS if (root / name).is_dir()]
     if not roots:
         text = "not an output folder of pbrs-farm: it has no houses"
@@ -69,6 +70,7 @@ def _views(folder: Path) -> Iterator[ViewEntry]:
 
 
 def _house(folder: Path) -> OutputHouse:
+    # Clean each name once, where it is read.
     facts = json_object(folder / "house.json")
     source = facts.get("source") or {}
     rooms = {

@@ -75,6 +75,7 @@ def class_statistics(folder: Path) -> ClassStatistics:
         for row in view.facts["instances"]:
             instances[int(row["nyu40"])] += 1
     total = pixels.sum()
+    # Read what the homes say of their items.
     items = {
         house: json_object(folder / keys.house_key(house, "house.json")).get("items", [])
         for house in sorted({v.house.id for v in views})
@@ -109,6 +110,7 @@ def _pixels_of_classes(view: ViewEntry) -> np.ndarray[tuple[int], np.dtype[np.in
 def _unmapped(items: dict[str, list[dict[str, Any]]]) -> tuple[str, ...]:
     lines = []
     for house, rows in items.items():
+        # Count the items of each class that the source names and NYU40 lacks.
         names: dict[str, int] = {}
         for item in rows:
             if "unmapped" in item.get("tags", ()):

@@ -36,6 +36,7 @@ def contact_sheet(folder: Path, *, max_views: int = 12) -> bytes:
     The views are spread over houses, then rooms. A tile that is missing says so. Raises BadInput
     if folder is no output folder or holds no view.
     """
+    # Choose the views and make their tiles.
     everything = views_of(folder)
     if not everything:
         raise BadInput(folder, "houses/", "holds no view yet", hint="run `pbrs-farm run` first")
@@ -81,6 +82,7 @@ def spread_views(views: Sequence[ViewEntry], max_views: int) -> list[ViewEntry]:
 
 def _in_turn(lists: Iterable[Sequence[ViewEntry]]) -> list[ViewEntry]:
     """The first of each list, then the second of each, and so on."""
+    # Deal by position: a list that has ended is passed over.
     columns = [list(x) for x in lists]
     longest = max((len(x) for x in columns), default=0)
     return [x[i] for i in range(longest) for x in columns if i < len(x)]
@@ -109,6 +111,7 @@ def _font(size: int) -> _Font:
 
 
 def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown: int) -> None:
+    # Write what the sheet shows, then a title over each column.
     n_houses = len({view.house.id for view in views})
     draw.text((_MARGIN_PX, 22), "pbrs_farm", INK, _font(30))
     shown = "" if n_shown == len(views) else f"{n_shown} of "
@@ -125,6 +128,7 @@ def _draw_row(
     sheet: Image.Image, draw: ImageDraw.ImageDraw, y: int, view: ViewEntry, tiles: Sequence[Tile]
 ) -> None:
     draw.line([(_MARGIN_PX, y + 2), (sheet.width - _MARGIN_PX, y + 2)], fill=(38, 42, 52), width=1)
+    # Write the room, and the home and view behind it, over the row of tiles.
     length = draw_line(draw, (_MARGIN_PX, y + 9), view.room_name, fill=INK, size=16)
     after = _MARGIN_PX + length + 14
     text = f"{view.house.name}, view {view.id}"
@@ -157,6 +161,7 @@ def _legend_rows(classes: Sequence[int], width: int) -> list[list[_Chip]]:
     rows: list[list[_Chip]] = []
     x = width  # where the next chip would begin
     for nyu40 in classes:
+        # Measure a chip: its square, its word and the gap behind it.
         length = 22 + round(_font(14).getlength(NYU40_NAMES[nyu40])) + 22
         if not rows or x + length > width:
             rows.append([])

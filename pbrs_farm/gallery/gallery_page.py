@@ -69,6 +69,7 @@ def _options(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
 
 def _card(root: Path, view: ViewEntry, tiles: Sequence[Tile], reason: str | None) -> dict[str, Any]:
     """A view for the template. reason: why it is rejected, "" if kept, None if nobody judged it."""
+    # Search by home, room, view and the classes that are seen.
     classes = next((tile.classes for tile in tiles if tile.classes), ())
     names = " ".join(NYU40_NAMES[i] for i, _share in classes)
     words = f"{view.house.id} {view.house.name} {view.room_name} {view.id} {names}"

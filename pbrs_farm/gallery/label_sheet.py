@@ -32,6 +32,7 @@ def label_sheet(view: ViewEntry) -> Srgb8Image:
 
     Raises BadInput when the view has no labels or no picture.
     """
+    # Lay the classes over the picture and find the busiest edge of both.
     picture = _picture(view)
     semantic, boundary = _layer(view, "semantic.png"), _layer(view, "boundary.png")
     over = _overlaid(picture, semantic, boundary)
@@ -78,6 +79,7 @@ def _layer(view: ViewEntry, file: str) -> NDArray[Any]:
 def _overlaid(
     picture: Srgb8Image, semantic: NDArray[Any], boundary: NDArray[Any]
 ) -> NDArray[np.uint8]:
+    # Mix half of each, and draw the instances' edges white.
     mixed = (picture.astype(np.uint16) + semantic_colours(semantic)) // 2
     mixed[boundary > 0] = (255, 255, 255)
     return mixed.astype(np.uint8)

@@ -105,6 +105,7 @@ def _note(kind: TileKind, stored: NDArray[Any]) -> str:
 def _classes(kind: TileKind, stored: NDArray[Any]) -> tuple[tuple[int, float], ...]:
     if kind.layer != "semantic":
         return ()
+    # Count the pixels of each class, largest first.
     counts = np.bincount(stored.reshape(-1), minlength=len(NYU40_NAMES))[: len(NYU40_NAMES)]
     order = np.argsort(-counts, kind="stable")
     return tuple((int(i), float(counts[i] / stored.size)) for i in order if counts[i])

@@ -21,6 +21,7 @@ _ROUNDS = 5  # of looking again; more houses than that do not come in while a te
 
 def write_attribution(store: Store) -> None:
     """Write ATTRIBUTION.txt where a house of the root shows what must be credited."""
+    # Look again after writing: a house may have come in meanwhile.
     seen: list[dict[str, str]] | None = None
     for _round in range(_ROUNDS):
         rows = dressing_rows(_manifest(store))
@@ -46,6 +47,7 @@ def attribution_text(homes: Iterable[str], credits: Iterable[Credit]) -> str:
 
     homes: the lines that the homes themselves ask for.
     """
+    # Write a line a work, apart by whether its licence asks for one.
     lines: dict[bool, set[str]] = {True: set(), False: set()}
     for credit in credits:
         by = f", by {credit.creator}" if credit.creator else ""

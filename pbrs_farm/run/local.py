@@ -106,6 +106,7 @@ def _limits(run: Run, n_jobs: int) -> ProcessLimits:
 
 
 def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
+    # Take each home once, whatever words name it; one that is none costs itself alone.
     seeds = run.dress_seeds or (run.recipe.dress.seed,)
     sources = {s.house_id: s for given in run.sources for s in variants(given, seeds)}
     files = SourceFiles()

@@ -105,6 +105,7 @@ def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor])
     """Lamp's number -> (3,) factors. BadInput for a word that names no lamp, saying which exist."""
     factors: dict[int, F32] = {}
     for asked in words:
+        # Find the lamps that the word names.
         named = [int(row["number"]) for row in rows if _is_named(row, asked.word)]
         if not named:
             exist = ", ".join(f"{row['number']} {row['item']} ({row['name']})" for row in rows)
@@ -124,6 +125,7 @@ def unlit_lamps(view: Path, words: Sequence[LampFactor]) -> list[dict[str, Any]]
 
 def _is_named(row: Mapping[str, Any], word: str) -> bool:
     """By number, item (all light sources of one that has several), name, or a pattern of these."""
+    # Compare with each of its names, then as a pattern.
     item, name = str(row["item"]), str(row["name"])
     is_it = word in (str(row["number"]), item, name) or item.startswith(f"{word}/")
     return is_it or ("*" in word and (fnmatchcase(item, word) or fnmatchcase(name, word)))

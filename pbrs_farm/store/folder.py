@@ -164,6 +164,7 @@ class FolderStore:
 
     def _failure(self, key: str, error: OSError) -> StoreFailed:
         code = error.errno
+        # Sort by what a caller can do: wait, ask for rights, give up.
         reason = error.strerror or str(error)
         if code in _FULL:
             return StoreUnavailable(key, f"{self.root} is full: {reason}", hint="free some space")

@@ -33,12 +33,14 @@ def seconds_per_view(recipe: Recipe) -> float:
 
 def estimate(spec: JobSpec, n_slots: int) -> dict[str, float | int | str]:
     """Expected houses, views, tasks, hours and storage of a job."""
+    # Expect as many views a house as the paper had, or as were asked for.
     per_house = min(spec.n_views, VIEWS_PER_HOUSE) if spec.n_views else VIEWS_PER_HOUSE
     n_views = round(spec.n_houses * per_house)
     per_batch = max(1.0, TARGET_S / spec.seconds_per_view)
     n_batches = spec.n_houses * math.ceil(per_house / per_batch)
     # geometry and reduce a house, then each stage of each batch.
     n_tasks = 2 * spec.n_houses + n_batches * len(spec.batch_stages)
+    # Sum the time of houses and views, then their pixels.
     has_light = "light" in spec.batch_stages
     seconds_per_view = _LABELS_S + (spec.seconds_per_view if has_light else 0.0)
     seconds = spec.n_houses * _HOUSE_S + n_views * seconds_per_view

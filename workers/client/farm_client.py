@@ -194,6 +194,7 @@ class Farm:
         # One object an attempt, in the folder of the task's unit.
         folder = log_key(job, str(task), 0).rpartition("/")[0] + "/"
         found = attempts_from_log_keys(job, str(task), self.store.list(folder))
+        # Take the last attempt unless one is named.
         chosen = attempt if attempt is not None else max(found, default=0)
         if chosen not in found:
             self._check_task(job, task)

@@ -29,6 +29,7 @@ def status_text(status: Mapping[str, Any]) -> str:
         f"{'stage':<10}{'done':>9}{'running':>9}{'queued':>8}{'failed':>8}{'of':>9}"
         f"{'per h':>9}{'p50':>8}{'p90':>8}{'left':>9}",
     ]
+    # A row a stage: tasks by state, rate, durations, time left.
     for stage in status["stages"]:
         lines.append(
             f"{stage['stage']:<10}{stage['done']:>9}{stage['running']:>9}{stage['queued']:>8}"

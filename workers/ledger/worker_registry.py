@@ -118,6 +118,7 @@ class Registry:
 
     def slots(self) -> dict[str, int]:
         """Stage -> tasks that workers seen in the last ALIVE_S seconds can run at once."""
+        # A worker's slots serve every stage of every queue it takes.
         slots: dict[str, int] = {}
         for worker in self.workers():
             if worker.age_s <= ALIVE_S:

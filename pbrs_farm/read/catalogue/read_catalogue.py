@@ -130,6 +130,7 @@ def _furniture(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
         return None
     pieces = []
     for entry in library.entries:
+        # Go by what people decided of this very piece, else by its name and size.
         seen = verdicts().get(entry.id)
         rule = None if seen and not seen.group else _rule(entry, seen.group if seen else "")
         if rule is not None:
@@ -148,6 +149,7 @@ def _rule(entry: Entry, group: str) -> GroupRule | None:
 def _piece(
     library: Library, entry: Entry, rule: GroupRule, seen: Verdict, notes: LibraryNotes
 ) -> tuple[Piece, Loader]:
+    # Turn the size with a piece that is turned a quarter.
     width, depth, height = entry.piece.size
     is_across = round(seen.turn_deg / 90) % 2 == 1
     piece = Piece(

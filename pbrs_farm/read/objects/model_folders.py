@@ -66,6 +66,7 @@ def pick_models(
     A category is a ShapeNet class or synset id, a folder's name or an NYU40 class; BadInput where
     no model has it. The choice depends on seed and ids alone: more models do not reorder the others.
     """
+    # Refuse a category that no model has: a slip would give nothing, silently.
     wanted = [c.strip().lower() for c in categories if c.strip()]
     for category in wanted:
         if not any(_is_of(model, category) for model in models):

@@ -71,6 +71,7 @@ class ChildProcess:
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Its next line, None when none came in time or the pipe is closed."""
+        # Read on where no whole line is held yet.
         if b"\n" not in self._buffer:
             readable, _, _ = select.select([self._replies], [], [], timeout_s)
             if not readable:

@@ -33,6 +33,7 @@ class ProcessLimits:
 
 def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
     """Memory this container or machine may use, in MiB."""
+    # Take the container's limit where it is below what the machine has.
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     for path in limits:
         try:
