@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 NAME ?=
 HOME_NAME ?= Studio
 
-.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study bench bench-light bench-cycles bench-luxcore bench-farm format clean
+.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study bench bench-light bench-cycles bench-luxcore bench-farm docs format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -70,6 +70,11 @@ bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in 
 
 bench-farm: setup ## queue, ledger, coordinator (FULL=1 for the whole job)
 	$(BIN)/python -m benchmarks farm
+
+docs: setup ## these docs as a site: out/site/index.html; ends at the first dead link
+	@$(BIN)/python -c "import mkdocstrings, material" 2>/dev/null || $(BIN)/pip install -q -e ".[docs]"
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo out/site/index.html
 
 format: setup ## format and fix what can be fixed
 	$(BIN)/ruff format .

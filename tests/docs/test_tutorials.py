@@ -1,0 +1,57 @@
+"""What the tutorials and pages show is true: commands run, Python runs, files are there."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.cli import MODULES, main
+
+REPO = Path(__file__).parents[2]
+PAGES = sorted((REPO / "docs").rglob("*.md"))
+
+
+def blocks(page: str) -> list[tuple[str, str]]:
+    """(language, text) of each fenced block of a page."""
+    text = (REPO / "docs" / page).read_text(encoding="utf-8")
+    return re.findall(r"^```(sh|python)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_every_line_of_the_researchers_tutorial_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    n_run = 0
+    for language, text in blocks("tutorials/researcher.md"):
+        if language == "python":
+            exec(compile(text, "researcher.md", "exec"), names)
+            n_run += 1
+            continue
+        for line in text.splitlines():
+            program, *words = shlex.split(line)
+            assert program == "pbrs-farm"
+            assert main(words) == 0, line
+            n_run += 1
+    assert n_run >= 12
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_page_shows_verbs_that_exist_and_no_folder_a_clone_lacks(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    known = {verb for verbs in MODULES.values() for verb in verbs}
+    for fence in re.findall(r"^```[a-z]*\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        for verb in re.findall(r"^(?:\.venv/bin/)?pbrs-farm ([a-z][a-z-]*)", fence, re.MULTILINE):
+            assert verb in known, verb
+    assert "../shared" not in text
+    for link in re.findall(r"\]\(([^)#:]+)\)", text):
+        assert (page.parent / link).exists(), link
+
+
+def test_every_page_stands_in_the_sites_navigation() -> None:
+    nav = (REPO / "mkdocs.yml").read_text(encoding="utf-8")
+    for page in PAGES:
+        assert f": {page.relative_to(REPO / 'docs')}" in nav, page
