@@ -34,6 +34,8 @@ OWN_TARGET: Final = {
     "farm": "farm.farm_cost",
     "hostile": "hostile",
     "loading": "study.loading",
+    "study": "study.study_figures",
+    "lived_in": "study.lived_in",
 }
 
 

@@ -112,7 +112,8 @@ _PAPER_EDGES = Plan(
 _H200: Final[dict[str, Any]] = {
     "name": "h200", "device": "cuda", "bf16": True, "checkpoint_every": 1000, "log_every": 100,
 }  # fmt: skip
-_TINY_NORMALS = Plan("tiny", "normals", "small")
+# Chord and strong changes of light were the better ones of seven short trials (docs/study.md).
+_TINY_NORMALS = Plan("tiny", "normals", "small", loss="chord", gain=0.4, gamma=0.4, tint=0.15)
 _TINY_CLASSES = Plan("tiny", "segmentation", "small", steps=1500)
 _TINY_EDGES = Plan(
     "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01
