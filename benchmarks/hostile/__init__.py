@@ -22,6 +22,7 @@ from benchmarks.hostile import (
     arch_cases,
     command_cases,
     container_cases,
+    crowd_cases,
     file_cases,
     gltf_cases,
     gltf_companion_cases,
@@ -42,13 +43,14 @@ from benchmarks.hostile.verdict import Verdict, judge
 MODULES: Final = (
     shape_cases, text_cases, file_cases, container_cases, plan_cases, model_cases, suncg_cases,
     arch_cases, gltf_cases, gltf_companion_cases, object_cases, command_cases, stored_cases,
-    mutation_cases,
+    mutation_cases, crowd_cases,
 )  # fmt: skip
 N_PROCESSES: Final = 2
 STRIDES: Final = {
     "suncg": 5, "stored": 8, "gltf": 5, "plan": 5, "mutation": 5, "set": 5, "shape": 2, "file": 4,
     "objects": 5, "model": 4, "text": 4, "xml": 4, "arch": 5, "cameras": 5, "words": 5, "zip": 4,
     "glb": 4, "rooms": 4, "classes": 4, "texture": 3, "mtl": 4,
+    "crowd": 1,
 }  # fmt: skip
 """Of a family of cases, every n-th is run unless all are asked for: what fits 12 minutes."""
 
