@@ -62,13 +62,21 @@ def _sheet(args: argparse.Namespace) -> int:
 def write_sheets(folder: Path, max_views: int) -> None:
     """Write sheet.png and index.html into an output folder and say where they are."""
     from pbrs_farm.gallery.contact_sheet import contact_sheet
-    from pbrs_farm.gallery.gallery_page import gallery
+    from pbrs_farm.gallery.gallery_page import gallery_pages
     from pbrs_farm.store.folder import FolderStore
 
     store = FolderStore(folder)
     store.put("sheet.png", contact_sheet(folder, max_views=max_views))
-    store.put("index.html", gallery(folder).encode())
-    echo(f"{folder / 'sheet.png'}\n{folder / 'index.html'}")
+    names = []
+    for name, html in gallery_pages(folder):
+        store.put(name, html.encode())
+        names.append(name)
+    # Pages of an earlier, larger gallery would show views that are gone.
+    for stale in folder.glob("index-*.html"):
+        if stale.name not in names and stale.stem.removeprefix("index-").isdigit():
+            stale.unlink()
+    more = f" ({len(names)} pages)" if len(names) > 1 else ""
+    echo(f"{folder / 'sheet.png'}\n{folder / 'index.html'}{more}")
 
 
 def _verify(args: argparse.Namespace) -> int:

@@ -101,20 +101,27 @@ def distribution(scores: F64, kept: Bools, threshold: float, title: str) -> Mark
     return frame.svg()
 
 
-def joint(colour: F64, depth: F64, limits: tuple[float, float]) -> Markup:
-    """Colour score against depth score: a cell is darker the more views it holds (log scale)."""
-    n = 50
-    cells, _, _ = np.histogram2d(colour, depth, bins=n, range=[[0, 1], [0, 1]])
+def joint(colour: F64, depth: F64, kept: Bools, limits: tuple[float, float]) -> Markup:
+    """Colour score against depth score: a cell is darker the more views it holds (log scale).
+
+    A cell that holds both is parted by their shares: a view refused for another reason than its
+    scores is not drawn as a kept one.
+    """
+    n, bounds = 50, [[0, 1], [0, 1]]
+    cells, _, _ = np.histogram2d(colour, depth, bins=n, range=bounds)
+    good, _, _ = np.histogram2d(colour[kept], depth[kept], bins=n, range=bounds)
     frame = PlotArea(460, 400, "Colour score against depth score")
     frame.axes("colour score", _TENTHS, _TENTHS)
     top = np.log1p(cells.max(initial=0)) or 1.0
     frame.box((limits[0], limits[1], 1, 1), "zone")  # where views are kept
     for i, j in zip(*np.nonzero(cells), strict=True):
-        inside = (i + 0.5) / n > limits[0] and (j + 0.5) / n > limits[1]
         # Darken by the logarithm: most cells hold few views.
-        opacity = 0.15 + 0.85 * np.log1p(cells[i, j]) / top
-        at = (i / n, j / n, (i + 1) / n, (j + 1) / n)
-        frame.box(at, "kept" if inside else "rejected", f"opacity:{opacity:.2f}")
+        style = f"opacity:{0.15 + 0.85 * np.log1p(cells[i, j]) / top:.2f}"
+        border = (i + good[i, j] / cells[i, j]) / n
+        if border > i / n:
+            frame.box((i / n, j / n, border, (j + 1) / n), "kept", style)
+        if border < (i + 1) / n:
+            frame.box((border, j / n, (i + 1) / n, (j + 1) / n), "rejected", style)
     for ends in ([(limits[0], 0), (limits[0], 1)], [(0, limits[1]), (1, limits[1])]):
         frame.line(ends, "limit")
     # Write the vertical axis's title upwards.

@@ -28,6 +28,7 @@ from pbrs_farm.curate.selection_summary import (
     PAPER_VIEWS,
     KeptCount,
     SelectionSummary,
+    good_scores,
     summary_of,
     yield_curve,
 )
@@ -64,7 +65,7 @@ def selection_report(
         fields=fields,
         reference=summary.reference,
         numbers=_numbers(summary),
-        charts=_charts(scored, summary, fields),
+        charts=_charts(table, scored, summary, fields),
         reasons=sorted(summary.reasons.items(), key=lambda pair: -pair[1]),
         room_types=_tally_table(summary.room_types),
         houses=_tally_table(summary.houses),
@@ -90,18 +91,22 @@ def _median(quartiles: Sequence[float]) -> str:
     return f"{quartiles[2]:.3f}" if quartiles else "–"
 
 
-def _charts(scored: Any, summary: SelectionSummary, fields: SelectionFields) -> dict[str, Markup]:
+def _charts(
+    table: Any, scored: Any, summary: SelectionSummary, fields: SelectionFields
+) -> dict[str, Markup]:
     colour, depth = (scored[k].to_numpy() for k in ("colour_score", "depth_score"))
     kept, limits = _is_kept(scored), (fields.min_colour, fields.min_depth)
+    # All curves count views of good quality, as a share of all views: as the card does.
+    good = good_scores(table)
     curves = (
         ("colour and depth", "both", summary.yield_both),
-        ("colour alone", "colour", yield_curve(colour)),
-        ("depth alone", "depth", yield_curve(depth)),
+        ("colour alone", "colour", yield_curve(good[0], summary.views)),
+        ("depth alone", "depth", yield_curve(good[1], summary.views)),
     )
     return {
         "colour": charts.distribution(colour, kept, limits[0], "colour score"),
         "depth": charts.distribution(depth, kept, limits[1], "depth score"),
-        "joint": charts.joint(colour, depth, limits),
+        "joint": charts.joint(colour, depth, kept, limits),
         "yields": charts.yields(curves, min(limits), (0.70, PAPER_KEPT / PAPER_VIEWS)),
     }
 

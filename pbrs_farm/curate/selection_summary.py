@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.compute as pc
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.core.record import Record
 from pbrs_farm.selection.binning import Binning, BinningRow
@@ -52,7 +54,8 @@ class SelectionSummary(Record):
     modes: dict[str, int]  # scored views by the lighting mode they were scored on
     colour_quartiles: tuple[float, ...]  # with minimum and maximum; empty without scores
     depth_quartiles: tuple[float, ...]
-    yield_both: tuple[float, ...]  # share with both scores above each of THRESHOLDS
+    # Share of all views that would be kept with both thresholds at each of THRESHOLDS, before caps.
+    yield_both: tuple[float, ...]
     houses: tuple[KeptCount, ...]
     room_types: tuple[KeptCount, ...]
     n_scored_houses: int = 0  # houses scored in this very run; not stored
@@ -85,19 +88,33 @@ def summary_of(
         modes={m["values"]: m["counts"] for m in sorted(modes, key=lambda m: str(m["values"]))},
         colour_quartiles=_quartiles(colour),
         depth_quartiles=_quartiles(depth),
-        yield_both=tuple(yield_curve(np.minimum(colour, depth))),
+        yield_both=tuple(yield_curve(np.minimum(*good_scores(judged)), judged.num_rows)),
         houses=_tallies(judged, "house"),
         room_types=_tallies(judged, "room_type"),
     )
 
 
-def yield_curve(scores: np.ndarray[Any, np.dtype[np.float64]]) -> list[float]:
-    """Share of scores above each of THRESHOLDS; zeros where there are no scores."""
+def good_scores(judged: Any) -> tuple[F64, F64]:
+    """Colour and depth scores of the views that nothing but thresholds, caps and balance can reject."""
+    of_quality = set(REASONS) - _OF_CHOICE
+    is_good = [
+        not of_quality.intersection(text.split(",")) for text in judged["reasons"].to_pylist()
+    ]
+    good = judged.filter(pa.array(is_good, pa.bool_()))
+    colour, depth = (good[k].drop_null().to_numpy() for k in ("colour_score", "depth_score"))
+    return colour, depth
+
+
+_OF_CHOICE: Final = {"unlike-colour", "unlike-depth", "room-cap", "class-balance"}
+
+
+def yield_curve(scores: F64, n_views: int) -> list[float]:
+    """Share of n_views whose score is above each of THRESHOLDS; zeros where there are no scores."""
     if not len(scores):
         return [0.0] * len(THRESHOLDS)
     # Count by sorting once: the scores above each threshold.
     above = len(scores) - np.searchsorted(np.sort(scores), THRESHOLDS, side="right")
-    return [round(float(n) / len(scores), 6) for n in above]
+    return [round(float(n) / n_views, 6) for n in above]
 
 
 def _quartiles(scores: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, ...]:

@@ -1,13 +1,14 @@
-"""The HTML gallery of a finished output folder: one file, no network. Effects: reads files.
+"""The HTML gallery of a finished output folder: pages of 5 MB at most, no network. Effects: reads files.
 
-Thumbnails are inside the file; a click shows the full picture, linked relative to the folder.
+Thumbnails are inside a page, so that one can be sent by mail; a click shows the full picture, linked
+relative to the folder.
 """
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
@@ -23,16 +24,42 @@ from pbrs_farm.gallery.templates import page
 from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 
 THUMBNAIL_PX: Final = 320  # longer edge
-# Of a thumbnail: 200 views of 9 tiles stay under 30 MB with base64's third on top.
-MAX_TILE_BYTES: Final = 11_000
+MAX_TILE_BYTES: Final = 11_000  # of a thumbnail
+MAX_PAGE_BYTES: Final = 5_000_000
+# Views of a page: nine tiles each, with base64's third on top and 6 kB of words, stay below the bound.
+PAGE_VIEWS: Final = 35
+
+
+def page_name(number: int) -> str:
+    """The file of a page, counted from 1."""
+    return "index.html" if number == 1 else f"index-{number}.html"
+
+
+def gallery_pages(folder: Path) -> Iterator[tuple[str, str]]:
+    """(file name, HTML) of each page, made one at a time. Raises BadInput as gallery."""
+    views, reasons = views_of(folder), reasons_of(folder)
+    n_pages = max(1, -(-len(views) // PAGE_VIEWS))
+    for number in range(1, n_pages + 1):
+        yield page_name(number), _page(folder, views, reasons, number, n_pages)
 
 
 def gallery(folder: Path) -> str:
-    """HTML of every view below folder (written as folder/index.html its links are right).
+    """HTML of the first page (written as folder/index.html its links are right).
 
     Raises BadInput if folder is no output folder. Full pictures are linked, never embedded.
     """
-    views, reasons = views_of(folder), reasons_of(folder)
+    return next(gallery_pages(folder))[1]
+
+
+def _page(
+    folder: Path,
+    every: Sequence[ViewEntry],
+    reasons: Mapping[tuple[str, str], str],
+    number: int,
+    n_pages: int,
+) -> str:
+    """HTML of one page; only its own pictures are read."""
+    views = every[(number - 1) * PAGE_VIEWS : number * PAGE_VIEWS]
     cards: list[dict[str, Any]] = []
     aspect = "4 / 3"
     for view in views:
@@ -42,11 +69,13 @@ def gallery(folder: Path) -> str:
         if not cards and shape is not None:
             aspect = f"{shape[1]} / {shape[0]}"
         cards.append(_card(folder, view, tiles, reasons.get((view.house.id, view.id))))
-    n_houses = len({view.house.id for view in views})
+    n_houses = len({view.house.id for view in every})
     return page(
         "pbrs_farm.gallery",
         "gallery.html",
-        title=f"{len(views)} views of {n_houses} house{'s'[: n_houses != 1]}",
+        title=f"{len(every)} views of {n_houses} house{'s'[: n_houses != 1]}",
+        number=number,
+        pages=[(k, page_name(k)) for k in _near_pages(number, n_pages)],
         aspect=aspect,
         houses=_options((view.house.id, view.house.name) for view in views),
         rooms=_options((view.room_name, view.room_name) for view in views),
@@ -55,6 +84,12 @@ def gallery(folder: Path) -> str:
         cards=cards,
         credits=attributions(views),
     )
+
+
+def _near_pages(number: int, n_pages: int) -> list[int]:
+    """The pages a page links to: the first, the last, and those around it; none of a single one."""
+    near = {1, n_pages, *range(number - 3, number + 4)}
+    return sorted(k for k in near if 1 <= k <= n_pages) if n_pages > 1 else []
 
 
 def attributions(views: Iterable[ViewEntry]) -> list[str]:

@@ -19,7 +19,7 @@ from pbrs_farm.selection.balance import balanced, class_shares
 
 # Why a view is rejected, in the order in which the first is named.
 REASONS: Final = (
-    "failed", "unscored", "too-dark", "blown", "one-surface", "inside-object", "too-few-objects",
+    "failed", "unscored", "black", "too-dark", "blown", "one-surface", "inside-object", "too-few-objects",
     "too-noisy", "missing-textures", "unlike-colour", "unlike-depth", "room-cap",
     "class-balance",
 )  # fmt: skip
@@ -62,6 +62,7 @@ def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, Bools]:
         return {
             "failed": failed,
             "unscored": unscored,
+            "black": number["brightness"] <= _BLACK,
             "too-dark": number["brightness"] < fields.min_brightness,
             "blown": number["blown"] > fields.max_blown,
             "one-surface": number["surface"] > fields.max_surface,
@@ -78,6 +79,10 @@ _NUMBERS: Final = (
     "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
     "colour_score", "depth_score",
 )  # fmt: skip
+
+_BLACK: Final = (
+    1.5 / 255
+)  # median luma of a picture in which nothing is seen, whatever the thresholds
 
 
 def _floats(scores: Any, name: str) -> F64:

@@ -120,3 +120,15 @@ def test_bin_colours_lie_in_their_own_bins() -> None:
     assert middle[3, 0, 1].tolist() == [224, 32, 192]
     grey = bin_colours((2, 2, 2), "ycbcr").reshape(2, 2, 2, 3)
     assert grey[1].mean() > grey[0].mean()
+
+
+def test_what_was_refused_is_not_drawn_in_the_colour_of_what_was_kept() -> None:
+    scores = np.array(
+        [0.9, 0.9, 0.9, 0.2]
+    )  # three in one cell above both limits, one refused there
+    kept = np.array([True, True, False, False])
+    drawn = str(charts.joint(scores, scores, kept, (0.7, 0.7)))
+    assert drawn.count('class="kept"') == 1
+    assert drawn.count('class="rejected"') == 2
+    none = str(charts.joint(scores, scores, np.zeros(4, bool), (0.7, 0.7)))
+    assert 'class="kept"' not in none

@@ -13,12 +13,13 @@ import pytest
 from PIL import Image
 
 from pbrs_farm import images
+from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.classes import NYU40_COLOURS
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.gallery import contact_sheet as sheet
+from pbrs_farm.gallery import gallery_page, lettering
 from pbrs_farm.gallery import label_colours as colours
-from pbrs_farm.gallery import lettering
 from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
 from pbrs_farm.gallery.view_tiles import TILES, Tile
 
@@ -107,6 +108,39 @@ def test_gallery_links_files_that_exist_and_nothing_outside(root: Path) -> None:
     assert not re.findall(r'(?:src|href)="(?:https?:)?//', html)
     assert "@import" not in html
     assert not re.findall("{{|{%|%}", html)
+
+
+def test_a_page_of_the_gallery_stays_below_five_megabytes(tmp_path: Path) -> None:
+    write_house(tmp_path, "a", ())
+    for k in range(2):
+        # Pure noise is the worst case there is.
+        write_view(tmp_path / f"houses/a/views/0_0_{k}", size=(480, 640))
+    of_a_view = len(gallery(tmp_path).encode()) / 2  # the page's own words counted with each
+    assert of_a_view * gallery_page.PAGE_VIEWS <= gallery_page.MAX_PAGE_BYTES
+    worst = gallery_page.PAGE_VIEWS * len(TILES) * (MAX_TILE_BYTES * 4 / 3 + 600)
+    assert worst <= gallery_page.MAX_PAGE_BYTES
+
+
+def test_the_gallery_has_as_many_pages_as_it_needs_and_links_them(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gallery_page, "PAGE_VIEWS", 2)
+    (root / "index-9.html").write_text("of an earlier, larger gallery")
+    write_sheets(root, 4)
+    pages = sorted(path.name for path in root.glob("index*.html"))
+    assert pages == ["index-2.html", "index.html"]
+    first, second = ((root / name).read_text() for name in ("index.html", "index-2.html"))
+    assert [html.count("<article") for html in (first, second)] == [2, 2]
+    assert 'href="index-2.html"' in first
+    assert 'href="index.html"' in second
+    assert "4 views of 2 houses" in second
+    # All views together, each once.
+    links = re.findall(r'href="([^"]+)/view.json"', first + second)
+    assert len(set(links)) == len(links) == 4
+
+
+def test_a_gallery_of_one_page_has_no_pages_to_turn(root: Path) -> None:
+    assert "<nav" not in gallery(root)
 
 
 def test_gallery_embeds_thumbnails_no_larger_than_320(tmp_path: Path) -> None:

@@ -41,6 +41,7 @@ def test_a_good_view_is_kept() -> None:
     [
         ({"colour_score": 0.69}, "unlike-colour"),
         ({"depth_score": 0.69}, "unlike-depth"),
+        ({"brightness": 0.0}, "black"),
         ({"brightness": 0.01}, "too-dark"),
         ({"blown": 0.9}, "blown"),
         ({"surface": 0.99}, "one-surface"),
@@ -59,6 +60,10 @@ def test_each_number_beyond_its_threshold_rejects_with_its_reason(
     assert judged["kept"] is False
     assert judged["reason"] == reason
     assert reason in REASONS
+
+
+def test_a_black_picture_is_refused_whatever_the_thresholds() -> None:
+    assert reasons({"brightness": 0.0}, {"brightness": 0.01}, min_brightness=0.0) == ["black", ""]
 
 
 def test_a_score_at_the_threshold_is_not_above_it() -> None:
