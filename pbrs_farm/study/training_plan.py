@@ -26,6 +26,7 @@ class Plan:
     width_px: int = 160
     height_px: int = 120
     n_classes: int = 40
+    enlarge: int = 1  # pictures times this before the network, its maps back after it
     encoding: str = (
         "centred"  # of colour: centred (0..1 less 128/255), caffe (BGR less means), imagenet
     )
@@ -67,7 +68,7 @@ class Plan:
     log_every: int = 10
 
     def __post_init__(self) -> None:
-        for name, least in (("batch", 1), ("steps", 1), ("accumulate", 1), ("width_px", 32),
+        for name, least in (("batch", 1), ("steps", 1), ("enlarge", 1), ("accumulate", 1), ("width_px", 32),
                             ("height_px", 32), ("zoom", 1), ("checkpoint_every", 1),
                             ("log_every", 1), ("rate_every", 1)):  # fmt: skip
             if getattr(self, name) < least:

@@ -99,9 +99,10 @@ def _judged(predictions: Iterable[NDArray[Any]], run: Trained, views: JudgedView
 
 
 def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
-    """What HED says that has seen BSDS500 alone, at the run's size."""
-    size = {"width_px": str(run.plan.width_px), "height_px": str(run.plan.height_px)}
-    plan = plan_of("boundaries", "tiny", size | {"network": "hed", "device": run.plan.device})
+    """What HED says that has seen BSDS500 alone; it knows pictures of 320 pixels and more."""
+    enlarge = str(max(1, round(320 / run.plan.width_px)))
+    fields = {"network": "hed", "enlarge": enlarge, "device": run.plan.device}
+    plan = plan_of("boundaries", "tiny", fields)
     network = network_of("hed", 1)
     start_from(network, "hed")
     return predicted(placed(network, plan), views.colour, run.task, plan, views.sizes)

@@ -27,7 +27,7 @@ from pbrs_farm.study.training_plan import Plan
 
 PLANE_TRUTH: Final = (
     "planes fitted to depth in windows of 1/40 of the width; mask: at least 60 % of the window on"
-    " one surface, within 0.6 % of its depth, not seen edge-on"
+    " one surface, within 1 % of its depth, not seen edge-on"
 )
 _FILES: Final = ("intrinsics.json", "intrinsics.txt")
 _MAX_BYTES: Final = 100_000

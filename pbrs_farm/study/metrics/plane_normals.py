@@ -24,7 +24,7 @@ class PlaneFit:
     radius: float = 0.0125  # of the window, as a share of the picture's width: 8 pixels of 640
     same_surface: float = 0.03  # a neighbour counts whose depth differs by less than this share
     least_share: float = 0.6  # of the window's samples that must count
-    most_residual: float = 0.006  # mean distance from the plane, as a share of depth
+    most_residual: float = 0.01  # mean distance from the plane, as a share of depth
     least_cosine: float = 0.15  # between normal and ray: planes seen edge-on are noise
 
 

@@ -60,7 +60,7 @@ def predicted(
         for at in range(0, len(colour), _BATCH):
             pictures = torch.from_numpy(colour[at : at + _BATCH]).to(device)
             with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
-                output = network(encoded(as_colour(pictures), plan.encoding)).float()
+                output = network_output(network, as_colour(pictures), plan).float()
             wanted = sizes[at : at + _BATCH]
             if all(size == tuple(output.shape[-2:]) for size in wanted):
                 yield from task.predictions(output)
@@ -73,6 +73,18 @@ def predicted(
                 yield from task.predictions(large)
     finally:
         network.train(was_training)
+
+
+def network_output(network: nn.Module, colour: torch.Tensor, plan: Plan) -> torch.Tensor:
+    """The network's map of colour (B, 3, H, W) 0..1, at that size; enlarged between where the plan says."""
+    size = colour.shape[-2:]
+    colour = encoded(colour, plan.encoding)
+    if plan.enlarge == 1:
+        return network(colour)
+    large = functional.interpolate(
+        colour, scale_factor=plan.enlarge, mode="bilinear", align_corners=False
+    )
+    return functional.adaptive_avg_pool2d(network(large), size)
 
 
 def as_colour(pictures: torch.Tensor) -> torch.Tensor:

@@ -15,7 +15,6 @@ import torch
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, PbrsError
-from pbrs_farm.study.networks.network_choice import encoded
 from pbrs_farm.study.tasks.task import Batch, Task
 from pbrs_farm.study.training.augmentation import augmented
 from pbrs_farm.study.training.checkpoint import (
@@ -25,7 +24,7 @@ from pbrs_farm.study.training.checkpoint import (
     save_weights,
 )
 from pbrs_farm.study.training.optimisers import optimiser_of, set_rate
-from pbrs_farm.study.training.prediction import as_colour, device_of, placed
+from pbrs_farm.study.training.prediction import as_colour, device_of, network_output, placed
 from pbrs_farm.study.training.run_folder import RunFolder, plan_digest
 from pbrs_farm.study.training.view_arrays import ViewArrays, rows_of_step
 from pbrs_farm.study.training_plan import Plan, rate_at
@@ -148,7 +147,7 @@ class _Loop:
         batch = augmented(batch, self.task, plan, torch.Generator().manual_seed(chance))
 
         with torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
-            output = self.model(encoded(batch["colour"], plan.encoding))
+            output = network_output(self.model, batch["colour"], plan)
         losses = self.task.loss(output, batch, plan)
         self._stop_at_nan(losses, [self.views.ids[k] for k in rows], step)
         loss = losses.mean()

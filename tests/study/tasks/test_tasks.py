@@ -9,7 +9,9 @@ import pytest
 import torch
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.networks.network_choice import network_of
 from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.training.prediction import network_output
 from tests.study.training.made_views import sample, small_plan, views
 
 pytestmark = pytest.mark.study
@@ -72,3 +74,13 @@ def test_the_truth_as_a_prediction_is_perfect(name: str) -> None:
 def test_a_task_that_is_none_is_refused() -> None:
     with pytest.raises(BadInput, match="no such task"):
         task_of("depth")
+
+
+def test_an_enlarged_picture_gives_a_map_of_its_own_size() -> None:
+    plan = small_plan("boundaries", enlarge="2")
+    network = network_of(plan.network, 1).eval()
+    colour = torch.rand(1, 3, 32, 40)
+    with torch.no_grad():
+        output = network_output(network, colour, plan)
+        plain = network_output(network, colour, small_plan("boundaries"))
+    assert output.shape == plain.shape == (1, 6, 32, 40)
