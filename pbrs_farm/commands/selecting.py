@@ -43,6 +43,8 @@ def add_verbs(verb: Verb) -> None:
     add("--per-room-cap", type=int, metavar="N", help="best views kept per room")
     add("--balance", choices=("none", "classes"), help="keep classes in balance")
     add("--report", action="store_true", help="write selection/<run>.html too")
+    text = "the photographs' folder, to show the nearest ones in the report"
+    add("--photographs", type=Path, metavar="FOLDER", help=text)
     add("--json", action="store_true", help="the summary as JSON")
     _add_photographs(p)
 
@@ -105,7 +107,8 @@ def _select(args: argparse.Namespace) -> int:
     if args.report:
         from pbrs_farm.curate.selection_report import selection_report
 
-        html = selection_report(store, reference, fields, run=args.run)
+        shown = _photograph_files(args.photographs or path)
+        html = selection_report(store, reference, fields, run=args.run, photographs=shown)
         store.put(keys.selection_key(args.run, "html"), html.encode())
     if args.json:
         echo_json(summary.model_dump(mode="json"))
@@ -113,6 +116,13 @@ def _select(args: argparse.Namespace) -> int:
     _echo_summary(summary)
     echo(keys.selection_key(args.run, "html" if args.report else "parquet"))
     return 0
+
+
+def _photograph_files(folder: Path) -> dict[str, Path]:
+    """Id -> picture of the photographs of a folder; none where it is a file."""
+    from pbrs_farm.curate.photographs import pairs_in
+
+    return {pair.id: pair.rgb for pair in pairs_in(folder)} if folder.is_dir() else {}
 
 
 def _echo_summary(summary: SelectionSummary) -> None:

@@ -6,7 +6,8 @@ The page needs no network and no script: charts are inline SVG, examples are sma
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm import images
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.arrays import F64, Bools, Srgb8Image
 from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import Mode
@@ -35,6 +36,7 @@ from pbrs_farm.curate.selection_summary import (
 from pbrs_farm.gallery.gallery_page import data_url, small_jpeg
 from pbrs_farm.gallery.label_colours import depth_colours
 from pbrs_farm.gallery.templates import page
+from pbrs_farm.regular_files import read_regular
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.reference_set import Reference
 from pbrs_farm.store.object_store import Store
@@ -45,18 +47,25 @@ _SHOWN_COLOURS: Final = 26  # fullest colour bins of a histogram
 
 
 def selection_report(
-    store: Store, reference: Reference, fields: SelectionFields, *, run: str = "default"
+    store: Store,
+    reference: Reference,
+    fields: SelectionFields,
+    *,
+    run: str = "default",
+    photographs: Mapping[str, Path] | None = None,
 ) -> str:
     """HTML of a run as it stands in the store; _N_EXAMPLES kept and as many rejected views are shown.
 
-    fields: the thresholds the run was judged with. Raises BadInput when there is no such run.
+    fields: the thresholds the run was judged with. photographs: id -> picture of the reference's
+    photographs, where the user has them: the nearest ones are shown beside each view. Raises
+    BadInput when there is no such run.
     """
     table = verdict_table(store, run)
     summary = summary_of(table, run, fields, reference)
     # Draw scored views only; count all of them.
     scored = table.filter(table["colour_score"].is_valid())
     shown = {"kept": _spread(scored, _N_EXAMPLES), "rejected": _rejected(scored, _N_EXAMPLES)}
-    examples = _Examples(store, reference, fields)
+    examples = _Examples(store, reference, fields, photographs or {})
     return page(
         "pbrs_farm.curate",
         "selection_report.html",
@@ -170,8 +179,15 @@ def _rejected(scored: Any, n: int) -> Any:
 class _Examples:
     """Cards of views with their histograms beside those of their nearest photographs."""
 
-    def __init__(self, store: Store, reference: Reference, fields: SelectionFields) -> None:
+    def __init__(
+        self,
+        store: Store,
+        reference: Reference,
+        fields: SelectionFields,
+        photographs: Mapping[str, Path],
+    ) -> None:
         self._store = store
+        self._photographs = photographs
         self._mode = Mode(fields.score_mode)
         # Look up photographs by their ids.
         self._binning = reference.facts.binning
@@ -183,7 +199,23 @@ class _Examples:
         """A row of verdicts with its pictures as data URLs and its histograms as charts."""
         layers = (row["mode"], "depth")
         pictures = [(layer, self._picture(row, layer)) for layer in layers]
-        return {"row": row, "pictures": pictures, "histograms": self._histograms(row)}
+        nearest = dict.fromkeys((row["colour_reference"], row["depth_reference"]))
+        neighbours = {name: self._neighbour(name) for name in nearest}
+        return {
+            "row": row, "pictures": pictures, "histograms": self._histograms(row),
+            "neighbours": neighbours,
+        }  # fmt: skip
+
+    def _neighbour(self, name: str) -> str:
+        """A photograph's thumbnail as a data URL, "" where it is not here or cannot be read."""
+        path = self._photographs.get(name)
+        try:
+            if path is None:
+                return ""
+            pixels = images.decode_photo(read_regular(path), str(path))
+        except (BadInput, OSError):
+            return ""
+        return _thumbnail_url(pixels)
 
     def _picture(self, row: dict[str, Any], layer: str) -> str:
         """The layer's thumbnail as a data URL, "" where it cannot be read."""
@@ -193,7 +225,7 @@ class _Examples:
         except (ObjectMissing, BadInput):
             return ""
         pixels = depth_colours(stored) if layer == "depth" else stored[..., :3].astype(np.uint8)
-        return data_url(small_jpeg(images.thumbnail(pixels, max_edge_px=320), 14_000), "jpeg")
+        return _thumbnail_url(pixels)
 
     def _histograms(self, row: dict[str, Any]) -> list[tuple[Markup | None, str]]:
         """(chart, nearest photograph) for colour and for depth; no chart where there are none."""
@@ -215,6 +247,10 @@ class _Examples:
         of_colour = colour[fullest], like_colour[fullest], "colour histograms", tuples
         drawn = charts.mirrored(*of_colour), charts.mirrored(depth, like_depth, "depth histograms")
         return list(zip(drawn, names, strict=True))
+
+
+def _thumbnail_url(pixels: Srgb8Image) -> str:
+    return data_url(small_jpeg(images.thumbnail(pixels, max_edge_px=320), 14_000), "jpeg")
 
 
 def bin_colours(bins: Iterable[int], space: str) -> NDArray[np.uint8]:

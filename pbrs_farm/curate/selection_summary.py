@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.core.record import Record
+from pbrs_farm.dress.space.room_kinds import named_kind
 from pbrs_farm.selection.binning import Binning, BinningRow
 from pbrs_farm.selection.reference_set import Reference
 from pbrs_farm.selection.verdicts import REASONS
@@ -90,7 +91,7 @@ def summary_of(
         depth_quartiles=_quartiles(depth),
         yield_both=tuple(yield_curve(np.minimum(*good_scores(judged)), judged.num_rows)),
         houses=_tallies(judged, "house"),
-        room_types=_tallies(judged, "room_type"),
+        room_types=_tallies(_with_types(judged), "room_type"),
     )
 
 
@@ -122,6 +123,15 @@ def _quartiles(scores: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, ..
     if not len(scores):
         return ()
     return tuple(round(float(q), 6) for q in np.percentile(scores, (0, 25, 50, 75, 100)))
+
+
+def _with_types(judged: Any) -> Any:
+    """The table with types of rooms for their names: "Bedroom 2" and "Chambre" are bedrooms."""
+    names = judged["room_type"].to_pylist()
+    kinds = {name: named_kind(name or "") for name in set(names)}
+    column = [kind.value if (kind := kinds[name]) else "" for name in names]
+    at = judged.schema.get_field_index("room_type")
+    return judged.set_column(at, "room_type", pa.array(column, pa.string()))
 
 
 def _tallies(judged: Any, column: str) -> tuple[KeptCount, ...]:

@@ -265,6 +265,24 @@ def test_select_by_a_reference_that_was_built_writes_the_run_and_its_report(
     assert "<h1>Selection “low”</h1>" in (root / "selection/low.html").read_text()
 
 
+def test_the_report_shows_the_nearest_photographs_where_they_are(
+    root, photographs, tmp_path, capsys
+):
+    words = ("select", str(root), "--reference", str(photographs), *LOW, "--report")
+    printed(capsys, *words, "--run", "here")
+    html = (root / "selection/here.html").read_text()
+    assert 'alt="photograph p' in html
+    # From a file of histograms alone there is nothing to show, unless the folder is named.
+    reference = tmp_path / "photographs.npz"
+    bins = ("--set", "histogram.colour_bins=4", "--set", "histogram.depth_bins=16")
+    printed(capsys, "reference", "build", str(photographs), "--out", str(reference), *bins)
+    words = ("select", str(root), "--reference", str(reference), *LOW, "--report", "--run", "npz")
+    printed(capsys, *words)
+    assert 'alt="photograph' not in (root / "selection/npz.html").read_text()
+    printed(capsys, *words, "--photographs", str(photographs))
+    assert 'alt="photograph p' in (root / "selection/npz.html").read_text()
+
+
 def test_select_takes_photographs_and_options_and_prints_json(root, photographs, capsys):
     words = ("select", str(root), "--reference", str(photographs), *LOW, "--json")
     options = ("--per-room-cap", "1", "--balance", "none", "--score-mode", "mlt_ol")

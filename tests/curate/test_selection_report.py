@@ -8,13 +8,14 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from pbrs_farm import images
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import SelectionFields
-from pbrs_farm.curate import charts
+from pbrs_farm.curate import charts, selection_summary
 from pbrs_farm.curate import selection_run as selecting
 from pbrs_farm.curate.selection_report import bin_colours, selection_report
 from pbrs_farm.store import MemoryStore
@@ -132,3 +133,9 @@ def test_what_was_refused_is_not_drawn_in_the_colour_of_what_was_kept() -> None:
     assert drawn.count('class="rejected"') == 2
     none = str(charts.joint(scores, scores, np.zeros(4, bool), (0.7, 0.7)))
     assert 'class="kept"' not in none
+
+
+def test_room_types_are_types_whatever_rooms_are_called() -> None:
+    names = ["Bedroom 2", "Chambre", "Kitchen", "Room 7", None]
+    table = selection_summary._with_types(pa.table({"room_type": pa.array(names, pa.string())}))
+    assert table["room_type"].to_pylist() == ["bedroom", "bedroom", "kitchen", "", ""]

@@ -102,6 +102,11 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
     return RoomKind.HALL if area_m2 < _LARGE_M2 else RoomKind.OTHER
 
 
+def named_kind(name: str) -> RoomKind | None:
+    """What a room of that name is for; None where the name does not say."""
+    return _named(name)
+
+
 @lru_cache(1024)
 def _named(said: str) -> RoomKind | None:
     words = set(re.findall(r"[^\W\d]+", _folded(said)))
