@@ -29,6 +29,21 @@ def surface_points(corners: F64, spacing_m: float = SPACING_M) -> F64:
         return np.zeros((0, 3))
     area = float(np.linalg.norm(area_vectors(corners), axis=1).sum()) / 2
     spacing_m = max(spacing_m, float(np.sqrt(area / _MOST_POINTS)))
+    # The middle stands for a small triangle.
+    low, high = triangle_bounds(corners)
+    size = high - low
+    is_small = np.maximum(np.maximum(size[:, 0], size[:, 1]), size[:, 2]) < spacing_m / 2
+    middles = corners[is_small].sum(1) / 3
+    points = np.concatenate([middles, _laid_over(corners[~is_small], spacing_m)])
+    # Fine meshes have many points in one place.
+    cube = np.floor((points - points.min(0)) / (spacing_m / 2)).astype(np.int64)
+    cells = cube.max(0) + 1
+    keys = (cube[:, 0] * cells[1] + cube[:, 1]) * cells[2] + cube[:, 2]
+    return np.asarray(points[_first_of_each(keys, int(cells.prod()))])
+
+
+def _laid_over(corners: F64, spacing_m: float) -> F64:
+    """(N, 3) the middles of cells of about spacing_m of a grid over each of the triangles."""
     # Turn each triangle so that its longest edge is the base, the apex opposite.
     lengths = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=2)
     first = lengths.argmax(1)
@@ -44,12 +59,7 @@ def surface_points(corners: F64, spacing_m: float = SPACING_M) -> F64:
     k = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
     u = ((k % n_u[of] + 0.5) / n_u[of])[:, None]
     v = ((k // n_u[of] + 0.5) / n_v[of])[:, None]
-    points = (a[of] * (1 - u) + b[of] * u) * (1 - v) + c[of] * v
-    # Fine meshes have many points in one place.
-    cube = np.floor((points - points.min(0)) / (spacing_m / 2)).astype(np.int64)
-    size = cube.max(0) + 1
-    keys = (cube[:, 0] * size[1] + cube[:, 1]) * size[2] + cube[:, 2]
-    return np.asarray(points[_first_of_each(keys, int(size.prod()))])
+    return np.asarray((a[of] * (1 - u) + b[of] * u) * (1 - v) + c[of] * v)
 
 
 def _first_of_each(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:

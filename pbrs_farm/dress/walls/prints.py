@@ -20,7 +20,7 @@ Palette = tuple[Rgb, ...]  # paper first, then from calm to loud
 Family = Callable[[np.random.Generator, Size, Palette], F32]
 
 _NONE: Mapping[str, int] = MappingProxyType({})
-EDGE_PX = 448  # the longer edge of a picture
+EDGE_PX = 400  # the longer edge of a picture
 _WORDS = (
     "home", "slow down", "be kind", "breathe", "less is more", "dream", "hello", "good things",
     "coffee first", "eat well", "stay wild", "paris", "tokyo", "lisboa", "havana", "rest",
@@ -71,16 +71,17 @@ def _grid(size: Size) -> tuple[F32, F32]:
 def _noise(rng: np.random.Generator, size: Size, beta: float, stretch: float = 1.0) -> F32:
     """(H, W) noise of mean 0 and deviation 1 with a spectrum k^-beta; stretch > 1: longer along u."""
     fy, fx = np.fft.fftfreq(size[1])[:, None], np.fft.rfftfreq(size[0])[None]
-    k = np.hypot(fy * size[1], fx * size[0] * stretch)
+    k = np.hypot(fy * size[1], fx * size[0] * stretch).astype(np.float32)
     k[0, 0] = 1.0
-    spectrum = np.fft.rfft2(rng.standard_normal((size[1], size[0]))) * k**-beta
+    white = rng.standard_normal((size[1], size[0]), np.float32)
+    spectrum = np.fft.rfft2(white) * k ** np.float32(-beta)
     spectrum[0, 0] = 0.0
     field = np.fft.irfft2(spectrum, s=(size[1], size[0]))
     return np.asarray(field / max(float(field.std()), 1e-9), np.float32)
 
 
 def _mixed(a: F32 | Rgb, b: F32 | Rgb, t: F32 | F64) -> F32:
-    w = t[..., None]
+    w = t.astype(np.float32)[..., None]
     return np.asarray(
         np.asarray(a, np.float32) * (1 - w) + np.asarray(b, np.float32) * w, np.float32
     )
