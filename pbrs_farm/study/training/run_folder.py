@@ -60,6 +60,10 @@ class RunFolder:
             raise BadInput(path, "", "not the record of a run")
         return row
 
+    def is_finished(self) -> bool:
+        """The folder holds a run that is finished."""
+        return (self.root / "run.json").exists() and self.record()["state"] == FINISHED
+
     def begin(self, row: dict[str, Any]) -> bool:
         """Write the record of a run that begins or goes on; False where it is finished already.
 

@@ -57,8 +57,8 @@ def train(
     network = network_of(plan.network, task.n_out(plan))
     origin = start_from(network, job.init)
     row = _record(job, views, held_out, origin) | {"weights": n_weights(network)}
-    if share.is_first and not folder.begin(row):
-        return folder.figures()
+    if not (folder.begin(row) if share.is_first else not folder.is_finished()):
+        return folder.figures() if share.is_first else {}
     try:
         network = train_network(
             network, views, task, plan,
