@@ -36,6 +36,7 @@ OWN_TARGET: Final = {
     "loading": "study.loading",
     "study": "study.study_figures",
     "lived_in": "study.lived_in",
+    "board": "board.board_pages",
 }
 
 

@@ -132,9 +132,8 @@ class Queries:
         n_pages = max(1, -(-n_rows // VIEWS_PER_PAGE))
         number = min(wanted.page, n_pages)
         # Find the page's keys first, which an index holds, then read those rows alone.
-        join = _JOIN if "h." in where else ""
         found = self._index.rows(
-            f"{_VIEW} WHERE (v.house, v.id) IN (SELECT v.house, v.id FROM view v{join} {where}"
+            f"{_VIEW} WHERE (v.house, v.id) IN (SELECT v.house, v.id FROM view v {where}"
             " ORDER BY v.house, v.id LIMIT ? OFFSET ?) ORDER BY v.house, v.id",
             (*values, VIEWS_PER_PAGE, (number - 1) * VIEWS_PER_PAGE),
         )
@@ -161,7 +160,7 @@ class Queries:
 
     def homes(self, words: str, number: int) -> Page[ListedHome]:
         """The homes of a page, by name. words: part of a name or id."""
-        where = "WHERE (name || ' ' || id) LIKE ? ESCAPE '\\'" if words else ""
+        where = f"WHERE {_NAMED}" if words else ""
         values = (_pattern(words),) if words else ()
         n_rows = self._index.rows(f"SELECT count(*) AS n FROM house {where}", values)[0]["n"]
         n_pages = max(1, -(-n_rows // HOMES_PER_PAGE))
@@ -193,8 +192,7 @@ class Queries:
         )  # fmt: skip
 
     def _counted(self, where: str, values: tuple[Any, ...], _generation: int) -> int:
-        join = _JOIN if "h." in where else ""
-        sql = f"SELECT count(*) AS n FROM view v{join} {where}"
+        sql = f"SELECT count(*) AS n FROM view v {where}"
         return int(self._index.rows(sql, values)[0]["n"])
 
     def _menus(self, _generation: int) -> dict[str, list[tuple[str, str]]]:
@@ -224,7 +222,7 @@ class Queries:
         }
 
 
-_JOIN: Final = " JOIN house h ON h.id = v.house"
+_NAMED: Final = "(name || ' ' || id) LIKE ? ESCAPE '\\'"
 _VIEW: Final = (
     "SELECT v.*, h.name AS house_name, h.fingerprint AS fingerprint"
     " FROM view v JOIN house h ON h.id = v.house"
@@ -272,8 +270,10 @@ def _where(wanted: ViewFilter) -> tuple[str, tuple[Any, ...]]:
     if wanted.warned:
         add("v.warnings != '[]'" if wanted.warned == "1" else "v.warnings = '[]'")
     if wanted.words:
-        text = "(h.name || ' ' || v.house || ' ' || v.id || ' ' || v.room) LIKE ? ESCAPE '\\'"
-        add(text, _pattern(wanted.words))
+        # Match each home's name once, not once a view.
+        homes = f"SELECT id FROM house WHERE {_NAMED}"
+        views = "v.id LIKE ? ESCAPE '\\' OR v.room LIKE ? ESCAPE '\\'"
+        add(f"(v.house IN ({homes}) OR {views})", *[_pattern(wanted.words)] * 3)
     return ("WHERE " + " AND ".join(tests) if tests else ""), tuple(values)
 
 
