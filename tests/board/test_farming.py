@@ -117,6 +117,13 @@ def test_a_change_is_asked_confirmed_done_and_written_down(
     assert "paused" in client.get("/farm").text
 
 
+def test_of_a_job_that_is_over_nothing_is_to_come(farm: Farm, drive: Drive) -> None:
+    assert LiveFarm(farm).now().jobs[0]["eta_s"] is not None
+    farm.cancel(drive.job.job_id)
+    (row,) = LiveFarm(farm).now().jobs
+    assert (row["eta_s"], row["slot_hours_left"]) == (None, 0.0)
+
+
 def test_failed_tasks_are_retried(client: httpx.Client, farm: Farm, drive: Drive) -> None:
     log_in(client)
     assert do(client, "retry", drive.job.job_id).status_code == 303

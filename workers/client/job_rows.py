@@ -22,6 +22,8 @@ def job_rows(farm: Farm) -> list[dict[str, Any]]:
 def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
     """A job's row. slot_hours: spent by tasks that are done; slot_hours_left: expected."""
     stages = stage_views(view, slots)
+    # Of a job that is over nothing is to come, though tasks behind failed ones were never run.
+    is_over = view.state not in ("loading", "running", "paused")
     left_s = sum(s.mean_s * max(0, s.total - s.done - s.failed) for s in stages)
     seconds = sum(n for name, n in view.counts.items() if name.startswith("seconds:"))
     return {
@@ -33,10 +35,12 @@ def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
         "houses_done": int(view.counts.get("houses:done", 0)),
         "views": int(view.counts.get("views", 0)),
         "views_per_h": round(3600 * _views_per_s(view, stages), 1),
-        "eta_s": max((s.eta_s for s in stages if s.eta_s is not None), default=None),
+        "eta_s": None
+        if is_over
+        else max((s.eta_s for s in stages if s.eta_s is not None), default=None),
         "failed": view.n_failed,
         "slot_hours": round(seconds / 3600, 4),
-        "slot_hours_left": round(left_s / 3600, 4),
+        "slot_hours_left": 0.0 if is_over else round(left_s / 3600, 4),
         "done": sum(s.done for s in stages),
         "running": sum(s.running for s in stages),
         "tasks": sum(s.total for s in stages),

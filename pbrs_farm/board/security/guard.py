@@ -22,7 +22,7 @@ from pbrs_farm.board.security.sessions import COOKIE, Sessions
 
 LOGIN: Final = "/login"
 _READS: Final = ("GET", "HEAD")
-_OPEN: Final = ("/static/", LOGIN)  # readable by everybody who may reach the board
+_OPEN: Final = ("/static/", "/health", LOGIN)  # readable by everybody who may reach the board
 _CSP: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:;"
     " connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"

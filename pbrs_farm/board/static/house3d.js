@@ -131,7 +131,7 @@ class HousePage {
     const bounds = new THREE.Box3();
     for (const [room, group] of this.rooms) if (room !== null || this.rooms.size === 1) bounds.expandByObject(group);
     const size = bounds.getSize(new THREE.Vector3());
-    this.orbit.look(bounds.getCenter(new THREE.Vector3()), Math.max(4, 1.15 * Math.hypot(size.x, size.z)));
+    this.orbit.look(bounds.getCenter(new THREE.Vector3()), Math.max(4, 1.25 * Math.hypot(size.x, size.z)));
   }
 
   #resize() {
