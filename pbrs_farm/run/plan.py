@@ -37,7 +37,7 @@ _VIEW_READS: Final = ("cameras", "truth", "opengl_dl", "opengl_il", "light", "de
 STEPS: Final = {
     step.name: step
     for step in (
-        Step("house", 3, ("read", "repair"), per_view=False),
+        Step("house", 4, ("read", "repair"), per_view=False),
         Step("cameras", 1, ("cameras",), ("house",), per_view=False),
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
