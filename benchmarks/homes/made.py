@@ -88,11 +88,8 @@ def _of_plans(rows: Rows, again: dict[int, str]) -> dict[str, Any]:
     seconds = np.array([r["seconds"] for r in fine])
     areas = [(kind, area) for r in fine for kind, area in r["areas"]]
     errors = {
-        f"{kind.value} {median}": float(
-            np.median([a for k, a in areas if k == kind.value]) / median - 1
-        )
-        for kind, medians in MEDIANS.items()
-        for median in medians
+        kind.value: float(np.median([a for k, a in areas if k == kind.value]) / median - 1)
+        for kind, median in MEDIANS.items()
     }
     print("   area errors", {kind: round(error, 3) for kind, error in errors.items()})
     return {

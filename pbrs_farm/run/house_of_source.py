@@ -10,7 +10,7 @@ from dataclasses import replace
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import made_homes
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.source import SourceRef, check_unchanged, read_house
+from pbrs_farm.read.source import SourceRef, check_unchanged, home_id, read_house
 from pbrs_farm.run.dress_catalogue import catalogue_of_words
 
 _MADE_BY = "home: made by pbrs_farm, CC0"
@@ -32,4 +32,4 @@ def _made_house(source: SourceRef, fields: ReadFields) -> House:
     house = read_home(data, f"{home.name}.sh3d", fields=fields)
     credit = house.source.attribution.replace("pbrs_farm", _MADE_BY, 1)
     its_source = replace(house.source, kind="made", file=source.location, attribution=credit)
-    return replace(house, id=source.house_id.split("-d")[0], source=its_source)
+    return replace(house, id=home_id(source), source=its_source)

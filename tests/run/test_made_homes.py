@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.read.source import resolve
+from pbrs_farm.read.source import resolve, variants
 from pbrs_farm.run.house_of_source import house_of_source
 from pbrs_farm.run.steps import repaired_house
 
@@ -17,6 +17,14 @@ def test_the_house_of_a_seed_has_the_id_its_word_gave() -> None:
     assert house.id.startswith("made-5-")
     assert house.source.kind == "made"
     assert "pbrs_farm" in house.source.attribution
+
+
+def test_a_home_whose_digest_begins_with_a_d_keeps_its_id_when_it_is_dressed() -> None:
+    # Ids of dressed homes end in -d<seed>.
+    words = (f"made:{seed}{BARE}" for seed in range(1, 200))
+    source = next(s for s in map(resolve, words) if "-d" in s.house_id)
+    for one in (source, *variants(source, [3])):
+        assert house_of_source(one, Recipe().read).id == source.house_id
 
 
 def test_a_made_home_is_repaired_without_leaks() -> None:
