@@ -99,6 +99,7 @@ def upload_catalogue(store: Store, recipe: Recipe) -> Recipe:
     catalogue_of(recipe.dress)
     if GENERATED not in recipe.dress.catalogue.split(":"):
         _upload_package(store, furniture_package.PACKAGE)
+    # placed: key in the store -> local path; what maps to itself stays where it is.
     placed = placed_catalogue(recipe.dress.catalogue)
     for key, path in placed.items():
         if key != path:
@@ -168,6 +169,7 @@ def _expanded(word: str) -> list[str]:
 def _placed(ref: SourceRef) -> SourceRef:
     """The source as workers find it: a single file by its key in the store."""
     path = Path(ref.location)
+    # glTF with files beside it cannot travel as one object.
     has_side_files = ref.kind == "gltf" and bool(ref.companions)
     if (
         has_side_files

@@ -130,6 +130,7 @@ class Tally:
             },
             failures=tuple(line for lines in self._listed.values() for line in lines),
             notes=tuple(self.notes),
+            # The pairs that share the most pixels come first.
             coincident=tuple(
                 Coincidence(house=house, items=(a, b), pixels=n)
                 for (house, a, b), n in sorted(

@@ -36,6 +36,7 @@ def check_darkness(
         what = f"all light together leaves nine tenths of it below {_BLACK_CD_M2:g} cd/m2"
         is_bright = _ninth_tenth(level, valid > 0) >= _BLACK_CD_M2
         tally.expect("black pictures", view.place, is_bright, what)
+    # A dark room is told of, not failed.
     room = str(view.table.get("room", ""))
     lux = _lux_of_rooms(view.folder.parent.parent / "illuminance.json").get(room)
     if lux is not None and lux < _DARK_LX:
@@ -51,6 +52,7 @@ def _luminance(
     planes = [channels[name] for name in names if name in channels]
     if len(planes) < len(names) or any(p.shape != shape for p in planes):
         return None
+    # Both light groups add up; what is no number counts as black.
     level = np.zeros(shape)
     for plane, share in zip(planes, 2 * _LUMINANCE, strict=True):
         level += _LM_PER_W * share * np.nan_to_num(plane)

@@ -111,11 +111,13 @@ def _fill_one_place(
     """(N,) of the chosen pixels, those whose ray pierces two parallel triangles in one place."""
     triangles, rays = scene
     found = np.zeros(len(first), bool)
+    # Only pixels where both rays hit something, and not the same triangle.
     both = chosen & (first >= 0) & (other >= 0) & (first != other)
     for k in np.nonzero(both)[0]:
         pair, ray = np.array([first[k], other[k]]), directions[k]
         normals = rays.normal(pair, np.stack([ray, ray]))
         t = _pierced(triangles, pair, origin, ray)
+        # One place: parallel, and closer along the normal than a tie may be.
         if np.isfinite(t).all() and abs(normals[0] @ normals[1]) >= _PARALLEL:
             found[k] = abs(t[0] - t[1]) * abs(normals[0] @ ray) <= TIE_DEPTH_M
     return found

@@ -51,6 +51,7 @@ def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False)
     if not houses:
         raise BadInput(folder, "houses/", "no houses here", hint="give the folder of --out")
     tally, n_views = Tally(), 0
+    # None is every pixel.
     n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)
     check_root_manifest(folder, houses, tally)
     for house in houses:
@@ -97,6 +98,7 @@ def _check_view(
     arrays = read_labels(view, tally)
     if arrays is None:
         return None
+    # From cheap to dear: whole pictures, layers against each other, rays.
     check_pictures(view, arrays, tally)
     check_consistency(view, arrays, tally)
     check_planes(view, arrays, tally)

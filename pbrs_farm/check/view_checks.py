@@ -42,6 +42,7 @@ def _read(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | None:
     except (BadInput, KeyError) as error:
         tally.expect("layers", place, False, str(error))
         return None
+    # Vectors and colours have a third axis of 3, every other layer two axes.
     shape = (*view.size, 3) if layer.channels in ("RGB", "X Y Z") else view.size
     fits = array.shape == shape and str(array.dtype) == layer.dtype
     what = f"{array.shape} {array.dtype}, expected {shape} {layer.dtype}"
@@ -64,6 +65,7 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
         if layer.step != "truth" and layer.name in arrays:
             picture = arrays[layer.name]
             constant = bool((picture == picture[0, 0]).all())
+            # Developed modes may be black, and so may any picture of a view that sees nothing.
             may_be = layer.step == "develop" or not arrays["valid"].any()
             place = f"{view.place}/{layer.file}"
             tally.expect("pictures", place, not constant or may_be, "is one colour")
@@ -139,6 +141,7 @@ def _check_optional(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Ta
     if "boundary_semantic" in arrays:
         edges = np.where(_boundary(semantic), 255, 0)
         _same(view, tally, "boundary_semantic", arrays["boundary_semantic"] == edges)
+    # Edge layers hold 0 where there is no edge, and a value for each kind of edge.
     for name, values in (("boundary_occlusion", (0, 128, 255)), ("boundary_crease", (0, 255))):
         if name in arrays:
             _same(view, tally, name, np.isin(arrays[name], values))

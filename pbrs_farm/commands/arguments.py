@@ -80,6 +80,7 @@ def dress_seeds(text: str | None) -> tuple[int, ...]:
     """The seeds of --dress, each once; none where it is not given. Raises BadInput."""
     if text is None:
         return ()
+    # A dict keeps the order in which seeds are named; MAX_SEEDS bounds each range.
     seeds: dict[int, None] = {}
     for word in text.split(","):
         first, dots, last = word.partition("..")

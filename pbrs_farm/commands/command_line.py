@@ -72,6 +72,7 @@ def verb_first(
 
     parser_of: a verb's parser, which says how many words each of its options takes.
     """
+    # A word is the verb only where all before it are options of its own with their values.
     if words and words[0].startswith("-"):
         for at, word in enumerate(words):
             if word in verbs and _are_options(words[:at], parser_of(word)):

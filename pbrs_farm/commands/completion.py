@@ -51,6 +51,7 @@ def _bash_script(verbs: Mapping[str, argparse.ArgumentParser]) -> str:
 
 
 def _bash_case(pattern: str, words: list[str], then: str = "") -> str:
+    # compgen keeps the words that begin with what is typed.
     reply = f'COMPREPLY=($(compgen -W {shlex.quote(" ".join(words))} -- "$word"))'
     return f"    {pattern}) {reply}{f'; {then}' if then else ''} ;;"
 
@@ -63,6 +64,7 @@ def _fish_lines(verbs: Mapping[str, argparse.ArgumentParser]) -> Iterator[str]:
         of_verb = f"{start} -n '__fish_seen_subcommand_from {verb}'"
         values = dict(_option_choices(parser))
         for option in _options(parser):
+            # -x: nothing but these words may follow the option, no file names.
             known = f" -x -a {shlex.quote(' '.join(values[option]))}" if option in values else ""
             yield f"{of_verb} -l {option.removeprefix('--')}{known}"
         if arguments := _arguments(verb, parser):
@@ -79,6 +81,7 @@ def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list
     from pbrs_farm.core.lighting import ALL_MODES
     from pbrs_farm.core.recipe import RECIPE_NAMES
 
+    # Options that take lists declare no choices of their own.
     known = {
         "--recipe": list(RECIPE_NAMES),
         "--modes": [mode.value for mode in ALL_MODES],

@@ -118,12 +118,14 @@ def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dic
     from pbrs_farm.run.steps import repaired_house
     from pbrs_farm.run.view_pairs import pairs
 
+    # The same recipe without dressing gives the home as it was drawn.
     undressed = recipe.model_copy(update={"dress": type(recipe.dress)()})
     bare, _report = repaired_house(resolve(args.home), undressed)
     doing(args.home, "before and after")
     files = {}
     for n, pair in enumerate(pairs(bare, house, recipe, args.views)):
         caption = f"{house.name}, view {pair.view.id}, bare and dressed"
+        # Licences of homes ask for credit wherever a picture is shown.
         caption = "; ".join(t for t in (caption, house.source.attribution) if t)
         name = f"before_after{f'_{n + 1}' if n else ''}.png"
         files[name] = before_after_png(pair.before, pair.after, caption)

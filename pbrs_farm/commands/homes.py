@@ -85,6 +85,7 @@ def _make(args: argparse.Namespace) -> int:
     homes, programme = _asked_for(args)
     if not args.empty:
         catalogue_here()
+    # Homes come in the order of their seeds; say how far it is every _SAY_EVERY_S seconds.
     started = said = time.monotonic()
     n_new = 0
     _folder(args.out)
@@ -97,6 +98,7 @@ def _make(args: argparse.Namespace) -> int:
         if time.monotonic() - said > _SAY_EVERY_S:
             said = time.monotonic()
             echo(f"{number} of {len(homes)} homes")
+    # What is neither new nor failed was there from a former run.
     kept = len(homes) - n_new - len(failed)
     text = f"{counted(n_new, 'home')} made in {time.monotonic() - started:.0f} s"
     echo(text + (f", {kept} kept" if kept else "") + f": {args.out / 'plans.html'}")
@@ -110,6 +112,7 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     from pbrs_farm.generate.made import made_of_plan
     from pbrs_farm.generate.own_plan import plan_from_file
 
+    # The plan decides the rooms, so wishes about rooms contradict it.
     given = [f"--{k}" for k in ("rooms", "area", "programme") if getattr(args, k)]
     if given:
         raise BadInput("--plan", str(args.plan), f"leaves no choice of {given[0]}")

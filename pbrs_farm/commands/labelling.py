@@ -56,6 +56,7 @@ def _export(args: argparse.Namespace) -> int:
     from pbrs_farm.export.chosen_view import Choice
     from pbrs_farm.export.export_views import export
 
+    # None is all there is: layers (but radiance), modes, the stored size.
     choice = Choice(
         layers=tuple(args.layers) if args.layers else None,
         modes=tuple(args.modes) if args.modes else None,

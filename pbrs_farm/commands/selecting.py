@@ -79,6 +79,7 @@ def _reference(args: argparse.Namespace) -> int:
 
     recipe = recipe_from_name("fast", _overrides(args.set))
     reference = _built(args, args.source, recipe.histogram, recipe.selection)
+    # Through a store, so that the file appears whole or not at all.
     store = FolderStore(args.out.parent)
     store.put(args.out.name, bytes_from_reference(reference))
     store.tidy()

@@ -51,12 +51,14 @@ def _board(args: argparse.Namespace) -> int:
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 
+    # Refuse what cannot be shown before a port is taken.
     root = args.root or os.environ.get("PBRS_STORE", "")
     if not root:
         raise BadInput("board", "", "nothing to show", hint="pbrs-farm board OUT, or PBRS_STORE")
     if "://" not in root and not Path(root).is_dir():
         raise BadInput(root, "", "no such folder", hint="the folder of --out, or a store's URL")
     token = _token(args.token_file) if args.token_file else new_token()
+    # Bind first: only then is the port known that 0 stands for, and the address holds it.
     listening = bound_socket(args.host, args.port)
     options = BoardOptions(
         cache=args.cache or default_cache(),

@@ -104,6 +104,7 @@ def _train(args: argparse.Namespace) -> int:
     n_held = len(held_out) if held_out else 0
     echo(f"{len(views)} views of {len(views.homes)} homes, {n_held} of others held out")
     job = Job(plan, args.out, args.seed, "+".join(args.modes), source.name, args.init)
+    # Tell about twenty times a run, at steps that are logged anyway.
     every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
 
     def tell(row: dict[str, float]) -> None:
@@ -163,10 +164,12 @@ def _ablation(args: argparse.Namespace) -> int:
 
     at_least("--seeds", args.seeds, 1)
     plan, common = _plan(args, args.task), Source((), (), _hold_out(args), most=args.views)
+    # A set of training views a row; all rows share plan, seeds and held-out homes.
     sets = training_sets(args.root, args.modes, common)
     if args.objects:
         objects = Source((args.objects,), ("mlt_il_ol",), frozenset(), True, args.views)
         sets = (*sets, TrainingSet("objects", objects))
+    # No row may be judged on homes that any of the rows trains on.
     trained_on = homes_that_train([each.source for each in sets])
     judged_on = [
         judged_place(word, plan, mode="mlt_il_ol", trained_on=trained_on, hold_out=common.hold_out)

@@ -70,6 +70,7 @@ def is_made(word: str) -> bool:
 
 def made_homes(word: str) -> list[MadeHome]:
     """The homes of a word, one a seed. Raises BadInput for a word that names none."""
+    # made:FIRST..LAST,key=value,...
     seeds, *options = word.removeprefix(PREFIX).split(",")
     first, last = _range(word, seeds, MAX_SEED)
     if last - first >= MAX_HOMES:

@@ -208,6 +208,7 @@ class NyuMat:
 
     def _tables(self, h5py: Any) -> tuple[Any, Any]:
         pictures, depths = self._file.get("images"), self._file.get("depths")
+        # HDF5 shows MATLAB's arrays with their axes reversed: (n, 3, w, h) and (n, w, h).
         for name, table, n_axes in (("images", pictures, 4), ("depths", depths, 3)):
             if not isinstance(table, h5py.Dataset):
                 raise BadInput(self.path, name, "missing; is this nyu_depth_v2_labeled.mat?")

@@ -107,6 +107,7 @@ def _charts(
     kept, limits = _is_kept(scored), (fields.min_colour, fields.min_depth)
     # All curves count views of good quality, as a share of all views: as the card does.
     good = good_scores(table)
+    # Curves: (label, CSS class, share of views kept at equal steps of the limit).
     curves = (
         ("colour and depth", "both", summary.yield_both),
         ("colour alone", "colour", yield_curve(good[0], summary.views)),

@@ -115,6 +115,7 @@ class Draft:
         positions = moved(surface.positions.astype(np.float64)).astype(np.float32)
         normals = surface.normals
         if normals is not None:
+            # The inverse transpose keeps normals at right angles to stretched faces, not their length.
             n = normals.astype(np.float64) @ normal_matrix.T
             n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
             normals = n.astype(np.float32)

@@ -125,6 +125,7 @@ class ChosenView:
         facts = self.entry.facts
         width, height = self.choice.size or (0, 0)
         x, y = width / facts["width_px"], height / facts["height_px"]
+        # Scale the first two rows of K: pixel centres lie at +0.5, so no shift is needed.
         scale = np.array([x, y, 1.0])
         facts = facts | {
             "width_px": width,
@@ -157,6 +158,7 @@ def _instances_in(instance: NDArray[Any], rows: list[dict[str, Any]]) -> list[di
         mask = instance == row["id"]
         if not mask.any():
             continue
+        # Rows and columns that hold a pixel of it: their ends are the box, its high end exclusive.
         y, x = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
         box = [int(x[0]), int(y[0]), int(x[-1]) + 1, int(y[-1]) + 1]
         pixels = int(mask.sum())

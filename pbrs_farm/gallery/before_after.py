@@ -25,6 +25,7 @@ def before_after_png(before: Srgb8Image, after: Srgb8Image, caption: str) -> byt
     A long caption takes several lines: credits are shown whole.
     """
     height, width = before.shape[:2]
+    # A letter of size 12 is about 6 px wide.
     most = max(20, (2 * width) // 6)
     lines = textwrap.wrap(shown(caption, most * _MOST_LINES), most)[:_MOST_LINES] or [""]
     size = (2 * width + _GAP_PX, height + 8 + _LINE_PX * len(lines))

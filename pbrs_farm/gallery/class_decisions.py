@@ -64,6 +64,7 @@ def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
         for d in decisions
     ]
     n_items = sum(by_rule.values())
+    # Otherprop is where things without a class of their own end up.
     n_prop = sum(d.n_items for d in decisions if d.name == "otherprop")
     rules = ", ".join(f"{n} by {rule}" for rule, n in by_rule.most_common())
     return "\n".join([*lines, "", f"{n_items} items: {rules}; {n_prop} are otherprop"])

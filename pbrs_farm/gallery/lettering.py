@@ -47,6 +47,7 @@ def draw_line(
     if text.isascii():
         draw.text(at, text, fill, _own(size))
         return float(draw.textlength(text, _own(size)))
+    # Letters of several fonts share a baseline, not a top.
     base = y + _own_ascent(size)
     for name, part in _parts(text):
         font = _font(name, size)

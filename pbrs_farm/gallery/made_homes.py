@@ -40,6 +40,7 @@ def make_homes(
 ) -> Iterator[Done]:
     """Write <name>.sh3d and <name>.svg of each home, and plans.html at the end; tells of each."""
     one = partial(_make, folder, programme)
+    # The page of plans is written even where a run is cut short.
     try:
         if n_jobs > 1:
             with ProcessPoolExecutor(n_jobs, get_context("spawn")) as pool:

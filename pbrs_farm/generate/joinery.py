@@ -31,6 +31,7 @@ def joinery(opening: PlanOpening, wall_m: float, colour: Triple) -> Shape:
     paint = Material("joinery", diffuse=colour, specular=(0.3, 0.3, 0.3), shininess=40.0)
     metal = Material("handle", diffuse=(0.2, 0.2, 0.2), specular=(0.7, 0.7, 0.7), shininess=60.0)
     glass = Material("pane", kind=MaterialKind.PANE, diffuse=(0.9, 0.95, 0.95), opacity=0.2)
+    # The frame is 2 cm deeper than the wall, so that it shows on both sides.
     w, h, d = opening.width, opening.height, wall_m + 0.02
     frame = _frame(w, h, d, has_sill=opening.sill > 0)
     if opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE):

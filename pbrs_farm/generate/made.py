@@ -36,6 +36,7 @@ def made(home: MadeHome, catalogue: Catalogue, programme: Programme | None = Non
     Raises BadInput for wishes that no home meets.
     """
     wishes = Wishes(home.bedrooms, (float(home.area[0]), float(home.area[1])))
+    # All randomness comes from one stream that the wishes and the version name.
     words = (home.word,) if programme is None else (home.word, repr(programme))
     rng = np.random.default_rng(keys.seed("made", VERSION, *words))
     shelf = catalogue if home.furniture else EMPTY

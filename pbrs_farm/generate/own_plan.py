@@ -80,11 +80,13 @@ def _plan_of(path: Path, value: Any, *, is_table: bool = False) -> OwnPlan:
     height = value.get("height", 2.5)
     if not _is_number(height) or not 2.0 <= height <= 6.0:
         raise BadInput(path, "height", "is no number from 2 to 6 metres")
+    # Walls stand between the drawn rooms; openings then find their wall.
     drawn = [_room(path, k, row) for k, row in enumerate(value["rooms"])]
     _check_apart(path, drawn)
     walls, rooms = _walled(path, drawn)
     openings: list[PlanOpening] = []
     left_out = []
+    # A table lists what it cannot place; a file written for us must be right.
     for key, kind in (("doors", OpeningKind.DOOR), ("windows", OpeningKind.WINDOW)):
         rows = value.get(key, [])
         if not isinstance(rows, list):

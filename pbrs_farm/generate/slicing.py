@@ -96,6 +96,7 @@ def solved(
 
     The outline is another one each time: 0.6 to 1.7 times as wide as it is deep.
     """
+    # An outline of the leaves' area, in whole steps of STEP_M.
     area = sum(leaf.area for leaf in leaves)
     width = math.sqrt(area * float(rng.uniform(0.6, 1.7)))
     w, d = round(width / STEP_M), round(area / width / STEP_M)

@@ -124,6 +124,7 @@ def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...
             box(x0 * STEP_M, z0 * STEP_M, x1 * STEP_M, z1 * STEP_M) for x0, z0, x1, z1 in parts
         ]
         polygon = unary_union(rects).difference(ground)
+        # Rooms of one type without a name of their own are numbered: "bedroom 2".
         count[wish.type] = count.get(wish.type, 0) + 1
         name = wish.name or wish.type.label
         if not wish.name and types.count(wish.type) > 1:
@@ -141,11 +142,13 @@ def corners(shape: BaseGeometry) -> tuple[Point, ...]:
         return ()
     ring = list(simple.exterior.normalize().coords)[:-1]
     points = [(round(x, 4), round(z, 4)) for x, z in ring]
+    # Leave out what lies on a straight side: three points that turn by nothing.
     kept = [
         p
         for i, p in enumerate(points)
         if abs(_turn(points[i - 1], p, points[(i + 1) % len(points)])) > 1e-6
     ]
+    # The shoelace sum is positive for a ring that runs anticlockwise.
     area = sum(_turn((0.0, 0.0), a, b) for a, b in zip(kept, kept[1:] + kept[:1], strict=True))
     return tuple(kept if area > 0 else kept[::-1])
 

@@ -242,10 +242,12 @@ class Rasterizer:
             if mode == "depth":
                 program = depth_program(self._context)
             else:
+                # Features become #defines: a program has no code that its surfaces do not need.
                 features = [f"MODE_{mode.upper()}", *feature_names(kind)]
                 features += self._light_features if mode == "il" else []
                 n_lights = self._fields.lights_per_object
                 program = surface_program(self._context, features, n_lights, self._samples)
+                # The compiler drops uniforms that no feature uses, so ask for each.
                 if "prepass_depth" in program:
                     program["prepass_depth"] = 1
                 for block, binding in (("Material", 0), ("Lights", 1)):

@@ -73,6 +73,7 @@ def with_rooms_furnished(house: House, catalogue: Catalogue, seed: int, style: s
                 storey.plan, catalogue, rng, style, rooms=storey.empty, standing=standing
             )
             _add(draft, storey, pieces, catalogue)
+    # Attribution licences (CC-BY) oblige whoever shows the pictures: name their authors.
     owed = sorted(
         {(p.creator or p.library, p.licence) for p in draft.used.values() if "BY" in p.licence}
     )
@@ -162,6 +163,7 @@ def _opening(
 ) -> tuple[PlanOpening, PlanWall]:
     """A door or window with a wall of its own, as wide as itself."""
     (x, _, z), along = passage.centre.tolist(), passage.along[[0, 2]] * passage.width / 2
+    # The wall's ends in plan, rounded to 0.1 mm as those of made homes are.
     start = round(x - float(along[0]), 4), round(z - float(along[1]), 4)
     end = round(x + float(along[0]), 4), round(z + float(along[1]), 4)
     sill, height = max(passage.bottom_y - floor_y, 0.0), passage.top_y - passage.bottom_y

@@ -84,6 +84,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     if any(uses_catalogue(source, run.recipe) for source in sources):
         fetch_catalogue(run.recipe.dress)
     claim_root(store, run.recipe, update=run.update)
+    # Share the cores among the processes, or each would take them all.
     n_jobs = max(1, run.n_jobs)
     n_threads = max(1, (os.cpu_count() or 1) // n_jobs)
     setting = Setting(run.store_url, run.recipe, n_threads, run.debug, run.store)
@@ -91,6 +92,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
         _Schedule(run, sources, summary, observe).drive(pool)
     for house_id in summary.houses:
         finish_house(store, house_id)
+    # The root's manifest covers every house of the folder, those of former runs too.
     below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
     merge_manifests(store, [at.house for at in below if at and at.file == keys.MANIFEST])
     write_attribution(store)

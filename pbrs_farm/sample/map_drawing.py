@@ -62,6 +62,7 @@ class Drawing:
 
 
 def _draw(root: Element, mark: Mark) -> None:
+    # Points are in pixels of the drawing; the first is where dots and text stand.
     x, y = (f"{value:.1f}" for value in mark.points[0])
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in mark.points)
     if mark.shape == "dot":

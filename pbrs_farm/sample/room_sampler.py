@@ -71,6 +71,7 @@ class RoomSampler:
             return "its polygon has no area"
         if self.fields.preset == "released" and not (room.has_floor and room.has_ceiling):
             return "the released sampler needs a floor and a ceiling"
+        # More cells than this come of a wrong unit or an enormous polygon.
         n_x, n_z = n_cells(self._grid(), self.fields.cell_m)
         if n_x * n_z > MAX_CELLS:
             return f"it has {n_x * n_z} grid cells, more than {MAX_CELLS}: set cameras.cell_m"
@@ -84,6 +85,7 @@ class RoomSampler:
         verdict = rules.rejections(
             self.house, self.room, self.fields, candidates, self.geometry, self.counter
         )
+        # Sectors compete by themselves: each keeps its own best views.
         views: list[View] = []
         sectors: list[SectorReport] = []
         for sector in range(self.fields.n_sectors):

@@ -84,6 +84,7 @@ def relative_noise(half_a: NDArray[np.floating], half_b: NDArray[np.floating]) -
     level = float(mean.mean())
     if level <= 0:
         return 0.0
+    # Half the difference of two halves estimates the standard error of their mean.
     error = np.sort(((0.5 * (a - b)) / (mean + 0.1 * level)).ravel() ** 2)
     without_fireflies = error[: max(int(len(error) * 0.999), 1)]
     return float(np.sqrt(without_fireflies.mean()))

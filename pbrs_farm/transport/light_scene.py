@@ -155,10 +155,12 @@ class LightScene:
         """
         from pbrs_farm.transport.path_tracer import Lanes, trace
 
+        # Depth counts a path's segments, the camera's among them: 2 is light that met one surface.
         i = camera.intrinsics
         n_samples, max_depth = (fields.direct_spp, 2) if fields.direct_spp > 0 else (1, 1)
         per_launch = _samples_per_launch(camera)
         total: Any = None
+        # Launch by launch: sums over samples add up, and a launch must fit into memory.
         for first in range(0, n_samples, per_launch):
             n = min(per_launch, n_samples - first)
             lanes = Lanes(i.width_px, i.height_px, first, n, seed)

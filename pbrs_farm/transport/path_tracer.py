@@ -129,12 +129,14 @@ def trace(
     max_depth: int | None = None,
 ) -> SampleSums:
     """Trace n_samples paths for every lane; max_depth replaces the recipe's."""
+    # A lane is a pixel, or a pixel and an emitter filter.
     lane = dr.arange(mi.UInt32, lanes.n_lanes)
     pixel, emitter_filter = _pixels_and_emitters(lane, lanes)
     lamp_sums = None
     if lanes.n_lamps > 0:
         sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
         lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
+    # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(
         PathContext(scene, emitters, depth_fields, emitter_filter),
@@ -146,6 +148,7 @@ def trace(
         lamp_sums,
     )
     dr.eval(total)
+    # Device layout is (channels, lanes); images are (lanes, channels).
     rows = {
         f.name: np.ascontiguousarray(getattr(total, f.name).numpy().T, np.float32)
         for f in fields(total)

@@ -82,6 +82,7 @@ def _holder(
 ) -> dict[str, Any]:
     """How long the lease of a running task lasts, and how long its holder has been silent."""
     stage = task_from_text(row["task"]).stage
+    # Light on a GPU has a lease of its own length.
     gpu = stage == LIGHT and view.fields.get("gpu") == "1"
     left_s = ledger.lease_left_s(view.job_id, row["task"], LIGHT_GPU if gpu else stage)
     seen = {w.name: w.age_s for w in registry.workers()}

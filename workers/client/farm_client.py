@@ -103,6 +103,7 @@ class Farm:
         theirs = {
             w.fields["store_id"]: w.fields["store"] for w in living if w.fields.get("store_id")
         }
+        # Workers that name no store, and a farm without workers, prove nothing.
         if theirs and known_store_id(self.store) not in theirs:
             held = ", ".join(sorted(set(theirs.values()))[:3])
             hint = "--store URL, or PBRS_STORE; or start workers on this store"

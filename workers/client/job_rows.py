@@ -24,6 +24,7 @@ def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
     stages = stage_views(view, slots)
     # Of a job that is over nothing is to come, though tasks behind failed ones were never run.
     is_over = view.state not in ("loading", "running", "paused")
+    # Tasks that are left, running ones too, times the mean of those done.
     left_s = sum(s.mean_s * max(0, s.total - s.done - s.failed) for s in stages)
     seconds = sum(n for name, n in view.counts.items() if name.startswith("seconds:"))
     return {

@@ -60,6 +60,7 @@ def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
             if name in row:
                 value = row[name]
                 lines.append(f"    {name}: {' '.join(value) if name == 'views' else value}")
+        # A silent holder keeps its task until the lease ends.
         if "silent_s" in row:
             age = row["silent_s"]
             silent = "left the farm" if age is None else f"has been silent for {duration_text(age)}"

@@ -79,6 +79,7 @@ class FarmCollector:
         paused = GaugeMetricFamily("pbrs_job_paused", "1 while a job is paused", labels=["job"])
         for view in views:
             rate.add_metric([view.job_id], views_per_hour(view))
+            # A job ends with the slowest of its stages.
             etas = [s.eta_s for s in stage_views(view, slots) if s.eta_s is not None]
             if etas:
                 left.add_metric([view.job_id], max(etas))

@@ -132,6 +132,7 @@ class RedisLedger:
         """Append fresh houses to the job's order; `first` is the index of the first of them."""
         p = self._p(job)
         with self.errors():
+            # Chunks bound the size of a transaction, which blocks Redis while it runs.
             for start in range(0, len(houses), _CHUNK):
                 chunk = houses[start : start + _CHUNK]
                 pipe = self.client.pipeline(transaction=True)

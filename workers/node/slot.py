@@ -114,6 +114,7 @@ class Slot:
         direct = False
         following: TaskId | None = task
         while following is not None:
+            # A token names this attempt alone: the ledger tells it from a former holder.
             random_part = secrets.token_hex(4)
             token = f"{self._config.worker}:{os.getpid()}:{next(self._numbers)}:{random_part}"
             ask = partial(
@@ -283,6 +284,7 @@ class Slot:
 
 def _request(held: _Claimed) -> Request:
     task, inputs = held.task, held.claim.inputs
+    # Only geometry reads the home itself; later stages find its bundle in the store.
     is_geometry = task.unit == WHOLE and task.stage == GEOMETRY
     return Request(
         job_id=held.job,

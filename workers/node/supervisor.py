@@ -133,6 +133,7 @@ def _wait_while_drained(config: FarmConfig, orders: _Orders) -> bool:
     while orders.leave_at is None:
         if time.monotonic() >= due:
             due = time.monotonic() + _DRAINED_POLL_S
+            # The liveness probe must see a drained worker as alive.
             touch(config.heartbeat_file)
             try:
                 if not registry.is_drained():

@@ -93,6 +93,7 @@ def make_app(config: FarmConfig) -> Celery:
     app = Celery("pbrs_farm", broker=url, include=["workers.queue.task"], set_as_current=False)
     app.conf.update(_SETTINGS)
     app.conf.broker_transport_options = _TRANSPORT | {"global_keyprefix": config.prefix}
+    # Redis over TLS: verify against the farm's own authority, else the system's.
     if url.startswith("rediss:"):
         ca = {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
         app.conf.broker_use_ssl = {"ssl_cert_reqs": ssl.CERT_REQUIRED, **ca}

@@ -86,6 +86,7 @@ def _camera(stored: dict[str, ListedView]) -> Any:
             size = [float(i[name]) for name in ("width_px", "height_px", "fx", "fy")]
         except (KeyError, TypeError, ValueError):
             return None
+        # What was stored is not trusted: a damaged row is left out of the page.
         if len(pose) != 16 or not all(x > 0 for x in size):
             return None
         view = stored.get(str(row.get("id", "")))

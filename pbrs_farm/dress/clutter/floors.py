@@ -55,6 +55,7 @@ class _Floor:
 def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> int:
     """Put things on the floor of a room; how many."""
     rng = placing.rng
+    # Draw what the room usually has before its floor is looked at, which costs more.
     wanted = [
         kind for kind, chance in _USUAL.get(room.kind, ()) if rng.random() < chance * placing.share
     ]

@@ -76,6 +76,7 @@ class Placing:
     def drop_near(self, top: Worktop, made: Made, at: F64) -> bool:
         """Put the thing at a plan place (2,), or within 6 cm of it; False where it does not fit."""
         low, high = made[1].bounds
+        # Of the free spots take the nearest; n: the rows and columns of cells that it covers.
         rows, columns, n = top.spots(turned_size(high - low, 0.0), margin_m=0.01)
         if not len(rows):
             return False

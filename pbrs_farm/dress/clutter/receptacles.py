@@ -126,6 +126,7 @@ def _top_of(item: Item, name: str, at: float, kind: RoomKind) -> str:
 
 
 def _table_of(item: Item, name: str, at: float, kind: RoomKind) -> str:
+    # at: height of the top above the floor, metres; "" where nothing is put on it.
     if item.nyu40 == DESK or (
         item.nyu40 == TABLE and kind in (RoomKind.BEDROOM, RoomKind.OFFICE) and at > 0.6
     ):
@@ -138,6 +139,7 @@ def _table_of(item: Item, name: str, at: float, kind: RoomKind) -> str:
     if item.nyu40 in (TABLE, NIGHT_STAND):
         if at < 0.3:
             return ""
+        # Below 0.36 m2 a table is a side table; its height tells a sofa's from a dining table.
         low, high = item.bounds
         small = float((high[0] - low[0]) * (high[2] - low[2])) < 0.36
         if at < 0.6:

@@ -26,6 +26,7 @@ class Solids:
         solid_a, solid_b = self._solid(a), self._solid(b)
         if solid_a is None or solid_b is None:
             return []
+        # Intersect the solids (manifold's ^); specks below the least volume are rounding.
         common = solid_a ^ solid_b
         if common.is_empty() or common.volume() < _LEAST_M3:
             return []
@@ -59,8 +60,10 @@ def thickness(corners: F64) -> float:
     surface = float(areas.sum()) / 2
     if surface <= 0:
         return 0.0
+    # The divergence theorem: a sixth of the sum of corner times (twice the area) vectors.
     points = corners.reshape(-1, 3) - corners[0, 0]
     volume = abs(float(np.einsum("ij,ij->i", points[0::3], vectors).sum())) / 6
+    # The least width across the solid, along the normals of its largest faces.
     largest = np.argsort(-areas, kind="stable")[:_MANY]
     normals = vectors[largest] / np.maximum(areas[largest, None], 1e-30)
     width = float(np.ptp(points @ normals.T, axis=0).min())

@@ -116,6 +116,7 @@ def _places(body: Body) -> F64:
     else:
         ring = points[points[:, 1] < body.low[1] + _RING_M]
     ring = np.unique(ring, axis=0)
+    # Take places evenly over the sorted points; cloth, which sags, needs more of them.
     n = _MOST_PLACES * (16 if body.group in _SOFT else 1)
     rows = np.unique(np.linspace(0, len(ring) - 1, min(n, len(ring))).astype(np.int64))
     return np.asarray(ring[rows])
@@ -124,6 +125,7 @@ def _places(body: Body) -> F64:
 def _hanging(bodies: Sequence[Body], number: int, low: F64, high: F64) -> Held:
     """The nearest that a body's mesh comes to that of another."""
     body = bodies[number]
+    # Only bodies whose boxes come near can be the ones it hangs from.
     below, above = body.low - _REACH_M / 10, body.high + _REACH_M / 10
     near = np.flatnonzero(((low <= above) & (high >= below)).all(1))
     best, by = _REACH_M, list[int]()

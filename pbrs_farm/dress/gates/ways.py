@@ -107,6 +107,7 @@ def _covers(
 
     Bodies that are not near are left out.
     """
+    # A grid over the opening; low and high bound the space before it, in the window's frame.
     columns = max(1, round(window.width / _CELL_M))
     rows = max(1, round((window.top_y - window.bottom_y) / _CELL_M))
     low = np.array([-window.width / 2, window.bottom_y, 0.01])
@@ -116,6 +117,7 @@ def _covers(
     for number in np.flatnonzero(near_it).tolist():
         if not _counts(bodies[number]):
             continue
+        # Columns of local: along the window, height, and distance into the room, metres.
         local = in_front_of(window, side, space.points[number])
         near = (local[:, 2] > 0.01) & (local[:, 2] < _BEFORE_WINDOW_M)
         column = np.floor((local[near, 0] / window.width + 0.5) * columns).astype(np.int64)

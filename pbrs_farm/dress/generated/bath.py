@@ -17,9 +17,11 @@ def toiletries(rng: np.random.Generator, style: Style) -> Made:
     parts: list[Part] = []
     x = 0.0
     for _ in range(int(rng.integers(1, 5))):
+        # Bottles stand in a row along x, 8 mm apart; x is the row's end so far.
         r, tall = float(rng.uniform(0.018, 0.036)), float(rng.uniform(0.06, 0.21))
         x += r
         at = (x, 0.0, float(rng.uniform(-0.02, 0.02)))
+        # Profiles are (radius, height); the cap begins just above, so no faces coincide.
         body = turned(
             [
                 (0, 0),
@@ -51,6 +53,7 @@ def toiletries(rng: np.random.Generator, style: Style) -> Made:
 def soap_dispenser(rng: np.random.Generator, style: Style) -> Made:
     """A soap dispenser with a pump."""
     r, tall = 0.034, 0.13
+    # (radius, height): the bottle, then the stem and the nose of its pump above it, 0.2 mm apart.
     body = turned(
         [(0, 0), (r, 0), (r, tall), (0.014, tall + 0.012), (0.014, tall + 0.02), (0, tall + 0.02)]
     )
@@ -71,6 +74,7 @@ def brush_cup(rng: np.random.Generator, style: Style) -> Made:
     cup = vessel([(0, 0), (0.035, 0), (0.037, 0.1)], 0.003)
     parts: list[Part] = [(cup, china(rng, style))]
     for k in range(int(rng.integers(1, 4))):
+        # Lean each brush outwards by 0.16 rad, then turn it 120 degrees on from the one before.
         tilt = 0.16
         c, s = np.cos(tilt), np.sin(tilt)
         lean: F64 = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
@@ -86,6 +90,7 @@ def brush_cup(rng: np.random.Generator, style: Style) -> Made:
 
 def soap_bar(rng: np.random.Generator, style: Style) -> Made:
     """A bar of soap on a dish."""
+    # (radius, height): a shallow dish, its rim 15 mm high and its floor 5 mm thick.
     dish = turned(
         [(0, 0), (0.04, 0), (0.058, 0.014), (0.055, 0.015), (0.038, 0.005), (0, 0.005)], n=18
     )
@@ -100,6 +105,7 @@ def soap_bar(rng: np.random.Generator, style: Style) -> Made:
 
 def spray_bottle(rng: np.random.Generator, style: Style) -> Made:
     """A spray bottle of cleaner."""
+    # (radius, height) of the bottle; head and trigger are boxes that point along +z.
     body = turned([(0, 0), (0.038, 0), (0.038, 0.14), (0.014, 0.19), (0.014, 0.2), (0, 0.2)], n=14)
     head = slab((-0.012, 0.2002, -0.025), (0.012, 0.232, 0.05))
     trigger = slab((-0.005, 0.15, 0.03), (0.005, 0.2001, 0.038))
@@ -113,6 +119,7 @@ def spray_bottle(rng: np.random.Generator, style: Style) -> Made:
 
 def sponge(rng: np.random.Generator, style: Style) -> Made:
     """A kitchen sponge."""
+    # Foam below, 22 mm, and the scouring layer, 9 mm, on it.
     low = slab((-0.045, 0, -0.03), (0.045, 0.022, 0.03))
     top = slab((-0.045, 0.022, -0.03), (0.045, 0.031, 0.03))
     return made(

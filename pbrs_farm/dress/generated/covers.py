@@ -118,6 +118,7 @@ def book_covers(rng: np.random.Generator, style: Style) -> Covers:
     """The covers of a home's library."""
     image = Image.new("RGB", (_EDGE_PX, _EDGE_PX), (200, 200, 200))
     draw = ImageDraw.Draw(image)
+    # Every cell has a spine; only the first N_COVERS, which may lie flat, have a front.
     for cell in range(N_CELLS):
         colour = _cover_colour(rng, style)
         ink = _ink(colour, rng)

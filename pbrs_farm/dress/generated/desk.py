@@ -17,6 +17,7 @@ _LYING_PEN: F64 = np.array([[0.0, 1.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
 
 def laptop(rng: np.random.Generator, style: Style) -> Made:
     """An open laptop; its screen is dark."""
+    # Width and depth of a 13 to 15 inch laptop, metres; z points to who sits before it.
     w, d = float(rng.uniform(0.3, 0.36)), float(rng.uniform(0.21, 0.25))
     grey = float(rng.choice([0.12, 0.62, 0.75]))
     body = plain("laptop", (grey, grey, grey * 1.01), 0.35)
@@ -50,6 +51,7 @@ def papers(rng: np.random.Generator, style: Style) -> Made:
     for _ in range(int(rng.integers(2, 6))):
         thick = float(rng.uniform(0.0006, 0.005))
         white = float(rng.uniform(0.85, 0.94))
+        # Sheets of A4, turned a little against each other.
         sheet = slab((-0.105, 0, -0.1485), (0.105, thick, 0.1485))
         at = (float(rng.uniform(-0.012, 0.012)), y, float(rng.uniform(-0.012, 0.012)))
         paper = plain("paper", (round(white, 2), round(white, 2), round(white * 0.98, 2)), 0.9)
@@ -62,6 +64,7 @@ def notebook(rng: np.random.Generator, style: Style) -> Made:
     """A notebook with a pen on it."""
     cover = plain("notebook", any_colour(rng, style), 0.6)
     book = slab((-0.075, 0, -0.105), (0.075, 0.014, 0.105))
+    # The pages stand out of the cover by up to 1 mm, on all sides but the spine's.
     pages = slab((-0.073, 0.003, -0.106), (0.0755, 0.011, 0.106))
     pen = transformed(_pen(), rotation_y(float(rng.uniform(-0.6, 0.6))), (0.01, 0.0142 + 0.0045, 0))
     ink: Rgb = ((0.08, 0.1, 0.3), (0.05, 0.05, 0.05), (0.6, 0.1, 0.1))[int(rng.integers(3))]
@@ -74,6 +77,7 @@ def notebook(rng: np.random.Generator, style: Style) -> Made:
 
 
 def _pen() -> Surface:
+    # (radius, height) of an upright pen 14 cm long; then lay it along x, its middle at the origin.
     body = turned([(0, 0), (0.002, 0.002), (0.0045, 0.015), (0.0045, 0.138), (0, 0.14)], n=8)
     return transformed(body, _LYING_PEN, (-0.07, 0, 0))
 
@@ -83,6 +87,7 @@ def pen_pot(rng: np.random.Generator, style: Style) -> Made:
     pot = vessel([(0, 0), (0.04, 0), (0.04, 0.1)], 0.003)
     parts: list[Part] = [(pot, plain("pot", any_colour(rng, style), 0.5))]
     for k in range(int(rng.integers(3, 7))):
+        # Up to six pens lean outwards round the pot, each 0.1 to 0.17 rad off the vertical.
         angle = 2 * np.pi * k / 6 + float(rng.uniform(-0.2, 0.2))
         tilt = float(rng.uniform(0.1, 0.17))
         c, s = np.cos(tilt), np.sin(tilt)
@@ -97,6 +102,7 @@ def pen_pot(rng: np.random.Generator, style: Style) -> Made:
 def remote(rng: np.random.Generator, style: Style) -> Made:
     """A remote control."""
     body = slab((-0.024, 0, -0.085), (0.024, 0.016, 0.085))
+    # Keys in three columns and five rows on its upper side.
     keys = [
         slab((x - 0.005, 0.016, z - 0.004), (x + 0.005, 0.0175, z + 0.004))
         for x in (-0.013, 0.0, 0.013)
@@ -126,6 +132,7 @@ def magazine_file(rng: np.random.Generator, style: Style) -> Made:
     x = 0.0
     colour = any_colour(rng, style)
     for _ in range(int(rng.integers(2, 5))):
+        # Binders for A4 are 50 or 78 mm wide; x is the row's end so far.
         w = float(rng.choice([0.05, 0.078]))
         parts.append((slab((x, 0, -0.28), (x + w, 0.315, 0)), plain("binder", colour, 0.5)))
         label = slab((x + 0.008, 0.12, 0), (x + w - 0.008, 0.26, 0.0006))

@@ -29,6 +29,7 @@ def storage_box(rng: np.random.Generator, style: Style) -> Made:
         float(v) for v in (rng.uniform(0.2, 0.36), rng.uniform(0.1, 0.2), rng.uniform(0.16, 0.28))
     )
     colour = any_colour(rng, style)
+    # The lid takes the upper 22 % of the height and stands out by 4 mm all round.
     body = slab((-w / 2, 0, -d / 2), (w / 2, h * 0.78, d / 2))
     lid = slab((-w / 2 - 0.004, h * 0.78, -d / 2 - 0.004), (w / 2 + 0.004, h, d / 2 + 0.004))
     parts = [(body, plain("box", colour, 0.7)), (lid, plain("lid", shade(colour, 0.9), 0.7))]
@@ -43,6 +44,7 @@ def carton(rng: np.random.Generator, style: Style) -> Made:
     board = plain("cardboard", shade((0.66, 0.5, 0.33), float(rng.uniform(0.9, 1.1))), 0.85)
     tape = plain("tape", (0.72, 0.6, 0.42), 0.25)
     body = slab((-w / 2, 0, -d / 2), (w / 2, h, d / 2))
+    # The tape runs over the top along x and 6 cm down both sides.
     strip = slab((-w / 2 - 0.0005, h - 0.06, -0.025), (w / 2 + 0.0005, h + 0.0005, 0.025))
     return made("carton", [(body, board), (strip, tape)], group="box", nyu40=BOX)
 
@@ -53,6 +55,7 @@ def cartons(rng: np.random.Generator, style: Style) -> Made:
     y = 0.0
     for _ in range(int(rng.integers(2, 4))):
         piece, shape = carton(rng, style)
+        # Move the whole carton; 0.3 mm between two keeps their faces apart.
         for s in shape.surfaces:
             moved = transformed(s, np.eye(3), (float(rng.uniform(-0.02, 0.02)), y, 0))
             parts.append((moved, shape.materials[s.material]))
@@ -64,6 +67,7 @@ def basket(rng: np.random.Generator, style: Style) -> Made:
     """A round or square basket, open at the top."""
     tall, r = float(rng.uniform(0.14, 0.26)), float(rng.uniform(0.12, 0.17))
     weave = mix((0.62, 0.47, 0.3), any_colour(rng, style), float(rng.choice([0.0, 0.2, 0.7])))
+    # (radius, height): a side that swells upwards and draws in at the rim.
     outside = [(0, 0), (r * 0.85, 0), (r * 0.95, tall * 0.3), (r, tall * 0.7), (r * 0.98, tall)]
     return made(
         "basket", [(vessel(outside, 0.01, n=20), plain("wicker", weave, 0.9))], group="basket"
@@ -84,6 +88,7 @@ def shelf_basket(rng: np.random.Generator, style: Style) -> Made:
 
 def _open_box(w: float, h: float, d: float, t: float) -> list[Surface]:
     """A bottom and four sides of thickness t."""
+    # Front and back fit between the left and right sides, all of them on the bottom.
     return [
         slab((-w / 2, 0, -d / 2), (w / 2, t, d / 2)),
         slab((-w / 2, t, -d / 2), (-w / 2 + t, h, d / 2)),
@@ -99,6 +104,7 @@ def vase(rng: np.random.Generator, style: Style) -> Made:
     waist, mouth = r * float(rng.uniform(0.3, 0.8)), r * float(rng.uniform(0.35, 0.9))
     t = np.linspace(0, 1, 8)
     belly = float(rng.uniform(0.25, 0.6))
+    # Radius over height through foot, belly, waist and mouth, smoothed by a binomial filter.
     curve = np.interp(t, [0, belly, 0.85, 1], [r * 0.6, r, waist, mouth])
     curve = np.convolve(np.pad(curve, 1, mode="edge"), [0.25, 0.5, 0.25], "valid")
     outside = [(0.0, 0.0), *((float(a), float(b)) for a, b in zip(curve, t * tall, strict=True))]
@@ -110,6 +116,7 @@ def plant_pot(rng: np.random.Generator, style: Style) -> Made:
     """A pot with earth in it and no plant."""
     r = float(rng.uniform(0.06, 0.1))
     tall = r * 1.7
+    # (radius, height): the outside up, the rim, and the earth at 85 % of the height.
     outside = [
         (0, 0),
         (r * 0.72, 0),
@@ -132,6 +139,7 @@ def candle(rng: np.random.Generator, style: Style) -> Made:
     for _ in range(int(rng.integers(1, 4))):
         r, tall = float(rng.uniform(0.025, 0.04)), float(rng.uniform(0.06, 0.18))
         x += r
+        # (radius, height): the rim stands 4 mm above the hollow that the wick rises from.
         body = turned([(0, 0), (r, 0), (r, tall - 0.004), (r - 0.004, tall), (0, tall - 0.004)])
         wick = turned(
             [(0, tall - 0.005), (0.0015, tall - 0.005), (0.001, tall + 0.008), (0, tall + 0.008)],
@@ -205,6 +213,7 @@ def tissue_box(rng: np.random.Generator, style: Style) -> Made:
     body = slab((-0.115, 0, -0.06), (0.115, 0.085, 0.06))
     c, s = np.cos(0.35), np.sin(0.35)
     lean: F64 = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    # The tissue is a thin sheet that leans by 0.35 rad, its foot inside the box.
     sheet = transformed(
         box("tissue", np.array([0, 0.03, 0.0]), np.array([0.045, 0.035, 0.002]), 0),
         lean,
@@ -227,6 +236,7 @@ def clock(rng: np.random.Generator, style: Style) -> Made:
             (face, plain("display", (0.05, 0.06, 0.05), 0.1)),
         ]
         return made("alarm_clock", parts, group="clock")
+    # (radius, height) of case and dial about y; then turn their axis to z, to face the room.
     disc = turned(
         [(0, -0.02), (0.05, -0.02), (0.055, 0), (0.05, 0.02), (0.047, 0.021), (0, 0.021)], n=20
     )
@@ -253,6 +263,7 @@ def ornament(rng: np.random.Generator, style: Style) -> Made:
     n, y, profile = int(rng.integers(2, 5)), 0.0, [(0.0, 0.0)]
     r = float(rng.uniform(0.035, 0.055))
     for _ in range(n):
+        # Each body is part of a sine's arch, and smaller than the one below it.
         tall = r * float(rng.uniform(0.8, 1.9))
         for t in (0.0, 0.25, 0.5, 0.75, 1.0):
             profile.append((max(r * np.sin(np.pi * (0.12 + 0.76 * t)), 0.004), y + tall * t))
@@ -279,6 +290,7 @@ def bag(rng: np.random.Generator, style: Style) -> Made:
     cloth = plain("bag", any_colour(rng, style), 0.85)
     t = 0.004
     sides = _open_box(w, h, d, t)
+    # A handle on each side: two straps, 15 cm across, and a bar between them.
     for z in (-d / 2, d / 2 - t):
         for x in (-0.075, 0.063):
             sides.append(slab((x, h, z), (x + 0.012, h + 0.11, z + t)))
@@ -292,6 +304,7 @@ def shoes(rng: np.random.Generator, style: Style) -> Made:
     sole = plain("sole", (0.85, 0.84, 0.8) if rng.random() < 0.5 else (0.1, 0.09, 0.08), 0.8)
     parts: list[Part] = []
     for side in (-0.065, 0.065):
+        # Feet are never quite parallel: turn each shoe about y.
         turn = float(rng.normal(0, 0.08))
         c, s = np.cos(turn), np.sin(turn)
         rotation: F64 = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
@@ -317,6 +330,7 @@ def _shoe_upper() -> Surface:
 
 def _stretched(surface: Surface, size: tuple[float, float, float]) -> Surface:
     scale = np.asarray(size)
+    # Normals scale by the inverse, so that they stay at right angles to the surface.
     normals = np.asarray(surface.normals, np.float64) / scale
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     positions = surface.positions.astype(np.float64) * scale

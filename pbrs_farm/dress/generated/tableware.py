@@ -37,6 +37,7 @@ def cup(rng: np.random.Generator, style: Style) -> Made:
     tall, r = float(rng.uniform(0.075, 0.105)), float(rng.uniform(0.036, 0.044))
     foot = r * float(rng.uniform(0.65, 1.0))
     material = china(rng, style)
+    # (radius, height): the foot, a rounded bottom, then straight sides; 3 mm of wall.
     body = vessel(
         [(0, 0), (foot, 0), (foot + 0.3 * (r - foot), 0.012), (r, 0.4 * tall), (r, tall)], 0.003
     )
@@ -47,13 +48,16 @@ def _handle(radius: float, tall: float) -> Surface:
     # A bent strip of six pieces, 8 mm wide, its ends inside the cup's side.
     t = np.linspace(-0.5, 0.5, 7) * np.pi
     reach, half = 0.026, tall * 0.3
+    # The strip's middle line (radius, height): half an ellipse beside the cup.
     middle = np.stack([radius - 0.002 + reach * np.cos(t), tall * 0.52 + half * np.sin(t)], -1)
     outward = np.stack([np.cos(t), np.sin(t)], -1)
     points = []
+    # Four corners a station, (depth across the strip, side along z), metres.
     for along, out in zip(middle, outward, strict=True):
         for depth, side in ((-0.003, -0.004), (0.003, -0.004), (0.003, 0.004), (-0.003, 0.004)):
             x, y = along + out * depth
             points.append((x, y, side))
+    # The caps at both ends, then two triangles a side between neighbouring stations.
     faces = [(0, 2, 1), (0, 3, 2), (24, 25, 26), (24, 26, 27)]
     for k in range(6):
         for j in range(4):
@@ -66,6 +70,7 @@ def glass_of_water(rng: np.random.Generator, style: Style) -> Made:
     """A tumbler, or a wine glass."""
     if rng.random() < 0.35:
         r, tall = float(rng.uniform(0.032, 0.04)), float(rng.uniform(0.17, 0.22))
+        # (radius, height): foot, stem and bowl outside, and the bowl's inside down to the axis.
         outside = [(0, 0), (0.034, 0), (0.032, 0.003), (0.005, 0.008), (0.004, tall * 0.45),
                    (0.02, tall * 0.5), (r, tall * 0.68), (r * 0.85, tall)]  # fmt: skip
         inside = [
@@ -94,6 +99,7 @@ def _pile(rng: np.random.Generator, style: Style, n: int) -> Made:
     r, material = float(rng.uniform(0.1, 0.14)), china(rng, style)
     parts: list[Part] = []
     for k in range(n):
+        # (radius, height): flat in the middle, then the rim; plates nest 6.3 mm apart.
         outside = [(0, 0), (r * 0.6, 0), (r * 0.72, 0.006), (r, 0.02)]
         inside = [(r - 0.002, 0.0225), (r * 0.7, 0.0095), (r * 0.6, 0.005), (0, 0.005)]
         body = turned(outside + inside, n=24 if n == 1 else 16)
@@ -105,6 +111,7 @@ def bowl(rng: np.random.Generator, style: Style) -> Made:
     """A bowl, empty or with fruit."""
     r = float(rng.uniform(0.07, 0.15))
     tall = r * float(rng.uniform(0.45, 0.7))
+    # (radius, height): a foot, then a curve that opens towards the rim.
     outside = [(0, 0), (r * 0.45, 0), (r * 0.47, 0.006), (r * 0.78, tall * 0.45), (r, tall)]
     wood = plain("wood bowl", style.wood.mean, 0.4)
     material = wood if rng.random() < 0.3 else china(rng, style)
@@ -141,6 +148,7 @@ def fruit(rng: np.random.Generator, style: Style) -> Made:
     parts: list[Part] = []
     x = 0.0
     for _ in range(int(rng.integers(1, 4))):
+        # Fruit lie in a row along x, 8 mm apart; x is the row's end so far.
         radius = float(rng.uniform(0.028, 0.04))
         x += radius
         z = float(rng.uniform(-0.02, 0.02))
@@ -163,8 +171,10 @@ def bottle(rng: np.random.Generator, style: Style) -> Made:
     )
     tint = tints[int(rng.integers(4))]
     body = plain("bottle", tint, 0.08)
+    # (radius, height): body, shoulder, neck, and the ring at its mouth.
     outside = [(0, 0), (r, 0), (r, shoulder), (r * 0.75, shoulder + 0.03), (neck, shoulder + 0.06),
                (neck, tall - 0.012), (neck + 0.002, tall - 0.012), (neck + 0.002, tall), (0, tall)]  # fmt: skip
+    # The label is a sleeve of paper round the body, 0.4 mm proud of the glass.
     low, high, inner, outer = shoulder * 0.25, shoulder * 0.8, r - 0.001, r + 0.0004
     label = turned([(inner, low), (outer, low), (outer, high), (inner, high), (inner, low)])
     paper = plain(
@@ -178,6 +188,7 @@ def jar(rng: np.random.Generator, style: Style) -> Made:
     r, tall = float(rng.uniform(0.035, 0.055)), float(rng.uniform(0.09, 0.2))
     side = china(rng, style) if rng.random() < 0.6 else plain("filled jar", _grain(rng), 0.15)
     lid = plain("wood lid", style.wood.mean, 0.5) if rng.random() < 0.5 else metal(style)
+    # (radius, height) of body and lid; the lid begins 0.2 mm above the body.
     body = turned(
         [
             (0, 0),
@@ -229,6 +240,7 @@ def pot(rng: np.random.Generator, style: Style) -> Made:
     r = float(rng.uniform(0.09, 0.13))
     tall = r * float(rng.uniform(0.8, 1.2))
     side = metal(style) if rng.random() < 0.6 else plain("enamel", any_colour(rng, style), 0.2)
+    # (radius, height): body, rim, the lid's dome and its knob in one closed profile.
     body = turned([(0, 0), (r * 0.95, 0), (r, 0.01), (r, tall), (r * 1.03, tall), (r * 0.9, tall + 0.012),
                    (r * 0.2, tall + 0.025), (0.012, tall + 0.028), (0.018, tall + 0.045), (0, tall + 0.048)], n=20)  # fmt: skip
     grip = turned([(0, -0.006), (0.04, -0.006), (0.04, 0.006), (0, 0.006)], n=12)
@@ -248,6 +260,7 @@ def pan(rng: np.random.Generator, style: Style) -> Made:
     body = vessel([(0, 0), (r * 0.85, 0), (r, 0.045)], 0.003, n=20)
     black = plain("black iron", (0.06, 0.06, 0.065), 0.35)
     handle = turned([(0, 0), (0.011, 0.0), (0.009, 0.1), (0.012, 0.18), (0, 0.18)], n=8)
+    # Lay the handle, turned about y, along +z, and then turn the pan's front a little.
     along: F64 = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
     turn = rotation_y(float(rng.uniform(-0.5, 0.5)))
     part = transformed(transformed(handle, along, (0, 0.035, r * 0.97)), turn)
@@ -258,6 +271,7 @@ def kettle(rng: np.random.Generator, style: Style) -> Made:
     """A kettle with a lid and a spout."""
     r = 0.085
     side = metal(style) if rng.random() < 0.7 else plain("enamel", any_colour(rng, style), 0.2)
+    # (radius, height): a body that narrows upwards, its lid and the lid's knob.
     body = turned(
         [
             (0, 0),
@@ -271,6 +285,7 @@ def kettle(rng: np.random.Generator, style: Style) -> Made:
         ]
     )
     spout = turned([(0, 0), (0.02, 0), (0.011, 0.07), (0, 0.07)], n=8)
+    # The spout leans forward by 0.9 rad (+x); the grip is a cup's handle, turned to the back.
     c, s = np.cos(0.9), np.sin(0.9)
     lean: F64 = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
     grip = _handle(0.068, 0.17)

@@ -80,6 +80,7 @@ def _choices(
     ]
     if room.kind in _PLAIN and rng.random() < 0.6:
         return made
+    # Leave out lamps of other places, those too wide, and tubes outside kitchen and store.
     found = []
     for piece in catalogue.of("ceiling_lamp"):
         name = piece.name.lower()
@@ -89,6 +90,7 @@ def _choices(
         if is_tube and room.kind not in (RoomKind.KITCHEN, RoomKind.STORE):
             continue
         found.append(piece)
+    # Up to three of the catalogue and our own pendants, mixed; the dome last.
     drawn = [found[int(k)] for k in rng.permutation(len(found))][:3]
     own = [made[1], made[2]] if rng.random() < 0.5 else [made[2], made[1]]
     some: list[tuple[Piece, Shape | None]] = [(piece, None) for piece in drawn]

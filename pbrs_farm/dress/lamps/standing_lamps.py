@@ -37,6 +37,7 @@ def stand_by_sofas(
     piece, shape = _drawn(catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
     radius = float(np.abs(shape.bounds[:, [0, 2]]).max())
     for number in sofas:
+        # Try each end; take the lamp away again where it closes a way.
         for place in _ends(space, room, number, radius):
             if _floor_is_free(space, room, place, radius, float(shape.bounds[1, 1])):
                 at = np.array([place[0], room.room.floor_y, place[1]])

@@ -140,10 +140,12 @@ def meeting(bounds: F64, reach: F64) -> list[int]:
 
 
 def _cut_passage(clear: F32, face: WallFace, passage: Passage) -> None:
+    # Only openings in this very wall count: parallel to the face, and within its depth.
     if abs(float(passage.normal @ face.normal)) < 0.9:
         return
     if not -_OPENING_WALL_M < float(face.out_of(passage.centre[None])[0]) < 0.1:
         return
+    # Columns j run along the face (s), rows i up from low_y; both in cells of CELL_M.
     middle = float(face.s_of(passage.centre[None])[0])
     half = passage.width / 2 + _BY_OPENING_M
     j0, j1 = (int(np.clip((middle + s * half) / CELL_M, 0, clear.shape[1])) for s in (-1, 1))

@@ -114,8 +114,10 @@ def _diamonds(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     u, v = _coordinates(size)
     pitch = float(rng.uniform(0.22, 0.4))
     snap = 0.018
+    # Snap coordinates to 18 mm, so that oblique lines climb in steps.
     u, v = np.floor(u / snap) * snap, np.floor(v / snap) * snap
     column, row = np.round(u / pitch), np.round(v / (1.3 * pitch))
+    # The L1 distance to the nearest diamond's middle; bands of it take turns in three colours.
     ring = np.abs(u / pitch - column) + np.abs(v / (1.3 * pitch) - row)
     picture = _filled(size, inks[0])
     pick = (column + 2 * row).astype(int) % 3 + 1

@@ -40,6 +40,7 @@ def rug(
     low, high = np.array([-length / 2, -width / 2]), np.array([length / 2, width / 2])
     face, back = slab("rug", low, high, (0.0, thick))
     shown = Material(f"rug {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
+    # The back and the edge take the mean colour of the face.
     r, g, b = (round(float(c) / 255, 2) for c in pixels.reshape(-1, 3).mean(0))
     parts = [(face, shown), (back, plain("rug edge", (r, g, b), 1.0))]
     lying = [(replace(s, positions=s.positions @ _LYING.T), m) for s, m in parts]
@@ -120,6 +121,7 @@ def _by_table(
     if not large:
         return
     box = max(large, key=lambda b: float(b.half[0] * b.half[2]))
+    # The rug lies along the table's longer side, and 0.35 to 0.6 m out for chairs.
     axis = 0 if box.half[0] >= box.half[2] else 2
     along = box.axes[:, axis]
     turn = float(np.arctan2(-along[2], along[0]))

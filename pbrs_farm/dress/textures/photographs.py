@@ -59,6 +59,7 @@ def photograph_for(draft: Draft, catalogue: Catalogue, family: str, seed: int) -
     picture = fitting[int(rng.integers(len(fitting)))]
     if _KEPT + picture.texture.id in draft.kept:
         return picture.texture.id
+    # Take the mean colour now: a picture that cannot be read is drawn instead.
     try:
         mean = _mean_rgb(picture)
     except BadInput as error:

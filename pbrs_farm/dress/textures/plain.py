@@ -43,10 +43,12 @@ def concrete_maps(
     rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb
 ) -> SurfaceMaps:
     """Smooth concrete: clouds of cement, pores."""
+    # Bands are in cycles over the picture: clouds wide, streaks long, grain fine.
     clouds = noise(rng, shape, slope=2.2, band=(1.0, 120.0))
     streaks = noise(rng, shape, slope=2.0, stretch=(1.0, 2.5), band=(4.0, 200.0))
     grain = noise(rng, shape, slope=0.6)
     dots = noise(rng, shape, slope=0.0, band=(1.0, shape[0] / 4))
+    # Pores are the tail of a noise, beyond about three standard deviations.
     pores = smoothstep(2.9, 3.4, dots)
     tone = 0.045 * clouds + 0.02 * streaks + 0.014 * grain - 0.22 * pores
     colour = np.array(tint, np.float32) * (1.0 + tone)[..., None]

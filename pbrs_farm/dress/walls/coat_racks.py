@@ -58,6 +58,7 @@ def coat_rack(rng: np.random.Generator, style: Style, n: int, *, is_bath: bool) 
     parts: list[Part] = [
         (slab((-half, 0.0, 0.0), (half, 0.09, 0.018)), board if rng.random() < 0.6 else white)
     ]
+    # A hook is an arm out of the board and a tip that turns up.
     for k in range(n):
         x = -half + (k + 0.5) * step
         parts.append((slab((x - 0.008, 0.035, 0.018), (x + 0.008, 0.05, 0.06)), steel))

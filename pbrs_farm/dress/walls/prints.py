@@ -238,11 +238,13 @@ def _lines(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
 
 def _botanical(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
     """A stem with leaves, pressed on paper."""
+    # Draw at twice the size and halve it at the end: antialiased lines.
     image = Image.new("RGB", (2 * size[0], 2 * size[1]), _bytes(palette[0]))
     pen = ImageDraw.Draw(image)
     w, h = image.size
     short = min(w, h)
     green = mix((0.27, 0.4, 0.24), palette[int(rng.integers(1, 6))], 0.35)
+    # The stem rises from 8 % above the lower edge to 12 % below the upper, bent as a parabola.
     bend = float(rng.uniform(-0.15, 0.15)) * w
     stem = [(w / 2 + bend * (k / 30) ** 2, h * (0.92 - 0.8 * k / 30)) for k in range(31)]
     pen.line(stem, fill=_bytes(shade(green, 0.7)), width=max(w // 110, 3), joint="curve")
@@ -252,6 +254,7 @@ def _botanical(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
         for side in (-1.0, 1.0):
             angle = side * float(rng.uniform(0.7, 1.1)) - np.pi / 2
             t = np.linspace(0, 1, 20)
+            # A leaf's outline: half widths along its length, there and back, turned into place.
             half = slim * length * np.sin(np.pi * t**0.8)
             along = np.concatenate([t, t[::-1]]) * length
             across = np.concatenate([half, -half[::-1]])
@@ -303,9 +306,11 @@ def _marbled(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
     """Paint that ran: a field bent by another."""
     u, v = _grid(size)
     field = _noise(rng, size, 1.8)
+    # Look the field up at places that two other fields moved (domain warping).
     rows = v * min(size) + 40 * _noise(rng, size, 1.9)
     columns = u * min(size) + 40 * _noise(rng, size, 1.9)
     bent = ndimage.map_coordinates(field, [rows, columns], order=1, mode="reflect")
+    # Six paints along the bent field; the cube keeps each flat nearly up to the next.
     t = np.clip((bent + 1.8) / 3.6, 0, 0.999) * 5
     colours = np.array(palette, np.float32)
     k = t.astype(int)
@@ -346,11 +351,13 @@ def _skyline(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
     w, h = image.size
     grey = rng.random() < 0.6
     sky = (0.82, 0.82, 0.82) if grey else mix(palette[1], (0.9, 0.6, 0.5), 0.5)
+    # The sky is brighter towards the horizon; y runs down.
     ramp = np.linspace(0.75, 1.1, h)[:, None, None] * np.array(sky)[None, None]
     image.paste(
         Image.fromarray(np.broadcast_to(np.clip(ramp, 0, 1) * 255, (h, w, 3)).astype(np.uint8))
     )
     pen = ImageDraw.Draw(image)
+    # Three rows of houses, the nearest last: darker, lower, with lit windows.
     for layer in range(3):
         tone = shade(sky, 0.62 - 0.22 * layer)
         x = -20

@@ -64,6 +64,7 @@ def _largest_rectangle(space: RoomSpace) -> tuple[float, float, float, float]:
     xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})
     best = space.bounds
     largest = 0.0
+    # With axis-parallel walls its sides lie on lines through corners: try all pairs of them.
     for i, xa in enumerate(xs):
         for xb in xs[i + 1 :]:
             for k, za in enumerate(zs):

@@ -86,6 +86,7 @@ def _cuts(low: float, high: float, wall: Wall) -> list[tuple[float, float]]:
 
 def _free(space: RoomSpace, wall: Wall) -> list[tuple[float, float]]:
     """Stretches of a wall before which a unit can stand."""
+    # What doors' swings and low windows take of the strip that units stand on.
     taken = []
     strip = wall.frame.rect((0.0, 0.0, wall.length, DEPTH_M + 0.02))
     low_windows = [w.zone for w in space.windows if w.sill < 0.8]
@@ -93,6 +94,7 @@ def _free(space: RoomSpace, wall: Wall) -> list[tuple[float, float]]:
         along = _along(rect, strip, wall)
         if along is not None:
             taken.append(along)
+    # Sweep along the wall; a unit needs 0.6 m.
     found, start = [], 0.0
     for low, high in sorted(taken):
         if low - start > 0.6:

@@ -47,6 +47,7 @@ def _stands(shelf: Shelf) -> list[list[Slot]]:
     found = []
     for base in low:
         slots = [backed(base)]
+        # A screen is neither wider nor deeper than what carries it.
         fitting = [t for t in screens if t.size[0] <= base.size[0] and t.size[1] < base.size[1]]
         if fitting:
             middle = slots[0].v

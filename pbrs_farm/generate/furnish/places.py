@@ -116,6 +116,7 @@ def fixed_places(found: Sequence[Standing]) -> Places:
 
 
 def _places(templates: list[Template], template_of: Ints, frames: F64, scores: F64) -> Places:
+    # Pad with NaN, which no comparison is true for: templates differ in their number of bodies.
     n_bodies = max((len(t.bodies) for t in templates), default=0)
     n_clear = max((len(t.clear) for t in templates), default=0)
     bodies = np.full((len(frames), n_bodies, 4), np.nan)

@@ -135,6 +135,7 @@ def small_texture(texture: Texture, edge_px: int) -> Texture:
     picture: Image.Image = Image.open(io.BytesIO(texture.data))
     if max(picture.size) <= edge_px:
         return texture
+    # Cut-outs (leaves, lace) need alpha; palettes carry it in their info.
     has_alpha = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
     picture = picture.convert("RGBA" if has_alpha else "RGB")
     picture.thumbnail((edge_px, edge_px), Image.Resampling.LANCZOS)

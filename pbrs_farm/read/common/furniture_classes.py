@@ -225,6 +225,7 @@ def class_of_piece(
         if own.nyu40 is None and own.rule == "none":
             own = _by_words(group, place, "group")
         return own if own.nyu40 is not None else PieceClass(known, "catalogue")
+    # The catalogue is the surest, as long as the size agrees.
     if known is not None and _fits(NYU40_NAMES[known], place):
         word = next((label for label, _ in (*_candidates(inner), *_candidates(name))), "")
         return PieceClass(known, "catalogue", word)
@@ -232,6 +233,7 @@ def class_of_piece(
     if own.nyu40 is not None:
         return own
     by_id = _by_words(inner, place, "id")
+    # Say "size" where a class was found and refused, "none" where there was none.
     misfit = known is not None or "size" in (own.rule, by_id.rule)
     return by_id if by_id.nyu40 is not None else PieceClass(None, "size" if misfit else "none")
 

@@ -165,6 +165,7 @@ def _lights(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]
         text = "no lamp's light is known; bulbs get an assumed power"
         notes.add("missing-table", "metadata/suncgModelLights.json", text)
         return {}
+    # Rows are model id -> its lamps; what is no list is passed over.
     name, data = found
     entry_json = json_from_bytes(data, name)
     if not isinstance(entry_json, dict):

@@ -28,6 +28,7 @@ def mirror_slot(model: ParsedModel) -> int | None:
     The glass faces away from the wall: of the materials that lie flat across the model's thinnest
     level axis the one named so, else the one that shows the largest area.
     """
+    # The thinner of the two level axes points out of the wall.
     corners = np.concatenate([m.positions for m in model.meshes])
     extent = np.ptp(corners, axis=0)
     across = 0 if extent[0] < extent[2] else 2

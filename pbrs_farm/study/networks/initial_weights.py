@@ -97,6 +97,7 @@ def _from_vgg(network: nn.Module, path: Path) -> dict[str, str]:
         raise BadInput(
             path, "", "not a VGG-16 with torchvision's names (features.0.weight)"
         ) from None
+    # Convolutions have four axes; batch normalisation may stand between them.
     kernels = [pair for pair in kernels if pair[0].ndim == 4]
     _fill(_vgg_of(network, str(path)), kernels, str(path))
     return {"source": _VGG_SOURCE, "file": str(path)}
@@ -108,6 +109,7 @@ def _from_run(network: nn.Module, path: Path) -> dict[str, str]:
     file = path / "weights.safetensors" if path.is_dir() else path
     tensors, position = read_tensors(file)
     own = network.state_dict()
+    # Weights are stored below "model."; take what has the same name and shape.
     given = {name.removeprefix("model."): tensor for name, tensor in tensors.items()}
     fitting = {n: t for n, t in given.items() if n in own and own[n].shape == t.shape}
     if not any(t.ndim > 1 for t in fitting.values()):

@@ -36,6 +36,7 @@ class ClassesTask:
         """labels (H, W) uint8."""
         if sample.class40 is None:
             raise BadInput(sample.id, "class40", "the view has no classes")
+        # A class beyond the network's would be an index outside its scores.
         highest = int(sample.class40.max(initial=0))
         if highest > plan.n_classes:
             name = f" ({NYU40_NAMES[highest]})" if highest < len(NYU40_NAMES) else ""
@@ -55,10 +56,12 @@ class ClassesTask:
 
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W) uint8 ids of the highest score."""
+        # Channel 0 is class 1: no label has no score.
         return np.asarray((output.argmax(1) + 1).to(torch.uint8).numpy(force=True))
 
     def baseline(self, targets: list[Arrays]) -> tuple[str, F32]:
         """The class that most pixels of the training views have, everywhere."""
+        # No label (0) must not win.
         counts = np.zeros(256, np.int64)
         for target in targets:
             counts += np.bincount(target["labels"].ravel(), minlength=256)
@@ -105,7 +108,9 @@ class ClassScorer:
 def _colours() -> NDArray[np.uint8]:
     """(256, 3): hues a golden angle apart, so that neighbours in number differ."""
     k = np.arange(256)
+    # Three cosines a third of a turn apart are red, green and blue of a hue.
     phase = (k[:, None] * 0.618034 + np.array([0, 1 / 3, 2 / 3])) % 1
+    # Three brightnesses in turn tell apart hues that come close.
     light = 0.55 + 0.35 * ((k % 3) / 2)[:, None]
     colours = 255 * light * (0.5 + 0.5 * np.cos(2 * np.pi * phase))
     colours[0] = 0

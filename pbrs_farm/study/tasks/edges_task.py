@@ -53,6 +53,7 @@ class EdgesTask:
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W) float32 strengths 0..1."""
         output = output.float()
+        # HED gives six maps of scores (five sides, and one fused), other networks one.
         edges = edges_of_sides(output) if output.shape[1] > 1 else torch.sigmoid(output[:, 0])
         return np.asarray(edges.numpy(force=True))
 

@@ -50,6 +50,7 @@ class NormalsTask:
         """Left and right change places, and what points right points left."""
         turned = dict(batch)
         turned["valid"] = _where(flips, batch["valid"].flip(2), batch["valid"])
+        # Mirroring flips the sign of x.
         signs = torch.tensor([-1, 1, 1], dtype=batch["normal"].dtype, device=flips.device)
         turned["normal"] = _where(flips, batch["normal"].flip(2) * signs, batch["normal"])
         return turned
@@ -81,6 +82,7 @@ class NormalsTask:
     def picture(self, prediction: NDArray[Any]) -> NDArray[np.uint8]:
         """Red to the right, green up, blue towards the camera; nothing is black."""
         known = np.linalg.norm(prediction, axis=-1, keepdims=True) > 0
+        # From OpenCV's axes to the usual colours: y up, z towards the camera.
         seen = prediction * np.array([1, -1, -1], np.float32)
         return np.where(known, np.rint((seen + 1) * 127.5), 0).astype(np.uint8)
 

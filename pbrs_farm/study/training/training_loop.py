@@ -73,6 +73,7 @@ def train_network(
         raise BadInput("batch", str(plan.batch), f"cannot be shared by {share.of} processes")
     network = placed(network, plan)
     optimiser = optimiser_of(network, plan)
+    # What a checkpoint must agree with to be gone on from.
     where = Position(0, task.name, plan_digest(plan), views.digest(), seed)
     first = _resumed(folder, network, optimiser, where)
     model = nn.parallel.DistributedDataParallel(network) if share.of > 1 else network
@@ -84,6 +85,7 @@ def train_network(
         done = step + 1
         if not share.is_first:
             continue
+        # Means since the last row: loss, and views a second.
         if done % plan.log_every == 0 or done == plan.steps:
             seconds = max(time.monotonic() - started, 1e-9)
             row = {
@@ -95,6 +97,7 @@ def train_network(
             folder.add_metrics(row)
             observe(row)
             started, loss_sum, n_summed = time.monotonic(), 0.0, 0
+        # A checkpoint holds no gradients, so it waits until none are accumulated.
         if done % plan.checkpoint_every == 0 and done % plan.accumulate == 0 and done < plan.steps:
             save_checkpoint(folder.checkpoint, network, optimiser, _at(where, done))
     if share.is_first:

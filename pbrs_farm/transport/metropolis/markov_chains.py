@@ -186,10 +186,12 @@ def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
     pixel, at = sample_film(film, sampler.get_2d(mi.UInt32(0)), context.paths.fields.is_tent)
     suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
     y = _camera_split_path(context.camera, at.x, at.y)
+    # Extend each lane's path until it ends; the loop is recorded, ended lanes are masked.
     active = mi.Bool(True)
     while active:
         y, alive = _extend(context, sampler, y, suffix, active)
         active = active & alive
+    # The suffix's light was gathered without the prefix's throughput.
     light = y.light + y.prefix_beta * y.suffix_light
     target = target_function(film, pixel, light)
     target = dr.select(dr.isfinite(target), target, 0)

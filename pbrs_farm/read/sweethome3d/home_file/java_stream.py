@@ -148,6 +148,7 @@ class _Reader:
         self._n_contents += 1
         if self._n_contents > _MAX_CONTENTS:
             raise self._fail(f"more than {_MAX_CONTENTS} objects")
+        # A content begins with a type code (Java Object Serialization Specification, 6.4).
         code = self._number("B")
         if code == _NULL:
             return None
@@ -156,10 +157,12 @@ class _Reader:
         if code in (_STRING, _LONG_STRING):
             count = self._number("H" if code == _STRING else "q")
             return self._remember(self._utf(count))
+        # Blocks are what a class wrote by itself; their end has a mark of its own.
         if code in (_BLOCK, _LONG_BLOCK):
             return self._bytes(self._number("B" if code == _BLOCK else "i"))
         if code == _END:
             return _ENDED
+        # Deeper contents are yielded, not called: a deep stream costs no Python stack.
         if code == _OBJECT:
             return (yield self._object())
         if code == _ARRAY:
@@ -240,8 +243,10 @@ class _Reader:
         desc = yield self._class_desc()
         made: list[Any] = self._remember([])
         count, letter = self._number("i"), desc.name[1:2] if desc is not None else ""
+        # Every element takes a byte or more, so a larger count is damage.
         if not 0 <= count <= len(self._data) - self.at:
             raise self._fail(f"an array of {count} elements")
+        # "[I" names an array of int; its numbers follow without type codes.
         if letter in _PRIMITIVES:
             form = f">{count}{_PRIMITIVES[letter]}"
             made += struct.unpack_from(form, self._data, self.at)
