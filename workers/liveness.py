@@ -34,6 +34,7 @@ def main() -> int:
     try:
         age_s = time.time() - path.stat().st_mtime
     except FileNotFoundError:
+        # Without a file nobody has ever been seen alive.
         age_s = float("inf")
     if age_s < STALE_S:
         return 0

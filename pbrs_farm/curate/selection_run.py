@@ -144,6 +144,7 @@ def _records(
     records, failed = [], {}
     for view, has in views.items():
         key = keys.view_key(house, view, "histogram.json")
+        # A view that cannot be read costs itself alone.
         try:
             if not has:
                 raise BadInput(key, "", "missing", hint="render the view again")

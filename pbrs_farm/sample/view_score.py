@@ -34,6 +34,7 @@ def released_columns(house: House, room: Room) -> NDArray[np.intp]:
 
     Objects of this room alone; stairs, columns and boxes are no objects there.
     """
+    # An item's instance id is its place in the list plus 1; 0 is nothing.
     ids = [
         i + 1
         for i, item in enumerate(house.items)

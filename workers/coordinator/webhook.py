@@ -99,6 +99,7 @@ def watch_jobs(webhook: Webhook, ledger: Ledger) -> Callable[[], None]:
 
     A URL that does not answer holds up no task; while one look lasts no other begins.
     """
+    # Taken by begin, given back by the thread that it starts.
     busy = threading.Lock()
 
     def look() -> None:

@@ -74,6 +74,7 @@ def make_slot(config: FarmConfig) -> Slot:
     from workers.ledger.worker_registry import Registry
     from workers.node.renderer import HANDLER
 
+    # A folder for each pool process, so that their logs do not mix.
     folder = config.scratch / f"pbrs-{config.worker}-{os.getpid()}"
     folder.mkdir(parents=True, exist_ok=True)
     start = partial(ChildProcess, HANDLER, folder / "log.txt")

@@ -34,6 +34,7 @@ def scene(request: Request) -> Response:
     """GET /homes/HOUSE/scene.json: rooms, cameras with their pictures, refusals counted."""
     home = asked_home(request)
     board = board_of(request)
+    # Stored files may come from anybody: every field may be missing or of another type.
     house = json_at(board.reader, keys.house_key(home.id, "house.json"))
     cameras = json_at(board.reader, keys.house_key(home.id, "cameras.json"))
     stored = {view.id: view for view in board.queries.views_of(home.id)}
@@ -58,6 +59,7 @@ def candidates(request: Request) -> Response:
     board = board_of(request)
     version = board.index.fingerprints().get(home.id, "")
 
+    # Sampling takes seconds: in a process of its own, kept by the home's fingerprint.
     def make() -> bytes:
         return candidates_in_process(board.reader.url, home.id)
 

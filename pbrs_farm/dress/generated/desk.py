@@ -116,6 +116,7 @@ def remote(rng: np.random.Generator, style: Style) -> Made:
 
 def phone(rng: np.random.Generator, style: Style) -> Made:
     """A mobile phone, its screen up."""
+    # The screen lies 0.3 mm proud of the shell.
     body = slab((-0.036, 0, -0.075), (0.036, 0.0085, 0.075))
     screen = slab((-0.0335, 0.0085, -0.0715), (0.0335, 0.0088, 0.0715))
     shell: Rgb = ((0.1, 0.1, 0.11), (0.8, 0.8, 0.8), (0.3, 0.35, 0.45))[int(rng.integers(3))]

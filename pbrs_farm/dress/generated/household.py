@@ -163,6 +163,7 @@ def table_frame(rng: np.random.Generator, style: Style) -> Made:
         if rng.random() < 0.5
         else plain("frame", (0.1, 0.1, 0.1), 0.35)
     )
+    # b: width of the frame's wood, t: its depth; left and right fit between the other two.
     sides = [
         slab((-w / 2, 0, 0), (w / 2, b, t)), slab((-w / 2, h - b, 0), (w / 2, h, t)),
         slab((-w / 2, b, 0), (-w / 2 + b, h - b, t)), slab((w / 2 - b, b, 0), (w / 2, h - b, t)),
@@ -314,6 +315,7 @@ def shoes(rng: np.random.Generator, style: Style) -> Made:
 
 
 def _shoe_sole() -> Surface:
+    # (radius, height) of a unit body, stretched to 8.8 x 2.2 x 27 cm.
     return _stretched(
         turned([(0, 0), (0.5, 0), (0.52, 0.6), (0.5, 1), (0, 1)], n=14), (0.088, 0.022, 0.27)
     )

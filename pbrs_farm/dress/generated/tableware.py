@@ -220,6 +220,7 @@ def mills(rng: np.random.Generator, style: Style) -> Made:
     parts: list[Part] = []
     for k, colour in enumerate((style.wood.dark, (0.85, 0.84, 0.8))):
         tall = 0.11
+        # (radius, height): foot, waist, head, and the knob that is turned.
         profile = [
             (0, 0),
             (0.024, 0),

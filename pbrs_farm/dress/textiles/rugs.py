@@ -43,6 +43,7 @@ def rug(
     # The back and the edge take the mean colour of the face.
     r, g, b = (round(float(c) / 255, 2) for c in pixels.reshape(-1, 3).mean(0))
     parts = [(face, shown), (back, plain("rug edge", (r, g, b), 1.0))]
+    # Slabs stand upright like what hangs on walls: lay it down.
     lying = [(replace(s, positions=s.positions @ _LYING.T), m) for s, m in parts]
     return hung("rug", "rug", FLOOR_MAT, lying, [texture], Place.FLOOR)
 

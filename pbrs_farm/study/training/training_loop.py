@@ -53,6 +53,7 @@ def share_of_process() -> Share:
     """As torchrun's environment says; begins the process group where there are several."""
     share = Share(int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1")))
     if share.of > 1 and not torch.distributed.is_initialized():
+        # NCCL joins GPUs, Gloo processes without one.
         on_gpu = torch.cuda.is_available()
         if on_gpu:
             torch.cuda.set_device(int(os.environ.get("LOCAL_RANK", "0")))
@@ -119,6 +120,7 @@ def _resumed(
     position = load_checkpoint(folder.checkpoint, network, optimiser)
     if _at(position, 0) != where:
         raise BadInput(folder.checkpoint, "", "a checkpoint of another task, plan, seed or views")
+    # Rows of steps after the checkpoint go: these steps are run again.
     folder.keep_metrics_until(position.step)
     return position.step
 
@@ -141,6 +143,7 @@ class _Loop:
         chance = (self.seed * 1_000_003 + step) * 1024 + self.share.rank
         torch.manual_seed(chance)
         rows = rows_of_step(len(self.views), plan.batch, step, self.seed)
+        # Each process takes its own rows of the one batch.
         rows = rows[self.share.rank :: self.share.of]
         batch: Batch = {
             name: torch.from_numpy(array).to(device, non_blocking=True)
@@ -153,6 +156,7 @@ class _Loop:
             output = network_output(self.model, batch["colour"], plan)
         losses = self.task.loss(output, batch, plan)
         self._stop_at_nan(losses, [self.views.ids[k] for k in rows], step)
+        # Gradients add up over plan.accumulate batches before the weights move.
         loss = losses.mean()
         (loss / plan.accumulate).backward()
         if (step + 1) % plan.accumulate == 0:
