@@ -183,7 +183,7 @@ UNITS = {
     "made.views": "views of them",
     "made.objects_per_view": "objects of 0.05 % of the pixels or more, median of views",
     "made.classes_per_view": "NYU13 classes, median of views",
-    "made.share_distance": "half the sum of differences of class shares from NYUv2's",
+    "made.share_distance": "sum of differences of NYU13 pixel shares from NYUv2's",
 }
 
 if __name__ == "__main__":
