@@ -6,7 +6,9 @@ a link inside a folder that leads out of it is refused here.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from typing import Any
 
 from pbrs_farm.core.errors import ObjectMissing, PbrsError, StoreFailed
 from pbrs_farm.regular_files import real_path
@@ -55,6 +57,15 @@ class RootReader:
             return self.get(key, most_bytes)
         except PbrsError:
             return None
+
+    def json_object(self, key: str) -> dict[str, Any]:
+        """The JSON object under a key, {} where there is none or it is damaged."""
+        data = self.get_or_none(key)
+        try:
+            value = json.loads(data) if data is not None else {}
+        except (ValueError, RecursionError):
+            return {}
+        return value if isinstance(value, dict) else {}
 
     def list(self, prefix: str) -> Iterator[str]:
         """Keys below the folder prefix."""

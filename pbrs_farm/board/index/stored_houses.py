@@ -96,7 +96,7 @@ def _is_id(name: str) -> bool:
 
 def read_house(reader: RootReader, house: str) -> HouseRow:
     """The house and its views; what is damaged is left out, the rest stands."""
-    facts = _json_object(reader, keys.house_key(house, "house.json"))
+    facts = reader.json_object(keys.house_key(house, "house.json"))
     source = facts.get("source")
     credit = source.get("attribution") if isinstance(source, dict) else ""
     rooms = _room_names(facts.get("rooms"))
@@ -127,7 +127,7 @@ def _view_row(
 ) -> ViewRow:
     facts: dict[str, Any] = {}
     if "view.json" in files:
-        facts = _json_object(reader, keys.view_key(house, view, "view.json"))
+        facts = reader.json_object(keys.view_key(house, view, "view.json"))
     room = str(facts.get("room") or view.rpartition("_")[0])
     warnings = facts.get("warnings")
     texts = [shown(w, MAX_MESSAGE) for w in warnings] if isinstance(warnings, list) else []
@@ -151,7 +151,7 @@ def _class_bits(instances: Any) -> int:
 
 def verdicts(reader: RootReader) -> dict[tuple[str, str], str]:
     """(house, view) -> "" where the last selection kept it, else why not; {} without a selection."""
-    run = _json_object(reader, keys.SELECTION).get("run")
+    run = reader.json_object(keys.SELECTION).get("run")
     if not run:
         return {}
     try:
@@ -166,12 +166,3 @@ def selection_fingerprint(reader: RootReader) -> str:
     """A text that changes when another selection was made."""
     data = reader.get_or_none(keys.SELECTION)
     return "" if data is None else keys.sha256(data)
-
-
-def _json_object(reader: RootReader, key: str) -> dict[str, Any]:
-    data = reader.get_or_none(key)
-    try:
-        value = json.loads(data) if data is not None else {}
-    except (ValueError, RecursionError):
-        return {}
-    return value if isinstance(value, dict) else {}

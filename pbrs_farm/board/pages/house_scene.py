@@ -11,7 +11,7 @@ from starlette.responses import JSONResponse, Response
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.looking import asked_home, board_of
 from pbrs_farm.board.pages.rendering import thumb_url, view_url
-from pbrs_farm.board.pages.viewing import FOREVER, json_at
+from pbrs_farm.board.pages.viewing import FOREVER
 from pbrs_farm.board.pictures.candidates import candidates_in_process
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
@@ -35,8 +35,8 @@ def scene(request: Request) -> Response:
     home = asked_home(request)
     board = board_of(request)
     # Stored files may come from anybody: every field may be missing or of another type.
-    house = json_at(board.reader, keys.house_key(home.id, "house.json"))
-    cameras = json_at(board.reader, keys.house_key(home.id, "cameras.json"))
+    house = board.reader.json_object(keys.house_key(home.id, "house.json"))
+    cameras = board.reader.json_object(keys.house_key(home.id, "cameras.json"))
     stored = {view.id: view for view in board.queries.views_of(home.id)}
     report = cameras.get("report")
     refused = report.get("refused") if isinstance(report, dict) else None

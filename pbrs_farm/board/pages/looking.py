@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from starlette.exceptions import HTTPException
@@ -77,8 +78,8 @@ def views(request: Request) -> Response:
     return answer
 
 
-def _credits(homes: object) -> set[str]:
-    return {h.credit for h in homes if h is not None and h.credit}  # type: ignore[attr-defined]
+def _credits(homes: Iterable[ListedHome | None]) -> set[str]:
+    return {h.credit for h in homes if h is not None and h.credit}
 
 
 def home(request: Request) -> Response:

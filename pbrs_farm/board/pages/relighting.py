@@ -12,7 +12,7 @@ from starlette.responses import Response
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.looking import asked_view, board_of
 from pbrs_farm.board.pages.rendering import page
-from pbrs_farm.board.pages.viewing import FOREVER, json_at
+from pbrs_farm.board.pages.viewing import FOREVER
 from pbrs_farm.board.pictures.light_layers import light_packet_in_process
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.core import keys
@@ -29,7 +29,7 @@ def relight(request: Request) -> Response:
     if not found.has("radiance"):
         raise HTTPException(404, "This view has no light stored: radiance.exr is missing.")
     board = board_of(request)
-    facts = json_at(board.reader, keys.view_key(found.house, found.id, "view.json"))
+    facts = board.reader.json_object(keys.view_key(found.house, found.id, "view.json"))
     modes = facts.get("modes")
     develop = modes.get("develop") if isinstance(modes, dict) else None
     is_denoised = isinstance(develop, dict) and develop.get("denoised") is not False

@@ -43,7 +43,7 @@ def view(request: Request) -> Response:
     """GET /homes/HOUSE/views/VIEW: a view with all its layers."""
     found = asked_view(request)
     board = board_of(request)
-    facts = json_at(board.reader, keys.view_key(found.house, found.id, "view.json"))
+    facts = board.reader.json_object(keys.view_key(found.house, found.id, "view.json"))
     layers = [
         {"name": x.name, "title": title_of(x.name), "label": is_label(x.name), "unit": x.unit}
         for x in LAYERS
@@ -139,16 +139,6 @@ def download(data: bytes, name: str) -> Response:
     ascii_name = name.encode("ascii", "replace").decode().replace('"', "_")
     headers = {"Content-Disposition": f'attachment; filename="{ascii_name}"'}
     return Response(data, media_type=content_type(name), headers=headers)
-
-
-def json_at(reader: RootReader, key: str) -> dict[str, Any]:
-    """The JSON object under a key, {} where there is none or it is damaged."""
-    data = reader.get_or_none(key)
-    try:
-        value = json.loads(data) if data is not None else {}
-    except (ValueError, RecursionError):
-        return {}
-    return value if isinstance(value, dict) else {}
 
 
 def _asked_layer(request: Request) -> str:
@@ -257,7 +247,7 @@ def _seconds(reader: RootReader, found: ListedView) -> list[tuple[str, float, st
     """(step, seconds, worker) of the view's steps that are done."""
     rows = []
     for step in _STEPS:
-        marker = json_at(reader, keys.marker_key(found.house, step, found.id))
+        marker = reader.json_object(keys.marker_key(found.house, step, found.id))
         if marker:
             rows.append((step, _number(marker.get("seconds")), str(marker.get("worker", ""))))
     return rows
