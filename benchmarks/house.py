@@ -23,9 +23,7 @@ import numpy as np
 from benchmarks.figures import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
-MARKERS = (
-    "not slow and not gpu and not chaos and not infra and not web and not sweethome3d and not study"
-)
+MARKERS = "not slow and not gpu and not chaos and not infra and not web and not sweethome3d"
 PRAGMAS = ("noqa", "type:", "fmt:", "pragma:")
 # Parts that came after a number of lines was wished for.
 LATER_PARTS = tuple(
@@ -161,23 +159,32 @@ def coverage_percent() -> float:
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob(".coverage*"):
         old.unlink()
-    settings = folder / "coveragerc"
-    settings.write_text(
-        "[run]\nparallel = true\npatch = subprocess\nsigterm = true\n"
-        f"concurrency = multiprocessing,thread\nsource = {','.join(PACKAGES)}\n"
-        f"data_file = {folder}/.coverage\n"
-        "[report]\nexclude_also =\n    if TYPE_CHECKING:\n    @overload\n    \\.\\.\\.$\n"
-    )
+    # What .ci/run runs: all but the study on two processes, then the study alone. Loaders of torch
+    # end their workers by a signal and take a handler of coverage's for a crash.
+    counted = "sigterm = true\nconcurrency = multiprocessing,thread\n"
+    others = _settings(folder / "others.rc", counted)
+    study = _settings(folder / "study.rc", "concurrency = thread\n")
     coverage = [sys.executable, "-m", "coverage"]
-    options = [f"--rcfile={settings}"]
     env = os.environ | {"COVERAGE_FILE": f"{folder}/.coverage"}
-    tests = ["-m", "pytest", "-n", "2", "-m", MARKERS]
-    subprocess.run([*coverage, "run", *options, *tests], check=True, env=env)
+    for rc, words in ((others, ["-n", "2", "-m", f"{MARKERS} and not study"]),
+                      (study, ["-m", f"{MARKERS} and study"])):  # fmt: skip
+        tests = ["-m", "pytest", *words]
+        subprocess.run([*coverage, "run", f"--rcfile={rc}", *tests], check=True, env=env)
+    options = [f"--rcfile={others}"]
     subprocess.run([*coverage, "combine", "-q", *options], check=True, env=env)
     report = folder / "coverage.json"
     subprocess.run([*coverage, "json", "-q", *options, "-o", str(report)], check=True, env=env)
     totals = json.loads(report.read_text())["totals"]
     return round(float(totals["percent_covered"]), 2)
+
+
+def _settings(path: Path, counted: str) -> Path:
+    path.write_text(
+        f"[run]\nparallel = true\npatch = subprocess\n{counted}source = {','.join(PACKAGES)}\n"
+        f"data_file = {path.parent}/.coverage\n"
+        "[report]\nexclude_also =\n    if TYPE_CHECKING:\n    @overload\n    \\.\\.\\.$\n"
+    )
+    return path
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import made_homes
 from pbrs_farm.core.recipe import ReadFields
@@ -28,7 +29,9 @@ def _made_house(source: SourceRef, fields: ReadFields) -> House:
     # The package must be the one that the home was named with: other models, another home.
     check_unchanged(source)
     (home,) = made_homes(source.location)
-    data = made(home, catalogue_of_words("")).data
+    # An empty home needs no package, so that it is made where none can be read.
+    catalogue = catalogue_of_words("") if home.furniture else EMPTY
+    data = made(home, catalogue).data
     house = read_home(data, f"{home.name}.sh3d", fields=fields)
     credit = house.source.attribution.replace("pbrs_farm", _MADE_BY, 1)
     its_source = replace(house.source, kind="made", file=source.location, attribution=credit)
