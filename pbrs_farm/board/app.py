@@ -15,7 +15,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from pbrs_farm.board.board_state import Board
-from pbrs_farm.board.pages import entering, farming, house_scene, looking, relighting, viewing
+from pbrs_farm.board.pages import entering, farming, house_scene, lists, relighting, viewing
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.security.guard import Guard
 from pbrs_farm.core.errors import BadInput, PbrsError
@@ -48,9 +48,9 @@ def application(board: Board) -> ASGIApp:
 
 def _routes() -> list[Route]:
     return [
-        Route("/", looking.homes),
-        Route("/views", looking.views),
-        Route("/homes/{house}", looking.home),
+        Route("/", lists.homes),
+        Route("/views", lists.views),
+        Route("/homes/{house}", lists.home),
         Route("/homes/{house}/house.glb", house_scene.house_glb),
         Route("/homes/{house}/scene.json", house_scene.scene),
         Route("/homes/{house}/candidates.json", house_scene.candidates),

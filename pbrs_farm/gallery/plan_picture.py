@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
+from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, PlanWall, Point, RoomType
 from pbrs_farm.generate.furniture import PlacedPiece
-from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, PlanWall, Point, RoomType
 
 _MARGIN_M: Final = 0.6
 _PX_PER_M: Final = 60.0

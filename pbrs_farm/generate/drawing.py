@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.floor_plan import Plan
 from pbrs_farm.generate.layout import Layout, layout
 from pbrs_farm.generate.openings import openings_of
-from pbrs_farm.generate.plan import Plan
+from pbrs_farm.generate.plan_walls import rooms_of, runs_of, walls_of
 from pbrs_farm.generate.programme import Programme, Wishes, drawn_programme
-from pbrs_farm.generate.walls import rooms_of, runs_of, walls_of
 
 _PROGRAMMES: Final = 6  # that are tried before a wish is refused
 

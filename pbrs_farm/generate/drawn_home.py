@@ -9,10 +9,10 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.generate.drawing import drawn_plan
+from pbrs_farm.generate.floor_plan import Plan
 from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.furnish.gates import FurnishReport, furnish_report
 from pbrs_farm.generate.furniture import PlacedPiece
-from pbrs_farm.generate.plan import Plan
 from pbrs_farm.generate.programme import Programme, Wishes
 
 _TRIES: Final = 4

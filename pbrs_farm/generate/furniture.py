@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from pbrs_farm.core.catalogue import Piece
-from pbrs_farm.generate.plan import Point
+from pbrs_farm.generate.floor_plan import Point
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from pbrs_farm.generate.plan import RoomType
+from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.programme import Programme, RoomWish
 from pbrs_farm.generate.slicing import STEP_M, Brief, IntRect, shared_length
 

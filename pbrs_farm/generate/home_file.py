@@ -18,10 +18,17 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Picture, Place, Shape
+from pbrs_farm.generate.floor_plan import (
+    OpeningKind,
+    Plan,
+    PlanOpening,
+    PlanRoom,
+    PlanWall,
+    RoomType,
+)
 from pbrs_farm.generate.furniture import PlacedPiece
 from pbrs_farm.generate.joinery import joinery
 from pbrs_farm.generate.model_file import model_files
-from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, PlanRoom, PlanWall, RoomType
 from pbrs_farm.images import png_from_array
 
 AUTHOR: Final = "pbrs_farm"

@@ -14,7 +14,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind, Surface
 from pbrs_farm.core.primitives import box_quads, quads_surface
-from pbrs_farm.generate.plan import OpeningKind, PlanOpening
+from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
 
 _FRAME_M: Final = 0.06  # breadth of a frame's posts
 _LEAF_M: Final = 0.04  # thickness of a door's leaf

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.guest_rooms import (
     DAYLIGHT_M,
     DOOR_WALL_M,
@@ -22,7 +23,6 @@ from pbrs_farm.generate.guest_rooms import (
     hall_wall_m,
     hosts_of,
 )
-from pbrs_farm.generate.plan import RoomType
 from pbrs_farm.generate.programme import Programme, RoomWish
 from pbrs_farm.generate.slicing import N_TRIES, Contact, IntRect, Leaf, solved
 

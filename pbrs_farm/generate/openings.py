@@ -9,8 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.plan import (
+from pbrs_farm.generate.floor_plan import (
     OpeningKind,
     PlanOpening,
     PlanRoom,
@@ -19,8 +18,9 @@ from pbrs_farm.generate.plan import (
     Rect,
     RoomType,
 )
+from pbrs_farm.generate.layout import Layout
+from pbrs_farm.generate.plan_walls import OUTER_M, OUTSIDE, PARAPET_M, Run, balcony, open_rooms
 from pbrs_farm.generate.slicing import STEP_M
-from pbrs_farm.generate.walls import OUTER_M, OUTSIDE, PARAPET_M, Run, balcony, open_rooms
 
 DOOR_HEIGHT_M: Final = 2.1
 _DOOR_M, _WET_DOOR_M, _ENTRANCE_M = 0.9, 0.8, 0.95

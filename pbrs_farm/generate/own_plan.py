@@ -26,7 +26,7 @@ from shapely.ops import unary_union
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.dwelling_rows import plan_value_of_rows
-from pbrs_farm.generate.plan import (
+from pbrs_farm.generate.floor_plan import (
     OpeningKind,
     Plan,
     PlanOpening,
@@ -35,8 +35,8 @@ from pbrs_farm.generate.plan import (
     Point,
     RoomType,
 )
+from pbrs_farm.generate.plan_walls import INNER_M, OUTER_M, PARAPET_HEIGHT_M, PARAPET_M, corners
 from pbrs_farm.generate.programme_file import json_from_file
-from pbrs_farm.generate.walls import INNER_M, OUTER_M, PARAPET_HEIGHT_M, PARAPET_M, corners
 
 MAX_ROOMS: Final = 60
 _FAR_M: Final = 200.0

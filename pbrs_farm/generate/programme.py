@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.made_home import check_wishes
-from pbrs_farm.generate.plan import RoomType
+from pbrs_farm.generate.floor_plan import RoomType
 
 MEDIAN_AREA: Final = {
     RoomType.LIVING: 27.2,

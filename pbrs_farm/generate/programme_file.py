@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.plan import RoomType
+from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.programme import AREA_RANGE, MEDIAN_AREA, Programme, RoomWish
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 

@@ -23,10 +23,7 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, floor_space
 from pbrs_farm.dress.space.passages import Passage
 from pbrs_farm.dress.space.room_kinds import RoomKind
-from pbrs_farm.generate.furnish.furnished import furnished
-from pbrs_farm.generate.furniture import PlacedPiece
-from pbrs_farm.generate.made import turned_by, upright_angle
-from pbrs_farm.generate.plan import (
+from pbrs_farm.generate.floor_plan import (
     OpeningKind,
     Plan,
     PlanOpening,
@@ -35,7 +32,10 @@ from pbrs_farm.generate.plan import (
     Rect,
     RoomType,
 )
-from pbrs_farm.generate.walls import corners
+from pbrs_farm.generate.furnish.furnished import furnished
+from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.made import turned_by, upright_angle
+from pbrs_farm.generate.plan_walls import corners
 
 _EMPTY_SHARE: Final = 0.03  # of a room's floor
 _STANDS_M: Final = 0.5  # what begins higher above the floor hangs

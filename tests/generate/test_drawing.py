@@ -11,7 +11,7 @@ from shapely.ops import unary_union
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.drawing import drawn_plan
-from pbrs_farm.generate.plan import OpeningKind, Plan, RoomType
+from pbrs_farm.generate.floor_plan import OpeningKind, Plan, RoomType
 from pbrs_farm.generate.programme import Wishes
 
 SEEDS = range(12)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.guest_rooms import cut_guests, hosts_of
-from pbrs_farm.generate.plan import RoomType
 from pbrs_farm.generate.programme import Programme, RoomWish
 from pbrs_farm.generate.slicing import STEP_M, Brief, IntRect, shared_length
 

@@ -6,7 +6,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 
-from pbrs_farm.board.pages.looking import board_of
+from pbrs_farm.board.pages.lists import board_of
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.security.guard import form_of
 from pbrs_farm.board.security.sessions import COOKIE

@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response, StreamingResponse
 
 from pbrs_farm.board.farm.live_farm import LiveFarm
-from pbrs_farm.board.pages.looking import board_of
+from pbrs_farm.board.pages.lists import board_of
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.security.guard import form_of
 from pbrs_farm.core.errors import PbrsError

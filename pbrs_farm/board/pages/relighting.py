@@ -10,7 +10,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from pbrs_farm.board.index.queries import ListedView
-from pbrs_farm.board.pages.looking import asked_view, board_of
+from pbrs_farm.board.pages.lists import asked_view, board_of
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.pages.viewing import FOREVER
 from pbrs_farm.board.pictures.light_layers import light_packet_in_process

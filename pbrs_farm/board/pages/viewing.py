@@ -17,7 +17,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from pbrs_farm.board.index.queries import ListedView
-from pbrs_farm.board.pages.looking import asked_view, board_of
+from pbrs_farm.board.pages.lists import asked_view, board_of
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.pictures.label_pixels import PLANES, packet
 from pbrs_farm.board.pictures.shown_layers import (

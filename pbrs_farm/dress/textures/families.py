@@ -25,7 +25,7 @@ from pbrs_farm.dress.textures.laid_tiles import (
     tile_maps,
 )
 from pbrs_farm.dress.textures.maps import SurfaceMaps, encoded
-from pbrs_farm.dress.textures.photographs import photograph_for, photograph_material
+from pbrs_farm.dress.textures.photo_textures import photograph_for, photograph_material
 from pbrs_farm.dress.textures.plain import (
     carpet_maps,
     concrete_maps,

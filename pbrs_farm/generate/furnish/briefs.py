@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pbrs_farm.generate.floor_plan import Plan, RoomType
 from pbrs_farm.generate.furnish import bathroom, bedroom, living, small_rooms
 from pbrs_farm.generate.furnish.kitchen import kitchen_places, units_of
 from pbrs_farm.generate.furnish.places import Places, fixed_places
 from pbrs_farm.generate.furnish.room_space import RoomSpace
 from pbrs_farm.generate.furnish.shelf import Shelf
 from pbrs_farm.generate.furnish.template import Group, Template
-from pbrs_farm.generate.plan import Plan, RoomType
 
 
 @dataclass(frozen=True, slots=True)

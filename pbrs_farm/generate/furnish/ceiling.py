@@ -7,10 +7,10 @@ from typing import Final
 from shapely.geometry import Polygon, box
 
 from pbrs_farm.core.catalogue import Piece
+from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.furnish.room_space import RoomSpace
 from pbrs_farm.generate.furnish.shelf import Shelf
 from pbrs_farm.generate.furniture import PlacedPiece
-from pbrs_farm.generate.plan import RoomType
 
 _HEAD_M: Final = 1.95  # the lowest point of a lamp
 _LARGE_M2: Final = 22.0  # rooms above have two

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.generate.floor_plan import Plan, Rect, RoomType
 from pbrs_farm.generate.furnish.briefs import Brief, brief_of
 from pbrs_farm.generate.furnish.ceiling import ceiling_lamps
 from pbrs_farm.generate.furnish.places import Places, places_of
@@ -19,7 +20,6 @@ from pbrs_farm.generate.furnish.shelf import Shelf, style_of
 from pbrs_farm.generate.furnish.template import Group
 from pbrs_farm.generate.furnish.walking import WalkMap
 from pbrs_farm.generate.furniture import PlacedPiece
-from pbrs_farm.generate.plan import Plan, Rect, RoomType
 
 _ORDER: Final = (RoomType.KITCHEN, RoomType.LIVING, RoomType.STUDIO)  # then the others
 _MOST_ORDERS: Final = 6

@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.generate.floor_plan import Plan, Rect, RoomType
 from pbrs_farm.generate.furnish.room_space import RoomSpace, room_space
 from pbrs_farm.generate.furnish.walking import WalkMap
 from pbrs_farm.generate.furniture import PlacedPiece
-from pbrs_farm.generate.plan import Plan, Rect, RoomType
 
 _SEATS: Final = ("sofa", "corner_sofa", "armchair", "chair")
 MUST_HAVES: Final[dict[RoomType, tuple[tuple[str, ...], ...]]] = {

@@ -14,12 +14,12 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.catalogue import Piece
+from pbrs_farm.generate.floor_plan import Rect
 from pbrs_farm.generate.furnish.kitchen_shapes import DEPTH_M, MODULE_M, Arm, run_shapes
 from pbrs_farm.generate.furnish.places import allowed, frames_array
 from pbrs_farm.generate.furnish.room_space import RoomSpace
 from pbrs_farm.generate.furnish.shelf import Shelf
 from pbrs_farm.generate.furnish.template import Slot, Standing, Template
-from pbrs_farm.generate.plan import Rect
 
 UPPER_M: Final = 1.45  # lower edge of wall cabinets
 _FRONT_M: Final = 0.8  # free before the run

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from pbrs_farm.generate.floor_plan import Rect
 from pbrs_farm.generate.furnish.room_space import RoomSpace, Wall
-from pbrs_farm.generate.plan import Rect
 
 DEPTH_M: Final = 0.62
 MODULE_M: Final = 0.60

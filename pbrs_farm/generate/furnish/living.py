@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pbrs_farm.core.catalogue import Piece
+from pbrs_farm.generate.floor_plan import Rect
 from pbrs_farm.generate.furnish.bedroom import single
 from pbrs_farm.generate.furnish.shelf import Shelf, backed, slot
 from pbrs_farm.generate.furnish.template import Liking, Slot, Stand, Template
-from pbrs_farm.generate.plan import Rect
 
 _TO_TABLE_M = 0.45  # from a sofa to its table
 _BEHIND_CHAIR_M = 0.75  # from the table's edge

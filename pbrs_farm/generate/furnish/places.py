@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.generate.floor_plan import Point, Rect
 from pbrs_farm.generate.furnish.room_space import RoomSpace, Wall
 from pbrs_farm.generate.furnish.template import Frame, Group, Liking, Stand, Standing, Template
-from pbrs_farm.generate.plan import Point, Rect
 
 Ints = NDArray[np.int64]
 

@@ -15,8 +15,8 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, Point, Rect
 from pbrs_farm.generate.furnish.template import Frame
-from pbrs_farm.generate.plan import OpeningKind, Plan, PlanOpening, Point, Rect
 
 BEFORE_DOOR_M: Final = 0.8
 BEFORE_FRENCH_M: Final = 0.6

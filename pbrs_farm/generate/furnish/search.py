@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import Bools
+from pbrs_farm.generate.floor_plan import Rect
 from pbrs_farm.generate.furnish.places import Places
 from pbrs_farm.generate.furnish.template import Group, Standing
 from pbrs_farm.generate.furnish.walking import WalkMap
-from pbrs_farm.generate.plan import Rect
 
 _ROOTS: Final = 5  # places of the first group that are compared
 _NODES_A_ROOT: Final = 14

@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import Final
 
 from pbrs_farm.core.catalogue import Piece
+from pbrs_farm.generate.floor_plan import Point, Rect
 from pbrs_farm.generate.furniture import PlacedPiece
-from pbrs_farm.generate.plan import Point, Rect
 
 _WORKTOP_M: Final = 0.9
 

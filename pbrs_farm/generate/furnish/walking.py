@@ -11,8 +11,8 @@ import shapely
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import Bools
+from pbrs_farm.generate.floor_plan import Rect
 from pbrs_farm.generate.furnish.room_space import RoomSpace
-from pbrs_farm.generate.plan import Rect
 
 CELL_M: Final = 0.05
 WALK_M: Final = 0.6  # the width of a way

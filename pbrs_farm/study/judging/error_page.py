@@ -24,7 +24,7 @@ from pbrs_farm.study.judging.evaluation import (
 from pbrs_farm.study.judging.figure_table import shown_figure, title_of
 from pbrs_farm.study.metrics.angular import angles_deg
 from pbrs_farm.study.reading.png_rows import png_of_rows
-from pbrs_farm.study.tasks.task import Arrays, Task
+from pbrs_farm.study.tasks.study_task import Arrays, Task
 
 N_SHOWN: Final = 8  # of the worst views, and of the best
 _WORST_DEG: Final = 60.0  # what an error picture shows as white

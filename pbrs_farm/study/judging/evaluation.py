@@ -19,7 +19,7 @@ from pbrs_farm.study.judging.paper_numbers import paper_row
 from pbrs_farm.study.judging.photo_views import JudgedViews
 from pbrs_farm.study.networks.initial_weights import has_hed, start_from
 from pbrs_farm.study.networks.network_choice import network_of
-from pbrs_farm.study.tasks.task import Task
+from pbrs_farm.study.tasks.study_task import Task
 from pbrs_farm.study.tasks.task_choice import task_of
 from pbrs_farm.study.training.checkpoint import load_checkpoint
 from pbrs_farm.study.training.prediction import Judged, placed, predicted, scored

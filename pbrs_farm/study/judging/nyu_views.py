@@ -17,7 +17,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.curate.photographs import NyuMat, Photo
 from pbrs_farm.study.judging.pair_views import PLANE_TRUTH, framed, normal_truth, normals_of_photo
 from pbrs_farm.study.judging.photo_views import JudgedViews
-from pbrs_farm.study.tasks.task import Arrays
+from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.training_plan import Plan
 from pbrs_farm.truth.boundary import instance_boundary
 

@@ -22,7 +22,7 @@ from pbrs_farm.curate.photographs import Photo, pairs_in, photo_from_pair
 from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.study.judging.photo_views import JudgedViews
 from pbrs_farm.study.metrics.plane_normals import normals_of_depth
-from pbrs_farm.study.tasks.task import Arrays
+from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.training_plan import Plan
 
 PLANE_TRUTH: Final = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.study.tasks.task import Arrays
+from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.training.view_arrays import ViewArrays
 
 

@@ -16,7 +16,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.reading.view_sample import Sample
 from pbrs_farm.study.tasks.losses import class_loss
-from pbrs_farm.study.tasks.task import Arrays, Batch
+from pbrs_farm.study.tasks.study_task import Arrays, Batch
 from pbrs_farm.study.training_plan import Plan
 
 

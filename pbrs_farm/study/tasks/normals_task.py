@@ -16,7 +16,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.metrics.angular import AngularErrors
 from pbrs_farm.study.reading.view_sample import Sample
 from pbrs_farm.study.tasks.losses import normal_loss
-from pbrs_farm.study.tasks.task import Arrays, Batch
+from pbrs_farm.study.tasks.study_task import Arrays, Batch
 from pbrs_farm.study.training_plan import Plan
 
 _SCALE = 32767  # a stored component of 1

@@ -6,7 +6,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.tasks.classes_task import ClassesTask
 from pbrs_farm.study.tasks.edges_task import EdgesTask
 from pbrs_farm.study.tasks.normals_task import NormalsTask
-from pbrs_farm.study.tasks.task import Task
+from pbrs_farm.study.tasks.study_task import Task
 
 
 def task_of(name: str) -> Task:

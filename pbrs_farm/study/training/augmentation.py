@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from pbrs_farm.study.tasks.task import Batch, Task
+from pbrs_farm.study.tasks.study_task import Batch, Task
 from pbrs_farm.study.training_plan import Plan
 
 

@@ -15,7 +15,7 @@ from torch.nn import functional
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.study.networks.network_choice import encoded
-from pbrs_farm.study.tasks.task import Arrays, Task
+from pbrs_farm.study.tasks.study_task import Arrays, Task
 from pbrs_farm.study.training.view_arrays import ViewArrays
 from pbrs_farm.study.training_plan import Plan
 

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, PbrsError
-from pbrs_farm.study.tasks.task import Batch, Task
+from pbrs_farm.study.tasks.study_task import Batch, Task
 from pbrs_farm.study.training.augmentation import augmented
 from pbrs_farm.study.training.checkpoint import (
     Position,

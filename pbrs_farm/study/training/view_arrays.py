@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.reading.view_sample import Sample
-from pbrs_farm.study.tasks.task import Arrays, Task
+from pbrs_farm.study.tasks.study_task import Arrays, Task
 from pbrs_farm.study.training_plan import Plan
 
 

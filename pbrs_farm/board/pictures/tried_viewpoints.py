@@ -21,7 +21,7 @@ _TIMEOUT_S: Final = 300.0
 
 def candidates_in_process(store_url: str, house: str) -> bytes:
     """The JSON of `candidates`, made by a process of its own. Raises BadInput with what it said."""
-    command = [sys.executable, "-m", "pbrs_farm.board.pictures.candidates", store_url, house]
+    command = [sys.executable, "-m", "pbrs_farm.board.pictures.tried_viewpoints", store_url, house]
     try:
         done = subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:

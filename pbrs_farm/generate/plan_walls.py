@@ -12,8 +12,8 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
+from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, Point, RoomType
 from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.plan import PlanRoom, PlanWall, Point, RoomType
 from pbrs_farm.generate.slicing import STEP_M
 
 OUTSIDE: Final = -1
