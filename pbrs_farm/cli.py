@@ -36,7 +36,7 @@ MODULES: Final = {
     "submitting": ("submit",),
     "steering": (
         "status", "jobs", "why", "logs", "failures", "retry", "pause", "resume", "cancel", "reduce",
-        "drain", "workers", "recover", "coordinator", "worker",
+        "priority", "drain", "workers", "recover", "coordinator", "worker",
     ),
 }  # fmt: skip
 

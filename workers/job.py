@@ -10,6 +10,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
 from workers.ids import GL, LIGHT
+from workers.job_priority import DEFAULT_PRIORITY, LEAST_URGENT
 
 
 class HouseEntry(Record):
@@ -47,7 +48,7 @@ class JobSpec(BaseModel):
     layers: tuple[str, ...] = ()
     n_views: int = 0
     gpu: bool = False
-    priority: int = Field(5, ge=0, le=9, description="0 goes first")
+    priority: int = Field(DEFAULT_PRIORITY, ge=0, le=LEAST_URGENT, description="0 goes first")
     batch_stages: tuple[str, ...] = Field((GL, LIGHT), alias="group_stages")
     seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the batches")
     min_batches: int = Field(

@@ -21,6 +21,7 @@ from workers.client.text import (
     status_text,
     workers_text,
 )
+from workers.job_priority import LEAST_URGENT
 from workers.ledger.task_ledger import WITH_FAILURES
 
 if TYPE_CHECKING:
@@ -56,6 +57,9 @@ def add_verbs(verb: Verb) -> None:
         p = farm_verb(name, _steer, text)
         p.set_defaults(what=name)
         _add_job(p)
+    p = farm_verb("priority", _priority, "how urgent a job is, while it runs: 0 goes first, 9 last")
+    p.add_argument("number", type=int, choices=range(LEAST_URGENT + 1), metavar="NUMBER")
+    _add_job(p)
     p = farm_verb("drain", _drain, "a worker finishes what it runs and leaves")
     p.add_argument("worker")
     p.add_argument("--undo", action="store_true", help="let it stay")
@@ -157,6 +161,14 @@ def _steer(args: argparse.Namespace) -> int:
     # Each of these verbs is a method of the farm.
     state: str = getattr(farm, args.what)(job)
     _show(args, {"job": job, "state": state}, lambda: f"{job} {state}")
+    return 0
+
+
+def _priority(args: argparse.Namespace) -> int:
+    farm, job = _farm_and_job(args)
+    state = farm.set_priority(job, args.number)
+    answer = {"job": job, "state": state, "priority": args.number}
+    _show(args, answer, lambda: f"{job} {state}, priority {args.number}")
     return 0
 
 

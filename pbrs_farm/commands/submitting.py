@@ -43,7 +43,9 @@ def add_verbs(verb: Verb) -> None:
     add_output(p)
     p.add_argument("--reference", type=Path, help="reference file: select when the job ends")
     p.add_argument("--gpu", action="store_true", help="light goes to the queue light.gpu")
-    p.add_argument("--priority", type=int, default=5, choices=range(10), help="0 goes first")
+    p.add_argument(
+        "--priority", type=int, default=5, choices=range(10), help="0 goes first, 9 last"
+    )
     p.add_argument("--update", action="store_true", help="give the store this recipe")
     p.add_argument("--dry-run", action="store_true", help="print tasks, hours, storage; do nothing")
     p.add_argument("--slots", type=int, default=2, help="for --dry-run: tasks at once")

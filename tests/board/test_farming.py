@@ -18,6 +18,7 @@ from tests.board.served import log_in, served
 from tests.workers.conftest import config, redis_server
 from tests.workers.drive import Drive
 from workers.client.farm_client import Farm, new_spec
+from workers.client.text import workers_text
 from workers.config import FarmConfig
 from workers.ids import log_key
 from workers.job import HouseEntry
@@ -60,12 +61,12 @@ def client(farm: Farm, drive: Drive, tmp_path: Path) -> Iterator[httpx.Client]:
         yield client
 
 
-def do(client: httpx.Client, what: str, of: str) -> httpx.Response:
+def do(client: httpx.Client, what: str, of: str, **more: str) -> httpx.Response:
     """Confirm a change as a person would, from its own page."""
-    html = client.get("/farm/confirm", params={"what": what, "of": of}).text
+    html = client.get("/farm/confirm", params={"what": what, "of": of, **more}).text
     found = re.search(r'name="form_word" value="([0-9a-f]{64})"', html)
     word = found[1] if found else ""
-    return client.post("/farm/do", data={"form_word": word, "what": what, "of": of})
+    return client.post("/farm/do", data={"form_word": word, "what": what, "of": of, **more})
 
 
 def test_jobs_and_workers_are_listed_with_what_runs(client: httpx.Client, drive: Drive) -> None:
@@ -115,6 +116,31 @@ def test_a_change_is_asked_confirmed_done_and_written_down(
     ]  # fmt: skip
     assert rows[0]["address"] == "127.0.0.1"
     assert "paused" in client.get("/farm").text
+
+
+def test_a_priority_is_changed_confirmed_and_kept_for_a_recovery(
+    client: httpx.Client, farm: Farm, drive: Drive, tmp_path: Path
+) -> None:
+    job = drive.job.job_id
+    assert do(client, "priority", job, to="1").status_code == 401
+    log_in(client)
+    assert "<option selected>5</option>" in client.get(f"/farm/jobs/{job}").text
+    assert do(client, "priority", job, to="1").status_code == 303
+    assert farm.view(job).fields["priority"] == "1"
+    assert farm.spec(job).priority == 1
+    for wrong in ("10", "-1", "x", EVIL):
+        assert do(client, "priority", job, to=wrong).status_code == 409
+    assert do(client, "priority", job).status_code == 409
+    assert farm.view(job).fields["priority"] == "1"
+    (file,) = (tmp_path / "cache").glob("*/audit.jsonl")
+    row = json.loads(file.read_text().splitlines()[0])
+    assert (row["what"], row["of"], row["answer"]) == ("priority", job, "5 -> 1")
+
+
+def test_a_worker_tells_its_memory(client: httpx.Client, farm: Farm) -> None:
+    assert "GB" not in client.get("/farm").text
+    Registry(farm.ledger).heartbeat(memory_mb=1536.0)
+    assert re.search(r"1\.5 of [\d.]+ GB", workers_text(farm.workers()))
 
 
 def test_of_a_job_that_is_over_nothing_is_to_come(farm: Farm, drive: Drive) -> None:
@@ -217,7 +243,9 @@ def test_jobs_is_a_verb(
     monkeypatch.setenv("PBRS_STORE", farm.config.store_url)
     monkeypatch.setenv("PBRS_FARM_PREFIX", farm.config.prefix)
     assert main(["jobs"]) == 0
-    assert re.search(rf"{drive.job.job_id}\s+running\s+preview\s+0/3", capsys.readouterr().out)
+    assert re.search(rf"{drive.job.job_id}\s+running\s+5\s+preview\s+0/3", capsys.readouterr().out)
+    assert main(["priority", "2"]) == 0
+    assert capsys.readouterr().out == f"{drive.job.job_id} running, priority 2\n"
     assert main(["jobs", "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)
-    assert (row["failed"], row["running"], row["houses"]) == (1, 1, 3)
+    assert (row["failed"], row["running"], row["houses"], row["priority"]) == (1, 1, 3, 2)

@@ -16,6 +16,8 @@ from workers.config import FarmConfig
 from workers.job import JobRules, JobSpec
 from workers.ledger.redis_ledger import RedisLedger
 
+JOB_ID = "0123456789ab"
+
 
 @pytest.fixture(scope="session")
 def redis_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RedisServer]:
@@ -59,7 +61,7 @@ def ledger(config: FarmConfig) -> Iterator[RedisLedger]:
     ledger.client.close()
 
 
-def spec(n_houses: int, job_id: str = "0123456789ab", **rules: object) -> JobSpec:
+def spec(n_houses: int, job_id: str = JOB_ID, **rules: object) -> JobSpec:
     return JobSpec(
         job_id=job_id,
         version="0.1.0",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field, replace
 
-from tests.workers.conftest import spec
+from tests.workers.conftest import JOB_ID, spec
 from workers.config import FarmConfig
 from workers.ids import STAGES
 from workers.job import HouseEntry, JobSpec
@@ -78,9 +78,11 @@ class Drive:
         return view.state
 
 
-def drive(ledger: RedisLedger, n_houses: int, *, gpu: bool = False, **rules: object) -> Drive:
+def drive(
+    ledger: RedisLedger, n_houses: int, *, gpu: bool = False, job_id: str = JOB_ID, **rules: object
+) -> Drive:
     """A submitted job of houses h0, h1, ..."""
-    job = spec(n_houses, **rules).model_copy(update={"gpu": gpu})
+    job = spec(n_houses, job_id, **rules).model_copy(update={"gpu": gpu})
     assert ledger.create(job) == ""
     ledger.add_houses(
         job.job_id, 0, [HouseEntry(house_id=f"h{k}", source="{}") for k in range(n_houses)]

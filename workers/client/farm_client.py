@@ -24,6 +24,7 @@ from pbrs_farm.store import Store, store_from_url
 from workers.client.explain import explain
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
+from workers.coordinator.shares import priority_of
 from workers.ids import (
     TaskId,
     attempts_from_log_keys,
@@ -161,6 +162,7 @@ class Farm:
             "state": view.outcome,
             "reason": view.fields.get("reason", ""),
             "recipe": view.fields.get("recipe_name", ""),
+            "priority": priority_of(view),
             "houses": {
                 "total": int(view.fields.get("n_houses", 0)),
                 "waiting": view.n_waiting_houses,
@@ -243,6 +245,15 @@ class Farm:
     def reduce(self, job: str) -> str:
         """Merge what is there now, of a finished or a running job; its report says what lacks."""
         return self._steer(job, "reduce")
+
+    def set_priority(self, job: str, priority: int) -> str:
+        """Feed the job by another number, 0 first; from the coordinator's next turn. Its state."""
+        state = self._steer(job, "priority", str(priority))
+        # A job that is recovered keeps it; who only steers may do without a store.
+        if self.config.store_url:
+            spec = self.spec(job).model_copy(update={"priority": priority})
+            self.store.put(job_key(job), spec.model_dump_json(indent=1).encode())
+        return state
 
     def drain(self, worker: str, *, undo: bool = False) -> None:
         """The worker finishes what it runs and leaves; BadInput when there is no such worker."""

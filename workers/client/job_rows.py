@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from workers.coordinator.progress_rates import StageView, stage_views
+from workers.coordinator.shares import priority_of
 from workers.ids import GL, LIGHT
 from workers.ledger.task_ledger import JobView
 
@@ -32,6 +33,7 @@ def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
         "state": view.outcome,
         "reason": view.fields.get("reason", ""),
         "recipe": view.fields.get("recipe_name", ""),
+        "priority": priority_of(view),
         "houses": int(view.fields.get("n_houses", 0)),
         "houses_done": int(view.counts.get("houses:done", 0)),
         "views": int(view.counts.get("views", 0)),

@@ -21,7 +21,8 @@ def status_text(status: Mapping[str, Any]) -> str:
     houses = status["houses"]
     lines = [
         f"job {status['job']}  {status['state']}"
-        + (f": {status['reason']}" if status["reason"] else ""),
+        + (f": {status['reason']}" if status["reason"] else "")
+        + f"  priority {status['priority']}",
         f"houses {houses['done']} done, {houses['open']} open, {houses['waiting']} waiting, "
         f"{houses['quarantined']} quarantined, of {houses['total']};  "
         f"{status['views_done']} views done;  {status['workers']} workers",
@@ -95,15 +96,24 @@ def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
     """A worker a line, whether it lives, and how many do."""
     if not rows:
         return "no workers"
-    lines = [f"{'worker':<32}{'state':<10}{'seen':>8}{'slots':>6}  {'version':<9}queues"]
+    lines = [
+        f"{'worker':<32}{'state':<10}{'seen':>8}{'slots':>6}{'memory':>14}  {'version':<9}queues"
+    ]
     for row in rows:
         refusal = f" refuses: {row['refuses']}" if row.get("refuses") else ""
         lines.append(
             f"{row['worker']:<32}{row['state']:<10}{duration_text(row['age_s']):>8}"
-            f"{row.get('slots', '?'):>6}  {row.get('version', '?'):<9}{row.get('queues', '')}{refusal}"
+            f"{row.get('slots', '?'):>6}{memory_text(row):>14}  "
+            f"{row.get('version', '?'):<9}{row.get('queues', '')}{refusal}"
         )
     counts = Counter(row["state"] for row in rows)
     return "\n".join([*lines, ", ".join(f"{n} {state}" for state, n in sorted(counts.items()))])
+
+
+def memory_text(row: Mapping[str, Any]) -> str:
+    """ "3.2 of 15.6 GB" that a worker's processes hold of its machine; "-" when not known."""
+    held, has = (float(row.get(name) or 0) / 1024 for name in ("memory_mb", "machine_mb"))
+    return f"{held:.1f} of {has:.1f} GB" if held else "-"
 
 
 def jobs_text(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -111,13 +121,13 @@ def jobs_text(rows: Sequence[Mapping[str, Any]]) -> str:
     if not rows:
         return "no jobs"
     lines = [
-        f"{'job':<14}{'state':<20}{'recipe':<10}{'houses':>13}{'views':>9}{'per h':>8}{'left':>8}"
+        f"{'job':<14}{'state':<20}{'priority':>8}  {'recipe':<10}{'houses':>13}{'views':>9}{'per h':>8}{'left':>8}"
         f"{'failed':>8}{'slot-h':>8}"
     ]
     for row in rows:
         houses = f"{row['houses_done']}/{row['houses']}"
         lines.append(
-            f"{row['job']:<14}{row['state']:<20}{row['recipe']:<10}{houses:>13}{row['views']:>9}"
+            f"{row['job']:<14}{row['state']:<20}{row['priority']:>8}  {row['recipe']:<10}{houses:>13}{row['views']:>9}"
             f"{row['views_per_h']:>8.0f}{duration_text(row['eta_s']):>8}{row['failed']:>8}"
             f"{row['slot_hours']:>8.2f}"
         )

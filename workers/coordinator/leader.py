@@ -7,6 +7,7 @@ whatever the size of a job; it may be killed at any time, and a standby takes ov
 from __future__ import annotations
 
 import logging
+import math
 import os
 import platform
 import secrets
@@ -14,12 +15,14 @@ import signal
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from pbrs_farm.core.errors import PbrsError
 from workers.config import FarmConfig, config_from_environment
-from workers.coordinator.progress_rates import Rates
+from workers.coordinator.progress_rates import Rates, mean_s
+from workers.coordinator.shares import Shares, n_ready
 from workers.ids import STAGES, queue_of, task_from_text
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import JobView, Ledger, LedgerUnavailable, WorkerRegistry
@@ -36,6 +39,8 @@ _REAP_EVERY_S: Final = 5.0
 _RESEND_EVERY_S: Final = 15.0
 _RATES_EVERY_S: Final = 10.0
 _NOTICE_EVERY_S: Final = 10.0
+_AHEAD_S: Final = 20.0  # of work on a queue; a standby leads after 15
+_WITHOUT_SLOTS: Final = 8  # messages of a stage that nobody takes yet
 
 
 Send = Callable[[Iterable[tuple[str, str, str, str]]], None]
@@ -68,6 +73,7 @@ class Coordinator:
         self._due: dict[str, float] = {}  # duty -> when it is due next
         self._slots: dict[str, int] = {}  # stage -> tasks the workers can run at once
         self._rates = Rates()
+        self._shares = Shares()
         self.leading = False
 
     def run(self, stop: threading.Event) -> None:
@@ -120,22 +126,40 @@ class Coordinator:
         return n_sent
 
     def _dispatch(self, views: list[JobView]) -> int:
+        """Send what there is room for, by the jobs' priorities; how many messages."""
         room = self._room(views)
-        n_sent = 0
-        # Jobs come most urgent first and share the room on the queues.
-        for view in views:
-            tasks = self._ledger.dispatch(
-                view.job_id, self._token, max_open=self._max_open(), room=room
-            )
-            if tasks is None:
-                self.leading = False
-                return n_sent
-            self._publish(view, tasks)
-            n_sent += len(tasks)
-            for task in tasks:
-                stage = task.rpartition("/")[2]
-                room[stage] -= 1
+        given = self._shares.split(room, views)
+        spare = {s: n - sum(own[s] for own in given.values()) for s, n in room.items()}
+        # Each job its share and what those before it left; then what is still free to whoever has
+        # more: a ready task may be waiting for its time, and one may have become ready meanwhile.
+        n_sent, rest = 0, list(views)
+        for allowed in (given, {v.job_id: dict.fromkeys(room, 0) for v in views}):
+            limited = []
+            for view in rest:
+                may_send = {s: n + spare[s] for s, n in allowed[view.job_id].items()}
+                n_by_stage = self._send_of(view, may_send)
+                if n_by_stage is None:
+                    self.leading = False
+                    return n_sent
+                n_sent += n_by_stage.total()
+                spare = {s: n - n_by_stage[s] for s, n in may_send.items()}
+                if any(n_by_stage[s] == n and n_ready(view, s) > n for s, n in may_send.items()):
+                    limited.append(view)
+            rest = limited if any(spare.values()) else []
         return n_sent
+
+    def _send_of(self, view: JobView, may_send: dict[str, int]) -> Counter[str] | None:
+        """Stage -> tasks of one job that were sent, at most may_send; None: not leading."""
+        tasks = self._ledger.dispatch(
+            view.job_id, self._token, max_open=self._max_open(), room=may_send
+        )
+        if tasks is None:
+            return None
+        self._publish(view, tasks)
+        sent = Counter(task.rpartition("/")[2] for task in tasks)
+        for stage, n in sent.items():
+            self._shares.charge(stage, view.job_id, n)
+        return sent
 
     def _room(self, views: list[JobView]) -> dict[str, int]:
         """Stage -> messages that may be sent now, over all jobs."""
@@ -143,9 +167,23 @@ class Coordinator:
         for stage in STAGES:
             # What is queued or runs; the rest of the window may be filled.
             in_flight = sum(v.counts.get(f"{stage}:{s}", 0) for v in views for s in "qr")
-            wanted = self._config.window_per_slot * self._slots.get(stage, 0)
-            room[stage] = max(0, int(max(self._config.window_min, wanted) - in_flight))
+            room[stage] = max(0, int(self._window(views, stage) - in_flight))
         return room
+
+    def _window(self, views: list[JobView], stage: str) -> int:
+        """Messages of a stage in flight: what slots run, and what they will take soon.
+
+        A queue serves who came first: the shorter it is, the sooner a job's new priority counts.
+        """
+        n_slots = self._slots.get(stage, 0)
+        most = max(self._config.window_min, self._config.window_per_slot * n_slots)
+        if not n_slots:
+            return min(most, _WITHOUT_SLOTS)
+        # Twice as many as run, so that an autoscaler sees more work than there is; more where
+        # tasks are short and a standby may need its time to take the lead.
+        seconds = mean_s(views, stage)
+        per_slot = 1 + max(1, math.ceil(_AHEAD_S / seconds)) if seconds else 2
+        return min(most, per_slot * n_slots)
 
     def _max_open(self) -> int:
         n_slots = max(self._slots.values(), default=0)

@@ -93,10 +93,12 @@ def _workers(workers: list[WorkerView]) -> Iterator[Metric]:
     slots = GaugeMetricFamily(
         "pbrs_worker_slots", "tasks it runs at once", labels=["worker", "state"]
     )
+    memory = GaugeMetricFamily("pbrs_worker_bytes", "memory its processes hold", labels=["worker"])
     for worker in workers:
         age.add_metric([worker.name], worker.age_s)
+        memory.add_metric([worker.name], 2**20 * float(worker.fields.get("memory_mb", 0)))
         slots.add_metric([worker.name, worker.state], float(worker.fields.get("slots", 0)))
-    yield from (age, slots)
+    yield from (age, slots, memory)
 
 
 def _tasks(views: list[JobView]) -> Metric:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -133,6 +133,15 @@ def durations(view: JobView, stage: str) -> dict[int, float]:
         for name, n in view.counts.items()
         if name.startswith(prefix)
     }
+
+
+def mean_s(views: Iterable[JobView], stage: str) -> float:
+    """Mean seconds of the stage's tasks over all these jobs, 0 before one has ended."""
+    seconds, n = 0.0, 0.0
+    for view in views:
+        seconds += view.counts.get(f"seconds:{stage}", 0.0)
+        n += sum(durations(view, stage).values())
+    return seconds / n if n else 0.0
 
 
 def quantile_s(counts: Mapping[int, float], share: float) -> float:

@@ -186,7 +186,10 @@ class RedisLedger:
                 self.client.unlink(*own_keys)
 
     def steer(self, job: str, what: str, reason: str = "") -> str:
-        """pause, resume, cancel or reduce; the state afterwards, "" for an unknown job."""
+        """pause, resume, cancel, reduce, or priority, whose number is the reason.
+
+        The state afterwards, "" for an unknown job.
+        """
         return str(self._run("steer", job, what, reason))
 
     def retry(self, job: str, task: str) -> bool:

@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping
 
 import pbrs_farm
+from pbrs_farm.run.processes.limits import machine_mb
 from workers.config import shown_url
 from workers.ids import QUEUES, stages_of_queue
 from workers.ledger.redis_ledger import RedisLedger
@@ -25,10 +26,11 @@ class Registry:
         self._ledger = ledger
         self._g = ledger.config.prefix
 
-    def heartbeat(self, *, takes_work: bool = True) -> bool:
+    def heartbeat(self, *, takes_work: bool = True, memory_mb: float = 0.0) -> bool:
         """This worker is alive; True when it is asked to leave.
 
         takes_work: False while it is drained and waits to be asked back; it has no slot then.
+        memory_mb: what its processes hold now, 0 when that is not known.
         """
         config, client = self._ledger.config, self._ledger.client
         key = f"{self._g}worker:{config.worker}"
@@ -47,6 +49,8 @@ class Registry:
                 "store_id": config.store_id,
                 "version": pbrs_farm.__version__,
                 "pid": os.getpid(),
+                "memory_mb": round(memory_mb),
+                "machine_mb": round(machine_mb()),
             }
             pipe.hset(key, mapping=dict(fields))
             pipe.expire(key, int(2 * _GONE_S))

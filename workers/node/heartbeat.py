@@ -9,6 +9,7 @@ from typing import Any, Final
 from celery import bootsteps
 from celery.worker import state
 
+from pbrs_farm.run.processes.limits import tree_mb
 from workers.config import config_from_environment
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import LedgerUnavailable
@@ -46,7 +47,8 @@ class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
     def _heartbeat(self) -> None:
         touch(self._config.heartbeat_file)
         try:
-            if self._registry.heartbeat():
+            # The supervisor started Celery, and Celery its slots and their renderers.
+            if self._registry.heartbeat(memory_mb=tree_mb(os.getppid())):
                 _log.info("drained: finishing what runs, then leaving")
                 # Celery's warm shutdown: no more messages, what runs ends.
                 state.should_stop = os.EX_OK

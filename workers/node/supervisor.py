@@ -23,6 +23,7 @@ from typing import Final
 
 from pbrs_farm.core.errors import MachineFailed, PbrsError
 from pbrs_farm.run.processes.child_process import die_with_parent
+from pbrs_farm.run.processes.limits import tree_mb
 from pbrs_farm.store import store_from_url
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES
@@ -138,7 +139,7 @@ def _wait_while_drained(config: FarmConfig, orders: _Orders) -> bool:
             try:
                 if not registry.is_drained():
                     return True
-                registry.heartbeat(takes_work=False)
+                registry.heartbeat(takes_work=False, memory_mb=tree_mb(os.getpid()))
             except LedgerUnavailable as error:
                 _log.warning("%s", error)
             if not told:

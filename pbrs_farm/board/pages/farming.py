@@ -30,6 +30,7 @@ _OF_JOBS: Final = {
     "resume": "Go on with this job.",
     "cancel": "Stop this job for good: what runs is killed, what is stored stays.",
     "retry": "Give every failed task of this job fresh attempts.",
+    "priority": "Feed this job by another number: 0 goes first, 9 last.",
 }
 _OF_WORKERS: Final = {
     "drain": "Let this worker finish what it runs and take nothing more.",
@@ -130,22 +131,23 @@ def confirm(request: Request) -> Response:
     live_farm(request)
     what, of = request.query_params.get("what", ""), request.query_params.get("of", "")[:200]
     text = (_OF_JOBS | _OF_WORKERS).get(what)
-    if text is None or not of:
+    to = request.query_params.get("to", "")[:40]
+    if text is None or not of or (what == "priority") != bool(to):
         raise HTTPException(404, "There is nothing to confirm.")
     back = f"/farm/jobs/{of}" if what in _OF_JOBS and of.isalnum() else "/farm"
-    return page(request, "confirm.html", what=what, of=of, text=text, back=back)
+    return page(request, "confirm.html", what=what, of=of, to=to, text=text, back=back)
 
 
 async def steer(request: Request) -> Response:
     """POST /farm/do: does it, writes the audit line, and goes back."""
     farm, board = live_farm(request), board_of(request)
     form = await form_of(request)
-    what, of = form.get("what", ""), form.get("of", "")[:200]
+    what, of, to = form.get("what", ""), form.get("of", "")[:200], form.get("to", "")[:40]
     if what not in _OF_JOBS | _OF_WORKERS or not of:
         raise HTTPException(404, "There is no such thing to do.")
     address = request.client.host if request.client else ""
     try:
-        answer = await anyio.to_thread.run_sync(partial(_do, farm, what, of))
+        answer = await anyio.to_thread.run_sync(partial(_do, farm, what, of, to))
     except PbrsError as error:
         board.audit.note(address=address, what=what, of=of, answer=f"refused: {error}")
         return page(request, "told.html", 409, text=str(error))
@@ -154,8 +156,15 @@ async def steer(request: Request) -> Response:
     return RedirectResponse(f"/farm/jobs/{of}" if what in _OF_JOBS else "/farm", 303)
 
 
-def _do(live: LiveFarm, what: str, of: str) -> str:
+def _do(live: LiveFarm, what: str, of: str, to: str) -> str:
+    """Do it to a job or worker; what came of it, for the audit. to: the new priority of a job."""
+    from workers.job_priority import priority_from_text
+
     farm = live.farm
+    if what == "priority":
+        before, number = farm.status(of)["priority"], priority_from_text(to)
+        farm.set_priority(of, number)
+        return f"{before} -> {number}"
     if what == "retry":
         return f"{len(farm.retry(of))} tasks get fresh attempts"
     if what in _OF_JOBS:

@@ -14,7 +14,7 @@ from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pictures.shown_layers import title_of
 from pbrs_farm.board.static_files import Asset
 from pbrs_farm.core.shown_text import printable, shown
-from workers.client.text import duration_text
+from workers.client.text import duration_text, memory_text
 
 _MAX_PAGES_SHOWN: Final = 2  # before and after the one that is shown
 
@@ -35,7 +35,8 @@ def environment(found: Mapping[str, Asset]) -> Environment:
     )
     env.globals |= {
         "asset_url": asset_url, "home_url": home_url, "view_url": view_url, "thumb_url": thumb_url,
-        "page_numbers": page_numbers, "title_of": title_of, "duration": duration_text, "confirm_url": confirm_url, "log_url": log_url,
+        "page_numbers": page_numbers, "title_of": title_of, "duration": duration_text,
+        "memory": memory_text, "confirm_url": confirm_url, "log_url": log_url,
     }  # fmt: skip
     return env
 

@@ -50,6 +50,16 @@ def memory_share_mb(n_processes: int) -> float:
     return _SHARE_OF_MACHINE * machine_mb() / max(1, n_processes)
 
 
+def tree_mb(pid: int) -> float:
+    """Resident memory of a process and all it started, in MiB; pages they share count for each."""
+    try:
+        # Children are listed by the thread that started them.
+        lists = [p.read_text().split() for p in Path(f"/proc/{pid}/task").glob("*/children")]
+    except OSError:
+        return 0.0
+    return resident_mb(pid) + sum(tree_mb(int(child)) for words in lists for child in words)
+
+
 def resident_mb(pid: int) -> float:
     """Resident memory of a process in MiB, 0 when it is gone."""
     try:

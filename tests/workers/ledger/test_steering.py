@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import pytest
 
 from pbrs_farm.store.secret import Secret
 from tests.workers.conftest import spec
-from tests.workers.drive import BATCHES, ROOM, drive
+from tests.workers.drive import BATCHES, ROOM, drive, with_config
 from workers.config import FarmConfig
+from workers.coordinator.leader import Coordinator
 from workers.job import HouseEntry
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import HouseState, LedgerUnavailable
@@ -25,6 +27,34 @@ def test_a_paused_job_gives_its_tasks_back_and_resumes(ledger: RedisLedger) -> N
     assert ledger.steer(d.job.job_id, "resume") == "running"
     d.run_all()
     assert d.state == "done"
+
+
+def test_a_priority_is_changed_while_a_job_runs_and_stays_when_it_is_over(
+    ledger: RedisLedger,
+) -> None:
+    first, second = drive(ledger, 1), drive(ledger, 1, job_id="ba9876543210")
+    assert ledger.active_jobs() == [first.job.job_id, second.job.job_id]
+    assert ledger.steer(second.job.job_id, "priority", "1") == "running"
+    assert ledger.active_jobs() == [second.job.job_id, first.job.job_id]
+    second.run_all()
+    assert ledger.steer(second.job.job_id, "priority", "7") == "done"
+    assert ledger.active_jobs() == [first.job.job_id]
+    view = ledger.view(second.job.job_id)
+    assert view is not None
+    assert view.fields["priority"] == "7"
+    assert ledger.steer("0" * 12, "priority", "1") == ""
+
+
+def test_an_urgent_job_is_sent_first_and_the_other_gets_its_share(ledger: RedisLedger) -> None:
+    calm, urgent = drive(ledger, 60), drive(ledger, 60, job_id="ba9876543210")
+    ledger.steer(urgent.job.job_id, "priority", "0")
+    messages: list[tuple[str, str, str, str]] = []
+    config = replace(ledger.config, window_min=20)
+    coordinator = Coordinator(config, ledger, messages.extend, registry=Registry(ledger))
+    Registry(with_config(ledger, slots=10)).heartbeat()
+    coordinator.turn()
+    n = Counter(job for _queue, job, _task, _recipe in messages)
+    assert n == {urgent.job.job_id: 18, calm.job.job_id: 2}
 
 
 def test_a_cancelled_job_stops_its_runners(ledger: RedisLedger) -> None:

@@ -1,4 +1,5 @@
--- pause, resume, cancel, reduce. ARGV: what, reason -> the job's state afterwards, "" if unknown
+-- pause, resume, cancel, reduce, priority. ARGV: what, reason (priority: the number)
+-- -> the job's state afterwards, "" if unknown
 local state = redis.call('HGET', P .. 'job', 'state')
 if not state then return '' end
 if ARGV[1] == 'pause' then
@@ -13,6 +14,10 @@ elseif ARGV[1] == 'cancel' and state ~= 'done' then
   for _, stage in ipairs(STAGES) do
     redis.call('DEL', P .. 'out:' .. stage)
   end
+elseif ARGV[1] == 'priority' then
+  -- The coordinator reads it at its next turn; a job that is over keeps it for a retry.
+  redis.call('HSET', P .. 'job', 'priority', ARGV[2])
+  redis.call('ZADD', G .. 'jobs', 'XX', ARGV[2], job_of(P))
 elseif ARGV[1] == 'reduce' and state ~= 'cancelled' then
   -- Merge what is there now, unless a merge is on its way.
   local _, letter = unit_at('-', '-')
