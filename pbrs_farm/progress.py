@@ -9,12 +9,15 @@ import json
 import sys
 import time
 from abc import ABC, abstractmethod
+from typing import Final
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from pbrs_farm.core.shown_text import printable
 from pbrs_farm.run.processes.render_task import Event
+
+_SHARE_EVERY_S: Final = 30.0
 
 
 class ProgressReporter(ABC):
@@ -60,6 +63,7 @@ class TimeLeft:
         self._n_made = 0  # views of them that were not there already
         self._began_s: float | None = None  # when the first view that is made was begun
         self._making: set[str] = set()
+        self._shares: dict[str, float] = {}  # view under way -> share of its long step, light
 
     def hear(self, event: Event, now_s: float) -> None:
         """Take an event into account."""
@@ -77,6 +81,9 @@ class TimeLeft:
             self._n_ended += 1
             self._n_made += _name(event) in self._making
             self._making.discard(_name(event))
+            self._shares.pop(_name(event), None)
+        elif event.kind == "under_way":
+            self._shares[_name(event)] = event.facts["share"]
 
     @property
     def views_text(self) -> str:
@@ -85,13 +92,14 @@ class TimeLeft:
         return f"{self._n_ended} of {about}{self._expected_views()}"
 
     def seconds(self, now_s: float) -> float | None:
-        """Seconds to the end; None while no view was made."""
-        if self._began_s is None or not self._n_made:
+        """Seconds to the end; None while no view was made, not even a part of one."""
+        part = sum(self._shares.values())
+        if self._began_s is None or not self._n_made + part > 0:
             return None
-        return self._n_left() * (now_s - self._began_s) / self._n_made
+        return self._n_left(part) * (now_s - self._began_s) / (self._n_made + part)
 
-    def _n_left(self) -> int:
-        return max(0, self._expected_views() - self._n_ended)
+    def _n_left(self, part: float) -> float:
+        return max(0.0, self._expected_views() - self._n_ended - part)
 
     def _expected_views(self) -> int:
         unknown = max(0, self._n_homes - self._n_planned)
@@ -124,6 +132,8 @@ class _JsonLines(ProgressReporter):
             row["message"] = event.message
         if event.kind == "planned":
             row["views"] = event.facts["views"]
+        if event.kind == "under_way":
+            row["share"] = round(event.facts["share"], 4)
         _write_line(json.dumps(row))
 
 
@@ -135,6 +145,7 @@ class _PlainLines(ProgressReporter):
         self._started = time.monotonic()
         self._seconds: dict[str, float] = {}  # view -> seconds of its steps so far
         self._made: dict[str, int] = {}  # view -> steps made now, not kept
+        self._told_s: dict[str, float] = {}  # view -> when its share was told last
 
     def __call__(self, event: Event) -> None:
         name = _name(event)
@@ -148,12 +159,26 @@ class _PlainLines(ProgressReporter):
             self._made[name] = self._made.get(name, 0) + (event.kind == "done")
             if event.view_id is None:
                 _write_line(f"{clock} {name} {event.step}: {_how(event)}{_facts(event)}")
+        elif event.kind == "under_way":
+            self._tell_share(name, clock, event)
         elif event.kind == "end" and event.view_id is not None:
+            self._told_s.pop(name, None)
             seconds, made = self._seconds.pop(name, 0.0), self._made.pop(name, 0)
             how = f"{seconds:.1f} s" if made else "already there"
-            left_s = self._left.seconds(time.monotonic())
-            left = f", {seconds_text(left_s)} left" if left_s else ""
-            _write_line(f"{clock} {name}: {how}; {self._left.views_text}{left}")
+            _write_line(f"{clock} {name}: {how}; {self._left.views_text}{self._time_left()}")
+
+    def _tell_share(self, name: str, clock: str, event: Event) -> None:
+        """A line for a view that takes minutes, twice a minute."""
+        now_s = time.monotonic()
+        if now_s - self._told_s.get(name, self._started) < _SHARE_EVERY_S:
+            return
+        self._told_s[name] = now_s
+        share = f"{100 * event.facts['share']:.0f} %"
+        _write_line(f"{clock} {name} {event.step}: {share}{self._time_left()}")
+
+    def _time_left(self) -> str:
+        left_s = self._left.seconds(time.monotonic())
+        return f", {seconds_text(left_s)} left" if left_s else ""
 
 
 def _how(event: Event) -> str:
@@ -203,8 +228,9 @@ class _Bars(ProgressReporter):
                 style="red",
                 markup=False,
             )
-        elif event.kind == "begin":
-            note = f"{_name(event)} {event.step}"
+        elif event.kind in ("begin", "under_way"):
+            share = f" {100 * event.facts['share']:.0f} %" if event.kind == "under_way" else ""
+            note = f"{_name(event)} {event.step}{share}"
             self._progress.update(self._views, note=f"{self._rate()}  {note}")
         elif event.kind == "planned":
             self._n_views += len(event.facts["views"])

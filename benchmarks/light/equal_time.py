@@ -226,7 +226,8 @@ def _mutation_cost() -> float:
 
     With 99 % large steps a proposal is a path like any other, so that depths are the same.
     """
-    from pbrs_farm.transport.metropolis import integrator as markov
+    from pbrs_farm.transport.metropolis.integrator import STEPS_PER_LAUNCH, chain_run
+    from pbrs_farm.transport.sample_passes import SampledView
 
     house, camera = hard_rooms.sunlit()
     scene = LightScene.load(
@@ -244,9 +245,12 @@ def _mutation_cost() -> float:
 
     def mutate(n: int) -> int:
         some = fields.model_copy(update={"mutations_per_pixel": n})
-        return markov.metropolis(
-            scene.device_scene, emitters, camera, Group.OUTDOOR, some, 1, min_segments=1
-        ).n_mutations
+        view = SampledView(scene.device_scene, emitters, camera, some, 1)
+        run = chain_run(view, Group.OUTDOOR, min_segments=1)
+        assert run is not None
+        while run.n_steps < run.n_wanted:
+            run.advance(min(STEPS_PER_LAUNCH, run.n_wanted - run.n_steps))
+        return run.estimate().n_mutations
 
     # The bootstrap is the same for both counts and drops out of the difference.
     mutate(1)

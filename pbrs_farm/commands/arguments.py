@@ -138,8 +138,8 @@ def add_light(p: argparse.ArgumentParser) -> None:
     add = p.add_argument
     add(
         "--noise", metavar="E",
-        help="add samples until the estimated relative error is below E, e.g. 0.05"
-        " (light.noise; path only)",
+        help="end a view's light at this estimated relative error, e.g. 0.05 (light.noise):"
+        " path adds samples, metropolis leaves out mutations",
     )  # fmt: skip
     add(
         "--time-budget", metavar="S",

@@ -6,7 +6,8 @@ digests are over canonical JSON, never over Python's own hash.
     houses/<house>/<file>                        recipe.json   manifest.jsonl   ATTRIBUTION.txt
     houses/<house>/views/<view>/<file>           selection.json
     houses/<house>/done/<step>[.<view>].json     selection/<run>.<ending>
-    objects/<house>/...  for objects             selection/histograms/<house>.bin
+    houses/<house>/unfinished/<step>.<view>.npz  selection/histograms/<house>.bin
+    objects/<house>/...  for objects
 """
 
 from __future__ import annotations
@@ -94,6 +95,11 @@ def marker_name(step: str, view: str | None = None) -> str:
 def marker_key(house: str, step: str, view: str | None = None) -> str:
     """Key of the marker that says a step is done."""
     return house_key(house, f"done/{marker_name(step, view)}.json")
+
+
+def unfinished_key(house: str, step: str = "", view: str = "") -> str:
+    """Key of what a step under way has kept; of the folder of all, with a trailing slash, when step is ""."""
+    return house_key(house, f"unfinished/{step}.{view}.npz" if step else "unfinished/")
 
 
 def parse_house_key(key: str) -> HouseKey | None:

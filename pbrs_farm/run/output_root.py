@@ -25,7 +25,7 @@ def attribution(store: Store, house_id: str) -> str:
 
 
 def finish_house(store: Store, house_id: str) -> int:
-    """Write the house's manifest if it changed; the number of objects in it."""
+    """Write the house's manifest if it changed, remove what done steps kept; the number of objects."""
     # A manifest lists what the markers say, not what lies in the folder.
     found = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
     markers = [marker for marker in found if marker is not None]
@@ -34,6 +34,11 @@ def finish_house(store: Store, house_id: str) -> int:
     # Leave an equal file alone: its date tells when the house last changed.
     if store.head(key) is None or store.get(key) != data:
         store.put(key, data)
+    # A step that was killed between its marker and the removal of what it kept left that behind.
+    done = {keys.unfinished_key(house_id, m.step, m.view_id) for m in markers if m.view_id}
+    for unfinished in list(store.list(keys.unfinished_key(house_id))):
+        if unfinished in done:
+            store.delete(unfinished)
     return data.count(b"\n")
 
 

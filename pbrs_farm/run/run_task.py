@@ -54,6 +54,7 @@ def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Task) 
         source=task.source,
         view_id=task.view_id,
         layers=task.layers,
+        tell_share=lambda share: send(Message("share", f"{share:.4f}")),
     )
     # A step is left out when one it reads failed; view.json lists whatever there is.
     failed: set[str] = set()

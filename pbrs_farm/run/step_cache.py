@@ -28,6 +28,10 @@ from pbrs_farm.sample.room_camera import with_names
 from pbrs_farm.store.object_store import Store
 
 
+def _unheard(_share: float) -> None:
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class Work:
     """Everything a step may need."""
@@ -40,6 +44,8 @@ class Work:
     view_id: str | None = None  # of a step of a view
     layers: tuple[str, ...] = ()  # optional layers to write too
     inputs: Mapping[str, str] = field(default_factory=dict)  # step it reads -> digest of its marker
+    digest: str = ""  # of the step under way
+    tell_share: Callable[[float], None] = _unheard  # called with the share done of a long step
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +54,7 @@ class StepOutput:
 
     files: Mapping[str, bytes]  # by name below the house's or the view's folder
     facts: dict[str, Any] = field(default_factory=dict)  # of its marker
+    unfinished: str = ""  # key of what it had kept of itself, to remove once it is done
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +87,7 @@ def run_unless_done(
 
     # Do the step, put its files, then its marker.
     started = time.perf_counter()
-    made = function(replace(work, inputs=inputs))
+    made = function(replace(work, inputs=inputs, digest=digest))
     files = tuple(_put(work, name, file, made.files[file]) for file in sorted(made.files))
     marker = Marker(
         step=name,
@@ -95,6 +102,8 @@ def run_unless_done(
         finished_utc=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     work.store.put_if_absent(key, marker.json_bytes())
+    if made.unfinished:
+        work.store.delete(made.unfinished)
     return Outcome(marker, was_done=False)
 
 

@@ -36,6 +36,7 @@ from pbrs_farm.run import plan
 from pbrs_farm.run.dressed_house import dressed, furnished
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.house_of_source import house_of_source
+from pbrs_farm.run.light_checkpoint import LightCheckpoint
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.run.step_cache import (
@@ -234,7 +235,11 @@ def _light(work: Work) -> StepOutput:
     view, camera = _view_at_size(work, cached)
     digest = work.recipe.picture_digest(*plan.STEPS["light"].groups)
     seed = keys.seed(work.house_id, view.id, "light", digest)
-    result = cached.light_scene.render(camera, view.room_id, work.recipe.light, seed)
+    # Go on from what a killed render of this step has kept.
+    unfinished = keys.unfinished_key(work.house_id, "light", view.id)
+    checkpoint = LightCheckpoint(work.store, unfinished, work.digest, work.tell_share)
+    fields = work.recipe.light
+    result = cached.light_scene.render(camera, view.room_id, fields, seed, checkpoint)
     # Name the images as the file does.
     images = {name: getattr(result, name) for name in ("outdoor", "indoor", "albedo", "normal")}
     images |= {layer_name(number): image for number, image in result.lamps.items()}
@@ -243,7 +248,8 @@ def _light(work: Work) -> StepOutput:
         missed = _missed(cached, camera)
         images = {name: np.where(missed, np.float32(0), image) for name, image in images.items()}
     exr = radiance_exr(images, attribution=cached.house.source.attribution)
-    return StepOutput({RADIANCE_EXR: exr}, _facts_of_light(work, cached, view, result))
+    facts = _facts_of_light(work, cached, view, result)
+    return StepOutput({RADIANCE_EXR: exr}, facts, unfinished)
 
 
 def _facts_of_light(

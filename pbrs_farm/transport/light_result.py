@@ -93,13 +93,22 @@ def relative_noise(half_a: NDArray[np.floating], half_b: NDArray[np.floating]) -
 class GroupSums(Protocol):
     """Sums over the samples of each pixel, row by row, (N, 3); *_even: of every second sample."""
 
-    outdoor: F32
-    indoor: F32
-    outdoor_even: F32
-    indoor_even: F32
-    albedo: F32
-    normal: F32
-    n_bad: int  # paths that were not finite
+    @property
+    def outdoor(self) -> F32: ...
+    @property
+    def indoor(self) -> F32: ...
+    @property
+    def outdoor_even(self) -> F32: ...
+    @property
+    def indoor_even(self) -> F32: ...
+    @property
+    def albedo(self) -> F32: ...
+    @property
+    def normal(self) -> F32: ...
+    @property
+    def n_bad(self) -> int:
+        """Paths that were not finite."""
+        ...
 
 
 def result_from_sums(

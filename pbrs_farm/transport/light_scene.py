@@ -5,8 +5,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
-import time
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.lamp_layers import MAX_SUMS, with_lamp_layers
 from pbrs_farm.transport.light_result import LightResult, joined_result, result_from_sums
+from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
 from pbrs_farm.transport.scene_tables.portals import nearest_portals, portals_of_house
 from pbrs_farm.transport.scene_tables.scene_tables import (
     SceneTables,
@@ -27,9 +27,10 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
     tables_from_house,
 )
 from pbrs_farm.transport.scene_tables.sky import Sky
-from pbrs_farm.transport.time_budget import TimeBudget
 
-_SAMPLES_PER_LAUNCH: Final = 1 << 26  # bounds how long one kernel runs
+if TYPE_CHECKING:
+    from pbrs_farm.transport.sample_passes import SampledView
+
 _FLOOR_POINTS: Final = 256  # a room, for its mean illuminance
 _PILOT_SEED: Final = 0x5EED  # parts the pilot's random stream from the picture's
 
@@ -79,30 +80,43 @@ class LightScene:
         """The number of area emitters."""
         return len(self.tables.lamps)
 
-    def render(self, camera: Camera, room_id: str, fields: LightFields, seed: int) -> LightResult:
+    def render(
+        self,
+        camera: Camera,
+        room_id: str,
+        fields: LightFields,
+        seed: int,
+        checkpoint: RenderCheckpoint | None = None,
+    ) -> LightResult:
         """The radiance of both light groups in a camera's view, by the integrator of fields.
 
         `path`: fields.spp samples per pixel, in passes until fields.noise is reached when it is
         given, or as many as fit into fields.time_budget_s. `metropolis`: direct light by
-        fields.direct_spp samples, the rest by mutations. With fields.groups "lamps" `path` also
-        sums the light of each lamp by itself. room_id names the view in errors. Equal arguments
+        fields.direct_spp samples, the rest by mutations, fewer where they reach fields.noise
+        before. With fields.groups "lamps" `path` also sums the light of each lamp by itself.
+        room_id names the view in errors. Equal arguments
         give equal bits on one machine (Metropolis: equal to 1e-5, it splats in parallel); with a
-        time budget similar pictures.
+        time budget similar pictures. checkpoint: what an earlier render of equal arguments kept,
+        and where this one keeps what it has; the picture is the same as without.
         """
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
         mitsuba(self.variant)
+        from pbrs_farm.transport.sample_passes import SampledView, path_sums
+
+        checkpoint = checkpoint or NoCheckpoint()
         emitters, weights = self.emitters(camera, fields, seed)
+        view = SampledView(self.device_scene, emitters, camera, fields, seed)
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": weights}
         if fields.integrator == "metropolis":
-            return self._render_metropolis(camera, room_id, fields, seed, emitters, facts)
+            return self._render_metropolis(view, room_id, checkpoint, facts)
         facts["integrator"] = "path"
         if fields.groups == "two":
-            sums, spp = self._path_sums(camera, fields, seed, emitters)
+            sums, spp = path_sums(view, checkpoint)
             return result_from_sums(sums, camera, spp, facts)
         # Sum each lamp by itself, too, and split indoor light into layers.
         n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
-        sums, spp = self._path_sums(camera, fields, seed, emitters, n_lamps=n_lamps)
+        sums, spp = path_sums(view, checkpoint, n_lamps=n_lamps)
         result = result_from_sums(sums, camera, spp, facts)
         return with_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
 
@@ -115,96 +129,24 @@ class LightScene:
             raise RenderFailed(text, view=room_id, mode="light", seed=seed, hint=hint)
         return self.n_lamps
 
-    def _path_sums(
-        self, camera: Camera, fields: LightFields, seed: int, emitters: Any, *, n_lamps: int = 0
-    ) -> tuple[Any, int]:
-        """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached.
-
-        With a time budget: launches that fit into what is left of it, one at least. n_lamps: 0,
-        or the number of all lamps, to sum the light of each by itself.
-        """
-        from pbrs_farm.transport.path_tracer import Lanes, trace
-
-        # Size the launches: by memory, by the pace so far, and one pass each when noise decides.
-        i = camera.intrinsics
-        per_launch = _samples_per_launch(camera)
-        budget = TimeBudget(fields.time_budget_s)
-        is_open = budget.is_limited or fields.noise > 0
-        goal = max(fields.spp, fields.max_spp) if is_open else fields.spp
-        if fields.noise > 0:
-            per_launch = min(per_launch, fields.spp)
-        # Launch until samples, budget or noise say that it is enough.
-        total: Any = None
-        spp = 0
-        while spp < goal and (n := budget.n_that_fit(min(per_launch, goal - spp))) > 0:
-            lanes = Lanes(i.width_px, i.height_px, spp, n, seed, n_lamps=n_lamps)
-            sums = trace(self.device_scene, emitters, camera, lanes, fields)
-            budget.record(n)
-            total = sums if total is None else total + sums
-            spp += n
-            if fields.noise > 0 and spp >= fields.spp:
-                noise = result_from_sums(total, camera, spp, {}).noise["sum"]
-                if noise <= fields.noise:
-                    break
-        return total, spp
-
-    def _direct_sums(self, camera: Camera, fields: LightFields, seed: int, emitters: Any) -> Any:
-        """Sums over fields.direct_spp samples of light that meets one surface.
-
-        Without any such samples: over one sample of no light, for the denoiser's guides.
-        """
-        from pbrs_farm.transport.path_tracer import Lanes, trace
-
-        # Depth counts a path's segments, the camera's among them: 2 is light that met one surface.
-        i = camera.intrinsics
-        n_samples, max_depth = (fields.direct_spp, 2) if fields.direct_spp > 0 else (1, 1)
-        per_launch = _samples_per_launch(camera)
-        total: Any = None
-        # Launch by launch: sums over samples add up, and a launch must fit into memory.
-        for first in range(0, n_samples, per_launch):
-            n = min(per_launch, n_samples - first)
-            lanes = Lanes(i.width_px, i.height_px, first, n, seed)
-            sums = trace(self.device_scene, emitters, camera, lanes, fields, max_depth=max_depth)
-            total = sums if total is None else total + sums
-        return total
-
     def _render_metropolis(
-        self,
-        camera: Camera,
-        room_id: str,
-        fields: LightFields,
-        seed: int,
-        emitters: Any,
-        facts: dict[str, Any],
+        self, view: SampledView, room_id: str, checkpoint: RenderCheckpoint, facts: dict[str, Any]
     ) -> LightResult:
         """Direct light by `path` with two segments, the rest by Metropolis, group by group."""
-        from pbrs_farm.transport.metropolis.integrator import metropolis
+        from pbrs_farm.transport.metropolis.metropolis_view import render_groups
 
-        # Trace direct light by path.
-        began = time.monotonic()
-        has_direct = fields.direct_spp > 0
-        sums = self._direct_sums(camera, fields, seed, emitters)
-        direct = result_from_sums(sums, camera, max(fields.direct_spp, 1), {})
-
-        # Run the chains of each group for half of the time that is left.
-        left_s = max(fields.time_budget_s - (time.monotonic() - began), 0.0)
-        estimates = {}
-        for k, group in enumerate(Group):
-            deadline = time.monotonic() + left_s / 2 if fields.time_budget_s > 0 else None
-            first = 3 if has_direct else 1
-            estimates[group] = metropolis(
-                self.device_scene, emitters, camera, group, fields, seed + k,
-                min_segments=first, deadline=deadline,
-            )  # fmt: skip
+        fields = view.fields
+        direct, estimates = render_groups(view, checkpoint)
         halves = {group: e.halves for group, e in estimates.items()}
-        self._check_lit(direct, halves, room_id, seed)
+        self._check_lit(direct, halves, room_id, view.seed)
         for group, e in estimates.items():
             numbers = {"mean_luminance": e.mean_luminance, "acceptance": round(e.acceptance, 4)}
             facts[group.value] = numbers | {"mutations": e.n_mutations}
         facts |= {"integrator": "pssmlt-camera", "large_step": fields.large_step}
         facts |= {"tail_pixels": fields.tail_pixels, "direct_spp": fields.direct_spp}
         n_bad = direct.n_nonfinite + sum(e.n_bad for e in estimates.values())
-        return joined_result(direct if has_direct else None, direct, halves, n_bad, facts)
+        base = direct if fields.direct_spp > 0 else None
+        return joined_result(base, direct, halves, n_bad, facts)
 
     def floor_lux(self, house: House, *, seed: int = 0) -> dict[str, dict[str, float]]:
         """Room id -> mean illuminance of its floor in lx by "outdoor" and "indoor" light.
@@ -304,8 +246,3 @@ class LightScene:
             self._emitters.set_targets(targets)
         self._emitters.set_view(portals, weights)
         return self._emitters
-
-
-def _samples_per_launch(camera: Camera) -> int:
-    """Samples of every pixel that fit into the memory of one launch."""
-    return max(_SAMPLES_PER_LAUNCH // (camera.intrinsics.width_px * camera.intrinsics.height_px), 1)

@@ -6,6 +6,7 @@ waits for the longest path. A lane sums its samples in order: the same seed give
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -54,6 +55,17 @@ class SampleSums:
             return None if a is None or b is None else a + b
 
         return SampleSums(**{field.name: total(field.name) for field in fields(self)})
+
+    def arrays(self) -> dict[str, Any]:
+        """Its arrays by name, as sums_from_arrays takes them."""
+        rows = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: np.asarray(row) for name, row in rows.items() if row is not None}
+
+
+def sums_from_arrays(arrays: Mapping[str, Any]) -> SampleSums:
+    """The sums whose arrays these are, among others."""
+    rows = {f.name: arrays[f.name] for f in fields(SampleSums) if f.name in arrays}
+    return SampleSums(**rows | {"n_bad": int(rows["n_bad"])})
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,10 +41,6 @@ def zipped(path: Path, **entries: str) -> Path:
         (["run", "builtin", "--out", "{out}", "--noise", "low"], "light.noise"),
         (["run", "builtin", "--out", "{out}", "--time-budget", "-1"], "light.time_budget_s"),
         (
-            ["run", "builtin", "--out", "{out}", "--recipe", "paper", "--noise", "0.05"],
-            "give metropolis a time_budget_s",
-        ),
-        (
             ["run", "builtin", "--out", "{out}", "--recipe", "paper", "--groups", "lamps"],
             "add --set light.integrator=path",
         ),

@@ -59,6 +59,34 @@ def test_views_that_are_there_already_do_not_make_the_rest_look_quick() -> None:
     assert left.seconds(10.1) == pytest.approx(20.0)
 
 
+def test_a_part_of_a_long_view_tells_already() -> None:
+    left = TimeLeft(1)
+    left.hear(planned("a", 2), 0)
+    left.hear(Event("begin", "a", "0", "light"), 0.0)
+    left.hear(Event("under_way", "a", "0", "light", facts={"share": 0.25}), 100.0)
+    assert left.seconds(100.0) == pytest.approx(700.0)
+    left.hear(Event("done", "a", "0", "light"), 400.0)
+    left.hear(Event("end", "a", "0", ""), 400.0)
+    assert left.seconds(400.0) == pytest.approx(400.0)
+
+
+def test_plain_lines_tell_the_share_of_a_long_view_twice_a_minute(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr("pbrs_farm.progress.time.monotonic", lambda: now[0])
+    with progress_reporter(1, as_json=False) as report:
+        report(planned("a", 1))
+        report(Event("begin", "a", "0", "light"))
+        for seconds in range(0, 100, 5):
+            now[0] = float(seconds)
+            report(Event("under_way", "a", "0", "light", facts={"share": seconds / 400}))
+    lines = [line.split("] ")[1] for line in capsys.readouterr().out.splitlines()]
+    assert lines == [
+        "a/0 light: 8 %, 6 min left", "a/0 light: 15 %, 6 min left", "a/0 light: 22 %, 5 min left",
+    ]  # fmt: skip
+
+
 def test_plain_lines_tell_it(capsys: pytest.CaptureFixture[str]) -> None:
     with progress_reporter(1, as_json=False) as report:
         report(planned("a", 2))

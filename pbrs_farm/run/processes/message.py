@@ -8,8 +8,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 # ready: it may be given a task. step: a step begins. waiting: storage does not answer.
-# event: something else its parent wants to know. done, fault: the end of the task.
-MessageKind = Literal["ready", "step", "waiting", "event", "done", "fault"]
+# share: how much of the step is done, 0..1. event: something else its parent wants to know.
+# done, fault: the end of the task.
+MessageKind = Literal["ready", "step", "waiting", "share", "event", "done", "fault"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -123,6 +123,9 @@ def _events_in(worker: _Worker, task: Task, message: Message) -> Iterator[Event]
     if message.kind == "step":
         worker.step = message.text
         yield Event("begin", task.house_id, task.view_id, message.text)
+    elif message.kind == "share":
+        share = {"share": float(message.text)}
+        yield Event("under_way", task.house_id, task.view_id, worker.step, facts=share)
     elif message.kind == "event":
         event = Event(**message.body)
         worker.done.append(event.step)

@@ -19,17 +19,14 @@ steps, to a thousand other pixels that see its second vertex too (reconnection.p
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Any, Final
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64
-from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
@@ -42,29 +39,19 @@ from pbrs_farm.transport.kernels.path_state import (
     device_camera,
     device_fields,
 )
-from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
-from pbrs_farm.transport.metropolis.film import ChainContext, Chains, Film
-from pbrs_farm.transport.metropolis.markov_chains import (
-    STORED_DIMS,
-    ChainSums,
-    Mutations,
-    draw_paths,
-    mutate,
-)
-from pbrs_farm.transport.metropolis.reconnection import (
-    SUFFIX_FLOATS,
-    reconnect,
-    stratified_groups,
-    trace_prefixes,
-)
+from pbrs_farm.transport.kernels.sampler import device_array
+from pbrs_farm.transport.metropolis.bootstrap import bootstrap_chains, flat_film, with_importance
+from pbrs_farm.transport.metropolis.film import ChainContext, Chains
+from pbrs_farm.transport.metropolis.markov_chains import ChainSums, Mutations, mutate
+from pbrs_farm.transport.metropolis.reconnection import reconnect, stratified_groups, trace_prefixes
+from pbrs_farm.transport.render_checkpoint import Arrays
+from pbrs_farm.transport.sample_passes import SampledView
 
+STEPS_PER_LAUNCH: Final = 16
+MIN_STEPS: Final = 64  # of a chain
 _MIN_RR_DEPTH: Final = 3
-_STEPS_PER_LAUNCH: Final = 16
-_MIN_STEPS: Final = 64  # of a chain
 _MIN_RECONNECT_SEGMENTS: Final = 3
-_STEPS_PER_PREFIX: Final = 4 * _STEPS_PER_LAUNCH
-_PATHS_PER_TILE: Final = 256  # of the importance
-_MIN_RELATIVE_LIGHT: Final = 0.05  # of the mean, in the importance
+_STEPS_PER_PREFIX: Final = 4 * STEPS_PER_LAUNCH
 _MIN_BOOTSTRAP, _MAX_BOOTSTRAP = 1 << 14, 1 << 18  # paths
 
 
@@ -98,54 +85,133 @@ class _Totals:
         self.n_steps += n_steps
 
 
-def metropolis(
-    scene: DeviceScene,
-    emitters: Emitters,
-    camera: Camera,
-    group: Group,
-    fields: LightFields,
-    seed: int,
-    *,
-    min_segments: int = 3,
-    deadline: float | None = None,
-) -> Estimate:
-    """Light of paths of min_segments or more (3: all but direct light) of one group.
+class ChainRun:
+    """The chains of one light group under way, and the film they have splatted on.
 
-    deadline: mutate until this time.monotonic(), instead of fields.mutations_per_pixel times.
+    The same chains go on from the same state to the same picture (its splats are added in parallel:
+    to 1e-5); `state` gives it, `chain_run` takes it.
     """
-    shape = (camera.intrinsics.height_px, camera.intrinsics.width_px)
-    black = np.zeros((*shape, 3), np.float32)
-    nothing = Estimate((black, black), 0.0, 0.0, 0, 0)
-    if not emitters.has_group(group):
-        return nothing
-    n_pixels = shape[0] * shape[1]
-    wanted = fields.mutations_per_pixel * n_pixels
-    n_chains = int(np.clip(wanted // _MIN_STEPS, 16, fields.chains)) & ~1
-    n_bootstrap = int(np.clip(wanted, _MIN_BOOTSTRAP, _MAX_BOOTSTRAP))
 
+    def __init__(
+        self, view: SampledView, context: ChainContext, min_segments: int, started: _Started
+    ) -> None:
+        i, fields = view.camera.intrinsics, view.fields
+        self._shape = (i.height_px, i.width_px)
+        self._context = context
+        self._chains, self._totals = started
+        self._seed = view.seed
+        self._n_shared = fields.tail_pixels if min_segments >= _MIN_RECONNECT_SEGMENTS else 0
+        self._p_large = dr.opaque(mi.Float, fields.large_step)
+        self._prefixes: Any = None
+        self.n_chains = int(dr.width(self._chains.target))
+        self.n_wanted = -(-_wanted(view) // self.n_chains)  # steps of each chain
+
+    @property
+    def n_steps(self) -> int:
+        """Steps of each chain so far."""
+        return self._totals.n_steps
+
+    def advance(self, n_steps: int) -> None:
+        """Make n_steps more of every chain, in one launch, and share their suffixes."""
+        first, seed, n_pixels = self.n_steps, self._seed, self._shape[0] * self._shape[1]
+        steps = dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, first + n_steps)
+        mutation_seed = dr.opaque(
+            mi.UInt32, (seed ^ 0x3C6EF372) & 0xFFFFFFFF
+        )  # not the bootstrap's
+        reconnects = dr.opaque(mi.Bool, self._n_shared > 0)
+        how = Mutations(*steps, self._p_large, mutation_seed, reconnects)
+        self._chains, sums = mutate(self._context, self._chains, how)
+        film = self._context.film
+        dr.eval(*self._chains, sums, film.splats)
+        if self._n_shared > 0:
+            # Trace the prefixes anew now and then; those of a resumed run are traced again.
+            block = first - first % _STEPS_PER_PREFIX
+            if self._prefixes is None or first == block:
+                self._prefixes = trace_prefixes(self._context, n_pixels, seed + block)
+            groups = stratified_groups(*self._shape, self._n_shared, seed + first)
+            scene, weight = self._context.paths.scene, dr.opaque(mi.Float, n_steps)
+            reconnect(scene, film, self._prefixes, groups, self._chains, weight)
+        self._totals.add(sums, n_steps)
+
+    def estimate(self) -> Estimate:
+        """The light so far, scaled to the mean of the target function."""
+        totals, film = self._totals, self._context.film
+        n_mutations = totals.n_steps * self.n_chains
+        n_pixels = self._shape[0] * self._shape[1]
+        scale = np.float32(totals.target / totals.n_paths * n_pixels / (n_mutations / 2))
+        splats = film.splats.numpy().reshape(2, *self._shape, 3)
+        halves = splats[0] * scale, splats[1] * scale
+        mean = float(np.mean((halves[0] + halves[1]) @ LUMINANCE) / 2)
+        return Estimate(halves, mean, totals.n_accepted / n_mutations, n_mutations, totals.n_bad)
+
+    def state(self) -> Arrays:
+        """What chain_run goes on from: film, importance, chains and sums."""
+        film, t = self._context.film, self._totals
+        sums = np.array([t.target, t.n_paths, t.n_accepted, t.n_bad, t.n_steps], np.float64)
+        chains = {name: getattr(self._chains, name).numpy() for name in Chains._fields}
+        return chains | {
+            "splats": film.splats.numpy(),
+            "importance": film.importance.numpy(),
+            "sums": sums,
+        }
+
+
+_Started = tuple[Chains, _Totals]
+
+
+def chain_run(
+    view: SampledView, group: Group, *, min_segments: int = 3, kept: Arrays | None = None
+) -> ChainRun | None:
+    """The chains of one group that sample paths of min_segments or more (3: all but direct light).
+
+    None where no path brings light. kept: the state of a run of the same arguments, to go on from.
+    """
+    if not view.emitters.has_group(group):
+        return None
+    i = view.camera.intrinsics
+    paths = _path_context(view.scene, view.emitters, group, view.fields)
+    least = dr.opaque(mi.UInt32, min_segments)
+    shape = (i.height_px, i.width_px)
+    context = ChainContext(paths, device_camera(view.camera), flat_film(shape), least)
+    if kept:
+        context, started = _restored(context, kept)
+        return ChainRun(view, context, min_segments, started)
     # Bootstrap the importance, then the chains.
-    paths = _path_context(scene, emitters, group, fields)
-    context = ChainContext(
-        paths, device_camera(camera), _flat_film(shape), dr.opaque(mi.UInt32, min_segments)
-    )
-    context = _with_importance(context, shape, n_bootstrap // 4, seed ^ 0x5BD1E995)
-    chains, target = _bootstrap_chains(context, n_bootstrap, n_chains, seed)
+    wanted = _wanted(view)
+    n_chains = int(np.clip(wanted // MIN_STEPS, 16, view.fields.chains)) & ~1
+    n_paths = int(np.clip(wanted, _MIN_BOOTSTRAP, _MAX_BOOTSTRAP))
+    context = with_importance(context, shape, n_paths // 4, view.seed ^ 0x5BD1E995)
+    chains, target = bootstrap_chains(context, n_paths, n_chains, view.seed)
     if chains is None:
-        return nothing
+        return None
+    return ChainRun(view, context, min_segments, (chains, _Totals(target, n_paths)))
 
-    # Run the chains.
-    totals = _Totals(target, n_bootstrap)
-    n_steps = -(-wanted // n_chains) if deadline is None else 1 << 31
-    n_shared = fields.tail_pixels if min_segments >= _MIN_RECONNECT_SEGMENTS else 0
-    _run(context, chains, totals, fields.large_step, n_steps, deadline, shape, n_shared, seed)
 
-    # Scale the film to the mean of the target function.
-    n_mutations = totals.n_steps * n_chains
-    scale = np.float32(totals.target / totals.n_paths * n_pixels / (n_mutations / 2))
-    splats = context.film.splats.numpy().reshape(2, *shape, 3)
-    halves = splats[0] * scale, splats[1] * scale
-    mean = float(np.mean((halves[0] + halves[1]) @ LUMINANCE) / 2)
-    return Estimate(halves, mean, totals.n_accepted / n_mutations, n_mutations, totals.n_bad)
+def _wanted(view: SampledView) -> int:
+    """Mutations of a whole picture."""
+    i = view.camera.intrinsics
+    return view.fields.mutations_per_pixel * i.width_px * i.height_px
+
+
+def _restored(context: ChainContext, kept: Arrays) -> tuple[ChainContext, _Started]:
+    """A run's context and chains as ChainRun.state gave them."""
+    film = context.film._replace(
+        splats=device_array(mi.Float, kept["splats"]),
+        importance=device_array(mi.Float, kept["importance"]),
+    )
+    floats = {
+        name: device_array(mi.Float, kept[name]) for name in ("samples", "target", "suffixes")
+    }
+    chains = Chains(
+        **floats,
+        light=mi.Color3f(*(device_array(mi.Float, row) for row in kept["light"])),
+        pixel=device_array(mi.UInt32, kept["pixel"]),
+        is_reconnectable=device_array(mi.UInt32, kept["is_reconnectable"].astype(np.uint32)) > 0,
+    )
+    dr.eval(*chains)
+    target, n_paths, n_accepted, n_bad, n_steps = (float(v) for v in kept["sums"])
+    totals = _Totals(target, n_paths, n_accepted, int(n_bad), int(n_steps))
+    return context._replace(film=film), (chains, totals)
 
 
 def _path_context(
@@ -161,130 +227,3 @@ def _path_context(
     emitter_filter = EmitterFilter(every, None) if is_indoor else EmitterFilter(None, every)
     late = fields.model_copy(update={"rr_depth": max(fields.rr_depth, _MIN_RR_DEPTH)})
     return PathContext(scene, emitters, device_fields(late), emitter_filter)
-
-
-def _run(
-    context: ChainContext,
-    chains: Chains,
-    totals: _Totals,
-    large_step: float,
-    n_steps: int,
-    deadline: float | None,
-    shape: tuple[int, int],
-    n_shared: int,
-    seed: int,
-) -> None:
-    """Launch after launch up to n_steps or the deadline, at least one; n_shared: 0 or pixels that
-    share a suffix."""
-    reconnects = dr.opaque(mi.Bool, n_shared > 0)
-    p_large = dr.opaque(mi.Float, large_step)
-    mutation_seed = dr.opaque(mi.UInt32, (seed ^ 0x3C6EF372) & 0xFFFFFFFF)  # not the bootstrap's
-    prefixes: Any = None
-    while totals.n_steps < n_steps and (
-        deadline is None or totals.n_steps == 0 or time.monotonic() < deadline
-    ):
-        first = totals.n_steps
-        n = min(_STEPS_PER_LAUNCH, n_steps - first)
-        steps = dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, first + n)
-        how = Mutations(*steps, p_large, mutation_seed, reconnects)
-        chains, sums = mutate(context, chains, how)
-        dr.eval(*chains, sums, context.film.splats)
-        if n_shared > 0:
-            if first % _STEPS_PER_PREFIX == 0:
-                prefixes = trace_prefixes(context, shape[0] * shape[1], seed + first)
-            groups = stratified_groups(*shape, n_shared, seed + first)
-            weight = dr.opaque(mi.Float, n)
-            reconnect(context.paths.scene, context.film, prefixes, groups, chains, weight)
-        totals.add(sums, n)
-
-
-def _flat_film(shape: tuple[int, int]) -> Film:
-    """A black film of even importance."""
-    height, width = shape
-    flat = device_array(mi.Float, np.ones(height * width, np.float32))
-    splats = dr.zeros(mi.Float, 2 * height * width * 3)
-    return Film(dr.opaque(mi.UInt32, width), dr.opaque(mi.UInt32, height), splats, flat)
-
-
-def _with_importance(
-    context: ChainContext, shape: tuple[int, int], n_paths: int, seed: int
-) -> ChainContext:
-    """The context with the film's importance as n_paths independent paths tell it."""
-    pilot = _draw(context, n_paths, seed)
-    importance = pixel_importance(shape, pilot.pixel.numpy(), pilot.target.numpy())
-    on_device = device_array(mi.Float, importance.ravel())
-    return context._replace(film=context.film._replace(importance=on_device))
-
-
-def pixel_importance(shape: tuple[int, int], pixels: NDArray[np.uint32], luminances: F32) -> F32:
-    """(H, W) what a unit of luminance counts: about 1 / the light expected at a pixel.
-
-    Without it chains go where the picture is bright; with it every pixel gets its share (Veach's
-    two stages, 1997). From N paths, their pixels and luminances: means over tiles of about
-    _PATHS_PER_TILE, blended between tiles, held above a part of the mean. Any positive ones are unbiased.
-    """
-    height, width = shape
-    side = max(int(np.sqrt(_PATHS_PER_TILE * height * width / len(pixels))), 1)
-    rows, columns = -(-height // side), -(-width // side)
-    tile = (pixels // width // side) * columns + pixels % width // side
-    count = np.bincount(tile, minlength=rows * columns)
-    total = np.bincount(tile, luminances.astype(np.float64), rows * columns)
-    grid = (total / np.maximum(count, 1)).reshape(rows, columns)
-    mean = grid.mean()
-    if not mean > 0:
-        return np.ones(shape, np.float32)
-    y, x = (_between(n, side, m) for n, m in ((height, rows), (width, columns)))
-    light = y @ grid @ x.T
-    return np.asarray(mean / (light + _MIN_RELATIVE_LIGHT * mean), np.float32)
-
-
-def _between(n: int, side: int, n_tiles: int) -> F64:
-    """(n, n_tiles) linear weights of tiles of `side` pixels at each of n pixels."""
-    at = np.clip((np.arange(n) + 0.5) / side - 0.5, 0, n_tiles - 1)
-    return np.asarray(np.maximum(1 - np.abs(at[:, None] - np.arange(n_tiles)[None]), 0))
-
-
-def _path_keys(n: int, seed: int) -> Any:
-    return stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
-
-
-def _draw(context: ChainContext, n: int, seed: int) -> Chains:
-    """n independent paths."""
-    paths = draw_paths(context, HashedSampler(_path_keys(n, seed), mi.UInt32(0)), n)
-    dr.eval(*paths)
-    return paths
-
-
-def _bootstrap_chains(
-    context: ChainContext, n_bootstrap: int, n_chains: int, seed: int
-) -> tuple[Chains | None, float]:
-    """(chains at independent paths, drawn in proportion to I; sum of I over n_bootstrap paths).
-
-    None where no path brings light.
-    """
-    paths = _draw(context, n_bootstrap, seed)
-    key = _path_keys(n_bootstrap, seed)
-    targets = paths.target.numpy().astype(np.float64)
-    if targets.sum() <= 0:
-        return None, 0.0
-    # Choose by equidistant quantiles from a random offset, in random order.
-    quantiles = (np.arange(n_chains) + np.random.default_rng(seed).random()) / n_chains
-    chosen = np.searchsorted(np.cumsum(targets) / targets.sum(), quantiles)
-    chosen = np.random.default_rng(seed + 1).permutation(np.minimum(chosen, n_bootstrap - 1))
-    at = mi.UInt32(chosen.astype(np.uint32))
-
-    # Draw the numbers of the chosen paths again; copy what the paths are.
-    index = dr.arange(mi.UInt32, STORED_DIMS * n_chains)
-    keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, at, index % n_chains))
-    column = dr.arange(mi.UInt32, SUFFIX_FLOATS * n_chains)
-    source = column // n_chains * n_bootstrap + dr.gather(mi.UInt32, at, column % n_chains)
-    chains = Chains(
-        samples=HashedSampler(keys, mi.UInt32(0)).get_1d(index // n_chains),
-        light=dr.gather(mi.Color3f, paths.light, at),
-        target=dr.gather(mi.Float, paths.target, at),
-        pixel=dr.gather(mi.UInt32, paths.pixel, at),
-        is_reconnectable=dr.gather(mi.Bool, paths.is_reconnectable, at),
-        suffixes=dr.gather(mi.Float, paths.suffixes, source),
-    )
-    dr.eval(*chains)
-    return chains, float(targets.sum())

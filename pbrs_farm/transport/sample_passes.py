@@ -1,0 +1,123 @@
+"""Passes of `path` over a view: launch after launch, up to a number of samples, a noise or a time.
+
+Effects: reads the clock where there is a time budget.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.transport.kernels.device_scene import DeviceScene
+from pbrs_farm.transport.kernels.emitters import Emitters
+from pbrs_farm.transport.light_result import result_from_sums
+from pbrs_farm.transport.path_tracer import Lanes, SampleSums, sums_from_arrays, trace
+from pbrs_farm.transport.render_checkpoint import Arrays, RenderCheckpoint
+from pbrs_farm.transport.time_budget import TimeBudget
+
+_SAMPLES_PER_LAUNCH: Final = 1 << 26  # bounds how long one kernel runs
+_SPP: Final = "spp"  # in what is kept: samples of each pixel so far
+
+
+@dataclass(frozen=True, slots=True)
+class SampledView:
+    """What is sampled, and how."""
+
+    scene: DeviceScene
+    emitters: Emitters
+    camera: Camera
+    fields: LightFields
+    seed: int
+
+
+def path_sums(
+    view: SampledView, checkpoint: RenderCheckpoint, *, n_lamps: int = 0
+) -> tuple[SampleSums, int]:
+    """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached.
+
+    With a time budget: launches that fit into what is left of it, one at least. n_lamps: 0,
+    or the number of all lamps, to sum the light of each by itself.
+    """
+    # Size the launches: by memory, by the pace so far, and one pass each when noise decides.
+    camera, fields = view.camera, view.fields
+    per_launch = _samples_per_launch(camera)
+    budget = TimeBudget(fields.time_budget_s, checkpoint.spent_s)
+    is_open = budget.is_limited or fields.noise > 0
+    goal = max(fields.spp, fields.max_spp) if is_open else fields.spp
+    if fields.noise > 0:
+        per_launch = min(per_launch, fields.spp)
+    # Launch until samples, budget or noise say that it is enough.
+    total, spp = _kept_sums(checkpoint, "path")
+    left = _noise_left(total, spp, view)
+    while spp < goal and left > 1 and (n := budget.n_that_fit(min(per_launch, goal - spp))) > 0:
+        total = _plus(total, _traced(view, spp, n, n_lamps=n_lamps))
+        spp += n
+        budget.record(n)
+        left = _noise_left(total, spp, view)
+        share = max(spp / goal, budget.share, 1 / max(left, 1) ** 2)
+        checkpoint.keep("path", min(share, 1.0), _state_of(total, spp))
+    assert total is not None, "a first launch always fits"
+    return total, spp
+
+
+def _noise_left(total: SampleSums | None, spp: int, view: SampledView) -> float:
+    """The noise so far over the one asked for; infinite where samples alone decide."""
+    if view.fields.noise <= 0 or total is None or spp < view.fields.spp:
+        return np.inf
+    return result_from_sums(total, view.camera, spp, {}).noise["sum"] / view.fields.noise
+
+
+def direct_sums(
+    view: SampledView, checkpoint: RenderCheckpoint, *, share: float = 1.0
+) -> SampleSums:
+    """Sums over fields.direct_spp samples of light that meets one surface.
+
+    Without any such samples: over one sample of no light, for the denoiser's guides. share: of the
+    whole render.
+    """
+    # Depth counts a path's segments, the camera's among them: 2 is light that met one surface.
+    n_samples, max_depth = (view.fields.direct_spp, 2) if view.fields.direct_spp > 0 else (1, 1)
+    per_launch = _samples_per_launch(view.camera)
+    total, spp = _kept_sums(checkpoint, "direct")
+    # Launch by launch: sums over samples add up, and a launch must fit into memory.
+    while spp < n_samples:
+        n = min(per_launch, n_samples - spp)
+        total = _plus(total, _traced(view, spp, n, max_depth=max_depth))
+        spp += n
+        checkpoint.keep("direct", share * spp / n_samples, _state_of(total, spp))
+    assert total is not None
+    return total
+
+
+def _traced(
+    view: SampledView, first: int, n: int, *, n_lamps: int = 0, max_depth: int | None = None
+) -> SampleSums:
+    """Sums over n samples of every pixel, from the first on."""
+    i = view.camera.intrinsics
+    lanes = Lanes(i.width_px, i.height_px, first, n, view.seed, n_lamps=n_lamps)
+    return trace(view.scene, view.emitters, view.camera, lanes, view.fields, max_depth=max_depth)
+
+
+def _plus(total: SampleSums | None, sums: SampleSums) -> SampleSums:
+    return sums if total is None else total + sums
+
+
+def _kept_sums(checkpoint: RenderCheckpoint, part: str) -> tuple[SampleSums | None, int]:
+    """(sums, samples per pixel) of a part as they were kept."""
+    kept = checkpoint.kept(part)
+    return (sums_from_arrays(kept), int(kept[_SPP])) if kept else (None, 0)
+
+
+def _state_of(total: SampleSums, spp: int) -> Callable[[], Arrays]:
+    state: dict[str, Any] = {_SPP: np.int64(spp)}
+    return lambda: total.arrays() | state
+
+
+def _samples_per_launch(camera: Camera) -> int:
+    """Samples of every pixel that fit into the memory of one launch."""
+    return max(_SAMPLES_PER_LAUNCH // (camera.intrinsics.width_px * camera.intrinsics.height_px), 1)
