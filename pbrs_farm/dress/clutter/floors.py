@@ -9,10 +9,11 @@ import shapely
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.walkable import CELL_M
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.worktop import LIFT_M
 from pbrs_farm.dress.generated.assembly import Made
-from pbrs_farm.dress.space.floor_bitmaps import CELL_M, FloorBitmap, doors_are_joined, floor_bitmap
+from pbrs_farm.dress.space.floor_bitmaps import FloorBitmap, doors_are_joined, floor_bitmap
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.supports.find_supports import surroundings

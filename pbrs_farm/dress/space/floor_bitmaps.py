@@ -11,12 +11,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.walkable import CELL_M, HEAD_M, STEP_M, WALK_M, FloorGrid, connected_ways
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 
-CELL_M = 0.05
-WALK_M = 0.6  # the width of a way
-_STEP_M = 0.08  # what is lower is walked over
-_HEAD_M = 1.8  # what is higher is walked under
 _DOOR_REACH_M = 0.15  # beyond half the way's width, in front of a door
 
 
@@ -31,8 +28,7 @@ class FloorBitmap:
 
     def cells(self, places: F64) -> NDArray[np.int64]:
         """(N, 2) row and column of plan places (N, 2); may lie outside."""
-        cells = np.floor((places - np.asarray(self.origin)) / CELL_M).astype(np.int64)
-        return np.asarray(cells[:, ::-1])
+        return FloorGrid(self.origin, self.inside.shape).cells(places)
 
     @property
     def walkable_share(self) -> float:
@@ -46,30 +42,21 @@ def floor_bitmap(
 ) -> FloorBitmap:
     """The room's floor; without: numbers of items that are not counted."""
     x0, z0, x1, z1 = room.area.bounds if not room.area.is_empty else (0.0, 0.0, CELL_M, CELL_M)
-    origin = x0 - 2 * CELL_M, z0 - 2 * CELL_M
-    shape = int((z1 - z0) / CELL_M) + 5, int((x1 - x0) / CELL_M) + 5
-    x = origin[0] + (np.arange(shape[1]) + 0.5) * CELL_M
-    z = origin[1] + (np.arange(shape[0]) + 0.5) * CELL_M
-    xx, zz = np.meshgrid(x, z)
+    grid = FloorGrid.over(x0, z0, x1, z1)
+    xx, zz = grid.middles
     inside = shapely.contains_xy(room.area, xx, zz) & ~shapely.contains_xy(room.walls, xx, zz)
     # Mark every cell above which a thing has a point between a step and a head.
-    occupied = np.zeros(shape, bool)
-    low, high = room.room.floor_y + _STEP_M, room.room.floor_y + _HEAD_M
+    occupied = np.zeros(grid.shape, bool)
+    low, high = room.room.floor_y + STEP_M, room.room.floor_y + HEAD_M
     for number in room.items:
         points = space.points[number]
         if number in without:
             continue
         body = points[(points[:, 1] > low) & (points[:, 1] < high)]
-        j = ((body[:, 0] - origin[0]) / CELL_M).astype(np.int64)
-        i = ((body[:, 2] - origin[1]) / CELL_M).astype(np.int64)
-        good = (i >= 0) & (i < shape[0]) & (j >= 0) & (j < shape[1])
-        occupied[i[good], j[good]] = True
+        occupied |= grid.marked(body[:, [0, 2]])
     occupied &= inside
-    # A way's middle keeps half its width from everything.
-    free = inside & ~occupied
-    wide = ndimage.distance_transform_edt(free) * CELL_M >= WALK_M / 2
-    ways, _n = ndimage.label(wide, structure=np.ones((3, 3)))
-    return FloorBitmap(origin, np.asarray(inside), occupied, ways.astype(np.int32))
+    ways = connected_ways(inside & ~occupied)
+    return FloorBitmap(grid.origin, np.asarray(inside), occupied, ways)
 
 
 def doors_are_joined(bitmap: FloorBitmap, room: RoomSpace) -> bool:

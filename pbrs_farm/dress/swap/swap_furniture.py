@@ -16,8 +16,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import Box, Item, LightPart, Surface
+from pbrs_farm.core.surface_points import item_triangles
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.space.surface_points import item_triangles
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD
 from pbrs_farm.dress.swap.fits import Scale, common_scale, is_lit_alike

@@ -11,11 +11,10 @@ import shapely
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import Bools
+from pbrs_farm.core.walkable import CELL_M, WALK_M
 from pbrs_farm.generate.floor_plan import Rect
 from pbrs_farm.generate.furnish.room_space import RoomSpace
 
-CELL_M: Final = 0.05
-WALK_M: Final = 0.6  # the width of a way
 _RADIUS: Final = WALK_M / 2 / CELL_M  # cells
 # (rows, columns) by which a rectangle grows, together all cells nearer to it than the radius.
 _NEAR: Final = ((3, 5), (4, 4), (5, 3))
