@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.file_checks import check_files, check_root_manifest
+from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_partners
 from pbrs_farm.check.pixel_checks import RAY_LAYERS, judge
 from pbrs_farm.check.plane_checks import check_planes
 from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
@@ -87,6 +88,7 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
         if arrays is not None:
             seen.append(SeenView(view, arrays["depth"], arrays["normal"]))
     check_reprojection(seen, tally)
+    check_partners([one.view for one in seen], tally)
     return len(views)
 
 
@@ -103,6 +105,8 @@ def _check_view(
     check_consistency(view, arrays, tally)
     check_planes(view, arrays, tally)
     _check_rays(view, arrays, scenes, n_pixels, tally)
+    if MOTION_LAYERS & arrays.keys():
+        check_motion(view, arrays, scenes.all[1], _chosen(view, n_pixels), tally)
     return arrays
 
 

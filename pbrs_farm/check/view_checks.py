@@ -42,9 +42,12 @@ def _read(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | None:
     except (BadInput, KeyError) as error:
         tally.expect("layers", place, False, str(error))
         return None
-    # Vectors and colours have a third axis of 3, every other layer two axes.
-    shape = (*view.size, 3) if layer.channels in ("RGB", "X Y Z") else view.size
-    fits = array.shape == shape and str(array.dtype) == layer.dtype
+    # Vectors and colours have a third axis, every other layer two axes.
+    depth = {"RGB": (3,), "X Y Z": (3,), "X Y": (2,)}.get(layer.channels, ())
+    shape = (*view.size, *depth)
+    # An EXR is read as 32-bit floats, whatever it holds.
+    dtype = "float32" if layer.dtype == "float16" else layer.dtype
+    fits = array.shape == shape and str(array.dtype) == dtype
     what = f"{array.shape} {array.dtype}, expected {shape} {layer.dtype}"
     return array if tally.expect("layers", place, fits, what) else None
 

@@ -107,7 +107,15 @@ def add_home(p: argparse.ArgumentParser) -> None:
 
 def add_cameras(p: argparse.ArgumentParser) -> None:
     """Where viewpoints come from (cameras.source)."""
-    p.add_argument("--cameras", choices=("sampled", "stored"), help="where viewpoints come from")
+    add = p.add_argument
+    text = "where viewpoints come from; walk: frames along a person's way (docs/motion.md)"
+    add("--cameras", choices=("sampled", "stored", "walk"), help=text)
+    text = "your own way: TUM rows t x y z qx qy qz qw (docs/motion.md)"
+    add("--trajectory", type=Path, metavar="FILE", help=text)
+    add("--frames", type=int, metavar="N", help="frames of a walk (default 150)")
+    add("--fps", type=float, metavar="F", help="frames a second of a walk (default 30)")
+    text = "a second view to the right of each, so many metres off, e.g. 0.065"
+    add("--stereo", type=float, metavar="B", help=text)
 
 
 def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
@@ -190,6 +198,9 @@ _SHORT_FORMS: Final = {
     "seed": "seed",
     "cameras": "cameras.source",
     "per_sector": "cameras.per_sector",
+    "frames": "cameras.walk_frames",
+    "fps": "cameras.walk_fps",
+    "stereo": "cameras.stereo_m",
 }
 
 
@@ -225,6 +236,9 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
     if getattr(args, "camera_file", None):
         # A recipe's fields are JSON: quote the path.
         overrides |= {"cameras.source": "file", "cameras.file": json.dumps(str(args.camera_file))}
+    if getattr(args, "trajectory", None):
+        text = json.dumps(str(args.trajectory))
+        overrides |= {"cameras.source": "trajectory", "cameras.file": text}
     if getattr(args, "catalogue", None):
         overrides["dress.catalogue"] = json.dumps(":".join(args.catalogue))
     if getattr(args, "furnish", None):

@@ -169,9 +169,9 @@ def _cameras(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.read.source import resolve
+    from pbrs_farm.run.chosen_cameras import chosen_cameras
     from pbrs_farm.run.processes.verb_process import doing
     from pbrs_farm.run.steps import camera_seed, repaired_house
-    from pbrs_farm.sample import sample_cameras
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_of(args)
@@ -179,9 +179,8 @@ def _cameras(args: argparse.Namespace) -> int:
     # Score candidates by the items that rays from them meet.
     caster = Caster(geometry_from_house(house))
     doing(args.home, "cameras")
-    counters = caster.item_counts, caster.depth_pictures
     seed = camera_seed(house.id, recipe)
-    sampling = sample_cameras(house, recipe.cameras, seed, *counters)
+    sampling = chosen_cameras(house, recipe.cameras, seed, caster)
     document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))
     if args.out is not None:
         store = FolderStore(args.out.parent)
@@ -217,6 +216,8 @@ def _echo_report(report: CameraReport) -> None:
         for s in room.sectors:
             rejected = ", ".join(f"{n} {rule}" for rule, n in s.refused.items() if n)
             echo(f"  sector {s.sector}: {_outcome(s)}; {s.n_candidates} candidates: {rejected}")
+    for note in report.notes:
+        echo(shown(note))
     echo(f"{report.n_views} views of {report.n_candidates} candidates")
 
 

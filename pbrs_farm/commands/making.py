@@ -97,6 +97,8 @@ def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
     add("--silence", type=float, default=0.0, metavar="S", help=text)
     text = "memory a process may hold (default: its share of the machine)"
     add("--memory", type=float, default=0.0, metavar="MB", help=text)
+    text = "pairs.parquet: what each two views of a room have in common (docs/motion.md)"
+    add("--pairs", action="store_true", help=text)
     text = "give the output folder this recipe, rendering again what differs"
     add("--update", action="store_true", help=text)
     add("--json", action="store_true", help="a JSON line per event")
@@ -149,7 +151,7 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
         homes=homes,
         store_url=args.out,
         recipe=recipe_of(args),
-        want=wanted(args.modes, args.layers, views_wanted(args)),
+        want=wanted(args.modes, args.layers, views_wanted(args), pairs=args.pairs),
         n_jobs=args.jobs,
         update=args.update,
         step_timeout_s=args.step_timeout,

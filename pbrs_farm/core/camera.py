@@ -121,6 +121,10 @@ class View:
     room_id: str
     sector: int
     camera: Camera
-    origin: str = "sampled"  # or "stored" (placed by the home's author), "file" (the user's)
+    # "sampled", "stored" (placed by the home's author), "file" (the user's), "walk", "trajectory"
+    origin: str = "sampled"
     score: float = 0.0  # the sampler's; 0 where there is none
     objects: dict[int, int] = field(default_factory=dict)  # instance id -> pixels when scored
+    frame: int | None = None  # number in a sequence, from 0
+    time_s: float | None = None  # of that frame
+    left_id: str = ""  # of a stereo pair's right view: the id of the left one

@@ -77,6 +77,16 @@ def view_id(room_id: str, sector: int, k: int | None = None) -> str:
     return f"{room_id}_{sector}" if k is None else f"{room_id}_{sector}_{k}"
 
 
+def frame_id(number: int) -> str:
+    """Id of the view of a sequence's frame: `frame_00012`."""
+    return f"frame_{number:05d}"
+
+
+def right_id(left: str) -> str:
+    """Id of a stereo pair's right view, of the left one's."""
+    return f"{left}_right"
+
+
 def house_key(house: str, file: str = "") -> str:
     """Key of a house's file; of its folder, with a trailing slash, when file is ""."""
     return f"{FOLDERS[is_object(house)]}/{house}/{file}"

@@ -22,6 +22,9 @@ class Layer:
     nodata: str  # what a pixel holds that sees nothing
     step: str  # the step of run/plan.py that writes it
     optional: bool = False  # only when --layers names it
+    partner: str = (
+        ""  # "next", "previous" or "stereo": the view without which there is no such file
+    )
 
 
 def _picture(name: str, step: str) -> Layer:
@@ -36,6 +39,32 @@ def _optional(
     name: str, channels: str, dtype: str, unit: str, nodata: str = "0", file: str = ""
 ) -> Layer:
     return Layer(name, file or f"{name}.png", channels, dtype, unit, nodata, "truth", optional=True)
+
+
+def _between(
+    name: str,
+    partner: str,
+    channels: str,
+    dtype: str,
+    unit: str,
+    nodata: str = "0",
+    ending: str = "png",
+) -> Layer:
+    file = f"{name}.{ending}"
+    return Layer(name, file, channels, dtype, unit, nodata, "truth", optional=True, partner=partner)
+
+
+def _flow(name: str, partner: str) -> tuple[Layer, ...]:
+    unit = f"px right, px down, to the {partner} frame"
+    kitti = "64 x + 2^15, 64 y + 2^15, 1 = seen there (KITTI)"
+    return (
+        _between(f"flow_{name}", partner, "X Y", "float16", unit, "0, 0", "exr"),
+        _between(f"flow_{name}_kitti", partner, "RGB", "uint16", kitti, "0 in all three"),
+        _between(f"occlusion_{name}", partner, "Y", "uint8", _SEEN_THERE, "128"),
+    )
+
+
+_SEEN_THERE: Final = "in the other picture: 0 = seen, 128 = outside it, 255 = hidden"
 
 
 def _behind_glass(name: str, channels: str, dtype: str, nodata: str = "0") -> Layer:
@@ -98,6 +127,11 @@ LAYERS: Final[tuple[Layer, ...]] = (
     # Depth as other works encode or measure it.
     _optional("hha", "RGB", "uint8", "disparity, height in cm, angle with gravity (Gupta et al. 2014)"),
     _optional("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it"),
+    # Where surfaces lie in the next and the previous frame, and in the other picture of a pair.
+    *_flow("forward", "next"),
+    *_flow("backward", "previous"),
+    _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)"),
+    _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128"),
 )  # fmt: skip
 
 LAYER: Final = {layer.name: layer for layer in LAYERS}

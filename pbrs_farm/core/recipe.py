@@ -103,7 +103,18 @@ class Recipe(FieldGroup):
 
 
 _CAME_LATER: Mapping[str, tuple[str, ...]] = {
-    "cameras": ("max_opening_fraction", "min_score", "min_room_score", "hfov_spread"),
+    "cameras": (
+        "max_opening_fraction",
+        "min_score",
+        "min_room_score",
+        "hfov_spread",
+        "walk_frames",
+        "walk_fps",
+        "walk_speed_mps",
+        "walk_turn_dps",
+        "walk_shake",
+        "stereo_m",
+    ),
     "dress": tuple(DressFields.model_fields),
     "repair": ("lamp_in_every_room", "lamp_lx"),
     "selection": ("min_room_lx",),

@@ -130,9 +130,17 @@ class CameraFields(FieldGroup):
     coarse_width_px: int = Field(160, gt=0, le=4096)
     coarse_height_px: int = Field(120, gt=0, le=4096)
     per_sector: int = Field(1, ge=1, le=1000)
-    source: Literal["sampled", "stored", "file"] = "sampled"
-    file: str = Field("", description="camera file of the user's, for source file")
+    source: Literal["sampled", "stored", "file", "walk", "trajectory"] = "sampled"
+    file: str = Field("", description="camera or trajectory file of the user's, for those sources")
     exact: bool = Field(False, description="score every candidate at full size")
+    walk_frames: int = Field(150, ge=2, le=100_000, description="walk: views along it")
+    walk_fps: float = Field(30.0, gt=0, le=1_000, description="walk: frames a second")
+    walk_speed_mps: float = Field(0.8, ge=0.1, le=10, description="walk: of the eye, at most")
+    walk_turn_dps: float = Field(60.0, ge=5, le=720, description="walk: degrees a second, at most")
+    walk_shake: float = Field(0.0, ge=0, le=3, description="walk: 1 = as a hand holds a camera")
+    stereo_m: float = Field(
+        0.0, ge=0, le=10, description="baseline: a view more to the right of each; 0 = none"
+    )
 
 
 class ImageFields(FieldGroup):

@@ -26,7 +26,12 @@ def cameras_json(views: Iterable[View], report: Mapping[str, Any]) -> bytes:
 def _json_of_view(view: View) -> dict[str, Any]:
     """A view as JSON values; the pose keeps every bit (repr of float64)."""
     i = view.camera.intrinsics
+    # Views of no sequence and no pair are written as they always were.
+    sequence = {} if view.frame is None else {"frame": view.frame, "time_s": view.time_s}
+    pair = {"left": view.left_id} if view.left_id else {}
     return {
+        **sequence,
+        **pair,
         "id": view.id,
         "room": view.room_id,
         "sector": view.sector,
@@ -56,6 +61,9 @@ def _view_from_json(row: dict[str, Any]) -> View:
         origin=row["origin"],
         score=row["score"],
         objects={int(k): n for k, n in row["objects"].items()},
+        frame=row.get("frame"),
+        time_s=row.get("time_s"),
+        left_id=row.get("left", ""),
     )
 
 

@@ -24,7 +24,7 @@ def layer_bytes(name: str, array: NDArray[Any], attribution: str = "") -> bytes:
     planes = [array] if len(channels) == 1 else list(np.moveaxis(array, -1, 0))
     named = zip(channels, planes, strict=True)
     layers = {c: np.ascontiguousarray(plane, np.float32) for c, plane in named}
-    return exr_from_layers(layers, attribution=attribution)
+    return exr_from_layers(layers, half=layer.dtype == "float16", attribution=attribution)
 
 
 def layer_from_bytes(name: str, data: bytes, place: str) -> NDArray[Any]:

@@ -22,6 +22,10 @@ def view_description(
     """What view.json says. facts: step -> facts of its marker; "table" of `truth` stands at the top."""
     table = facts.get("truth", {}).get("table", {})
     light = facts.get("light", {})
+    sequence: dict[str, Any] = {}
+    if view.frame is not None:
+        sequence = {"frame": view.frame, "time_s": view.time_s}
+    sequence |= {"left": view.left_id} if view.left_id else {}
     # The room's warnings, and what is dark of the picture and of the room.
     warnings = list(dict.fromkeys([*light.get("warnings", []), *light.get("dark", [])]))
     return {
@@ -30,6 +34,7 @@ def view_description(
         "room": view.room_id,
         "sector": view.sector,
         "origin": view.origin,
+        **sequence,
         "score": view.score,
         **table,
         "warnings": warnings,

@@ -6,6 +6,7 @@ Effects: reads the store, holds a GL context and Mitsuba scenes; one house at a 
 from __future__ import annotations
 
 import gc
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -94,14 +95,19 @@ class CachedHouse:
 
         cameras_digest: of the cameras step's marker; cameras.json is read again when it changes.
         """
-        # Parse the file once for all views of the house.
-        key = keys.house_key(self.house_id, "cameras.json")
-        if self._views is None or self._views[0] != cameras_digest:
-            self._views = (cameras_digest, views_from_json(self.store.get(key), key))
-        views = self._views[1]
+        views = self.views(cameras_digest)
         if view_id not in views:
+            key = keys.house_key(self.house_id, "cameras.json")
             raise BadInput(key, view_id, "no such view", hint=f"of {', '.join(views) or 'none'}")
         return views[view_id]
+
+    def views(self, cameras_digest: str) -> Mapping[str, View]:
+        """All views of the house by id, in the order of cameras.json; as for view."""
+        # Parse the file once for all views of the house.
+        if self._views is None or self._views[0] != cameras_digest:
+            key = keys.house_key(self.house_id, "cameras.json")
+            self._views = (cameras_digest, views_from_json(self.store.get(key), key))
+        return self._views[1]
 
     def close(self) -> None:
         """Free what the GPU or Mitsuba holds."""

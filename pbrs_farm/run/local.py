@@ -209,7 +209,7 @@ class _Schedule:
             rows, lines = plan.lit_views(rows, lux, self._run.recipe.selection.min_room_lx)
             self._summary.left_out += [(house, line) for line in lines]
             reason = reason or "; ".join(lines)
-        views = plan.spread(rows, want.n_views)
+        views = plan.chosen_views(rows, want.n_views, self._run.recipe)
         self._summary.n_views += len(views)
         self._observe(Event("planned", house, None, "view", facts={"views": views}))
         if not views:

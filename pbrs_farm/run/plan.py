@@ -39,6 +39,7 @@ STEPS: Final = {
     for step in (
         Step("house", 4, ("read", "repair"), per_view=False),
         Step("cameras", 1, ("cameras",), ("house",), per_view=False),
+        Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
@@ -66,9 +67,12 @@ class Wanted:
     modes: tuple[Mode, ...] = ALL_MODES
     layers: tuple[str, ...] = ()  # optional layers, by name
     n_views: int = 0  # per house, 0 = all
+    pairs: bool = False  # what each pair of views of a room has in common, too
 
 
-def wanted(modes: Iterable[str], layers: Iterable[str], n_views: int = 0) -> Wanted:
+def wanted(
+    modes: Iterable[str], layers: Iterable[str], n_views: int = 0, *, pairs: bool = False
+) -> Wanted:
     """Wanted from words of the command line; raises BadInput for a word that is none of ours."""
     names = [m.value for m in ALL_MODES]
     for mode in modes:
@@ -81,13 +85,14 @@ def wanted(modes: Iterable[str], layers: Iterable[str], n_views: int = 0) -> Wan
         if layer not in LAYER:
             raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, optional))
     chosen = tuple(m for m in ALL_MODES if m.value in set(modes)) or ALL_MODES
-    return Wanted(chosen, tuple(x for x in optional if x in set(layers)), n_views)
+    return Wanted(chosen, tuple(x for x in optional if x in set(layers)), n_views, pairs)
 
 
 def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:
     """Steps of a house in the order they run, all before the steps of its views."""
     needed = [n for step in view_steps(want) for n in needed_of_house(step, house_id)]
-    return ("house", "cameras", *needed)
+    pairs = ("pairs",) if want.pairs and not keys.is_object(house_id) else ()
+    return ("house", "cameras", *needed, *pairs)
 
 
 def needed_of_house(step: str, house_id: str) -> tuple[str, ...]:
@@ -160,6 +165,22 @@ def lit_views(
         f" the floor by all light, less than selection.min_room_lx = {least_lx:g}"
         for room, n in left_out.items()
     ]
+
+
+def chosen_views(rows: Iterable[tuple[str, str, float]], n_views: int, recipe: Recipe) -> list[str]:
+    """The n_views views to make: the first frames of a sequence, else spread over rooms; 0 = all.
+
+    A stereo pair is one view, of which both pictures are made.
+    """
+    all_rows = list(rows)
+    rights = {keys.right_id(row[0]) for row in all_rows} if recipe.cameras.stereo_m > 0 else set()
+    lefts = [row for row in all_rows if row[0] not in rights]
+    if recipe.cameras.source in ("walk", "trajectory"):
+        chosen = [view for view, _room, _score in lefts[: n_views or None]]
+    else:
+        chosen = spread(lefts, n_views)
+    both = {view for left in chosen for view in (left, keys.right_id(left))}
+    return [view for view, _room, _score in all_rows if view in both]
 
 
 def spread(view_rooms: Iterable[tuple[str, str, float]], n_views: int) -> list[str]:

@@ -25,7 +25,7 @@ from pbrs_farm.run.step_cache import Outcome, Work
 from pbrs_farm.store import store_from_url
 
 # Steps that start Dr.Jit, whose number of threads is fixed from then on.
-_DRJIT_STEPS = ("house", "cameras", "truth", "illuminance", "light", "develop")
+_DRJIT_STEPS = ("house", "cameras", "pairs", "truth", "illuminance", "light", "develop")
 
 
 def make_handler(send: Send) -> Handler:

@@ -129,7 +129,7 @@ def _extra(name: str, work: Work) -> object:
         return [source.fingerprint, dressing] if dressing else source.fingerprint
     if name == "truth":
         return work.layers
-    if name == "cameras" and work.recipe.cameras.source == "file":
+    if name == "cameras" and work.recipe.cameras.source in ("file", "trajectory"):
         return keys.sha256(camera_file_text(work.recipe.cameras).encode())
     return None
 

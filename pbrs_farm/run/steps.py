@@ -22,7 +22,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Room, geometry_from_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
-from pbrs_farm.core.recipe import CameraFields, Recipe
+from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import cameras_json
 from pbrs_farm.formats.illuminance_json import illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
@@ -39,14 +39,7 @@ from pbrs_farm.run.house_of_source import house_of_source
 from pbrs_farm.run.light_checkpoint import LightCheckpoint
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.processes.verb_process import doing
-from pbrs_farm.run.step_cache import (
-    Outcome,
-    StepOutput,
-    Work,
-    camera_file_text,
-    required_source,
-    run_unless_done,
-)
+from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, required_source, run_unless_done
 from pbrs_farm.run.view_histogram import view_histogram
 
 if TYPE_CHECKING:
@@ -54,6 +47,7 @@ if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
     from pbrs_farm.selection.view_record import ViewPlace
     from pbrs_farm.transport.light_result import LightResult
+    from pbrs_farm.truth.partners import Relation
 
 
 def _cached_house(work: Work) -> CachedHouse:
@@ -125,20 +119,17 @@ def made_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport, 
 
 
 def _cameras(work: Work) -> StepOutput:
-    """cameras.json: around an object, from the user's file, or sampled (paper section 3.1)."""
-    from pbrs_farm.sample import cameras
+    """cameras.json: around an object, else as the recipe's group `cameras` says."""
+    from pbrs_farm.run.chosen_cameras import chosen_cameras
 
     cached = _cached_house(work)
     house, fields = cached.house, work.recipe.cameras
     seed = camera_seed(work.house_id, work.recipe)
-    # Objects and files bring their cameras: nothing is searched.
     if keys.is_object(work.house_id):
         return _object_cameras(work, house, seed)
-    if fields.source == "file":
-        return _file_cameras(cached, fields)
-    # Sampled views and stored ones: the sampler's fields say which. Say why where there are none.
-    caster = cached.caster
-    views, report = cameras(house, fields, seed, caster.item_counts, caster.depth_pictures)
+    sampling = chosen_cameras(house, fields, seed, cached.caster)
+    views, report = sampling.views, sampling.report
+    # Say why where there are none.
     made = _camera_output(views, report.model_dump(mode="json"))
     return made if views else StepOutput(made.files, {**made.facts, "why_none": report.why_none})
 
@@ -150,18 +141,6 @@ def _object_cameras(work: Work, house: House, seed: int) -> StepOutput:
     intrinsics = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
     views = object_views(house.items[0].bounds, intrinsics, seed, (house.id,))
     return _camera_output(views, {"preset": "objects", "n_views": len(views)})
-
-
-def _file_cameras(cached: CachedHouse, fields: CameraFields) -> StepOutput:
-    from pbrs_farm.sample.camera_file import cameras_from_file_text
-    from pbrs_farm.sample.stored_cameras import views_from_cameras
-
-    given = cameras_from_file_text(
-        camera_file_text(fields), fields.file, fields.score_width_px, fields.score_height_px
-    )
-    counter = cached.caster.item_counts
-    views = views_from_cameras(cached.house, given, fields, counter, origin="file")
-    return _camera_output(views, {"source": "file", "n_views": len(views)})
 
 
 def _camera_output(views: Sequence[View], report: dict[str, Any]) -> StepOutput:
@@ -177,6 +156,19 @@ def room_of(house: House, view: View) -> Room | None:
 def camera_seed(house_id: str, recipe: Recipe) -> int:
     """The sampler's seed for a house under a recipe."""
     return keys.seed(house_id, "cameras", recipe.digest("cameras"))
+
+
+def _pairs(work: Work) -> StepOutput:
+    """pairs.parquet: what each pair of views of a room has in common."""
+    from dataclasses import asdict
+
+    from pbrs_farm.formats.pairs_parquet import FILE, pairs_parquet
+    from pbrs_farm.truth.common_surface import pair_rows
+
+    cached = _cached_house(work)
+    views = list(cached.views(work.inputs["cameras"]).values())
+    rows = [asdict(row) for row in pair_rows(views, cached.caster.first_hit)]
+    return StepOutput({FILE: pairs_parquet(rows)}, {"n_pairs": len(rows)})
 
 
 def _truth(work: Work) -> StepOutput:
@@ -197,15 +189,34 @@ def _truth(work: Work) -> StepOutput:
     # Add the layers that were asked for; those behind glass cast once more without it.
     if work.layers:
         seed = keys.seed(work.house_id, view.id, "truth", work.recipe.seed)
+        partners = _partners(work, cached, view, table)
         inputs = truth.LabelInputs(
             hit, house, cached.geometry, camera,
             lambda skip: caster.hit_record(camera, skip_faces=skip), cached.textures, seed,
+            partners, caster.first_hit,
         )  # fmt: skip
         arrays |= truth.optional_layers(work.layers, inputs)
         table |= truth.optional_tables(work.layers, house)
     credit = house.source.attribution
     files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
     return StepOutput(files, {"table": table})
+
+
+def _partners(
+    work: Work, cached: CachedHouse, view: View, table: dict[str, Any]
+) -> dict[Relation, Camera]:
+    """The cameras of the partners that the layers need; they are written into the table."""
+    needed = {LAYER[name].partner for name in work.layers} - {""}
+    if not needed:
+        return {}
+    from pbrs_farm.truth.partners import partner_table, partners_of
+
+    found = partners_of(view, cached.views(work.inputs["cameras"]))
+    kept = {relation: other for relation, other in found.items() if relation in needed}
+    image = work.recipe.image
+    cameras = {r: o.camera.with_size(image.width_px, image.height_px) for r, o in kept.items()}
+    table["partners"] = partner_table(kept, cameras)
+    return cameras
 
 
 def _opengl(work: Work, mode: str) -> StepOutput:
@@ -371,6 +382,7 @@ def versions() -> dict[str, str]:
 _FUNCTIONS: Final[Mapping[str, Callable[[Work], StepOutput]]] = {
     "house": _house,
     "cameras": _cameras,
+    "pairs": _pairs,
     "truth": _truth,
     "opengl_dl": partial(_opengl, mode="opengl_dl"),
     "opengl_il": partial(_opengl, mode="opengl_il"),

@@ -40,6 +40,7 @@ COLOURS: Final = {
 
 _PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0  # scale, largest width of a panel, border
 _ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = 16.0, 12.0, 0.56, 200.0  # px
+_GAZE_M = 0.45  # length of the lines of gaze along a walk
 _ROOM, _FURNITURE, _WALL, _INK = "#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222"
 
 
@@ -112,9 +113,31 @@ def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel)
         for room in rooms.values()
         if len(room.polygon)
     ]
-    for view in sampling.views:
-        if view.room_id in rooms:
+    # A walk is one line; of its frames a few say where they look.
+    views = [view for view in sampling.views if view.room_id in rooms and not view.left_id]
+    frames = [view for view in views if view.frame is not None]
+    marks += _walk(frames, panel)
+    for view in views:
+        if view.frame is None:
             marks += _winner(view, panel)
+    return marks
+
+
+def _walk(frames: list[View], panel: _Panel) -> list[Mark]:
+    """The way of a sequence's frames, a short line of gaze every tenth of it, its first and last frame."""
+    if not frames:
+        return []
+    colour, gaze = COLOURS[Verdict.WINNER], COLOURS[Verdict.NEAR_OBSTACLE]
+    places = [(float(v.camera.eye[0]), float(v.camera.eye[2])) for v in frames]
+    marks = [Mark("line", tuple(panel(x, z) for x, z in places), colour, 2.5)]
+    for view, (x, z) in list(zip(frames, places, strict=True))[:: max(len(frames) // 20, 1)]:
+        dx, dz = view.camera.towards[0], view.camera.towards[2]
+        line = panel(x, z), panel(x + _GAZE_M * dx, z + _GAZE_M * dz)
+        title = f"{view.id}: {view.time_s or 0:.2f} s"
+        marks += [Mark("line", line, gaze, 1.5, title=title), Mark("dot", line[:1], gaze, 2.0)]
+    for view, place, text in ((frames[0], places[0], "start"), (frames[-1], places[-1], "end")):
+        marks.append(Mark("dot", (panel(*place),), colour, 5.0, title=view.id))
+        marks.append(_text(panel(*place)[0] + 8, panel(*place)[1], text, _LETTERS, colour))
     return marks
 
 
@@ -168,7 +191,7 @@ def _notes(sampling: Sampling) -> list[Mark]:
         counts += np.bincount(trace.verdict, minlength=len(Verdict))
     # List the verdicts with their colours, then rooms, then notes.
     rows: list[tuple[str, str | None]] = []
-    for verdict in Verdict:
+    for verdict in Verdict if sampling.traces else ():
         text = f"{verdict.label.replace('_', ' ')}: {counts[verdict]}"
         rows.append((text, COLOURS[verdict]))
     rows.append(("", None))

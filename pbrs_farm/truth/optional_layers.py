@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -15,10 +15,20 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.classes import NYU13_FROM_NYU40
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Geometry, House, MaterialKind
+from pbrs_farm.core.layers import LAYER
 from pbrs_farm.truth.albedo import albedo_png
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
 from pbrs_farm.truth.depth_sensor import sensor_depth
 from pbrs_farm.truth.hha import hha_png
+from pbrs_farm.truth.optical_flow import (
+    Correspondence,
+    FirstHit,
+    correspondence,
+    disparity_png,
+    flow_exr,
+    flow_kitti,
+)
+from pbrs_farm.truth.partners import Relation
 from pbrs_farm.truth.shading_normal import shading_normals
 from pbrs_farm.truth.standard_layers import (
     depth_mm,
@@ -42,12 +52,25 @@ class LabelInputs:
     hit_without: HitWithout  # for the layers behind glass
     textures: Mapping[str, NDArray[np.uint8]]  # id -> (H, W, 3 or 4) sRGB, row 0 = top
     seed: int = 0  # of depth_sensor's noise
+    partners: Mapping[Relation, Camera] = field(default_factory=dict)  # at this picture's size
+    first_hit: FirstHit | None = None  # for the layers between views
 
     @cached_property
     def behind(self) -> HitRecord:
         """The hit record behind glass: the first hit that is neither glass nor pane."""
         transparent = transparent_faces(self.geometry, self.house)
         return self.hit_without(transparent) if transparent.any() else self.hit
+
+    @cached_property
+    def to_partners(self) -> dict[Relation, Correspondence]:
+        """Where the hits lie in the picture of each partner."""
+        if self.first_hit is None:
+            return {}
+        cast = self.first_hit
+        return {
+            relation: correspondence(self.hit, self.camera, other, cast)
+            for relation, other in self.partners.items()
+        }
 
     @cached_property
     def boundaries(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
@@ -128,6 +151,15 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "boundary_crease": lambda s: s.boundaries[1],
     "hha": lambda s: hha_png(s.hit, s.camera),
     "depth_sensor": lambda s: sensor_depth(s.hit, s.camera, seed=s.seed),
+    # Where the hits lie in other views.
+    "flow_forward": lambda s: flow_exr(s.to_partners["next"]),
+    "flow_forward_kitti": lambda s: flow_kitti(s.to_partners["next"]),
+    "occlusion_forward": lambda s: s.to_partners["next"].state,
+    "flow_backward": lambda s: flow_exr(s.to_partners["previous"]),
+    "flow_backward_kitti": lambda s: flow_kitti(s.to_partners["previous"]),
+    "occlusion_backward": lambda s: s.to_partners["previous"].state,
+    "disparity": lambda s: disparity_png(s.to_partners["stereo"]),
+    "occlusion_stereo": lambda s: s.to_partners["stereo"].state,
 }
 
 OPTIONAL_NAMES = tuple(_LAYER_FUNCTIONS)
@@ -136,9 +168,11 @@ OPTIONAL_NAMES = tuple(_LAYER_FUNCTIONS)
 def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, NDArray[Any]]:
     """The named optional layers, as layers.py says: PNG arrays, and float32 for the EXR ones.
 
-    Raises KeyError for a name that is no optional label layer.
+    A layer between views is left out where the view has no such partner. Raises KeyError for a
+    name that is no optional label layer.
     """
-    return {name: _LAYER_FUNCTIONS[name](inputs) for name in names}
+    made = [n for n in names if not LAYER[n].partner or LAYER[n].partner in inputs.to_partners]
+    return {name: _LAYER_FUNCTIONS[name](inputs) for name in made}
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:

@@ -119,3 +119,13 @@ def test_few_views_are_spread_over_rooms_best_first() -> None:
 def test_a_field_that_does_not_fit_is_refused(overrides: dict[str, str]) -> None:
     with pytest.raises(BadRecipe):
         recipe_from_name("fast", overrides)
+
+
+def test_the_first_frames_of_a_sequence_are_made_and_pairs_stay_together() -> None:
+    rows = [(f"frame_{k:05d}{side}", "a", 0.0) for k in range(3) for side in ("", "_right")]
+    recipe = recipe_from_name("fast", {"cameras.source": "walk", "cameras.stereo_m": "0.065"})
+    assert plan.chosen_views(rows, 2, recipe) == [row[0] for row in rows[:4]]
+    assert plan.chosen_views(rows, 0, recipe) == [row[0] for row in rows]
+    sampled = recipe_from_name("fast", {"cameras.stereo_m": "0.1"})
+    best = [("a_0", "a", 1.0), ("a_0_right", "a", 1.0), ("b_0", "b", 2.0), ("b_0_right", "b", 2.0)]
+    assert plan.chosen_views(best, 1, sampled) == ["b_0", "b_0_right"]

@@ -144,7 +144,7 @@ class HouseRunner:
             lux = illuminance.facts.get("floor_lux", {}) if illuminance is not None else {}
             rows, _left_out = plan.lit_views(rows, lux, spec.recipe.selection.min_room_lx)
         rooms = {view: room for view, room, _score in rows}
-        chosen = plan.spread(rows, spec.n_views)
+        chosen = plan.chosen_views(rows, spec.n_views, spec.recipe)
         placed = [(v, rooms[v]) for v in chosen]
         return batches_from_views(placed, spec.seconds_per_view, spec.min_batches)
 

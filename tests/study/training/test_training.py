@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from pbrs_farm.study.training.training_views import BatchOrder
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.study.training.checkpoint import read_tensors
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_loop import LossFailed
-from pbrs_farm.study.training.view_arrays import rows_of_step
 from pbrs_farm.study.training_plan import plan_of
 from tests.study.training.made_views import small_plan, views
 
@@ -40,7 +40,7 @@ train(Job(plan, Path(sys.argv[1]), seed=3), views(5, plan), observe=killed)
 
 _ALONE = """
 import sys
-for name in ("pydantic", "pydantic_core", "OpenImageIO", "scipy", "h5py", "jinja2", "PIL", "cv2"):
+for name in ("pydantic", "pydantic_core", "OpenImageIO", "scipy", "h5py", "jinja2", "PIL", "cv2", "safetensors"):
     sys.modules[name] = None
 from pathlib import Path
 from tests.study.training.made_views import small_plan, views
@@ -137,10 +137,26 @@ def test_a_damaged_checkpoint_is_one_line(tmp_path: Path) -> None:
 
 
 def test_every_view_is_taken_once_a_round() -> None:
-    rows = np.concatenate([rows_of_step(7, 3, step, seed=5) for step in range(7)])
+    order = BatchOrder(7, 3, seed=5)
+    rows = np.concatenate([order.rows(step) for step in range(7)])
     for k in range(3):
         assert sorted(rows[7 * k : 7 * k + 7]) == list(range(7))
     assert not np.array_equal(rows[:7], rows[7:14])
+    # A run that goes on at the fifth step takes the same views.
+    assert np.array_equal(BatchOrder(7, 3, seed=5).rows(4), rows[12:15])
+
+
+def test_views_of_shards_come_from_four_shards_at_a_time() -> None:
+    groups = np.repeat(np.arange(12), 10)
+    order = BatchOrder(120, 40, seed=1, groups=groups)
+    rounds = [np.concatenate([order.rows(3 * k + i) for i in range(3)]) for k in range(2)]
+    for rows in rounds:
+        assert sorted(rows) == list(range(120))
+        windows = [set(groups[rows[40 * i : 40 * i + 40]]) for i in range(3)]
+        assert [len(window) for window in windows] == [4, 4, 4]
+        # Within them the shards are mixed.
+        assert len(set(groups[rows[:10]])) > 1
+    assert not np.array_equal(*rounds)
 
 
 def test_four_views_can_be_learnt_by_heart(tmp_path: Path) -> None:
@@ -151,6 +167,32 @@ def test_four_views_can_be_learnt_by_heart(tmp_path: Path) -> None:
     )  # fmt: skip
     figures = train(Job(plan, tmp_path), views(4, plan))
     assert figures["network"]["train"]["mean_deg"] < 12
+
+
+def test_errors_on_training_and_held_out_views_are_drawn(tmp_path: Path) -> None:
+    plan = small_plan(judge_every="3")
+    train(Job(plan, tmp_path / "a"), views(4, plan), views(2, plan))
+    rows = [row for row in RunFolder(tmp_path / "a").metrics() if "held_out_error" in row]
+    assert [row["step"] for row in rows] == [3, 6]
+    assert all(0 < row["train_error"] < 180 for row in rows)
+    picture = (tmp_path / "a" / "curves.svg").read_text()
+    assert picture.count("<polyline") == 3
+    assert "mean angle, degrees" in picture
+    # Looking changes nothing: the same weights as without.
+    blind = small_plan()
+    train(Job(blind, tmp_path / "b"), views(4, plan), views(2, plan))
+    seen, unseen = (read_tensors(RunFolder(tmp_path / x).weights)[0] for x in "ab")
+    assert all(torch.equal(seen[name], unseen[name]) for name in seen)
+
+
+def test_a_run_of_before_a_field_was_there_goes_on(tmp_path: Path) -> None:
+    plan = small_plan(steps="2")
+    first = train(Job(plan, tmp_path), views(3, plan))
+    record = RunFolder(tmp_path).record()
+    for name in ("workers", "memory_gb", "judge_every", "judge_views", "final_views"):
+        del record["plan"][name]
+    RunFolder(tmp_path).write("run.json", record)
+    assert train(Job(plan, tmp_path), views(3, plan))["network"] == first["network"]
 
 
 def test_a_plans_fields_are_set_and_checked() -> None:

@@ -1,0 +1,193 @@
+"""Flow, disparity and occlusion against points that are followed from one stored view to another.
+
+Effects: none. Rays are Embree's, points and cameras those of view.json; a pixel whose depth is another
+one's (an edge that two casters see differently) is left to the checks of its own layers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.embree_caster import Faces, Floats, Rays
+from pbrs_farm.check.stored_view import StoredView
+
+Bools = NDArray[np.bool_]
+
+FLOW_PX = 0.02  # beside half a step of what stores it
+SEEN, OUTSIDE, HIDDEN = 0, 128, 255
+BORDER_PX = 0.01  # of the other picture: on it a point is in or out
+KITTI_REACH_PX = 511.9  # of motion that KITTI's 16 bits hold
+REACH_M = 2e-4  # how far before a point the ray to it may end
+JITTER_PX = 0.02  # around a point: where its surroundings differ either state is right
+
+# Relation -> layers of flow, of its KITTI form and of occlusion.
+FLOW_LAYERS = {
+    "next": ("flow_forward", "flow_forward_kitti", "occlusion_forward"),
+    "previous": ("flow_backward", "flow_backward_kitti", "occlusion_backward"),
+}
+
+MOTION_LAYERS = {name for names in FLOW_LAYERS.values() for name in names}
+MOTION_LAYERS |= {"disparity", "occlusion_stereo"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OtherView:
+    """The partner's camera, as the view's own table has it."""
+
+    k: Floats  # (3, 3)
+    world_from_camera: Floats  # (4, 4), OpenCV axes
+    size: tuple[int, int]  # height, width
+
+    def pixels(self, points: Floats) -> tuple[Floats, Floats]:
+        """(N, 2) px of world points (N, 3), and (N,) their depth; NaN where they are behind."""
+        local = (points - self.world_from_camera[:3, 3]) @ self.world_from_camera[:3, :3]
+        z = local[:, 2]
+        homogeneous = local @ self.k.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            px = homogeneous[:, :2] / homogeneous[:, 2:]
+        return np.where(z[:, None] > 1e-3, px, np.nan), z
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Followed:
+    """N points of a view in its partner's picture."""
+
+    motion: Floats  # (N, 2) px right and down; NaN behind the other camera
+    state: NDArray[np.int64]  # (N,) SEEN, OUTSIDE or HIDDEN
+    is_tie: Bools  # (N,) another state is as right: on a border, or at an edge
+
+
+def other_view(view: StoredView, relation: str) -> OtherView | None:
+    """The partner of that relation that view.json names, None without it."""
+    row = view.table.get("partners", {}).get(relation)
+    if row is None:
+        return None
+    pose = np.array(row["world_from_camera_opencv"], np.float64)
+    return OtherView(np.array(row["K"], np.float64), pose, view.size)
+
+
+def followed(
+    view: StoredView,
+    other: OtherView,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    z: Floats,
+    rays: Rays,
+) -> Followed:
+    """The surfaces at depth z (N,) metres behind pixels' centres, looked for in the other picture."""
+    origin, directions = view.rays(rows, columns)
+    points = origin + directions * z[:, None]
+    px, _depth = other.pixels(points)
+    height, width = other.size
+    # Inside the picture by more than the border's width, or outside it by more.
+    with np.errstate(invalid="ignore"):
+        margin = np.minimum(px, np.array([width, height]) - px).min(axis=1)
+    inside = margin >= 0
+    is_tie = np.abs(margin) <= BORDER_PX
+    state = np.full(len(rows), OUTSIDE, np.int64)
+    at = np.nonzero(inside)[0]
+    seen = _is_seen(points[at], other, rays)
+    state[at] = np.where(seen, SEEN, HIDDEN)
+    # Ask again a little beside each point, where it may matter.
+    for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        _o, beside = view.rays(rows[at] + JITTER_PX * dy, columns[at] + JITTER_PX * dx)
+        moved = origin + beside * z[at][:, None]
+        is_tie[at] |= _is_seen(moved, other, rays, slack_m=0.01) != seen
+    return Followed(px - np.stack([columns + 0.5, rows + 0.5], axis=1), state, is_tie)
+
+
+def _is_seen(points: Floats, other: OtherView, rays: Rays, slack_m: float = REACH_M) -> Bools:
+    """(N,) whether nothing stands between the other eye and each point."""
+    eye = other.world_from_camera[:3, 3]
+    to = points - eye
+    face: Faces = rays.first(eye, to)
+    t = rays.distance(face, eye, to)
+    distance = np.linalg.norm(to, axis=1)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((face < 0) | ((1 - t) * distance <= slack_m), bool)
+
+
+def check_motion(
+    view: StoredView,
+    arrays: Mapping[str, NDArray[Any]],
+    rays: Rays,
+    pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
+    tally: Tally,
+) -> None:
+    """Recompute the layers between views at pixels (rows, columns)."""
+    rows, columns = pixels
+    origin, directions = view.rays(rows, columns)
+    face = rays.first(origin, directions)
+    z = rays.distance(face, origin, directions)
+    # Keep the pixels whose stored depth is that of the ray.
+    own = (face >= 0) & (np.abs(arrays["depth"][rows, columns] - z * 1000) <= 1.0 + z)
+    rows, columns, z = rows[own], columns[own], z[own]
+    for relation in (*FLOW_LAYERS, "stereo"):
+        other = other_view(view, relation)
+        names = FLOW_LAYERS.get(relation, ("disparity", "occlusion_stereo"))
+        if other is None:
+            there = [name for name in names if name in arrays]
+            tally.expect("motion", view.place, not there, f"{there} without a {relation} view")
+            continue
+        found = followed(view, other, rows, columns, z, rays)
+        stored = {n: arrays[n][rows, columns].astype(np.float64) for n in names if n in arrays}
+        _judge(view, stored, found, rows, columns, tally)
+
+
+def _judge(
+    view: StoredView,
+    stored: dict[str, Floats],
+    found: Followed,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    tally: Tally,
+) -> None:
+    in_front = np.isfinite(found.motion).all(axis=1)
+    motion = np.nan_to_num(found.motion)
+    for name, values in stored.items():
+        ties = np.zeros(len(values), bool)
+        if name.startswith("occlusion"):
+            right, ties = values == found.state, found.is_tie & (values != found.state)
+        elif name.endswith("kitti"):
+            # What is valid is seen; it moves as far as the steps say.
+            valid = values[:, 2] == 1
+            close = (np.abs((values[:, :2] - 2**15) / 64 - motion) <= FLOW_PX).all(axis=1)
+            hidden = (found.state != SEEN) | (np.abs(motion) >= KITTI_REACH_PX).any(axis=1)
+            right = np.where(valid, close & (found.state == SEEN), hidden)
+            ties = found.is_tie & ~right & (close | ~valid)
+        elif name == "disparity":
+            shift = np.abs(motion[:, 0])
+            right = ~in_front | (np.abs(values / 256 - np.minimum(shift, 65535 / 256)) <= FLOW_PX)
+        else:
+            right = (np.abs(values - motion) <= FLOW_PX + half_step(motion)).all(axis=1) | ~in_front
+        tally.add(f"motion: {name}", len(values), ties=int(ties.sum()))
+        for k in np.nonzero(~(right | ties))[0]:
+            tally.fail(f"motion: {name}", view.place, f"row {rows[k]}, column {columns[k]}")
+
+
+def half_step(values: Floats) -> Floats:
+    """Half the distance between 16-bit floats next to values: what storing them may cost."""
+    return np.asarray(np.spacing(np.abs(values).astype(np.float16)).astype(np.float64) / 2)
+
+
+def check_partners(views: list[StoredView], tally: Tally) -> None:
+    """Each partner that is stored itself has the pose and K that the view's table says."""
+    by_name = {view.folder.name: view for view in views}
+    for view in views:
+        for relation, row in sorted(view.table.get("partners", {}).items()):
+            other = by_name.get(str(row["view"]))
+            if other is None:
+                continue
+            pose = np.array(row["world_from_camera_opencv"], np.float64)
+            same = pose.shape == (4, 4) and bool(
+                np.abs(pose - other.world_from_camera).max() < 1e-9
+                and np.abs(np.array(row["K"]) - other.k).max() < 1e-9
+            )
+            what = f"the {relation} view {other.folder.name} has another camera"
+            tally.expect("partners", view.place, same, what)

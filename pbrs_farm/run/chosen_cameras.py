@@ -1,0 +1,59 @@
+"""Which views a house gets: sampled, stored, walked, or those of the user's file. Effects: reads that file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from pbrs_farm.core.camera import View
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.run.step_cache import camera_file_text
+from pbrs_farm.sample.camera_file import cameras_from_file_text
+from pbrs_farm.sample.camera_report import CameraReport
+from pbrs_farm.sample.house_sampler import Sampling, sample_cameras
+from pbrs_farm.sample.stereo_views import with_right_views
+from pbrs_farm.sample.stored_cameras import views_from_cameras
+from pbrs_farm.sample.walks.trajectory_file import poses_from_tum, trajectory_views
+from pbrs_farm.sample.walks.walk_sampler import sample_walk
+
+if TYPE_CHECKING:
+    from pbrs_farm.raycast.caster import Caster
+
+
+def chosen_cameras(house: House, fields: CameraFields, seed: int, caster: Caster) -> Sampling:
+    """The views by fields.source and the report on them, right views of stereo pairs among them.
+
+    caster: of this house, panes included. Raises BadInput for a file that gives no cameras.
+    """
+    sampling = _one_by_one(house, fields, seed, caster)
+    if fields.stereo_m <= 0:
+        return sampling
+    views = with_right_views(sampling.views, fields.stereo_m)
+    report = sampling.report.model_copy(update={"n_views": len(views)})
+    return replace(sampling, views=views, report=report)
+
+
+def _one_by_one(house: House, fields: CameraFields, seed: int, caster: Caster) -> Sampling:
+    if fields.source == "walk":
+        return sample_walk(house, fields, seed, caster.geometry, caster.first_hit)
+    if fields.source == "file":
+        given = cameras_from_file_text(
+            camera_file_text(fields), fields.file, fields.score_width_px, fields.score_height_px
+        )
+        views = views_from_cameras(house, given, fields, caster.item_counts, origin="file")
+        return Sampling(views, _report_of_file(fields, views), ())
+    if fields.source == "trajectory":
+        poses = poses_from_tum(camera_file_text(fields), fields.file)
+        views = trajectory_views(
+            house, poses, fields.file, fields, caster.geometry, caster.first_hit
+        )
+        return Sampling(views, _report_of_file(fields, views), ())
+    return sample_cameras(house, fields, seed, caster.item_counts, caster.depth_pictures)
+
+
+def _report_of_file(fields: CameraFields, views: tuple[View, ...]) -> CameraReport:
+    return CameraReport(
+        preset=fields.preset, source=fields.source, n_views=len(views),
+        n_candidates=len(views), refused={}, rooms=(),
+    )  # fmt: skip

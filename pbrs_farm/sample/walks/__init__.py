@@ -1,0 +1,1 @@
+"""Cameras that move: a person's walk through a home, and a user's trajectory; no effects."""

@@ -1,0 +1,162 @@
+"""Where a walker looks: at things on the way, turning no faster than a person does; no effects of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.core.arrays import F32, F64, I32, Bools
+from pbrs_farm.core.house import Geometry, House
+from pbrs_farm.sample.walks.walk_space import is_door_item
+
+FirstHit = Callable[[F64, F64], tuple[F32, I32]]
+"""Rays of the house: origins and directions (N, 3) -> distance in lengths of the direction, face or -1."""
+
+_FIXATION_S: Final = (1.2, 2.8)  # how long one thing is looked at
+_DISTANCE_M: Final = (0.9, 5.5)  # of a thing that is looked at
+_ASIDE_RAD: Final = math.radians(80)  # from the way, at most
+_SMOOTH_S: Final = 0.35  # standard deviation of the filter over the gaze
+_TILT_SHARE: Final = 0.5  # of a thing's own angle; the rest is the usual tilt
+_TILT_DEG: Final = (-4.0, 22.0)  # downwards, least and most
+_USUAL_TILT_DEG: Final = 8.0  # NYUv2's median (docs/cameras.md)
+_SIZE_M: Final = (0.15, 3.0)  # diagonal of a thing that is looked at
+_SEEN_SHARE: Final = 0.9  # of the way to a thing's middle that nothing may stand in
+_YAW_PART, _TILT_PART = 0.95, 0.3  # of the turn that is allowed: together below 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Things:
+    """What can be looked at: N items that are no structure, door or window."""
+
+    ids: NDArray[np.int64]  # (N,) instance ids
+    middles: F64  # (N, 3)
+    weights: F64  # (N,) how much each draws the eye
+
+
+def things_of(house: House) -> Things:
+    """The house's furniture and things, by the size of their boxes."""
+    ids, middles, weights = [], [], []
+    for number, item in enumerate(house.items, start=1):
+        if item.kind.is_structure or is_door_item(item) or not item.n_faces:
+            continue
+        low, high = item.bounds
+        size = float(np.linalg.norm(high - low))
+        if _SIZE_M[0] <= size <= _SIZE_M[1]:
+            ids.append(number)
+            middles.append((low + high) / 2)
+            weights.append(math.sqrt(size))
+    return Things(
+        np.array(ids, np.int64), np.array(middles, np.float64).reshape(-1, 3), np.array(weights)
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Walker:
+    """A walker's eyes and way at N times."""
+
+    eyes: F64  # (N, 3)
+    heading: F64  # (N, 2) unit, plan
+    times: F64  # (N,) s, evenly spaced
+
+
+def gaze(
+    walker: Walker,
+    things: Things,
+    geometry: Geometry,
+    first_hit: FirstHit,
+    turn_rps: float,
+    rng: np.random.Generator,
+) -> tuple[F64, F64]:
+    """(N,) azimuth from +x towards +z and (N,) tilt downwards, radians; turning at most turn_rps.
+
+    Every one to three seconds another thing that is in sight is looked at, or the way ahead.
+    """
+    n = len(walker.times)
+    step_s = float(walker.times[1] - walker.times[0]) if n > 1 else 1.0
+    azimuth, tilt = np.zeros(n), np.zeros(n)
+    looked_at: list[int] = []
+    start = 0
+    while start < n:
+        stop = min(n, start + max(int(rng.uniform(*_FIXATION_S) / step_s), 1))
+        part = slice(start, stop)
+        chosen = _chosen(
+            walker, (start + stop - 1) // 2, things, geometry, first_hit, looked_at, rng
+        )
+        azimuth[part], tilt[part] = _towards(walker, part, things, chosen)
+        if chosen is not None:
+            looked_at.append(chosen)
+        start = stop
+    return (
+        _bounded(_unwrapped(azimuth), turn_rps * _YAW_PART * step_s, step_s),
+        _bounded(tilt, turn_rps * _TILT_PART * step_s, step_s),
+    )
+
+
+def _towards(walker: Walker, part: slice, things: Things, chosen: int | None) -> tuple[F64, F64]:
+    """Azimuth and tilt of one fixation: to the middle of a thing, or along the way."""
+    usual = math.radians(_USUAL_TILT_DEG)
+    heading = walker.heading[part]
+    if chosen is None:
+        return np.arctan2(heading[:, 1], heading[:, 0]), np.full(len(heading), usual)
+    to = things.middles[chosen] - walker.eyes[part]
+    level = np.linalg.norm(to[:, [0, 2]], axis=1)
+    tilt = _TILT_SHARE * np.arctan2(-to[:, 1], level) + (1 - _TILT_SHARE) * usual
+    return np.arctan2(to[:, 2], to[:, 0]), np.clip(tilt, *np.radians(_TILT_DEG))
+
+
+def _chosen(
+    walker: Walker,
+    at: int,
+    things: Things,
+    geometry: Geometry,
+    first_hit: FirstHit,
+    looked_at: list[int],
+    rng: np.random.Generator,
+) -> int | None:
+    """The thing that is looked at from the place at, of those ahead and in sight; None without any."""
+    if not len(things.ids):
+        return None
+    eye, heading = walker.eyes[at], walker.heading[at]
+    to = things.middles - eye
+    level = np.linalg.norm(to[:, [0, 2]], axis=1)
+    ahead = (to[:, [0, 2]] @ heading) >= math.cos(_ASIDE_RAD) * level
+    near = (level >= _DISTANCE_M[0]) & (level <= _DISTANCE_M[1])
+    candidates = np.flatnonzero(ahead & near)
+    candidates = candidates[_in_sight(eye, candidates, things, geometry, first_hit)]
+    if not len(candidates):
+        return None
+    # What was looked at lately draws the eye less.
+    weights = things.weights[candidates] * np.where(np.isin(candidates, looked_at[-4:]), 0.05, 1.0)
+    return int(rng.choice(candidates, p=weights / weights.sum()))
+
+
+def _in_sight(
+    eye: F64, candidates: NDArray[np.intp], things: Things, geometry: Geometry, first_hit: FirstHit
+) -> Bools:
+    if not len(candidates):
+        return np.zeros(0, bool)
+    to = things.middles[candidates] - eye
+    t, face = first_hit(np.broadcast_to(eye, to.shape), to)
+    itself = np.zeros(len(candidates), bool)
+    itself[face >= 0] = geometry.face_item[face[face >= 0]] == things.ids[candidates][face >= 0]
+    return np.asarray(itself | (t >= _SEEN_SHARE))
+
+
+def _unwrapped(azimuth: F64) -> F64:
+    """The same directions without jumps by whole turns: each change is the shorter way round."""
+    return np.asarray(np.unwrap(azimuth))
+
+
+def _bounded(angle: F64, most: float, step_s: float) -> F64:
+    """The angle (N,) following as fast as it may, smoothed; no step is larger than most."""
+    followed = angle.copy()
+    for k in range(1, len(followed)):
+        followed[k] = followed[k - 1] + np.clip(angle[k] - followed[k - 1], -most, most)
+    # A mean of neighbours changes no faster than they do.
+    return np.asarray(ndimage.gaussian_filter1d(followed, _SMOOTH_S / step_s, mode="nearest"))

@@ -1,0 +1,133 @@
+"""A user's trajectory, TUM rows `t x y z qx qy qz qw`, as cameras in time; text only, no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
+from pbrs_farm.core.house import Geometry, House, ItemKind
+from pbrs_farm.core.mesh import triangle_corners, unit_normals
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
+from pbrs_farm.sample.walks.gaze import FirstHit
+
+MAX_ROWS: Final = 100_000
+ORIGIN: Final = "trajectory"
+_UNIT: Final = 0.01  # a quaternion's length may differ from 1 by so much
+_AXES: Final = np.concatenate([np.eye(3), -np.eye(3)])
+_BACKS: Final = 4  # of six looks along the axes: so many backs of walls mean an eye inside one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """One row: when, where, and the line of the file it stands in."""
+
+    line: int
+    time_s: float
+    world_from_camera: F64  # (4, 4), OpenGL axes
+
+
+def poses_from_tum(text: str, file: str) -> list[Pose]:
+    """The poses of the rows `t x y z qx qy qz qw`, metres and seconds; lines from # on are comments.
+
+    The world is the home's, y up; the quaternion turns camera axes x right, y down, z forward
+    (TUM's, OpenCV's) into it. Raises BadInput with the file, the row's line and the reason.
+    """
+    poses: list[Pose] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.partition("#")[0].replace(",", " ").split()
+        if not words:
+            continue
+        if len(poses) == MAX_ROWS:
+            raise BadInput(file, f"line {number}", f"more than {MAX_ROWS} rows")
+        poses.append(_pose(words, number, file))
+        if len(poses) > 1 and poses[-1].time_s <= poses[-2].time_s:
+            text = f"time {poses[-1].time_s:g} is not after {poses[-2].time_s:g} of the row before"
+            raise BadInput(file, f"line {number}", text)
+    if not poses:
+        raise BadInput(file, "", "holds no row", hint="rows are t x y z qx qy qz qw")
+    return poses
+
+
+def _pose(words: list[str], line: int, file: str) -> Pose:
+    place = f"line {line}"
+    if len(words) != 8:
+        hint = "t x y z qx qy qz qw"
+        raise BadInput(file, place, f"expected 8 numbers, got {len(words)}", hint=hint)
+    try:
+        numbers = np.array([float(word) for word in words])
+    except ValueError:
+        raise BadInput(file, place, "expected numbers") from None
+    if not np.isfinite(numbers).all():
+        name = ["t", "x", "y", "z", "qx", "qy", "qz", "qw"][
+            int(np.flatnonzero(~np.isfinite(numbers))[0])
+        ]
+        raise BadInput(file, place, f"{name} is not finite")
+    # A quaternion of length 1 is a rotation; one that was rounded is set right.
+    quaternion = numbers[4:]
+    length = float(np.linalg.norm(quaternion))
+    if abs(length - 1) > _UNIT:
+        raise BadInput(
+            file, place, f"qx qy qz qw is no rotation: its length is {length:.4g}, not 1"
+        )
+    world_from_opencv = np.eye(4)
+    world_from_opencv[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+    world_from_opencv[:3, 3] = numbers[1:4]
+    return Pose(line, float(numbers[0]), world_from_opencv @ OPENCV_FROM_OPENGL)
+
+
+def trajectory_views(
+    house: House,
+    poses: Sequence[Pose],
+    file: str,
+    fields: CameraFields,
+    geometry: Geometry,
+    first_hit: FirstHit,
+) -> tuple[View, ...]:
+    """A view for each pose, in time. Raises BadInput, naming the row, for an eye inside a wall."""
+    eyes = np.array([pose.world_from_camera[:3, 3] for pose in poses])
+    inside = np.flatnonzero(inside_walls(house, eyes, geometry, first_hit))
+    if len(inside):
+        pose = poses[int(inside[0])]
+        at = ", ".join(f"{v:.2f}" for v in pose.world_from_camera[:3, 3])
+        raise BadInput(file, f"line {pose.line}", f"the camera at {at} stands inside a wall")
+    intrinsics = Intrinsics.from_hfov(
+        fields.score_width_px, fields.score_height_px, fields.hfov_rad
+    )
+    views = []
+    for number, pose in enumerate(poses):
+        camera = Camera(intrinsics, pose.world_from_camera)
+        room = room_of(house, camera)
+        views.append(
+            View(
+                keys.frame_id(number),
+                OUTSIDE if room is None else room.id,
+                sector_of(camera, fields.n_sectors),
+                camera,
+                ORIGIN,
+                frame=number,
+                time_s=pose.time_s,
+            )
+        )
+    return tuple(views)
+
+
+def inside_walls(house: House, eyes: F64, geometry: Geometry, first_hit: FirstHit) -> Bools:
+    """(N,) whether an eye (N, 3) is inside a wall: most looks along the axes meet a wall's back."""
+    if not len(geometry.faces):
+        return np.zeros(len(eyes), bool)
+    is_wall = np.array([False, *(item.kind is ItemKind.WALL for item in house.items)])
+    origins, axes = np.repeat(eyes, len(_AXES), axis=0), np.tile(_AXES, (len(eyes), 1))
+    _t, face = first_hit(origins, axes)
+    normals = unit_normals(triangle_corners(geometry.positions, geometry.faces[face]))
+    back = (face >= 0) & is_wall[geometry.face_item[face]] & ((normals * axes).sum(1) > 0)
+    return np.asarray(back.reshape(len(eyes), len(_AXES)).sum(1) >= _BACKS)

@@ -1,0 +1,197 @@
+"""The free space of a storey that a person walks in, and its doors, open or shut; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.core.arrays import F64, I64, Bools
+from pbrs_farm.core.house import House, Item, ItemKind, Opening, Room
+from pbrs_farm.core.surface_points import item_triangles, surface_points
+from pbrs_farm.core.walkable import (
+    CELL_M,
+    HEAD_M,
+    STEP_M,
+    WALK_M,
+    FloorGrid,
+    clearance_m,
+    connected_ways,
+)
+from pbrs_farm.sample.paper_rules import room_shape
+
+LEAST_WAY_M2: Final = 0.05  # of places for a person's middle; less is no region to walk in
+_DOOR_DEPTH_M: Final = 0.35  # from a door's middle plane to where its rooms have begun
+_DOOR_SIDE_M: Final = 0.75  # from its middle plane, where one stands before it
+_SPACING_M: Final = 0.03  # of points on surfaces: two fall into every cell that a surface crosses
+_LEAST_DOOR_M: Final = 1.6  # a lower hole is a hatch
+_NO_ROOM: Final = -1
+
+
+@dataclass(frozen=True, slots=True)
+class DoorWay:
+    """A door or archway of a storey."""
+
+    name: str
+    is_open: bool  # one way leads from its one side to the other
+
+
+@dataclass(frozen=True)
+class WalkSpace:
+    """One storey in cells of 5 cm."""
+
+    level_id: str
+    grid: FloorGrid
+    room: NDArray[np.int32]  # (H, W) index of the room in House.rooms, -1 = none
+    floor_y: F64  # (H, W) world y of the floor, NaN where there is none
+    clearance: F64  # (H, W) metres to the nearest cell where nobody can be
+    ways: NDArray[np.int32]  # (H, W) number of the connected way, 0 = none
+    doors: tuple[DoorWay, ...]
+
+    @cached_property
+    def region(self) -> Bools:
+        """(H, W) the largest connected way; empty where it is too small to walk in."""
+        sizes = np.bincount(self.ways.ravel())
+        sizes[0] = 0
+        number = int(sizes.argmax()) if len(sizes) > 1 else 0
+        if not number or sizes[number] * CELL_M**2 < LEAST_WAY_M2:
+            return np.zeros(self.grid.shape, bool)
+        return np.asarray(self.ways == number)
+
+    @property
+    def area_m2(self) -> float:
+        """Of the region."""
+        return float(self.region.sum()) * CELL_M**2
+
+
+def walk_spaces(house: House) -> tuple[WalkSpace, ...]:
+    """The storeys that have rooms, in the house's order."""
+    spaces = []
+    for level in house.levels:
+        rooms = [(k, r) for k, r in enumerate(house.rooms) if r.level_id == level.id]
+        rooms = [(k, r) for k, r in rooms if not shapely.is_empty(room_shape(r))]
+        if rooms:
+            openings = [o for o in house.openings if o.level_id == level.id]
+            spaces.append(_walk_space(house, level.id, rooms, openings))
+    return tuple(spaces)
+
+
+def _walk_space(
+    house: House, level_id: str, rooms: list[tuple[int, Room]], openings: list[Opening]
+) -> WalkSpace:
+    # Lay the grid over the storey; a place in two rooms belongs to the smaller.
+    x0, z0, x1, z1 = shapely.total_bounds([room_shape(r) for _k, r in rooms])
+    grid = FloorGrid.over(float(x0), float(z0), float(x1), float(z1))
+    xx, zz = grid.middles
+    room = np.full(grid.shape, _NO_ROOM, np.int32)
+    floor_y = np.full(grid.shape, np.nan)
+    for k, one in sorted(rooms, key=lambda pair: -shapely.area(room_shape(pair[1]))):
+        inside = shapely.contains_xy(room_shape(one), xx, zz)
+        room[inside], floor_y[inside] = k, one.floor_y
+    # Carry the floors through the holes of doors, whose walls belong to no room.
+    doors = [o for o in openings if _is_door(o)]
+    strips = np.zeros(grid.shape, bool)
+    for door in doors:
+        strips |= _strip(grid, door)
+    strips &= room == _NO_ROOM
+    _, nearest = ndimage.distance_transform_edt(room == _NO_ROOM, return_indices=True)
+    floor_y[strips] = floor_y[tuple(nearest)][strips]
+    # Mark where something stands between a step and a head, and where there is a floor.
+    occupied, has_floor = _marks(house, grid, floor_y)
+    free = np.isfinite(floor_y) & ~occupied & (has_floor | strips)
+    ways = connected_ways(free)
+    return WalkSpace(
+        level_id, grid, room, floor_y, clearance_m(free), ways,
+        tuple(DoorWay(_name(house, door), _joins(grid, ways, door)) for door in doors),
+    )  # fmt: skip
+
+
+def _marks(house: House, grid: FloorGrid, floor_y: F64) -> tuple[Bools, Bools]:
+    """(H, W) cells where something is between a step and a head; cells that have a floor."""
+    occupied, floor = np.zeros(grid.shape, bool), np.zeros(grid.shape, bool)
+    levels = floor_y[np.isfinite(floor_y)]
+    low, high = float(levels.min()) - STEP_M, float(levels.max()) + HEAD_M
+    for item in house.items:
+        points = _points_between(item, low, high)
+        cells = grid.cells(points[:, [0, 2]])
+        inside = grid.holds(cells)
+        cells, y = cells[inside], points[inside, 1]
+        # Heights count from each cell's own floor.
+        with np.errstate(invalid="ignore"):
+            above = y - floor_y[tuple(cells.T)]
+            body, ground = (above > STEP_M) & (above < HEAD_M), np.abs(above) <= STEP_M
+        occupied[tuple(cells[body].T)] = True
+        floor[tuple(cells[ground].T)] = True
+    # Close cracks between floors that abut.
+    return occupied, np.asarray(
+        ndimage.binary_closing(np.pad(floor, 2), np.ones((3, 3), bool))[2:-2, 2:-2]
+    )
+
+
+def _points_between(item: Item, low: float, high: float) -> F64:
+    corners = item_triangles(item)
+    y = corners[:, :, 1]
+    corners = corners[(y.max(1) >= low) & (y.min(1) <= high)]
+    return surface_points(corners, _SPACING_M)
+
+
+def _is_door(opening: Opening) -> bool:
+    quad = np.asarray(opening.quad)
+    is_upright = np.isfinite(quad).all() and abs(float(opening.normal[1])) < 0.5
+    is_high = float(np.ptp(quad[:, 1])) >= _LEAST_DOOR_M
+    return bool(not opening.is_window and is_upright and is_high)
+
+
+def _frame(door: Opening) -> tuple[F64, F64, float]:
+    """The hole's middle and the unit normal across the wall, in plan, and half its width."""
+    normal = np.asarray(door.normal)[[0, 2]] / np.linalg.norm(np.asarray(door.normal)[[0, 2]])
+    plan = np.asarray(door.quad)[:, [0, 2]]
+    middle = (plan.min(0) + plan.max(0)) / 2
+    along = (plan - middle) @ np.array([normal[1], -normal[0]])
+    return middle, normal, float(np.abs(along).max())
+
+
+def _strip(grid: FloorGrid, door: Opening) -> Bools:
+    """(H, W) the cells of the hole through the wall."""
+    middle, normal, half = _frame(door)
+    xx, zz = grid.middles
+    dx, dz = xx - middle[0], zz - middle[1]
+    across, along = dx * normal[0] + dz * normal[1], dx * normal[1] - dz * normal[0]
+    return np.asarray((np.abs(across) <= _DOOR_DEPTH_M) & (np.abs(along) <= half))
+
+
+def _joins(grid: FloorGrid, ways: NDArray[np.int32], door: Opening) -> bool:
+    """Whether one way passes through the hole: it reaches both sides and the middle plane."""
+    middle, normal, half = _frame(door)
+    reached = [_ways_near(grid, ways, middle, CELL_M + half - WALK_M / 2)]
+    reached += [
+        _ways_near(grid, ways, middle + s * normal * _DOOR_SIDE_M, WALK_M / 2) for s in (-1, 1)
+    ]
+    return bool(set.intersection(*reached))
+
+
+def _ways_near(grid: FloorGrid, ways: NDArray[np.int32], place: F64, reach_m: float) -> set[int]:
+    cell: I64 = grid.cells(place[None])[0]
+    r = max(int(np.ceil(reach_m / CELL_M)), 1)
+    rows, columns = (slice(max(int(c) - r, 0), max(int(c) + r + 1, 0)) for c in cell)
+    return {int(way) for way in np.unique(ways[rows, columns])} - {0}
+
+
+def _name(house: House, door: Opening) -> str:
+    item = next((i for i in house.items if i.id == door.item_id), None)
+    return f"{item.name} ({item.id})" if item is not None and item.name != item.id else door.id
+
+
+def shut_doors(space: WalkSpace) -> list[str]:
+    """The names of the storey's doors that no way passes."""
+    return [door.name for door in space.doors if not door.is_open]
+
+
+def is_door_item(item: Item) -> bool:
+    """Whether an item is a door or window: nothing that a person looks at."""
+    return item.kind in (ItemKind.DOOR, ItemKind.WINDOW)

@@ -1,0 +1,125 @@
+"""Where the surfaces of one view lie in another: flow, disparity, and what is hidden there.
+
+No effects of its own: rays are cast by the function that it is given. Nothing in a home moves, so that a
+surface point stays where it is and all motion is the camera's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, F64, I32, Bools, HitRecord
+from pbrs_farm.core.camera import Camera
+
+FirstHit = Callable[[F64, F64], tuple[F32, I32]]
+"""Origins and directions (N, 3) -> distance in lengths of the direction, and face (-1 = nothing)."""
+
+SEEN: Final = 0
+OUTSIDE: Final = 128  # outside the other picture, or behind the other camera
+HIDDEN: Final = 255  # behind another surface
+
+KITTI_FLOW_STEP: Final = 64  # steps a pixel, 2**15 is no motion
+KITTI_DISPARITY_STEP: Final = 256
+_MOST_PX: Final = 2.0**15  # of flow: 16-bit floats end at twice that
+_NEAREST_M: Final = 1e-3  # to the other camera's plane
+_SLACK: Final = 1e-4  # of the distance, and metres: how far before a point a ray may end
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Correspondence:
+    """Where each pixel's surface point lies in another picture."""
+
+    flow: F64  # (H, W, 2) pixels to the right and down; 0 where nothing is seen or it is behind
+    state: NDArray[np.uint8]  # (H, W) SEEN, OUTSIDE or HIDDEN; OUTSIDE where nothing is seen
+    in_front: Bools  # (H, W) the flow is defined
+
+
+def correspondence(
+    hit: HitRecord, camera: Camera, other: Camera, first_hit: FirstHit
+) -> Correspondence:
+    """The surface points of a hit record, looked for in another camera's picture."""
+    shape = hit.face.shape
+    pixels = np.flatnonzero(hit.face.ravel() >= 0)
+    # Take the points in double precision, from the ray and the depth along the axis.
+    origin, directions = camera.exact_rays()
+    depth = hit.depth_z.ravel()[pixels].astype(np.float64)
+    points = origin + depth[:, None] * directions.reshape(-1, 3)[pixels]
+    there, z = projected(points, other)
+    # Subtract the pixel's own centre.
+    rows, columns = np.divmod(pixels, shape[1])
+    front = z > _NEAREST_M
+    motion = np.where(front[:, None], there - np.stack([columns + 0.5, rows + 0.5], axis=1), 0.0)
+    # What lies in the other picture is seen where no ray ends before it.
+    inside = inside_picture(there, z, other)
+    state = np.full(len(pixels), OUTSIDE, np.uint8)
+    seen = reaches(points[inside], hit.face.ravel()[pixels][inside], other, first_hit)
+    state[inside] = np.where(seen, SEEN, HIDDEN)
+
+    flow = np.zeros((*shape, 2))
+    states = np.full(shape, OUTSIDE, np.uint8)
+    in_front = np.zeros(shape, bool)
+    flow.reshape(-1, 2)[pixels] = motion
+    states.ravel()[pixels] = state
+    in_front.ravel()[pixels] = front
+    return Correspondence(flow, states, in_front)
+
+
+def projected(points: F64, camera: Camera) -> tuple[F64, F64]:
+    """(N, 2) px of world points (N, 3), x right and y down, and (N,) their depth along the axis."""
+    local = (points - camera.eye) @ camera.world_from_camera[:3, :3]
+    z = -local[:, 2]
+    i = camera.intrinsics
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = i.cx + i.fx * local[:, 0] / z, i.cy - i.fy * local[:, 1] / z
+    return np.stack([x, y], axis=1), np.asarray(z)
+
+
+def inside_picture(px: F64, z: F64, camera: Camera) -> Bools:
+    """(N,) whether projected points (N, 2) at depths z (N,) lie before a camera and in its picture."""
+    i = camera.intrinsics
+    with np.errstate(invalid="ignore"):
+        inside = ((px >= 0) & (px < (i.width_px, i.height_px))).all(1)
+    return np.asarray((z > _NEAREST_M) & inside)
+
+
+def reaches(points: F64, faces: I32, camera: Camera, first_hit: FirstHit) -> Bools:
+    """(N,) whether a ray from the camera reaches each point, or meets the point's own face."""
+    if not len(points):
+        return np.zeros(0, bool)
+    to = points - camera.eye
+    distance = np.linalg.norm(to, axis=1)
+    t, face = first_hit(np.broadcast_to(camera.eye, to.shape), to)
+    slack = _SLACK + _SLACK / np.maximum(distance, _SLACK)
+    return np.asarray((t >= 1 - slack) | (face == faces))
+
+
+def flow_exr(found: Correspondence) -> F32:
+    """(H, W, 2) float32 for a 16-bit EXR: pixels right and down, 0 where it is not defined.
+
+    Beyond 32,768 px it is stored as that.
+    """
+    return np.clip(found.flow, -_MOST_PX, _MOST_PX).astype(np.float32)
+
+
+def flow_kitti(found: Correspondence) -> NDArray[np.uint16]:
+    """(H, W, 3) uint16 as KITTI stores flow: 64 x + 2**15, 64 y + 2**15, 1 = seen in the other picture."""
+    steps = np.rint(found.flow * KITTI_FLOW_STEP) + 2**15
+    valid = (found.state == SEEN) & ((steps >= 0) & (steps <= 65535)).all(-1)
+    steps = np.where(valid[..., None], np.clip(steps, 0, 65535), 0)
+    return np.concatenate([steps, valid[..., None]], axis=-1).astype(np.uint16)
+
+
+def disparity_png(found: Correspondence) -> NDArray[np.uint16]:
+    """(H, W) uint16 as KITTI stores disparity: 256 times the pixels by which rows are shifted.
+
+    At least 1 where a surface is, hidden in the other picture or not; 0 = nothing. Beyond 255.99
+    px it is stored as that.
+    """
+    shift = np.abs(found.flow[..., 0])
+    steps = np.clip(np.rint(shift * KITTI_DISPARITY_STEP), 1, 65535)
+    return np.where(found.in_front, steps, 0).astype(np.uint16)

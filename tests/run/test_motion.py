@@ -1,0 +1,149 @@
+"""A walk in stereo through the small home, labels alone: what a run leaves, and what verify says of it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrs_farm.check import verify
+from pbrs_farm.check.certificate import Certificate
+from pbrs_farm.core.layers import LAYER, LAYERS
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.formats.cameras_json import views_from_json
+from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
+from pbrs_farm.formats.pairs_parquet import pairs_from_parquet
+from pbrs_farm.images import array_from_png, layers_from_exr, png_from_array
+from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.plan import wanted
+from tests.check.roots import sign
+
+BETWEEN = [x.name for x in LAYERS if x.partner]
+FIELDS = {
+    "image.width_px": "96",
+    "image.height_px": "72",
+    "cameras.source": "walk",
+    "cameras.walk_frames": "4",
+    "cameras.walk_fps": "5",
+    "cameras.stereo_m": "0.065",
+}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+    out = tmp_path_factory.mktemp("out")
+    want = wanted(["opengl_dl"], BETWEEN, pairs=True)
+    return out, run_local(Run(["builtin"], str(out), recipe_from_name("preview", FIELDS), want))
+
+
+@pytest.fixture(scope="module")
+def certificate(made: tuple[Path, Summary]) -> Certificate:
+    return verify(made[0], all_pixels=True)
+
+
+def house(root: Path) -> Path:
+    return next(root.glob("houses/*"))
+
+
+def test_every_frame_has_both_pictures_and_nothing_fails(made: tuple[Path, Summary]) -> None:
+    assert made[1].failures == []
+    assert sorted(p.name for p in house(made[0]).glob("views/*")) == sorted(
+        f"frame_{k:05d}{side}" for k in range(4) for side in ("", "_right")
+    )
+
+
+def test_the_first_frame_has_no_previous_and_the_last_no_next(made: tuple[Path, Summary]) -> None:
+    for name, lacking in (("frame_00000", "backward"), ("frame_00003_right", "forward")):
+        view = house(made[0]) / "views" / name
+        there = {x.name for x in LAYERS if x.partner and (view / x.file).is_file()}
+        assert there == {n for n in BETWEEN if lacking not in n}
+
+
+def test_verify_finds_every_layer_between_views_right(certificate: Certificate) -> None:
+    assert certificate.is_clean, certificate.text()
+    for name in BETWEEN:
+        count = certificate.counts[f"motion: {name}"]
+        assert count.checked > 10_000
+        assert count.ties <= 1e-3 * count.checked
+
+
+def test_the_cameras_keep_frame_and_time_and_the_view_names_its_partners(
+    made: tuple[Path, Summary],
+) -> None:
+    file = house(made[0]) / "cameras.json"
+    views = views_from_json(file.read_bytes(), "cameras.json")
+    assert (views["frame_00002"].frame, views["frame_00002"].time_s) == (2, 0.4)
+    table = json.loads((house(made[0]) / "views/frame_00002/view.json").read_text())
+    assert table["frame"] == 2
+    assert {k: v["view"] for k, v in table["partners"].items()} == {
+        "next": "frame_00003",
+        "previous": "frame_00001",
+        "stereo": "frame_00002_right",
+    }
+
+
+def test_flow_there_and_back_cancels_where_both_frames_see_a_point(
+    made: tuple[Path, Summary],
+) -> None:
+    def layer(frame: int, name: str) -> np.ndarray:
+        file = house(made[0]) / f"views/frame_{frame:05d}" / LAYER[name].file
+        return layer_from_bytes(name, file.read_bytes(), name)
+
+    there, back = layer(1, "flow_forward"), layer(2, "flow_backward")
+    seen = layer(1, "occlusion_forward") == 0
+    rows, columns = np.nonzero(seen)
+    x, y = columns + 0.5 + there[seen][:, 0], rows + 0.5 + there[seen][:, 1]
+    returned = back[np.floor(y).astype(int), np.floor(x).astype(int)] + there[seen]
+    # Neighbouring pixels differ at edges: nine of ten cancel.
+    assert np.quantile(np.abs(returned).max(1), 0.9) < 0.5
+
+
+def test_pairs_are_those_of_each_room_and_a_stereo_pair_shares_nearly_all(
+    made: tuple[Path, Summary],
+) -> None:
+    rows = pairs_from_parquet((house(made[0]) / "pairs.parquet").read_bytes(), "pairs.parquet")
+    assert len(rows) == 8 * 7 / 2
+    stereo = next(
+        r for r in rows if (r["view_a"], r["view_b"]) == ("frame_00000", "frame_00000_right")
+    )
+    assert stereo["common"] > 0.8
+    assert stereo["baseline_m"] == pytest.approx(0.065)
+
+
+def _flow_moved(view: Path) -> None:
+    file = view / "flow_forward.exr"
+    planes = layers_from_exr(file.read_bytes())
+    flow = np.stack([planes["X"] + 0.1, planes["Y"]], axis=-1)
+    file.write_bytes(layer_bytes("flow_forward", flow))
+
+
+def _hidden_swapped(view: Path) -> None:
+    file = view / "occlusion_forward.png"
+    file.write_bytes(png_from_array(np.zeros_like(array_from_png(file.read_bytes()))))
+
+
+def _disparity_doubled(view: Path) -> None:
+    file = view / "disparity.png"
+    file.write_bytes(png_from_array(array_from_png(file.read_bytes()) * np.uint16(2)))
+
+
+@pytest.mark.parametrize(
+    ("damage", "check"),
+    [
+        (_flow_moved, "motion: flow_forward"),
+        (_hidden_swapped, "motion: occlusion_forward"),
+        (_disparity_doubled, "motion: disparity"),
+    ],
+)
+def test_verify_finds_damage_to_a_layer_between_views(
+    damage, check: str, made: tuple[Path, Summary], tmp_path: Path
+) -> None:
+    root = tmp_path / "root"
+    shutil.copytree(made[0], root)
+    damage(house(root) / "views/frame_00001")
+    sign(root, house(root))
+    counts = verify(root, all_pixels=True).counts
+    assert counts[check].failed > 500

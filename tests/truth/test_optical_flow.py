@@ -1,0 +1,159 @@
+"""Flow, disparity, occlusion and common surface of squares whose answers are known in closed form."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.house import Geometry
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.sample.stereo_views import with_right_views
+from pbrs_farm.truth.common_surface import pair_rows
+from pbrs_farm.truth.optical_flow import (
+    HIDDEN,
+    OUTSIDE,
+    SEEN,
+    correspondence,
+    disparity_png,
+    flow_kitti,
+)
+from pbrs_farm.truth.partners import partners_of
+
+WIDTH, HEIGHT, F = 64, 48, 40.0
+INTRINSICS = Intrinsics(WIDTH, HEIGHT, F, F, WIDTH / 2, HEIGHT / 2)
+LEVEL = np.array([0.0, 0.0, -1.0])
+
+
+def squares(*rows: tuple[float, float, float, float]) -> Caster:
+    """Squares across the axis of a camera at the origin: half edge, x and y of the middle, distance."""
+    positions, faces = [], []
+    for k, (half, x, y, z) in enumerate(rows):
+        corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+        positions += [(x + half * a, y + half * b, -z) for a, b in corners]
+        faces += [(4 * k, 4 * k + 1, 4 * k + 2), (4 * k, 4 * k + 2, 4 * k + 3)]
+    n, f = len(positions), len(faces)
+    return Caster(
+        Geometry(
+            np.array(positions, np.float32), np.zeros((n, 3), np.float32),
+            np.zeros((n, 2), np.float32), np.array(faces, np.int32),
+            np.repeat(np.arange(1, f // 2 + 1), 2).astype(np.uint32),
+            np.zeros(f, np.int32), np.zeros(f, np.int32),
+        )
+    )  # fmt: skip
+
+
+def at(x: float, y: float = 0.0, z: float = 0.0, yaw: float = 0.0) -> Camera:
+    towards = np.array([math.sin(yaw), 0.0, -math.cos(yaw)])
+    return Camera.look(INTRINSICS, np.array([x, y, z]), towards)
+
+
+def matched(caster: Caster, a: Camera, b: Camera):
+    return correspondence(caster.hit_record(a), a, b, caster.first_hit)
+
+
+def test_a_wall_flows_by_focal_length_times_move_over_depth() -> None:
+    found = matched(squares((9, 0, 0, 2)), at(0), at(0.1, 0.05))
+    np.testing.assert_allclose(found.flow[..., 0], -F * 0.1 / 2, atol=1e-4)
+    np.testing.assert_allclose(found.flow[..., 1], F * 0.05 / 2, atol=1e-4)
+
+
+def test_a_camera_that_stands_still_sees_everything_where_it_was() -> None:
+    found = matched(squares((0.4, 0, 0, 1), (9, 0, 0, 3)), at(0), at(0))
+    assert (found.state == SEEN).all()
+    assert np.abs(found.flow).max() < 1e-4
+
+
+def test_what_leaves_the_picture_is_outside_and_no_more() -> None:
+    found = matched(squares((9, 0, 0, 2)), at(0), at(0.2))
+    # It moves 4 px to the left.
+    assert (found.state[:, :4] == OUTSIDE).all()
+    assert (found.state[:, 4:] == SEEN).all()
+
+
+def test_a_wall_behind_a_square_is_hidden_by_the_parallax_between_them() -> None:
+    # The square spans 20 px; it moves 8 px, the wall 2 px, so 6 columns of wall are newly hidden.
+    caster = squares((0.25, 0, 0, 1), (9, 0, 0, 4))
+    found = matched(caster, at(0), at(0.2))
+    rows = found.state[HEIGHT // 2]
+    hit = caster.hit_record(at(0)).item[HEIGHT // 2]
+    assert (rows == HIDDEN).sum() == 6
+    assert (hit[rows == HIDDEN] == 2).all()
+    # Those columns lie to the left of the square, where it moves to.
+    assert np.flatnonzero(rows == HIDDEN).max() < np.flatnonzero(hit == 1).min()
+
+
+def test_what_is_behind_the_other_camera_is_outside_with_no_flow() -> None:
+    found = matched(squares((0.5, 0, 0, 1)), at(0), at(0, z=-2))
+    assert (found.state == OUTSIDE).all()
+    assert not found.flow.any()
+
+
+def test_kittis_flow_is_in_64ths_of_a_pixel_and_valid_where_seen() -> None:
+    found = matched(squares((9, 0, 0, 2)), at(0), at(0.1))
+    png = flow_kitti(found)
+    seen = found.state == SEEN
+    assert (png[seen] == (2**15 - 128, 2**15, 1)).all()
+    assert not png[~seen].any()
+
+
+def test_disparity_is_256ths_of_focal_length_times_baseline_over_depth() -> None:
+    found = matched(squares((9, 0, 0, 2)), at(0), at(0.065))
+    assert (disparity_png(found) == round(256 * F * 0.065 / 2)).all()
+    nothing = matched(squares((0.1, 0, 0, 2)), at(0), at(0.065))
+    assert disparity_png(nothing)[0, 0] == 0
+
+
+def views() -> dict[str, View]:
+    frames = [
+        View(f"frame_{k:05d}", "0_0", 0, at(0.1 * k), "walk", frame=k, time_s=k / 10)
+        for k in range(3)
+    ]
+    return {v.id: v for v in with_right_views(frames, 0.065)}
+
+
+def test_right_views_stand_a_baseline_to_the_right_and_keep_their_frame() -> None:
+    pair = views()
+    right = pair["frame_00001_right"]
+    assert (right.frame, right.left_id) == (1, "frame_00001")
+    np.testing.assert_allclose(right.camera.eye, [0.165, 0, 0], atol=1e-12)
+    assert len(with_right_views([replace(right, left_id="")], 0.0)) == 1
+
+
+def test_each_view_knows_its_neighbours_in_time_and_the_other_of_its_pair() -> None:
+    every = views()
+    middle = partners_of(every["frame_00001"], every)
+    assert {r: v.id for r, v in middle.items()} == {
+        "next": "frame_00002",
+        "previous": "frame_00000",
+        "stereo": "frame_00001_right",
+    }
+    right = partners_of(every["frame_00000_right"], every)
+    assert {r: v.id for r, v in right.items()} == {
+        "next": "frame_00001_right",
+        "stereo": "frame_00000",
+    }
+
+
+def test_a_view_alone_has_no_partner() -> None:
+    alone = View("0_0_1", "0_0", 1, at(0))
+    assert partners_of(alone, {alone.id: alone}) == {}
+
+
+def test_pairs_share_all_half_or_none_of_a_wall() -> None:
+    # At 2 m the picture is 3.2 m wide: a move by 1.6 m leaves half of it in common.
+    caster = squares((9, 0, 0, 2))
+    cameras = {"a": at(0), "b": at(1.6), "c": at(0, yaw=math.pi)}
+    rows = pair_rows([View(k, "0_0", 0, c) for k, c in cameras.items()], caster.first_hit)
+    share = {(r.view_a, r.view_b): r for r in rows}
+    assert len(rows) == 3
+    assert share["a", "b"].common == pytest.approx(0.5, abs=0.04)
+    assert share["a", "b"].baseline_m == pytest.approx(1.6)
+    assert share["a", "c"].common == 0
+    assert share["a", "c"].angle_deg == pytest.approx(180)
+
+
+def test_views_of_different_rooms_are_no_pair() -> None:
+    both = [View("a", "0_0", 0, at(0)), View("b", "0_1", 0, at(0))]
+    assert pair_rows(both, squares((9, 0, 0, 2)).first_hit) == []
