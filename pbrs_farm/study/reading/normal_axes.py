@@ -35,15 +35,12 @@ def decoded_normal(
     stored: NDArray[np.uint16], valid: NDArray[np.bool_], axes: str
 ) -> NDArray[np.float32]:
     """(H, W, 3) float32 normals in the axes of that name, of unit length within 3e-5; 0 if not valid."""
-    published = stored.astype(np.float32)
-    published *= np.float32(2 / 65535)
-    published -= np.float32(1)
-    normal = published
-    if axes != "published":
-        # Each published channel becomes an axis, turned round where the sign says.
-        normal = np.empty_like(published)
-        for axis, (channel, sign) in enumerate(AXES[axes]):
-            np.multiply(published[..., channel], np.float32(sign), out=normal[..., axis])
+    normal = np.empty(stored.shape, np.float32)
+    # Each published channel becomes an axis, turned round where the sign says.
+    for axis, (channel, sign) in enumerate(AXES[axes]):
+        own = normal[..., axis]
+        np.multiply(stored[..., channel], np.float32(sign * 2 / 65535), out=own)
+        own -= np.float32(sign)
     if not valid.all():
         normal[~valid] = 0
     return normal

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -20,6 +21,8 @@ _CHANNELS: Final = {0: 1, 2: 3}  # PNG's colour type: grey, RGB
 _NONE, _UP = 0, 2  # filters
 _LEVEL: Final = 6  # of zlib
 _MAX_PIXELS: Final = 16384 * 16384
+_STRIP_BYTES: Final = 100_000
+_DAMAGED: Final = "cannot be read as a picture: damaged or truncated"
 
 
 def png_of_rows(array: NDArray[np.uint8]) -> bytes:
@@ -47,21 +50,28 @@ def array_of_rows(png: bytes, place: str) -> NDArray[Any] | None:
     width, height, bits, kind, interlaced, data = _parsed(png, place)
     if bits not in (8, 16) or kind not in _CHANNELS or interlaced:
         return None
-    n_row = width * _CHANNELS[kind] * bits // 8
-    lines = np.frombuffer(_inflated(data, height * (n_row + 1), place), np.uint8)
-    lines = lines.reshape(height, n_row + 1)
-    # Look at the filters: rows that take their left neighbour are left to others.
-    filters = lines[:, 0]
-    is_up = filters == _UP
-    if not (is_up | (filters == _NONE)).all():
-        return None
-    # Add each row to the one above it, where it is a difference.
-    rows = np.empty((height, n_row), np.uint8)
-    above = np.zeros(n_row, np.uint8)
-    for differs, row, line in zip(is_up.tolist(), rows, lines[:, 1:], strict=True):
-        above = np.add(above if differs else 0, line, out=row)
-    pixels = rows if bits == 8 else rows.view(">u2").astype(np.uint16)
-    return pixels.reshape((height, width) if kind == 0 else (height, width, 3))
+    dtype = np.dtype(np.uint8 if bits == 8 else ">u2")
+    shape = (height, width) if kind == 0 else (height, width, 3)
+    pixels = np.empty(shape, dtype.newbyteorder("="))
+    table = pixels.reshape(height, -1)
+    # Undo some rows at a time: they stay in the processor's cache.
+    n_row = table.shape[1] * dtype.itemsize
+    n_strip = max(_STRIP_BYTES // (n_row + 1), 1)
+    rows = np.zeros((n_strip + 1, n_row), np.uint8)  # the first is the last of the strip above
+    first = 0
+    for lines in _inflated(data, height, n_row + 1, n_strip, place):
+        # Look at the filters: rows that take their left neighbour are left to others.
+        filters = lines[:, 0]
+        is_up = filters == _UP
+        if not (is_up | (filters == _NONE)).all():
+            return None
+        # Add each row to the one above it, where it is a difference.
+        for differs, above, line, row in zip(is_up.tolist(), rows, lines[:, 1:], rows[1:]):
+            np.add(above if differs else 0, line, out=row)
+        n = len(lines)
+        table[first : first + n] = rows[1 : n + 1].view(dtype)
+        rows[0], first = rows[n], first + n
+    return pixels
 
 
 def _chunk(name: bytes, data: bytes) -> bytes:
@@ -86,16 +96,28 @@ def _parsed(png: bytes, place: str) -> tuple[int, int, int, int, int, bytes]:
         at = end
         if name == b"IEND" and end <= len(png):
             return width, height, bits, kind, interlaced, b"".join(parts)
-    raise BadInput(place, "", "cannot be read as a picture: damaged or truncated")
+    raise BadInput(place, "", _DAMAGED)
 
 
-def _inflated(data: bytes, n_bytes: int, place: str) -> bytes:
-    # Ask for one byte more than there may be, so that a bomb stays small.
+def _inflated(
+    data: bytes, n_lines: int, n_line: int, n_strip: int, place: str
+) -> Iterator[NDArray[np.uint8]]:
+    """(n_strip, n_line) bytes one after the other, the last with what is left of n_lines."""
     inflate = zlib.decompressobj()
+    for first in range(0, n_lines, n_strip):
+        n = min(n_strip, n_lines - first)
+        yield np.frombuffer(_some(inflate, data, n * n_line, place), np.uint8).reshape(n, n_line)
+        data = inflate.unconsumed_tail
+    # Ask for one byte more than there may be, so that a bomb stays small.
+    if _some(inflate, data, 1, place, may_lack=True) or not inflate.eof:
+        raise BadInput(place, "", _DAMAGED)
+
+
+def _some(inflate: Any, data: bytes, n_bytes: int, place: str, *, may_lack: bool = False) -> bytes:
     try:
-        raw = inflate.decompress(data, n_bytes + 1)
+        raw: bytes = inflate.decompress(data, n_bytes)
     except zlib.error:
-        raw = b""
-    if len(raw) != n_bytes or not inflate.eof:
-        raise BadInput(place, "", "cannot be read as a picture: damaged or truncated")
+        raise BadInput(place, "", _DAMAGED) from None
+    if len(raw) != n_bytes and not may_lack:
+        raise BadInput(place, "", _DAMAGED)
     return raw
