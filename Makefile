@@ -47,12 +47,17 @@ test-sweethome3d: setup ## the real program opens ten made homes and saves them:
 	@$(BIN)/pbrs-farm homes --fetch --furniture >/dev/null
 	$(BIN)/pytest -m sweethome3d tests/sweethome3d
 
+define study-packages
+$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check "torch==2.13.0"; \
+$(BIN)/pip install -q --disable-pip-version-check -e ".[study,study-peers]"
+endef
+
 test-study: setup ## the study's tests that need torch; installs its CPU build (192 MB) the first time
-	@$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check "torch==2.13.0"
-	@$(BIN)/pip install -q --disable-pip-version-check -e ".[study]"
+	@$(study-packages)
 	$(BIN)/pytest -m "study and not slow and not gpu"
 
 bench: setup ## measure everything but house, dress, made, light, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
+	@$(if $(filter study lived_in,$(NAME)),$(study-packages))
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## light transport: path, metropolis, denoiser

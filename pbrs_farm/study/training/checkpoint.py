@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.training.tensor_file import read_tensor_file, write_tensor_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,12 +72,11 @@ def load_checkpoint(
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], Position]:
     """All tensors of a file, on the CPU, and the position it holds."""
     try:
-        with safe_open(path, framework="pt", device="cpu") as file:
-            row = json.loads((file.metadata() or {})["position"])
-            return {name: file.get_tensor(name) for name in file.keys()}, Position(**row)  # noqa: SIM118
+        tensors, words = read_tensor_file(path)
+        return tensors, Position(**json.loads(words["position"]))
     except FileNotFoundError:
         raise BadInput(path, "", "no such file") from None
-    except (SafetensorError, OSError, KeyError, TypeError, ValueError):
+    except (OSError, KeyError, TypeError, ValueError):
         raise BadInput(path, "", "not a checkpoint of `train`, or damaged") from None
 
 
@@ -97,7 +95,4 @@ def _below(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
 
 def _write(path: Path, tensors: dict[str, Tensor], position: Position) -> None:
     row: dict[str, Any] = {name: getattr(position, name) for name in position.__slots__}
-    plain = {name: t.detach().to("cpu").contiguous() for name, t in tensors.items()}
-    beside = path.with_suffix(".part")
-    save_file(plain, beside, metadata={"position": json.dumps(row, sort_keys=True)})
-    beside.replace(path)
+    write_tensor_file(path, tensors, {"position": json.dumps(row, sort_keys=True)})

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 import torch
-from pbrs_farm.study.training.tensor_file import read_tensor_file, write_tensor_file
 from safetensors import safe_open
 from safetensors.torch import save_file
+
+from pbrs_farm.study.training.tensor_file import read_tensor_file, write_tensor_file
 
 pytestmark = pytest.mark.study
 

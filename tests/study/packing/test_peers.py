@@ -1,0 +1,72 @@
+"""What other people's libraries make of our files and figures: webdataset, torchmetrics, pycocotools."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from pbrs_farm.export.run_lengths import compressed_runs
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.metrics.confusion import Confusion
+from pbrs_farm.study.packing.pack_shards import pack
+from pbrs_farm.study.packing.packing_plan import Packing
+from pbrs_farm.study.reading.open_views import open_views
+from pbrs_farm.study.reading.view_sample import LAYERS
+from tests.study.small_roots import MODES, arrays_of_view, fill
+
+pytestmark = pytest.mark.study
+
+
+def test_webdataset_reads_every_view_with_all_its_bits(tmp_path: Path) -> None:
+    import webdataset
+
+    fill(FolderStore(tmp_path / "root"), {"home-0-00000000": 3, "home-1-00000000": 2})
+    packing = Packing(layers=LAYERS, modes=MODES, views_per_shard=4)
+    pack(open_views(tmp_path / "root"), tmp_path / "shards", packing)
+    tars = [str(tar) for tar in sorted((tmp_path / "shards").glob("*.tar"))]
+    assert len(tars) == 2
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of its own making
+        read = list(webdataset.WebDataset(tars, shardshuffle=False).decode("rgb8"))
+    assert len(read) == 5
+    for sample in read:
+        house, _, view = sample["__key__"].partition("__")
+        stored = arrays_of_view(1000 * int(house.split("-")[1]) + int(view[-1]))
+        assert sample["json"]["house"] == house
+        for mode in MODES:
+            assert np.array_equal(sample[f"{mode}.png"], stored[f"{mode}.png"])
+        # Labels of 16 bits come as they were stored, which its picture decoders would not do.
+        for part, name in (("normal", "normal"), ("depth", "depth"), ("instance", "instance")):
+            array = sample[f"{part}.npz"][name]
+            assert array.dtype == np.uint16
+            assert np.array_equal(array, stored[f"{name}.png"])
+        assert np.array_equal(sample["normal.npz"]["valid"], stored["valid.png"])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mean_iou_is_that_of_torchmetrics(seed: int) -> None:
+    from torchmetrics.classification import MulticlassJaccardIndex
+
+    dice = np.random.default_rng(seed)
+    truth, predicted = dice.integers(0, 41, (60, 80)), dice.integers(1, 41, (60, 80))
+    ours = Confusion(40)
+    ours.add(predicted, truth)
+    theirs = MulticlassJaccardIndex(40, ignore_index=-1)
+    value = theirs(torch.from_numpy(predicted - 1), torch.from_numpy(truth - 1))
+    assert ours.score().mean_iou == pytest.approx(float(value), abs=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:__array__ implementation")  # of its own, by numpy 2
+@pytest.mark.parametrize("seed", range(4))
+def test_pycocotools_reads_compressed_runs(seed: int) -> None:
+    from pycocotools import mask as coco
+
+    dice = np.random.default_rng(seed)
+    mask = dice.random((37, 53)) < (0.02, 0.3, 0.7, 1)[seed]
+    row = compressed_runs(mask)
+    assert np.array_equal(coco.decode(row).astype(bool), mask)
+    assert coco.encode(np.asfortranarray(mask.astype(np.uint8)))["counts"].decode() == row["counts"]
