@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -230,9 +230,10 @@ class NyuMat:
     def __len__(self) -> int:
         return int(self._depths.shape[0])
 
-    def photos(self) -> Iterator[Photo]:
-        """The photographs in order, ids from 0001; one at a time in memory."""
-        for k in range(len(self)):
+    def photos(self, numbers: Collection[int] | None = None) -> Iterator[Photo]:
+        """The photographs in order, ids from 0001; one at a time in memory. numbers: those alone, from 1."""
+        chosen = range(1, len(self) + 1) if numbers is None else sorted(numbers)
+        for k in (number - 1 for number in chosen if number <= len(self)):
             place = f"image {k + 1}"
             try:
                 # Turn MATLAB's (channel, column, row) round.

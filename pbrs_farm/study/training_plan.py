@@ -63,21 +63,32 @@ class Plan:
     threads: int = 0  # of torch, 0 = its own choice
     bf16: bool = False  # the forward pass in bfloat16
     channels_last: bool = True
+    memory_gb: float = 4.0  # training views that take more are read anew for each step
+    workers: int = 0  # processes that read them then
     # Records
     checkpoint_every: int = 100  # steps
     log_every: int = 10
+    judge_every: int = 0  # steps between two errors on training and held-out views, 0 = none
+    judge_views: int = 32  # views of each, for the curve
+    final_views: int = 400  # views of each, for the figures at the end; spread over all
 
     def __post_init__(self) -> None:
         for name, least in (("batch", 1), ("steps", 1), ("enlarge", 1), ("accumulate", 1), ("width_px", 32),
                             ("height_px", 32), ("zoom", 1), ("checkpoint_every", 1),
-                            ("log_every", 1), ("rate_every", 1)):  # fmt: skip
+                            ("log_every", 1), ("rate_every", 1), ("workers", 0), ("judge_every", 0),
+                            ("judge_views", 1), ("final_views", 1)):  # fmt: skip
             if getattr(self, name) < least:
                 raise BadInput("plan", name, f"expected {least} or more, got {getattr(self, name)}")
+        if self.memory_gb < 0:
+            raise BadInput("plan", "memory_gb", f"expected 0 or more, got {self.memory_gb}")
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:
                 text = f"expected one of {', '.join(choices)}, got {getattr(self, name)}"
                 raise BadInput("plan", name, text)
 
+
+# Fields that change neither weights nor figures: a run may go on with others.
+_FREE: Final = ("workers", "memory_gb", "log_every", "judge_every", "judge_views")
 
 _CHOICES: Final = {
     "task": TASKS,
@@ -90,35 +101,42 @@ _CHOICES: Final = {
 }
 
 _PLAIN: Final[dict[str, Any]] = {"gain": 0.0, "gamma": 0.0, "tint": 0.0, "noise": 0.0}
+# Lines are matched pixel by pixel, which takes long: few views judge.
+_EDGE_JUDGING: Final[dict[str, Any]] = {"judge_views": 8, "final_views": 60}
 _QVGA: Final[dict[str, Any]] = {"width_px": 320, "height_px": 240}
 # Section 4.1: RMSprop from 1e-3, halved every 300 k steps; batch and length as the code has them.
 _PAPER_NORMALS = Plan(
     "paper", "normals", "paper", **_QVGA, **_PLAIN, batch=10, steps=1_137_000,
     optimiser="rmsprop", rate=1e-3, weight_decay=0.0, clip_norm=0.0, schedule="steps",
-    loss_over="all", flip=False, checkpoint_every=2000, log_every=100,
+    loss_over="all", flip=False, checkpoint_every=2000, log_every=100, judge_every=20_000,
+    final_views=2000,
 )  # fmt: skip
 # Section 4.2: SGD at 1e-5; the front end of Yu and Koltun with batch 14, momentum .9.
 _PAPER_CLASSES = Plan(
     "paper", "segmentation", "dilated", **_QVGA, **_PLAIN, batch=14, steps=60_000,
     optimiser="sgd", rate=1e-5, weight_decay=5e-4, clip_norm=0.0, schedule="constant",
-    encoding="caffe", checkpoint_every=1000, log_every=50,
+    encoding="caffe", checkpoint_every=1000, log_every=50, judge_every=2000, final_views=2000,
 )  # fmt: skip
 # Section 4.3 with HED's released solver: batch 1 x 10, decay 2e-4, rates by layer.
 _PAPER_EDGES = Plan(
     "paper", "boundaries", "hed", **_QVGA, **_PLAIN, batch=1, accumulate=10, steps=300_000,
     optimiser="sgd", rate=1e-6, weight_decay=2e-4, clip_norm=0.0, schedule="steps",
     rate_factor=0.1, released_rates=True, edge_sum=True, encoding="caffe",
-    checkpoint_every=2000, log_every=100,
+    checkpoint_every=2000, log_every=100, judge_every=20_000, **_EDGE_JUDGING,
 )  # fmt: skip
 _H200: Final[dict[str, Any]] = {
     "name": "h200", "device": "cuda", "bf16": True, "checkpoint_every": 1000, "log_every": 100,
+    "judge_every": 1000, "memory_gb": 32.0, "workers": 8,
 }  # fmt: skip
 # Chord and strong changes of light were the better ones of seven short trials (docs/study.md).
-_TINY_NORMALS = Plan("tiny", "normals", "small", loss="chord", gain=0.4, gamma=0.4, tint=0.15)
-_TINY_CLASSES = Plan("tiny", "segmentation", "small", steps=1500)
-_TINY_EDGES = Plan(
-    "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01
+_TINY_NORMALS = Plan(
+    "tiny", "normals", "small", loss="chord", gain=0.4, gamma=0.4, tint=0.15, judge_every=110
 )
+_TINY_CLASSES = Plan("tiny", "segmentation", "small", steps=1500, judge_every=150)
+_TINY_EDGES = Plan(
+    "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01,
+    judge_every=200, **_EDGE_JUDGING,
+)  # fmt: skip
 
 PLANS: Final[dict[tuple[str, str], Plan]] = {
     (plan.name, plan.task): plan
@@ -174,6 +192,11 @@ def _value(kind: type, field: str, text: str) -> Any:
 def plan_as_json(plan: Plan) -> dict[str, Any]:
     """Every field by its name."""
     return asdict(plan)
+
+
+def plan_as_trained(plan: Plan) -> dict[str, Any]:
+    """Every field that weights or figures depend on: what a run that goes on must share."""
+    return {name: value for name, value in asdict(plan).items() if name not in _FREE}
 
 
 def plan_from_json(row: dict[str, Any], file: str) -> Plan:

@@ -18,6 +18,7 @@ from pbrs_farm.study.judging.paper_numbers import paper_row
 from pbrs_farm.study.judging.photo_views import JudgedViews
 from pbrs_farm.study.tasks.task_choice import task_of
 from pbrs_farm.study.training.training_job import Job, train
+from pbrs_farm.study.training.training_views import TrainingViews
 from pbrs_farm.study.training.view_arrays import ViewArrays
 from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views
 from pbrs_farm.study.training_plan import Plan
@@ -43,6 +44,7 @@ class Comparison:
     out: Path
     n_seeds: int = 3
     equal_views: bool = True
+    exact: bool = False  # boundaries at 99 thresholds
 
 
 def compare(
@@ -74,14 +76,14 @@ def compare(
 
 
 def _one(
-    comparison: Comparison, each: TrainingSet, views: ViewArrays, held_out: ViewArrays | None,
+    comparison: Comparison, each: TrainingSet, views: TrainingViews, held_out: ViewArrays | None,
     judged_on: Sequence[JudgedViews], seed: int,
 ) -> dict[str, Any]:  # fmt: skip
     out = comparison.out / each.name / f"seed{seed}"
     source = each.source
     job = Job(comparison.plan, out, seed, source.modes[0], source.name)
     figures = train(job, views, held_out)
-    run = open_run(out)
+    run = open_run(out, exact=comparison.exact)
     others = {on.name: evaluate(run, on) for on in judged_on}
     return {
         **figures,
@@ -170,6 +172,9 @@ def training_sets(
         label, equals, rest = word.partition("=")
         label, rest = (label, rest) if equals else ("", word)
         places, _, mode = rest.partition("@")
+        if places.endswith(".mat"):
+            hint = "`train TASK nyu.mat --init RUN` tunes a run on it"
+            raise BadInput("ablation", word, "photographs have none of the four lights", hint=hint)
         for one in (mode,) if mode else tuple(modes):
             name = "_".join(part for part in (label, "" if mode and label else one) if part)
             if name in sets:

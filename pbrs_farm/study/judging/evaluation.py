@@ -15,15 +15,18 @@ from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
 from pbrs_farm.study.judging.figure_table import is_underfit, markdown, shown_figure, title_of
-from pbrs_farm.study.judging.paper_numbers import paper_row
+from pbrs_farm.study.judging.paper_numbers import PaperRow, paper_row, tuned_row
 from pbrs_farm.study.judging.photo_views import JudgedViews
+from pbrs_farm.study.metrics.edge_scores import EXACT_THRESHOLDS
 from pbrs_farm.study.networks.initial_weights import has_hed, start_from
 from pbrs_farm.study.networks.network_choice import network_of
+from pbrs_farm.study.tasks.edges_task import N_THRESHOLDS, EdgesTask
 from pbrs_farm.study.tasks.study_task import Task
 from pbrs_farm.study.tasks.task_choice import task_of
 from pbrs_farm.study.training.checkpoint import load_checkpoint
 from pbrs_farm.study.training.prediction import Judged, placed, predicted, scored
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
+from pbrs_farm.study.training.view_sources import NYU_LIGHT
 from pbrs_farm.study.training_plan import Plan, plan_of
 
 _HED_ROW = "HED untouched"
@@ -64,10 +67,14 @@ class Evaluation:
         }
 
 
-def open_run(root: Path) -> Trained:
-    """Load a finished run; BadInput for any other folder."""
+def open_run(root: Path, *, exact: bool = False) -> Trained:
+    """Load a finished run; BadInput for any other folder.
+
+    exact: boundaries are judged at the benchmark's own 99 thresholds.
+    """
     folder, record, plan = finished_run(root)
-    task = task_of(plan.task)
+    check_exact(plan.task, exact=exact)
+    task = task_of(plan.task, EXACT_THRESHOLDS if exact else 0)
     network = network_of(plan.network, task.n_out(plan))
     position = load_checkpoint(folder.weights, network)
     if position.task != plan.task:
@@ -77,6 +84,12 @@ def open_run(root: Path) -> Trained:
     except (OSError, ValueError):
         raise BadInput(folder.baseline, "", "missing or damaged: train again") from None
     return Trained(folder, record, plan, task, placed(network, plan), baseline)
+
+
+def check_exact(task_name: str, *, exact: bool) -> None:
+    """Raise BadInput where 99 thresholds are asked for of a task that has none."""
+    if exact and task_name != "boundaries":
+        raise BadInput("--exact", "", f"{task_name} has no thresholds: of boundaries alone")
 
 
 def predictions_of(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
@@ -110,12 +123,12 @@ def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
 
 def table(run: Trained, evaluations: list[Evaluation]) -> str:
     """Figures by row; training homes, held-out homes and what was judged, side by side, as Markdown."""
-    paper = paper_row(run.task.name, str(run.record["mode"]))
+    paper = _paper(run)
     columns: list[tuple[str, dict[str, float]]] = []
     stored = run.figures
     for part, title in (("train", "training homes"), ("held_out", "held-out homes")):
         if part in stored["network"]:
-            n = run.record["views"][part]
+            n = stored.get("views", run.record["views"])[part]
             columns.append((f"{title} ({n})", stored["network"][part]))
             columns.append((stored["baseline_name"], stored["baseline"][part]))
     for one in evaluations:
@@ -134,6 +147,14 @@ def table(run: Trained, evaluations: list[Evaluation]) -> str:
     return markdown(["", *(title for title, _ in columns), said], rows)
 
 
+def _paper(run: Trained) -> PaperRow:
+    """The paper's row beside this run: of its light, or of the light it was tuned from."""
+    mode = str(run.record["mode"])
+    if mode != NYU_LIGHT:
+        return paper_row(run.task.name, mode)
+    return tuned_row(run.task.name, str(run.record["init_origin"].get("mode", "")))
+
+
 def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
     """What must be said with the table: underfit, and which truth and mask."""
     said = []
@@ -144,7 +165,10 @@ def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
             f"underfit: the error on its own training views, {train:.3g}, is above 80 % of the"
             f" baseline's, {still:.3g}; rank nothing by it"
         )
-    said.append(f"truth of homes: {run.record['truth']}")
+    said.append(f"truth of training and held-out homes: {run.record['truth']}")
+    if isinstance(run.task, EdgesTask):
+        text = f"thresholds: {N_THRESHOLDS} of training and held-out homes"
+        said.append(text + f", {run.task.n_thresholds} of all else" * bool(evaluations))
     said += [f"truth of {one.views.name}: {one.views.truth}" for one in evaluations]
     said.append("the paper's numbers are of other pictures, another truth and 568,793 views")
     return said
@@ -156,6 +180,6 @@ def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
         "run": run.record,
         "trained": run.figures,
         "evaluations": [one.as_json() for one in evaluations],
-        "paper": asdict(paper_row(run.task.name, str(run.record["mode"]))),
+        "paper": asdict(_paper(run)),
         "notes": notes(run, evaluations),
     }

@@ -32,7 +32,7 @@ def judged_place(
     if path.suffix == ".mat":
         from pbrs_farm.study.judging.nyu_views import nyu_views
 
-        return nyu_views(path, plan, label or "NYUv2")
+        return nyu_views(path, plan, label or "NYUv2", trained_on)
     if path.is_dir() and not _is_root(path):
         from pbrs_farm.study.judging.pair_views import pair_views
 

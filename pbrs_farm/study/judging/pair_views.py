@@ -13,22 +13,20 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, Mask
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.resampling import resized_by_area
-from pbrs_farm.curate.photographs import Photo, pairs_in, photo_from_pair
+from pbrs_farm.curate.photographs import pairs_in, photo_from_pair
 from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.study.judging.photo_views import JudgedViews
-from pbrs_farm.study.metrics.plane_normals import normals_of_depth
-from pbrs_farm.study.tasks.study_task import Arrays
+from pbrs_farm.study.photographs.photo_truth import (
+    PLANE_TRUTH,
+    framed,
+    normal_truth,
+    normals_of_photo,
+)
 from pbrs_farm.study.training_plan import Plan
 
-PLANE_TRUTH: Final = (
-    "planes fitted to depth in windows of 1/40 of the width; mask: at least 60 % of the window on"
-    " one surface, within 1 % of its depth, not seen edge-on"
-)
 _FILES: Final = ("intrinsics.json", "intrinsics.txt")
 _MAX_BYTES: Final = 100_000
 
@@ -61,27 +59,6 @@ def pair_views(folder: Path, plan: Plan, name: str) -> JudgedViews:
         colours.append(colour)
         truths.append(normal_truth(normal[rows, columns], valid[rows, columns]))
     return JudgedViews(name, PLANE_TRUTH, tuple(ids), np.stack(colours), tuple(truths))
-
-
-def normals_of_photo(photo: Photo, K: F64) -> tuple[F32, Mask]:
-    """Normals and mask of a photograph's depth."""
-    return normals_of_depth(photo.depth_mm / np.float64(1000), K)
-
-
-def normal_truth(normal: F32, valid: Mask) -> Arrays:
-    """In the form of NormalsTask's targets."""
-    return {"normal": np.rint(normal * 32767).astype(np.int16), "valid": valid}
-
-
-def framed(rgb: NDArray[np.uint8], plan: Plan) -> tuple[NDArray[np.uint8], slice, slice]:
-    """The middle of a photograph in the plan's form, at the plan's size; the rows and columns taken."""
-    height, width = rgb.shape[:2]
-    share = plan.width_px / plan.height_px
-    new_width = min(width, round(height * share))
-    new_height = min(height, round(width / share))
-    top, left = (height - new_height) // 2, (width - new_width) // 2
-    rows, columns = slice(top, top + new_height), slice(left, left + new_width)
-    return resized_by_area(rgb[rows, columns], plan.width_px, plan.height_px), rows, columns
 
 
 def camera_of(folder: Path, top: Path) -> PhotoCamera:

@@ -58,3 +58,14 @@ def paper_row(task: str, mode: str) -> PaperRow:
     rows = PAPER[task]
     same = [row for row in rows if row.pretrained == name and not row.tuned]
     return same[0] if same else rows[-1]
+
+
+def tuned_row(task: str, pretrained: str) -> PaperRow:
+    """The paper's row tuned on NYUv2 from a lighting mode; without one, trained on NYUv2 alone."""
+    name = _NAMES.get(pretrained)
+    rows = PAPER[task]
+    tuned = [row for row in rows if row.tuned and name is not None]
+    # Segmentation tells MLT from OpenGL, the other tasks their lights too.
+    same = [row for row in tuned if row.pretrained == name]
+    kind = "MLT" if name and name.startswith("MLT") else "OpenGL"
+    return next(iter(same or [row for row in tuned if kind in row.pretrained]), rows[0])

@@ -117,7 +117,15 @@ def _from_run(network: nn.Module, path: Path) -> dict[str, str]:
     own.update(fitting)
     network.load_state_dict(own)
     taken = f"{len(fitting)} of {len(own)} tensors"
-    return {"source": f"a run of {position.task}, {taken}", "file": str(file)}
+    origin = {"source": f"a run of {position.task}, {taken}", "file": str(file)}
+    return origin | _light_of(path)
+
+
+def _light_of(run: Path) -> dict[str, str]:
+    """The lighting mode that the run's pictures had, where its record says."""
+    from pbrs_farm.study.training.run_folder import RunFolder
+
+    return {"mode": str(RunFolder(run).record().get("mode", ""))} if run.is_dir() else {}
 
 
 def _vgg_of(network: nn.Module, init: str) -> list[nn.Conv2d]:

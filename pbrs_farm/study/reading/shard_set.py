@@ -159,6 +159,10 @@ class ShardSet:
         self.check(request)
         return self.read_at(*self._at[ref], request)
 
+    def shard_of(self, ref: ViewRef) -> Shard:
+        """The shard that holds a view."""
+        return self._at[ref][0]
+
     def split_of(self, ref: ViewRef, shares: Shares | None) -> str:
         packed = self._at[ref][0].split
         return split_of_house(ref.house, shares) if shares or packed == WHOLE else packed

@@ -26,6 +26,7 @@ class ClassesTask:
     name: str = "segmentation"
     layers: tuple[str, ...] = ("colour", "class40")
     figures: tuple[str, ...] = ("mean_iou", "pixel_accuracy", "mean_accuracy", "weighted_iou")
+    error_name: str = "share of pixels of another class"
     truth: str = "rendered: NYU40 class of the surface seen, where it has one"
 
     def n_out(self, plan: Plan) -> int:

@@ -18,6 +18,8 @@ from pbrs_farm.study.tasks.losses import edge_loss
 from pbrs_farm.study.tasks.study_task import Arrays, Batch
 from pbrs_farm.study.training_plan import Plan
 
+N_THRESHOLDS = 33  # of judging; the benchmark's own number is 99
+
 
 class EdgesTask:
     """The truth are lines where the instance changes (Gupta et al. 2013)."""
@@ -25,11 +27,12 @@ class EdgesTask:
     name: str = "boundaries"
     layers: tuple[str, ...] = ("colour", "boundary")
     figures: tuple[str, ...] = ("ods", "ois", "ap", "r50")
+    error_name: str = "1 - ODS at 9 thresholds"
     truth: str = "rendered: lines where the instance changes; matched within 0.011 of the diagonal"
 
-    def __init__(self, n_thresholds: int = 33) -> None:
-        """n_thresholds: of judging; the benchmark's own number is 99."""
-        self._n_thresholds = n_thresholds
+    def __init__(self, n_thresholds: int = N_THRESHOLDS) -> None:
+        """n_thresholds: of judging."""
+        self.n_thresholds = n_thresholds
 
     def n_out(self, plan: Plan) -> int:
         """One for networks without sides."""
@@ -64,7 +67,7 @@ class EdgesTask:
 
     def scorer(self, plan: Plan) -> EdgeScorer:
         """Counts at each threshold over all views."""
-        return EdgeScorer(self._n_thresholds)
+        return EdgeScorer(self.n_thresholds)
 
     def error(self, figures: dict[str, float]) -> float:
         """What ODS lacks to 1."""

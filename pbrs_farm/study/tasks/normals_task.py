@@ -28,6 +28,7 @@ class NormalsTask:
     name: str = "normals"
     layers: tuple[str, ...] = ("colour", "normal")
     figures: tuple[str, ...] = ("mean_deg", "median_deg", "below_11_25", "below_22_5", "below_30")
+    error_name: str = "mean angle, degrees"
     truth: str = "rendered: the surface's own normal, where a pixel sees a surface"
 
     def n_out(self, plan: Plan) -> int:

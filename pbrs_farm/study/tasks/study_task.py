@@ -34,6 +34,7 @@ class Task(Protocol):
     name: str
     layers: tuple[str, ...]  # of a Request
     figures: tuple[str, ...]  # what a table shows, the first is what runs are told apart by
+    error_name: str  # what `error` is, with its unit
     truth: str  # which truth and which mask, in words
 
     def n_out(self, plan: Plan) -> int:

@@ -9,9 +9,13 @@ from pbrs_farm.study.tasks.normals_task import NormalsTask
 from pbrs_farm.study.tasks.study_task import Task
 
 
-def task_of(name: str) -> Task:
-    """Raises BadInput for a name that is none."""
-    tasks: dict[str, Task] = {t.name: t for t in (NormalsTask(), ClassesTask(), EdgesTask())}
+def task_of(name: str, n_thresholds: int = 0) -> Task:
+    """Raises BadInput for a name that is none.
+
+    n_thresholds: at which boundaries are judged, 0 = the task's own number.
+    """
+    edges = EdgesTask(n_thresholds) if n_thresholds else EdgesTask()
+    tasks: dict[str, Task] = {t.name: t for t in (NormalsTask(), ClassesTask(), edges)}
     if name not in tasks:
         raise BadInput("task", name, "no such task", hint=f"of {', '.join(tasks)}")
     return tasks[name]

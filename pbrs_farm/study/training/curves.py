@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 
@@ -13,15 +13,25 @@ _INK, _FAINT, _LINE, _COLOURS = "#1b1e25", "#6b7280", "#e2e0da", ("#0f7c74", "#d
 Points = Sequence[tuple[float, float]]  # (step, value)
 
 
-def curves_svg(title: str, curves: dict[str, Points]) -> str:
-    """A picture of named curves over steps, values from 0; those without a point are left out."""
-    svg = svg_file(viewBox=f"0 0 {_WIDTH} {_HEIGHT}", width=_WIDTH, height=_HEIGHT,
+def curves_svg(panels: Mapping[str, Mapping[str, Points]]) -> str:
+    """A picture of panels one below the other: title -> named curves over steps, values from 0.
+
+    Curves without a point are left out.
+    """
+    height = _HEIGHT * len(panels)
+    svg = svg_file(viewBox=f"0 0 {_WIDTH} {height}", width=_WIDTH, height=height,
                    font_family="system-ui, sans-serif", font_size=12)  # fmt: skip
-    element(svg, "rect", width=_WIDTH, height=_HEIGHT, fill="#ffffff")
+    element(svg, "rect", width=_WIDTH, height=height, fill="#ffffff")
+    for k, (title, curves) in enumerate(panels.items()):
+        _panel(element(svg, "g", transform=f"translate(0 {k * _HEIGHT})"), title, curves)
+    return svg_text(svg)
+
+
+def _panel(svg: Element, title: str, curves: Mapping[str, Points]) -> None:
     element(svg, "text", title, x=_LEFT, y=22, fill=_INK, font_size=14)
     shown = {name: points for name, points in curves.items() if points}
     if not shown:
-        return svg_text(svg)
+        return
     last = max(step for points in shown.values() for step, _ in points)
     top = _round_up(max(value for points in shown.values() for _, value in points))
     _axes(svg, last, top)
@@ -31,7 +41,6 @@ def curves_svg(title: str, curves: dict[str, Points]) -> str:
         element(svg, "polyline", points=line, fill="none", stroke=colour, stroke_width=1.8)
         x = _WIDTH - _RIGHT - 110 * (len(shown) - k)
         element(svg, "text", name, x=x, y=22, fill=colour)
-    return svg_text(svg)
 
 
 def smoothed(points: Points, share: float = 0.05) -> list[tuple[float, float]]:

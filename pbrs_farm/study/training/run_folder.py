@@ -6,7 +6,7 @@
     weights.safetensors     the trained weights
     baseline.npy            the prediction that needs no picture
     figures.json            how good it is, on training and held-out homes, beside the baseline
-    curves.svg              loss and error over the steps
+    curves.svg              loss, and error on training and held-out views, over the steps
 
 A run is finished when run.json says so; that is written last.
 """
@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.training_plan import Plan, plan_as_json, plan_from_json
+from pbrs_farm.study.training_plan import Plan, plan_as_trained, plan_from_json
 
 RUNNING, FINISHED, FAILED = "running", "finished", "failed"
-_SAME: Final = ("task", "plan", "seed", "mode", "init", "views_digest")  # of a run that goes on
+_SAME: Final = ("task", "seed", "mode", "init", "views_digest")  # of a run that goes on
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +71,20 @@ class RunFolder:
         """
         if (self.root / "run.json").exists():
             older = self.record()
-            for name in _SAME:
-                if older.get(name) != json.loads(json.dumps(row[name])):
-                    was, now = _difference(older.get(name), row[name])
-                    text = f"holds a run with another {name}: {was}, now {now}"
-                    raise BadInput(self.root, "", text, hint="give another --out")
+            self._check_same(older, row)
             if older["state"] == FINISHED:
                 return False
         self.root.mkdir(parents=True, exist_ok=True)
         self.write("run.json", {**row, "state": RUNNING})
         return True
+
+    def _check_same(self, older: dict[str, Any], row: dict[str, Any]) -> None:
+        """Raise BadInput where the run that stands here is of something else."""
+        was, now = (_depends_on(one, str(self.root / "run.json")) for one in (older, row))
+        for name, value in now.items():
+            if was.get(name) != value:
+                text = f"holds a run with another {name} {was.get(name)}, now {value}"
+                raise BadInput(self.root, "", text, hint="give another --out")
 
     def end(self, state: str, why: str = "") -> None:
         """Say that the run is finished, or why it failed."""
@@ -136,15 +140,13 @@ def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], Plan]:
 
 
 def plan_digest(plan: Plan) -> str:
-    """First 16 hex of the sha256 over every field."""
-    text = json.dumps(plan_as_json(plan), sort_keys=True)
+    """First 16 hex of the sha256 over every field that weights or figures depend on."""
+    text = json.dumps(plan_as_trained(plan), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _difference(was: Any, now: Any) -> tuple[Any, Any]:
-    """The first field that differs, of plans; else the values."""
-    if isinstance(was, dict) and isinstance(now, dict):
-        for name in now:
-            if was.get(name) != now[name]:
-                return f"{name} {was.get(name)}", f"{now[name]}"
-    return was, now
+def _depends_on(row: dict[str, Any], place: str) -> dict[str, Any]:
+    """What two records of one run share, in words -> value; a plan of before has newer fields' defaults."""
+    plan = plan_as_trained(plan_from_json(row["plan"], place))
+    words = {f"{name}:": row.get(name) for name in _SAME}
+    return words | {f"plan: {name}": value for name, value in plan.items()}

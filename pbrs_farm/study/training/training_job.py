@@ -18,11 +18,12 @@ from pbrs_farm.study.tasks.task_choice import task_of
 from pbrs_farm.study.training.curves import curves_svg, smoothed
 from pbrs_farm.study.training.prediction import baseline_judged, device_of, judged
 from pbrs_farm.study.training.run_folder import FAILED, FINISHED, RunFolder
-from pbrs_farm.study.training.training_loop import Observer, share_of_process, train_network
+from pbrs_farm.study.training.training_loop import Judge, Observer, share_of_process, train_network
+from pbrs_farm.study.training.training_views import TrainingViews
 from pbrs_farm.study.training.view_arrays import ViewArrays
 from pbrs_farm.study.training_plan import Plan, plan_as_json
 
-MAX_JUDGED = 400  # training views that figures are taken from, spread over all
+_CURVE_THRESHOLDS = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class Job:
 
 
 def train(
-    job: Job, views: ViewArrays, held_out: ViewArrays | None = None,
+    job: Job, views: TrainingViews, held_out: ViewArrays | None = None,
     observe: Observer = lambda _row: None,
 ) -> dict[str, Any]:  # fmt: skip
     """Train, judge, and say so in the folder; the figures. A finished run is not trained again.
@@ -62,7 +63,8 @@ def train(
     try:
         network = train_network(
             network, views, task, plan,
-            seed=job.seed, folder=folder, observe=observe, share=share,
+            seed=job.seed, folder=folder, observe=observe,
+            judge=_judge_of_curve(views, held_out, plan), share=share,
         )  # fmt: skip
         if not share.is_first:
             return {}
@@ -79,7 +81,7 @@ def train(
 
 
 def _record(
-    job: Job, views: ViewArrays, held_out: ViewArrays | None, origin: dict[str, str]
+    job: Job, views: TrainingViews, held_out: ViewArrays | None, origin: dict[str, str]
 ) -> dict[str, Any]:
     held = held_out.homes if held_out else ()
     return {
@@ -103,18 +105,41 @@ def _record(
     }
 
 
+def _judge_of_curve(views: TrainingViews, held_out: ViewArrays | None, plan: Plan) -> Judge:
+    """Errors on a few training and held-out views; of lines at fewer thresholds, for speed."""
+    task = task_of(plan.task, _CURVE_THRESHOLDS)
+    parts: dict[str, ViewArrays] = {}
+
+    def judge(network: torch.nn.Module) -> dict[str, float]:
+        if not parts:
+            parts["train_error"] = views.decoded(plan.judge_views)
+            if held_out:
+                parts["held_out_error"] = held_out.some(plan.judge_views)
+        return {
+            name: task.error(judged(network, part, task, plan).figures)
+            for name, part in parts.items()
+        }
+
+    return judge
+
+
 def _judge(
-    network: torch.nn.Module, views: ViewArrays, held_out: ViewArrays | None, plan: Plan,
+    network: torch.nn.Module, views: TrainingViews, held_out: ViewArrays | None, plan: Plan,
     folder: RunFolder,
 ) -> dict[str, Any]:  # fmt: skip
     """Figures on training and held-out views, of the network and of the baseline."""
     task = task_of(plan.task)
-    seen = views.some(MAX_JUDGED)
-    name, baseline = task.baseline([views.target(k) for k in range(len(views))])
+    seen = views.decoded(plan.final_views)
+    # The baseline knows every training view that is in memory.
+    known = views if isinstance(views, ViewArrays) else seen
+    name, baseline = task.baseline([known.target(k) for k in range(len(known))])
     np.save(folder.baseline, baseline)
-    parts = {"train": seen} | ({"held_out": held_out} if held_out else {})
+    parts = {"train": seen}
+    if held_out:
+        parts["held_out"] = held_out.some(plan.final_views)
     return {
         "baseline_name": name,
+        "views": {at: len(part) for at, part in parts.items()},
         "network": {at: judged(network, part, task, plan).figures for at, part in parts.items()},
         "baseline": {
             at: baseline_judged(baseline, part, task, plan).figures for at, part in parts.items()
@@ -124,5 +149,13 @@ def _judge(
 
 def _curves(folder: RunFolder, plan: Plan) -> str:
     rows = folder.metrics()
-    loss = smoothed([(row["step"], row["loss"]) for row in rows])
-    return curves_svg(f"{plan.task}, plan {plan.name}: loss", {"loss": loss})
+
+    def points(name: str) -> list[tuple[float, float]]:
+        return [(row["step"], row[name]) for row in rows if name in row]
+
+    title = f"{plan.task}, plan {plan.name}"
+    errors = {"training": points("train_error"), "held out": points("held_out_error")}
+    panels = {f"{title}: loss": {"loss": smoothed(points("loss"))}}
+    if any(errors.values()):
+        panels[f"{title}: {task_of(plan.task).error_name}"] = errors
+    return curves_svg(panels)

@@ -26,10 +26,11 @@ from pbrs_farm.study.training.checkpoint import (
 from pbrs_farm.study.training.optimisers import optimiser_of, set_rate
 from pbrs_farm.study.training.prediction import as_colour, device_of, network_output, placed
 from pbrs_farm.study.training.run_folder import RunFolder, plan_digest
-from pbrs_farm.study.training.view_arrays import ViewArrays, rows_of_step
+from pbrs_farm.study.training.training_views import BatchRead, TrainingViews
 from pbrs_farm.study.training_plan import Plan, rate_at
 
 Observer = Callable[[dict[str, float]], None]
+Judge = Callable[[nn.Module], dict[str, float]]  # errors of the network as it is, by name
 
 
 class LossFailed(PbrsError):
@@ -62,13 +63,14 @@ def share_of_process() -> Share:
 
 
 def train_network(
-    network: nn.Module, views: ViewArrays, task: Task, plan: Plan, *, seed: int,
-    folder: RunFolder, observe: Observer, share: Share,
+    network: nn.Module, views: TrainingViews, task: Task, plan: Plan, *, seed: int,
+    folder: RunFolder, observe: Observer, judge: Judge, share: Share,
 ) -> nn.Module:  # fmt: skip
     """Train from the folder's checkpoint, or from the network's own weights; writes weights last.
 
-    Raises LossFailed, naming the view, when the loss is no number; BadInput when the checkpoint is
-    of something else.
+    judge: asked each plan.judge_every steps; what it says becomes a row of the metrics. Raises
+    LossFailed, naming the view, when the loss is no number; BadInput when the checkpoint is of
+    something else.
     """
     if plan.batch % share.of:
         raise BadInput("batch", str(plan.batch), f"cannot be shared by {share.of} processes")
@@ -78,11 +80,14 @@ def train_network(
     where = Position(0, task.name, plan_digest(plan), views.digest(), seed)
     first = _resumed(folder, network, optimiser, where)
     model = nn.parallel.DistributedDataParallel(network) if share.of > 1 else network
-    loop = _Loop(model, optimiser, views, task, plan, seed, share)
+    loop = _Loop(model, optimiser, task, plan, seed, share)
 
     started, loss_sum, n_summed = time.monotonic(), 0.0, 0
-    for step in range(first, plan.steps):
-        loss_sum, n_summed = loss_sum + loop.step(step), n_summed + 1
+    # Each process takes its own rows of the one batch.
+    own = slice(share.rank, None, share.of)
+    steps = range(first, plan.steps)
+    for step, read in zip(steps, views.batches(steps, plan, seed, own), strict=True):
+        loss_sum, n_summed = loss_sum + loop.step(step, read), n_summed + 1
         done = step + 1
         if not share.is_first:
             continue
@@ -98,6 +103,10 @@ def train_network(
             folder.add_metrics(row)
             observe(row)
             started, loss_sum, n_summed = time.monotonic(), 0.0, 0
+        if plan.judge_every and done % plan.judge_every == 0:
+            judging = time.monotonic()
+            folder.add_metrics({"step": done} | judge(network))
+            started += time.monotonic() - judging
         # A checkpoint holds no gradients, so it waits until none are accumulated.
         if done % plan.checkpoint_every == 0 and done % plan.accumulate == 0 and done < plan.steps:
             save_checkpoint(folder.checkpoint, network, optimiser, _at(where, done))
@@ -129,25 +138,22 @@ def _resumed(
 class _Loop:
     model: nn.Module
     optimiser: torch.optim.Optimizer
-    views: ViewArrays
     task: Task
     plan: Plan
     seed: int
     share: Share
 
-    def step(self, step: int) -> float:
+    def step(self, step: int, read: BatchRead) -> float:
         """One batch forth and back; its loss."""
         plan = self.plan
         device = device_of(plan)
         # Draw what is random from the seed and the step alone.
         chance = (self.seed * 1_000_003 + step) * 1024 + self.share.rank
         torch.manual_seed(chance)
-        rows = rows_of_step(len(self.views), plan.batch, step, self.seed)
-        # Each process takes its own rows of the one batch.
-        rows = rows[self.share.rank :: self.share.of]
+        ids, arrays = read
         batch: Batch = {
             name: torch.from_numpy(array).to(device, non_blocking=True)
-            for name, array in self.views.rows(rows).items()
+            for name, array in arrays.items()
         }
         batch["colour"] = as_colour(batch["colour"])
         batch = augmented(batch, self.task, plan, torch.Generator().manual_seed(chance))
@@ -155,7 +161,7 @@ class _Loop:
         with torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
             output = network_output(self.model, batch["colour"], plan)
         losses = self.task.loss(output, batch, plan)
-        self._stop_at_nan(losses, [self.views.ids[k] for k in rows], step)
+        self._stop_at_nan(losses, ids, step)
         # Gradients add up over plan.accumulate batches before the weights move.
         loss = losses.mean()
         (loss / plan.accumulate).backward()

@@ -1,4 +1,4 @@
-"""Views decoded once and held in memory at a plan's size, and which of them a step takes; numpy.
+"""Views decoded once and held in memory at a plan's size; numpy.
 
 Effects: reads views. 1,000 views take 192 MB for normals at 160x120, 768 MB at 320x240.
 """
@@ -6,7 +6,7 @@ Effects: reads views. 1,000 views take 192 MB for normals at 160x120, 768 MB at 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.reading.view_sample import Sample
 from pbrs_farm.study.tasks.study_task import Arrays, Task
+from pbrs_farm.study.training.training_views import BatchOrder, BatchRead
 from pbrs_farm.study.training_plan import Plan
 
 
@@ -52,6 +53,17 @@ class ViewArrays:
         colour = rows.pop("colour")
         return ViewArrays(tuple(self.ids[k] for k in at), colour, rows)
 
+    def decoded(self, most: int) -> ViewArrays:
+        """The same: they are in memory."""
+        return self.some(most)
+
+    def batches(self, steps: range, plan: Plan, seed: int, own: slice) -> Iterator[BatchRead]:
+        """The batch of each step; own: which rows of it."""
+        order = BatchOrder(len(self), plan.batch, seed)
+        for step in steps:
+            rows = order.rows(step)[own]
+            yield [self.ids[k] for k in rows], self.rows(rows)
+
     def digest(self) -> str:
         """First 16 hex of the sha256 over the ids and the pixels: what a run goes on with."""
         sha = hashlib.sha256("\n".join(self.ids).encode())
@@ -63,33 +75,21 @@ class ViewArrays:
 def arrays_of_samples(samples: Iterable[Sample], task: Task, plan: Plan) -> ViewArrays:
     """Decode samples of one size; BadInput names the view that cannot be trained on."""
     ids: list[str] = []
-    colours: list[NDArray[np.uint8]] = []
-    targets: dict[str, list[NDArray[Any]]] = {}
+    stacked: dict[str, list[NDArray[Any]]] = {}
     for sample in samples:
-        if sample.colour is None or sample.size != (plan.width_px, plan.height_px):
-            size = f"{plan.width_px}x{plan.height_px}"
-            raise BadInput(sample.id, "colour", f"expected {size} pixels, got {sample.size}")
         ids.append(sample.id)
-        colours.append(sample.colour)
-        for name, array in task.targets(sample, plan).items():
-            targets.setdefault(name, []).append(array)
+        for name, array in arrays_of_sample(sample, task, plan).items():
+            stacked.setdefault(name, []).append(array)
     if not ids:
         raise BadInput("views", "", "no view to train on")
-    return ViewArrays(
-        tuple(ids), np.stack(colours), {name: np.stack(rows) for name, rows in targets.items()}
-    )
+    # Let go of each list as soon as it is one array.
+    arrays = {name: np.stack(stacked.pop(name)) for name in list(stacked)}
+    return ViewArrays(tuple(ids), arrays.pop("colour"), arrays)
 
 
-def rows_of_step(n_views: int, batch: int, step: int, seed: int) -> NDArray[np.intp]:
-    """(batch,) which views step takes: each once in an order drawn anew each time round.
-
-    A function of its arguments alone: a run that was killed goes on with the same views.
-    """
-    at = np.arange(step * batch, (step + 1) * batch)
-    rounds = at // n_views
-    rows = np.empty(batch, np.intp)
-    for k in np.unique(rounds):
-        order = np.random.default_rng([seed, 1, int(k)]).permutation(n_views)
-        mine = rounds == k
-        rows[mine] = order[at[mine] % n_views]
-    return rows
+def arrays_of_sample(sample: Sample, task: Task, plan: Plan) -> Arrays:
+    """Colour and targets of one view, by name; BadInput where it cannot be trained on."""
+    if sample.colour is None or sample.size != (plan.width_px, plan.height_px):
+        size = f"{plan.width_px}x{plan.height_px}"
+        raise BadInput(sample.id, "colour", f"expected {size} pixels, got {sample.size}")
+    return {"colour": sample.colour, **task.targets(sample, plan)}

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, TypeVar
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import home_of
 from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.reading.view_sample import Request, Sample
+from pbrs_farm.study.reading.view_sample import Request
 from pbrs_farm.study.reading.views import View, Views
 from pbrs_farm.study.tasks.task_choice import task_of
-from pbrs_farm.study.training.view_arrays import ViewArrays, arrays_of_samples
+from pbrs_farm.study.training.streamed_views import Picture, StreamedViews
+from pbrs_farm.study.training.training_views import TrainingViews
+from pbrs_farm.study.training.view_arrays import ViewArrays, arrays_of_sample, arrays_of_samples
 from pbrs_farm.study.training_plan import Plan
+
+T = TypeVar("T")
+NYU_LIGHT: Final = "nyuv2"  # what a run's record calls the light of photographs
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
     """Where views come from and how they are parted.
 
-    places: roots or shards. modes: each view is taken once in each of them. hold_out: homes by id,
+    places: roots or shards, or NYUv2's .mat alone. modes: each view is taken once in each of them. hold_out: homes by id,
     or by name without digest and variant, that never train; None = the split by house holds out
     val and test (a fifth of the homes). objects: models without context instead of rooms. most: at
     most so many training views, spread over all; 0 = all.
@@ -36,25 +43,64 @@ class Source:
         """What a record calls it."""
         return " + ".join(self.places)
 
+    @property
+    def is_nyu(self) -> bool:
+        """Photographs of NYUv2: the training pictures of splits.mat, its test pictures held out."""
+        return any(place.endswith(".mat") for place in self.places)
 
-def training_views(source: Source, plan: Plan) -> ViewArrays:
-    """The views that train; BadInput where there is none."""
-    views = _decoded(source, plan, held_out=False, most=source.most)
-    if views is None:
+    @property
+    def light(self) -> str:
+        """What a record calls the pictures' light."""
+        return NYU_LIGHT if self.is_nyu else "+".join(self.modes)
+
+
+def training_views(source: Source, plan: Plan) -> TrainingViews:
+    """The views that train: in memory, or streamed where they take more than plan.memory_gb.
+
+    Raises BadInput where there is none.
+    """
+    if source.is_nyu:
+        return _nyu_views(source, plan, "train", source.most)
+    pictures = _pictures(source, plan, held_out=False, most=source.most)
+    if not pictures:
         text = "no view to train on: all its homes are held out"
         raise BadInput(source.name, "", text, hint="--hold-out HOME..., or --hold-out none")
-    return views
+    if len(pictures) > _n_fitting(pictures, plan):
+        return StreamedViews(pictures, plan)
+    return _arrays(pictures, plan)
 
 
 def held_out_views(source: Source, plan: Plan, most: int = 0) -> ViewArrays | None:
-    """The views of the homes that are held out; None where there is none."""
-    return _decoded(source, plan, held_out=True, most=most)
+    """The views of the homes that are held out, at most so many, and as fit into plan.memory_gb.
+
+    None where there is none; of NYUv2 the test pictures.
+    """
+    if source.is_nyu:
+        return _nyu_views(source, plan, "test", most)
+    pictures = _pictures(source, plan, held_out=True, most=most)
+    if not pictures:
+        return None
+    return _arrays(_spread(pictures, max(_n_fitting(pictures, plan), plan.final_views)), plan)
 
 
 def all_views(source: Source, plan: Plan, most: int = 0) -> ViewArrays:
     """Every view of the source: one that no training has seen."""
     views = [view for place in source.places for view in _finished(open_views(place), source, plan)]
-    return _arrays(_spread(views, most), source.modes, plan)
+    return _arrays(_in_each_light(_spread(views, most), source, plan), plan)
+
+
+def left_out(source: Source, plan: Plan) -> dict[str, str]:
+    """id -> why, of views that lack what the plan's task needs, or that a run has begun only."""
+    if source.is_nyu:
+        return {}
+    lacking: dict[str, str] = {}
+    for place in source.places:
+        views = open_views(place)
+        lacking |= views.left_out
+        for mode in source.modes:
+            request = _request(mode, plan)
+            lacking |= views.only(objects=source.objects, request=request).left_out
+    return lacking
 
 
 def is_held_out(view: View, source: Source) -> bool:
@@ -64,7 +110,7 @@ def is_held_out(view: View, source: Source) -> bool:
     return view.source.split_of(view.ref, None) != "train"
 
 
-def _decoded(source: Source, plan: Plan, *, held_out: bool, most: int) -> ViewArrays | None:
+def _pictures(source: Source, plan: Plan, *, held_out: bool, most: int) -> tuple[Picture, ...]:
     found: list[View] = []
     homes: set[str] = set()
     for place in source.places:
@@ -74,7 +120,30 @@ def _decoded(source: Source, plan: Plan, *, held_out: bool, most: int) -> ViewAr
     unknown = sorted((source.hold_out or frozenset()) - homes)
     if unknown:
         raise BadInput("--hold-out", unknown[0], f"no such home in {source.name}")
-    return _arrays(_spread(found, most), source.modes, plan) if found else None
+    return _in_each_light(_spread(found, most), source, plan)
+
+
+def _in_each_light(views: Sequence[View], source: Source, plan: Plan) -> tuple[Picture, ...]:
+    requests = [_request(mode, plan) for mode in source.modes]
+    return tuple((view, request) for request in requests for view in views)
+
+
+def _n_fitting(pictures: Sequence[Picture], plan: Plan) -> int:
+    """How many views plan.memory_gb holds, by the first one's size."""
+    view, request = pictures[0]
+    arrays = arrays_of_sample(view.sample(request), task_of(plan.task), plan)
+    return int(plan.memory_gb * 1e9 / sum(array.nbytes for array in arrays.values()))
+
+
+def _nyu_views(source: Source, plan: Plan, split: str, most: int) -> ViewArrays:
+    # Imported where needed: it wants h5py.
+    from pbrs_farm.study.photographs.nyu_arrays import nyu_arrays
+
+    if len(source.places) > 1:
+        text = "NYUv2 trains alone"
+        raise BadInput(source.name, "", text, hint="pre-train first, then --init RUN")
+    views = nyu_arrays(Path(source.places[0]), plan, split)
+    return views.some(most) if most else views
 
 
 def _finished(views: Views, source: Source, plan: Plan) -> Views:
@@ -84,21 +153,15 @@ def _finished(views: Views, source: Source, plan: Plan) -> Views:
     return views
 
 
-def _spread(views: Sequence[View], most: int) -> list[View]:
+def _spread(views: Sequence[T], most: int) -> list[T]:
     if not most or len(views) <= most:
         return list(views)
     return [views[round(k * (len(views) - 1) / max(most - 1, 1))] for k in range(most)]
 
 
-def _arrays(views: Sequence[View], modes: Sequence[str], plan: Plan) -> ViewArrays:
-    return arrays_of_samples(_samples(views, modes, plan), task_of(plan.task), plan)
-
-
-def _samples(views: Sequence[View], modes: Sequence[str], plan: Plan) -> Iterator[Sample]:
-    for mode in modes:
-        request = _request(mode, plan)
-        for view in views:
-            yield view.sample(request)
+def _arrays(pictures: Sequence[Picture], plan: Plan) -> ViewArrays:
+    samples = (view.sample(request) for view, request in pictures)
+    return arrays_of_samples(samples, task_of(plan.task), plan)
 
 
 def _request(mode: str, plan: Plan) -> Request:

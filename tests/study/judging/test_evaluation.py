@@ -149,41 +149,18 @@ def test_depth_says_nothing_of_classes(pairs: Path) -> None:
         judged_place(str(pairs), small_plan("segmentation"), mode="mlt_il_ol")
 
 
-def test_a_mat_that_is_none_is_one_line(tmp_path: Path) -> None:
-    (tmp_path / "nyu.mat").write_bytes(b"no matrix at all")
-    with pytest.raises(BadInput, match="not a MATLAB"):
-        judged_place(str(tmp_path / "nyu.mat"), small_plan(), mode="mlt_il_ol")
-
-
-@pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries"])
-def test_nyu_is_cut_to_its_crop_and_its_test_split(task: str, tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
-    from scipy.io import savemat
-
-    rng = np.random.default_rng(0)
-    with h5py.File(tmp_path / "nyu.mat", "w") as file:
-        file["images"] = rng.integers(0, 256, (3, 3, 640, 480)).astype(np.uint8)
-        file["depths"] = np.full((3, 640, 480), 2.5, np.float32)
-        file["labels"] = np.full((3, 640, 480), 5, np.uint16)
-        instances = np.ones((3, 640, 480), np.uint8)
-        instances[:, 320:] = 2
-        file["instances"] = instances
-    savemat(tmp_path / "splits.mat", {"testNdxs": [[1], [3]]})
-    savemat(tmp_path / "classMapping40.mat", {"mapClass": [np.arange(894) % 40 + 1]})
-    plan = small_plan(task, width_px="160", height_px="120")
-    views = judged_place(str(tmp_path / "nyu.mat"), plan, mode="mlt_il_ol")
-    assert views.ids == ("0001", "0003")
-    assert "2 test pictures" in views.truth
-    # The crop is 561x427: wider than 4:3 by a few pixels of height.
-    assert views.sizes == [(421, 561)] * 2
-    seen = task_of(task).prediction_of(views.truths[0])
-    if task == "normals":
-        assert views.truths[0]["valid"].mean() > 0.9
-        np.testing.assert_allclose(seen[200, 200], [0, 0, -1], atol=1e-3)
-    elif task == "segmentation":
-        assert (seen == 5).all()
-    else:
-        assert (np.nonzero(seen.any(0))[0] == 279).all()
+def test_all_99_thresholds_are_used_where_they_are_asked_for(
+    root: Path, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = root.parent / "edges"
+    words = ["train", "boundaries", str(root), "--out", str(out), "--hold-out", "home-2", *TINY]
+    assert main(words) == 0
+    capsys.readouterr()
+    assert main(["evaluate", str(out), "--on", f"home={root}", "--exact"]) == 0
+    said = capsys.readouterr().out
+    assert "thresholds: 33 of training and held-out homes, 99 of all else" in said
+    assert main(["evaluate", str(run), "--exact"]) == 1
+    assert "normals has no thresholds" in capsys.readouterr().err
 
 
 def test_a_home_that_trained_may_not_judge(root: Path) -> None:

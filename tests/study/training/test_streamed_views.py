@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 import torch
-from pbrs_farm.study.training.streamed_views import StreamedViews
 
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
@@ -14,6 +13,7 @@ from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.training.checkpoint import read_tensors
 from pbrs_farm.study.training.run_folder import RunFolder
+from pbrs_farm.study.training.streamed_views import StreamedViews
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.view_arrays import ViewArrays
 from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views

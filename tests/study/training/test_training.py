@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from pbrs_farm.study.training.training_views import BatchOrder
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.study.training.checkpoint import read_tensors
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_loop import LossFailed
+from pbrs_farm.study.training.training_views import BatchOrder
 from pbrs_farm.study.training_plan import plan_of
 from tests.study.training.made_views import small_plan, views
 

@@ -1,0 +1,136 @@
+"""NYUv2's .mat, built in code: judged on, tuned on, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import torch
+from scipy.io import savemat
+
+from pbrs_farm.cli import main
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.judging.judged_places import judged_place
+from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views
+from tests.study.small_roots import fill
+from tests.study.training.made_views import small_plan
+
+pytestmark = pytest.mark.study
+TINY = [
+    word
+    for field in ("width_px=40", "height_px=32", "batch=2", "steps=3", "threads=1", "log_every=1")
+    for word in ("--set", field)
+]  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+@pytest.fixture
+def mat(tmp_path: Path) -> Path:
+    """Three pictures of a wall straight ahead; 1 and 3 judge, 2 trains."""
+    rng = np.random.default_rng(0)
+    with h5py.File(tmp_path / "nyu.mat", "w") as file:
+        file["images"] = rng.integers(0, 256, (3, 3, 640, 480)).astype(np.uint8)
+        file["depths"] = np.full((3, 640, 480), 2.5, np.float32)
+        file["labels"] = np.full((3, 640, 480), 5, np.uint16)
+        instances = np.ones((3, 640, 480), np.uint8)
+        instances[:, 320:] = 2
+        file["instances"] = instances
+    savemat(tmp_path / "splits.mat", {"trainNdxs": [[2]], "testNdxs": [[1], [3]]})
+    savemat(tmp_path / "classMapping40.mat", {"mapClass": [np.arange(894) % 40 + 1]})
+    return tmp_path / "nyu.mat"
+
+
+@pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries"])
+def test_pictures_are_cut_to_the_crop_and_the_test_split(task: str, mat: Path) -> None:
+    plan = small_plan(task, width_px="160", height_px="120")
+    views = judged_place(str(mat), plan, mode="mlt_il_ol")
+    assert views.ids == ("0001", "0003")
+    assert "2 test pictures" in views.truth
+    # The crop is 561x427: wider than 4:3 by a few pixels of height.
+    assert views.sizes == [(421, 561)] * 2
+    seen = task_of(task).prediction_of(views.truths[0])
+    if task == "normals":
+        assert views.truths[0]["valid"].mean() > 0.9
+        np.testing.assert_allclose(seen[200, 200], [0, 0, -1], atol=1e-3)
+    elif task == "segmentation":
+        assert (seen == 5).all()
+    else:
+        assert (np.nonzero(seen.any(0))[0] == 279).all()
+
+
+@pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries"])
+def test_its_train_split_trains_and_its_test_split_is_held_out(task: str, mat: Path) -> None:
+    plan, source = small_plan(task), Source((str(mat),))
+    views, held_out = training_views(source, plan), held_out_views(source, plan)
+    assert views.ids == ("NYUv2/0002",)
+    assert held_out is not None
+    assert held_out.ids == ("NYUv2/0001", "NYUv2/0003")
+    target = held_out.target(0)
+    if task == "normals":
+        assert target["normal"].shape == (32, 40, 3)
+        assert (target["normal"][16, 20] == [0, 0, -32767]).all()
+    elif task == "segmentation":
+        assert (target["labels"] == 5).all()
+    else:
+        # A line of one pixel stays whole at a fourteenth of the size.
+        assert target["edges"].any(1).all()
+        assert target["edges"].any(0).sum() == 1
+
+
+def test_a_run_is_tuned_on_it_and_judged_beside_the_papers_tuned_row(
+    mat: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fill(FolderStore(tmp_path / "root"), {"home-0-00000000": 2}, (40, 32))
+    root, first, tuned = (str(tmp_path / name) for name in ("root", "first", "tuned"))
+    words = ["train", "normals", root, "--hold-out", "none", "--out", first]
+    assert main([*words, *TINY]) == 0
+    assert main(["train", "normals", str(mat), "--init", first, "--out", tuned, *TINY]) == 0
+    record = json.loads((tmp_path / "tuned" / "run.json").read_text())
+    assert record["mode"] == "nyuv2"
+    assert record["init_origin"]["mode"] == "mlt_il_ol"
+    assert record["views"] == {"train": 1, "held_out": 2}
+    capsys.readouterr()
+    assert main(["evaluate", tuned, "--on", str(mat), "--on", f"home={root}"]) == 0
+    said = capsys.readouterr().out
+    assert "paper: MLT-IL/OL, then NYUv2, on NYUv2" in said
+    assert "21.74" in said
+    assert "NYUv2 (2)" in said
+    assert "home (2)" in said
+    # Without splits.mat nobody knows which pictures trained.
+    (mat.parent / "splits.mat").unlink()
+    assert main(["evaluate", tuned, "--on", str(mat)]) == 1
+    assert "without splits.mat what trained would judge" in capsys.readouterr().err
+    assert main(["evaluate", first, "--on", str(mat)]) == 0
+
+
+def test_what_training_on_it_needs_is_said(mat: Path) -> None:
+    plan = small_plan()
+    with pytest.raises(BadInput, match="NYUv2 trains alone"):
+        training_views(Source((str(mat), "root")), plan)
+    (mat.parent / "splits.mat").write_bytes(b"no matrix")
+    with pytest.raises(BadInput, match="not the MATLAB 5 file"):
+        training_views(Source((str(mat),)), plan)
+    (mat.parent / "splits.mat").unlink()
+    with pytest.raises(BadInput, match=r"splits.mat.*needed beside"):
+        training_views(Source((str(mat),)), plan)
+    mat.write_bytes(b"no matrix at all")
+    with pytest.raises(BadInput, match="not a MATLAB"):
+        judged_place(str(mat), plan, mode="mlt_il_ol")
+    assert main(["ablation", str(mat), "--out", str(mat.parent / "a")]) == 1
+
+
+@pytest.mark.parametrize("lacking", ["images", "depths", "labels"])
+def test_a_mat_that_lacks_a_table_names_it(lacking: str, mat: Path) -> None:
+    with h5py.File(mat, "a") as file:
+        del file[lacking]
+    with pytest.raises(BadInput, match=lacking):
+        judged_place(str(mat), small_plan("boundaries"), mode="mlt_il_ol")
