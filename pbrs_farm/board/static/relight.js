@@ -4,8 +4,10 @@ import { numbers, packetOf } from "./light_packet.js";
 import { Plane } from "./plane.js";
 import { toneOf } from "./tone.js";
 
-const SAMPLE = 20000; // pixels that tell the exposure while a slider moves
+const SAMPLE = 6000; // pixels that tell the exposure while a slider moves
 const SETTLE_MS = 120; // then all of them do
+const SLOW_MS = 30; // between two pictures: a machine that takes longer draws fewer pixels
+const MOST_STEP = 3; // every so many-th pixel, while a slider moves
 const by = (id) => document.getElementById(id);
 const stage = by("stage");
 if (stage) start();
@@ -51,7 +53,8 @@ class Relight {
     const step = Math.max(1, Math.floor((light.width * light.height) / SAMPLE));
     this.sample = this.#numbers(step);
     this.all = null;
-    this.controls = controlsOf(light, said, () => this.change());
+    this.step = 1;
+    this.controls = controlsOf(light, said, (control) => this.change(control));
     by("controls").replaceChildren(...this.controls.map((c) => c.element));
     for (const button of document.querySelectorAll("[data-preset]")) button.addEventListener("click", () => this.preset(button.dataset.preset));
     by("copy").addEventListener("click", () => navigator.clipboard?.writeText(by("command").textContent));
@@ -65,42 +68,72 @@ class Relight {
     return { albedo: numbers(planes.get("albedo"), step, 1), layers: this.names.map((name) => numbers(planes.get(name), step, 1 / scale)) };
   }
 
-  change() {
+  // control: the only one that moved, or none for several.
+  change(control) {
     stage.dataset.settled = "";
     by("command").textContent = commandOf(this.controls);
     lastState = this.controls;
     keepInAddress(this.controls, by("denoise").checked);
-    if (!this.waiting) this.waiting = requestAnimationFrame(() => this.#frame());
+    if (control !== this.moved) this.held = null;
+    this.moved = control;
     clearTimeout(this.settling);
-    this.settling = setTimeout(() => this.settle(), SETTLE_MS);
+    this.waiting ||= requestAnimationFrame((now) => this.#frame(now));
   }
 
   settle() {
+    clearTimeout(this.settling);
     this.all ??= this.#numbers(1);
-    this.#draw(this.all);
+    const { albedo, layers } = this.all;
+    const factors = factorsOf(this.controls, this.names);
+    const tone = toneOf(sumOf(layers, factors), albedo, this.light.tone);
+    this.#drawAll(factors, tone, 1);
+    this.held = null;
     stage.dataset.settled = "yes";
   }
 
-  #frame() {
+  // While a slider moves: fewer pixels tell the exposure, and what does not move is summed once.
+  #frame(now) {
     this.waiting = 0;
-    this.#draw(this.sample);
+    this.#chooseStep(now);
+    const { albedo, layers } = this.sample, { tone: fields, scale } = this.light;
+    if (this.moved) this.held ??= this.#hold(this.moved);
+    if (this.held) {
+      const factor = this.moved.factor(), { still, moving } = this.held;
+      const sum = still.map((v, i) => v + moving[i] * factor[i % 3]);
+      this.gl.drawHeld(factor, 1 / scale, toneOf(sum, albedo, fields), fields.preset === "released", this.step);
+    } else {
+      const factors = factorsOf(this.controls, this.names);
+      this.#drawAll(factors, toneOf(sumOf(layers, factors), albedo, fields), this.step);
+    }
+    // A slow machine must not take the time between two pictures for the end of a drag.
+    this.settling = setTimeout(() => this.settle(), Math.max(SETTLE_MS, 3 * (this.average ?? 0)));
   }
 
-  #draw({ albedo, layers }) {
-    const factors = factorsOf(this.controls, this.names);
-    const sum = new Float32Array(albedo.length);
-    layers.forEach((layer, k) => {
-      const [r, g, b] = factors.slice(3 * k, 3 * k + 3);
-      if (r === 0 && g === 0 && b === 0) return;
-      for (let i = 0; i < sum.length; i += 3) {
-        sum[i] += layer[i] * r;
-        sum[i + 1] += layer[i + 1] * g;
-        sum[i + 2] += layer[i + 2] * b;
-      }
-    });
-    const tone = toneOf(sum, albedo, this.light.tone);
+  #hold(control) {
+    const without = factorsOf(this.controls, this.names, new Map([[control.name, [0, 0, 0]]]));
+    const whole = factorsOf(this.controls, this.names, new Map([[control.name, [1, 1, 1]]]));
+    const moving = whole.map((f, k) => f - without[k]);
+    if (!this.gl.hold(Float32Array.from(without), Float32Array.from(moving), this.step)) return null;
+    const { layers } = this.sample;
+    return { still: sumOf(layers, without), moving: sumOf(layers, moving) };
+  }
+
+  // Pictures that come too slowly get fewer pixels; the last one always has all.
+  #chooseStep(now) {
+    const took = now - (this.before ?? -Infinity);
+    this.before = now;
+    if (took > 4 * SETTLE_MS) return; // a new drag
+    this.average = this.average === undefined ? took : 0.7 * this.average + 0.3 * took;
+    if (this.average > SLOW_MS && this.step < MOST_STEP) {
+      this.step++;
+      this.average = undefined;
+      this.held = null;
+    }
+  }
+
+  #drawAll(factors, tone, step) {
     const scaled = Float32Array.from(factors, (f) => f / this.light.scale);
-    this.gl.draw(scaled, tone, this.light.tone.preset === "released");
+    this.gl.draw(scaled, tone, this.light.tone.preset === "released", step);
   }
 
   preset(name) {
@@ -122,6 +155,21 @@ class Relight {
       setTimeout(() => URL.revokeObjectURL(link.href), 10000);
     }, "image/png");
   }
+}
+
+// The sum of layers as numbers, three factors of each.
+function sumOf(layers, factors) {
+  const sum = new Float32Array(layers[0].length);
+  layers.forEach((layer, k) => {
+    const [r, g, b] = factors.slice(3 * k, 3 * k + 3);
+    if (r === 0 && g === 0 && b === 0) return;
+    for (let i = 0; i < sum.length; i += 3) {
+      sum[i] += layer[i] * r;
+      sum[i + 1] += layer[i + 1] * g;
+      sum[i + 2] += layer[i + 2] * b;
+    }
+  });
+  return sum;
 }
 
 // A control of each light group and lamp: {name, flag, element, factor(), set(), isOne()}.
@@ -168,7 +216,7 @@ function controlOf(row, text, onChange) {
   for (const input of [slider, colour]) {
     input.addEventListener("input", () => {
       show();
-      onChange();
+      onChange(control);
     });
   }
   return control;
@@ -187,8 +235,9 @@ const linearOf = (hex) =>
   [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
 
 // Three factors of each layer, in the layers' order: a lamp's own times that of all lamps.
-function factorsOf(controls, names) {
-  const found = new Map(controls.map((c) => [c.name, c.factor()]));
+// others: name of a control -> factors that stand for its own.
+function factorsOf(controls, names, others = new Map()) {
+  const found = new Map(controls.map((c) => [c.name, others.get(c.name) ?? c.factor()]));
   return names.flatMap((name) => {
     if (name === "outdoor" || name === "indoor") return found.get(name);
     const own = found.get(name) ?? [1, 1, 1];
