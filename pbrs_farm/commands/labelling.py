@@ -8,7 +8,9 @@ from pathlib import Path
 from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, warn
 from pbrs_farm.core.errors import BadInput
 
-FORMS = ("coco", "hdf5", "webdataset", "released", "yolo")
+FORMS = (
+    "coco", "hdf5", "webdataset", "released", "yolo", "nerfstudio", "colmap", "tum", "kitti",
+)  # fmt: skip
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
 

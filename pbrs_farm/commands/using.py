@@ -23,6 +23,8 @@ def add_verbs(verb: Verb) -> None:
     p = verb("sheet", _sheet, text)
     p.add_argument("folder", type=Path)
     p.add_argument("--views", type=int, default=24, help="rows of the contact sheet (default 24)")
+    text = "films of the sequences too: <house>.mp4, and <house>_labels.mp4 with labels beside it"
+    p.add_argument("--video", action="store_true", help=text)
 
     p = verb(
         "verify",
@@ -56,7 +58,27 @@ def add_verbs(verb: Verb) -> None:
 
 def _sheet(args: argparse.Namespace) -> int:
     write_sheets(args.folder, args.views)
+    if args.video:
+        _write_films(args.folder)
     return 0
+
+
+def _write_films(folder: Path) -> None:
+    """Write the films of every sequence in an output folder and say where they are."""
+    from pbrs_farm.formats.output_folder import views_of
+    from pbrs_farm.gallery.walk_video import films_of, sequences_of
+    from pbrs_farm.store.folder import FolderStore
+
+    sequences = sequences_of(views_of(folder))
+    if not sequences:
+        hint = "pbrs-farm run HOME --cameras walk"
+        raise BadInput(folder, "", "no view is a frame of a sequence", hint=hint)
+    store = FolderStore(folder)
+    for house, frames in sequences.items():
+        for what, data in films_of(frames).items():
+            name = f"{house}.mp4" if what == "picture" else f"{house}_{what}.mp4"
+            store.put(name, data)
+            echo(str(folder / name))
 
 
 def write_sheets(folder: Path, max_views: int) -> None:

@@ -25,6 +25,7 @@ PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
 _MODES: Final = tuple(str(mode) for mode in Mode)
 _RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: only when it is named
 _BY_AREA: Final = (*_MODES, "albedo")
+_IN_PIXELS: Final = ("flow_", "disparity")  # what measures the picture's own pixels
 _LINES: Final = tuple(layer.name for layer in LAYERS if layer.name.startswith("boundary"))
 
 
@@ -142,6 +143,8 @@ def resized_layer(name: str, array: NDArray[Any], width: int, height: int) -> ND
     """A layer on another grid: pictures by area, lines kept whole, all else the nearest pixel."""
     if name in _BY_AREA:
         return resized_by_area(array, width, height)
+    if name.startswith(_IN_PIXELS):
+        return _with_scaled_pixels(name, resized_nearest(array, width, height), array.shape)
     if name not in _LINES:
         return resized_nearest(array, width, height)
     # A line's stronger value wins.
@@ -149,6 +152,20 @@ def resized_layer(name: str, array: NDArray[Any], width: int, height: int) -> ND
     for value in np.unique(array[array > 0]):
         lines[resized_any(array == value, width, height)] = value
     return lines
+
+
+def _with_scaled_pixels(name: str, resized: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """Flow or disparity on another grid than that of shape (H, W ...), in the new grid's pixels."""
+    scale = np.array([resized.shape[1] / shape[1], resized.shape[0] / shape[0]])
+    if name.endswith("_kitti"):
+        valid = resized[..., 2:] > 0
+        steps = np.rint((resized[..., :2] - 2.0**15) * scale) + 2**15
+        flow = np.where(valid, np.clip(steps, 0, 65535), 0)
+        return np.concatenate([flow, resized[..., 2:]], axis=-1).astype(resized.dtype)
+    if resized.ndim == 2:
+        steps = np.clip(np.rint(resized * scale[0]), 1, 65535)
+        return np.where(resized > 0, steps, 0).astype(resized.dtype)
+    return np.asarray(resized * scale, resized.dtype)
 
 
 def _instances_in(instance: NDArray[Any], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -16,9 +16,13 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, Shares, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.coco import write_coco
+from pbrs_farm.export.colmap import write_colmap
 from pbrs_farm.export.hdf5 import write_hdf5
+from pbrs_farm.export.kitti import write_kitti
+from pbrs_farm.export.nerfstudio import write_nerfstudio
 from pbrs_farm.export.new_folder import new_folder
 from pbrs_farm.export.released_layout import write_released
+from pbrs_farm.export.tum import write_tum
 from pbrs_farm.export.webdataset import write_webdataset
 from pbrs_farm.export.yolo import write_data_yaml, write_yolo
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
@@ -32,6 +36,10 @@ FORMS: Final[Mapping[str, Writer]] = {
     "webdataset": write_webdataset,
     "released": write_released,
     "yolo": write_yolo,
+    "nerfstudio": write_nerfstudio,
+    "colmap": write_colmap,
+    "tum": write_tum,
+    "kitti": write_kitti,
 }
 
 

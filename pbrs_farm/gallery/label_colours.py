@@ -66,6 +66,20 @@ def instance_colours(instance: NDArray[np.integer]) -> Srgb8Image:
     return np.asarray(np.rint(table).astype(np.uint8)[instance])
 
 
+def flow_colours(flow: NDArray[Any], most_px: float | None = None) -> Srgb8Image:
+    """(H, W, 3): hue = direction of (H, W, 2) motion, colourful = far; white = none.
+
+    most_px: what is shown at full colour; the 99th percentile of the picture when None.
+    """
+    length = np.linalg.norm(flow, axis=-1)
+    most = max(float(np.percentile(length, 99)), 0.5) if most_px is None else most_px
+    share = np.clip(length / most, 0, 1)[..., None]
+    # HSV to RGB with value 1: the hue's ring fades to white.
+    hue = np.arctan2(flow[..., 1], flow[..., 0]) / (2 * np.pi) % 1.0
+    ring = np.clip(np.abs((hue[..., None] * 6 + [0, 4, 2]) % 6 - 3) - 1, 0, 1)
+    return np.asarray(np.rint(255 * (1 - share * (1 - ring))), np.uint8)
+
+
 def normal_colours(normal_png: NDArray[Any]) -> Srgb8Image:
     """(H, W, 3) uint8 of a normal layer as stored (16-bit RGB); only the precision is lost."""
     if normal_png.dtype == np.uint8:

@@ -22,6 +22,7 @@ _IDS: Final = {"instance", "behind_glass_instance", "material", "nyu13", "class_
 _CLASSES: Final = {"semantic", "behind_glass_semantic"}
 _MASKS: Final = {
     "valid", "boundary", "glass", "boundary_occlusion", "boundary_semantic", "boundary_crease",
+    "occlusion_forward", "occlusion_backward", "occlusion_stereo",
 }  # fmt: skip
 _TITLES: Final = {
     "opengl_dl": "OpenGL, directional",
@@ -62,6 +63,12 @@ def shown_pixels(layer: str, data: bytes, place: str) -> Srgb8Image:
         return colours.depth_colours(stored)
     if layer == "depth_z":
         return colours.depth_colours(np.rint(np.nan_to_num(stored) * 1000).astype(np.int64))
+    if layer in ("flow_forward", "flow_backward"):
+        return colours.flow_colours(stored)
+    if layer.endswith("_kitti"):
+        return colours.flow_colours(np.where(stored[..., 2:] > 0, stored[..., :2] / 64 - 512, 0))
+    if layer == "disparity":  # near is large: turned round
+        return colours.depth_colours(np.where(stored > 0, 4_000_000 // np.maximum(stored, 1), 0))
     if layer == "position":
         return _position_colours(stored)
     if LAYER[layer].dtype == "uint16":  # normals

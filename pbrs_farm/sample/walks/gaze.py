@@ -27,6 +27,9 @@ _TILT_DEG: Final = (-4.0, 22.0)  # downwards, least and most
 _USUAL_TILT_DEG: Final = 8.0  # NYUv2's median (docs/cameras.md)
 _SIZE_M: Final = (0.15, 3.0)  # diagonal of a thing that is looked at
 _SEEN_SHARE: Final = 0.9  # of the way to a thing's middle that nothing may stand in
+_OPEN_M: Final = 3.0  # as far as anything need be
+_FAN_AZIMUTH: Final = np.radians([-24.0, -12.0, 0.0, 12.0, 24.0])
+_FAN_TILT: Final = np.radians([-8.0, 8.0, 24.0])
 _YAW_PART, _TILT_PART = 0.95, 0.3  # of the turn that is allowed: together below 1
 
 
@@ -120,8 +123,6 @@ def _chosen(
     rng: np.random.Generator,
 ) -> int | None:
     """The thing that is looked at from the place at, of those ahead and in sight; None without any."""
-    if not len(things.ids):
-        return None
     eye, heading = walker.eyes[at], walker.heading[at]
     to = things.middles - eye
     level = np.linalg.norm(to[:, [0, 2]], axis=1)
@@ -129,11 +130,27 @@ def _chosen(
     near = (level >= _DISTANCE_M[0]) & (level <= _DISTANCE_M[1])
     candidates = np.flatnonzero(ahead & near)
     candidates = candidates[_in_sight(eye, candidates, things, geometry, first_hit)]
-    if not len(candidates):
-        return None
-    # What was looked at lately draws the eye less.
-    weights = things.weights[candidates] * np.where(np.isin(candidates, looked_at[-4:]), 0.05, 1.0)
-    return int(rng.choice(candidates, p=weights / weights.sum()))
+    # What was looked at lately draws the eye less, and a wall close before it least of all.
+    seen_lately = np.isin(candidates, looked_at[-4:])
+    weights = things.weights[candidates] * np.where(seen_lately, 0.05, 1.0)
+    towards = np.concatenate([to[candidates][:, [0, 2]], heading[None]])
+    weights = np.append(weights, 1.0) * _openness(eye, towards, first_hit)
+    # The last of them is the way ahead.
+    chosen = int(rng.choice(len(weights), p=weights / weights.sum()))
+    return None if chosen == len(candidates) else int(candidates[chosen])
+
+
+def _openness(eye: F64, towards: F64, first_hit: FirstHit) -> F64:
+    """(N,) from near 0 to 1: how far one sees, by the median of a fan of rays about directions (N, 2)."""
+    azimuth = np.arctan2(towards[:, 1], towards[:, 0])[:, None, None] + _FAN_AZIMUTH[:, None]
+    tilt = np.broadcast_to(_FAN_TILT, azimuth.shape[:2] + _FAN_TILT.shape)
+    azimuth = np.broadcast_to(azimuth, tilt.shape)
+    rays = np.stack(
+        [np.cos(tilt) * np.cos(azimuth), -np.sin(tilt), np.cos(tilt) * np.sin(azimuth)], axis=-1
+    ).reshape(-1, 3)
+    t, _face = first_hit(np.broadcast_to(eye, rays.shape), rays)
+    distance = np.minimum(t, _OPEN_M).reshape(len(towards), -1)
+    return np.asarray(np.maximum(np.median(distance, axis=1) / _OPEN_M, 0.05) ** 3)
 
 
 def _in_sight(

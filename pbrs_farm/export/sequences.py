@@ -1,0 +1,62 @@
+"""Views that belong together, for the exports of sequences: by house, in time, with their right views; pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.export.chosen_view import ChosenView
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One moment of a house: the left view, and the right one where there is a pair."""
+
+    left: ChosenView
+    right: ChosenView | None = None
+
+    @property
+    def time_s(self) -> float | None:
+        """None of a view that is no frame."""
+        time = self.left.facts.get("time_s")
+        return None if time is None else float(time)
+
+
+def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[Frame]]:
+    """House id -> its frames by number, then the views that are none by id; right views by their left."""
+    rights = {(v.house.id, v.facts["left"]): v for v in views if v.facts.get("left")}
+    frames: dict[str, list[Frame]] = {}
+    for view in views:
+        if not view.facts.get("left"):
+            right = rights.get((view.house.id, view.id))
+            frames.setdefault(view.house.id, []).append(Frame(view, right))
+
+    def order(frame: Frame) -> tuple[float, str]:
+        return float(frame.left.facts.get("frame", float("inf"))), frame.left.id
+
+    return {house: sorted(own, key=order) for house, own in frames.items()}
+
+
+def pose_opencv(view: ChosenView) -> F64:
+    """(4, 4) world from camera, axes x right, y down, z forward."""
+    return np.array(view.facts["world_from_camera_opencv"], np.float64)
+
+
+def tum_row(time_s: float, world_from_camera: F64) -> str:
+    """`t x y z qx qy qz qw` of an OpenCV pose, w not negative."""
+    quaternion = Rotation.from_matrix(world_from_camera[:3, :3]).as_quat(canonical=True)
+    numbers = [*world_from_camera[:3, 3], *quaternion]
+    return f"{time_s:.6f} " + " ".join(f"{v:.9g}" for v in numbers)
+
+
+def required_picture(view: ChosenView, form: str) -> str:
+    """The mode of the view's picture; BadInput where it has none."""
+    if view.picture is None:
+        hint = "run it with --modes, or export labels in another form"
+        raise BadInput(f"{view.house.id}/{view.id}", "", f"{form} needs a picture", hint=hint)
+    return view.picture

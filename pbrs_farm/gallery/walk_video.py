@@ -1,0 +1,137 @@
+"""A sequence of frames as mp4 films: the picture, and its labels beside it; the only user of PyAV.
+
+Effects: reads picture files, keeps a film in memory while it is coded.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.export.chosen_view import PICTURES
+from pbrs_farm.formats.layer_file import layer_from_bytes
+from pbrs_farm.formats.output_folder import ViewEntry
+from pbrs_farm.gallery import label_colours as colours
+from pbrs_farm.installation import need
+from pbrs_farm.regular_files import read_regular
+
+_QUALITY: Final = "20"  # H.264's constant rate factor: visually clean
+_LABELS: Final = ("depth", "normal", "semantic", "instance", "flow_forward")
+_DEFAULT_FPS: Final = 30.0
+
+
+def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
+    """House id -> the left frames of its sequence in their order; houses without any are left out."""
+    found: dict[str, list[ViewEntry]] = {}
+    for view in views:
+        if view.facts.get("frame") is not None and not view.facts.get("left"):
+            found.setdefault(view.house.id, []).append(view)
+    return {house: sorted(own, key=lambda v: int(v.facts["frame"])) for house, own in found.items()}
+
+
+def films_of(frames: Sequence[ViewEntry]) -> dict[str, bytes]:
+    """ "picture" and "labels" -> an mp4 file: the frames' picture alone, and beside its labels.
+
+    Raises BadInput where a frame has no picture, MachineFailed without PyAV.
+    """
+    need("av")
+    fps = _fps(frames)
+    picture = _mode(frames[0])
+    depth_m = _depth_range(frames)
+    return {
+        "picture": film((_photo(f, picture) for f in frames), fps),
+        "labels": film((_beside(f, picture, depth_m) for f in frames), fps),
+    }
+
+
+def film(pictures: Iterator[Srgb8Image], fps: Fraction) -> bytes:
+    """An mp4 file (H.264, 4:2:0) of pictures (H, W, 3) of one size; an odd row or column is cut off."""
+    import av
+
+    buffer = io.BytesIO()
+    with av.open(buffer, "w", format="mp4") as container:
+        stream: Any = None
+        for rgb in pictures:
+            height, width = (n // 2 * 2 for n in rgb.shape[:2])
+            if stream is None:
+                stream = container.add_stream("libx264", rate=fps)
+                stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+                # One thread: the same frames give the same file.
+                stream.options = {"crf": _QUALITY, "threads": "1"}
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(rgb[:height, :width]), "rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode() if stream is not None else [])
+    return buffer.getvalue()
+
+
+def _fps(frames: Sequence[ViewEntry]) -> Fraction:
+    """Frames a second by the times of the first and last; a film has one pace."""
+    times = [float(f.facts["time_s"]) for f in (frames[0], frames[-1])]
+    span = int(frames[-1].facts["frame"]) - int(frames[0].facts["frame"])
+    pace = span / (times[1] - times[0]) if times[1] > times[0] else _DEFAULT_FPS
+    return Fraction(pace).limit_denominator(1001)
+
+
+def _mode(frame: ViewEntry) -> str:
+    for mode in PICTURES:
+        if frame.file(f"{mode}.png") is not None:
+            return str(mode)
+    raise BadInput(
+        frame.folder, "", "has no picture to film", hint="pbrs-farm run --modes opengl_il"
+    )
+
+
+def _layer(frame: ViewEntry, name: str) -> Any:
+    path = frame.file(LAYER[name].file)
+    if path is None:
+        return None
+    return layer_from_bytes(name, read_regular(path), str(path))
+
+
+def _photo(frame: ViewEntry, mode: str) -> Srgb8Image:
+    rgb = _layer(frame, mode)
+    if rgb is None:
+        raise BadInput(frame.folder, f"{mode}.png", "is missing", hint="finish the run first")
+    return np.asarray(rgb[..., :3], np.uint8)
+
+
+def _depth_range(frames: Sequence[ViewEntry]) -> tuple[float, float]:
+    """Near and far end of the scale of depth for the whole film, so that it does not flicker."""
+    ranges = []
+    for frame in frames[:: max(len(frames) // 10, 1)]:
+        depth = _layer(frame, "depth")
+        if depth is not None:
+            ranges.append(colours.depth_range_m(depth))
+    return min((r[0] for r in ranges), default=0.0), max((r[1] for r in ranges), default=1.0)
+
+
+def _beside(frame: ViewEntry, mode: str, depth_m: tuple[float, float]) -> Srgb8Image:
+    """The picture and its labels as tiles, three a row."""
+    picture = _photo(frame, mode)
+    tiles = [picture]
+    for name in _LABELS:
+        stored = _layer(frame, name)
+        tiles.append(
+            np.full_like(picture, 255) if stored is None else _shown(name, stored, depth_m)
+        )
+    rows = [np.concatenate(tiles[k : k + 3], axis=1) for k in range(0, len(tiles), 3)]
+    return np.concatenate(rows, axis=0)
+
+
+def _shown(name: str, stored: Any, depth_m: tuple[float, float]) -> Srgb8Image:
+    if name == "depth":
+        return colours.depth_colours(stored, *depth_m)
+    if name == "normal":
+        return colours.normal_colours(stored)
+    if name == "semantic":
+        return colours.semantic_colours(stored)
+    if name == "instance":
+        return colours.instance_colours(stored)
+    return colours.flow_colours(stored, 0.02 * stored.shape[1])

@@ -1,0 +1,140 @@
+"""A walk in stereo in the forms that SLAM, reconstruction and stereo tools read."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.export.chosen_view import Choice, resized_layer
+from pbrs_farm.export.export_views import export
+from pbrs_farm.formats.output_folder import views_of
+from pbrs_farm.images import array_from_png
+from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.plan import wanted
+from pbrs_farm.sample.walks.trajectory_file import poses_from_tum
+from tests.check.roots import make_root
+
+LAYERS = ["flow_forward", "occlusion_forward", "disparity", "occlusion_stereo"]
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("walk")
+    fields = {
+        "image.width_px": "64", "image.height_px": "48", "cameras.source": "walk",
+        "cameras.walk_frames": "3", "cameras.walk_fps": "5", "cameras.stereo_m": "0.065",
+    }  # fmt: skip
+    recipe = recipe_from_name("preview", fields)
+    summary = run_local(Run(["builtin"], str(out), recipe, wanted(["opengl_dl"], LAYERS)))
+    assert summary.failures == []
+    return out
+
+
+def facts_of(root: Path, view: str) -> dict:
+    return next(v.facts for v in views_of(root) if v.id == view)
+
+
+def only(folder: Path) -> Path:
+    return next(p for p in folder.iterdir() if p.is_dir())
+
+
+def test_nerfstudios_poses_turn_the_home_to_z_up(root: Path, tmp_path: Path) -> None:
+    n_views, n_files = export(root, tmp_path / "x", "nerfstudio")
+    house = only(tmp_path / "x")
+    assert (n_views, n_files) == (6, 13)
+    transforms = json.loads((house / "transforms.json").read_text())
+    turn = np.array([*transforms["applied_transform"], [0, 0, 0, 1]])
+    assert len(transforms["frames"]) == 6
+    for frame in transforms["frames"]:
+        facts = facts_of(root, Path(frame["file_path"]).stem)
+        pose = turn @ np.array(facts["world_from_camera_opengl"])
+        np.testing.assert_allclose(frame["transform_matrix"], pose, atol=1e-12)
+        assert (house / frame["file_path"]).is_file()
+        assert (house / frame["depth_file_path"]).is_file()
+    # The eye's height is the third coordinate.
+    assert 1.4 < transforms["frames"][0]["transform_matrix"][2][3] < 1.7
+
+
+def test_colmaps_points_project_to_the_pixels_they_came_from(root: Path, tmp_path: Path) -> None:
+    export(root, tmp_path / "x", "colmap")
+    sparse = only(tmp_path / "x") / "sparse/0"
+    rows = (sparse / "images.txt").read_text().split("\n\n")
+    number, *pose, camera, name = rows[0].split()
+    assert (number, camera, name) == ("1", "1", "frame_00000.png")
+    model = (sparse / "cameras.txt").read_text().split()
+    assert model[1:4] == ["PINHOLE", "64", "48"]
+    fx, fy, cx, cy = map(float, model[4:])
+    # The first points are those of the first view, in the rows of a grid.
+    first = np.array((sparse / "points3D.txt").read_text().split("\n")[0].split()[1:4], float)
+    from scipy.spatial.transform import Rotation
+
+    w, x, y, z = map(float, pose[:4])
+    local = Rotation.from_quat([x, y, z, w]).apply(first) + np.array(pose[4:], float)
+    pixel = fx * local[0] / local[2] + cx, fy * local[1] / local[2] + cy
+    assert pixel == pytest.approx((8.5, 8.5), abs=0.05)
+
+
+def test_tums_trajectory_is_read_back_as_the_same_poses(root: Path, tmp_path: Path) -> None:
+    export(root, tmp_path / "x", "tum")
+    house = only(tmp_path / "x")
+    poses = poses_from_tum((house / "groundtruth.txt").read_text(), "groundtruth.txt")
+    assert [p.time_s for p in poses] == pytest.approx([0.0, 0.2, 0.4])
+    stored = facts_of(root, "frame_00001")["world_from_camera_opengl"]
+    np.testing.assert_allclose(poses[1].world_from_camera, stored, atol=1e-7)
+    time, file = (house / "depth.txt").read_text().split("\n")[1].split()
+    assert float(time) == pytest.approx(0.2)
+    depth = array_from_png((house / file).read_bytes())
+    view = next(v for v in views_of(root) if v.id == "frame_00001")
+    millimetres = array_from_png((view.folder / "depth.png").read_bytes())
+    np.testing.assert_array_equal(depth, millimetres.astype(int) * 5)
+
+
+def test_kittis_maps_are_in_its_steps_and_noc_leaves_out_what_is_hidden(
+    root: Path, tmp_path: Path
+) -> None:
+    export(root, tmp_path / "x", "kitti")
+    out = tmp_path / "x"
+    index = [line.split() for line in (out / "index.txt").read_text().splitlines()]
+    assert [row[2] for row in index] == [f"frame_{k:05d}" for k in range(3)]
+    occ, noc = (
+        array_from_png((out / f"disp_{n}_0/000000_10.png").read_bytes()) for n in ("occ", "noc")
+    )
+    assert (occ > 0).sum() > (noc > 0).sum() > 0
+    np.testing.assert_array_equal(noc[noc > 0], occ[noc > 0])
+    flow = array_from_png((out / "flow_noc/000000_10.png").read_bytes())
+    assert set(np.unique(flow[..., 2])) == {0, 1}
+    assert (out / "image_2/000000_11.png").read_bytes() == (
+        out / "image_2/000001_10.png"
+    ).read_bytes()
+    assert not (out / "image_2/000002_11.png").exists()
+    assert not (out / "flow_occ/000002_10.png").exists()
+    p2, p3 = (out / "calib/000000.txt").read_text().strip().split("\n")
+    left, right = (np.array(p.split()[1:], float).reshape(3, 4) for p in (p2, p3))
+    assert (left - right)[0, 3] == pytest.approx(left[0, 0] * 0.065)
+
+
+@pytest.mark.parametrize(
+    ("form", "reason"), [("tum", "no view is a frame"), ("kitti", "no view has flow or disparity")]
+)
+def test_views_that_belong_to_no_sequence_are_refused(
+    form: str, reason: str, tmp_path: Path
+) -> None:
+    make_root(tmp_path / "root")
+    with pytest.raises(BadInput, match=reason):
+        export(tmp_path / "root", tmp_path / "x", form, choice=Choice())
+
+
+def test_flow_and_disparity_are_measured_in_the_pixels_of_the_new_size() -> None:
+    flow = np.full((4, 8, 2), 6.0, np.float32)
+    np.testing.assert_array_equal(resized_layer("flow_forward", flow, 4, 4)[0, 0], [3.0, 6.0])
+    kitti = np.full((4, 8, 3), 2**15 + 64, np.uint16)
+    kitti[..., 2] = 1
+    assert resized_layer("flow_forward_kitti", kitti, 4, 4)[0, 0].tolist() == [
+        2**15 + 32,
+        2**15 + 64,
+        1,
+    ]
+    assert resized_layer("disparity", np.full((4, 8), 512, np.uint16), 4, 4)[0, 0] == 256
