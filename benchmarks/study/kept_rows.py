@@ -13,7 +13,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-FOLDER = Path("out/study/bench")
+from benchmarks.study.rendered import FOLDER
+
+BENCH = FOLDER / "bench"
 _SOURCES = ("pbrs_farm/study", "benchmarks/study")
 
 Figures = dict[str, float]
@@ -24,7 +26,7 @@ def folder_of_code() -> Path:
     sha = hashlib.sha256()
     for path in sorted(p for source in _SOURCES for p in Path(source).rglob("*.py")):
         sha.update(f"{path}\n".encode() + path.read_bytes())
-    return FOLDER / sha.hexdigest()[:12]
+    return BENCH / sha.hexdigest()[:12]
 
 
 def kept(folder: Path, name: str, measure: Callable[[], Figures]) -> tuple[Figures, float]:

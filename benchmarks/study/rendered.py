@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
+from typing import Final
 
 import pbrs_farm.cli
 
-FOLDER = Path("out/study")
+FOLDER = Path(os.environ.get("PBRS_STUDY_FOLDER", "out/study"))
 HOMES = (
     "Studio", "1BedroomApartmentWithRoundWall", "2BedroomApartment",
     "2BedroomApartmentWithBowWindow", "2BedroomHouseWithBasement", "3BedroomApartment",
@@ -16,11 +18,22 @@ HOMES = (
 HELD_OUT = ("studio", "2bedroomapartment", "3bedroomhousewithattic")
 """Homes that never train: a small one, a middling one, a large one."""
 
+# The modes of Metropolis come from one trace, those of OpenGL cost a hundredth of it: all four.
+_MODES: Final = ("--modes", "mlt_il_ol", "opengl_dl", "mlt_ol", "opengl_il")
+_OF_HOMES: Final = (*_MODES, "--views", "45")
+ROOTS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
+    "bare_fast": (HOMES, ("--set", "cameras.preset=paper", *_OF_HOMES)),
+    "bare_photo": (HOMES, _OF_HOMES),
+    "dressed": (HOMES, ("--dress", "1", *_OF_HOMES)),
+    "made": (("made:1..15",), ("--dress", "1", *_MODES, "--views", "20")),
+}
+"""Name -> homes, and the words of `run` behind them: about 1,500 views in all."""
 
-def rendered(name: str, homes: tuple[str, ...], *words: str, size: str = "160x120") -> Path:
-    """out/study/<name>: homes by recipe preview; what stands there already is kept."""
-    out = FOLDER / name
-    line = ["run", *homes, "--recipe", "preview", "--size", size, "--jobs", "2", *words]
+
+def rendered(name: str, *, jobs: int = 2) -> Path:
+    """out/study/<name>: its homes by recipe preview at 160x120; what stands there already is kept."""
+    (homes, words), out = ROOTS[name], FOLDER / name
+    line = ["run", *homes, "--recipe", "preview", "--size", "160x120", "--jobs", str(jobs), *words]
     # A view that fails costs that view; the others train.
     code = pbrs_farm.cli.main([*line, "--out", str(out)])
     if code:

@@ -27,7 +27,7 @@ from benchmarks.study.kept_rows import Figures, folder_of_code, kept
 from benchmarks.study.lived_in import RUNS
 from benchmarks.study.loading import UNITS as LOADING_UNITS
 from benchmarks.study.loading import loading_figures
-from benchmarks.study.rendered import HELD_OUT, HOMES, rendered
+from benchmarks.study.rendered import FOLDER, HELD_OUT, rendered
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.metrics.edge_matching import n_matched
 from pbrs_farm.study.metrics.edge_scores import edge_counts
@@ -58,7 +58,7 @@ _OVERFIT = {
 }  # fmt: skip
 # HED at the views' own size: about ten minutes.
 _HED = {"network": "hed", "steps": "250", "rate": "3e-5", "gain": "0.2", "gamma": "0.2"}
-_PACKAGES = Path("out/study/packages")
+_PACKAGES = FOLDER / "packages"
 
 
 def main() -> None:
@@ -91,7 +91,7 @@ def main() -> None:
 @cache
 def _root() -> Path:
     """Nine bare homes; about ten minutes of two cores where they are not rendered yet."""
-    return rendered("bare_photo", HOMES, "--modes", "mlt_il_ol", "--views", "45")
+    return rendered("bare_photo")
 
 
 def _trained(

@@ -7,7 +7,7 @@ Arrays of 8 bits are PNGs that zlib and numpy undo, colour a JPEG where it was p
 from __future__ import annotations
 
 import io
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -48,17 +48,18 @@ def part_of_array(name: str, mode: str, parts: Collection[str]) -> str:
     return f"{mode}.jpg" if f"{mode}.jpg" in parts else f"{mode}.png"
 
 
-def array_of_part(name: str, part: str, data: bytes, place: str) -> NDArray[Any]:
-    """The array of that name in a part; BadInput, naming place, where it is damaged."""
+def arrays_of_part(names: Sequence[str], part: str, data: bytes, place: str) -> Stored:
+    """The arrays of those names in a part; BadInput, naming place, where it is damaged."""
     if part.endswith(".npz"):
         arrays = arrays_of_npz(data, place)
-        if name not in arrays:
-            raise BadInput(place, "", f"has no array {name}")
-        return arrays[name]
+        for name in names:
+            if name not in arrays:
+                raise BadInput(place, "", f"has no array {name}")
+        return {name: arrays[name] for name in names}
     array = _jpeg_array(data, place) if part.endswith(".jpg") else array_of_rows(data, place)
     if array is None:
         raise BadInput(place, "", "a PNG of another program", hint="`pbrs-farm pack` writes shards")
-    return array
+    return dict.fromkeys(names, array)
 
 
 def _jpeg_array(data: bytes, place: str) -> NDArray[np.uint8]:

@@ -21,8 +21,9 @@ from pbrs_farm.study.reading.dataset_json import (
     Shard,
     dataset_from_json,
 )
-from pbrs_farm.study.reading.packed_parts import array_of_part, part_of_array
+from pbrs_farm.study.reading.packed_parts import arrays_of_part, part_of_array
 from pbrs_farm.study.reading.stored_layers import (
+    Stored,
     ViewFacts,
     array_names,
     checked_array,
@@ -113,10 +114,14 @@ class ShardSet:
             text = f"{len(opened.views)} views, {shard.n_views} were packed"
             raise BadInput(opened.place, "", text, hint="copy or pack it again")
         facts = self._facts_at(opened, view)
-        arrays = {
-            name: self._array(opened, view, name, request, facts)
-            for name in array_names(request.layers)
-        }
+        # A part may hold several arrays: read it once.
+        held = opened.views[view]
+        names_of: dict[str, list[str]] = {}
+        for name in array_names(request.layers):
+            names_of.setdefault(part_of_array(name, request.mode, held), []).append(name)
+        arrays: Stored = {}
+        for part, names in names_of.items():
+            arrays |= self._arrays(opened, view, part, names, facts)
         return sample_of_stored(facts, arrays, request)
 
     def refs(self) -> tuple[ViewRef, ...]:
@@ -167,13 +172,12 @@ class ShardSet:
         packed = self._at[ref][0].split
         return split_of_house(ref.house, shares) if shares or packed == WHOLE else packed
 
-    def _array(
-        self, opened: OpenShard, view: int, name: str, request: Request, facts: ViewFacts
-    ) -> NDArray[Any]:
-        part = part_of_array(name, request.mode, opened.views[view])
+    def _arrays(
+        self, opened: OpenShard, view: int, part: str, names: list[str], facts: ViewFacts
+    ) -> Stored:
         place = f"{opened.place}: {facts.id}.{part}"
-        array = array_of_part(name, part, opened.bytes_of(view, part), place)
-        return checked_array(name, array, facts.size, place)
+        arrays = arrays_of_part(names, part, opened.bytes_of(view, part), place)
+        return {name: checked_array(name, arrays[name], facts.size, place) for name in names}
 
     def _facts_at(self, opened: OpenShard, view: int) -> ViewFacts:
         return facts_from_json(self._table_at(opened, view), f"{opened.place}: view {view}")
