@@ -17,19 +17,13 @@ from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.likeness import NYUV2_SHARES
 from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.photo_score import item_roles, photo_shares
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE, overlap
 
 PRESETS = {"paper": "paper", "photo": "fast"}
 """Name in the figures -> the recipe whose cameras are taken."""
-
-NYUV2_SHARES = {
-    "wall": 0.235, "furniture": 0.139, "objects": 0.121, "floor": 0.098, "window": 0.051,
-    "bed": 0.041, "table": 0.035, "chair": 0.033, "sofa": 0.031, "picture": 0.022,
-    "ceiling": 0.013, "books": 0.007,
-}  # fmt: skip
-"""Shares of pixels over NYUv2's 1,449 labelled frames, unlabelled pixels counted."""
 
 NEAR_M, TWIN, LEAST_ROOM_M2 = 1.5, 0.8, 4.0
 SIZE = (160, 120)
@@ -64,21 +58,19 @@ def _content(
     padded[:, : counts.shape[1]] = counts
     depth = caster.depth_pictures([v.camera.with_size(*DEPTH_SIZE) for v in views])
     seen = photo_shares(padded, depth.reshape(len(views), -1), roles, 0.01)
-    classes = np.zeros((len(views), len(NYU13_NAMES)))
-    np.add.at(classes.T, roles.nyu13, (padded / padded.sum(1, keepdims=True)).T)
     rows = [
         {
             "openings": float(seen.opening[k]),
             "furniture": float(seen.furniture[k]),
             "median_m": float(seen.median_m[k]),
             "floor": float(seen.floor[k]),
-            "classes": int((classes[k, 1:] > 0).sum()),
+            "classes": int((seen.nyu13[k, 1:] > 0).sum()),
             "objects": int(seen.n_objects[k]),
             "tilt_deg": float(np.degrees(np.arcsin(-views[k].camera.towards[1]))),
         }
         for k in range(len(views))
     ]
-    return rows, classes
+    return rows, seen.nyu13
 
 
 def _twins(caster: Caster, views: list[View]) -> int:

@@ -108,6 +108,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
         "min_score",
         "min_room_score",
         "hfov_spread",
+        "likeness",
         "walk_frames",
         "walk_fps",
         "walk_speed_mps",
@@ -133,6 +134,7 @@ _PHOTO: Mapping[str, Any] = {
     "max_opening_fraction": 0.35,
     "min_score": 0.8,
     "min_room_score": 0.2,
+    "likeness": 3.0,
     "hfov_rad": 1.0472,
     "hfov_spread": 0.1,
 }

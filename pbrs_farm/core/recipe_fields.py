@@ -121,6 +121,13 @@ class CameraFields(FieldGroup):
     min_room_score: float = Field(
         0.0, ge=0, le=2, description="photo: but a room's best view stays from here on"
     )
+    likeness: float = Field(
+        0.0,
+        ge=0,
+        le=100,
+        description="photo: weight, beside the score, of how near the class shares of all views are to"
+        " NYUv2's; 0 = off",
+    )
     hfov_rad: float = Field(2 * 0.5534, gt=0, lt=3.1, description="full horizontal field of view")
     hfov_spread: float = Field(
         0.0, ge=0, le=0.3, description="photo: part by which the focal length varies, either way"

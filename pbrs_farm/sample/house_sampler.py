@@ -12,7 +12,8 @@ from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import CameraReport, RoomReport, total_rejected
 from pbrs_farm.sample.eye_probes import Counter
-from pbrs_farm.sample.photo_sampler import PhotoSampler, RoomCandidates, room_report
+from pbrs_farm.sample.photo_sampler import PhotoSampler, room_report
+from pbrs_farm.sample.room_candidates import RoomCandidates
 from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
 from pbrs_farm.sample.stored_cameras import stored_views
 from pbrs_farm.sample.view_overlap import DepthOf

@@ -1,8 +1,7 @@
 """Views as a person would photograph a home: the preset `photo`; no effects of its own.
 
 Candidates are the paper's (one a grid cell and sector), held as people hold cameras. Each gets
-the score of photo_score.py from a small picture; the best of each sector is kept unless it is
-weak, or shows what a better view of the home shows already.
+the score of photo_score.py from a small picture; photo_choice.py chooses among those of all rooms.
 """
 
 from __future__ import annotations
@@ -10,48 +9,22 @@ from __future__ import annotations
 import collections
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import RoomReport, SectorReport
-from pbrs_farm.sample.candidates import Candidates, grid_candidates
+from pbrs_farm.sample.candidates import grid_candidates
 from pbrs_farm.sample.eye_probes import Counter, counted
 from pbrs_farm.sample.paper_rules import rejections, room_grid
+from pbrs_farm.sample.photo_choice import PhotoChoice
 from pbrs_farm.sample.photo_score import PhotoShares, item_roles, photo_score, photo_shares
 from pbrs_farm.sample.rejection import REJECTIONS, Verdict
-from pbrs_farm.sample.view_overlap import DEPTH_SIZE, DepthOf, overlap
-
-MOST_OVERLAP: Final = 0.8
-"""A view that shares more than this with a better one is its twin."""
-
-_TRIES: Final = 12
-"""Candidates of a sector that are asked, best first, before the sector is given up as a twin."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RoomCandidates:
-    """A room's candidates with the rule that rejected each, and the score of the others.
-
-    verdict: (N,) uint8 of Verdict. score: (N,) float64, -inf where a rule rejected it.
-    """
-
-    room: Room
-    candidates: Candidates
-    verdict: NDArray[np.uint8]
-    score: F64
-
-    def ranked(self, sector: int) -> NDArray[np.intp]:
-        """Numbers of a sector's candidates that no rule rejected, best first."""
-        mine = (self.candidates.sector == sector) & np.isfinite(self.score)
-        which = np.flatnonzero(mine)
-        return which[np.argsort(-self.score[which], kind="stable")]
+from pbrs_farm.sample.room_candidates import RoomCandidates
+from pbrs_farm.sample.view_overlap import DEPTH_SIZE, DepthOf
 
 
 @dataclass(slots=True, eq=False)
@@ -84,62 +57,14 @@ class PhotoSampler:
         score[eligible] = np.where(
             verdict[eligible] == Verdict.LOWER_SCORE, photo_score(seen), -np.inf
         )
-        return RoomCandidates(room, candidates, verdict, score)
+        nyu13 = np.zeros((len(candidates), seen.nyu13.shape[1]))
+        nyu13[eligible] = seen.nyu13
+        return RoomCandidates(room, candidates, verdict, score, nyu13)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
-        """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
-
-        Sectors take turns by their best score, over all rooms, so that of two twins the better
-        one stays.
-        """
-        # Let every sector that has a candidate take its turn, the best first.
-        turns = [
-            (-scored.score[ranked[0]], scored, sector)
-            for scored in rooms
-            for sector in range(self.fields.n_sectors)
-            if len(ranked := scored.ranked(sector))
-        ]
-        turns.sort(key=lambda turn: turn[0])
-        # Give each its views, compared with those of all rooms that are taken already.
-        taken: list[tuple[Camera, F32]] = []
-        chosen: dict[tuple[str, int], list[int]] = {}
-        with_view: set[str] = set()
-        for _key, scored, sector in turns:
-            found = self._take(scored, sector, taken, is_first=scored.room.id not in with_view)
-            chosen[scored.room.id, sector] = found
-            if found:
-                with_view.add(scored.room.id)
-        return chosen
-
-    def _take(
-        self,
-        scored: RoomCandidates,
-        sector: int,
-        taken: list[tuple[Camera, F32]],
-        *,
-        is_first: bool,
-    ) -> list[int]:
-        f, found = self.fields, list[int]()
-        ranked = scored.ranked(sector)
-        # A room's first view, its best, may be weaker than the others.
-        weak = scored.score[ranked] < f.min_score
-        if is_first and scored.score[ranked[0]] >= f.min_room_score:
-            weak[0] = False
-        scored.verdict[ranked[weak]] = Verdict.WEAK
-        # Try the others from the best down; leave out what a view taken before shows.
-        small = self._intrinsics(*DEPTH_SIZE)
-        for number in ranked[~weak][: _TRIES * f.per_sector].tolist():
-            camera = scored.candidates.cameras(np.array([number]), small)[0]
-            depth = self.depth_of([camera])[0]
-            if any(overlap(camera, depth, *other) > MOST_OVERLAP for other in taken):
-                scored.verdict[number] = Verdict.TWIN
-                continue
-            taken.append((camera, depth))
-            scored.verdict[number] = Verdict.WINNER
-            found.append(number)
-            if len(found) == f.per_sector:
-                break
-        return found
+        """(room id, sector) -> numbers of the chosen candidates; writes their verdicts."""
+        choice = PhotoChoice(self.fields, self._intrinsics(*DEPTH_SIZE), self.depth_of)
+        return choice.choose(rooms)
 
     def views(self, scored: RoomCandidates, sector: int, chosen: list[int]) -> list[View]:
         """The chosen candidates of a sector as views, at the scoring size."""
@@ -186,6 +111,8 @@ def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) ->
     tally = collections.Counter(verdict.tolist())
     refused = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
     ranked = scored.ranked(sector)
+    winners = np.flatnonzero(scored.verdict[ranked] == Verdict.WINNER)
+    others = scored.score[np.delete(ranked, winners[:1] if len(winners) else slice(0, 1))]
     most = ", ".join(
         f"{n} {rule.replace('_', ' ')}" for rule, n in sorted(refused.items(), key=lambda p: -p[1])
     )
@@ -197,7 +124,7 @@ def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) ->
         n_rescored=0,
         views=tuple(view.id for view in views),
         winner_score=views[0].score if views else None,
-        runner_up_score=round(float(scored.score[ranked[1]]), 4) if len(ranked) > 1 else None,
+        runner_up_score=round(float(others[0]), 4) if len(others) else None,
         reason="" if views else f"every candidate was rejected: {most}",
     )
 

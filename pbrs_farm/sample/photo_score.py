@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I64, Bools
-from pbrs_farm.core.classes import DOOR, NYU13_FROM_NYU40, NYU40_NAMES, WINDOW
+from pbrs_farm.core.classes import DOOR, NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES, WINDOW
 from pbrs_farm.core.house import House, Item, ItemKind
 
 # NYU40 classes of what hangs at openings or is built in: no furniture.
@@ -54,6 +54,7 @@ class PhotoShares:
 
     largest: of the one largest piece of furniture. wall: of the largest wall. n_objects: pieces
     that cover the least share. n_classes: NYU13 classes seen. median_m: median planar depth.
+    nyu13: (N, 14) of each class, column 0 of what has none.
     """
 
     furniture: F64
@@ -64,6 +65,7 @@ class PhotoShares:
     n_objects: I64
     n_classes: I64
     median_m: F64
+    nyu13: F64
 
 
 def item_roles(house: House) -> ItemRoles:
@@ -89,9 +91,7 @@ def photo_shares(
     # Turn pixels into shares, of instances and of classes.
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
     share = counts / pixels[:, None]
-    classes = np.zeros((len(counts), 14))
-    for k in range(1, 14):
-        classes[:, k] = share[:, roles.nyu13 == k].sum(1)
+    classes = np.stack([share[:, roles.nyu13 == k].sum(1) for k in range(len(NYU13_NAMES))], 1)
     # Take the median depth of what is not nothing; a picture of nothing has 0.
     seen = np.where(depth_m > 0, depth_m, np.nan)
     median = np.zeros(len(counts))
@@ -104,8 +104,9 @@ def photo_shares(
         wall=share[:, roles.wall].max(1, initial=0),
         floor=share[:, roles.floor].sum(1),
         n_objects=(share[:, roles.furniture] >= least).sum(1),
-        n_classes=(classes >= LEAST_CLASS_SHARE).sum(1),
+        n_classes=(classes[:, 1:] >= LEAST_CLASS_SHARE).sum(1),
         median_m=median,
+        nyu13=classes,
     )
 
 

@@ -16,7 +16,7 @@ class Verdict(IntEnum):
     FEW_OBJECTS = 5  # too few objects cover enough of the picture
     WEAK = 6  # preset photo: scores less than the least score
     TWIN = 7  # preset photo: shows what a better view of the home shows
-    LOWER_SCORE = 8  # kept every rule; another one of its sector scored higher
+    LOWER_SCORE = 8  # kept every rule; another one of its sector was taken
     WINNER = 9
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
@@ -48,7 +49,8 @@ def shares(**changes: float) -> PhotoShares:
         "furniture": 0.4, "opening": 0.05, "largest": 0.2, "wall": 0.3, "floor": 0.1,
         "n_objects": 5, "n_classes": 6, "median_m": 2.5,
     }  # fmt: skip
-    return PhotoShares(**{k: np.array([v]) for k, v in (plain | changes).items()})
+    columns = {k: np.array([v]) for k, v in (plain | changes).items()}
+    return PhotoShares(**columns, nyu13=np.zeros((1, 14)))
 
 
 @pytest.mark.parametrize(
@@ -78,6 +80,8 @@ def test_shares_are_those_of_the_pixels() -> None:
     seen = photo_shares(counts, depth, item_roles(house), 0.01)
     assert (seen.furniture[0], seen.floor[0], seen.wall[0]) == (0.3, 0.2, 0.4)
     assert (seen.n_objects[0], seen.n_classes[0], seen.median_m[0]) == (1, 1, 2.0)
+    assert seen.nyu13[0, NYU13_NAMES.index("chair")] == 0.3
+    assert seen.nyu13[0].sum() == pytest.approx(1)
 
 
 def test_a_view_shares_all_with_itself_and_nothing_with_its_back() -> None:
@@ -181,3 +185,9 @@ def test_the_papers_recipes_keep_the_digest_they_had_before_the_preset(name: str
         "released": "3cb9b128bce13c48429f225ddef11fcd",
     }
     assert recipe_from_name(name).digest("cameras") == before[name]
+
+
+@pytest.mark.parametrize("name", ["preview", "fast"])
+def test_a_root_of_before_likeness_keeps_its_cameras(name: str) -> None:
+    before = recipe_from_name(name, {"cameras.likeness": "0"})
+    assert before.digest("cameras") == "4c5973062bed425210868640775f3b46"

@@ -1,0 +1,165 @@
+"""Which candidates of a home become its views: good ones, no twins, together like photographs.
+
+No effects of its own. The views of a home maximise the sum of their scores less likeness x their
+number x the distance of their mean class shares to those of photographs (likeness.py): first sector
+by sector, the best first, then by exchange.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.classes import NYU13_NAMES
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.sample.likeness import share_distance
+from pbrs_farm.sample.rejection import Verdict
+from pbrs_farm.sample.room_candidates import RoomCandidates
+from pbrs_farm.sample.view_overlap import DepthOf, overlap
+
+MOST_OVERLAP: Final = 0.8
+"""A view that shares more than this with a better one is its twin."""
+
+_TRIES: Final = 12
+"""Candidates of a sector that are asked, best first, before the sector is given up as a twin."""
+
+_ROUNDS: Final = 3
+"""How often every view may be exchanged for another of its sector."""
+
+MOST_TILT_DEG, TILT_COST = 12.0, 0.05
+"""Beside likeness: the upper quartile of NYUv2's tilts, and what a degree beyond it costs.
+
+The steepest views show least wall; without a cost they would be held as nobody holds a camera.
+"""
+
+_Name = tuple[str, int]
+"""A candidate's room and number."""
+
+
+@dataclass(slots=True, eq=False)
+class _Turn:
+    """A sector that may have views: its candidates, best first, and the numbers of those taken."""
+
+    scored: RoomCandidates
+    sector: int
+    open_to: NDArray[np.intp]
+    taken: list[int] = field(default_factory=list)
+
+
+@dataclass(slots=True, eq=False)
+class PhotoChoice:
+    """The choice among all candidates of one home, made once.
+
+    lens: of zoom 1, of the size of depth pictures. depth_of: small depth pictures.
+    """
+
+    fields: CameraFields
+    lens: Intrinsics
+    depth_of: DepthOf
+    _shown: F64 = field(default_factory=lambda: np.zeros(len(NYU13_NAMES)))  # sum over views
+    _taken: dict[_Name, tuple[Camera, F32]] = field(default_factory=dict)
+    _looked_at: dict[_Name, tuple[Camera, F32]] = field(default_factory=dict)
+
+    def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
+        """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
+
+        Sectors take turns by their best score, over all rooms, so that of two twins the better
+        one stays.
+        """
+        # Let every sector that has a candidate take its turn, the best first.
+        turns = [
+            _Turn(scored, sector, ranked)
+            for scored in rooms
+            for sector in range(self.fields.n_sectors)
+            if len(ranked := scored.ranked(sector))
+        ]
+        turns.sort(key=lambda turn: -turn.scored.score[turn.open_to[0]])
+        # Give each its views, compared with those of all rooms that are taken already.
+        with_view: set[str] = set()
+        for turn in turns:
+            self._leave_out_weak(turn, is_first=turn.scored.room.id not in with_view)
+            self._fill(turn)
+            if turn.taken:
+                with_view.add(turn.scored.room.id)
+        # Exchange views for others that bring all of them nearer to photographs.
+        for _ in range(_ROUNDS if self.fields.likeness > 0 else 0):
+            if not sum(self._exchange(turn) for turn in turns):
+                break
+        for turn in turns:
+            turn.scored.verdict[turn.taken] = Verdict.WINNER
+        return {(turn.scored.room.id, turn.sector): turn.taken for turn in turns}
+
+    def _leave_out_weak(self, turn: _Turn, *, is_first: bool) -> None:
+        """Close a sector to weak candidates; a room's first view, its best, may be weaker."""
+        f, scored = self.fields, turn.scored
+        weak = scored.score[turn.open_to] < f.min_score
+        if is_first and scored.score[turn.open_to[0]] >= f.min_room_score:
+            weak[0] = False
+        scored.verdict[turn.open_to[weak]] = Verdict.WEAK
+        turn.open_to = turn.open_to[~weak]
+
+    def _fill(self, turn: _Turn) -> None:
+        """Take a sector's views from the candidate worth most down, leaving out twins."""
+        left = turn.open_to
+        for _ in range(_TRIES * self.fields.per_sector):
+            if len(turn.taken) == self.fields.per_sector or not len(left):
+                return
+            # Rank again after each: what is worth most depends on what is taken.
+            at = int(np.argmax(self._worth(turn.scored, left)))
+            number, left = int(left[at]), np.delete(left, at)
+            if self._is_twin(turn.scored, number):
+                turn.scored.verdict[number] = Verdict.TWIN
+            else:
+                self._take(turn, number)
+
+    def _exchange(self, turn: _Turn) -> bool:
+        """Give each view of a sector up for the candidate that is then worth most."""
+        before = list(turn.taken)
+        for number in before:
+            self._give_up(turn, number)
+            others = np.setdiff1d(turn.open_to, turn.taken)
+            worth = self._worth(turn.scored, others)
+            # Try the better ones from the best down; itself is no twin of any.
+            order = others[np.argsort(-worth, kind="stable")][:_TRIES].tolist()
+            better = order[: order.index(number)] if number in order else order
+            free = (k for k in better if not self._is_twin(turn.scored, k))
+            self._take(turn, next(free, number))
+        return set(before) != set(turn.taken)
+
+    def _worth(self, scored: RoomCandidates, numbers: NDArray[np.intp]) -> F64:
+        """(M,) what candidates would add to the views that are taken."""
+        score = scored.score[numbers]
+        if self.fields.likeness == 0:
+            return score
+        tilt_deg = np.degrees(np.arcsin(-scored.candidates.towards[numbers, 1]))
+        steep = TILT_COST * np.maximum(tilt_deg - MOST_TILT_DEG, 0.0)
+        distance = share_distance(self._shown + scored.nyu13[numbers])
+        return score - steep - self.fields.likeness * (len(self._taken) + 1) * distance
+
+    def _take(self, turn: _Turn, number: int) -> None:
+        turn.taken.append(number)
+        self._taken[turn.scored.room.id, number] = self._look(turn.scored, number)
+        self._shown = self._shown + turn.scored.nyu13[number]
+
+    def _give_up(self, turn: _Turn, number: int) -> None:
+        turn.taken.remove(number)
+        del self._taken[turn.scored.room.id, number]
+        self._shown = self._shown - turn.scored.nyu13[number]
+
+    def _is_twin(self, scored: RoomCandidates, number: int) -> bool:
+        camera, depth = self._look(scored, number)
+        return any(overlap(camera, depth, *o) > MOST_OVERLAP for o in self._taken.values())
+
+    def _look(self, scored: RoomCandidates, number: int) -> tuple[Camera, F32]:
+        """A candidate's camera and depth picture; remembered."""
+        name = scored.room.id, number
+        if name not in self._looked_at:
+            camera = scored.candidates.cameras(np.array([number]), self.lens)[0]
+            self._looked_at[name] = camera, self.depth_of([camera])[0]
+        return self._looked_at[name]
