@@ -24,7 +24,7 @@ class ViewRef:
 
     @property
     def id(self) -> str:
-        """<house>/<view>, as in Sample.id."""
+        """`<house>/<view>`, as in Sample.id."""
         return f"{self.house}/{self.view}"
 
     @property
@@ -87,7 +87,7 @@ class View:
 
     @property
     def id(self) -> str:
-        """<house>/<view>."""
+        """`<house>/<view>`."""
         return self.ref.id
 
     @property

@@ -1,0 +1,22 @@
+"""What the image copies is let through to the build, without Docker to ask."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+REPO = Path(__file__).parents[2]
+
+
+def test_the_build_is_given_everything_that_the_dockerfile_copies() -> None:
+    text = (REPO / "docker/Dockerfile").read_text(encoding="utf-8")
+    copied = {
+        word
+        for line in re.findall(r"^COPY (?!--from)(.+)$", text, re.MULTILINE)
+        for word in line.split()[:-1]
+    }
+    let_through = (REPO / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    assert copied >= {"pyproject.toml", "setup.py", "pbrs_farm", "workers"}
+    for name in copied:
+        assert (REPO / name).exists(), name
+        assert f"!{name}" in let_through or f"!{name}/**" in let_through, name
