@@ -43,7 +43,7 @@ def add_verbs(verb: Verb) -> None:
     text = "other strengths of lamps and daylight from a stored view, no rendering"
     p = verb("relight", _relight, text)
     add = p.add_argument
-    add("view", type=Path, help=VIEW)
+    add("view", help=f"{VIEW}, or a store's URL of one")
     add("--indoor", default="1", metavar="F", help="factor of the lamps, F or R,G,B (default 1)")
     add("--outdoor", default="1", metavar="F", help="factor of the sky, F or R,G,B (default 1)")
     text = (
@@ -158,34 +158,41 @@ def _claim_row(claim: LightClaim) -> str:
 
 
 def _relight(args: argparse.Namespace) -> int:
+    from pbrs_farm.run.fetched_view import folder_of_view
+    from pbrs_farm.settings import settings_from_environment
+
+    store = settings_from_environment().store
+    with folder_of_view(args.view, store, needs_light=not args.list) as view:
+        return _list_lamps(args, view) if args.list else _relight_view(args, view)
+
+
+def _relight_view(args: argparse.Namespace, view: Path) -> int:
     from pbrs_farm.run.relight import relit, unlit_lamps
     from pbrs_farm.store.folder import FolderStore
 
-    if args.list:
-        return _list_lamps(args)
     # Factors scale radiance: none may be negative.
     expected = "expected F or R,G,B, numbers that are finite and not negative"
     indoor = _factors("--indoor", args.indoor, expected, args.indoor)
     outdoor = _factors("--outdoor", args.outdoor, expected, args.outdoor)
-    out = args.out or Path(f"{args.view.resolve().name}_relit.png")
+    out = args.out or Path(f"{view.resolve().name}_relit.png")
     lamps = [_lamp_factor(argument) for argument in args.lamp]
     denoise = not args.no_denoise
-    png = relit(args.view, indoor=indoor, outdoor=outdoor, denoise=denoise, lamps=lamps)
+    png = relit(view, indoor=indoor, outdoor=outdoor, denoise=denoise, lamps=lamps)
     FolderStore(out.parent).put(out.name, png)
     # A factor of a lamp that the view does not see changes nothing: say so.
-    for row in unlit_lamps(args.view, lamps) if lamps else ():
+    for row in unlit_lamps(view, lamps) if lamps else ():
         warn(f"lamp {row['number']} ({row['item']}) brings no light to this view")
     echo(str(out))
     return 0
 
 
-def _list_lamps(args: argparse.Namespace) -> int:
+def _list_lamps(args: argparse.Namespace, view: Path) -> int:
     from pbrs_farm.run.relight import lamps_of_view
 
     if args.lamp or args.out is not None:
         what = "lists the lamps and makes no picture: not with --lamp, --out"
         raise BadInput("--list", "", what)
-    rows = lamps_of_view(args.view)
+    rows = lamps_of_view(view)
     echo(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
     for row in rows:
         # A lamp that brings no light to the view has no layer.

@@ -207,3 +207,18 @@ def test_a_view_of_two_groups_says_how_to_have_lamps_and_gets_them_with_the_same
     after = array_from_png((view / "mlt_il_ol.png").read_bytes()).astype(int)
     assert np.abs(after - before).max() <= 1
     assert len(lamps_of(view)) == 2
+
+
+def test_a_view_is_named_by_the_url_of_its_store_too(
+    view: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["relight", view.as_uri()]) == 0
+    out = tmp_path / f"{view.name}_relit.png"
+    assert out.read_bytes() == (view / "mlt_il_ol.png").read_bytes()
+    assert main(["relight", view.as_uri(), "--list"]) == 0
+    assert capsys.readouterr().out.splitlines()[1].startswith("lamp")
+    # What is no view, and a view that is not there, are one line that names the URL.
+    for url in (view.parents[3].as_uri(), f"{view.as_uri()}_9"):
+        assert main(["relight", url]) == 1
+        assert url in capsys.readouterr().err

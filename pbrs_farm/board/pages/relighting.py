@@ -69,7 +69,7 @@ def light(request: Request) -> Response:
 
 
 def view_folder(reader: RootReader, found: ListedView) -> str:
-    """The view's folder as a command names it; OUT stands for a root that is no folder here."""
+    """The view's folder as a command names it: a path, or the URL of a root that is no folder."""
     store = reader.store
-    root = str(store.root) if isinstance(store, FolderStore) else "OUT"
+    root = str(store.root) if isinstance(store, FolderStore) else store.url.rstrip("/")
     return f"{root}/{keys.view_key(found.house, found.id)}".rstrip("/")
