@@ -45,7 +45,8 @@ class Rays:
             return np.full(len(directions), -1, np.int64)
         origins = np.broadcast_to(origin, directions.shape)
         local = np.asarray(self._caster.intersects_first(origins, directions), np.int64)
-        return np.where(local >= 0, self._face[local], -1)
+        # A pixel outside a fisheye's circle has no ray: its direction is 0.
+        return np.where((local >= 0) & directions.any(1), self._face[local], -1)
 
     def distance(self, face: Faces, origin: Floats, directions: Floats) -> Floats:
         """(N,) distance in lengths of directions to each face's plane; 0 where face is -1."""

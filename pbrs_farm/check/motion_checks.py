@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Faces, Floats, Rays
+from pbrs_farm.check.lens_rays import StoredLens
 from pbrs_farm.check.stored_view import StoredView
 
 Bools = NDArray[np.bool_]
@@ -43,10 +44,14 @@ class OtherView:
     k: Floats  # (3, 3)
     world_from_camera: Floats  # (4, 4), OpenCV axes
     size: tuple[int, int]  # height, width
+    lens: StoredLens | None = None  # as the view's own: a run has one
 
     def pixels(self, points: Floats) -> tuple[Floats, Floats]:
         """(N, 2) px of world points (N, 3), and (N,) their depth; NaN where they are behind."""
         local = (points - self.world_from_camera[:3, 3]) @ self.world_from_camera[:3, :3]
+        if self.lens is not None:
+            plane, depth = self.lens.plane_and_depth(local)
+            return plane * self.k[[0, 1], [0, 1]] + self.k[:2, 2], depth
         z = local[:, 2]
         homogeneous = local @ self.k.T
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -69,7 +74,7 @@ def other_view(view: StoredView, relation: str) -> OtherView | None:
     if row is None:
         return None
     pose = np.array(row["world_from_camera_opencv"], np.float64)
-    return OtherView(np.array(row["K"], np.float64), pose, view.size)
+    return OtherView(np.array(row["K"], np.float64), pose, view.size, view.lens)
 
 
 def followed(

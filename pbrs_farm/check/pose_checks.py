@@ -38,8 +38,8 @@ def check_pose(view: StoredView, tally: Tally) -> None:
     tally.expect("pose", view.place, bool(agree), "the OpenGL and OpenCV poses differ")
     height, width = view.size
     fx, fy, cx, cy = view.k[0, 0], view.k[1, 1], view.k[0, 2], view.k[1, 2]
-    pinhole = fx > 0 and fy > 0 and 0 < cx < width and 0 < cy < height and view.k[2, 2] == 1
-    tally.expect("pose", view.place, bool(pinhole), "K is no pinhole camera's")
+    usable = fx > 0 and fy > 0 and 0 < cx < width and 0 < cy < height and view.k[2, 2] == 1
+    tally.expect("pose", view.place, bool(usable), "K is no camera's")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,10 +131,11 @@ def _seen_past(
     broad &= own_distance > _MIN_NEARER * distance
     # Project the others, and count those in front of what the view sees.
     camera = towards[broad] @ view.world_from_camera[:3, :3]
-    camera = camera[camera[:, 2] > 0.05]
-    pixel = camera @ view.k.T
-    x, y = np.floor(pixel[:, :2] / pixel[:, 2:]).astype(np.int64).T
+    pixel, depth = view.pixels_and_depths(camera)
+    with np.errstate(invalid="ignore"):
+        seen = (depth > 0.05) & np.isfinite(pixel).all(1)
+    x, y = np.floor(pixel[seen]).astype(np.int64).T
     height, width = view.size
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    past = nearest[y[inside], x[inside]] > camera[inside, 2] + SLACK_M
+    past = nearest[y[inside], x[inside]] > depth[seen][inside] + SLACK_M
     return int(inside.sum()), int(past.sum())

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.check.lens_rays import StoredLens
 from pbrs_farm.check.stored_file import BadFile, stored_bytes, stored_object
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import array_from_png, layers_from_exr
@@ -39,6 +40,26 @@ class StoredView:
     def k(self) -> NDArray[np.float64]:
         """(3, 3) K."""
         return np.array(self.table["K"], np.float64)
+
+    @cached_property
+    def lens(self) -> StoredLens | None:
+        """What bends the picture's lines, None for a pin-hole."""
+        return StoredLens.of(self.table["lens"]) if "lens" in self.table else None
+
+    def pixels_and_depths(
+        self, camera: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(N, 2) pixel coordinates and (N,) depths of points (N, 3) with OpenCV's axes.
+
+        NaN where the view does not see the point.
+        """
+        if self.lens is not None:
+            plane, depth = self.lens.plane_and_depth(camera)
+        else:
+            depth = np.where(camera[:, 2] > 0, camera[:, 2], np.nan)
+            plane = camera[:, :2] / depth[:, None]
+        pixel = np.concatenate([plane, np.ones((len(plane), 1))], axis=1) @ self.k.T
+        return pixel[:, :2], depth
 
     @cached_property
     def world_from_camera(self) -> NDArray[np.float64]:
@@ -71,10 +92,15 @@ class StoredView:
     def rays(
         self, rows: NDArray[Any], columns: NDArray[Any]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Origin (3,) and directions (N, 3) of unit depth through (column + 0.5, row + 0.5)."""
+        """Origin (3,) and directions (N, 3) of unit depth through (column + 0.5, row + 0.5).
+
+        Depth is as the view stores it, along the axis or along the ray; (0, 0, 0) is no ray.
+        """
         # Through the middle of each pixel, turned into the world.
         pixel = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))], axis=1)
         camera = np.linalg.solve(self.k, pixel.T).T
+        if self.lens is not None:
+            camera = self.lens.rays(np.asarray(camera[:, :2], np.float64))
         return self.world_from_camera[:3, 3], camera @ self.world_from_camera[:3, :3].T
 
 

@@ -1,4 +1,4 @@
-"""Intrinsics, cameras and views; frozen values, no effects.
+"""Intrinsics, cameras and views; frozen values, no effects. The one place that makes rays.
 
 Inside the package a camera has OpenGL axes: x right, y up, looking along -z. Pixel (row 0,
 column 0) is top left and its centre lies at (0.5, 0.5).
@@ -6,27 +6,36 @@ column 0) is top left and its centre lies at (0.5, 0.5).
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, Matrix4
+from pbrs_farm.core.arrays import F32, F64, Mask, Matrix4
+from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
+from pbrs_farm.core.lenses.lens import PINHOLE, Lens
+from pbrs_farm.core.lenses.pinhole_faces import PinholeFaces, faces_of_directions
 
 # Full horizontal field of view of the published cameras: half-angle 0.5534 rad (docs/spec/suncg.md section 3).
 PAPER_HFOV_RAD = 2 * 0.5534
 
+_FLIP: Final[F64] = np.diag(OPENCV_FROM_OPENGL)[:3]  # OpenGL's axes <-> OpenCV's
+
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """A pinhole camera without distortion, in pixels."""
+    """The size of a picture, the lens, and K: from the lens's plane to pixels."""
 
     width_px: int
     height_px: int
-    fx: float  # focal lengths
+    fx: float  # focal lengths; of an equirectangular picture pixels per rad
     fy: float
-    cx: float  # principal point, from the top left corner
+    cx: float  # principal point, from the top left corner; of a cube map its first face's
     cy: float
+    lens: Lens = PINHOLE
 
     @staticmethod
     def from_hfov(width_px: int, height_px: int, hfov_rad: float = PAPER_HFOV_RAD) -> Intrinsics:
@@ -38,7 +47,7 @@ class Intrinsics:
         """The same field of view on another pixel grid."""
         sx, sy = width_px / self.width_px, height_px / self.height_px
         return Intrinsics(
-            width_px, height_px, self.fx * sx, self.fy * sy, self.cx * sx, self.cy * sy
+            width_px, height_px, self.fx * sx, self.fy * sy, self.cx * sx, self.cy * sy, self.lens
         )
 
     def zoomed(self, factor: float) -> Intrinsics:
@@ -47,16 +56,48 @@ class Intrinsics:
 
     @property
     def k(self) -> F64:
-        """(3, 3) matrix K: pixel = K @ (x right, y down, z forward), divided by z."""
+        """(3, 3) matrix K: pixel = K @ (x, y, 1) of the lens's plane.
+
+        Of a pin-hole the plane's point is (x right / z, y down / z).
+        """
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
+
+    def directions(self, pixels: F64) -> F64:
+        """(N, 3) of pixel coordinates (N, 2): x right, y down, z forward, as Lens.directions."""
+        plane = (pixels - [self.cx, self.cy]) / [self.fx, self.fy]
+        return self.lens.directions(plane)
+
+    def pixels(self, directions: F64) -> F64:
+        """(N, 2) pixel coordinates of directions (N, 3), x right, y down, z forward, any length.
+
+        NaN for those the lens does not see; others may lie beside the picture.
+        """
+        return np.asarray(
+            self.lens.plane_points(directions) * [self.fx, self.fy] + [self.cx, self.cy]
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CameraBlur:
+    """What light alone shows of a camera: an aperture, and motion while the shutter is open."""
+
+    aperture_radius_m: float = 0.0  # of the entrance pupil; 0 = all depths are sharp
+    focus_m: float = 1.0  # depth_z that is sharp
+    velocity_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # world, while the shutter is open
+    turn_rad: tuple[float, float, float] = (
+        0.0,
+        0.0,
+        0.0,
+    )  # the same, about the axis through the eye
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """Intrinsics and pose."""
+    """Intrinsics and pose; the pose is that of mid-shutter."""
 
     intrinsics: Intrinsics
     world_from_camera: Matrix4  # OpenGL axes, metres
+    blur: CameraBlur | None = None  # of light; labels are sharp
 
     @staticmethod
     def look(
@@ -90,20 +131,53 @@ class Camera:
 
     def with_size(self, width_px: int, height_px: int) -> Camera:
         """The same camera on another pixel grid."""
-        return Camera(self.intrinsics.resized(width_px, height_px), self.world_from_camera)
+        return replace(self, intrinsics=self.intrinsics.resized(width_px, height_px))
+
+    def pixels_of(self, points: NDArray[np.floating]) -> F64:
+        """(N, 2) pixel coordinates (x, y) of points (N, 3) of the world, in metres.
+
+        NaN for those the lens does not see; others may lie beside the picture.
+        """
+        return self.intrinsics.pixels(self._from_world(points) * _FLIP)
+
+    def depths_of(self, points: NDArray[np.floating]) -> F64:
+        """(N,) depth of points (N, 3) of the world, as depth_z has it: metres.
+
+        Along the optical axis (negative behind the camera), of a lens without planar depth the
+        distance from the eye.
+        """
+        local = self._from_world(points)
+        if self.intrinsics.lens.depth_is_planar:
+            return np.asarray(-local[:, 2])
+        return np.asarray(np.linalg.norm(local, axis=1))
+
+    def _from_world(self, points: NDArray[np.floating]) -> F64:
+        moved = np.asarray(points, np.float64) - self.eye
+        return np.asarray(moved @ self.world_from_camera[:3, :3])
+
+    @property
+    def blind(self) -> Mask | None:
+        """(H, W) bool: the pixel has no ray (outside a fisheye's circle); None: every one has."""
+        if self.intrinsics.lens.model != "fisheye":
+            return None
+        blind = np.asarray(~_lens_grid(self.intrinsics).any(-1))
+        return blind if blind.any() else None
 
     def rays(self) -> tuple[F32, F32]:
         """Rays through the pixels' centres: origin (3,) and directions (H, W, 3), float32, world.
 
-        Directions have unit length along the optical axis, so that t along a ray is depth_z.
+        t along a ray is the pixel's depth_z: directions have unit length along the optical axis,
+        of a lens without planar depth unit length; (0, 0, 0) where a pixel is blind.
         """
         origin, directions = self.exact_rays()
         return origin.astype(np.float32), directions.astype(np.float32)
 
     def exact_rays(self) -> tuple[F64, F64]:
         """As rays, in float64."""
-        # A point of each pixel on the plane z = -1 of the camera: unit length along the axis.
         i = self.intrinsics
+        if not i.lens.is_pinhole:
+            return self.eye, _lens_grid(i) @ self.world_from_camera[:3, :3].T
+        # A point of each pixel on the plane z = -1 of the camera: unit length along the axis.
         x = (np.arange(i.width_px) + 0.5 - i.cx) / i.fx
         y = -(np.arange(i.height_px) + 0.5 - i.cy) / i.fy
         grid = np.empty((i.height_px, i.width_px, 3), np.float64)
@@ -111,6 +185,41 @@ class Camera:
         grid[..., 1] = y[:, None]
         grid[..., 2] = -1.0
         return self.eye, grid @ self.world_from_camera[:3, :3].T
+
+
+@functools.lru_cache(maxsize=4)
+def _lens_grid(i: Intrinsics) -> F64:
+    """(H, W, 3) directions through the pixels' centres, OpenGL's camera axes; not to be written to.
+
+    Kept for the last lenses: the views of a run share one, and undistorting takes a while.
+    """
+    x, y = np.meshgrid(np.arange(i.width_px) + 0.5, np.arange(i.height_px) + 0.5)
+    found = i.directions(np.stack([x.ravel(), y.ravel()], axis=1)) * _FLIP
+    found.setflags(write=False)
+    return found.reshape(i.height_px, i.width_px, 3)
+
+
+@functools.lru_cache(maxsize=4)
+def _lens_faces(i: Intrinsics) -> PinholeFaces:
+    return faces_of_directions(_lens_grid(i) * _FLIP)
+
+
+def pinholes_of(camera: Camera) -> tuple[list[Camera], PinholeFaces]:
+    """Pin-hole cameras at the same eye that together see what the camera does, in finer pixels.
+
+    And how its picture follows from theirs. For what only draws pin-holes.
+    """
+    found = _lens_faces(camera.intrinsics)
+    cameras = []
+    for face in found.faces:
+        # The face's axes as columns, both frames with OpenGL's axes.
+        turned = camera.world_from_camera.copy()
+        turned[:3, :3] = camera.world_from_camera[:3, :3] @ (_FLIP[:, None] * face.axes.T * _FLIP)
+        f = face.focal_px
+        cameras.append(
+            Camera(Intrinsics(face.width_px, face.height_px, f, f, face.cx, face.cy), turned)
+        )
+    return cameras, found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

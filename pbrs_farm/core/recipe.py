@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.near_names import hint_of_choice, near_names, question
+from pbrs_farm.core.picture_fields.lens_fields import LensFields
 from pbrs_farm.core.recipe_fields import (
     CameraFields,
     DressFields,
@@ -39,6 +41,7 @@ __all__ = [
     "EmissionFields",
     "HistogramFields",
     "ImageFields",
+    "LensFields",
     "LightFields",
     "MaterialFields",
     "RasterFields",
@@ -65,6 +68,7 @@ class Recipe(FieldGroup):
     dress: DressFields = DressFields()
     repair: RepairFields = RepairFields()
     cameras: CameraFields = CameraFields()
+    lens: LensFields = LensFields()
     image: ImageFields = ImageFields()
     light: LightFields = LightFields()
     sky: SkyFields = SkyFields()
@@ -74,6 +78,17 @@ class Recipe(FieldGroup):
     raster: RasterFields = RasterFields()
     histogram: HistogramFields = HistogramFields()
     selection: SelectionFields = SelectionFields()
+
+    @model_validator(mode="after")
+    def _lens_fits(self) -> Self:
+        """The lens gives every pixel one ray, at the picture's size."""
+        f = self.cameras
+        fault = self.lens.aspect_fault(self.image.width_px, self.image.height_px)
+        if fault is not None:
+            raise ValueError(fault)
+        size = f.score_width_px, f.score_height_px
+        self.lens.intrinsics(Intrinsics.from_hfov(*size, f.hfov_rad))
+        return self
 
     def digest(self, *groups: str) -> str:
         """Digest of the seed and the named groups; of all fields but the name when none is named.
@@ -117,6 +132,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
         "stereo_m",
     ),
     "dress": tuple(DressFields.model_fields),
+    "lens": tuple(LensFields.model_fields),
     "repair": ("lamp_in_every_room", "lamp_lx"),
     "selection": ("min_room_lx",),
 }
@@ -210,6 +226,8 @@ def changed_recipe(
 def _fault(place: tuple[int | str, ...], kind: str, text: str, value: object) -> str:
     """What is wrong with a field; of one there is not, which it may have meant."""
     path = ".".join(str(part) for part in place)
+    if not path:  # of groups that do not fit each other
+        return text.removeprefix("Value error, ")
     if kind != "extra_forbidden":
         return f"{path}: {text}"
     # Of a group there is not, the field that was set in it.

@@ -139,6 +139,12 @@ class ChosenView:
         return facts
 
 
+def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
+    """A view's camera as an export repeats it: K, its lens where it is no pin-hole, its pose."""
+    names = ("K", "lens", "depth", "world_from_camera_opencv")
+    return {name: facts[name] for name in names if name in facts}
+
+
 def resized_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
     """A layer on another grid: pictures by area, lines kept whole, all else the nearest pixel."""
     if name in _BY_AREA:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core.classes import NYU40_NAMES
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import Choice, ChosenView, camera_facts
 from pbrs_farm.export.coco_panoptic import write_panoptic
 from pbrs_farm.export.run_lengths import compressed_runs
 
@@ -24,7 +24,7 @@ def write_coco(views: list[ChosenView], out: Path, _choice: Choice) -> int:
 
     Categories are NYU40's; an instance without a class is left out. Masks are compressed
     run lengths (as pycocotools reads them), iscrowd 0. Fields of
-    our own: house, view, K, world_from_camera_opencv, instance_id, visible_fraction, truncated.
+    our own: house, view, K, lens and depth (where no pin-hole), world_from_camera_opencv, instance_id, visible_fraction, truncated.
     """
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
@@ -63,8 +63,7 @@ def _image(view: ChosenView, number: int, out: Path) -> dict[str, Any]:
         "height": view.facts["height_px"],
         "house": view.house.id,
         "view": view.id,
-        "K": view.facts["K"],
-        "world_from_camera_opencv": view.facts["world_from_camera_opencv"],
+        **camera_facts(view.facts),
     }
     # Copy the picture of the best mode there is.
     if view.picture is not None:

@@ -23,7 +23,8 @@ def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     (H, W) float32 planar metres (0 = nothing), normals (H, W, 3) float32 (n + 1) / 2 with OpenGL
     camera axes, category_id_segmaps uint8, instance_segmaps uint16, and as JSON text
     instance_attribute_maps and campose (the OpenGL pose, and cam_K as BlenderProc means it: the centre
-    of the first pixel is (0, 0), so that cx is (W - 1) / 2). Raises MachineFailed without h5py.
+    of the first pixel is (0, 0), so that cx is (W - 1) / 2; where no pin-hole, also lens and depth as
+    view.json has them). Raises MachineFailed without h5py.
     """
     h5py = _h5py()
     index = []
@@ -68,8 +69,9 @@ def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
     maps = [{"idx": r["id"], "name": r["name"], "category_id": r["nyu40"]} for r in rows]
     data["instance_attribute_maps"] = json.dumps(maps)
     pose = view.facts["world_from_camera_opengl"]
+    lens = {name: view.facts[name] for name in ("lens", "depth") if name in view.facts}
     data["campose"] = json.dumps(
-        {"cam_K": blenderproc_k(view.facts["K"]), "cam2world_matrix": pose}
+        {"cam_K": blenderproc_k(view.facts["K"]), "cam2world_matrix": pose} | lens
     )
     return data
 

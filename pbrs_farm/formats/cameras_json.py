@@ -10,6 +10,7 @@ import numpy as np
 
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.lenses.lens import PINHOLE, lens_from_table
 from pbrs_farm.formats.serialise import json_bytes
 
 
@@ -42,6 +43,8 @@ def _json_of_view(view: View) -> dict[str, Any]:
         "intrinsics": {
             "width_px": i.width_px, "height_px": i.height_px,
             "fx": i.fx, "fy": i.fy, "cx": i.cx, "cy": i.cy,
+            # Without a lens it is a pin-hole's, as all were before there were others.
+            **({} if i.lens.is_pinhole else {"lens": i.lens.table()}),
         },
         "world_from_camera_opengl": view.camera.world_from_camera.tolist(),
     }  # fmt: skip
@@ -52,12 +55,14 @@ def _view_from_json(row: dict[str, Any]) -> View:
     pose = np.array(row["world_from_camera_opengl"], np.float64)
     if pose.shape != (4, 4):
         raise ValueError(f"a pose has (4, 4) numbers, got {pose.shape}")
+    stored = dict(row["intrinsics"])
+    lens = lens_from_table(stored.pop("lens")) if "lens" in stored else PINHOLE
     # Objects are by instance id, which JSON turned into text.
     return View(
         id=row["id"],
         room_id=row["room"],
         sector=row["sector"],
-        camera=Camera(Intrinsics(**row["intrinsics"]), pose),
+        camera=Camera(Intrinsics(**stored, lens=lens), pose),
         origin=row["origin"],
         score=row["score"],
         objects={int(k): n for k, n in row["objects"].items()},

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, I64, Srgb8Image
-from pbrs_farm.core.camera import Camera
-from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.camera import Camera, pinholes_of
+from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import RasterFields
 from pbrs_farm.raster.gl_device import (
@@ -120,13 +120,24 @@ class Rasterizer:
 
     def render_dl(self, camera: Camera) -> Srgb8Image:
         """(H, W, 3) OpenGL-DL: a headlight and two directional lights, no shadows (docs/spec/suncg.md section 4)."""
-        return self._render(camera, "dl")
+        return self._picture(camera, "dl")
 
     def render_il(self, camera: Camera) -> Srgb8Image:
         """(H, W, 3) OpenGL-IL: the lamps' lights, the best of them for each object, no shadows."""
-        return self._render(camera, "il")
+        return self._picture(camera, "il")
 
-    def _render(self, camera: Camera, mode: str) -> Srgb8Image:
+    def _picture(self, camera: Camera, mode: str) -> Srgb8Image:
+        if camera.intrinsics.lens.is_pinhole:
+            return self._render(camera, mode, camera.towards)
+        # OpenGL draws straight lines: resample another lens's picture from pin-holes, in linear light.
+        cameras, faces = pinholes_of(camera)
+        forward = camera.towards if len(cameras) == 1 else np.zeros(3)
+        linear = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
+        found = faces.bilinear([linear[self._render(c, mode, forward)] for c in cameras])
+        return np.rint(np.clip(srgb_from_linear(found), 0, 1) * 255).astype(np.uint8)
+
+    def _render(self, camera: Camera, mode: str, forward: F64) -> Srgb8Image:
+        """forward (3,): where the headlight points; 0 = it stands at the eye."""
         with self._context:
             target = self._target(camera)
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))
@@ -137,7 +148,7 @@ class Rasterizer:
             kind = self._kind[self._mesh.draw_material[order]]
             target.begin((*self._sky, 1.0))
             for number in np.unique(kind):
-                self._begin_surfaces(mode, int(number), camera, clip)
+                self._begin_surfaces(mode, int(number), camera, clip, forward)
                 if number & Feature.TRANSPARENT:
                     continue
                 for draw in order[kind == number]:
@@ -178,12 +189,14 @@ class Rasterizer:
         kept[is_solid] = [self._queries[draw].samples > 0 for draw in draws[is_solid]]
         return np.asarray(draws[kept])
 
-    def _begin_surfaces(self, mode: str, kind: int, camera: Camera, clip: F64) -> None:
+    def _begin_surfaces(
+        self, mode: str, kind: int, camera: Camera, clip: F64, forward: F64
+    ) -> None:
         _set(
             self._program(mode, kind)[0],
             clip_from_world=clip,
             eye=camera.eye,
-            forward=camera.towards,
+            forward=forward,
             sky=self._sky,
             white_per_lx=self._white_per_lx,
         )

@@ -108,16 +108,18 @@ void main() {
     vec3 n = normalize(normal);
     n = dot(n, to_eye) < 0.0 ? -n : n;
 
+    // Cube faces share a headlight at the eye: forward is 0.
+    vec3 to_head = forward == vec3(0.0) ? to_eye : -forward;
     vec3 diffuse_light = vec3(0.0);
     vec3 specular_light = vec3(0.0);
 #ifdef MODE_DL
-    vec2 head = reflected(n, -forward, to_eye);
+    vec2 head = reflected(n, to_head, to_eye);
     vec2 key = reflected(n, vec3(3.0, 4.0, 5.0) * inversesqrt(50.0), to_eye);
     vec2 fill = reflected(n, vec3(-3.0, -2.0, -3.0) * inversesqrt(22.0), to_eye);
     diffuse_light = vec3(DL_SCALE * (0.5 * head.x + key.x + 0.5 * fill.x));
     specular_light = vec3(DL_SCALE * (head.y + key.y + 0.5 * fill.y));
 #else
-    diffuse_light = vec3(IL_HEADLIGHT * reflected(n, -forward, to_eye).x);
+    diffuse_light = vec3(IL_HEADLIGHT * reflected(n, to_head, to_eye).x);
     int count = is_occluded() ? 0 : int(n_lights.x);
     for (int i = 0; i < count; ++i) {
         Light light = Light(lights[4 * i], lights[4 * i + 1], lights[4 * i + 2], lights[4 * i + 3]);

@@ -73,7 +73,7 @@ class Caster:
         return self._tracer.counts(cameras, self.geometry.face_item, self.n_items + 1)
 
     def depth_pictures(self, cameras: Sequence[Camera]) -> F32:
-        """(N, H, W) planar depth in metres at the pixels' centres, 0 = nothing.
+        """(N, H, W) depth_z in metres at the pixels' centres, 0 = nothing.
 
         cameras: N of one size. For small pictures: all rays are made at once.
         """
@@ -82,9 +82,10 @@ class Caster:
         rays = [camera.rays() for camera in cameras]
         directions = np.stack([d for _origin, d in rays])
         origins = np.broadcast_to(np.stack([o for o, _d in rays])[:, None, None], directions.shape)
-        # Directions have unit length along the axis, so the distance along a ray is the depth.
+        # Directions are as long as makes the distance along a ray the depth.
         t, _face = self.first_hit(origins.reshape(-1, 3), directions.reshape(-1, 3))
-        return np.where(np.isfinite(t), t, np.float32(0)).reshape(directions.shape[:3])
+        depth = np.where(np.isfinite(t), t, np.float32(0)).reshape(directions.shape[:3])
+        return np.where(directions.any(-1), depth, np.float32(0))
 
     def first_hit(
         self,

@@ -17,7 +17,8 @@ from pbrs_farm.core.mesh import area_vectors, triangle_corners
 def hit_record_from_faces(geometry: Geometry, camera: Camera, face: I32) -> HitRecord:
     """The record of the camera's unjittered rays. face: (H, W) int32, -1 = nothing.
 
-    The hit is where the ray meets the face's plane, computed in float64 and clamped to the
+    depth_z is as camera.depths_of has it: along the axis, or the distance of a lens without planar
+    depth. The hit is where the ray meets the face's plane, computed in float64 and clamped to the
     triangle (at grazing angles the plane's hit may lie beside it). Geometric normals are the
     faces' own, turned towards the camera; shading normals lie on their side. Faces have an area.
     """
@@ -29,7 +30,9 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: I32) -> HitR
     planes = _planes(geometry, f, origin)
 
     # Intersect every ray with its plane and turn the normal towards the camera.
-    t, weights = _intersect(planes, local, d, -camera.world_from_camera[:3, 2])
+    is_planar = camera.intrinsics.lens.depth_is_planar
+    axis = -camera.world_from_camera[:3, 2] if is_planar else None
+    t, weights = _intersect(planes, local, d, axis)
     normal = planes.normal[local]
     normal[_dot(normal, d) > 0] *= -1
     corner = geometry.faces[f][local]
@@ -72,8 +75,13 @@ def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: F64) -> _Planes
     return _Planes(origin, a, b, c, n / np.sqrt(squared), grad_b, grad_c)
 
 
-def _intersect(planes: _Planes, local: NDArray[np.intp], d: F64, axis: F64) -> tuple[F64, F64]:
-    """(N,) t along d (N, 3) to plane local[n], and (N, 3) weights of a, b, c, all >= 0."""
+def _intersect(
+    planes: _Planes, local: NDArray[np.intp], d: F64, axis: F64 | None
+) -> tuple[F64, F64]:
+    """(N,) t along d (N, 3) to plane local[n], and (N, 3) weights of a, b, c, all >= 0.
+
+    axis: that d has unit length along; None: d has unit length.
+    """
     # Solve the plane's equation for t and evaluate the barycentric coordinates there.
     from_a = planes.origin - planes.a
     along = _dot(planes.normal[local], d)
@@ -90,7 +98,8 @@ def _intersect(planes: _Planes, local: NDArray[np.intp], d: F64, axis: F64) -> t
     weights[beside] = held
     k = local[beside]
     point = held[:, :1] * planes.a[k] + held[:, 1:2] * planes.b[k] + held[:, 2:] * planes.c[k]
-    t[beside] = (point - planes.origin) @ axis
+    way = point - planes.origin
+    t[beside] = np.linalg.norm(way, axis=1) if axis is None else way @ axis
     return t, weights
 
 

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, I32
 from pbrs_farm.core.camera import Camera
-from pbrs_farm.raycast.tracer import scene_from_mesh
+from pbrs_farm.raycast.tracer import (
+    counted_labels,
+    faces_as_picture,
+    rays_of_pixels,
+    scene_from_mesh,
+)
 from pbrs_farm.raycast.variant import mitsuba
 
 
@@ -24,12 +29,10 @@ class ScalarTracer:
         self._scene = scene_from_mesh(mitsuba(variant), positions, faces)
 
     def faces_of_camera(self, camera: Camera) -> I32:
-        origin, directions = camera.rays()
-        flat = directions.reshape(-1, 3)
-        origins = np.broadcast_to(origin, flat.shape)
+        origins, flat, blind = rays_of_pixels(camera)
         reach = np.broadcast_to(np.float32(np.inf), len(flat))
         _t, face = self.first_hit(origins, flat, reach)
-        return face.reshape(directions.shape[:2])
+        return faces_as_picture(face, camera, blind)
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
         mi = mitsuba(self._variant)
@@ -48,8 +51,5 @@ class ScalarTracer:
     ) -> NDArray[np.uint32]:
         counts = np.zeros((len(cameras), n_labels), np.uint32)
         for row, camera in enumerate(cameras):
-            face = self.faces_of_camera(camera)
-            # Count a label per pixel; label 0 takes the rays that miss.
-            label = np.where(face >= 0, face_label[face], np.uint32(0))
-            counts[row] = np.bincount(label.ravel(), minlength=n_labels)
+            counts[row] = counted_labels(self.faces_of_camera(camera), face_label, n_labels)
         return counts

@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, I32
+from pbrs_farm.core.arrays import F32, I32, Mask
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.raycast.variant import mitsuba
 
@@ -39,6 +39,31 @@ class RayTracer(Protocol):
     ) -> NDArray[np.uint32]:
         """(n_cameras, n_labels) pixels of each label; label 0 also counts what hits nothing."""
         ...
+
+
+def rays_of_pixels(camera: Camera) -> tuple[F32, F32, Mask | None]:
+    """(N, 3) origins and directions of all pixels, and (H, W) the pixels without a ray, if any.
+
+    A pixel without a ray gets one along the axis: a tracer takes no direction of length 0.
+    """
+    origin, directions = camera.rays()
+    blind = camera.blind
+    if blind is not None:
+        directions = np.where(blind[..., None], camera.towards.astype(np.float32), directions)
+    flat = directions.reshape(-1, 3)
+    return np.broadcast_to(origin, flat.shape), flat, blind
+
+
+def faces_as_picture(face: I32, camera: Camera, blind: Mask | None) -> I32:
+    """(H, W) of the faces (N,) that the rays of rays_of_pixels hit; -1 where a pixel has no ray."""
+    picture = face.reshape(camera.intrinsics.height_px, camera.intrinsics.width_px)
+    return picture if blind is None else np.where(blind, np.int32(-1), picture)
+
+
+def counted_labels(face: I32, face_label: NDArray[np.uint32], n_labels: int) -> NDArray[np.int64]:
+    """(n_labels,) pixels of each label; label 0 takes the rays that miss."""
+    label = np.where(face >= 0, face_label[face], np.uint32(0))
+    return np.bincount(label.ravel(), minlength=n_labels)
 
 
 def scene_from_mesh(mi: Any, positions: F32, faces: I32, *, watertight: bool = True) -> Any:
@@ -73,11 +98,9 @@ class JitTracer:
         return scene_from_mesh(mitsuba(self._variant), *self._mesh, watertight=False)
 
     def faces_of_camera(self, camera: Camera) -> I32:
-        origin, directions = camera.rays()
-        flat = directions.reshape(-1, 3)
-        origins = np.broadcast_to(origin, flat.shape)
+        origins, flat, blind = rays_of_pixels(camera)
         _t, face = self._trace(origins, flat, None, coherent=True)
-        return face.reshape(directions.shape[:2])
+        return faces_as_picture(face, camera, blind)
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
         distance = np.full(len(origins), np.inf, np.float32)
@@ -95,6 +118,11 @@ class JitTracer:
         # Launch as many cameras of one size together as memory allows.
         counts = np.zeros((len(cameras), n_labels), np.uint32)
         for i, members in _by_intrinsics(cameras).items():
+            if not i.lens.is_pinhole:
+                for k in members:
+                    face = self.faces_of_camera(cameras[k])
+                    counts[k] = counted_labels(face, face_label, n_labels)
+                continue
             n_pixels = i.width_px * i.height_px
             most = max(1, min(_RAYS_PER_LAUNCH // n_pixels, _COUNTS_PER_LAUNCH // n_labels))
             for start in range(0, len(members), most):

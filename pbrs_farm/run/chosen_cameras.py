@@ -6,8 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from pbrs_farm.core.camera import View
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House
-from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.recipe import CameraFields, LensFields
 from pbrs_farm.run.step_cache import camera_file_text
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from pbrs_farm.sample.camera_report import CameraReport
@@ -32,6 +33,15 @@ def chosen_cameras(house: House, fields: CameraFields, seed: int, caster: Caster
     views = with_right_views(sampling.views, fields.stereo_m)
     report = sampling.report.model_copy(update={"n_views": len(views)})
     return replace(sampling, views=views, report=report)
+
+
+def with_lens(view: View, lens: LensFields) -> View:
+    """The view, which was chosen through a pin-hole, through the recipe's lens; BadInput for a fold."""
+    try:
+        intrinsics = lens.intrinsics(view.camera.intrinsics)
+    except ValueError as error:
+        raise BadInput("lens", view.id, str(error)) from None
+    return replace(view, camera=replace(view.camera, intrinsics=intrinsics))
 
 
 def _one_by_one(house: House, fields: CameraFields, seed: int, caster: Caster) -> Sampling:

@@ -130,7 +130,7 @@ def _cameras(work: Work) -> StepOutput:
     sampling = chosen_cameras(house, fields, seed, cached.caster)
     views, report = sampling.views, sampling.report
     # Say why where there are none.
-    made = _camera_output(views, report.model_dump(mode="json"))
+    made = _camera_output(views, report.model_dump(mode="json"), work.recipe)
     return made if views else StepOutput(made.files, {**made.facts, "why_none": report.why_none})
 
 
@@ -140,10 +140,14 @@ def _object_cameras(work: Work, house: House, seed: int) -> StepOutput:
     f = work.recipe.cameras
     intrinsics = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
     views = object_views(house.items[0].bounds, intrinsics, seed, (house.id,))
-    return _camera_output(views, {"preset": "objects", "n_views": len(views)})
+    return _camera_output(views, {"preset": "objects", "n_views": len(views)}, work.recipe)
 
 
-def _camera_output(views: Sequence[View], report: dict[str, Any]) -> StepOutput:
+def _camera_output(views: Sequence[View], report: dict[str, Any], recipe: Recipe) -> StepOutput:
+    """The file of views that were chosen through a pin-hole, with the recipe's lens before them."""
+    from pbrs_farm.run.chosen_cameras import with_lens
+
+    views = [with_lens(view, recipe.lens) for view in views]
     facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
     return StepOutput({"cameras.json": cameras_json(views, report)}, facts)
 

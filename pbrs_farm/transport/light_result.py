@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, RadianceImage, UnitVectors
+from pbrs_farm.core.arrays import F32, Mask, RadianceImage, UnitVectors
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
@@ -44,6 +44,22 @@ class LightResult:
         for group in groups[1:]:
             total = total + self.group(group)
         return total
+
+
+def blackened(result: LightResult, mask: Mask) -> LightResult:
+    """The result with every image 0 where the mask (H, W) is."""
+
+    def cleared(image: F32) -> F32:
+        return np.where(mask[..., None], np.float32(0), image)
+
+    return replace(
+        result,
+        outdoor=cleared(result.outdoor),
+        indoor=cleared(result.indoor),
+        albedo=cleared(result.albedo),
+        normal=cleared(result.normal),
+        lamps={number: cleared(image) for number, image in result.lamps.items()},
+    )
 
 
 BLACK_CD_M2 = 0.05  # what 1 lx makes of a surface that reflects a sixth

@@ -18,7 +18,7 @@ from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.lamp_layers import MAX_SUMS, with_lamp_layers
-from pbrs_farm.transport.light_result import LightResult, joined_result, result_from_sums
+from pbrs_farm.transport.light_result import LightResult, blackened, joined_result, result_from_sums
 from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
 from pbrs_farm.transport.scene_tables.portals import nearest_portals, portals_of_house
 from pbrs_farm.transport.scene_tables.scene_tables import (
@@ -98,17 +98,32 @@ class LightScene:
         give equal bits on one machine (Metropolis: equal to 1e-5, it splats in parallel); with a
         time budget similar pictures. checkpoint: what an earlier render of equal arguments kept,
         and where this one keeps what it has; the picture is the same as without.
+        Pixels without a ray are black. Raises MachineFailed for a lens or blur on a scalar variant,
+        RenderFailed for blur by Metropolis.
         """
+        result = self._render(camera, room_id, fields, seed, checkpoint or NoCheckpoint())
+        return result if camera.blind is None else blackened(result, camera.blind)
+
+    def _render(
+        self,
+        camera: Camera,
+        room_id: str,
+        fields: LightFields,
+        seed: int,
+        checkpoint: RenderCheckpoint,
+    ) -> LightResult:
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
         mitsuba(self.variant)
         from pbrs_farm.transport.sample_passes import SampledView, path_sums
 
-        checkpoint = checkpoint or NoCheckpoint()
         emitters, weights = self.emitters(camera, fields, seed)
         view = SampledView(self.device_scene, emitters, camera, fields, seed)
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": weights}
         if fields.integrator == "metropolis":
+            if camera.blur is not None:
+                text = "depth of field and motion blur are of `path` alone"
+                raise RenderFailed(text, view=room_id, mode="light", seed=seed)
             return self._render_metropolis(view, room_id, checkpoint, facts)
         facts["integrator"] = "path"
         if fields.groups == "two":
@@ -193,6 +208,11 @@ class LightScene:
         """Both groups by Mitsuba's own plugins: scalar variants have no arrays for our kernels."""
         from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
 
+        if not camera.intrinsics.lens.is_pinhole or camera.blur is not None:
+            text = (
+                f"lenses, depth of field and motion blur need LLVM or CUDA, this is {self.variant}"
+            )
+            raise MachineFailed(text, hint="sudo apt-get install -y libllvm19")
         if fields.groups == "lamps":
             text = f"light by lamp needs LLVM or CUDA, this is {self.variant}"
             hint = "sudo apt-get install -y libllvm19, or --groups two"

@@ -18,17 +18,16 @@ from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.bsdf import luminance
+from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera, device_camera
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,
-    DeviceCamera,
     EmitterFilter,
     PathContext,
     StepResult,
     camera_path,
-    device_camera,
     device_fields,
     film_position,
 )
@@ -189,7 +188,7 @@ def _pixels_and_emitters(lane: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:
 @dr.syntax
 def _trace(
     context: PathContext,
-    camera: DeviceCamera,
+    camera: DeviceCamera | LensCamera,
     pixel_width: tuple[Any, Any],
     first: Any,
     last: Any,
@@ -206,13 +205,14 @@ def _trace(
     fresh = mi.Bool(True)  # whether it has yet to start
     active = s < last
     x0, y0 = mi.Float(pixel_width[0] % pixel_width[1]), mi.Float(pixel_width[0] // pixel_width[1])
-    path = camera_path(camera, x0, y0)
+    corner = mi.Point2f(x0, y0)
+    path = camera_path(camera, corner, mi.Point2f(0))
 
     while active:
         # Start the next sample where the last path has ended.
         sampler = SobolSampler(key, s)
         at = film_position(sampler.get_2d(mi.UInt32(0)), context.fields.is_tent)
-        path = dr.select(fresh, camera_path(camera, x0 + at.x, y0 + at.y), path)
+        path = dr.select(fresh, camera_path(camera, corner, at, sampler), path)
         l_out, l_in = dr.select(fresh, mi.Color3f(0), l_out), dr.select(fresh, mi.Color3f(0), l_in)
         seen = seen & ~fresh
 

@@ -10,14 +10,24 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64, I32, I64, Mask
-from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.camera import Camera, Intrinsics, pinholes_of
 from pbrs_farm.core.house import Item
 
 _CHUNK_ROWS = 500_000  # row intervals handled at once: bounds memory on large meshes
 
 
 def coverage(item: Item, camera: Camera) -> Mask:
-    """(H, W) bool: the ray through the pixel's centre meets any triangle of item."""
+    """(H, W) bool: the ray through the pixel's centre meets any triangle of item.
+
+    Exact for a pin-hole; of another lens, by pin-hole pictures that are finer than its own.
+    """
+    if camera.intrinsics.lens.is_pinhole:
+        return _pinhole_coverage(item, camera)
+    cameras, faces = pinholes_of(camera)
+    return faces.nearest([_pinhole_coverage(item, face) for face in cameras])
+
+
+def _pinhole_coverage(item: Item, camera: Camera) -> Mask:
     # Count intervals that begin and end along each row; their running sum is the depth of cover.
     i = camera.intrinsics
     starts = np.zeros((i.height_px, i.width_px + 1), np.int32)

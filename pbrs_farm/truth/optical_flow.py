@@ -70,7 +70,13 @@ def correspondence(
 
 
 def projected(points: F64, camera: Camera) -> tuple[F64, F64]:
-    """(N, 2) px of world points (N, 3), x right and y down, and (N,) their depth along the axis."""
+    """(N, 2) px of world points (N, 3), x right and y down, and (N,) their depth_z.
+
+    Through another lens than a pin-hole's a point that it does not see has px NaN and depth 0.
+    """
+    if not camera.intrinsics.lens.is_pinhole:
+        px = camera.pixels_of(points)
+        return px, np.where(np.isfinite(px).all(1), camera.depths_of(points), 0.0)
     local = (points - camera.eye) @ camera.world_from_camera[:3, :3]
     z = -local[:, 2]
     i = camera.intrinsics

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import HitRecord, Mask
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.classes import NYU13_FROM_NYU40
-from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Geometry, House, MaterialKind
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.truth.albedo import albedo_png
@@ -169,8 +169,17 @@ def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, ND
     """The named optional layers, as layers.py says: PNG arrays, and float32 for the EXR ones.
 
     A layer between views is left out where the view has no such partner. Raises KeyError for a
-    name that is no optional label layer.
+    name that is no optional label layer, BadInput for one that needs planar depth from a lens
+    without.
     """
+    lens = inputs.camera.intrinsics.lens
+    for name in ("hha", "depth_sensor"):
+        if name in names and not lens.depth_is_planar:
+            what = f"needs depth along the axis, which lens.model {lens.model} has not"
+            raise BadInput("--layers", name, what, hint="lens.model pinhole or radtan")
+    if "disparity" in names and not lens.is_pinhole:
+        what = f"needs rows that correspond, which lens.model {lens.model} has not"
+        raise BadInput("--layers", "disparity", what, hint="lens.model pinhole")
     made = [n for n in names if not LAYER[n].partner or LAYER[n].partner in inputs.to_partners]
     return {name: _LAYER_FUNCTIONS[name](inputs) for name in made}
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrs_farm.core.arrays import DepthZ
+from pbrs_farm.core.arrays import F64, DepthZ
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Room
@@ -18,31 +18,42 @@ def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, 
     """A row per corner of the room's polygon, at its floor and at its nominal ceiling.
 
     corner: number in the polygon. at: "floor" or "ceiling". world: (x, y, z) in metres. pixel:
-    (x, y) in px, also beyond the picture's edges; None behind the camera. visible: it lies in the
+    (x, y) in px, also beyond the picture's edges; None where the lens does not see it. visible: it lies in the
     picture and nothing in depth_z (H, W) occludes it. A sloped or stepped ceiling is not followed.
     """
-    # List the polygon's corners at both heights and move them into the camera's frame.
-    i = camera.intrinsics
-    camera_from_world = np.asarray(np.linalg.inv(camera.world_from_camera), np.float64)
+    # List the polygon's corners at both heights, with their pixels and depths.
     rows = []
     for at, y in (("floor", room.floor_y), ("ceiling", room.ceiling_y)):
         corners = np.insert(room.polygon, 1, y, axis=1)
-        for number, (world, p) in enumerate(
-            zip(corners, transform_points(camera_from_world, corners), strict=True)
-        ):
-            # Project with the pinhole model: OpenGL's camera looks along -z, rows count down.
-            z = -float(p[2])
-            pixel = [i.fx * p[0] / z + i.cx, -i.fy * p[1] / z + i.cy] if z > 1e-6 else None
+        pixels, depths = _projected(corners, camera)
+        for number, (world, pixel, z) in enumerate(zip(corners, pixels, depths, strict=True)):
             rows.append(
                 {
                     "corner": number,
                     "at": at,
                     "world": world.tolist(),
-                    "pixel": [float(v) for v in pixel] if pixel else None,
+                    "pixel": pixel,
                     "visible": pixel is not None and _is_visible(pixel, z, depth_z),
                 }
             )
     return rows
+
+
+def _projected(points: F64, camera: Camera) -> tuple[list[list[float] | None], list[float]]:
+    """(x, y) in px of each point, None where the lens does not see it; and its depth."""
+    i = camera.intrinsics
+    if not i.lens.is_pinhole:
+        seen = [p if np.isfinite(p).all() else None for p in camera.pixels_of(points)]
+        pixels = [None if p is None else [float(v) for v in p] for p in seen]
+        return pixels, [float(z) for z in camera.depths_of(points)]
+    # OpenGL's camera looks along -z, rows count down.
+    camera_from_world = np.asarray(np.linalg.inv(camera.world_from_camera), np.float64)
+    local = transform_points(camera_from_world, points)
+    depths = [-float(z) for z in local[:, 2]]
+    return [
+        [float(i.fx * p[0] / z + i.cx), float(-i.fy * p[1] / z + i.cy)] if z > 1e-6 else None
+        for p, z in zip(local, depths, strict=True)
+    ], depths
 
 
 def _is_visible(pixel: list[float], z: float, depth_z: DepthZ) -> bool:

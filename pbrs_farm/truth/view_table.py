@@ -17,9 +17,18 @@ from pbrs_farm.truth.standard_layers import nyu40_of_instance
 
 
 def camera_table(camera: Camera) -> dict[str, Any]:
-    """Size, K and both poses of a camera, as view.json holds them."""
+    """Size, K and both poses of a camera, as view.json holds them.
+
+    Of another lens than a pin-hole also "lens" (its model and coefficients), and "depth": "planar"
+    along the axis, or "distance" along the ray.
+    """
     i = camera.intrinsics
+    lens: dict[str, Any] = {}
+    if not i.lens.is_pinhole:
+        depth = "planar" if i.lens.depth_is_planar else "distance"
+        lens = {"lens": i.lens.table(), "depth": depth}
     return {
+        **lens,
         "width_px": i.width_px,
         "height_px": i.height_px,
         "K": i.k.tolist(),
@@ -96,14 +105,21 @@ def _box3d(item: Item) -> dict[str, Any]:
 def is_truncated(item: Item, camera: Camera) -> bool:
     """Whether part of the item lies outside the picture: behind the camera, or beyond an edge.
 
-    Exact for a mesh: the view pyramid is convex, so triangles are inside when their vertices are.
+    Exact for a pin-hole: the view pyramid is convex, so triangles are inside when their vertices
+    are; of other lenses it says whether all vertices are. A panorama sees everything.
     """
+    if camera.intrinsics.lens.is_panorama:
+        return False
     return any(not _inside(s.positions, camera) for s in item.surfaces if len(s.positions))
 
 
 def _inside(points: F32, camera: Camera) -> bool:
-    # Move into the camera's frame, in float32 as the mesh is.
     i = camera.intrinsics
+    if not i.lens.is_pinhole:
+        x, y = camera.pixels_of(points).T
+        inside = (x >= 0) & (x <= i.width_px) & (y >= 0) & (y <= i.height_px)
+        return bool(inside.all())  # NaN, what the lens does not see, is not inside
+    # Move into the camera's frame, in float32 as the mesh is.
     rotation = camera.world_from_camera[:3, :3].astype(np.float32)
     p = (points - camera.eye.astype(np.float32)) @ rotation
     z = -p[:, 2]

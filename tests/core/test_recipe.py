@@ -56,3 +56,28 @@ def test_a_stored_recipe_reads_back_and_a_damaged_one_names_its_place(name):
     assert recipe_from_json(recipe.model_dump_json().encode(), "here") == recipe
     with pytest.raises(BadRecipe, match="here"):
         recipe_from_json(b'{"light": 1}', "here")
+
+
+def test_a_lens_changes_cameras_and_no_digest_of_before():
+    plain, bent = recipe_from_name("fast"), recipe_from_name("fast", {"lens.preset": "kinect1"})
+    assert plain.digest("cameras", "lens") == plain.digest("cameras")
+    assert bent.digest("cameras", "lens") != bent.digest("cameras")
+    # A recipe that was stored before there were lenses is a pin-hole's.
+    before = plain.model_dump(mode="json")
+    del before["lens"]
+    assert Recipe.model_validate(before) == plain
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"lens.model": "radtan", "lens.k1": "-1.5"}, "the distortion folds the picture"),
+        ({"lens.model": "cubemap"}, "image.width_px=1536"),
+        ({"lens.preset": "tum_vi"}, "image.width_px=512"),
+        ({"lens.preset": "gopro"}, "lens.preset"),
+    ],
+)
+def test_a_lens_that_does_not_fit_is_refused_in_one_line(settings, words):
+    with pytest.raises(BadRecipe, match=words) as error:
+        recipe_from_name("fast", settings)
+    assert "\n" not in str(error.value)

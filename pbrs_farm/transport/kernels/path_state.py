@@ -7,32 +7,22 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
-from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
 from pbrs_farm.transport.guiding.nearby_lamps import NearbyLamps, ReferencePoint, no_reference
 from pbrs_farm.transport.kernels.bsdf import Bsdf
+from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera, camera_ray
 from pbrs_farm.transport.kernels.device_scene import (
     DeviceScene,
     SurfaceInteraction,
     offset_ray_origin,
 )
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, opaque3
+from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, Sampler
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 ALL_EMITTERS, NO_EMITTERS = -1, -2
-
-
-class DeviceCamera(NamedTuple):
-    """A camera as opaque device values: another camera is no new kernel."""
-
-    eye: Any  # Point3f
-    d0: Any  # Vector3f, direction at pixel coordinates (0, 0)
-    du: Any  # what a pixel to the right adds
-    dv: Any  # what a pixel down adds
 
 
 class DeviceFields(NamedTuple):
@@ -120,18 +110,6 @@ class StepResult(NamedTuple):
     is_view_independent: Any  # Bool: weighted by view_independent_pdf (bsdf.py)
 
 
-def device_camera(camera: Camera) -> DeviceCamera:
-    """Device values: the direction at pixel coordinates (u, v) is d0 + u du + v dv."""
-    i, r = camera.intrinsics, camera.world_from_camera[:3, :3]
-    d0 = r @ np.array([-i.cx / i.fx, i.cy / i.fy, -1.0])
-    return DeviceCamera(
-        opaque3(mi.Point3f, camera.eye),
-        opaque3(mi.Vector3f, d0),
-        opaque3(mi.Vector3f, r[:, 0] / i.fx),
-        opaque3(mi.Vector3f, -r[:, 1] / i.fy),
-    )
-
-
 def device_fields(fields: LightFields, *, max_depth: int | None = None) -> DeviceFields:
     """Device values of the fields the kernels use; max_depth replaces the fields' own."""
     return DeviceFields(
@@ -147,10 +125,15 @@ def film_position(u: Any, is_tent: Any) -> Any:
     return dr.select(is_tent, tent, u)
 
 
-def camera_path(camera: DeviceCamera, x: Any, y: Any) -> PathState:
-    """The path that leaves the camera through film position (x, y), in pixels."""
-    d = dr.normalize(camera.d0 + x * camera.du + y * camera.dv)
-    origin, reference = mi.Point3f(camera.eye), no_reference(camera.eye)
+def camera_path(
+    camera: DeviceCamera | LensCamera, corner: Any, offset: Any, sampler: Sampler | None = None
+) -> PathState:
+    """The path that leaves the camera through the film at a pixel's corner plus an offset, px.
+
+    sampler: where a ray also depends on the place in the pupil and on the time.
+    """
+    origin, d = camera_ray(camera, corner, offset, sampler)
+    reference = no_reference(mi.Point3f(origin))
     return _first_ray(origin, mi.Vector3f(d), mi.UInt32(0), reference, mi.Float(0))
 
 

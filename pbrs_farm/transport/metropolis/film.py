@@ -8,7 +8,8 @@ import drjit as dr
 import mitsuba as mi
 
 from pbrs_farm.transport.kernels.bsdf import luminance
-from pbrs_farm.transport.kernels.path_state import DeviceCamera, PathContext, film_position
+from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera
+from pbrs_farm.transport.kernels.path_state import PathContext, film_position
 
 
 class Film(NamedTuple):
@@ -24,7 +25,7 @@ class ChainContext(NamedTuple):
     """What all chains share."""
 
     paths: PathContext
-    camera: DeviceCamera
+    camera: DeviceCamera | LensCamera
     film: Film
     min_segments: Any  # of paths whose light counts
 
@@ -40,20 +41,20 @@ class Chains(NamedTuple):
     suffixes: Any  # (SUFFIX_FLOATS * N,), column by column (reconnection.py)
 
 
-def sample_film(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any]:
-    """(pixel index, film position in pixels spread by the filter) of two numbers."""
+def sample_film(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any, Any]:
+    """(pixel index, its corner in pixels, offset spread by the filter) of two numbers."""
     x, y = u.x * mi.Float(film.width), u.y * mi.Float(film.height)
     column = dr.minimum(mi.UInt32(x), film.width - 1)
     row = dr.minimum(mi.UInt32(y), film.height - 1)
     inside = mi.Point2f(dr.clip(x - mi.Float(column), 0, 1), dr.clip(y - mi.Float(row), 0, 1))
-    at = film_position(inside, is_tent) + mi.Point2f(mi.Float(column), mi.Float(row))
-    return row * film.width + column, at
+    corner = mi.Point2f(mi.Float(column), mi.Float(row))
+    return row * film.width + column, corner, film_position(inside, is_tent)
 
 
-def sample_pixel(film: Film, pixel: Any, u: Any, is_tent: Any) -> Any:
-    """Film position of two numbers inside a pixel, spread by the filter."""
+def sample_pixel(film: Film, pixel: Any, u: Any, is_tent: Any) -> tuple[Any, Any]:
+    """(a pixel's corner in pixels, offset spread by the filter) of two numbers."""
     corner = mi.Point2f(mi.Float(pixel % film.width), mi.Float(pixel // film.width))
-    return film_position(u, is_tent) + corner
+    return corner, film_position(u, is_tent)
 
 
 def target_function(film: Film, pixel: Any, light: Any, active: Any = True) -> Any:

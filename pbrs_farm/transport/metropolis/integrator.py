@@ -30,13 +30,13 @@ from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.transport.kernels.camera_rays import device_camera
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     EmitterFilter,
     PathContext,
-    device_camera,
     device_fields,
 )
 from pbrs_farm.transport.kernels.sampler import device_array

@@ -18,7 +18,8 @@ import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.transport.kernels.bsdf import luminance
-from pbrs_farm.transport.kernels.path_state import DeviceCamera, PathState, camera_path
+from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera
+from pbrs_farm.transport.kernels.path_state import PathState, camera_path
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import (
     CAMERA_DIMS,
@@ -138,7 +139,8 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
     y_suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
     is_reconnectable = mi.Bool(chains.is_reconnectable)
     x = _State(chains.light, chains.target, chains.pixel, is_reconnectable, mi.Float(0))
-    y = _camera_split_path(context.camera, mi.Float(0) * mi.Float(lane), mi.Float(0))
+    corner = mi.Point2f(mi.Float(0) * mi.Float(lane), 0)
+    y = _camera_split_path(context.camera, corner, mi.Point2f(0))
     sums = ChainSums(mi.Float(0), mi.Float(0), mi.Float(0), mi.UInt32(0))
     chain_key = stream_key(lane, how.seed)
     step = mi.UInt32(how.first)
@@ -151,8 +153,8 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
         is_large = unit_float(hash32(key ^ 0x51ED270B)) < how.p_large
         proposal = MutatedSampler(x_samples, key, is_large)
         u = proposal.get_2d(mi.UInt32(0))
-        pixel, at = sample_film(film, u, context.paths.fields.is_tent)
-        y = dr.select(fresh, _camera_split_path(context.camera, at.x, at.y), y)
+        pixel, corner, at = sample_film(film, u, context.paths.fields.is_tent)
+        y = dr.select(fresh, _camera_split_path(context.camera, corner, at), y)
         y, alive = _extend(context, proposal, y, y_suffix, active)
         done = active & ~alive
 
@@ -183,9 +185,10 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
 def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
     """n independent paths, a lane each, as chains stand at them; their numbers are not kept."""
     film = context.film
-    pixel, at = sample_film(film, sampler.get_2d(mi.UInt32(0)), context.paths.fields.is_tent)
+    is_tent = context.paths.fields.is_tent
+    pixel, corner, at = sample_film(film, sampler.get_2d(mi.UInt32(0)), is_tent)
     suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
-    y = _camera_split_path(context.camera, at.x, at.y)
+    y = _camera_split_path(context.camera, corner, at)
     # Extend each lane's path until it ends; the loop is recorded, ended lanes are masked.
     active = mi.Bool(True)
     while active:
@@ -200,10 +203,10 @@ def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
     return Chains(mi.Float(0), light, target, pixel, y.is_reconnectable, suffixes)
 
 
-def _camera_split_path(camera: DeviceCamera, x: Any, y: Any) -> SplitPath:
-    """The path that leaves the camera through film position (x, y), in pixels."""
+def _camera_split_path(camera: DeviceCamera | LensCamera, corner: Any, offset: Any) -> SplitPath:
+    """The path that leaves the camera through the film at a pixel's corner plus an offset, px."""
     return SplitPath(
-        path=camera_path(camera, x, y),
+        path=camera_path(camera, corner, offset),
         light=mi.Color3f(0),
         prefix_beta=mi.Color3f(1),
         suffix_light=mi.Color3f(0),

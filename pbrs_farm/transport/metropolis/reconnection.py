@@ -143,8 +143,9 @@ def trace_prefixes(context: ChainContext, n_pixels: int, seed: int) -> Any:
 def _trace_prefix(context: ChainContext, sampler: HashedSampler, pixel: Any) -> _Prefix:
     """Follow mirrors and glass to the first rough surface; no emitter counts."""
     paths = context.paths._replace(emitter_filter=EmitterFilter(None, None))
-    at = sample_pixel(context.film, pixel, sampler.get_2d(mi.UInt32(0)), paths.fields.is_tent)
-    path = camera_path(context.camera, at.x, at.y)
+    u = sampler.get_2d(mi.UInt32(0))
+    corner, at = sample_pixel(context.film, pixel, u, paths.fields.is_tent)
+    path = camera_path(context.camera, corner, at)
     prefix = _Prefix(
         mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Color3f(0),
         mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.Color3f(0), mi.Bool(False),

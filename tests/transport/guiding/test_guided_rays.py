@@ -153,11 +153,11 @@ def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
 def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
     import mitsuba as mi
 
+    from pbrs_farm.transport.kernels.camera_rays import device_camera
     from pbrs_farm.transport.kernels.path_state import (
         EmitterFilter,
         PathContext,
         camera_path,
-        device_camera,
         device_fields,
     )
     from pbrs_farm.transport.kernels.path_step import advance
@@ -182,7 +182,7 @@ def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
 
     every = EmitterFilter(mi.Int32(-1), mi.Int32(-1))
     context = PathContext(scene.device_scene, emitters, device_fields(FIELDS), every)
-    path = camera_path(device_camera(camera), mi.Float(16), mi.Float(12))
+    path = camera_path(device_camera(camera), mi.Point2f(16, 12), mi.Point2f(0))
     for _step in range(3):
         asked.append(set())
         path, result, _alive = advance(context, Recorded(), path, mi.Bool(True))

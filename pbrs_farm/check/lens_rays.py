@@ -1,0 +1,154 @@
+"""Rays and projections of lenses, written again for `verify` from the published formulas; no effects.
+
+Nothing is shared with what made the pictures. OpenCV's documentation gives radtan and fisheye; both
+are inverted by bisection, of the radius alone, and by fixed-point steps for the tangential part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_HALVINGS = 60
+_STEPS = 200  # of the fixed point, which a third of a pixel of tangential part needs few of
+
+
+@dataclass(frozen=True, slots=True)
+class StoredLens:
+    """The "lens" of a view.json."""
+
+    model: str
+    k: tuple[float, ...]  # radial: k1 k2 k3, of a fisheye k1 k2 k3 k4
+    p: tuple[float, float]  # tangential
+    limit: float  # largest angle in rad
+
+    @staticmethod
+    def of(table: dict[str, Any]) -> StoredLens:
+        """From view.json; KeyError or ValueError for a lens there is not."""
+        model = table["model"]
+        if model not in ("radtan", "fisheye", "equirect", "cubemap"):
+            raise ValueError(f"no lens model {model!r}")
+        names = {"radtan": ("k1", "k2", "k3"), "fisheye": ("k1", "k2", "k3", "k4")}.get(model, ())
+        p = (float(table["p1"]), float(table["p2"])) if model == "radtan" else (0.0, 0.0)
+        k = tuple(float(table[name]) for name in names)
+        return StoredLens(model, k, p, float(table.get("max_angle_rad", np.pi)))
+
+    def rays(self, plane: Floats) -> Floats:
+        """(N, 3) directions with OpenCV's axes, of unit depth, of points (N, 2) of the plane."""
+        if self.model == "equirect":
+            longitude, latitude = plane.T
+            horizontal = np.cos(latitude)
+            parts = [
+                np.sin(longitude) * horizontal,
+                np.sin(latitude),
+                np.cos(longitude) * horizontal,
+            ]
+            return np.stack(parts, axis=1)
+        if self.model == "cubemap":
+            return _cube_rays(plane)
+        if self.model == "radtan":
+            ideal = self._undistorted(plane)
+            return np.concatenate([ideal, np.ones((len(ideal), 1))], axis=1)
+        # A fisheye: the angle whose radius is the point's, none beyond the image circle.
+        radius = np.hypot(plane[:, 0], plane[:, 1])
+        most = self._turn(self.limit)
+        angle = self._inverse(radius, most)
+        turn = np.arctan2(plane[:, 1], plane[:, 0])
+        parts = [np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)]
+        seen = radius <= self._radial(np.array([most]))[0]
+        return np.where(seen[:, None], np.stack(parts, axis=1), 0.0)
+
+    def plane_and_depth(self, points: Floats) -> tuple[Floats, Floats]:
+        """(N, 2) of the plane and (N,) depth of points (N, 3), OpenCV's axes; NaN = unseen."""
+        x, y, z = points.T
+        distance = np.sqrt(x * x + y * y + z * z)
+        if self.model == "equirect":
+            return np.stack([np.arctan2(x, z), np.arcsin(y / distance)], axis=1), distance
+        if self.model == "cubemap":
+            return _cube_plane(points), distance
+        if self.model == "radtan":
+            depth = np.where(z > 0, z, np.nan)
+            return self._distorted(points[:, :2] / depth[:, None]), depth
+        angle, turn = np.arccos(z / distance), np.arctan2(y, x)
+        radius = np.where(angle <= self._turn(self.limit), self._radial(angle), np.nan)
+        return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1), distance
+
+    def _radial(self, r: Floats) -> Floats:
+        """r (1 + k1 r^2 + k2 r^4 + ...)."""
+        powers = [k * r ** (2 * n) for n, k in enumerate(self.k, start=1)]
+        return np.asarray(r * (1 + np.sum(powers, axis=0)))
+
+    def _turn(self, most: float) -> float:
+        """Where _radial stops growing in 0..most; most where it never does."""
+        grid = np.linspace(0, most, 4001)
+        turns = np.nonzero(np.diff(self._radial(grid)) <= 0)[0]
+        return float(grid[turns[0]]) if len(turns) else most
+
+    def _inverse(self, value: Floats, most: float) -> Floats:
+        """The r in 0..most whose _radial is value, by bisection."""
+        low, high = np.zeros_like(value), np.full_like(value, most)
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            is_below = self._radial(middle) < value
+            low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
+        return (low + high) / 2
+
+    def _tangential(self, x: Floats, y: Floats) -> Floats:
+        p1, p2 = self.p
+        r2 = x * x + y * y
+        across = 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+        down = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        return np.stack([across, down], axis=1)
+
+    def _distorted(self, ideal: Floats) -> Floats:
+        r = np.hypot(ideal[:, 0], ideal[:, 1])
+        scale = np.divide(self._radial(r), r, out=np.ones_like(r), where=r > 0)
+        return ideal * scale[:, None] + self._tangential(ideal[:, 0], ideal[:, 1])
+
+    def _undistorted(self, plane: Floats) -> Floats:
+        # Bracket the radius below the fold, then take the tangential part off again and again.
+        most = self._turn(4.0)
+        ideal = plane.copy()
+        for _ in range(_STEPS):
+            target = plane - self._tangential(ideal[:, 0], ideal[:, 1])
+            radius = np.hypot(target[:, 0], target[:, 1])
+            found = self._inverse(radius, most)
+            scale = np.divide(found, radius, out=np.ones_like(radius), where=radius > 0)
+            before, ideal = ideal, target * scale[:, None]
+            if np.abs(ideal - before).max(initial=0.0) < 1e-12:
+                break
+        return ideal
+
+
+def _cube_rays(plane: Floats) -> Floats:
+    number = np.clip(np.floor((plane[:, 0] + 1) / 2), 0, 5).astype(np.int64)
+    u, v, one = plane[:, 0] - 2 * number, plane[:, 1], np.ones(len(plane))
+    # Front, right, back, left, up, down: what the face's right, down and forward are.
+    faces = [(u, v, one), (one, v, -u), (-u, v, -one), (-one, v, u), (u, -one, v), (u, one, -v)]
+    found = np.zeros((len(plane), 3))
+    for k, parts in enumerate(faces):
+        found[number == k] = np.stack(parts, axis=1)[number == k]
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+
+def _cube_plane(points: Floats) -> Floats:
+    x, y, z = points.T
+    ax, ay, az = np.abs(points).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        faces = {
+            0: ((z >= ax) & (z >= ay), x / z, y / z),
+            1: ((x >= az) & (x >= ay), -z / x, y / x),
+            2: ((-z >= ax) & (-z >= ay), x / z, -y / z),
+            3: ((-x >= az) & (-x >= ay), -z / x, -y / x),
+            4: ((-y >= ax) & (-y >= az), -x / y, -z / y),
+            5: ((y >= ax) & (y >= az), x / y, -z / y),
+        }
+    out = np.full((len(points), 2), np.nan)
+    for k, (inside, u, v) in faces.items():
+        out[inside] = np.stack([u + 2 * k, v], axis=1)[inside]
+    return out

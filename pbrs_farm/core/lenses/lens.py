@@ -1,0 +1,123 @@
+"""The noun Lens: a model, its coefficients, and the maps between plane and direction; no effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.lenses.fisheye import (
+    angle_of_fold,
+    directions_of_fisheye,
+    fisheye_of_directions,
+)
+from pbrs_farm.core.lenses.panorama import (
+    cubemap_of_directions,
+    directions_of_cubemap,
+    directions_of_equirect,
+    equirect_of_directions,
+)
+from pbrs_farm.core.lenses.radial_tangential import distorted, largest_radius, undistorted
+
+LensModel = Literal["pinhole", "radtan", "fisheye", "equirect", "cubemap"]
+
+COEFFICIENTS: Final[Mapping[str, tuple[str, ...]]] = {
+    "pinhole": (),
+    "radtan": ("k1", "k2", "p1", "p2", "k3"),  # in OpenCV's order
+    "fisheye": ("k1", "k2", "k3", "k4"),
+    "equirect": (),
+    "cubemap": (),
+}
+"""Names of each model's coefficients."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lens:
+    """How directions fall on the picture's plane; K then says where that is in pixels."""
+
+    model: LensModel = "pinhole"
+    coefficients: tuple[float, ...] = ()  # by COEFFICIENTS
+    max_angle_rad: float = math.pi  # fisheye: of the image circle, from the axis
+
+    @property
+    def is_pinhole(self) -> bool:
+        """Straight lines stay straight."""
+        return self.model == "pinhole"
+
+    @property
+    def is_panorama(self) -> bool:
+        """All directions are seen."""
+        return self.model in ("equirect", "cubemap")
+
+    @property
+    def depth_is_planar(self) -> bool:
+        """Depth is z along the optical axis; else the distance along the ray.
+
+        A model that sees more than half of all directions has no z that could be stored.
+        """
+        return self.model in ("pinhole", "radtan")
+
+    @property
+    def largest_angle_rad(self) -> float:
+        """The angle from the axis beyond which nothing is seen."""
+        if self.model == "fisheye":
+            return min(self.max_angle_rad, angle_of_fold(self.coefficients))
+        if self.model == "radtan":
+            return math.atan(largest_radius(self.coefficients))
+        return math.pi if self.is_panorama else math.pi / 2
+
+    def directions(self, plane: F64) -> F64:
+        """(N, 3) directions, x right, y down, z forward, of points (N, 2) of the plane.
+
+        Of unit depth where depth is planar, else of unit length; (0, 0, 0) where there is no ray.
+        """
+        if self.model == "fisheye":
+            found = directions_of_fisheye(plane, self.coefficients, self.largest_angle_rad)
+        elif self.model == "equirect":
+            found = directions_of_equirect(plane)
+        elif self.model == "cubemap":
+            found = directions_of_cubemap(plane)
+        else:
+            ideal = undistorted(plane, self.coefficients) if self.model == "radtan" else plane
+            found = np.concatenate([ideal, np.ones((len(plane), 1))], axis=1)
+        return np.where(np.isfinite(found).all(1, keepdims=True), found, 0.0)
+
+    def plane_points(self, directions: F64) -> F64:
+        """(N, 2) points of the plane of directions (N, 3), any length; NaN where none is seen."""
+        if self.model == "fisheye":
+            return fisheye_of_directions(directions, self.coefficients, self.largest_angle_rad)
+        if self.model == "equirect":
+            return equirect_of_directions(directions)
+        if self.model == "cubemap":
+            return cubemap_of_directions(directions)
+        # Only what lies before the camera, and within the fold, has a picture.
+        z = directions[:, 2:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ideal = np.where(z > 1e-9, directions[:, :2] / z, np.nan)
+        if self.model == "pinhole":
+            return ideal
+        with np.errstate(invalid="ignore"):
+            seen = np.linalg.norm(ideal, axis=1) <= largest_radius(self.coefficients)
+        return np.where(seen[:, None], distorted(ideal, self.coefficients), np.nan)
+
+    def table(self) -> dict[str, Any]:
+        """The lens as JSON values: model, its coefficients by name, a fisheye's max_angle_rad."""
+        names = COEFFICIENTS[self.model]
+        rows = {"model": self.model} | dict(zip(names, self.coefficients, strict=True))
+        return rows | ({"max_angle_rad": self.max_angle_rad} if self.model == "fisheye" else {})
+
+
+PINHOLE: Final = Lens()
+
+
+def lens_from_table(table: Mapping[str, Any]) -> Lens:
+    """The lens that Lens.table wrote; KeyError, TypeError or ValueError when it is none."""
+    model = table["model"]
+    if model not in COEFFICIENTS:
+        raise ValueError(f"no lens model {model!r}")
+    coefficients = tuple(float(table[name]) for name in COEFFICIENTS[model])
+    return Lens(model, coefficients, float(table.get("max_angle_rad", math.pi)))

@@ -1,0 +1,149 @@
+"""Every lens model goes from pixel to direction and back, and says where it has no ray."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.camera import Camera, Intrinsics, pinholes_of
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.lenses.lens import Lens, lens_from_table
+from pbrs_farm.core.picture_fields.lens_fields import LENS_PRESETS, LensFields, fold_of
+
+PINHOLE = Intrinsics.from_hfov(640, 480)
+MODELS = {
+    "pinhole": LensFields(fx=500, fy=510, cx=300, cy=260),
+    "kinect1": LensFields(preset="kinect1"),
+    "barrel": LensFields(model="radtan", k1=-0.2, k2=0.03, p1=1e-3, p2=-2e-3),
+    "tum_vi": LensFields(preset="tum_vi"),
+    "fisheye180": LensFields(preset="fisheye180"),
+    "equirect": LensFields(model="equirect"),
+    "cubemap": LensFields(model="cubemap"),
+}
+
+
+def camera_of(name: str) -> Camera:
+    pose = np.eye(4)
+    pose[:3, :3] = rotation_y(0.7)
+    pose[:3, 3] = 1, 2, 3
+    return Camera(MODELS[name].intrinsics(PINHOLE), pose)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_point_on_a_pixels_ray_projects_to_its_centre(name: str) -> None:
+    camera = camera_of(name)
+    origin, directions = camera.exact_rays()
+    sees = directions.any(-1)
+    points = origin + 2.5 * directions[sees]
+    rows, columns = np.nonzero(sees)
+    pixels = camera.pixels_of(points)
+    error = np.abs(pixels - np.stack([columns, rows], 1) - 0.5)
+    assert error.max() < 1e-6
+    assert np.allclose(camera.depths_of(points), 2.5)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_only_a_fisheye_has_pixels_without_a_ray(name: str) -> None:
+    camera = camera_of(name)
+    blind = camera.blind
+    if name not in ("tum_vi", "fisheye180"):
+        assert blind is None
+        assert camera.exact_rays()[1].any(-1).all()
+        return
+    # The picture's corners lie beyond the image circle, its middle within.
+    assert blind is not None
+    assert blind[0, 0]
+    assert not blind[256, 256]
+    assert not camera.rays()[1][blind].any()
+
+
+def test_a_circle_of_180_degrees_covers_what_a_circle_covers() -> None:
+    blind = camera_of("fisheye180").blind
+    assert blind is not None
+    assert 1 - blind.mean() == pytest.approx(math.pi / 4, abs=0.002)
+
+
+def test_a_panorama_looks_forward_in_its_middle_and_up_in_its_first_row() -> None:
+    i = MODELS["equirect"].intrinsics(PINHOLE)
+    middle, top, right = i.directions(np.array([[512.0, 256], [512, 0], [768, 256]]))
+    assert np.allclose(middle, [0, 0, 1])
+    assert np.allclose(top, [0, -1, 0])
+    assert np.allclose(right, [1, 0, 0])
+
+
+def test_the_faces_of_a_cube_map_meet_at_their_edges() -> None:
+    i = MODELS["cubemap"].intrinsics(PINHOLE)
+    edge = np.linspace(1, 255, 9)
+    tiny = 1e-7
+    # From face to face along the strip, and round from left to front.
+    for left, right in ((255, 257), (511, 513), (767, 769)):
+        a = i.directions(np.stack([np.full(9, left + 1 - tiny), edge], 1))
+        b = i.directions(np.stack([np.full(9, right - 1 + tiny), edge], 1))
+        assert np.allclose(a, b, atol=1e-6)
+    # The lower edge of `up` and the upper edge of `down` are those of the front.
+    front_top = i.directions(np.stack([edge, np.full(9, tiny)], 1))
+    up_bottom = i.directions(np.stack([4 * 256 + edge, np.full(9, 256 - tiny)], 1))
+    front_bottom = i.directions(np.stack([edge, np.full(9, 256 - tiny)], 1))
+    down_top = i.directions(np.stack([5 * 256 + edge, np.full(9, tiny)], 1))
+    assert np.allclose(front_top, up_bottom, atol=1e-6)
+    assert np.allclose(front_bottom, down_top, atol=1e-6)
+
+
+def test_a_barrel_bends_lines_outwards_in_the_middle_and_a_pin_hole_does_not() -> None:
+    # A straight horizontal edge above the axis: its ends are drawn towards the middle.
+    xs = np.linspace(-0.5, 0.5, 5)
+    line = np.stack([xs, np.full(5, -0.3), np.ones(5)], 1)
+    barrel = Lens("radtan", (-0.2, 0.0, 0.0, 0.0, 0.0)).plane_points(line)
+    assert abs(barrel[0, 1]) < abs(barrel[2, 1])
+    assert np.ptp(Lens().plane_points(line)[:, 1]) == 0
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"model": "radtan", "k1": -1.5}, "folds the picture at"),
+        ({"model": "radtan", "k1": -0.4, "k2": -2.0}, "folds the picture at"),
+        ({"model": "fisheye", "fx": 100, "k1": -0.3}, "folds the picture at"),
+        ({"model": "fisheye"}, "needs lens.fx"),
+    ],
+)
+def test_a_distortion_that_folds_the_picture_is_told(fields: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        LensFields(**fields).intrinsics(PINHOLE)  # type: ignore[arg-type]
+
+
+def test_an_image_circle_before_the_fold_is_no_fold() -> None:
+    fields = LensFields(model="fisheye", fx=100, k1=-0.1, max_angle_deg=80)
+    assert fold_of(fields.intrinsics(PINHOLE)) is None
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_lens_reads_back_from_its_table(name: str) -> None:
+    lens = MODELS[name].lens
+    assert lens_from_table(lens.table()) == lens
+
+
+def test_a_preset_fills_what_the_user_leaves() -> None:
+    assert LensFields(preset="kinect1", k1=0).k1 == 0
+    assert LensFields(preset="kinect1").fy == LENS_PRESETS["kinect1"]["fy"]
+    assert LensFields().intrinsics(PINHOLE) is PINHOLE
+
+
+@pytest.mark.parametrize("name", ["kinect1", "tum_vi", "equirect"])
+def test_a_picture_from_pin_hole_faces_shows_each_ray_its_own_direction(name: str) -> None:
+    # Paint each face with its directions; the resampled picture must show those of its own rays.
+    camera = camera_of(name)
+    faces, map_ = pinholes_of(camera)
+    painted = []
+    for face in faces:
+        directions = face.exact_rays()[1]
+        painted.append(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
+    found = map_.bilinear(painted)
+    own = camera.exact_rays()[1]
+    sees = own.any(-1)
+    own = own[sees] / np.linalg.norm(own[sees], axis=-1, keepdims=True)
+    assert np.linalg.norm(found[sees] - own, axis=-1).max() < 2e-4
+    # A lens of 195 degrees looks into five faces of the cube.
+    assert len(faces) == {"kinect1": 1, "tum_vi": 5, "equirect": 6}[name]
