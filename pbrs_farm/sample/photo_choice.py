@@ -140,7 +140,8 @@ class PhotoChoice:
         tilt_deg = np.degrees(np.arcsin(-scored.candidates.towards[numbers, 1]))
         steep = TILT_COST * np.maximum(tilt_deg - MOST_TILT_DEG, 0.0)
         distance = share_distance(self._shown + scored.nyu13[numbers])
-        return score - steep - self.fields.likeness * (len(self._taken) + 1) * distance
+        far = self.fields.likeness * (len(self._taken) + 1) * distance
+        return np.asarray(score - steep - far)
 
     def _take(self, turn: _Turn, number: int) -> None:
         turn.taken.append(number)
