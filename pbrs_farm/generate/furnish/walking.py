@@ -16,8 +16,8 @@ from pbrs_farm.generate.floor_plan import Rect
 from pbrs_farm.generate.furnish.room_space import RoomSpace
 
 _RADIUS: Final = WALK_M / 2 / CELL_M  # cells
-# (rows, columns) by which a rectangle grows, together all cells nearer to it than the radius.
-_NEAR: Final = ((3, 5), (4, 4), (5, 3))
+# From a cell's middle to walls and bodies, exactly: whole cells would let ways of 0.5 m pass.
+_REACH_M: Final = WALK_M / 2 - 0.005
 
 
 class WalkMap:
@@ -32,9 +32,9 @@ class WalkMap:
             self._origin[1] + (np.arange(shape[0]) + 0.5) * CELL_M,
         )
         self._inside: Bools = np.asarray(shapely.contains_xy(space.polygon, xx, zz))
-        floor: Bools = np.asarray(shapely.contains_xy(space.walk_polygon, xx, zz))
-        clear = ndimage.distance_transform_edt(floor) >= _RADIUS - 1e-9
-        self.free = self.with_bodies(np.asarray(clear), standing)
+        clear = space.walk_polygon.buffer(-_REACH_M, join_style="mitre")
+        self._xs, self._zs = xx[0], zz[:, 0]
+        self.free = self.with_bodies(np.asarray(shapely.contains_xy(clear, xx, zz)), standing)
         # A way that an empty room does not have is not asked for.
         self._start = space.ways[0] if space.ways else None
         region = self._region(self.free, self._start)
@@ -43,15 +43,17 @@ class WalkMap:
     def with_bodies(self, free: Bools, rects: Iterable[Rect]) -> Bools:
         """The middles that are left where something stands on rectangles."""
         left = free.copy()
-        for rect in rects:
-            rows, columns = self._cells(rect)
-            if rows.start >= rows.stop or columns.start >= columns.stop:
-                continue
-            for dz, dx in _NEAR:
-                left[
-                    max(rows.start - dz, 0) : rows.stop + dz,
-                    max(columns.start - dx, 0) : columns.stop + dx,
-                ] = False
+        for x0, z0, x1, z1 in rects:
+            # Look at the cells of the rectangle around what is near; round its corners off.
+            columns, rows = (
+                slice(*np.searchsorted(at, (low - _REACH_M, high + _REACH_M)).tolist())
+                for at, low, high in ((self._xs, x0, x1), (self._zs, z0, z1))
+            )
+            x, z = self._xs[columns], self._zs[rows]
+            dx, dz = (
+                np.maximum(np.maximum(a - v, v - b), 0) for v, a, b in ((x, x0, x1), (z, z0, z1))
+            )
+            left[rows, columns] &= dx[None] ** 2 + dz[:, None] ** 2 >= _REACH_M**2
         return left
 
     def reached(self, free: Bools, fronts: Iterable[Rect]) -> Bools | None:
