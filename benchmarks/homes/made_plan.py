@@ -74,8 +74,10 @@ def _unreached(plan: Plan) -> list[str]:
         for j in range(i):
             if a.buffer(0.01).intersection(shapes[j].buffer(0.01)).length > 1.5:
                 joined.append((i, j))
+    # One comes into an upper storey by the stairs.
     entrance = next((o.room for o in plan.openings if o.kind is OpeningKind.ENTRANCE), None)
-    seen = {entrance}
+    stairs = next((i for i, r in enumerate(plan.rooms) if r.type is RoomType.STAIRS), None)
+    seen = {stairs if entrance is None else entrance}
     while new := {b for pair in joined for a, b in (pair, pair[::-1]) if a in seen} - seen:
         seen |= new
     return [f"{r.name}: not reached" for i, r in enumerate(plan.rooms) if i not in seen]
@@ -109,7 +111,7 @@ def _lacking(plan: Plan, pieces: tuple[PlacedPiece, ...]) -> list[str]:
             if not has & set(one.split("|")):
                 found.append(f"{room.name}: no {one}")
         lit = any("lamp" in group for group in has)
-        if room.type is not RoomType.BALCONY and not lit:
+        if room.type not in (RoomType.BALCONY, RoomType.STAIRS) and not lit:
             found.append(f"{room.name}: no lamp")
     return found
 

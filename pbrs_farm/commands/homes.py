@@ -41,6 +41,7 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     add("--rooms", metavar="LOW..HIGH", help="bedrooms, 0 to 4, e.g. 2..4")
     add("--area", metavar="LOW..HIGH", help="floor of all rooms in square metres, e.g. 60..90")
     add("--style", metavar="NAME", help="of furniture and paints, e.g. nordic")
+    add("--storeys", metavar="N", help="1 or 2 with a staircase between (default 1)")
     text = "leave the rooms without furniture; needs no package"
     add("--empty", action="store_true", help=text)
     add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")
@@ -113,7 +114,7 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     from pbrs_farm.generate.own_plan import plan_from_file
 
     # The plan decides the rooms, so wishes about rooms contradict it.
-    given = [f"--{k}" for k in ("rooms", "area", "programme") if getattr(args, k)]
+    given = [f"--{k}" for k in ("rooms", "area", "storeys", "programme") if getattr(args, k)]
     if given:
         raise BadInput("--plan", str(args.plan), f"leaves no choice of {given[0]}")
     own = plan_from_file(args.plan, args.apartment)
@@ -145,15 +146,16 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
 
     if args.apartment:
         raise BadInput("--apartment", args.apartment, "needs --plan FILE.csv")
-    options = [f"{k}={v}" for k in ("rooms", "area", "style") if (v := getattr(args, k))]
+    options = [f"{k}={v}" for k in ("rooms", "area", "style", "storeys") if (v := getattr(args, k))]
     options += ["furniture=none"] * args.empty
-    if args.programme and (args.rooms or args.area):
-        raise BadInput("--programme", str(args.programme), "leaves no choice of --rooms or --area")
+    given = [f"--{k}" for k in ("rooms", "area", "storeys") if args.programme and getattr(args, k)]
+    if given:
+        raise BadInput("--programme", str(args.programme), f"leaves no choice of {given[0]}")
     first, last = args.seed, args.seed + args.count - 1
     homes = made_homes(",".join((f"made:{first}..{last}", *options)))
     # Say at once what no seed can meet.
     bedrooms, area = homes[0].bedrooms, homes[0].area
-    Wishes(bedrooms, (float(area[0]), float(area[1])))
+    Wishes(bedrooms, (float(area[0]), float(area[1])), homes[0].storeys)
     return homes, programme_from_json(args.programme) if args.programme else None
 
 

@@ -10,7 +10,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 
 PREFIX: Final = "made:"
-VERSION: Final = 2
+VERSION: Final = 3
 """Of the generator: part of a made home's id. Raised when it makes another home of a seed."""
 
 MAX_SEED: Final = 2**31 - 1
@@ -22,6 +22,9 @@ STYLES: Final = ("classic", "mixed", "modern", "nordic", "vintage")
 
 _AREA_OF_HOMES: Final = ((28, 60), (36, 85), (48, 115), (62, 150), (76, 180))
 """Smallest and largest floor of all rooms, square metres, by the number of bedrooms."""
+
+_AREA_OF_TWO_STOREYS: Final = {2: (76, 150), 3: (84, 190), 4: (96, 230)}
+"""The same of both storeys together."""
 
 _HINT: Final = "made:12, made:1..1000 or made:1..100,rooms=2..4,area=60..90"
 _RANGE: Final = re.compile(r"(\d{1,10})(?:\.\.(\d{1,10}))?")
@@ -36,6 +39,7 @@ class MadeHome:
     area: tuple[int, int] = (20, 250)  # of all rooms, square metres
     style: str = ""  # of furniture and paints; "" = drawn by seed
     furniture: bool = True
+    storeys: int = 1
 
     @property
     def word(self) -> str:
@@ -48,6 +52,8 @@ class MadeHome:
                 parts.append(f"{key}={low}..{high}")
         if self.style:
             parts.append(f"style={self.style}")
+        if self.storeys != plain.storeys:
+            parts.append(f"storeys={self.storeys}")
         if not self.furniture:
             parts.append("furniture=none")
         return ",".join(parts)
@@ -88,23 +94,33 @@ def made_homes(word: str) -> list[MadeHome]:
                     word, option[:60], "no such style", hint=f"one of {', '.join(STYLES)}"
                 )
             home = replace(home, style=value)
+        elif key == "storeys":
+            home = replace(home, storeys=_range(word, value, 2)[1])
         elif key == "furniture" and value == "none":
             home = replace(home, furniture=False)
         else:
             raise BadInput(word, option, "is no option of made homes", hint=_HINT)
-    check_wishes(home.bedrooms, home.area)
+    check_wishes(home.bedrooms, home.area, home.storeys)
     return [replace(home, seed=seed) for seed in range(first, last + 1)]
 
 
-def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float]) -> None:
-    """Raise BadInput for a number of bedrooms and an area that no home meets."""
+def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float], storeys: int = 1) -> None:
+    """Raise BadInput for a number of bedrooms, an area and storeys that no home meets."""
     low, high = bedrooms
     if not 0 <= low <= high <= len(_AREA_OF_HOMES) - 1:
         text = "homes have 0 to 4 bedrooms"
         raise BadInput("rooms", f"{low}..{high}", text, hint="rooms=2..4")
     if not 0 < area[0] <= area[1]:
         raise BadInput("area", f"{area[0]:g}..{area[1]:g}", "is no range", hint="area=60..90")
+    if storeys not in (1, 2):
+        raise BadInput("storeys", str(storeys), "homes have one storey or two", hint="storeys=2")
     least, most = _AREA_OF_HOMES[low][0], _AREA_OF_HOMES[high][1]
+    if storeys == 2:
+        if high < min(_AREA_OF_TWO_STOREYS):
+            text = "homes of two storeys have 2 to 4 bedrooms"
+            raise BadInput("rooms", f"{low}..{high}", text, hint="rooms=2..4")
+        low = max(low, min(_AREA_OF_TWO_STOREYS))
+        least, most = _AREA_OF_TWO_STOREYS[low][0], _AREA_OF_TWO_STOREYS[high][1]
     if area[1] < least or area[0] > most:
         of = f"{low}" if low == high else f"{low} to {high}"
         raise BadInput(

@@ -70,7 +70,7 @@ def write_home(path: Path, home: Made) -> None:
         _check_same(path, home.origin)
     else:
         _write(path, home.data)
-    picture = plan_svg(home.plan, home.pieces, path.stem)
+    picture = plan_svg(home.storeys, path.stem, home.stair)
     _write(path.with_suffix(".svg"), picture.encode())
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, PlanWall, Point, RoomType
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.furniture import PlacedPiece, Storey
+from pbrs_farm.generate.staircase import Stair
 
 _MARGIN_M: Final = 0.6
 _PX_PER_M: Final = 60.0
@@ -17,11 +18,16 @@ _PASSING, _KEEPING, _OUTSIDE = "#eeeeea", "#e6e6e0", "#e2efdd"
 _RAISED_M: Final = 1.2  # what hangs higher is drawn dashed
 
 
-def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
-    """The text of an SVG file: rooms with names and areas, walls, doors, windows, furniture."""
-    points = [p for wall in plan.walls for p in wall.corners()]
+def plan_svg(storeys: Sequence[Storey], title: str, stair: Stair | None = None) -> str:
+    """The text of an SVG file: rooms with names and areas, walls, doors, windows, furniture.
+
+    Storeys lie side by side, the lowest on the left; stair: between the first two.
+    """
+    points = [p for storey in storeys for wall in storey.plan.walls for p in wall.corners()]
     x0, z0 = (min(p[k] for p in points) - _MARGIN_M for k in (0, 1))
     x1, z1 = (max(p[k] for p in points) + _MARGIN_M for k in (0, 1))
+    apart = x1 - x0 - _MARGIN_M
+    x1 += apart * (len(storeys) - 1)
     root = svg_file(
         viewBox=f"{x0:.2f} {z0:.2f} {x1 - x0:.2f} {z1 - z0:.2f}",
         width=round((x1 - x0) * _PX_PER_M), height=round((z1 - z0) * _PX_PER_M),
@@ -29,9 +35,19 @@ def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
     )  # fmt: skip
     element(root, "title", title)
     element(root, "rect", x=f"{x0:.2f}", y=f"{z0:.2f}", width="100%", height="100%", fill="#ffffff")
+    for number, storey in enumerate(storeys):
+        group = element(root, "g", transform=f"translate({number * apart:.2f} 0)")
+        _draw_storey(group, storey, stair)
+    return svg_text(root)
+
+
+def _draw_storey(root: Element, storey: Storey, stair: Stair | None) -> None:
+    plan = storey.plan
     for room in plan.rooms:
         element(root, "polygon", points=_text(room.polygon), fill=_tint(room.type))
-    for piece in sorted(pieces, key=lambda p: p.elevation + p.height):
+    if stair is not None:
+        _draw_stairs(root, stair)
+    for piece in sorted(storey.pieces, key=lambda p: p.elevation + p.height):
         _draw_piece(root, piece)
     ends = Counter(end for wall in plan.walls for end in (wall.start, wall.end))
     for wall in plan.walls:
@@ -42,7 +58,21 @@ def plan_svg(plan: Plan, pieces: Iterable[PlacedPiece], title: str) -> str:
         _draw_opening(root, plan, opening)
     for room in plan.rooms:
         _label(root, room.name, room.area, room.polygon)
-    return svg_text(root)
+
+
+def _draw_stairs(root: Element, stair: Stair) -> None:
+    """Treads of both flights and the landing behind them."""
+    (x, z), (w, d), (fx, fz) = stair.middle, stair.size, stair.front
+
+    def line(a: Point, b: Point) -> None:
+        ends = [(x + u * -fz + v * fx, z + u * fx + v * fz) for u, v in (a, b)]
+        element(root, "polyline", points=_text(ends), stroke="#999", stroke_width="0.02")
+
+    landing = max(w / 2, 0.9)
+    for k in range(9):
+        v = d / 2 - (d - landing) * k / 8
+        line((-w / 2, v), (w / 2, v))
+    line((0.0, landing - d / 2), (0.0, d / 2))
 
 
 def _tint(type_: RoomType) -> str:
@@ -54,7 +84,7 @@ def _tint(type_: RoomType) -> str:
             return _COOKING
         case RoomType.BATHROOM | RoomType.WC:
             return _WATER
-        case RoomType.HALL:
+        case RoomType.HALL | RoomType.STAIRS:
             return _PASSING
         case RoomType.BALCONY:
             return _OUTSIDE

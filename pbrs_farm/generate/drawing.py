@@ -21,11 +21,20 @@ def drawn_plan(
 ) -> Plan:
     """A plan for a programme, or for one drawn by seed as wished. Raises BadInput if none fits."""
     where = layout(programme, rng, is_fixed=True) if programme else _drawn_layout(rng, wishes)
+    return plan_of_layout(where, drawn_height(rng), rng)
+
+
+def drawn_height(rng: np.random.Generator) -> float:
+    """From floor to ceiling, metres: mostly what people draw."""
+    return float(rng.choice([2.4, 2.5, 2.5, 2.5, 2.6, 2.7]))
+
+
+def plan_of_layout(where: Layout, height: float, rng: np.random.Generator) -> Plan:
+    """Walls and rooms on rectangles, with doors and windows."""
     runs = runs_of(where)
     walls = walls_of(where, runs)
     rooms = rooms_of(where, walls)
     all_rooms, all_walls, openings = openings_of(where, runs, walls, rooms, rng)
-    height = float(rng.choice([2.4, 2.5, 2.5, 2.5, 2.6, 2.7]))
     return Plan(all_rooms, all_walls, openings, height)
 
 

@@ -11,9 +11,12 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.generate.drawing import drawn_plan
 from pbrs_farm.generate.floor_plan import Plan
 from pbrs_farm.generate.furnish.furnished import furnished
-from pbrs_farm.generate.furnish.gates import FurnishReport, furnish_report
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.furnish.gates import furnish_report
+from pbrs_farm.generate.furniture import PlacedPiece, Storey
+from pbrs_farm.generate.plan_gates import plan_faults
 from pbrs_farm.generate.programme import Programme, Wishes
+from pbrs_farm.generate.staircase import Stair
+from pbrs_farm.generate.two_storeys import drawn_storeys
 
 _TRIES: Final = 4
 _FURNISHINGS: Final = 2  # of one plan
@@ -21,11 +24,21 @@ _FURNISHINGS: Final = 2  # of one plan
 
 @dataclass(frozen=True, slots=True)
 class DrawnHome:
-    """A plan, what stands in it, and what of it breaks a gate."""
+    """Its storeys from below, the stairs between, and what breaks a gate, a line each."""
 
-    plan: Plan
-    pieces: tuple[PlacedPiece, ...]
-    report: FurnishReport
+    storeys: tuple[Storey, ...]
+    stair: Stair | None
+    broken: tuple[str, ...]
+
+    @property
+    def plan(self) -> Plan:
+        """Of the lowest storey."""
+        return self.storeys[0].plan
+
+    @property
+    def pieces(self) -> tuple[PlacedPiece, ...]:
+        """What stands in the lowest storey."""
+        return self.storeys[0].pieces
 
 
 def drawn_home(
@@ -35,17 +48,32 @@ def drawn_home(
     """A home by seed, or for a programme. Raises BadInput if no plan fits, or for a style.
 
     A plan whose rooms cannot hold what they must is drawn anew; after a number of tries the home
-    that breaks fewest gates is given, its report saying which.
+    that breaks fewest gates is given, which says which.
     """
     best: DrawnHome | None = None
     for _ in range(_TRIES):
-        plan = drawn_plan(rng, wishes, programme)
+        plans, stair = _drawn_plans(rng, wishes, programme)
         for _ in range(_FURNISHINGS):
-            pieces = furnished(plan, catalogue, rng, style)
-            home = DrawnHome(plan, pieces, furnish_report(plan, pieces, catalogue))
-            if best is None or len(home.report.broken) < len(best.report.broken):
+            storeys = tuple(Storey(p, furnished(p, catalogue, rng, style)) for p in plans)
+            home = DrawnHome(
+                storeys, stair, tuple(b for s in storeys for b in _broken(s, catalogue))
+            )
+            if best is None or len(home.broken) < len(best.broken):
                 best = home
-            if not best.report.broken:
+            if not best.broken:
                 return best
     assert best is not None
     return best
+
+
+def _broken(storey: Storey, catalogue: Catalogue) -> list[str]:
+    report = furnish_report(storey.plan, storey.pieces, catalogue)
+    return [*plan_faults(storey.plan), *report.broken]
+
+
+def _drawn_plans(
+    rng: np.random.Generator, wishes: Wishes | None, programme: Programme | None
+) -> tuple[tuple[Plan, ...], Stair | None]:
+    if wishes is not None and wishes.storeys == 2 and programme is None:
+        return drawn_storeys(rng, wishes)
+    return (drawn_plan(rng, wishes, programme),), None

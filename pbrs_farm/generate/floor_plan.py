@@ -28,6 +28,7 @@ class RoomType(StrEnum):
     STORE = "store"
     WARDROBE = "wardrobe"
     BALCONY = "balcony"
+    STAIRS = "stairs"  # the stairwell: open to the hall, on either storey
 
     @property
     def is_habitable(self) -> bool:

@@ -1,4 +1,4 @@
-"""The noun of a furnished plan: a piece of the catalogue that stands in a room; no effects."""
+"""The nouns of a furnished plan: a piece that stands in a room, a storey with its pieces; no effects."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from pbrs_farm.core.catalogue import Piece
-from pbrs_farm.generate.floor_plan import Point
+from pbrs_farm.generate.floor_plan import Plan, Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,3 +40,11 @@ class PlacedPiece:
             for u, v in ((-w, -d), (w, -d), (w, d), (-w, d))
         )
         return a, b, c, e
+
+
+@dataclass(frozen=True, slots=True)
+class Storey:
+    """A plan and what stands in its rooms."""
+
+    plan: Plan
+    pieces: tuple[PlacedPiece, ...]

@@ -8,20 +8,22 @@ from typing import Final
 
 from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.programme import Programme, RoomWish
-from pbrs_farm.generate.slicing import STEP_M, Brief, IntRect, shared_length
+from pbrs_farm.generate.slicing_rules import STEP_M, Brief, IntRect, shared_length
 
 MIN_WIDTH: Final = {
     RoomType.LIVING: 3.2, RoomType.STUDIO: 3.2, RoomType.KITCHEN: 2.1, RoomType.BEDROOM: 2.6,
     RoomType.BATHROOM: 1.55, RoomType.HALL: 1.1, RoomType.WC: 0.9, RoomType.STORE: 0.9,
-    RoomType.WARDROBE: 1.4,
+    RoomType.WARDROBE: 1.4, RoomType.STAIRS: 0.0,
 }  # fmt: skip
 MAX_ASPECT: Final = {
     RoomType.LIVING: 1.7, RoomType.STUDIO: 1.7, RoomType.KITCHEN: 1.9, RoomType.BEDROOM: 1.6,
     RoomType.BATHROOM: 1.7, RoomType.HALL: 8.0, RoomType.WC: 1.9, RoomType.STORE: 1.8,
-    RoomType.WARDROBE: 1.8,
+    RoomType.WARDROBE: 1.8, RoomType.STAIRS: math.inf,
 }  # fmt: skip
 DOOR_WALL_M: Final = 1.2  # a door of 0.9 m, 10 cm from the corner, and the walls' thickness
-DAYLIGHT_M: Final = 2.0
+DAYLIGHT_M: Final = 2.0  # of outer wall, at least
+_FLOOR_A_GLASS_M: Final = 8 * 2.1 / 1.05  # m2 that a metre of French window lights: 8 of its glass
+_BESIDE_GLASS_M: Final = 0.96  # the outer walls' halves at its ends, and 35 cm beside it
 WALL_M: Final = 0.14  # mean thickness of walls
 SMALL: Final = frozenset([RoomType.STORE, RoomType.WARDROBE, RoomType.WC])
 _CUT_FROM: Final = {
@@ -40,7 +42,8 @@ Cut = tuple[IntRect, tuple[IntRect, ...]]  # the guest, and what is left of its 
 def hosts_of(programme: Programme) -> dict[int, int]:
     """Small room -> the room it is cut from: each host has one guest at most."""
     hosts: dict[int, int] = {}
-    first = first_of(programme, RoomType.BATHROOM)
+    bathrooms = (i for i, wish in enumerate(programme.rooms) if wish.type is RoomType.BATHROOM)
+    first = next(bathrooms, -1)
     # What lies beside a certain room is a rectangle of its own.
     wished = {k for room, others in programme.adjacent for k in (room, *others)}
     for number, wish in enumerate(programme.rooms):
@@ -114,7 +117,7 @@ def _keeps_rules(
     if _opens_to_hall(wish, host) and _shared((inner,), halls) < door_m(wish.type):
         return False
     lit = max(daylight_length(r, brief, notch) for r in rest) * STEP_M
-    return not host.type.is_habitable or lit >= DAYLIGHT_M
+    return not host.type.is_habitable or lit >= daylight_m(host.area)
 
 
 def _opens_to_hall(wish: RoomWish, host: RoomWish) -> bool:
@@ -198,6 +201,11 @@ def _fits(rect: IntRect, type_: RoomType) -> bool:
 def door_m(type_: RoomType) -> float:
     """Metres of wall that a door of such a room needs: of wet and small rooms 10 cm less."""
     return DOOR_WALL_M - 0.1 * (not type_.is_habitable)
+
+
+def daylight_m(area: float) -> float:
+    """Metres of one outer wall that give a floor of that area its glass, a French window alone."""
+    return max(DAYLIGHT_M, area / _FLOOR_A_GLASS_M + _BESIDE_GLASS_M)
 
 
 def daylight_length(rect: IntRect, where: Brief, notch: IntRect | None) -> int:

@@ -10,8 +10,7 @@ import io
 import math
 import zipfile
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final
 from xml.etree import ElementTree as ET
 
@@ -26,9 +25,11 @@ from pbrs_farm.generate.floor_plan import (
     PlanWall,
     RoomType,
 )
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.furniture import PlacedPiece, Storey
+from pbrs_farm.generate.home_paints import Paints, drawn_paints
 from pbrs_farm.generate.joinery import joinery
 from pbrs_farm.generate.model_file import model_files
+from pbrs_farm.generate.staircase import Stair, staircase
 from pbrs_farm.images import png_from_array
 
 AUTHOR: Final = "pbrs_farm"
@@ -45,43 +46,25 @@ _FLOOR_GROUPS: Final = {
     RoomType.KITCHEN: "tiles", RoomType.BATHROOM: "tiles", RoomType.WC: "tiles",
 }  # fmt: skip
 _DRY_FLOOR: Final = "wood"
-
-
-@dataclass(frozen=True, slots=True)
-class Paints:
-    """The colours of a home, "RRGGBB"."""
-
-    walls: tuple[str, ...]  # of rooms to live in, one drawn for each
-    wet_walls: str
-    floor: str
-    wet_floor: str
-    ceiling: str
-    joinery: tuple[float, float, float]  # sRGB
-
-
-def drawn_paints(rng: np.random.Generator) -> Paints:
-    """Soft walls, light ceilings, doors and windows of one paint."""
-    walls = ("F4F1EA", "EFEBE0", "E8ECEA", "F3E9DC", "E6E3DA", "DDE4E6", "F6F3EE", "EDE6DD")
-    chosen = [walls[i] for i in rng.permutation(len(walls))[:3]]
-    white, oak, grey = (0.93, 0.92, 0.90), (0.66, 0.50, 0.33), (0.45, 0.46, 0.47)
-    wood = (white, white, oak, grey)[int(rng.integers(4))]
-    return Paints(tuple(chosen), "EEF1F1", "B08A62", "C9C6BF", "FAFAF8", wood)
+_OPEN_WELLS: Final = {"level-0": "ceiling", "level-1": "floor"}
+_LEVEL_NAMES: Final = ("Ground floor", "Upper floor")
 
 
 def home_file(
-    plan: Plan,
-    pieces: Iterable[PlacedPiece],
+    storeys: Sequence[Storey],
     catalogue: Catalogue,
     rng: np.random.Generator,
+    stair: Stair | None = None,
     *,
     name: str = "home",
     origin: str = "",
 ) -> bytes:
     """The bytes of a .sh3d; equal arguments give equal bytes. origin: what it was made from.
 
-    Pieces whose model the catalogue cannot load are left out.
+    storeys: from below; stair: between the first two. Pieces whose model the catalogue cannot load
+    are left out.
     """
-    placed = list(pieces)
+    plan, placed = storeys[0].plan, [p for s in storeys for p in s.pieces]
     home = ET.Element("home", {
         "version": VERSION, "name": f"{name}.sh3d", "camera": "topCamera",
         "wallHeight": _cm(plan.height),
@@ -89,14 +72,24 @@ def home_file(
     contents = _Contents()
     _add_properties(home, placed, origin)
     _add_surroundings(home, plan)
-    for opening in plan.openings:
-        _add_opening(home, plan, opening, contents, paints := drawn_paints(_fork(rng)))
-    if not plan.openings:
-        paints = drawn_paints(_fork(rng))
-    for piece in placed:
-        _add_piece(home, piece, catalogue, contents, plan.height)
-    _add_walls(home, plan, paints)
-    _add_rooms(home, plan, paints, catalogue, contents, rng)
+    paints = drawn_paints(_fork(rng))
+    # One wood and one tile for the whole home.
+    floors = _drawn_floors(catalogue, rng)
+    levels = _add_levels(home, storeys, stair)
+    for storey, level in zip(storeys, levels, strict=True):
+        for opening in storey.plan.openings:
+            element = _add_opening(home, storey.plan, opening, contents, paints)
+            element.attrib |= level
+    if stair is not None:
+        rise = plan.height + stair.slab_m
+        _add_stairs(home, stair, rise, contents, paints).attrib |= levels[0]
+    for storey, level in zip(storeys, levels, strict=True):
+        for piece in storey.pieces:
+            _add_piece(home, piece, catalogue, contents, storey.plan.height, level)
+    for storey, level in zip(storeys, levels, strict=True):
+        _add_walls(home, storey.plan, paints, level)
+    for storey, level in zip(storeys, levels, strict=True):
+        _add_rooms(home, storey.plan, paints, floors, contents, level)
     xml = ET.tostring(home, encoding="UTF-8", xml_declaration=True)
     return contents.archive(xml)
 
@@ -190,9 +183,44 @@ def _add_surroundings(home: ET.Element, plan: Plan) -> None:
         })  # fmt: skip
 
 
+def _add_levels(
+    home: ET.Element, storeys: Sequence[Storey], stair: Stair | None
+) -> list[dict[str, str]]:
+    """The attributes that put an element on each storey: none for a home of one."""
+    if stair is None:
+        return [{} for _ in storeys]
+    found, elevation = [], 0.0
+    for number, storey in enumerate(storeys):
+        name = f"level-{number}"
+        ET.SubElement(home, "level", {
+            "id": name, "name": _LEVEL_NAMES[number], "elevation": _cm(elevation),
+            "floorThickness": _cm(stair.slab_m), "height": _cm(storey.plan.height),
+            "elevationIndex": "0",
+        })  # fmt: skip
+        found.append({"level": name})
+        elevation += storey.plan.height + stair.slab_m
+    return found
+
+
+def _add_stairs(
+    home: ET.Element, stair: Stair, rise: float, contents: _Contents, paints: Paints
+) -> ET.Element:
+    shape = staircase(stair, rise, paints.joinery)
+    (x, z), (low, high) = stair.middle, shape.bounds
+    width, height, depth = (high - low).tolist()
+    return ET.SubElement(home, "pieceOfFurniture", {
+        "id": f"pieceOfFurniture-{len(home)}", "name": "Staircase",
+        "catalogId": "pbrs_farm#staircase", "creator": AUTHOR,
+        "icon": contents.icon, "model": contents.model("staircase", shape),
+        "x": _cm(x), "y": _cm(z), "elevation": "0", "angle": f"{stair.angle_rad:.6f}",
+        "width": _cm(width), "depth": _cm(depth), "height": _cm(height), "movable": "false",
+        "staircaseCutOutShape": "M0,0 v1 h1 v-1 z",
+    })  # fmt: skip
+
+
 def _add_opening(
     home: ET.Element, plan: Plan, opening: PlanOpening, contents: _Contents, paints: Paints
-) -> None:
+) -> ET.Element:
     wall = plan.walls[opening.wall]
     shape = joinery(opening, wall.thickness, paints.joinery)
     low, high = shape.bounds
@@ -202,7 +230,7 @@ def _add_opening(
     key = (
         f"{opening.kind} {opening.width} {opening.height} {wall.thickness} {opening.hinge_at_start}"
     )
-    ET.SubElement(home, "doorOrWindow", {
+    return ET.SubElement(home, "doorOrWindow", {
         "id": f"doorOrWindow-{len(home)}", "name": _DOOR_NAMES[opening.kind],
         "catalogId": f"pbrs_farm#{opening.kind.value}", "creator": AUTHOR,
         "icon": contents.icon, "model": contents.model(key, shape),
@@ -225,8 +253,9 @@ def _angle_into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> float:
 
 
 def _add_piece(
-    home: ET.Element, placed: PlacedPiece, catalogue: Catalogue, contents: _Contents, height: float
-) -> None:
+    home: ET.Element, placed: PlacedPiece, catalogue: Catalogue, contents: _Contents,
+    height: float, level: dict[str, str],
+) -> None:  # fmt: skip
     piece = placed.piece
     shape = catalogue.shape(piece)
     if shape is None:
@@ -239,7 +268,7 @@ def _add_piece(
         "x": _cm(placed.x), "y": _cm(placed.z), "angle": f"{placed.angle_rad:.6f}",
         "elevation": _cm(min(placed.elevation, height - placed.height)),
         "width": _cm(placed.width), "depth": _cm(placed.depth), "height": _cm(placed.height),
-    })  # fmt: skip
+    } | level)  # fmt: skip
     if placed.mirrored:
         element.set("modelMirrored", "true")
     if placed.colour:
@@ -264,18 +293,19 @@ def _add_light_sources(element: ET.Element, shape: Shape) -> None:
         })  # fmt: skip
 
 
-def _add_walls(home: ET.Element, plan: Plan, paints: Paints) -> None:
+def _add_walls(home: ET.Element, plan: Plan, paints: Paints, level: dict[str, str]) -> None:
     joints = _joints(plan.walls)
+    first = len(home.findall("wall"))
     for number, wall in enumerate(plan.walls):
         (x0, z0), (x1, z1) = wall.start, wall.end
         element = ET.SubElement(home, "wall", {
-            "id": f"wall-{number}", "xStart": _cm(x0), "yStart": _cm(z0), "xEnd": _cm(x1),
+            "id": f"wall-{first + number}", "xStart": _cm(x0), "yStart": _cm(z0), "xEnd": _cm(x1),
             "yEnd": _cm(z1), "height": _cm(wall.height or plan.height),
             "thickness": _cm(wall.thickness), "pattern": "hatchUp",
-        })  # fmt: skip
+        } | level)  # fmt: skip
         for attribute, end in (("wallAtStart", 0), ("wallAtEnd", 1)):
             if (number, end) in joints:
-                element.set(attribute, f"wall-{joints[number, end]}")
+                element.set(attribute, f"wall-{first + joints[number, end]}")
         for side, outwards in (("leftSideColor", -1), ("rightSideColor", 1)):
             room = _room_beside(plan, wall, outwards)
             element.set(side, f"FF{_wall_colour(plan, room, paints)}")
@@ -319,29 +349,34 @@ def _wall_colour(plan: Plan, room: PlanRoom | None, paints: Paints) -> str:
     return paints.walls[plan.rooms.index(room) % len(paints.walls)]
 
 
-def _add_rooms(
-    home: ET.Element,
-    plan: Plan,
-    paints: Paints,
-    catalogue: Catalogue,
-    contents: _Contents,
-    rng: np.random.Generator,
-) -> None:
-    # One wood and one tile for the whole home.
+def _drawn_floors(catalogue: Catalogue, rng: np.random.Generator) -> dict[str, Picture]:
+    """By group, the picture of every floor of that group."""
     chosen = {}
     for group in (_DRY_FLOOR, "tiles"):
         pictures = [p for p in catalogue.pictures if p.group == group]
         if pictures:
             chosen[group] = pictures[int(rng.integers(len(pictures)))]
+    return chosen
+
+
+def _add_rooms(
+    home: ET.Element, plan: Plan, paints: Paints, floors: dict[str, Picture], contents: _Contents,
+    level: dict[str, str],
+) -> None:  # fmt: skip
+    first = len(home.findall("room"))
     for number, room in enumerate(plan.rooms):
         is_wet = room.type in _FLOOR_GROUPS
+        # Between storeys the stairwell is open: no floor above, no ceiling below.
+        open_at = _OPEN_WELLS.get(level.get("level", "")) if room.type is RoomType.STAIRS else ""
+        has_ceiling = room.type is not RoomType.BALCONY and open_at != "ceiling"
         element = ET.SubElement(home, "room", {
-            "id": f"room-{number}", "name": room.name,
-            "floorVisible": "true", "ceilingVisible": str(room.type is not RoomType.BALCONY).lower(),
+            "id": f"room-{first + number}", "name": room.name,
+            "floorVisible": str(open_at != "floor").lower(),
+            "ceilingVisible": str(has_ceiling).lower(),
             "floorColor": f"FF{paints.wet_floor if is_wet else paints.floor}",
             "ceilingColor": f"FF{paints.ceiling}", "areaVisible": "true",
-        })  # fmt: skip
-        picture = chosen.get(_FLOOR_GROUPS.get(room.type, _DRY_FLOOR))
+        } | level)  # fmt: skip
+        picture = floors.get(_FLOOR_GROUPS.get(room.type, _DRY_FLOOR))
         if picture is not None:
             ET.SubElement(element, "texture", {
                 "attribute": "floorTexture", "name": picture.texture.name,

@@ -11,20 +11,21 @@ import numpy as np
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.guest_rooms import (
-    DAYLIGHT_M,
     DOOR_WALL_M,
     MAX_ASPECT,
     MIN_WIDTH,
     SMALL,
     WALL_M,
     cut_guests,
+    daylight_m,
     first_of,
     guest_area,
     hall_wall_m,
     hosts_of,
 )
 from pbrs_farm.generate.programme import Programme, RoomWish
-from pbrs_farm.generate.slicing import N_TRIES, Contact, IntRect, Leaf, solved
+from pbrs_farm.generate.slicing import N_TRIES, solved
+from pbrs_farm.generate.slicing_rules import STEP_M, Contact, IntRect, Leaf
 
 _BESIDE_M: Final = 0.8  # of wall that rooms which lie beside each other share
 _FIXED_TRIES: Final = 4  # times as many for what a user wrote
@@ -43,6 +44,18 @@ class Layout:
     lit_sides: tuple[bool, bool, bool, bool]  # left, top, right, bottom
 
 
+@dataclass(frozen=True, slots=True)
+class Core:
+    """What the storeys of a home share, in steps."""
+
+    width: int  # of the outline
+    depth: int
+    stairs: IntRect
+    landing: IntRect  # before the stairs: a part of the hall
+    front: tuple[int, int]  # unit vector (x, z) from the stairs to the landing
+    lit_sides: tuple[bool, bool, bool, bool]
+
+
 def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = False) -> Layout:
     """Rectangles for a programme. What makes it hard is left out step by step: its notch, its
     second arm, its blind sides, its small rooms.
@@ -52,7 +65,8 @@ def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = F
     """
     said = f"{len(programme.rooms)} rooms in {programme.area:.0f} m2"
     for left_out, tried in _easier(programme):
-        found = _solved_layout(tried, rng, is_fixed=is_fixed)
+        n_tries = N_TRIES * (_FIXED_TRIES if is_fixed else 1)
+        found = _solved_layout(tried, rng, is_fixed=is_fixed, n_tries=n_tries)
         if found is None:
             continue
         if is_fixed and left_out:
@@ -87,9 +101,17 @@ def _easier(programme: Programme) -> list[tuple[str, Programme]]:
     return steps
 
 
-def _solved_layout(
-    programme: Programme, rng: np.random.Generator, *, is_fixed: bool
+def storey_layout(
+    programme: Programme, core: Core, n_tries: int, rng: np.random.Generator
 ) -> Layout | None:
+    """Rectangles for one storey of several around their core; None where annealing finds none."""
+    return _solved_layout(programme, rng, is_fixed=True, core=core, n_tries=n_tries)
+
+
+def _solved_layout(
+    programme: Programme, rng: np.random.Generator, *, is_fixed: bool, core: Core | None = None,
+    n_tries: int = N_TRIES,
+) -> Layout | None:  # fmt: skip
     hosts = hosts_of(programme)
     # Make a leaf of each room that is no part of another's; two of a room with a second arm.
     leaves, owner = [], []
@@ -98,16 +120,18 @@ def _solved_layout(
             continue
         guests = tuple(programme.rooms[g] for g, host in hosts.items() if host == number)
         for share in _arms(wish, programme):
-            leaves.append(_leaf(wish, share, guests))
+            leaf = _leaf(wish, share, guests)
+            leaves.append(_around(core, wish.type, leaf, programme) if core else leaf)
             owner.append(number)
     if programme.notch:
         leaves.append(Leaf(programme.notch, 1.5, 2.5, is_corner=True))
-    lit = _lit_sides(programme.n_blind_sides, rng)
+    lit = core.lit_sides if core else lit_sides(programme.n_blind_sides, rng)
+    outline = (core.width, core.depth) if core else None
     contacts = _contacts(programme, owner, hosts)
     n_solved = 0
     hall = owner.index(first_of(programme, RoomType.HALL))
-    for _ in range(N_TRIES * (_FIXED_TRIES if is_fixed else 1)):
-        found = solved(tuple(leaves), contacts, hall, lit, rng)
+    for _ in range(n_tries):
+        found = solved(tuple(leaves), contacts, hall, lit, rng, outline)
         if found is None:
             continue
         brief, rects = found
@@ -138,10 +162,21 @@ def _leaf(wish: RoomWish, share: float, guests: tuple[RoomWish, ...] = ()) -> Le
     half_round = 2.6 if wish.type is RoomType.HALL else 2.0
     gross = area + half_round * math.sqrt(area) * WALL_M + WALL_M**2
     is_arm = share < 0.5
-    lit = DAYLIGHT_M if wish.type.is_habitable and not is_arm else 0.0
+    lit = daylight_m(wish.area) if wish.type.is_habitable and not is_arm else 0.0
     entrance = 1.3 if wish.type is RoomType.HALL else 0.0
     narrow = 2.4 if is_arm else MIN_WIDTH[wish.type]
     return Leaf(gross, narrow, MAX_ASPECT[wish.type], outer=lit, any_outer=entrance)
+
+
+def _around(core: Core, type_: RoomType, leaf: Leaf, programme: Programme) -> Leaf:
+    """The leaf of a storey of several: the stairs where they are, the hall before them."""
+    if type_ is RoomType.STAIRS:
+        x0, z0, x1, z1 = core.stairs
+        return Leaf((x1 - x0) * (z1 - z0) * STEP_M**2, 0.0, pinned=core.stairs)
+    if type_ is RoomType.HALL:
+        entrance = 0.0 if programme.is_upper else leaf.any_outer
+        return replace(leaf, holds=core.landing, any_outer=entrance)
+    return leaf
 
 
 def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> tuple[Contact, ...]:
@@ -152,6 +187,8 @@ def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> 
 
     halls, living = leaves_of(RoomType.HALL), leaves_of(RoomType.LIVING, RoomType.STUDIO)
     guest_of = {host: programme.rooms[guest] for guest, host in hosts.items()}
+    en_suites = programme.en_suites
+    n_bathrooms = sum(wish.type is RoomType.BATHROOM for wish in programme.rooms)
     contacts = []
     for i, o in enumerate(owner):
         type_ = programme.rooms[o].type
@@ -162,7 +199,13 @@ def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> 
             wide = 2.0 if programme.open_kitchen else 1.0
             contacts.append(Contact(i, living, wide, is_hard=programme.open_kitchen))
             contacts.append(Contact(i, (*halls, *living), DOOR_WALL_M))
-        elif type_ is not RoomType.HALL:
+        elif o in en_suites:
+            # Its door is its bedroom's; guests reach the only one from the hall, where they can.
+            beds = tuple(j for j, other in enumerate(owner) if other in en_suites[o])
+            contacts.append(Contact(i, beds, DOOR_WALL_M))
+            if n_bathrooms == 1:
+                contacts.append(Contact(i, halls, DOOR_WALL_M, is_hard=False))
+        elif type_ not in (RoomType.HALL, RoomType.STAIRS):
             wall = hall_wall_m(programme.rooms[o], guest_of.get(o))
             contacts.append(Contact(i, halls, wall))
         # Keep pipes short.
@@ -176,6 +219,7 @@ def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> 
     return tuple(contacts)
 
 
-def _lit_sides(n_blind: int, rng: np.random.Generator) -> tuple[bool, bool, bool, bool]:
+def lit_sides(n_blind: int, rng: np.random.Generator) -> tuple[bool, bool, bool, bool]:
+    """Which sides of an outline have daylight, left, top, right, bottom: all but n by chance."""
     blind = set(rng.permutation(4)[:n_blind].tolist())
     return (0 not in blind, 1 not in blind, 2 not in blind, 3 not in blind)

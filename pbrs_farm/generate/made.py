@@ -15,19 +15,20 @@ from pbrs_farm.core.made_home import VERSION, MadeHome
 from pbrs_farm.generate.drawn_home import drawn_home
 from pbrs_farm.generate.floor_plan import Plan, PlanRoom, Point
 from pbrs_farm.generate.furnish.furnished import furnished
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.furniture import Storey
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.programme import Programme, Wishes
+from pbrs_farm.generate.staircase import Stair
 
 
 @dataclass(frozen=True, slots=True)
 class Made:
     """A home that was made."""
 
-    plan: Plan
-    pieces: tuple[PlacedPiece, ...]
+    storeys: tuple[Storey, ...]  # from below
     data: bytes  # of its .sh3d
     origin: str
+    stair: Stair | None = None  # between them
 
 
 def made(home: MadeHome, catalogue: Catalogue, programme: Programme | None = None) -> Made:
@@ -35,16 +36,15 @@ def made(home: MadeHome, catalogue: Catalogue, programme: Programme | None = Non
 
     Raises BadInput for wishes that no home meets.
     """
-    wishes = Wishes(home.bedrooms, (float(home.area[0]), float(home.area[1])))
+    wishes = Wishes(home.bedrooms, (float(home.area[0]), float(home.area[1])), home.storeys)
     # All randomness comes from one stream that the wishes and the version name.
     words = (home.word,) if programme is None else (home.word, repr(programme))
     rng = np.random.default_rng(keys.seed("made", VERSION, *words))
     shelf = catalogue if home.furniture else EMPTY
     drawn = drawn_home(rng, shelf, wishes=wishes, programme=programme, style=home.style)
-    plan, pieces = drawn.plan, drawn.pieces
     said = origin(home, shelf, programme)
-    data = home_file(plan, pieces, shelf, rng, name=home.name, origin=said)
-    return Made(plan, pieces, data, said)
+    data = home_file(drawn.storeys, shelf, rng, drawn.stair, name=home.name, origin=said)
+    return Made(drawn.storeys, data, said, drawn.stair)
 
 
 def origin(home: MadeHome, catalogue: Catalogue, programme: Programme | None = None) -> str:
@@ -69,8 +69,9 @@ def made_of_plan(
         if grounds[piece.room].contains(Polygon(piece.corners))
     )
     digest = keys.digest("own plan", VERSION, seed, style, repr(plan), catalogue.digest)
-    data = home_file(upright, pieces, catalogue, rng, name=name, origin=f"plan {digest}")
-    return Made(upright, pieces, data, f"plan {digest}")
+    storey = Storey(upright, pieces)
+    data = home_file([storey], catalogue, rng, name=name, origin=f"plan {digest}")
+    return Made((storey,), data, f"plan {digest}")
 
 
 def turned(plan: Plan) -> Plan:

@@ -2,127 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
-from pbrs_farm.generate.floor_plan import (
-    OpeningKind,
-    PlanOpening,
-    PlanRoom,
-    PlanWall,
-    Point,
-    Rect,
-    RoomType,
-)
+from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening, PlanRoom, PlanWall, RoomType
 from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.plan_walls import OUTER_M, OUTSIDE, PARAPET_M, Run, balcony, open_rooms
-from pbrs_farm.generate.slicing import STEP_M
+from pbrs_farm.generate.plan_walls import OUTSIDE, Run, open_pairs
+from pbrs_farm.generate.wall_drawing import Drawing, numbers
+from pbrs_farm.generate.windows import add_balcony, add_windows, is_lit
 
 DOOR_HEIGHT_M: Final = 2.1
 _DOOR_M, _WET_DOOR_M, _ENTRANCE_M = 0.9, 0.8, 0.95
 _FROM_CORNER_M: Final = 0.10  # of a door's frame
 _LEAST_CORNER_M: Final = 0.03
-_LEAVES_M: Final = 0.1  # that the squares of two leaves may share
-_WINDOW_M, _WINDOW_HEIGHT_M, _SILL_M = 1.3, 1.3, 0.9
-_WIDEST_M: Final = 2.4
-_FRENCH_HEIGHT_M, _FRENCH_SILL_M = 2.1, 0.1
-_BALCONY_M: Final = 4.5
-_CLEAR_M: Final = 0.35  # between a window and a corner or another window
 _OPENS_OUT: Final = (RoomType.WC, RoomType.STORE)
-_GLASS_SHARE: Final = 1 / 8  # of the floor
-
-
-@dataclass(slots=True)
-class _Drawing:
-    layout: Layout
-    runs: list[Run]
-    walls: list[PlanWall]
-    rooms: list[PlanRoom]
-    rng: np.random.Generator
-    openings: list[PlanOpening] = field(default_factory=list)
-    rims: list[Point] = field(default_factory=list)  # where parapets meet the wall
-    swings: list[tuple[int, Rect]] = field(default_factory=list)  # room, what a leaf sweeps there
-
-    @property
-    def types(self) -> list[RoomType]:
-        return [room.type for room in self.rooms]
-
-    def wall_of(self, run: Run, at: float) -> tuple[int, float]:
-        """(number, metres from its start) of the wall that holds the coordinate `at` of a run."""
-        x, z = run.point(at / STEP_M)
-        for number, wall in enumerate(self.walls):
-            (x0, z0), (x1, z1) = wall.start, wall.end
-            if run.is_vertical and x0 == x1 and abs(x - x0) < 1e-6 and z0 <= z <= z1:
-                return number, z - z0
-            if not run.is_vertical and z0 == z1 and abs(z - z0) < 1e-6 and x0 <= x <= x1:
-                return number, x - x0
-        raise AssertionError("each run that is not open has a wall")
-
-    def free(self, run: Run) -> tuple[float, float]:
-        """(low, high) metres on the run's axis between the faces of the walls at its ends."""
-        low, high = (self._margin(run, end) for end in (run.low, run.high))
-        return run.low * STEP_M + low, run.high * STEP_M - high
-
-    def _margin(self, run: Run, end: int) -> float:
-        x, z = run.point(end)
-        margin = 0.0
-        for wall in self.walls:
-            (x0, z0), (x1, z1) = wall.start, wall.end
-            crosses = (x0 == x1) != run.is_vertical
-            touches = x0 - 1e-6 <= x <= x1 + 1e-6 and z0 - 1e-6 <= z <= z1 + 1e-6
-            if crosses and touches:
-                margin = max(margin, wall.thickness / 2)
-        return margin
-
-    def taken(self, run: Run) -> list[tuple[float, float]]:
-        """What openings already take of a run's axis."""
-        spans = []
-        for opening in self.openings:
-            wall = self.walls[opening.wall]
-            x, z = wall.at(opening.along)
-            here, along = (x, z) if run.is_vertical else (z, x)
-            if (wall.start[0] == wall.end[0]) == run.is_vertical and (
-                abs(here - run.line * STEP_M) < 1e-6
-            ):
-                spans.append((along - opening.width / 2, along + opening.width / 2))
-        # Nothing opens where a parapet meets the wall.
-        half = PARAPET_M / 2
-        for x, z in self.rims:
-            here, along = (x, z) if run.is_vertical else (z, x)
-            if abs(here - run.line * STEP_M) < OUTER_M:
-                spans.append((along - half, along + half))
-        return spans
-
-    def gaps(self, run: Run) -> list[tuple[float, float]]:
-        """What openings leave of a run between its corners, the longest first."""
-        low, high = self.free(run)
-        found = []
-        for a, b in sorted(self.taken(run)):
-            if a < high and b > low:
-                found.append((low, a))
-                low = b
-        return sorted([*found, (low, high)], key=lambda g: (g[0] - g[1], g[0]))
-
-    def swing(self, run: Run, at: float, width: float, room: int) -> Rect:
-        """The square in a room that a door's leaf can sweep."""
-        side = 1 if run.after == room else -1
-        line = run.line * STEP_M
-        across, along = sorted((line, line + side * width)), (at - width / 2, at + width / 2)
-        (x0, x1), (z0, z1) = (across, along) if run.is_vertical else (along, across)
-        return x0, z0, x1, z1
-
-    def meets_swing(self, room: int, rect: Rect) -> bool:
-        """Whether a leaf would hit another one of the room."""
-        return any(
-            other == room
-            and min(rect[2], r[2]) - max(rect[0], r[0]) > _LEAVES_M
-            and min(rect[3], r[3]) - max(rect[1], r[1]) > _LEAVES_M
-            for other, r in self.swings
-        )
 
 
 def openings_of(
@@ -133,18 +28,19 @@ def openings_of(
     rng: np.random.Generator,
 ) -> tuple[tuple[PlanRoom, ...], tuple[PlanWall, ...], tuple[PlanOpening, ...]]:
     """Rooms and walls with the balcony's added, and every door and window."""
-    drawing = _Drawing(layout, runs, list(walls), list(rooms), rng)
-    _add_entrance(drawing)
+    drawing = Drawing(layout, runs, list(walls), list(rooms), rng)
+    if not layout.programme.is_upper:
+        _add_entrance(drawing)
     for room in range(len(rooms)):
         _add_doors(drawing, room)
     if layout.programme.balcony:
-        _add_balcony(drawing)
+        add_balcony(drawing)
     for room in range(len(rooms)):
-        _add_windows(drawing, room)
+        add_windows(drawing, room)
     return tuple(drawing.rooms), tuple(drawing.walls), tuple(drawing.openings)
 
 
-def _add_entrance(drawing: _Drawing) -> None:
+def _add_entrance(drawing: Drawing) -> None:
     """The door of the home, in an outer wall of the hall; on a side without daylight first."""
     hall = drawing.types.index(RoomType.HALL)
     outer = [r for r in drawing.runs if r.rooms == {hall, OUTSIDE}]
@@ -154,26 +50,27 @@ def _add_entrance(drawing: _Drawing) -> None:
             return
 
 
-def _add_doors(drawing: _Drawing, room: int) -> None:
+def _add_doors(drawing: Drawing, room: int) -> None:
     """The door of a room: to the hall, or to the room it belongs to."""
     type_ = drawing.types[room]
-    if type_ is RoomType.HALL:
+    if type_ in (RoomType.HALL, RoomType.STAIRS):
         return
     width = _DOOR_M if type_.is_habitable else _WET_DOOR_M
+    bedrooms = drawing.layout.programme.en_suites.get(room)
+    if bedrooms is not None:
+        _add_doors_of_en_suite(drawing, room, bedrooms)
+        return
     for others in _doors_to(drawing.types, type_):
-        runs = [r for r in drawing.runs if room in r.rooms and r.rooms & set(others)]
-        runs = [r for r in runs if r.rooms != open_rooms(drawing.layout)]
-        runs.sort(key=lambda r: (-r.length, r.line, r.low))
         # Two leaves that hit each other are the last choice.
         if any(
             _add_door(drawing, run, room, OpeningKind.DOOR, width, may_meet=may_meet)
             for may_meet in (False, True)
-            for run in runs
+            for run in _runs_between(drawing, room, others)
         ):
             break
     # A closed kitchen often has a second door, to the living room.
     if type_ is RoomType.KITCHEN and not drawing.layout.programme.open_kitchen:
-        living = _numbers(drawing.types, RoomType.LIVING, RoomType.STUDIO)
+        living = numbers(drawing.types, RoomType.LIVING, RoomType.STUDIO)
         between = [r for r in drawing.runs if room in r.rooms and r.rooms & set(living)]
         joined = any({o.room, o.other} == {room, *living} for o in drawing.openings)
         if between and not joined and drawing.rng.random() < 0.6:
@@ -181,31 +78,39 @@ def _add_doors(drawing: _Drawing, room: int) -> None:
             _add_door(drawing, longest, room, OpeningKind.DOOR, width, may_meet=False)
 
 
+def _runs_between(drawing: Drawing, room: int, others: Iterable[int]) -> list[Run]:
+    """The walls between a room and others, the longest first."""
+    runs = [r for r in drawing.runs if room in r.rooms and r.rooms & set(others)]
+    runs = [r for r in runs if r.rooms not in open_pairs(drawing.layout)]
+    return sorted(runs, key=lambda r: (-r.length, r.line, r.low))
+
+
+def _add_doors_of_en_suite(drawing: Drawing, room: int, bedrooms: tuple[int, ...]) -> None:
+    """A bathroom's door to its bedroom; the home's only one has another to the hall if it fits."""
+    wanted: list[tuple[Iterable[int], bool]] = [(bedrooms, True)]
+    if drawing.types.count(RoomType.BATHROOM) == 1:
+        wanted.append((numbers(drawing.types, RoomType.HALL), False))
+    for others, may_meet in wanted:
+        for run in _runs_between(drawing, room, others):
+            if _add_door(drawing, run, room, OpeningKind.DOOR, _WET_DOOR_M, may_meet=may_meet):
+                break
+
+
 def _doors_to(types: list[RoomType], type_: RoomType) -> Iterable[list[int]]:
-    halls = _numbers(types, RoomType.HALL)
+    halls = numbers(types, RoomType.HALL)
     if type_ is RoomType.KITCHEN:
-        return halls, _numbers(types, RoomType.LIVING, RoomType.STUDIO)
+        return halls, numbers(types, RoomType.LIVING, RoomType.STUDIO)
     if type_ is RoomType.WARDROBE:
-        return _numbers(types, RoomType.BEDROOM), halls
+        return numbers(types, RoomType.BEDROOM), halls
     if type_ is RoomType.STORE:
-        return halls, _numbers(types, RoomType.KITCHEN)
+        return halls, numbers(types, RoomType.KITCHEN)
     if type_ is RoomType.BATHROOM:
-        return halls, _numbers(types, RoomType.BEDROOM)
+        return halls, numbers(types, RoomType.BEDROOM)
     return (halls,)
 
 
-def _numbers(types: list[RoomType], *wanted: RoomType) -> list[int]:
-    return [i for i, t in enumerate(types) if t in wanted]
-
-
 def _add_door(
-    drawing: _Drawing,
-    run: Run,
-    room: int,
-    kind: OpeningKind,
-    width: float,
-    *,
-    may_meet: bool = True,
+    drawing: Drawing, run: Run, room: int, kind: OpeningKind, width: float, *, may_meet: bool = True
 ) -> bool:
     """A door at one end of a run, hinged towards the corner; False where there is no room.
 
@@ -248,153 +153,3 @@ def _add_door(
         )
         return True
     return False
-
-
-def is_lit(run: Run, layout: Layout) -> bool:
-    """Whether daylight comes in through an outer run: its side is no neighbour's wall."""
-    left, top, right, bottom = layout.lit_sides
-    if run.is_vertical:
-        if run.line in (0, layout.width):
-            return left if run.line == 0 else right
-    elif run.line in (0, layout.depth):
-        return top if run.line == 0 else bottom
-    return True
-
-
-def _add_balcony(drawing: _Drawing) -> None:
-    """A balcony before the longest wall with daylight of the living room, and the way out."""
-    living = _numbers(drawing.types, RoomType.LIVING, RoomType.STUDIO)[0]
-    lit = [r for r in drawing.runs if r.rooms == {living, OUTSIDE} and is_lit(r, drawing.layout)]
-    # Walls of a notch have no room before them.
-    ends = (0, drawing.layout.width), (0, drawing.layout.depth)
-    lit = [r for r in lit if r.line in ends[not r.is_vertical] and r.length >= 2.8]
-    if not lit:
-        return
-    run = max(lit, key=lambda r: (r.length, r.line, r.low))
-    low, high = drawing.free(run)
-    high = min(high, low + _BALCONY_M)
-    room, parapet = balcony(run, low, high)
-    drawing.rooms.append(room)
-    drawing.walls.extend(parapet)
-    drawing.rims += [parapet[0].start, parapet[-1].end]
-    # Its doors light a large room by themselves.
-    glass = 1.1 * drawing.rooms[living].area * _GLASS_SHARE
-    width = round(min(max(glass / _FRENCH_HEIGHT_M, 1.8), 3.0, high - low - 2 * _CLEAR_M), 2)
-    middle = (low + high) / 2
-    wall, along = drawing.wall_of(run, middle)
-    drawing.openings.append(
-        PlanOpening(
-            OpeningKind.FRENCH_WINDOW,
-            wall,
-            round(along, 4),
-            width,
-            _FRENCH_HEIGHT_M,
-            _FRENCH_SILL_M,
-            living,
-            len(drawing.rooms) - 1,
-        )
-    )
-
-
-def _add_windows(drawing: _Drawing, room: int) -> None:
-    """Windows until a room's glass is an eighth of its floor; small ones where water runs."""
-    here = drawing.rooms[room]
-    runs = [r for r in drawing.runs if r.rooms == {room, OUTSIDE} and is_lit(r, drawing.layout)]
-    runs.sort(key=lambda r: (-r.length, r.line, r.low))
-    if here.type in (RoomType.BATHROOM, RoomType.WC):
-        if runs and drawing.rng.random() < 0.75:
-            _add_window(drawing, runs[0], room, (0.6, 0.6, 1.5))
-        return
-    if not here.type.is_habitable and here.type is not RoomType.HALL:
-        return
-    if here.type is RoomType.HALL:
-        # A hall has a window where its outer wall is long.
-        if runs and runs[0].length > 2.6 and drawing.rng.random() < 0.5:
-            _add_window(drawing, runs[0], room, (0.8, _WINDOW_HEIGHT_M, _SILL_M))
-        return
-    french = here.type in (RoomType.LIVING, RoomType.STUDIO) and drawing.rng.random() < 0.5
-    height, sill = (_FRENCH_HEIGHT_M, _FRENCH_SILL_M) if french else (_WINDOW_HEIGHT_M, _SILL_M)
-    glass = sum(o.width * o.height for o in drawing.openings if _is_window_of(o, room))
-    wanted = here.area * _GLASS_SHARE * float(drawing.rng.uniform(1.05, 1.35))
-    # Fill the longest wall first, with two windows at most; make them wider where it is short.
-    for run in runs:
-        missing = wanted - glass
-        if missing <= 0:
-            break
-        for gap in drawing.gaps(run):
-            n = min(max(math.ceil(missing / (_WINDOW_M * height)), 1), 3)
-            added = _add_row(drawing, run, gap, room, (n, missing, height, sill))
-            glass, missing = glass + added, missing - added
-            if missing <= 0:
-                break
-    if wanted - glass > 0.05 * wanted:
-        _widen(drawing, room, here.area * _GLASS_SHARE)
-
-
-def _is_window_of(opening: PlanOpening, room: int) -> bool:
-    is_window = opening.kind in (OpeningKind.WINDOW, OpeningKind.FRENCH_WINDOW)
-    return is_window and room == opening.room
-
-
-def _add_row(
-    drawing: _Drawing, run: Run, gap: tuple[float, float], room: int,
-    wish: tuple[int, float, float, float],
-) -> float:  # fmt: skip
-    """Windows of one size spread over a gap of a run; gives their glass in square metres.
-
-    wish: how many, their glass, height and sill.
-    """
-    (low, high), (n, missing, height, sill) = gap, wish
-    for count in range(n, 0, -1):
-        room_each = (high - low - _CLEAR_M * (count + 1)) / count
-        width = min(max(missing / count / height, 0.8), _WIDEST_M, room_each)
-        if width < 0.6:
-            continue
-        # Round to the sizes that windows come in.
-        width = math.floor(width * 10 + 0.999) / 10 if width + 0.1 <= room_each else width
-        apart = (high - low - count * width) / (count + 1)
-        glass = 0.0
-        for k in range(count):
-            middle = low + apart * (k + 1) + width * (k + 0.5)
-            glass += _add_window(drawing, run, room, (width, height, sill), middle)
-        if glass:
-            return glass
-    return 0.0
-
-
-def _add_window(
-    drawing: _Drawing,
-    run: Run,
-    room: int,
-    size: tuple[float, float, float],
-    middle: float | None = None,
-) -> float:
-    """A window (width, height, sill) in a run, in its middle if not told; gives its glass."""
-    width, height, sill = size
-    low, high = drawing.free(run)
-    middle = (low + high) / 2 if middle is None else middle
-    span = (middle - width / 2, middle + width / 2)
-    if span[0] < low + 0.15 or span[1] > high - 0.15:
-        return 0.0
-    if any(a < span[1] + 0.2 and b > span[0] - 0.2 for a, b in drawing.taken(run)):
-        return 0.0
-    kind = OpeningKind.FRENCH_WINDOW if sill < 0.3 else OpeningKind.WINDOW
-    wall, along = drawing.wall_of(run, middle)
-    drawing.openings.append(
-        PlanOpening(kind, wall, round(along, 4), round(width, 2), height, sill, room)
-    )
-    return width * height
-
-
-def _widen(drawing: _Drawing, room: int, wanted: float) -> None:
-    """Make a room's windows French ones where plain ones give too little light."""
-    own = [i for i, o in enumerate(drawing.openings) if _is_window_of(o, room)]
-    for i in own:
-        glass = sum(drawing.openings[j].width * drawing.openings[j].height for j in own)
-        old = drawing.openings[i]
-        if glass >= wanted:
-            return
-        drawing.openings[i] = PlanOpening(
-            OpeningKind.FRENCH_WINDOW, old.wall, old.along, old.width, _FRENCH_HEIGHT_M,
-            _FRENCH_SILL_M, old.room, old.other,
-        )  # fmt: skip

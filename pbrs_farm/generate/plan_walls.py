@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import groupby, pairwise
+from itertools import combinations, groupby, pairwise, product
 from typing import Final
 
 import numpy as np
@@ -12,9 +12,9 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, Point, RoomType
+from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, Point, Rect, RoomType
 from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.slicing import STEP_M
+from pbrs_farm.generate.slicing_rules import STEP_M
 
 OUTSIDE: Final = -1
 OUTER_M, WET_M, INNER_M, PARAPET_M = 0.26, 0.16, 0.075, 0.10  # thickness, as people draw them
@@ -86,8 +86,8 @@ def thickness(run: Run, types: list[RoomType]) -> float:
 def walls_of(layout: Layout, runs: list[Run]) -> tuple[PlanWall, ...]:
     """The walls: runs of one line and thickness joined; none between rooms that are open."""
     types = [wish.type for wish in layout.programme.rooms]
-    open_pair = open_rooms(layout)
-    standing = [(r, thickness(r, types)) for r in runs if r.rooms != open_pair]
+    is_open = open_pairs(layout)
+    standing = [(r, thickness(r, types)) for r in runs if r.rooms not in is_open]
     standing.sort(key=lambda item: (item[0].is_vertical, item[0].line, item[1], item[0].low))
     # Join what continues in a line.
     walls: list[PlanWall] = []
@@ -104,13 +104,16 @@ def walls_of(layout: Layout, runs: list[Run]) -> tuple[PlanWall, ...]:
     return tuple(walls)
 
 
-def open_rooms(layout: Layout) -> frozenset[int]:
-    """The two rooms without a wall between; empty where there are none."""
+def open_pairs(layout: Layout) -> frozenset[frozenset[int]]:
+    """Each two rooms without a wall between: an open kitchen, stairs and their hall."""
     types = [wish.type for wish in layout.programme.rooms]
-    if not layout.programme.open_kitchen or RoomType.KITCHEN not in types:
-        return frozenset()
-    living = next(i for i, t in enumerate(types) if t in (RoomType.LIVING, RoomType.STUDIO))
-    return frozenset((living, types.index(RoomType.KITCHEN)))
+    found = []
+    if layout.programme.open_kitchen and RoomType.KITCHEN in types:
+        living = next(i for i, t in enumerate(types) if t in (RoomType.LIVING, RoomType.STUDIO))
+        found.append(frozenset((living, types.index(RoomType.KITCHEN))))
+    if RoomType.STAIRS in types:
+        found.append(frozenset((types.index(RoomType.HALL), types.index(RoomType.STAIRS))))
+    return frozenset(found)
 
 
 def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...]:
@@ -155,6 +158,21 @@ def corners(shape: BaseGeometry) -> tuple[Point, ...]:
 
 def _turn(a: Point, b: Point, c: Point) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def largest_rectangle(polygon: Polygon) -> Rect:
+    """The largest rectangle inside a polygon with upright sides; its bounds where there is none."""
+    points = list(polygon.exterior.coords)
+    xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})
+    x0, z0, x1, z1 = polygon.bounds
+    best, largest = (x0, z0, x1, z1), 0.0
+    inside = polygon.buffer(1e-6)
+    # Its sides lie on lines through corners: try all pairs of them.
+    for (xa, xb), (za, zb) in product(combinations(xs, 2), combinations(zs, 2)):
+        area = (xb - xa) * (zb - za)
+        if area > largest and inside.contains(box(xa, za, xb, zb)):
+            largest, best = area, (xa, za, xb, zb)
+    return best
 
 
 def balcony(run: Run, low: float, high: float) -> tuple[PlanRoom, tuple[PlanWall, ...]]:

@@ -5,6 +5,7 @@ Medians and shares are those of nine homes drawn by people (65 rooms), docs/home
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -64,11 +65,29 @@ class Programme:
     l_shaped: bool = False  # the living room has a second arm
     balcony: bool = False
     adjacent: tuple[tuple[int, tuple[int, ...]], ...] = ()  # room shares a wall with one of others
+    is_upper: bool = False  # the storey above: one comes up the stairs, not in by a front door
 
     @property
     def area(self) -> float:
         """Floor of all rooms, square metres."""
         return sum(wish.area for wish in self.rooms)
+
+    @property
+    def en_suites(self) -> dict[int, tuple[int, ...]]:
+        """Bathroom -> the bedrooms it is entered from: those that are wished beside each other.
+
+        Of several bathrooms that a pair leaves open the last one becomes it: the first is for all.
+        """
+        types = [wish.type for wish in self.rooms]
+        found: dict[int, tuple[int, ...]] = {}
+        for room, others in self.adjacent:
+            kinds = {types[k] for k in others}
+            if types[room] is RoomType.BATHROOM and kinds == {RoomType.BEDROOM}:
+                found[room] = others
+            if types[room] is RoomType.BEDROOM and kinds == {RoomType.BATHROOM}:
+                left = [k for k in others if k not in found] or list(others)
+                found[left[-1]] = (room,)
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +96,11 @@ class Wishes:
 
     bedrooms: tuple[int, int] = (0, 4)
     area: tuple[float, float] = (20.0, 250.0)  # of all rooms, square metres
+    storeys: int = 1
 
     def __post_init__(self) -> None:
         """Raise BadInput for ranges that no home can meet."""
-        check_wishes(self.bedrooms, self.area)
+        check_wishes(self.bedrooms, self.area, self.storeys)
 
 
 def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> Programme:
@@ -91,7 +111,8 @@ def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> P
         programme = _drawn(rng, wishes.bedrooms)
         if wishes.area[0] <= programme.area <= wishes.area[1]:
             return programme
-    return _scaled(programme, float(np.clip(programme.area, *wishes.area)))
+    area = float(np.clip(programme.area, *wishes.area))
+    return replace(programme, rooms=tuple(scaled_rooms(programme.rooms, area)))
 
 
 def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int]) -> Programme:
@@ -109,7 +130,7 @@ def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int]) -> Programme:
     ):
         if rng.random() < chances[n]:
             types.append(type_)
-    rooms = [RoomWish(t, _drawn_area(rng, t)) for t in types]
+    rooms = [RoomWish(t, drawn_area(rng, t)) for t in types]
     # Homes with few bedrooms have smaller living rooms and kitchens.
     if n <= 1:
         rooms = [
@@ -134,16 +155,25 @@ def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int]) -> Programme:
     )
 
 
-def _drawn_area(rng: np.random.Generator, type_: RoomType) -> float:
+def drawn_area(rng: np.random.Generator, type_: RoomType) -> float:
+    """Square metres of a room of that type by seed."""
     area = MEDIAN_AREA[type_] * float(np.exp(rng.normal(0.0, _SPREAD.get(type_, 0.18))))
     return float(np.clip(area, *AREA_RANGE[type_]))
 
 
-def _scaled(programme: Programme, area: float) -> Programme:
-    # Scale every room, each within its own bounds.
-    factor = area / programme.area
-    rooms = tuple(
-        RoomWish(r.type, float(np.clip(r.area * factor, *AREA_RANGE[r.type])), r.name)
-        for r in programme.rooms
-    )
-    return replace(programme, rooms=rooms)
+def scaled_rooms(wishes: Sequence[RoomWish], area: float) -> list[RoomWish]:
+    """The rooms with that area in all, as near as the bounds of each let them; stairs stay."""
+    # Scale all alike, then give what a bound refused to the others.
+    found = list(wishes)
+    for _ in range(20):
+        fixed = sum(w.area for w in found if w.type not in AREA_RANGE)
+        factor = (area - fixed) / (sum(w.area for w in found) - fixed)
+        if abs(factor - 1) < 1e-3:
+            break
+        found = [_resized(wish, factor) for wish in found]
+    return found
+
+
+def _resized(wish: RoomWish, factor: float) -> RoomWish:
+    low, high = AREA_RANGE.get(wish.type, (wish.area, wish.area))
+    return replace(wish, area=float(np.clip(wish.area * factor, low, high)))

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import RoomType
-from pbrs_farm.generate.programme import AREA_RANGE, MEDIAN_AREA, Programme, RoomWish
+from pbrs_farm.generate.programme import AREA_RANGE, MEDIAN_AREA, Programme, RoomWish, scaled_rooms
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 
 MAX_ROOMS: Final = 14
@@ -163,19 +163,4 @@ def _with_area(path: Path, area: object, wishes: list[RoomWish]) -> list[RoomWis
             path, "area", f"{len(wishes)} rooms in {area:g} m2 cannot be met",
             hint=f"rooms of these types take {math.ceil(least + hall)} to {most:.0f} m2",
         )  # fmt: skip
-    return _scaled(wishes, float(area))
-
-
-def _scaled(wishes: list[RoomWish], area: float) -> list[RoomWish]:
-    # Scale all alike, then give what a bound refused to the others.
-    found = wishes
-    for _ in range(20):
-        factor = area / sum(w.area for w in found)
-        if abs(factor - 1) < 1e-3:
-            break
-        found = [
-            RoomWish(w.type, min(max(w.area * factor, low), high), w.name)
-            for w in found
-            for low, high in (AREA_RANGE[w.type],)
-        ]
-    return found
+    return scaled_rooms(wishes, float(area))

@@ -13,50 +13,14 @@ from typing import Final
 
 import numpy as np
 
-STEP_M: Final = 0.05
+from pbrs_farm.generate.slicing_rules import STEP_M, Brief, Contact, IntRect, Leaf, Rules
+
 N_MOVES: Final = 3000
 N_TRIES: Final = 10
 _T_START, _T_END = 6.0, 0.8
-_WALL_STEPS: Final = 3  # what walls take from a room's width, about
-_UNMET: Final = 1.5  # cost of a hard rule that is not met, beside how far it is from it
+_SNAP: Final = 12  # steps that a cut moves to the side of a pinned rectangle
 
 _GOOD: Final = 0.1  # cost that more moves hardly better
-
-IntRect = tuple[int, int, int, int]  # x0, z0, x1, z1 in steps
-
-
-@dataclass(frozen=True, slots=True)
-class Leaf:
-    """A rectangle of the plan and what it must be; lengths in metres."""
-
-    area: float  # with its share of the walls, square metres
-    min_width: float
-    max_aspect: float = math.inf
-    outer: float = 0.0  # least length of outer wall with daylight
-    any_outer: float = 0.0  # least length of any outer wall
-    is_corner: bool = False  # a notch of the outline: it lies in a corner and counts as outside
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """A rule that a leaf shares a stretch of wall with one of others."""
-
-    leaf: int
-    others: tuple[int, ...]
-    length: float  # metres
-    is_hard: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class Brief:
-    """What annealing has to solve."""
-
-    leaves: tuple[Leaf, ...]
-    contacts: tuple[Contact, ...]
-    hall: int  # the leaf that a first tree puts in the middle
-    width: int  # of the outline, steps
-    depth: int
-    lit_sides: tuple[bool, bool, bool, bool]  # left, top, right, bottom: daylight comes in there
 
 
 @dataclass(slots=True)
@@ -85,22 +49,27 @@ class _Tree:
         return _Tree(self.vertical[:], self.children[:], self.leaf_at[:])
 
 
+def drawn_outline(area: float, rng: np.random.Generator) -> tuple[int, int]:
+    """Width and depth in steps of a rectangle of that area: 0.6 to 1.7 times as wide as it is deep."""
+    width = math.sqrt(area * float(rng.uniform(0.6, 1.7)))
+    return round(width / STEP_M), round(area / width / STEP_M)
+
+
 def solved(
     leaves: tuple[Leaf, ...],
     contacts: tuple[Contact, ...],
     hall: int,
     lit_sides: tuple[bool, bool, bool, bool],
     rng: np.random.Generator,
+    outline: tuple[int, int] | None = None,
 ) -> tuple[Brief, list[IntRect]] | None:
     """An outline and a rectangle for each leaf that meet every hard rule; None if annealing fails.
 
-    The outline is another one each time: 0.6 to 1.7 times as wide as it is deep.
+    outline: its width and depth in steps; another one of the leaves' area each time if not told.
     """
-    # An outline of the leaves' area, in whole steps of STEP_M.
-    area = sum(leaf.area for leaf in leaves)
-    width = math.sqrt(area * float(rng.uniform(0.6, 1.7)))
-    w, d = round(width / STEP_M), round(area / width / STEP_M)
-    brief = Brief(leaves, contacts, hall, w, d, lit_sides)
+    w, d = outline or drawn_outline(sum(leaf.area for leaf in leaves), rng)
+    pinned = next((i for i, leaf in enumerate(leaves) if leaf.pinned), -1)
+    brief = Brief(leaves, contacts, hall, w, d, lit_sides, pinned)
     rects, unmet = _annealed(brief, _Random(rng))
     return None if unmet else (brief, rects)
 
@@ -124,7 +93,7 @@ class _Random:
 def _annealed(brief: Brief, draw: _Random) -> tuple[list[IntRect], int]:
     """The best rectangles of one annealing and how many hard rules they break."""
     tree = _spine_tree(brief, draw)
-    rules = _Rules(brief)
+    rules = Rules(brief)
     rects = _laid_out(tree, brief)
     cost, unmet = rules.judge(rects)
     best, best_score = rects, (unmet, cost)
@@ -230,6 +199,7 @@ def _laid_out(tree: _Tree, brief: Brief) -> list[IntRect]:
     for k in reversed(order):
         a, b = children[k]
         area[k] = area[a] + area[b]
+    above_pin = _above_pin(tree, brief, order)
     # Go down from the outline.
     rects: list[IntRect] = [(0, 0, 0, 0)] * (n_cuts + 1)
     stack = [(n_cuts - 1, 0, 0, brief.width, brief.depth)]
@@ -242,105 +212,39 @@ def _laid_out(tree: _Tree, brief: Brief) -> list[IntRect]:
         share = area[a] / area[k]
         if tree.vertical[k]:
             cut = x0 + round((x1 - x0) * share)
+            if k in above_pin:
+                cut = _off_pin(cut, k, above_pin, tree, brief)
             stack += ((a, x0, z0, cut, z1), (b, cut, z0, x1, z1))
         else:
             cut = z0 + round((z1 - z0) * share)
+            if k in above_pin:
+                cut = _off_pin(cut, k, above_pin, tree, brief)
             stack += ((a, x0, z0, x1, cut), (b, x0, cut, x1, z1))
     return rects
 
 
-class _Rules:
-    """How far the rooms of a layout are from what they must be."""
-
-    def __init__(self, brief: Brief) -> None:
-        self._brief = brief
-        self._width, self._depth, self._lit = brief.width, brief.depth, brief.lit_sides
-        self._limits = [
-            (leaf.min_width, leaf.max_aspect, bool(leaf.outer or leaf.any_outer or leaf.is_corner))
-            for leaf in brief.leaves
-        ]
-        self._contacts = [(c.leaf, c.others, c.length, c.is_hard) for c in brief.contacts]
-        self._notches = [i for i, leaf in enumerate(brief.leaves) if leaf.is_corner]
-
-    def judge(self, rects: list[IntRect]) -> tuple[float, int]:
-        """(cost, hard rules that are broken) of one rectangle for each leaf."""
-        total, unmet = 0.0, 0
-        for leaf, (min_width, max_aspect, has_outer), rect in zip(
-            self._brief.leaves, self._limits, rects, strict=True
-        ):
-            width = rect[2] - rect[0] - _WALL_STEPS
-            depth = rect[3] - rect[1] - _WALL_STEPS
-            short, long = (width, depth) if width < depth else (depth, width)
-            short_m = short * STEP_M
-            if short_m < min_width:
-                total += _UNMET + 4 * (min_width - short_m)
-                unmet += 1
-            if long > max_aspect * short:
-                aspect = long / short if short > 0 else 20.0
-                total += min(2 * (aspect - max_aspect), 6.0)
-                unmet += aspect > 1.3 * max_aspect
-            missing = self._missing_outside(leaf, rect, rects) if has_outer else 0.0
-            if missing > 0:
-                total += _UNMET + missing
-                unmet += 1
-        for leaf_number, others, length, is_hard in self._contacts:
-            rect, missing = rects[leaf_number], math.inf
-            for other in others:
-                missing = min(missing, _missing_contact(rect, rects[other], length))
-                if missing <= 0:
-                    break
-            if missing > 0:
-                total += _UNMET + missing if is_hard else 0.2 + 0.3 * min(missing, 2.0)
-                unmet += is_hard
-        return total, unmet
-
-    def _missing_outside(self, leaf: Leaf, rect: IntRect, rects: list[IntRect]) -> float:
-        """Metres of outer wall that a leaf lacks; of a notch, whether it is off the corners."""
-        if leaf.is_corner:
-            return self._off_corner(rect)
-        if not leaf.outer and not leaf.any_outer:
-            return 0.0
-        x0, z0, x1, z1 = rect
-        left, top, right, bottom = self._lit
-        # Measure the stretches on the outline, with daylight and without.
-        daylight = anywhere = 0
-        for is_there, length, is_lit in (
-            (x0 == 0, z1 - z0, left), (z0 == 0, x1 - x0, top),
-            (x1 == self._width, z1 - z0, right), (z1 == self._depth, x1 - x0, bottom),
-        ):  # fmt: skip
-            if is_there and length > anywhere:
-                anywhere = length
-            if is_there and is_lit and length > daylight:
-                daylight = length
-        # A notch is outside, too.
-        for notch in self._notches:
-            beside = shared_length(rect, rects[notch])
-            daylight, anywhere = max(daylight, beside), max(anywhere, beside)
-        return max(leaf.outer - daylight * STEP_M, leaf.any_outer - anywhere * STEP_M)
-
-    def _off_corner(self, rect: IntRect) -> float:
-        x0, z0, x1, z1 = rect
-        at_x = x0 == 0 or x1 == self._brief.width
-        at_z = z0 == 0 or z1 == self._brief.depth
-        spans = x1 - x0 == self._brief.width or z1 - z0 == self._brief.depth
-        return 0.0 if at_x and at_z and not spans else 2.0 - at_x - at_z + spans
+def _above_pin(tree: _Tree, brief: Brief, order: list[int]) -> dict[int, int]:
+    """Each cut around the pinned leaf -> its child towards it; empty where no leaf is pinned."""
+    if brief.pinned < 0:
+        return {}
+    found: dict[int, int] = {}
+    wanted = len(tree.children) + tree.leaf_at.index(brief.pinned)
+    # From the leaves up to the root: every cut stands in the order before its children.
+    for k in reversed(order):
+        if wanted in tree.children[k]:
+            found[k] = wanted
+            wanted = k
+    return found
 
 
-def _missing_contact(a: IntRect, b: IntRect, length: float) -> float:
-    """Metres by which two rectangles miss `length` of common wall, the gap between them counted."""
-    ax0, az0, ax1, az1 = a
-    bx0, bz0, bx1, bz1 = b
-    overlap_x = (ax1 if ax1 < bx1 else bx1) - (ax0 if ax0 > bx0 else bx0)
-    overlap_z = (az1 if az1 < bz1 else bz1) - (az0 if az0 > bz0 else bz0)
-    # Rectangles of a slicing tree never overlap: one of these is a gap, or 0.
-    gap, along = (-overlap_x, overlap_z) if overlap_x <= overlap_z else (-overlap_z, overlap_x)
-    return gap * STEP_M + max(length - max(along, 0) * STEP_M, 0.0)
-
-
-def shared_length(a: IntRect, b: IntRect) -> int:
-    """Steps of wall between two rectangles that do not overlap."""
-    if a[2] == b[0] or b[2] == a[0]:
-        return max(min(a[3], b[3]) - max(a[1], b[1]), 0)
-    if a[3] == b[1] or b[3] == a[1]:
-        return max(min(a[2], b[2]) - max(a[0], b[0]), 0)
-    return 0
+def _off_pin(cut: int, k: int, above_pin: dict[int, int], tree: _Tree, brief: Brief) -> int:
+    """A cut moved to the pinned rectangle's side where it is near it, or would run through it."""
+    pin = brief.leaves[brief.pinned].pinned
+    assert pin is not None
+    low, high = (pin[0], pin[2]) if tree.vertical[k] else (pin[1], pin[3])
+    child = above_pin[k]
+    is_first, is_leaf = child == tree.children[k][0], child >= len(tree.children)
+    side = high if is_first else low
+    if is_leaf or abs(cut - side) <= _SNAP:
+        return side
+    return max(cut, side) if is_first else min(cut, side)

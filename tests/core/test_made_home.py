@@ -14,7 +14,7 @@ def test_a_range_names_one_home_a_seed() -> None:
 
 
 def test_a_word_says_all_of_its_home() -> None:
-    home = MadeHome(7, (1, 2), (50, 70), "nordic", furniture=False)
+    home = MadeHome(7, (2, 3), (90, 110), "nordic", furniture=False, storeys=2)
     assert made_homes(home.word) == [home]
     assert home.digest != MadeHome(7).digest
 
@@ -27,6 +27,8 @@ def test_a_word_says_all_of_its_home() -> None:
         ("made:9..3", "downwards"),
         ("made:1,rooms=5", "above 4"),
         ("made:1,walls=3", "no option"),
+        ("made:1,storeys=3", "above 2"),
+        ("made:1,storeys=2,rooms=1", "2 to 4 bedrooms"),
         ("made:1..2000000", "at most"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from pbrs_farm.core.made_home import MadeHome, made_homes
 from pbrs_farm.gallery.made_homes import make_homes
 from pbrs_farm.gallery.plan_picture import plan_svg
 from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, RoomType
+from pbrs_farm.generate.furniture import Storey
 from pbrs_farm.generate.made import made
 
 HOMES = made_homes("made:1..2,furniture=none")
@@ -52,9 +54,9 @@ def test_two_processes_write_what_one_does(tmp_path: Path) -> None:
 
 
 def test_a_plan_shows_every_room_and_escapes_its_name() -> None:
-    plan = made(of_seed(1), EMPTY).plan
+    plan = made(of_seed(1), EMPTY).storeys[0].plan
     rooms = tuple(PlanRoom(r.type, "<b>&", r.polygon) for r in plan.rooms)
-    text = plan_svg(type(plan)(rooms, plan.walls, plan.openings, plan.height), (), "a<b")
+    text = plan_svg([Storey(replace(plan, rooms=rooms), ())], "a<b")
     root = ET.fromstring(text)
     shown = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
     assert shown.count("<b>&") == len(rooms)

@@ -13,7 +13,7 @@ from tests.generate.furnish.shelves import plain_catalogue
 @pytest.mark.parametrize("seed", [9, 12, 29])
 def test_a_drawn_home_breaks_no_gate(seed: int) -> None:
     home = drawn_home(np.random.default_rng(seed), plain_catalogue())
-    assert home.report.broken == ()
+    assert home.broken == ()
 
 
 def test_the_same_seed_gives_the_same_home() -> None:

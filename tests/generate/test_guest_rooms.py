@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from pbrs_farm.generate.floor_plan import RoomType
-from pbrs_farm.generate.guest_rooms import cut_guests, hosts_of
+from pbrs_farm.generate.guest_rooms import cut_guests, daylight_m, hosts_of
 from pbrs_farm.generate.programme import Programme, RoomWish
-from pbrs_farm.generate.slicing import STEP_M, Brief, IntRect, shared_length
+from pbrs_farm.generate.slicing_rules import STEP_M, Brief, IntRect, shared_length
 
 ALL_LIT = (True, True, True, True)
 # A living room on the left, a bedroom at the top right, the hall below it.
@@ -60,3 +60,10 @@ def test_what_lies_beside_a_certain_room_is_cut_from_none() -> None:
     )  # fmt: skip
     assert hosts_of(Programme(rooms)) == {2: 1}
     assert hosts_of(Programme(rooms, adjacent=((2, (0,)),))) == {}
+
+
+@pytest.mark.parametrize("area", [10.0, 17.0, 23.2, 45.0])
+def test_the_wall_that_a_room_is_promised_holds_its_glass(area: float) -> None:
+    # A French window of 2.1 m between the outer walls' halves, 35 cm from either.
+    width = daylight_m(area) - 0.26 - 2 * 0.35
+    assert width * 2.1 >= area / 8

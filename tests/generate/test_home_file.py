@@ -26,7 +26,7 @@ from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.generate.drawing import drawn_plan
 from pbrs_farm.generate.floor_plan import Plan
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.furniture import PlacedPiece, Storey
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d.home import read_home
@@ -39,7 +39,7 @@ def plan(seed: int) -> Plan:
 
 
 def written(seed: int, pieces: tuple[PlacedPiece, ...] = (), catalogue: Catalogue = EMPTY) -> bytes:
-    return home_file(plan(seed), pieces, catalogue, np.random.default_rng(seed))
+    return home_file([Storey(plan(seed), pieces)], catalogue, np.random.default_rng(seed))
 
 
 def read(data: bytes) -> House:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -79,11 +80,32 @@ def test_rooms_that_are_wished_adjacent_share_a_wall(tmp_path: Path) -> None:
 
 
 def test_a_programme_without_a_plan_says_what_to_leave_out(tmp_path: Path) -> None:
-    # Every slicing of so few rooms parts them by the hall.
-    value = {"rooms": FLAT, "adjacent": [["Ada", "bathroom"]]}
+    # Five rooms on a page cannot all lie beside each other: these four and the hall.
+    four = ("living", "Ada", "Ben", "store")
+    rooms = [*FLAT, {"type": "bedroom", "name": "Ben"}, "store"]
+    value = {"rooms": rooms, "adjacent": [list(pair) for pair in combinations(four, 2)]}
     programme = programme_from_json(written(tmp_path, value))
     with pytest.raises(BadInput, match=r"no plan with these rooms adjacent.*leave it out"):
         drawn_plan(np.random.default_rng(1), None, programme)
+
+
+@pytest.mark.parametrize(
+    ("rooms", "is_only"), [(FLAT, True), ([*FLAT, {"type": "bathroom", "name": "Bath"}], False)]
+)
+def test_a_bathroom_beside_a_bedroom_is_entered_from_it(
+    tmp_path: Path, rooms: list[object], is_only: bool
+) -> None:
+    value = {"rooms": rooms, "adjacent": [["Ada", "bathroom" if is_only else "Bath"]]}
+    programme = programme_from_json(written(tmp_path, value))
+    for seed in (1, 2):
+        plan = drawn_plan(np.random.default_rng(seed), None, programme)
+        names = [room.name for room in plan.rooms]
+        bath = "Bathroom" if is_only else "Bath"
+        doors = [{names[o.room], names[o.other]} for o in plan.openings if o.other is not None]
+        assert {"Ada", bath} in doors
+        # Another bathroom is for everybody; this one is Ada's alone.
+        assert is_only or {"Hall", bath} not in doors
+        assert is_only or any("Hall" in pair and "Bathroom 1" in pair for pair in doors)
 
 
 @pytest.mark.parametrize(

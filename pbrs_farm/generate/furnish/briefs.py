@@ -39,7 +39,7 @@ def brief_of(plan: Plan, space: RoomSpace, shelf: Shelf, rng: np.random.Generato
         return _bathroom(plan, space, shelf)
     small = {
         RoomType.WC: _wc, RoomType.HALL: _hall, RoomType.STORE: _store,
-        RoomType.WARDROBE: _wardrobe, RoomType.BALCONY: _balcony,
+        RoomType.WARDROBE: _wardrobe, RoomType.BALCONY: _balcony, RoomType.STAIRS: _stairs,
     }  # fmt: skip
     return small[type_](space, shelf)
 
@@ -163,6 +163,12 @@ def _hall(space: RoomSpace, shelf: Shelf) -> Brief:
     )  # fmt: skip
     fillers = (_group("plant", living.plants(shelf)),) if space.area > 8 else ()
     return Brief(groups, fillers, 0.28, 0.45)
+
+
+def _stairs(space: RoomSpace, shelf: Shelf) -> Brief:
+    # Nothing stands on stairs.
+    del space, shelf
+    return Brief(())
 
 
 def _store(space: RoomSpace, shelf: Shelf) -> Brief:

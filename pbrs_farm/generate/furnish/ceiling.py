@@ -11,6 +11,7 @@ from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.furnish.room_space import RoomSpace
 from pbrs_farm.generate.furnish.shelf import Shelf
 from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.plan_walls import largest_rectangle
 
 _HEAD_M: Final = 1.95  # the lowest point of a lamp
 _LARGE_M2: Final = 22.0  # rooms above have two
@@ -23,7 +24,7 @@ def ceiling_lamps(
     space: RoomSpace, type_: RoomType, standing: list[PlacedPiece], shelf: Shelf
 ) -> list[PlacedPiece]:
     """One lamp in the room's middle, two in large and in long rooms; none where none is to be had."""
-    if type_ is RoomType.BALCONY:
+    if type_ in (RoomType.BALCONY, RoomType.STAIRS):
         return []
     piece = _lamp(shelf, type_)
     if piece is None:
@@ -48,7 +49,7 @@ def _lamp(shelf: Shelf, type_: RoomType) -> Piece | None:
 
 def _middles(space: RoomSpace, type_: RoomType) -> list[tuple[float, float]]:
     """The middle of the room's largest rectangle; two points along it where it is large."""
-    rect = _largest_rectangle(space)
+    rect = largest_rectangle(space.polygon)
     x0, z0, x1, z1 = rect
     w, d = x1 - x0, z1 - z0
     is_long = type_ is RoomType.HALL and max(w, d) > max(_LONG * min(w, d), 3.6)
@@ -57,23 +58,6 @@ def _middles(space: RoomSpace, type_: RoomType) -> list[tuple[float, float]]:
     if w >= d:
         return [(x0 + w / 4, (z0 + z1) / 2), (x1 - w / 4, (z0 + z1) / 2)]
     return [((x0 + x1) / 2, z0 + d / 4), ((x0 + x1) / 2, z1 - d / 4)]
-
-
-def _largest_rectangle(space: RoomSpace) -> tuple[float, float, float, float]:
-    points = list(space.polygon.exterior.coords)
-    xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})
-    best = space.bounds
-    largest = 0.0
-    # With axis-parallel walls its sides lie on lines through corners: try all pairs of them.
-    for i, xa in enumerate(xs):
-        for xb in xs[i + 1 :]:
-            for k, za in enumerate(zs):
-                for zb in zs[k + 1 :]:
-                    area = (xb - xa) * (zb - za)
-                    inside = space.polygon.buffer(1e-6).contains(box(xa, za, xb, zb))
-                    if area > largest and inside:
-                        largest, best = area, (xa, za, xb, zb)
-    return best
 
 
 def _hung(

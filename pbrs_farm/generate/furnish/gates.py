@@ -72,7 +72,7 @@ def missing(type_: RoomType, here: list[PlacedPiece], catalogue: Catalogue) -> l
     """The groups that a room of that type lacks."""
     has = {p.piece.group for p in here}
     wanted = MUST_HAVES.get(type_, ())
-    if type_ is not RoomType.BALCONY:
+    if type_ not in (RoomType.BALCONY, RoomType.STAIRS):
         wanted = (*wanted, ("ceiling_lamp", "floor_lamp"))
     return [
         " or ".join(groups) for groups in wanted if not has & set(groups) and catalogue.of(*groups)

@@ -15,13 +15,14 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, Point, Rect
+from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, Point, Rect, RoomType
 from pbrs_farm.generate.furnish.template import Frame
 
 BEFORE_DOOR_M: Final = 0.8
 BEFORE_FRENCH_M: Final = 0.6
 _BEFORE_WINDOW_M: Final = 0.4
 _SPARE_M: Final = 0.03  # behind an open leaf
+_BESIDE_DOOR_M: Final = 0.01  # more than two rectangles may overlap unseen (places.py)
 _OPEN_M: Final = 0.9  # kept free along the middle of a side without a wall
 _EPSILON: Final = 1e-3
 
@@ -79,7 +80,8 @@ def room_space(plan: Plan, number: int) -> RoomSpace:
     room = plan.rooms[number]
     polygon = Polygon(room.polygon)
     neighbours = _open_neighbours(plan, number)
-    walls = _walls(room.polygon, [n for _, n in neighbours])
+    near = [n for _, n in neighbours]
+    walls = _walls(room.polygon, near)
     doors, ways, windows = [], [], []
     for opening in plan.openings_of(number):
         frame = _seen_from(plan, opening, polygon)
@@ -95,14 +97,19 @@ def room_space(plan: Plan, number: int) -> RoomSpace:
         if is_french:
             windows.append(_window(opening, frame, walls, BEFORE_FRENCH_M))
             depth = BEFORE_FRENCH_M
-        doors.append(frame.rect((-half, 0.0, half, depth)))
+        side = half + _BESIDE_DOOR_M
+        doors.append(frame.rect((-side, 0.0, side, depth)))
         if not is_french or opening.other is not None:
             ways.append(frame.rect((-half + 0.15, 0.2, half - 0.15, 0.75)))
-    for rect in _open_sides(room.polygon, [n for _, n in neighbours]):
-        ways.append(rect[0])
-        doors.append(rect[1])
+    # Before stairs all stays free; one does not walk through them from side to side.
+    stairs = [n for i, n in neighbours if plan.rooms[i].type is RoomType.STAIRS]
+    floors = [n for n in near if n not in stairs]
+    for open_to, width in ((floors, _OPEN_M), (stairs, math.inf)):
+        for way, free in _open_sides(room.polygon, open_to, width):
+            ways.append(way)
+            doors.append(free)
     return RoomSpace(
-        number, polygon, unary_union([polygon, *(n.buffer(_EPSILON) for _, n in neighbours)]),
+        number, polygon, unary_union([polygon, *(n.buffer(_EPSILON) for n in floors)]),
         walls, outside_of(polygon), np.array(doors).reshape(-1, 4), tuple(ways), tuple(windows),
         plan.height,
     )  # fmt: skip
@@ -197,8 +204,10 @@ def _around(point: Point) -> Rect:
     return point[0] - 1e-4, point[1] - 1e-4, point[0] + 1e-4, point[1] + 1e-4
 
 
-def _open_sides(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> list[tuple[Rect, Rect]]:
-    """(what a way must reach, what stays free) for each open side."""
+def _open_sides(
+    corners: tuple[Point, ...], open_to: Iterable[Polygon], width: float
+) -> list[tuple[Rect, Rect]]:
+    """(what a way must reach, what stays free: at most so wide) for each open side."""
     near = unary_union([p.buffer(2 * _EPSILON) for p in open_to])
     found = []
     if near.is_empty:
@@ -221,7 +230,7 @@ def _open_sides(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> list[
         if high - low < 0.7:
             continue
         middle = (low + high) / 2
-        half = min(_OPEN_M, high - low) / 2
+        half = min(width, high - low) / 2
         reach = frame.rect((low + 0.1, 0.0, high - 0.1, 0.5))
         found.append((reach, frame.rect((middle - half, 0.0, middle + half, BEFORE_DOOR_M))))
     return found
