@@ -35,7 +35,7 @@ MODULES: Final = {
     "showing": ("board",),
     "submitting": ("submit",),
     "steering": (
-        "status", "jobs", "why", "logs", "failures", "retry", "pause", "resume", "cancel", "reduce",
+        "status", "jobs", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel", "reduce",
         "priority", "drain", "workers", "recover", "coordinator", "worker",
     ),
 }  # fmt: skip

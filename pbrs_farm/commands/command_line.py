@@ -20,7 +20,7 @@ GROUPS: Final = {
     "choose and hand on": ("reference", "select", "export", "pack"),
     "train and judge": ("train", "evaluate", "ablation"),
     "run on many machines": (
-        "submit", "jobs", "status", "why", "logs", "failures", "retry", "pause", "resume", "cancel",
+        "submit", "jobs", "status", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel",
         "priority", "reduce", "workers", "drain", "recover", "coordinator", "worker",
     ),
 }  # fmt: skip

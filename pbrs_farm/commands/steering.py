@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from pbrs_farm.commands.arguments import Handler, Verb, add_farm, echo, echo_json, farm_of
+from pbrs_farm.commands.arguments import Handler, Verb, add_farm, echo, echo_json, farm_of, warn
 from workers.client.text import (
     explanation_text,
     failures_text,
@@ -51,6 +51,9 @@ def add_verbs(verb: Verb) -> None:
     _add_job(farm_verb("failures", _failures, "what failed for good, alike together"))
     p = farm_verb("retry", _retry, "fresh attempts for failed tasks (all, unless named)")
     p.add_argument("tasks", nargs="*", metavar="TASK")
+    _add_job(p, flag=True)
+    p = farm_verb("rerun", _rerun, "a task once more, in this process: reproduces a failure")
+    p.add_argument("task", help="HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
     # Verbs that change a job's state take the job alone.
     for name, text in _STEERING.items():
@@ -153,6 +156,16 @@ def _retry(args: argparse.Namespace) -> int:
     farm, job = _farm_and_job(args)
     tasks = farm.retry(job, args.tasks)
     _show(args, tasks, lambda: f"{len(tasks)} tasks get fresh attempts")
+    return 0
+
+
+def _rerun(args: argparse.Namespace) -> int:
+    from workers.client.rerun import rerun
+
+    farm, job = _farm_and_job(args)
+    result = rerun(farm, job, args.task, lambda step: warn(f"rerun: {step}"))
+    done = {"task": args.task, "views": result.n_views}
+    _show(args, done, lambda: f"{args.task} done; `pbrs-farm retry {args.task}` tells the job")
     return 0
 
 

@@ -22,6 +22,7 @@ from pbrs_farm.core.errors import BadInput, MachineFailed, ObjectMissing
 from pbrs_farm.core.near_names import did_you_mean
 from pbrs_farm.store import Store, store_from_url
 from workers.client.explain import explain
+from workers.client.rerun_command import rerun_command
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
 from workers.coordinator.shares import priority_of
@@ -200,12 +201,20 @@ class Farm:
         # Take the last attempt unless one is named.
         chosen = attempt if attempt is not None else max(found, default=0)
         if chosen not in found:
-            self._check_task(job, task)
+            self.check_task(job, task)
             hint = "logs are kept of failed attempts and of tasks that run for a minute"
             if found:
                 hint = f"of attempts {', '.join(map(str, sorted(found)))}"
             raise BadInput(text, "", "no log stored", hint=hint)
         return self.store.get(found[chosen]).decode("utf-8", "replace")
+
+    def check_task(self, job: str, task: TaskId) -> None:
+        """Raises BadInput, saying which part is unknown, where the job has no such task."""
+        units = self.ledger.unit_states(self.view(job).job_id, task.house)
+        if not units:
+            self._explain_not_admitted(job, task.house)
+        elif ":" not in units.get(task.unit, ""):
+            raise BadInput(str(task), "", "the job has no such task", hint=f"`why {task.house}`")
 
     def failures(self, job: str) -> list[dict[str, Any]]:
         """Tasks that failed for good, alike ones together, most frequent first."""
@@ -215,7 +224,8 @@ class Farm:
             kind = kinds.setdefault(
                 fault.fingerprint,
                 {"fingerprint": fault.fingerprint, "class": fault.fault, "n": 0,
-                 "example": fault.message, "log": fault.log, "tasks": []},
+                 "example": fault.message, "log": fault.log, "tasks": [],
+                 "command": rerun_command(job, task)},
             )  # fmt: skip
             kind["n"] += 1
             kind["tasks"] = sorted([*kind["tasks"], task])[:20]
@@ -297,14 +307,6 @@ class Farm:
         rebuild(self.ledger, self.store, runner, spec, houses, progress)
         self.ledger.open(spec.job_id, spec.priority)
         return was
-
-    def _check_task(self, job: str, task: TaskId) -> None:
-        """Raises BadInput, saying which part is unknown, where the job has no such task."""
-        units = self.ledger.unit_states(self.view(job).job_id, task.house)
-        if not units:
-            self._explain_not_admitted(job, task.house)
-        elif ":" not in units.get(task.unit, ""):
-            raise BadInput(str(task), "", "the job has no such task", hint=f"`why {task.house}`")
 
     def _steer(self, job: str, what: str, reason: str = "") -> str:
         state = self.ledger.steer(check_job_id(job), what, reason)

@@ -87,7 +87,7 @@ def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
         more = f" and {kind['n'] - 5} more" if kind["n"] > 5 else ""
         parts.append(
             f"{kind['n']} x {kind['fingerprint']}\n    {kind['example']}\n"
-            f"    {' '.join(kind['tasks'][:5])}{more}"
+            f"    {' '.join(kind['tasks'][:5])}{more}\n    reproduce: {kind['command']}"
         )
     return "\n".join(parts)
 

@@ -121,14 +121,14 @@ class LiveFarm:
             {"task": task, "worker": worker, "for_s": max(0.0, now - since)}
             for task, (worker, since) in sorted(self.farm.ledger.claims(job).items())
         ]
-        failures = [_with_command(kind, job) for kind in self.farm.failures(job)]
+        failures = [_with_command(kind) for kind in self.farm.failures(job)]
         return JobNow(status, row, tuple(failures), tuple(running))
 
 
-def _with_command(kind: dict[str, Any], job: str) -> dict[str, Any]:
-    """A kind of failure with the command that makes one of it happen again, or shows its log."""
+def _with_command(kind: dict[str, Any]) -> dict[str, Any]:
+    """A kind of failure with the command that makes one of it happen again."""
     example = shown(kind["example"], 2 * MAX_MESSAGE)
     found = _COMMAND.search(example)
     task = kind["tasks"][0] if kind["tasks"] else ""
-    command = found[1] if found else f"pbrs-farm logs {task} --job {job}"
-    return {**kind, "example": example, "task": task, "command": command, "again": bool(found)}
+    command = found[1] if found else kind["command"]
+    return {**kind, "example": example, "task": task, "command": command}

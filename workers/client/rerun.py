@@ -1,0 +1,49 @@
+"""A task of a farm once more, in this process: its steps, log and error are seen at once.
+
+Effects: those of the task's steps, which write into the farm's store what a worker would have
+written. The ledger is not touched: `retry` puts a task that failed for good back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from pbrs_farm.core.errors import BadInput
+from workers.ids import GEOMETRY, TaskId, job_key, task_from_text
+from workers.job import houses_from_lines
+from workers.runner import Request, Result, runner_maker
+
+if TYPE_CHECKING:
+    from workers.client.farm_client import Farm
+
+
+def rerun(farm: Farm, job: str, text: str, on_step: Callable[[str], None]) -> Result:
+    """Run the task that text names; raises what its steps raise, BadInput where there is none.
+
+    on_step: told each step as it begins, and when storage is waited for.
+    """
+    task = task_from_text(text)
+    farm.check_task(job, task)
+    request = Request(
+        job_id=job,
+        house=task.house,
+        unit=task.unit,
+        stage=task.stage,
+        views=_views(farm, job, task),
+        source=_source(farm, job, task.house) if task.stage == GEOMETRY else "",
+    )
+    return runner_maker(farm.config.runner)(farm.config, on_step).run(request, on_step)
+
+
+def _views(farm: Farm, job: str, task: TaskId) -> tuple[str, ...]:
+    """The views of a batch, () for a task of a whole house or job."""
+    return farm.ledger.batches(job, task.house)[int(task.unit)] if task.unit.isdigit() else ()
+
+
+def _source(farm: Farm, job: str, house: str) -> str:
+    """What the house was submitted as, from the store."""
+    for entry in houses_from_lines(farm.store.get(job_key(job, "houses.jsonl"))):
+        if entry.house_id == house:
+            return entry.source
+    raise BadInput(house, "", "the job has no such house")
