@@ -42,6 +42,7 @@ UNITS = LOADING_UNITS | {
     "study.matching_equal": "share of 24 fixtures whose count is the min-cost assignment's",
     "study.iou_equal": "share of 8 fixtures whose mIoU is torchmetrics' within 1e-6",
     "study.resume_equal": "1 = a killed run went on to the same weights",
+    "study.ablation_s": "s: the built-in home rendered and its four lights compared; a test that must pass",
     "study.overfit_deg": "degrees, 4 views at 80x60 by heart in 300 steps",
     "study.seg_miou_margin": "mIoU over the most frequent class, tiny, held-out homes",
     "study.edges_ods": "ODS of HED tuned minus untouched at its better size, held-out homes",
@@ -66,7 +67,7 @@ def main() -> None:
     folder = folder_of_code()
     _root()
     measures: dict[str, Callable[[], Figures]] = {
-        "matching": _matching, "iou": _iou, "boundary": _boundary_seconds, "resume": _resume,
+        "matching": _matching, "iou": _iou, "boundary": _boundary_seconds, "resume": _resume, "builtin": _builtin,
         "loading": loading_figures, "heart": lambda: _by_heart(folder),
         "normals": lambda: _normals(folder), "classes": lambda: _classes(folder),
         "edges": lambda: _edges(folder),
@@ -234,9 +235,23 @@ def _boundary_seconds() -> Figures:
 
 def _resume() -> Figures:
     """The test that kills a run; its verdict."""
-    test = "tests/study/training/test_training.py::test_a_killed_run_goes_on_to_the_same_weights"
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", test], capture_output=True)
-    return {"study.resume_equal": float(done.returncode == 0)}
+    test = "training/test_training.py::test_a_killed_run_goes_on_to_the_same_weights"
+    return {"study.resume_equal": float(_passes(test))}
+
+
+def _builtin() -> Figures:
+    """The test that renders the built-in home and compares four lights on it."""
+    started = time.monotonic()
+    passed = _passes("judging/test_builtin_ablation.py")
+    return {"study.ablation_s": round(time.monotonic() - started, 1) if passed else float("nan")}
+
+
+def _passes(test: str) -> bool:
+    words = [sys.executable, "-m", "pytest", "-q", f"tests/study/{test}"]
+    done = subprocess.run(words, capture_output=True, text=True)
+    if done.returncode:
+        print(done.stdout[-2000:], file=sys.stderr)
+    return done.returncode == 0
 
 
 def _dressed_gain() -> Figures:

@@ -102,11 +102,13 @@ def _need_torch() -> None:
 
 def _train(args: argparse.Namespace) -> int:
     _need_torch()
+    from pbrs_farm.study.training.prediction import device_of
     from pbrs_farm.study.training.training_job import Job, train
     from pbrs_farm.study.training.view_arrays import ViewArrays
     from pbrs_farm.study.training.view_sources import held_out_views, left_out, training_views
 
     plan, source = _plan(args, args.task), _source(args)
+    device_of(plan)  # before views are read
     views, held_out = training_views(source, plan), held_out_views(source, plan)
     n_held = len(held_out) if held_out else 0
     lacking = left_out(source, plan)
@@ -139,9 +141,13 @@ def _evaluate(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.evaluation import evaluate, notes, open_run, report, table
     from pbrs_farm.study.judging.judged_places import judged_place
+    from pbrs_farm.study.training.run_folder import made_folder
     from pbrs_farm.study.training.view_sources import NYU_LIGHT
 
     run = open_run(args.run, exact=args.exact)
+    out = args.out or args.run / "evaluation"
+    if args.on:
+        made_folder(out)  # before anything is judged
     trained_on = frozenset(run.record["homes"]["train"])
     held = frozenset(run.record["homes"]["held_out"]) or None
     # Homes are looked at in the run's own light, photographs have none of the four.
@@ -162,7 +168,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     if evaluations:
         from pbrs_farm.study.judging.error_page import write_evaluation
 
-        echo(str(write_evaluation(args.out or args.run / "evaluation", run, evaluations)))
+        echo(str(write_evaluation(out, run, evaluations)))
     return 0
 
 
@@ -177,11 +183,13 @@ def _ablation(args: argparse.Namespace) -> int:
     )
     from pbrs_farm.study.judging.evaluation import check_exact
     from pbrs_farm.study.judging.judged_places import homes_that_train, judged_place
+    from pbrs_farm.study.training.run_folder import made_folder
     from pbrs_farm.study.training.view_sources import Source
 
     at_least("--seeds", args.seeds, 1)
     check_exact(args.task, exact=args.exact)
     plan, common = _plan(args, args.task), Source((), (), _hold_out(args), most=args.views)
+    made_folder(args.out)
     # A set of training views a row; all rows share plan, seeds and held-out homes.
     sets = training_sets(args.root, args.modes, common)
     if args.objects:

@@ -79,6 +79,9 @@ class Plan:
                             ("judge_views", 1), ("final_views", 1)):  # fmt: skip
             if getattr(self, name) < least:
                 raise BadInput("plan", name, f"expected {least} or more, got {getattr(self, name)}")
+        if self.network == "small" and (self.width_px % 2 or self.height_px % 2):
+            text = f"{self.width_px}x{self.height_px}: network small wants even numbers"
+            raise BadInput("plan", "width_px, height_px", text)
         if self.memory_gb < 0:
             raise BadInput("plan", "memory_gb", f"expected 0 or more, got {self.memory_gb}")
         for name, choices in _CHOICES.items():

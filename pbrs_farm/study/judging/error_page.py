@@ -25,14 +25,15 @@ from pbrs_farm.study.judging.figure_table import shown_figure, title_of
 from pbrs_farm.study.metrics.angular import angles_deg
 from pbrs_farm.study.reading.png_rows import png_of_rows
 from pbrs_farm.study.tasks.study_task import Arrays, Task
+from pbrs_farm.study.training.run_folder import made_folder
 
 N_SHOWN: Final = 8  # of the worst views, and of the best
 _WORST_DEG: Final = 60.0  # what an error picture shows as white
 
 
 def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> Path:
-    """Write the folder; the page's path."""
-    out.mkdir(parents=True, exist_ok=True)
+    """Write the folder; the page's path. Raises BadInput where it cannot be written to."""
+    made_folder(out)
     text = "\n".join([table(run, evaluations), "", *notes(run, evaluations), ""])
     (out / "table.md").write_text(text)
     (out / "evaluation.json").write_text(json.dumps(report(run, evaluations), indent=1) + "\n")

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -74,7 +75,7 @@ class RunFolder:
             self._check_same(older, row)
             if older["state"] == FINISHED:
                 return False
-        self.root.mkdir(parents=True, exist_ok=True)
+        made_folder(self.root)
         self.write("run.json", {**row, "state": RUNNING})
         return True
 
@@ -129,13 +130,26 @@ class RunFolder:
             file.write(json.dumps(row) + "\n")
 
 
+def made_folder(path: Path) -> Path:
+    """The folder, made where it was missing; BadInput where it cannot be written to."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        if os.access(path, os.W_OK):
+            return path
+        why = "not ours to write to"
+    except OSError as error:
+        why = error.strerror or "the system gave no reason"
+    raise BadInput(path, "", f"no folder can be written there: {why}") from None
+
+
 def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], Plan]:
     """The folder, record and plan of a run that is finished; BadInput for any other."""
     folder = RunFolder(root)
     row = folder.record()
     if row["state"] != FINISHED:
         text = f"the run is {row['state']}" + (f": {row['why']}" if row.get("why") else "")
-        raise BadInput(root, "", text, hint="the same `train` goes on with it")
+        hint = "the same `train` goes on with it" if row["state"] == RUNNING else ""
+        raise BadInput(root, "", text, hint=hint)
     return folder, row, plan_from_json(row["plan"], str(root / "run.json"))
 
 

@@ -195,6 +195,20 @@ def test_a_run_of_before_a_field_was_there_goes_on(tmp_path: Path) -> None:
     assert train(Job(plan, tmp_path), views(3, plan))["network"] == first["network"]
 
 
+def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("here")
+    plan = small_plan(steps="2")
+    for out in (tmp_path / "file", tmp_path / "file" / "run"):
+        with pytest.raises(BadInput, match="no folder can be written there"):
+            train(Job(plan, out), views(3, plan))
+
+
+def test_a_size_that_the_small_network_cannot_halve_is_one_line() -> None:
+    with pytest.raises(BadInput, match="33x32: network small wants even numbers"):
+        small_plan(width_px="33")
+    assert small_plan("boundaries", width_px="33").width_px == 33
+
+
 def test_a_plans_fields_are_set_and_checked() -> None:
     assert plan_of("normals", "paper", {"rate": "0.01", "bf16": "true"}).rate == 0.01
     for name, text in (("rate", "fast"), ("colour", "1"), ("batch", "0"), ("device", "tpu")):
