@@ -46,6 +46,7 @@ class DressFields(FieldGroup):
     surfaces: Share = Field(1.0, description="of rooms that get floors and walls of a style")
     parts: Share = Field(1.0, description="of furniture whose wood, cloth and metal change")
     swap: Share = Field(0.7, description="of furniture that another model of its class replaces")
+    furniture: Share = Field(1.0, description="of what is added along free walls, beside beds")
     clutter: Share = Field(1.0, description="of the things that stand on furniture")
     walls: Share = Field(1.0, description="of pictures, mirrors, clocks, sockets and switches")
     textiles: Share = Field(1.0, description="of curtains, blinds, rugs, pillows, blankets")

@@ -64,11 +64,11 @@ def clearance_m(free: Bools) -> F64:
     return np.asarray(ndimage.distance_transform_edt(free) * CELL_M)
 
 
-def connected_ways(free: Bools) -> NDArray[np.int32]:
+def connected_ways(free: Bools, width_m: float = WALK_M) -> NDArray[np.int32]:
     """(H, W) number of the connected way that the middle of a person can walk; 0 = none.
 
-    A way's middle keeps half its width, WALK_M, from everything.
+    A way's middle keeps half its width from everything.
     """
-    wide = clearance_m(free) >= WALK_M / 2
+    wide = clearance_m(free) >= width_m / 2
     ways, _n = ndimage.label(wide, structure=np.ones((3, 3)))
     return np.asarray(ways, np.int32)

@@ -17,6 +17,7 @@ from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.recipe import DressFields
 from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.draft import CHANGED_TAG, Draft
+from pbrs_farm.dress.furnishing import furniture
 from pbrs_farm.dress.gates import group_of, keep_gates, part_of, piece_id
 from pbrs_farm.dress.lamps import lamps
 from pbrs_farm.dress.parts import parts
@@ -30,7 +31,11 @@ from pbrs_farm.dress.walls import walls
 Part = Callable[[Draft, Catalogue, Style, float], None]
 
 
-_FURNITURE: Final[tuple[tuple[str, Part], ...]] = (("surfaces", surfaces), ("swap", swap))
+_FURNITURE: Final[tuple[tuple[str, Part], ...]] = (
+    ("surfaces", surfaces),
+    ("swap", swap),
+    ("furniture", furniture),
+)
 """Field of the recipe that holds the part's share, and the part, in the order they are done."""
 
 _THINGS: Final[tuple[tuple[str, Part], ...]] = (

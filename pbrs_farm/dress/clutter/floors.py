@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -13,7 +13,12 @@ from pbrs_farm.core.walkable import CELL_M
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.worktop import LIFT_M
 from pbrs_farm.dress.generated.assembly import Made
-from pbrs_farm.dress.space.floor_bitmaps import FloorBitmap, doors_are_joined, floor_bitmap
+from pbrs_farm.dress.space.floor_bitmaps import (
+    FloorBitmap,
+    doors_are_joined,
+    floor_bitmap,
+    with_body,
+)
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.supports.find_supports import surroundings
@@ -29,15 +34,15 @@ _RUG_M = 0.03  # what is lower may lie anywhere, but carries nothing
 
 # What stands on floors: kind, chance in a room.
 _USUAL: dict[RoomKind, tuple[tuple[str, float], ...]] = {
-    RoomKind.HALL: (("shoes", 0.8), ("shoes", 0.6), ("bag", 0.35), ("suitcase", 0.2), ("basket", 0.15)),
-    RoomKind.LIVING: (("armchair", 0.7), ("basket", 0.5), ("pouf", 0.55), ("magazines", 0.4), ("toy", 0.35), ("bag", 0.2), ("storage_box", 0.2), ("book", 0.25)),
-    RoomKind.BEDROOM: (("armchair", 0.3), ("laundry_basket", 0.4), ("suitcase", 0.25), ("pouf", 0.25), ("basket", 0.4), ("shoes", 0.45), ("toy", 0.3), ("bag", 0.3), ("book", 0.25), ("storage_box", 0.25), ("bin", 0.2)),
-    RoomKind.KITCHEN: (("bin", 0.75), ("bag", 0.25), ("bottle", 0.25), ("carton", 0.12)),
+    RoomKind.HALL: (("stool", 0.4), ("shoes", 0.8), ("shoes", 0.6), ("bag", 0.35), ("suitcase", 0.2), ("basket", 0.15)),
+    RoomKind.LIVING: (("armchair", 0.85), ("armchair", 0.4), ("basket", 0.5), ("pouf", 0.55), ("toy", 0.35), ("bag", 0.25), ("storage_box", 0.25)),
+    RoomKind.BEDROOM: (("armchair", 0.4), ("stool", 0.4), ("laundry_basket", 0.4), ("suitcase", 0.25), ("pouf", 0.25), ("basket", 0.4), ("shoes", 0.45), ("toy", 0.3), ("bag", 0.3), ("storage_box", 0.3), ("bin", 0.2)),
+    RoomKind.KITCHEN: (("stool", 0.5), ("bin", 0.75), ("bag", 0.25), ("bottle", 0.25), ("carton", 0.12)),
     RoomKind.DINING: (("basket", 0.25), ("toy", 0.2), ("bag", 0.2)),
-    RoomKind.BATHROOM: (("laundry_basket", 0.5), ("basket", 0.4), ("bin", 0.5), ("shoes", 0.15)),
-    RoomKind.OFFICE: (("armchair", 0.25), ("bin", 0.8), ("carton", 0.4), ("bag", 0.4), ("book", 0.5), ("storage_box", 0.3)),
+    RoomKind.BATHROOM: (("stool", 0.45), ("laundry_basket", 0.5), ("basket", 0.4), ("bin", 0.5), ("shoes", 0.15)),
+    RoomKind.OFFICE: (("armchair", 0.4), ("stool", 0.4), ("bin", 0.8), ("carton", 0.4), ("bag", 0.4), ("storage_box", 0.4)),
     RoomKind.STORE: (("cartons", 0.8), ("carton", 0.8), ("storage_box", 0.6), ("basket", 0.3), ("bag", 0.3), ("shoes", 0.4)),
-    RoomKind.OTHER: (("carton", 0.3), ("basket", 0.4), ("bag", 0.2)),
+    RoomKind.OTHER: (("armchair", 0.5), ("stool", 0.3), ("carton", 0.3), ("basket", 0.4), ("bag", 0.2)),
     RoomKind.OUTDOOR: (("plant_pot", 0.5), ("plant_pot", 0.3)),
 }  # fmt: skip
 
@@ -109,7 +114,10 @@ def _put(placing: Placing, floor: _Floor, made: Made) -> bool:
     rows, columns = np.nonzero((distance >= least) & (to_wall <= least + _REACH_M))
     for k in placing.rng.permutation(len(rows))[:12]:
         disc = _disc(floor.grid.shape, int(rows[k]), int(columns[k]), reach + CELL_M)
-        if floor.has_ways and not _ways_stay(floor, disc):
+        # One way still joins all doors, where one did.
+        if floor.has_ways and not doors_are_joined(
+            with_body(floor.bitmap, disc, _WALK_M), floor.room
+        ):
             continue
         x, z = floor.grid.plan_of(columns[k] + 0.5, rows[k] + 0.5)
         turn = _facing(to_wall, int(rows[k]), int(columns[k]))
@@ -138,13 +146,3 @@ def _facing(to_wall: F64, row: int, column: int) -> float:
         return 0.0
     down, right = np.gradient(part)
     return float(np.arctan2(right.mean(), down.mean()))
-
-
-def _ways_stay(floor: _Floor, disc: Bools) -> bool:
-    """Whether one way still joins all doors, where one did."""
-    occupied = floor.bitmap.occupied | disc
-    free = floor.bitmap.inside & ~occupied
-    wide = ndimage.distance_transform_edt(free) * CELL_M >= _WALK_M / 2
-    ways, _n = ndimage.label(wide, structure=np.ones((3, 3)))
-    after = replace(floor.bitmap, occupied=occupied, ways=np.asarray(ways, np.int32))
-    return doors_are_joined(after, floor.room)

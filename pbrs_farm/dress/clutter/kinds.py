@@ -74,6 +74,7 @@ _KINDS: Final[dict[str, Kind]] = {
     "pot": Kind(("pot_pan",), "pot", 0.45),
     "remote": Kind(("remote",), "remote", 0.3, True),
     "shoes": Kind(("shoes",), "shoes", 0.4),
+    "stool": Kind(("stool",), "stool", 0.8, place=Place.FLOOR, most_faces=6_000),
     "table_lamp": Kind(("table_lamp",), most_m=0.65),
     "toaster": Kind(("toaster",), most_m=0.45),
     "toy": Kind(("toy",), most_m=0.45, is_round=True),

@@ -58,13 +58,13 @@ class ShelfPlan:
 def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
     """How the shelves of one bookcase are filled, by the room it stands in."""
     rng = placing.rng
-    others, books = _DECOR, float(rng.uniform(0.2, 0.5))
+    others, books = _DECOR, float(rng.uniform(0.08, 0.26))
     if kind is RoomKind.KITCHEN or (kind is RoomKind.DINING and rng.random() < 0.4):
         others, books = _KITCHEN, 0.15
     elif kind is RoomKind.OFFICE:
-        others, books = _OFFICE, float(rng.uniform(0.3, 0.55))
+        others, books = _OFFICE, float(rng.uniform(0.15, 0.35))
     elif kind is RoomKind.BEDROOM and rng.random() < 0.35:
-        others, books = _CHILD, float(rng.uniform(0.15, 0.4))
+        others, books = _CHILD, float(rng.uniform(0.08, 0.25))
     fullness = float(np.clip(rng.uniform(0.55, 1.0) + placing.bias, 0.2, 1.0))
     return ShelfPlan(
         books, fullness * min(placing.share, 1.0), others, float(rng.uniform(0.01, 0.04))

@@ -1,10 +1,13 @@
-"""What stands on floors: laundry baskets, suitcases, poufs; no effects."""
+"""What stands on floors: laundry baskets, suitcases, poufs, stools; no effects."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pbrs_farm.core.classes import BAG
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.classes import BAG, CHAIR
+from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.generated.assembly import (
     Made,
     Part,
@@ -14,7 +17,7 @@ from pbrs_farm.dress.generated.assembly import (
     plain,
     transformed,
 )
-from pbrs_farm.dress.generated.turned import bulged, slab, turned, vessel
+from pbrs_farm.dress.generated.turned import bulged, slab, smooth, turned, vessel
 from pbrs_farm.dress.style import Rgb, Style, mix
 
 
@@ -62,3 +65,30 @@ def pouf(rng: np.random.Generator, style: Style) -> Made:
         (r * 0.84, tall * 0.97), (r * 0.5, tall), (0, tall),
     ]  # fmt: skip
     return made("pouf", [(turned(profile, n=28), plain("pouf", colour, 0.95))], group="ottoman")
+
+
+def stool(rng: np.random.Generator, style: Style) -> Made:
+    """A round seat of wood on three or four legs that lean outwards."""
+    r, tall = float(rng.uniform(0.15, 0.19)), float(rng.uniform(0.42, 0.5))
+    white = plain("stool white", (0.88, 0.88, 0.86), 0.4)
+    wood = plain(f"stool {style.wood.name}", style.wood.mean, 0.45)
+    seat = turned(
+        [(0, 0), (r - 0.006, 0), (r, 0.008), (r, 0.022), (r - 0.006, 0.03), (0, 0.03)], n=28
+    )
+    parts: list[Part] = [(transformed(seat, np.eye(3), (0, tall - 0.03, 0)), wood)]
+    leg, n = turned([(0, 0), (0.013, 0), (0.018, 1.0), (0, 1.0)], n=12), int(rng.integers(3, 5))
+    under = white if rng.random() < 0.3 else wood
+    # Shear each leg outwards, so that its foot stays level.
+    for k in range(n):
+        a = 2 * np.pi * (k + 0.5) / n
+        lean = np.array([np.cos(a), 0.0, np.sin(a)])
+        foot, top = lean * (r - 0.005), lean * (r - 0.07)
+        shear = np.eye(3)
+        shear[:, 1] = top - foot + [0, tall - 0.028, 0]
+        parts.append((_sheared(leg, shear, foot), under))
+    return made("stool", parts, group="stool", nyu40=CHAIR, place=Place.FLOOR)
+
+
+def _sheared(surface: Surface, matrix: F64, offset: F64) -> Surface:
+    points = surface.positions.astype(np.float64) @ matrix.T + offset
+    return smooth(surface.name, points, surface.faces)

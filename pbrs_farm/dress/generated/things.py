@@ -57,6 +57,7 @@ GENERATORS: Final[Mapping[str, Generator]] = {
     "soap_dispenser": bath.soap_dispenser,
     "sponge": bath.sponge,
     "spray_bottle": bath.spray_bottle,
+    "stool": floor_things.stool,
     "storage_box": household.storage_box,
     "suitcase": floor_things.suitcase,
     "table_frame": household.table_frame,

@@ -35,7 +35,7 @@ from pbrs_farm.dress.parts.part_kinds import (
     kind_by_name,
     kind_of_part,
 )
-from pbrs_farm.dress.style import METALS, WOODS, Metal, Rgb, Style
+from pbrs_farm.dress.style import METALS, WOODS, Metal, Rgb, Style, Wood
 from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
 
 PART: Final = "parts"
@@ -69,8 +69,11 @@ def parts(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
     Parts of one colour in one room get one look, so that sets stay sets.
     """
     groups = {p.id: p.group for p in catalogue.pieces}
-    for index, item in enumerate(draft.items[: len(draft.source.items)]):
-        if item.kind.is_structure or not item.n_faces:
+    n_source = len(draft.source.items)
+    for index, item in enumerate(draft.items):
+        # Of what was added only models of the catalogue have plain parts.
+        is_finished = index >= n_source and item.source_class not in groups
+        if item.kind.is_structure or not item.n_faces or is_finished:
             continue
         group = groups.get(item.source_class, "")
         kinds = _kinds(draft, item, group)
@@ -171,8 +174,14 @@ def _wood(
         wanted = mean * float(mine @ LUMINANCE + 0.02) / float(mean @ LUMINANCE)
     is_pale = float(wanted @ LUMINANCE) > float(mean @ LUMINANCE)
     wood = WOODS[_PALE] if is_pale else style.wood
-    pattern = Pattern("grain", int(draft.rng(PART, "grain", wood.name).integers(2**31)), wood=wood)
-    return _tinted(draft, photographed(draft, catalogue, pattern), wanted, is_grained=True)
+    pattern = photographed(draft, catalogue, grain_pattern(draft, wood))
+    return _tinted(draft, pattern, wanted, is_grained=True)
+
+
+def grain_pattern(draft: Draft, wood: Wood) -> Pattern:
+    """The one veneer that a home's furniture of that wood shows."""
+    seed = int(draft.rng(PART, "grain", wood.name).integers(2**31))
+    return Pattern("grain", seed, wood=wood)
 
 
 def _soft(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -57,6 +57,13 @@ def floor_bitmap(
     occupied &= inside
     ways = connected_ways(inside & ~occupied)
     return FloorBitmap(grid.origin, np.asarray(inside), occupied, ways)
+
+
+def with_body(bitmap: FloorBitmap, body: Bools, width_m: float = WALK_M) -> FloorBitmap:
+    """The floor when a body (H, W) stands there, too; width_m: of the ways that are left."""
+    occupied = bitmap.occupied | body
+    ways = connected_ways(bitmap.inside & ~occupied, width_m)
+    return replace(bitmap, occupied=occupied, ways=ways)
 
 
 def doors_are_joined(bitmap: FloorBitmap, room: RoomSpace) -> bool:

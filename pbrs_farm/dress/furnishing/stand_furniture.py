@@ -1,0 +1,220 @@
+"""The part `furniture` of dressing: what people add along free walls, room by room; no effects.
+
+A thing stands with its back at a wall where nothing is before it, closes no way, blocks no door,
+and leaves most of the floor and a good part of the wall free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Place
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.furnishing.looks import Look, grained, look_of
+from pbrs_farm.dress.furnishing.room_floor import LOWER_M, OUT_M, RoomFloor, Spot, spot_at
+from pbrs_farm.dress.furnishing.room_wants import KINDS, WANTED, Kind
+from pbrs_farm.dress.generated.assembly import Made
+from pbrs_farm.dress.generated.case_goods import Size, desk_chair
+from pbrs_farm.dress.space import RoomSpace, house_space
+from pbrs_farm.dress.style import Style, room_style
+from pbrs_farm.dress.walls.hanging import next_id
+
+PART = "furniture"
+
+_LEAST_M2 = 3.0  # of a room
+_SIDE_M = 0.03  # to what stands beside it
+_LIFT_M = 0.0001  # above the floor, so that no faces coincide
+_FREE_BEFORE_M = 1.19  # of a wall, at most: no more is measured
+_TRIES = 8  # places of one thing
+_MOST_FACES = 12_000  # of a model of the catalogue
+_FROM_CATALOGUE = 0.35  # of what both have
+_ALIKE, _BESIDE_ALIKE = 0.7, 0.8  # how much less a room wants of what it has
+_BESIDE_M = 0.15  # from a bed to its nightstand
+_END_LIKED = 0.5  # an end of a free stretch, where all its other places together count 1
+_FILLED = ("full", "filled")  # in names of models that hold things of their own
+_LOOKS = 3  # of a home's added furniture
+
+
+def furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Add furniture to the rooms of the draft. share: 0..1 of what a room would get."""
+    space = house_space(draft)
+    for room in space.rooms:
+        wanted = WANTED.get(room.kind, ())
+        if not wanted or not room.room.has_floor or room.area.area < _LEAST_M2:
+            continue
+        rng = draft.rng(PART, room.room.id)
+        names = _drawn(draft, room, wanted, rng, share)
+        floor = RoomFloor.of(draft, space, room) if names else None
+        if floor is None:
+            continue
+        own = room_style(style, draft.rng("style", room.room.id))
+        look = look_of(draft, catalogue, own, draft.rng(PART, "look", int(rng.integers(_LOOKS))))
+        for name in names:
+            _stand(draft, catalogue, floor, name, look, rng)
+
+
+def _drawn(
+    draft: Draft, room: RoomSpace, wanted: Sequence[tuple[str, float]], rng: np.random.Generator,
+    share: float,
+) -> list[str]:  # fmt: skip
+    has = {draft.items[n].nyu40 for n in room.items}
+    found = []
+    for name, chance in wanted:
+        kind = KINDS[name]
+        # The other side of a bed may still want its nightstand.
+        less = _BESIDE_ALIKE if kind.beside is not None else _ALIKE
+        chance *= less if has & set(kind.alike) else 1.0
+        if rng.random() < chance * share:
+            found.append(name)
+    return found
+
+
+def _stand(
+    draft: Draft, catalogue: Catalogue, floor: RoomFloor, name: str, look: Look,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Put a thing of that kind where it fits; narrower ones are tried."""
+    kind = KINDS[name]
+    width, height, depth = (
+        float(rng.uniform(*side)) for side in (kind.width, kind.height, kind.depth)
+    )
+    own, from_catalogue = int(rng.integers(1 << 30)), rng.random() < _FROM_CATALOGUE
+    widths = {max(width * factor, kind.width[0]) for factor in (1.0, 0.75, 0.55, 0.0)}
+    for w in sorted(widths, reverse=True):
+        if w > floor.wall_m:
+            continue
+        made = _from_catalogue(catalogue, kind, w, own) if from_catalogue else None
+        made = made or _generated(kind, look, (w, height, depth), own)
+        spot = _spot(draft, floor, kind, made, rng)
+        if spot is None:
+            continue
+        _put(draft, floor, made, spot)
+        if name == "desk":
+            _chair_before(draft, floor, spot, look, rng)
+        return
+    draft.refused[f"{PART}: no free wall for a {name}"] += 1
+
+
+def _generated(kind: Kind, look: Look, size: Size, own: int) -> Made:
+    return grained(kind.make(np.random.default_rng(own), look.boards, size), look)
+
+
+def _from_catalogue(catalogue: Catalogue, kind: Kind, width: float, own: int) -> Made | None:
+    """A model of about that width; None where there is none."""
+    fit = [
+        p
+        for p in catalogue.of(*kind.groups)
+        if p.place is Place.FLOOR
+        and 0.7 * width < p.size[0] <= width * 1.1
+        and p.size[1] < kind.depth[1] + 0.15
+        and 0.6 * kind.height[0] < p.size[2] < kind.height[1] + 0.1
+        and not any(word in p.name.lower() for word in _FILLED)
+    ]
+    if not fit:
+        return None
+    piece = fit[own % len(fit)]
+    shape = catalogue.shape(piece)
+    if shape is None or sum(len(s.faces) for s in shape.surfaces) > _MOST_FACES:
+        return None
+    return piece, shape
+
+
+def _spot(
+    draft: Draft, floor: RoomFloor, kind: Kind, made: Made, rng: np.random.Generator
+) -> Spot | None:
+    """A place for the thing, drawn from those that are free; None where there is none."""
+    low, high = made[1].bounds
+    w, h, d = (float(v) for v in high - low)
+    if floor.is_too_full(w * d):
+        return None
+    y = floor.room.room.floor_y
+    depth = min(OUT_M + d + kind.before_m, _FREE_BEFORE_M)
+    places: list[tuple[int, float, float]] = []
+    for k, face in enumerate(floor.faces):
+        starts = face.starts(w + 2 * _SIDE_M, y + LOWER_M, y + h + 0.05, depth)
+        places += [(k, s + _SIDE_M + w / 2, liked) for s, liked in _liked(starts)]
+    weights = np.array([liked for _, _, liked in places])
+    if kind.beside is not None:
+        weights *= [_is_beside(draft, floor, kind.beside, k, s, w) for k, s, _ in places]
+    if not weights.any():
+        return None
+    n = min(_TRIES, int(np.count_nonzero(weights)))
+    for j in rng.choice(len(places), n, replace=False, p=weights / weights.sum()):
+        k, s, _ = places[int(j)]
+        spot = spot_at(floor.faces[k], s, w, d, kind.before_m)
+        if floor.allows(spot.body, spot.front):
+            return spot
+    return None
+
+
+def _liked(starts: F64) -> list[tuple[float, float]]:
+    """(s, how much it is liked) of each start: furniture fills walls from their ends."""
+    if not len(starts):
+        return []
+    breaks = np.flatnonzero(np.diff(starts) > 0.03)
+    ends = {0, len(starts) - 1, *breaks.tolist(), *(breaks + 1).tolist()}
+    rest = 1.0 / len(starts)
+    return [(float(s), _END_LIKED if k in ends else rest) for k, s in enumerate(starts)]
+
+
+def _is_beside(
+    draft: Draft, floor: RoomFloor, nyu40: int, face_number: int, s: float, width: float
+) -> bool:
+    """Whether a place at a wall is right beside a thing of the class that stands at that wall."""
+    face = floor.faces[face_number]
+    for number in floor.room.items:
+        if draft.items[number].nyu40 != nyu40:
+            continue
+        low, high = floor.space.bounds[number]
+        corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
+        out, along = face.out_of(corners), face.s_of(corners)
+        gap = max(float(along.min()) - (s + width / 2), s - width / 2 - float(along.max()))
+        if -0.1 < out.min() < 0.4 and abs(gap) < _BESIDE_M:
+            return True
+    return False
+
+
+def _put(draft: Draft, floor: RoomFloor, made: Made, spot: Spot) -> None:
+    _piece, shape = made
+    low, high = shape.bounds
+    # Its back comes to the wall, the middle of its width to the spot.
+    y = floor.room.room.floor_y + _LIFT_M - float(low[1])
+    at = spot.face.point(spot.s, y, OUT_M - float(low[2]))
+    at = at - spot.face.along * float(low[0] + high[0]) / 2
+    _add(draft, floor, made, at, spot.face.turn_rad)
+    floor.take(spot.body, spot.front)
+    floor.wall_m -= float(high[0] - low[0])
+
+
+def _chair_before(
+    draft: Draft, floor: RoomFloor, spot: Spot, look: Look, rng: np.random.Generator
+) -> None:
+    """A chair before a desk, turned to it; none where it would be in the way."""
+    made = grained(desk_chair(rng, look.boards), look)
+    high = made[1].bounds[1]
+    out = OUT_M + spot.depth + float(high[2]) + float(rng.uniform(0.05, 0.12))
+    y = floor.room.room.floor_y
+    at = spot.face.point(spot.s + float(rng.normal(0, 0.06)), y + _LIFT_M, out)
+    body = shapely.Point(at[0], at[2]).buffer(float(high[2]) + 0.04)
+    x0, z0, x1, z1 = body.bounds
+    # It stands where the desk's own front is: ask as if the desk had none.
+    own = floor.fronts.pop()
+    is_free = floor.allows(body, shapely.Polygon()) and floor.space.is_free(
+        np.array([x0, y + 0.03, z0]), np.array([x1, y + 1.0, z1])
+    )
+    floor.fronts.append(own)
+    if is_free:
+        _add(draft, floor, made, at, spot.face.turn_rad + np.pi + float(rng.normal(0, 0.25)))
+        floor.take(body, shapely.Polygon())
+
+
+def _add(draft: Draft, floor: RoomFloor, made: Made, at: F64, turn_rad: float) -> None:
+    room = floor.room.room
+    item = draft.placed(
+        *made, at, turn_rad, item_id=next_id(draft, PART), room_id=room.id, level_id=room.level_id
+    )
+    draft.add(item, PART, made[0])

@@ -1,0 +1,128 @@
+"""Furniture that is added along free walls: where it stands, what it is made of, what it leaves free."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import signed_volume, triangle_corners
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.furnishing import furniture
+from pbrs_farm.dress.furnishing.room_wants import KINDS
+from pbrs_farm.dress.generated.assembly import Made, plain
+from pbrs_farm.dress.generated.case_goods import Boards, bookcase, cube_shelf, desk_chair
+from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
+from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from tests.builders import builtin_home
+
+STYLE = style_for(np.random.default_rng(1))
+_WOOD = plain("wood", (0.6, 0.5, 0.4), 0.4)
+BOARDS = Boards(
+    _WOOD, plain("white", (0.9, 0.9, 0.9), 0.4), _WOOD, plain("metal", (0.5, 0.5, 0.5), 0.3)
+)
+
+
+def _draft(seed: int, share: float = 1.0) -> Draft:
+    draft = Draft(builtin_home(), seed)
+    furniture(draft, EMPTY, STYLE, share)
+    return draft
+
+
+def _added(draft: Draft) -> list[Item]:
+    return draft.items[len(draft.source.items) :]
+
+
+def _pieces() -> list[Made]:
+    found = []
+    for name, kind in KINDS.items():
+        for seed in range(3):
+            rng = np.random.default_rng([seed, *name.encode()])
+            size = tuple(
+                float(rng.uniform(*side)) for side in (kind.width, kind.height, kind.depth)
+            )
+            found.append(kind.make(rng, BOARDS, (size[0], size[1], size[2])))
+    return [*found, desk_chair(np.random.default_rng(1), BOARDS)]
+
+
+def test_every_kind_stands_on_its_base_and_its_bodies_are_closed_and_face_outwards() -> None:
+    for piece, shape in _pieces():
+        low, high = shape.bounds
+        assert low[1] == pytest.approx(0.0, abs=1e-6), piece.name
+        assert np.allclose(high - low, np.array(piece.size)[[0, 2, 1]], atol=1e-5)
+        assert piece.nyu40 > 0
+        for surface in shape.surfaces:
+            corners = triangle_corners(surface.positions, surface.faces)
+            assert signed_volume(corners, corners[0, 0]) > 0, piece.name
+
+
+def test_pieces_are_as_large_as_their_kind_says() -> None:
+    for kind in KINDS.values():
+        rng = np.random.default_rng(5)
+        size = (kind.width[1], kind.height[1], kind.depth[1])
+        w, d, h = kind.make(rng, BOARDS, size)[0].size
+        assert w < size[0] + 0.02
+        assert h < size[1] + 0.03
+        assert d < size[2] + 0.05
+
+
+@pytest.mark.parametrize(
+    ("made", "least"),
+    [
+        (bookcase(np.random.default_rng(2), BOARDS, (0.8, 2.0, 0.3)), 4),
+        (cube_shelf(BOARDS, 3, 4), 12),
+    ],
+)
+def test_the_boards_of_a_shelf_are_found_as_supports(made: Made, least: int) -> None:
+    draft = Draft(builtin_home(), 1)
+    room = draft.source.rooms[0]
+    middle = room.polygon.mean(0)
+    at = np.array([middle[0], room.floor_y, middle[1]])
+    item = draft.placed(*made, at, 0.0, item_id="shelf", room_id=room.id, level_id=room.level_id)
+    draft.items = [item]
+    found = supports_of_item(SceneTriangles(draft.items), 0, room)
+    assert len(found) >= least
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_furniture_stands_on_the_floor_with_its_back_at_a_wall_of_its_room(seed: int) -> None:
+    draft = _draft(seed)
+    space = house_space(draft)
+    stood = [i for i in _added(draft) if "chair" not in i.name]
+    assert stood
+    for item in stood:
+        room = space.room(str(item.room_id))
+        low, high = item.bounds
+        assert low[1] == pytest.approx(room.room.floor_y, abs=0.0005)
+        assert shapely.contains(room.area, shapely.box(low[0], low[2], high[0], high[2]))
+        corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
+        back = min(float(np.abs(face.out_of(corners)).min()) for face in room.faces)
+        assert back < 0.03
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_doors_stay_free_and_joined_and_the_floor_open(seed: int) -> None:
+    draft = _draft(seed)
+    space = house_space(draft)
+    for item in _added(draft):
+        room = space.room(str(item.room_id))
+        low, high = item.bounds
+        body = shapely.box(low[0], low[2], high[0], high[2])
+        for door in room.doors:
+            side = door.side_of(room.room.id)
+            assert side is not None
+            assert not door.before(side).union(door.swing(side)).intersects(body)
+    for room in space.rooms:
+        bitmap = floor_bitmap(space, room)
+        assert doors_are_joined(bitmap, room)
+        assert (bitmap.occupied & bitmap.inside).sum() < 0.6 * bitmap.inside.sum()
+
+
+def test_a_seed_decides_every_bit_and_no_share_adds_nothing() -> None:
+    for a, b in zip(_draft(3).items, _draft(3).items, strict=True):
+        assert a.id == b.id
+        assert np.array_equal(a.bounds, b.bounds)
+    assert not _added(_draft(3, 0.0))
