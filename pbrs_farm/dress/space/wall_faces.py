@@ -103,9 +103,14 @@ class WallFace:
 
     def taken(self, s0: float, s1: float, y0: float, y1: float) -> WallFace:
         """The face with the rectangle no longer free."""
+        return self.limited(s0, s1, y0, y1, 0.0)
+
+    def limited(self, s0: float, s1: float, y0: float, y1: float, free_m: float) -> WallFace:
+        """The face with no more than free_m free before the rectangle."""
         rows, columns = self._window(s0, s1, y0, y1)
         clear = self.clear.copy()
-        clear[max(rows[0], 0) : max(rows[1], 0), max(columns[0], 0) : max(columns[1], 0)] = 0.0
+        part = clear[max(rows[0], 0) : max(rows[1], 0), max(columns[0], 0) : max(columns[1], 0)]
+        np.minimum(part, np.float32(free_m), out=part)
         return replace(self, clear=clear)
 
     def _window(

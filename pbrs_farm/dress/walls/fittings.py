@@ -1,4 +1,4 @@
-"""Mirrors, clocks, wall shelves, sockets and switches of one room."""
+"""Mirrors, clocks, sockets and switches of one room."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw, ImageFont
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import MIRROR, SINK
-from pbrs_farm.dress.generated.assembly import Made, metal, plain
+from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Rgb, Style, shade
@@ -20,14 +20,12 @@ from pbrs_farm.dress.walls.hung_things import (
     mirror,
     plate,
     round_mirror,
-    wall_shelf,
 )
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
 _CASING_M = 0.16  # from a door's hole to the middle of its switch
 _CLOCKS = {RoomKind.KITCHEN: 0.6, RoomKind.LIVING: 0.4, RoomKind.OFFICE: 0.5, RoomKind.DINING: 0.3}
-_SHELVES = {RoomKind.LIVING: 0.45, RoomKind.BEDROOM: 0.4, RoomKind.OFFICE: 0.6, RoomKind.KITCHEN: 0.4, RoomKind.OTHER: 0.4}  # fmt: skip
-_MIRRORS = {RoomKind.HALL: 0.8, RoomKind.BEDROOM: 0.5, RoomKind.LIVING: 0.25}
+_MIRRORS = {RoomKind.HALL: 0.9, RoomKind.BEDROOM: 0.65, RoomKind.LIVING: 0.35}
 _SOCKETS = {RoomKind.HALL: 1, RoomKind.BATHROOM: 1, RoomKind.KITCHEN: 2}
 
 
@@ -69,7 +67,7 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
     else:
         width, height = float(rng.uniform(0.4, 0.6)), float(rng.uniform(1.1, 1.5))
         made, low = mirror(width, height, frame, 0.03), 0.45
-    _anywhere(hanging, made, low, 0.4, rng)
+    hang_anywhere(hanging, made, low, 0.4, rng)
 
 
 def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
@@ -80,7 +78,7 @@ def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
     frame = frame_material(rng, style)
     light = rng.random() < 0.75
     dial = jpeg_texture("dial", _dial(rng, (0.93, 0.92, 0.88) if light else (0.1, 0.1, 0.11)))
-    _anywhere(hanging, clock(float(rng.uniform(0.24, 0.36)), dial, frame), 1.85, 0.3, rng)
+    hang_anywhere(hanging, clock(float(rng.uniform(0.24, 0.36)), dial, frame), 1.85, 0.3, rng)
 
 
 def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
@@ -108,28 +106,14 @@ def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
     return np.asarray(image, np.uint8)
 
 
-def hang_shelf(hanging: Hanging, style: Style, share: float) -> None:
-    """A shelf of one to three boards in some rooms: the clutter that follows fills it."""
-    room = hanging.room
-    rng = hanging.draft.rng("shelf", room.room.id)
-    if rng.random() >= _SHELVES.get(room.kind, 0.0) * share:
-        return
-    boards = int(rng.choice([1, 1, 2, 2, 3]))
-    width, depth = float(rng.uniform(0.6, 1.2)), float(rng.uniform(0.18, 0.24))
-    wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
-    board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
-    made = wall_shelf(width, depth, boards, board, metal(style))
-    # Boards at head height over free floor would be run into: hang them over furniture or high.
-    room_above = 0.32
-    low = 1.4 if boards > 1 else 1.5
-    _anywhere(hanging, made, low, depth + 0.35, rng, above_m=room_above, tags=("support",))
-
-
-def _anywhere(
+def hang_anywhere(
     hanging: Hanging, made: Made, low_m: float, depth_m: float, rng: np.random.Generator, *,
     above_m: float = 0.05, tags: tuple[str, ...] = (),
-) -> None:  # fmt: skip
-    """Hang the thing at that height at a place drawn from all that have the space before them."""
+) -> bool:  # fmt: skip
+    """Hang the thing at that height at a place drawn from all that have depth_m free before them.
+
+    above_m: free above it. False, and a reason counted, where there is no place.
+    """
     piece, shape = made
     (x0, _y0, _z0), (x1, y1, _z1) = shape.bounds
     low, width = hanging.floor_y + low_m, float(x1 - x0)
@@ -140,9 +124,10 @@ def _anywhere(
     ]
     if not places:
         hanging.draft.refused[f"walls: no free wall for a {piece.group}"] += 1
-        return
+        return False
     k, s = places[int(rng.integers(len(places)))]
     hanging.hang(piece, shape, k, s + 0.05 + width / 2, low, tags=tags)
+    return True
 
 
 def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: float) -> None:
@@ -161,7 +146,7 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
     for _ in range(_SOCKETS.get(room.kind, 3)):
         n = int(rng.choice([1, 1, 2, 3]))
         socket = _fitting(catalogue, "socket", rng) or plate(n, is_socket=True, colour=colour)
-        _anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
+        hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
 
 
 def _fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Made | None:

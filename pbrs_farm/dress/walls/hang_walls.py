@@ -8,11 +8,13 @@ from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.coat_racks import hang_coats
-from pbrs_farm.dress.walls.fittings import fit_switches, hang_clock, hang_mirrors, hang_shelf
+from pbrs_farm.dress.walls.fittings import fit_switches, hang_clock, hang_mirrors
 from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.dress.walls.kitchen_walls import hang_kitchen
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures
 from pbrs_farm.dress.walls.pin_boards import hang_pin_board
 from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
+from pbrs_farm.dress.walls.wall_furniture import hang_cloth, hang_shelves
 
 PART = "walls"
 
@@ -34,8 +36,10 @@ def walls(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
         if is_heated:
             hang_radiators(hanging, share)
         fit_switches(hanging, catalogue, style, share)
+        hang_kitchen(hanging, space, style, share)
         hang_coats(hanging, style, share)
         hang_pin_board(hanging, space, style, share)
+        hang_shelves(hanging, style, share)
         hang_pictures(hanging, space, gallery, style, share)
-        hang_shelf(hanging, style, share)
+        hang_cloth(hanging, style, share)
         hang_clock(hanging, style, share)

@@ -14,10 +14,12 @@ from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import RoomSpace, WallFace
-from pbrs_farm.dress.space.wall_faces import CELL_M
+from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M
 
 GAP_M = 0.0008  # between a wall's face and the back of what hangs on it
 _LEAF_M = (0.03, 0.12, 0.22)  # before a wall: where the leaf of a door would stand
+_WAY_M = (0.36, 0.5, 0.7, 0.9)  # farther out it is in the way of deep things alone
+_DEEP_M = 0.06  # what comes farther out of a wall is in the way of the walls beside it
 IN_FRONT_M = 0.35  # that a picture needs free to be seen
 
 
@@ -58,21 +60,42 @@ class Hanging:
             s + float(low[0]) - margin_m, s + float(high[0]) + margin_m,
             low_y + float(low[1]) - margin_m, low_y + float(high[1]) + margin_m,
         )  # fmt: skip
+        if float(high[2]) > _DEEP_M:
+            self._stand_before_others(item, face)
         return item
+
+    def _stand_before_others(self, item: Item, face: int) -> None:
+        """Limit what is free before the walls beside the one that a deep thing hangs on."""
+        low, high = item.bounds
+        corners = np.array(
+            [[x, low[1], z] for x in (low[0], high[0]) for z in (low[2], high[2])], np.float64
+        )
+        for k, other in enumerate(self.faces):
+            out, s = other.out_of(corners), other.s_of(corners)
+            is_near = -_DEEP_M < out.min() < FAR_M and s.max() > 0 and s.min() < other.length
+            if k != face and is_near:
+                self.faces[k] = other.limited(
+                    float(s.min()), float(s.max()), float(low[1]), float(high[1]),
+                    max(float(out.min()), 0.0),
+                )  # fmt: skip
 
 
 def _clear_of_doors(face: WallFace, doors: Sequence[tuple[BaseGeometry, float]]) -> WallFace:
-    """The face without what a door's leaf would hit, below the door's top."""
+    """The face without what a door's leaf would hit, below the door's top.
+
+    What sticks out of it may reach as far as where one goes through the door.
+    """
     columns = (np.arange(face.clear.shape[1]) + 0.5) * CELL_M
     clear = face.clear
     for area, top_y in doors:
-        hit = np.zeros(len(columns), bool)
-        for out_m in _LEAF_M:
+        rows, zone = max(int((top_y - face.low_y) / CELL_M), 0), area.buffer(CELL_M)
+        for out_m in (*_LEAF_M, *_WAY_M):
             places = face.origin + columns[:, None] * face.along + out_m * face.normal
-            hit |= shapely.contains_xy(area.buffer(CELL_M), places[:, 0], places[:, 2])
-        if hit.any():
-            clear = clear.copy()
-            clear[: max(int((top_y - face.low_y) / CELL_M), 0), hit] = 0.0
+            hit = shapely.contains_xy(zone, places[:, 0], places[:, 2])
+            if hit.any():
+                clear = clear.copy() if clear is face.clear else clear
+                free_m = np.float32(out_m if out_m in _WAY_M else 0.0)
+                clear[:rows, hit] = np.minimum(clear[:rows, hit], free_m)
     return face if clear is face.clear else replace(face, clear=clear)
 
 

@@ -1,0 +1,165 @@
+"""Shelves, boxes and cupboards on walls, towel radiators and woven cloth; no effects but on the draft."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.classes import OTHERPROP
+from pbrs_farm.core.house import Material, Surface
+from pbrs_farm.dress.generated.assembly import Made, Part, metal, plain, transformed
+from pbrs_farm.dress.generated.turned import turned
+from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.style import Style
+from pbrs_farm.dress.textiles.rug_patterns import rug_pixels
+from pbrs_farm.dress.walls.fittings import hang_anywhere
+from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging
+from pbrs_farm.dress.walls.hung_things import hung, jpeg_texture, slab, wall_shelf
+from pbrs_farm.dress.walls.kitchen_things import Fronts, open_box, wall_cupboard
+
+# How many things with shelves a room's walls get, from and to.
+_SHELVES: Final = {
+    RoomKind.LIVING: (1, 3), RoomKind.BEDROOM: (1, 3), RoomKind.OFFICE: (2, 4),
+    RoomKind.KITCHEN: (1, 2), RoomKind.DINING: (0, 2), RoomKind.HALL: (0, 2),
+    RoomKind.BATHROOM: (1, 2), RoomKind.STORE: (1, 3), RoomKind.OTHER: (0, 2),
+}  # fmt: skip
+_CLOTHS: Final = {
+    RoomKind.LIVING: 0.3,
+    RoomKind.BEDROOM: 0.35,
+    RoomKind.HALL: 0.2,
+    RoomKind.OTHER: 0.2,
+}
+_RADIATORS: Final = 0.65  # of bathrooms
+_LADDER_M: Final = 0.45  # of a towel radiator's foot above the floor
+_ABOVE_M: Final = 0.32  # free over the highest board: things stand there
+_BEFORE_M: Final = 0.3  # free before it
+
+
+def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
+    """Boards, open boxes and cupboards: the clutter that follows fills them. A bath's towel radiator."""
+    kind = hanging.room.kind
+    rng = hanging.draft.rng("shelf", hanging.room.room.id)
+    low, high = _SHELVES.get(kind, (0, 0))
+    wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
+    is_bath = kind is RoomKind.BATHROOM
+    if is_bath and rng.random() < _RADIATORS * share:
+        hang_anywhere(hanging, towel_radiator(rng), _LADDER_M, 0.2, rng)
+    wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
+    board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
+    # What hangs in one room is of one make, of several widths.
+    for _ in range(wanted):
+        longest = 0.7 if is_bath else 1.7
+        width = float(rng.uniform(0.35 if is_bath else 0.6, longest))
+        own = int(rng.integers(1 << 30))
+        for factor in (1.0, 0.65, 0.45):
+            made, low_m, above_m = _shelf(
+                np.random.default_rng(own), style, board, width * factor, is_bath=is_bath
+            )
+            depth = float(made[1].bounds[1, 2])
+            if hang_anywhere(
+                hanging, made, low_m, depth + _BEFORE_M, rng, above_m=above_m, tags=("support",)
+            ):
+                break
+
+
+def _shelf(
+    rng: np.random.Generator, style: Style, board: Material, width: float, *, is_bath: bool
+) -> tuple[Made, float, float]:
+    """Something with shelves, how high above the floor its lower edge hangs, and what stays free above it."""
+    depth = float(rng.uniform(0.14, 0.18) if is_bath else rng.uniform(0.19, 0.27))
+    kind, fronts = rng.random(), Fronts(board, board, metal(style))
+    if kind < 0.5:
+        boards = int(rng.choice([1, 2, 2, 3]))
+        return (
+            wall_shelf(width, depth, boards, board, metal(style)),
+            1.5 if boards == 1 else 1.38,
+            _ABOVE_M,
+        )
+    if kind < 0.75:
+        height = float(rng.choice([0.34, 0.34, 0.62]))
+        return open_box(fronts, width, height, depth), float(rng.uniform(1.35, 1.55)), _ABOVE_M
+    n_doors = max(1, round(width / 0.45))
+    height = float(rng.uniform(0.38, 0.6))
+    return (
+        wall_cupboard(fronts, width, height, n_doors, depth + 0.06),
+        float(rng.uniform(1.4, 1.6)),
+        0.05,
+    )
+
+
+def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
+    """A woven cloth on a rod, in some rooms."""
+    rng = hanging.draft.rng("wall cloth", hanging.room.room.id)
+    if rng.random() >= _CLOTHS.get(hanging.room.kind, 0.0) * share:
+        return
+    width, height = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.6, 1.1))
+    hang_anywhere(hanging, wall_cloth(rng, style, width, height), 1.6 - height / 2, IN_FRONT_M, rng)
+
+
+def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: float) -> Made:
+    """A patterned cloth that hangs from a rod, a fringe at its foot."""
+    fringe, rod = 0.09, 0.009
+    pixels = rug_pixels(rng, width, height, style, "")
+    texture = jpeg_texture("wall cloth", pixels)
+    shown = Material(f"cloth {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
+    r, g, b = (float(c) / 255 for c in pixels.reshape(-1, 3).mean(0))
+    yarn = plain("yarn", (r, g, b), 1.0)
+    low, high = np.array([-width / 2, fringe]), np.array([width / 2, height])
+    face, back = slab("cloth", low, high, (0.002, 0.008))
+    parts: list[Part] = [(face, shown), (back, yarn)]
+    for x in np.arange(-width / 2 + 0.01, width / 2 - 0.01, 0.02):
+        ends = (
+            np.array([float(x), float(rng.uniform(0.0, 0.015))]),
+            np.array([float(x) + 0.012, fringe]),
+        )
+        parts += [(part, yarn) for part in slab("fringe", *ends, (0.003, 0.007))]
+    along = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    long = width + 0.1
+    stick = turned([(0.0, 0.0), (rod, 0.0), (rod, long), (0.0, long)], n=12)
+    parts.append(
+        (
+            transformed(stick, along, (-long / 2, height + rod, rod)),
+            plain("rod", style.wood.mean, 0.5),
+        )
+    )
+    return hung("wall_cloth", "wall_cloth", OTHERPROP, parts, [texture])
+
+
+def towel_radiator(rng: np.random.Generator) -> Made:
+    """A ladder of tubes that towels are dried on, in groups with gaps between."""
+    w, h = float(rng.uniform(0.42, 0.56)), float(rng.uniform(0.9, 1.3))
+    is_dark = rng.random() < 0.2
+    paint = plain("towel radiator", (0.12, 0.12, 0.13) if is_dark else (0.92, 0.92, 0.91), 0.3)
+    parts: list[Part] = []
+    post = turned([(0.0, 0.0), (0.015, 0.0), (0.015, h), (0.0, h)], n=12)
+    for sign in (-1, 1):
+        parts.append((transformed(post, np.eye(3), (sign * (w / 2 - 0.015), 0.0, 0.06)), paint))
+        for y in (0.1, h - 0.1):
+            foot = _tube(0.008, 0.048)
+            parts.append(
+                (
+                    transformed(
+                        foot,
+                        np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]]),
+                        (sign * (w / 2 - 0.015), y, 0.0),
+                    ),
+                    paint,
+                )
+            )
+    along = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    y = 0.05
+    while y < h - 0.03:
+        # Five tubes, then room for a towel.
+        for _ in range(5):
+            if y < h - 0.02:
+                parts.append(
+                    (transformed(_tube(0.011, w - 0.03), along, (-w / 2 + 0.015, y, 0.068)), paint)
+                )
+            y += 0.04
+        y += 0.06
+    return hung("towel_radiator", "radiator", OTHERPROP, parts)
+
+
+def _tube(radius: float, length: float) -> Surface:
+    return turned([(0.0, 0.0), (radius, 0.0), (radius, length), (0.0, length)], n=10)
