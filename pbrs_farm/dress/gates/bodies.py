@@ -100,8 +100,9 @@ def has_same_mesh(a: Item, b: Item) -> bool:
     if a is b or a.surfaces is b.surfaces:
         return True
     return len(a.surfaces) == len(b.surfaces) and all(
-        (s.positions is t.positions or np.array_equal(s.positions, t.positions))
-        and (s.faces is t.faces or np.array_equal(s.faces, t.faces))
+        s is t
+        or (s.positions is t.positions and s.faces is t.faces)
+        or np.array_equal(s.positions[s.faces], t.positions[t.faces])
         for s, t in zip(a.surfaces, b.surfaces, strict=True)
     )
 

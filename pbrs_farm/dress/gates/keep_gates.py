@@ -53,8 +53,14 @@ class _Memory:
 
 
 def keep_gates(draft: Draft, pieces: Mapping[str, Piece]) -> tuple[Gate, ...]:
-    """Take out of the draft what breaks a gate, until nothing does. pieces: by id."""
-    memory = _Memory()
+    """Take out of the draft what breaks a gate, until nothing does. pieces: by id.
+
+    What an earlier call measured of items that are still the same is not measured again.
+    """
+    memory = draft.kept.get("gates")
+    if not isinstance(memory, _Memory):
+        memory = draft.kept["gates"] = _Memory()
+    memory.free.clear()
     taken: Counter[str] = Counter()
     for _round in range(_ROUNDS):
         checked, broken = _measured(draft, pieces, memory)
