@@ -142,6 +142,7 @@ def _seen(house: House) -> dict[str, Any]:
     is_object = np.array([False, *(not i.kind.is_structure for i in house.items)])
     return {
         "views": len(views),
+        "rooms": [v.room_id for v in views],
         "objects": ((shares >= LEAST_SHARE) & is_object).sum(1).tolist(),
         "classes": (classes[:, 1:] > 0).sum(1).tolist(),
         "shares": np.round(classes, 5).tolist(),

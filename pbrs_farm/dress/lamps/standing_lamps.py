@@ -19,6 +19,7 @@ from pbrs_farm.dress.walls.hanging import next_id
 PART = "lamps"
 _BY_SOFA, _BY_BED = 0.75, 0.75  # how often
 _FLOOR_LM, _TABLE_LM = 900.0, 400.0
+_FROM_WALL_M = 0.6  # of a floor lamp's edge, at most: no lamp stands in the middle of a room
 _UPSIDE_DOWN = np.array([1.0, -1.0, 1.0])
 
 
@@ -112,9 +113,11 @@ def _ends(space: HouseSpace, room: RoomSpace, number: int, radius: float) -> lis
             offset[long] = sign * (half[long] + radius + 0.06)
             offset[1 - long] = across * half[1 - long]
             found.append(middle + offset)
-    # Corners are where lamps stand: nearest to the room's edge first.
+    # Corners are where lamps stand: nearest to the room's edge first, none far from it.
     edge = room.area.boundary
-    return sorted(found, key=lambda p: float(shapely.distance(shapely.Point(p), edge)))
+    away = [float(shapely.distance(shapely.Point(p), edge)) for p in found]
+    order = sorted(range(len(found)), key=lambda k: away[k])
+    return [found[k] for k in order if away[k] < radius + _FROM_WALL_M]
 
 
 def _floor_is_free(

@@ -55,6 +55,8 @@ _FRONTS: Final = frozenset(
     {"sink", "base_cabinet", "upper_cabinet", "fridge", "cooker", "dishwasher", "washer", "oven"}
 )
 _SOFT_GROUPS: Final = frozenset({"armchair", "ottoman", "sofa", "corner_sofa"})
+_LARGE_M: Final = 0.3
+_BRIGHT: Final = 0.75
 _KINDS: Final = (ItemKind.OBJECT, ItemKind.LAMP, ItemKind.DOOR)
 
 _WORDS: Final = (
@@ -124,8 +126,22 @@ def is_furniture(item: Item, group: str) -> bool:
 def is_lacquered(item: Item, material: Material, group: str) -> bool:
     """Whether a plain part of no known kind is painted board: of furniture and kitchens."""
     is_plain = material.texture_id is None and material.kind is MaterialKind.OPAQUE
-    may_be = is_furniture(item, group) or group in _FRONTS
-    return is_plain and may_be and item.kind is ItemKind.OBJECT and material.roughness is None
+    may_be = item.kind is ItemKind.OBJECT and (is_furniture(item, group) or group in _FRONTS)
+    is_toned_down = is_loud(material.diffuse) and _is_large(item)
+    return is_plain and (may_be or is_toned_down) and material.roughness is None
+
+
+def _is_large(item: Item) -> bool:
+    # A lampshade is, a toy is not.
+    low, high = item.bounds
+    return item.kind in (ItemKind.OBJECT, ItemKind.LAMP) and float((high - low).max()) > _LARGE_M
+
+
+def is_loud(colour: Rgb) -> bool:
+    """Whether it is a colour of screens, such as few large things in homes have."""
+    _, saturation, value = colorsys.rgb_to_hsv(*colour)
+    is_of_wood = is_brown(colour) and value < _BRIGHT
+    return saturation > 0.6 and value > 0.35 and not is_of_wood
 
 
 def is_brown(colour: Rgb) -> bool:

@@ -25,6 +25,8 @@ PART = "textiles"
 _FROM_FLOOR_M = 0.015
 _OVER_WINDOW_M = 0.12  # of the rod above the hole
 _UNDER_CEILING_M = 0.05
+_HIGH_SILL_M = 1.25
+_BESIDE_M = 0.48  # how far a panel covers the wall beside a window, at most
 _MOST_OUT_M = 0.2  # of the rod from the wall
 _ROD_M = 0.012  # its radius
 
@@ -128,13 +130,16 @@ def _panel_place(
     sill = seen.window.bottom_y
     without = [n for n, i in enumerate(draft.items) if i.kind is ItemKind.WINDOW]
     free = shapely.difference(room.area, room.walls)
-    for beyond in (0.34, 0.25, 0.17, 0.12, 0.07):
+    for beyond in (_BESIDE_M, 0.34, 0.25, 0.17, 0.12, 0.07):
         inner, outer = sign * (half - cover), sign * (half + beyond)
         x0, x1 = min(inner, outer), max(inner, outer)
         corner = seen.origin + seen.along * (outer + sign * 0.04) + seen.inward * out / 2
         if not shapely.contains_xy(free, corner[0], corner[2]):
             continue
-        for bottom in (seen.floor_y + _FROM_FLOOR_M, sill - 0.15, sill - 0.05):
+        # Before a window high in the wall only short ones hang.
+        is_high = sill > seen.floor_y + _HIGH_SILL_M
+        full = (seen.floor_y + _FROM_FLOOR_M,) if not is_high else ()
+        for bottom in (*full, sill - 0.15, sill - 0.05):
             if bottom > sill or bottom < seen.floor_y:
                 continue
             low, high = seen.bounds(x0, x1, bottom, rod_y + 0.02, out)

@@ -15,8 +15,8 @@ from pbrs_farm.dress.textiles.towels import hang_towels
 
 # How likely a window gets curtains, and how likely a blind where it got none.
 _CURTAINS = {
-    RoomKind.LIVING: 0.85, RoomKind.BEDROOM: 0.85, RoomKind.DINING: 0.75, RoomKind.OFFICE: 0.6,
-    RoomKind.OTHER: 0.6, RoomKind.KITCHEN: 0.25, RoomKind.HALL: 0.15,
+    RoomKind.LIVING: 0.92, RoomKind.BEDROOM: 0.92, RoomKind.DINING: 0.85, RoomKind.OFFICE: 0.75,
+    RoomKind.OTHER: 0.75, RoomKind.KITCHEN: 0.4, RoomKind.HALL: 0.3, RoomKind.BATHROOM: 0.2,
 }  # fmt: skip
 _BLINDS = {
     RoomKind.LIVING: 0.2, RoomKind.BEDROOM: 0.3, RoomKind.KITCHEN: 0.5, RoomKind.BATHROOM: 0.5,
