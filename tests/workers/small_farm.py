@@ -1,4 +1,4 @@
-"""A whole farm of real processes on one machine: Redis, coordinator, Celery workers, fake runner."""
+"""A whole farm of real processes on one machine: Redis, coordinator, Celery workers, and a runner."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ from workers.config import FarmConfig
 from workers.job import HouseEntry
 from workers.runner import Request
 
+FAKE_RUNNER = "tests.workers.fake_runner:runner"
+REAL_RUNNER = "workers.node.house_runner:runner"
 REPO = Path(__file__).parents[2]
 
 
@@ -32,10 +34,12 @@ class SmallFarm:
     """Starts processes and ends every one of them; `control` steers the fake runner."""
 
     def __init__(
-        self, folder: Path, redis: RedisServer, *, s3: Store | None = None, **settings: object
-    ) -> None:
+        self, folder: Path, redis: RedisServer, *, s3: Store | None = None,
+        runner: str = FAKE_RUNNER, **settings: object,
+    ) -> None:  # fmt: skip
         self.folder = folder
         self.redis = redis
+        self.runner = runner
         self.control = folder / "control"
         self.control.mkdir(parents=True)
         self.store: Store = s3 or FolderStore(folder / "store")
@@ -49,7 +53,7 @@ class SmallFarm:
                 redis_url=Secret(redis.url),
                 store_url=self.store.url,
                 store=settings_from_environment().store if s3 else StoreSettings(),
-                runner="tests.workers.fake_runner:runner",
+                runner=runner,
             )
         )
         os.environ["PBRS_TEST_CONTROL"] = str(self.control)
@@ -67,7 +71,7 @@ class SmallFarm:
         return env | {
             "PBRS_REDIS_URL": self.redis.url,
             "PBRS_STORE": self.store.url,
-            "PBRS_FARM_RUNNER": "tests.workers.fake_runner:runner",
+            "PBRS_FARM_RUNNER": self.runner,
             "PBRS_FARM_WORKER": worker,
             "PBRS_FARM_SLOTS": str(slots),
             "PBRS_FARM_SCRATCH": str(scratch),

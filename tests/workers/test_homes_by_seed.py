@@ -12,6 +12,8 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.store import MemoryStore, Store
+from tests.workers.redis_server import RedisServer
+from tests.workers.small_farm import REAL_RUNNER, SmallFarm
 from workers import house_files
 from workers.client.farm_client import completed, new_spec
 from workers.house_files import entries_from_arguments
@@ -64,6 +66,32 @@ def test_a_farms_pictures_of_homes_by_seed_are_the_same_bytes_as_a_runs(tmp_path
     assert sum(key.endswith("mlt_il_ol.png") for key in ours) == len(WORDS)
     assert sorted(ours) == sorted(theirs)
     assert [key for key in ours if ours[key] != theirs[key]] == []
+
+
+@pytest.mark.chaos
+def test_two_workers_of_a_farm_leave_the_bytes_of_a_run(tmp_path: Path) -> None:
+    words = [f"made:{k},rooms=0..1,furniture=none" for k in (1, 2, 3, 4)]
+    (tmp_path / "redis").mkdir()
+    server = RedisServer(tmp_path / "redis")
+    server.start()
+    farm = SmallFarm(tmp_path, server, runner=REAL_RUNNER, lease_s=60, heartbeat_s=2, resend_s=30)
+    try:
+        farm.coordinator()
+        for worker in ("w1", "w2"):
+            farm.worker(worker)
+        entries = [entry for entry, _ref in entries_from_arguments(words)]
+        farm.job = farm.farm.submit(entries, new_spec(small(), n_views=1)).job_id
+        farm.wait_done(500)
+        theirs = products(farm.objects())
+    finally:
+        farm.close()
+        server.end()
+    summary = run_local(Run(words, str(tmp_path / "run"), small(), wanted([], [], 1)))
+    assert summary.failures == []
+    files = [p for p in (tmp_path / "run").rglob("*") if p.is_file()]
+    ours = products({str(p.relative_to(tmp_path / "run")): p.read_bytes() for p in files})
+    assert sum(key.endswith("mlt_il_ol.png") for key in ours) == len(words)
+    assert ours == theirs
 
 
 def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
