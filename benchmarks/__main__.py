@@ -37,6 +37,7 @@ OWN_TARGET: Final = {
     "study": "study.study_figures",
     "lived_in": "study.lived_in",
     "board": "board.board_pages",
+    "motion": "motion.motion",
 }
 
 

@@ -34,14 +34,14 @@ _SPEED_PART: Final = 0.95  # of the speed is along the floor, the rest up and do
 def sample_walk(
     house: House, fields: CameraFields, seed: int, geometry: Geometry, first_hit: FirstHit
 ) -> Sampling:
-    """fields.walk_frames views along one walk of the storey with the largest region to walk in.
+    """fields.walk_frames views along one walk, where the most floor is free and most things stand.
 
     Rooms are passed where their doors are open. No frame is farther from the last one than
     fields.walk_speed_mps, or turned by more than fields.walk_turn_dps, allow. A home without a
     region 0.6 m wide has no view; the report says which doors are shut.
     """
     spaces = walk_spaces(house)
-    space = max(spaces, key=lambda s: s.area_m2, default=None)
+    space = max(spaces, key=lambda s: s.interest, default=None)
     if space is None or not space.region.any():
         return Sampling((), _report(fields, 0, (_why_none(spaces),)), ())
     # Find the way, then where the walker is and what is looked at.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -31,6 +32,7 @@ _DOOR_SIDE_M: Final = 0.75  # from its middle plane, where one stands before it
 _SPACING_M: Final = 0.03  # of points on surfaces: two fall into every cell that a surface crosses
 _LEAST_DOOR_M: Final = 1.6  # a lower hole is a hatch
 _NO_ROOM: Final = -1
+_OUTDOORS: Final = 0.01  # of a room without a ceiling
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,21 +54,13 @@ class WalkSpace:
     clearance: F64  # (H, W) metres to the nearest cell where nobody can be
     ways: NDArray[np.int32]  # (H, W) number of the connected way, 0 = none
     doors: tuple[DoorWay, ...]
+    way: int = 0  # the one that is walked, 0 where none is large enough
+    interest: float = 0.0  # of that way: the larger, the more there is to see
 
     @cached_property
     def region(self) -> Bools:
-        """(H, W) the largest connected way; empty where it is too small to walk in."""
-        sizes = np.bincount(self.ways.ravel())
-        sizes[0] = 0
-        number = int(sizes.argmax()) if len(sizes) > 1 else 0
-        if not number or sizes[number] * CELL_M**2 < LEAST_WAY_M2:
-            return np.zeros(self.grid.shape, bool)
-        return np.asarray(self.ways == number)
-
-    @property
-    def area_m2(self) -> float:
-        """Of the region."""
-        return float(self.region.sum()) * CELL_M**2
+        """(H, W) the way that is walked; empty where none is large enough."""
+        return np.asarray((self.ways == self.way) & (self.way > 0))
 
 
 def walk_spaces(house: House) -> tuple[WalkSpace, ...]:
@@ -108,7 +102,42 @@ def _walk_space(
     return WalkSpace(
         level_id, grid, room, floor_y, clearance_m(free), ways,
         tuple(DoorWay(_name(house, door), _joins(grid, ways, door)) for door in doors),
+        *_most_interesting(house, level_id, grid, room, ways),
     )  # fmt: skip
+
+
+def _things_by_room(
+    house: House, level_id: str, grid: FloorGrid, room: NDArray[np.int32]
+) -> Counter[int]:
+    """Index of a room -> how many things of the storey have their middle in it."""
+    own = [i for i in house.items if i.level_id == level_id and i.n_faces]
+    things = [i for i in own if not (i.kind.is_structure or is_door_item(i))]
+    middles = np.array([i.bounds.mean(0)[[0, 2]] for i in things]).reshape(-1, 2)
+    cells = grid.cells(middles)
+    return Counter(room[tuple(cells[grid.holds(cells)].T)].tolist())
+
+
+def _most_interesting(
+    house: House, level_id: str, grid: FloorGrid, room: NDArray[np.int32], ways: NDArray[np.int32]
+) -> tuple[int, float]:
+    """(number, interest) of the way whose indoor floor and whose rooms' things are most; (0, 0) = none."""
+    best = (0, 0.0)
+    things = _things_by_room(house, level_id, grid, room)
+    walkable = Counter(room[ways > 0].tolist())
+    for number in range(1, int(ways.max(initial=0)) + 1):
+        own = room[ways == number]
+        if len(own) * CELL_M**2 < LEAST_WAY_M2:
+            continue
+        # A terrace counts, but little: a walk is one through rooms.
+        rooms = [(int(k), int((own == k).sum())) for k in np.unique(own[own >= 0])]
+        indoors = {k for k, _n in rooms if house.rooms[k].has_ceiling}
+        cells = sum(n if k in indoors else _OUTDOORS * n for k, n in rooms)
+        # Of a room's things as many count as of its floor belongs to this way.
+        n_things = sum(things[k] * n / walkable[k] for k, n in rooms if k in indoors)
+        interest = ((cells + 1) * CELL_M**2) ** 0.5 * (1 + n_things)
+        if interest > best[1]:
+            best = number, interest
+    return best
 
 
 def _marks(house: House, grid: FloorGrid, floor_y: F64) -> tuple[Bools, Bools]:

@@ -1,6 +1,7 @@
 """A person's walk: through open doors, clear of things, within speed and turn, the same each time."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,6 +52,15 @@ def test_an_open_door_joins_two_rooms_and_a_shut_one_parts_them(opened: House, s
     assert any("door_inner" in name for name in shut_doors(parted))
     assert set(space.room[space.region]) - {-1} == {0, 1}
     assert len(set(parted.room[parted.region]) - {-1}) == 1
+
+
+def test_a_room_without_a_ceiling_is_walked_only_where_nothing_else_is(shut: House) -> None:
+    living, bedroom = shut.rooms
+    outdoors = replace(shut, rooms=(replace(living, has_ceiling=False), bedroom))
+    (space,) = walk_spaces(outdoors)
+    assert set(space.room[space.region]) - {-1} == {1}
+    (space,) = walk_spaces(replace(outdoors, rooms=outdoors.rooms[:1]))
+    assert set(space.room[space.region]) - {-1} == {0}
 
 
 def test_the_walk_passes_the_open_door_and_says_which_are_shut(walk: Sampling) -> None:

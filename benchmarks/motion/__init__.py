@@ -1,0 +1,1 @@
+"""Cameras that move: walks, what lies between views, how fast frames are made."""

@@ -1,0 +1,62 @@
+"""Walks, labels between views, pace and lenses -> out/bench/motion.json.
+
+`python -m benchmarks.motion.motion [PART...]`: walks, between, pace, lenses; all of them if none is
+named. A part's figures stay in out/bench/motion/ and are written again when it is named.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.figures import write_report
+
+FOLDER: Final = Path("out/bench/motion")
+# Part -> its module, with figures() -> name -> value.
+PARTS: Final = {
+    "walks": "benchmarks.motion.walks",
+    "between": "benchmarks.motion.between_views",
+    "pace": "benchmarks.motion.pace",
+    "lenses": "benchmarks.motion.lens_error",
+}
+UNITS: Final = {
+    "flow_error_px": "px, largest of 20 pairs of frames",
+    "flow_error_99_px": "px, 99 of 100 pixels",
+    "occlusion_wrong": "share of pixels",
+    "stereo_error_px": "px, largest",
+    "warp_psnr_db": "dB, occluded apart",
+    "warp_psnr_within_db": "dB, occluded and pixels on an edge of depth apart",
+    "frames_per_s": "frames a second at 640x480: labels, flow, OpenGL",
+    "path_blocked": "frames nearer than 10 cm to a surface",
+    "walks": "share of homes with a walk of 300 frames",
+    "walks_homes": "homes tried",
+    "speed_limit": "frames over the limit of speed or turn",
+    "light_reuse": "CPU of frames 2.. over that of frame 1",
+    "lens_error_px": "px, largest against OpenCV",
+}
+
+
+def main(words: list[str] | None = None) -> None:
+    """Measure the named parts, or all, and write out/bench/motion.json."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for part in words or PARTS:
+        if find_spec(PARTS[part]) is None:
+            print(f"{part}: no such part here", flush=True)
+            continue
+        figures = importlib.import_module(PARTS[part]).figures()
+        (FOLDER / f"{part}.json").write_text(json.dumps(figures, indent=1) + "\n")
+        print(part, json.dumps(figures), flush=True)
+    measured: dict[str, Any] = {}
+    for part in PARTS:
+        file = FOLDER / f"{part}.json"
+        measured |= json.loads(file.read_text()) if file.is_file() else {}
+    units = {f"motion.{name}": UNITS.get(name, "") for name in measured}
+    write_report("motion", {f"motion.{k}": v for k, v in measured.items()}, units)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
