@@ -8,7 +8,15 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import Verb, add_set, at_least, echo, echo_json, fields_set
+from pbrs_farm.commands.arguments import (
+    Verb,
+    add_set,
+    at_least,
+    counted,
+    echo,
+    echo_json,
+    fields_set,
+)
 from pbrs_farm.core.errors import MachineFailed
 
 if TYPE_CHECKING:
@@ -114,9 +122,10 @@ def _train(args: argparse.Namespace) -> int:
     lacking = left_out(source, plan)
     if lacking:
         at, why = next(iter(lacking.items()))
-        echo(f"{len(lacking)} views left out, {at}: {why}")
+        echo(f"{counted(len(lacking), 'view')} left out, {at}: {why}")
     how = "" if isinstance(views, ViewArrays) else ", read anew for each step"
-    echo(f"{len(views)} views of {len(views.homes)} homes{how}, {n_held} of others held out")
+    homes = f"{counted(len(views), 'view')} of {counted(len(views.homes), 'home')}"
+    echo(f"{homes}{how}, {n_held} of others held out")
     job = Job(plan, args.out, args.seed, source.light, source.name, args.init)
     # Tell about twenty times a run, at steps that are logged anyway.
     every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every

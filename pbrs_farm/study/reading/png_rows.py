@@ -102,10 +102,10 @@ def _parsed(png: bytes, place: str) -> tuple[int, int, int, int, int, bytes]:
 def _inflated(
     data: bytes, n_lines: int, n_line: int, n_strip: int, place: str
 ) -> Iterator[NDArray[np.uint8]]:
-    """(n_strip, n_line) bytes one after the other, the last with what is left of n_lines."""
+    """(1, n_line) bytes, whose filter tells most, then (n_strip, n_line) as long as there are lines."""
     inflate = zlib.decompressobj()
-    for first in range(0, n_lines, n_strip):
-        n = min(n_strip, n_lines - first)
+    for first in range(1 - n_strip, n_lines, n_strip):
+        n = min(n_strip, n_lines - first) if first > 0 else 1
         yield np.frombuffer(_some(inflate, data, n * n_line, place), np.uint8).reshape(n, n_line)
         data = inflate.unconsumed_tail
     # Ask for one byte more than there may be, so that a bomb stays small.

@@ -7,7 +7,7 @@ from pbrs_farm.study.reading.png_rows import array_of_rows, png_of_rows
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-@pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3), (1, 1), (3, 1, 3)])
+@pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3), (1, 1), (3, 1, 3), (70, 700, 3)])
 def test_what_is_written_is_read_by_us_and_by_libpng(dtype, shape):
     top = np.iinfo(dtype).max + 1
     array = np.random.default_rng(1).integers(0, top, shape).astype(dtype)
