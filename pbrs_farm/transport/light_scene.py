@@ -5,6 +5,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -29,10 +30,12 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
 from pbrs_farm.transport.scene_tables.sky import Sky
 
 if TYPE_CHECKING:
+    from pbrs_farm.transport.kernels.emitters import EmitterWeights
     from pbrs_farm.transport.sample_passes import SampledView
 
 _FLOOR_POINTS: Final = 256  # a room, for its mean illuminance
 _PILOT_SEED: Final = 0x5EED  # parts the pilot's random stream from the picture's
+_TRIAL_SEED: Final = 0x7A1A1  # and that of the trial of guided rays
 
 
 class LightScene:
@@ -119,13 +122,13 @@ class LightScene:
 
         emitters, weights = self.emitters(camera, fields, seed)
         view = SampledView(self.device_scene, emitters, camera, fields, seed)
-        facts: dict[str, Any] = {"seed": seed, "lamp_weights": weights}
+        facts: dict[str, Any] = {"seed": seed, "lamp_weights": self._weights_by_name(weights)}
         if fields.integrator == "metropolis":
             if camera.blur is not None:
                 text = "depth of field and motion blur are of `path` alone"
                 raise RenderFailed(text, view=room_id, mode="light", seed=seed)
             return self._render_metropolis(view, room_id, checkpoint, facts)
-        facts["integrator"] = "path"
+        facts |= {"integrator": "path", "guided": weights.is_guided}
         if fields.groups == "two":
             sums, spp = path_sums(view, checkpoint)
             return result_from_sums(sums, camera, spp, facts)
@@ -134,6 +137,10 @@ class LightScene:
         sums, spp = path_sums(view, checkpoint, n_lamps=n_lamps)
         result = result_from_sums(sums, camera, spp, facts)
         return with_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
+
+    def _weights_by_name(self, weights: EmitterWeights) -> dict[str, float]:
+        names = [lamp.name for lamp in self.tables.lamps]
+        return {n: float(w) for n, w in zip(names, weights.lamps, strict=True)}
 
     def _n_lamps_that_fit(self, camera: Camera, room_id: str, seed: int) -> int:
         """The number of lamps; RenderFailed when the kernel cannot count a sum for each of them."""
@@ -232,9 +239,9 @@ class LightScene:
 
     def emitters(
         self, camera: Camera, fields: LightFields, seed: int
-    ) -> tuple[Any, dict[str, float]]:
-        """Emitters with the sampling weights of this view, and the lamps' weights by name."""
-        from pbrs_farm.transport.guiding.pilot import pilot_weights, uniform_weights
+    ) -> tuple[Any, EmitterWeights]:
+        """(emitters, their EmitterWeights) with the sampling weights of this view."""
+        from pbrs_farm.transport.guiding.pilot import guiding_pays, pilot_weights, uniform_weights
 
         # Start from uniform weights; a pilot measures what each emitter brings to the view.
         portals = nearest_portals(self._portals, camera.eye)
@@ -245,9 +252,15 @@ class LightScene:
             weights = pilot_weights(
                 self.device_scene, emitters, camera, *n, fields, seed ^ _PILOT_SEED
             )
+            # Guide the rays where that pays; Metropolis guides none.
+            if self.n_lamps > 0 and fields.integrator == "path":
+                trial_seed = seed ^ _TRIAL_SEED
+                pays = guiding_pays(
+                    self.device_scene, emitters, camera, weights, fields, trial_seed
+                )
+                weights = replace(weights, is_guided=pays)
             emitters.set_weights(weights)
-        names = [lamp.name for lamp in self.tables.lamps]
-        return emitters, {n: float(w) for n, w in zip(names, weights.lamps, strict=True)}
+        return emitters, weights
 
     def _emitters_of_view(self, portals: F64, weights: Any) -> Any:
         """The emitters, their tables built once, with the portals and weights of a view."""

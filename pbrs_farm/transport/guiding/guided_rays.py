@@ -82,13 +82,15 @@ def guiding_at(near: NearbyLamps, bsdf: Bsdf, beta: Any, may_aim: Any) -> Guidin
     gain = dr.minimum(
         _FULL_GUIDING * reference.guided_total / dr.maximum(reference.total, 1e-30), 1
     )
-    share = dr.select(may_aim & (reference.guided_total > 0), spare * gain, 0)
+    may_aim = may_aim & near.is_guided & (reference.guided_total > 0)
+    share = dr.select(may_aim, spare * gain, 0)
     return Guiding(near, share, dr.select(near.cones.total > 0, mi.Float(CONE_SHARE), 0))
 
 
 def survival_boost(near: NearbyLamps) -> Any:
     """How much less often roulette ends a path here: more than 1 near lamps, where it is bright."""
-    return dr.clip(_BOOST_M2 * near.reference.total, 1, _MAX_BOOST)
+    boost = dr.clip(_BOOST_M2 * near.reference.total, 1, _MAX_BOOST)
+    return dr.select(near.is_guided, boost, 1)
 
 
 def reflection_probability(reflectance: Any, boost: Any) -> Any:

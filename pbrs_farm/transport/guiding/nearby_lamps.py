@@ -55,6 +55,7 @@ class NearbyLamps(NamedTuple):
     importances: list[Any]  # weight of the view times closeness
     guided: list[Any]  # the same, times the share of light that guided rays can find
     cones: Cones
+    is_guided: Any  # Bool: rays of this view are guided at all
 
 
 class NearbyLampSampler:
@@ -66,12 +67,17 @@ class NearbyLampSampler:
         self._n = len(spheres)
         self._spheres = _rows(spheres)
         self._weights = np.zeros(self._n)
+        self.set_guided(True)
         self.set_targets(no_targets(self._n))
 
     def set_weights(self, weights: F64) -> None:
         """Set the weights of another view, (L,)."""
         self._weights = weights
         self._update()
+
+    def set_guided(self, is_guided: bool) -> None:
+        """Whether the rays of this view are guided."""
+        self._is_guided = dr.opaque(mi.Bool, is_guided)
 
     def set_targets(self, targets: GuidingTargets) -> None:
         """Set what of each lamp's light guided rays can find."""
@@ -107,7 +113,7 @@ class NearbyLampSampler:
             guided_total += guided[-1]
         reference = ReferencePoint(mi.Point3f(p), n, total, guided_total)
         cones = self._cones(p, lamps, guided, active)
-        return NearbyLamps(reference, lamps, importances, guided, cones)
+        return NearbyLamps(reference, lamps, importances, guided, cones, self._is_guided)
 
     def importance(self, lamp: Any, p: Any, n: Any, counted: Any, active: Any) -> tuple[Any, Any]:
         """(importance, guided importance) of one lamp as in NearbyLamps; 0 for the weak ones."""

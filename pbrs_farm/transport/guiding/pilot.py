@@ -7,24 +7,34 @@ the root of the mean square that a path brings from it, with a floor so that not
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, EmitterWeights
-from pbrs_farm.transport.path_tracer import Lanes, trace
+from pbrs_farm.transport.path_tracer import Lanes, SampleSums, trace
 
 # Least weights: what no pilot path has found may still be there.
 LAMP_FLOOR: Final = 0.01
 _SUN_FLOOR: Final = 0.1
 _DOME_FLOOR: Final = 0.05
 _PILOT_SIZE: Final = (32, 24)  # px
+# Of the trial of guided rays: its samples of a pixel (of 16, one trial in six missed the rare bright
+# paths of a home), the samples of a view from which it pays, the CPU of a guided sample over a plain
+# one's, and the part of the mean light below which a pixel's noise counts less.
+_TRIAL_SPP: Final = 64
+_MIN_SAMPLES: Final = 1 << 22
+_GUIDING_COST: Final = 1.1
+_DARK: Final = 0.1
+_NEIGHBOURS: Final = 5  # px, edge of the window whose median is the level of a pixel
 
 
 def uniform_weights(n_lamps: int, n_portals: int) -> EmitterWeights:
@@ -69,6 +79,51 @@ def pilot_weights(
     strength = np.sqrt((relative.astype(np.float64) ** 2).mean(0))
     lamps = _with_floors(strength[:n_lamps], np.full(n_lamps, LAMP_FLOOR))
     return EmitterWeights(lamps, outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0)))
+
+
+def guiding_pays(
+    scene: DeviceScene,
+    emitters: Emitters,
+    camera: Camera,
+    weights: EmitterWeights,
+    fields: LightFields,
+    seed: int,
+) -> bool:
+    """Whether guided rays cut the noise of a view by more than they cost; emitters are left guided.
+
+    Renders the view small both ways, with the view's weights. A view of few samples is guided
+    without a trial, which would cost as much as it saves.
+    """
+    i = camera.intrinsics
+    if i.width_px * i.height_px * fields.spp < _MIN_SAMPLES:
+        return True
+    width, height = _PILOT_SIZE
+    lanes = Lanes(width, height, 0, _TRIAL_SPP, seed)
+    small = camera.with_size(width, height)
+
+    def with_guiding(is_guided: bool) -> Emitters:
+        emitters.set_weights(replace(weights, is_guided=is_guided))
+        return emitters
+
+    plain, guided = (
+        trace(scene, with_guiding(is_guided), small, lanes, fields) for is_guided in (False, True)
+    )
+    # Judge noise against what is around a pixel: a firefly must not be its own measure.
+    light = _luminance(guided.outdoor + guided.indoor).reshape(height, width)
+    level = median_filter(light, size=_NEIGHBOURS, mode="nearest").ravel()
+    level += _DARK * max(float(level.mean()), 1e-12)
+    variances = [float(((_halves_apart(s) / level) ** 2).mean()) for s in (plain, guided)]
+    return variances[0] > _GUIDING_COST * variances[1]
+
+
+def _luminance(rgb: F32) -> F64:
+    return np.asarray(rgb.astype(np.float64) @ LUMINANCE)
+
+
+def _halves_apart(sums: SampleSums) -> F64:
+    """Difference of the half buffers of all light, pixel by pixel."""
+    whole, even = sums.outdoor + sums.indoor, sums.outdoor_even + sums.indoor_even
+    return 2 * _luminance(even) - _luminance(whole)
 
 
 def outdoor_weights(strength: F64, brought: NDArray[np.floating]) -> F64:

@@ -50,6 +50,7 @@ class EmitterWeights:
 
     lamps: F64  # (L,)
     outdoor: F64  # (2 + number of portals,)
+    is_guided: bool = True  # a part of the rays is guided into lamps
 
 
 class DirectionSample(NamedTuple):
@@ -97,6 +98,7 @@ class Emitters:
         """Set other weights; the scene stays."""
         self._set_lamp_weights(weights.lamps)
         self._set_outdoor_weights(weights.outdoor)
+        self.nearby.set_guided(weights.is_guided)
 
     def set_targets(self, targets: GuidingTargets) -> None:
         """Set what guided rays aim at."""

@@ -62,6 +62,37 @@ def test_guided_rays_leave_the_mean_alone_and_cut_the_noise(
     assert variances[0] < 0.25 * variances[1]
 
 
+def test_an_unguided_view_is_as_one_without_guiding(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, camera = loaded(hard_rooms.open_shade())
+    fields = FIELDS.model_copy(update={"spp": 16})
+    monkeypatch.setattr("pbrs_farm.transport.guiding.pilot.guiding_pays", lambda *_: False)
+    result = scene.render(camera, "0_0", fields, 1)
+    assert result.facts["guided"] is False
+    unguided(monkeypatch)
+    np.testing.assert_allclose(
+        result.indoor, scene.render(camera, "0_0", fields, 1).indoor, rtol=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("room", "pays"), [(hard_rooms.open_shade, True), (lambda: rooms.window_room(lumen=800), False)]
+)
+def test_rays_are_guided_where_a_shade_hides_the_bulb_and_not_where_nothing_does(
+    room: Callable[[], tuple[House, Camera]], pays: bool
+) -> None:
+    scene, camera = loaded(room())
+    large = camera.with_size(640, 480)
+    for seed in range(4):
+        _emitters, weights = scene.emitters(large, FIELDS, seed)
+        assert weights.is_guided is pays
+
+
+def test_a_small_view_is_guided_without_a_trial() -> None:
+    scene, camera = loaded(rooms.window_room(lumen=800))
+    _emitters, weights = scene.emitters(camera, FIELDS, 0)
+    assert weights.is_guided
+
+
 def test_small_faces_far_from_the_origin_lose_no_light() -> None:
     # Where float32 is coarse a ray starts a millimetre off its surface: it must still meet the
     # face it was aimed at, or that light is lost (2 % of it, once).
