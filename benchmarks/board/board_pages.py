@@ -25,6 +25,8 @@ from typing import Any, Final
 import httpx
 import numpy as np
 
+from benchmarks.board.farm_pages import UNITS as FARM_UNITS
+from benchmarks.board.farm_pages import farm_cost
 from benchmarks.board.many_views import write_many_views
 from benchmarks.figures import write_report
 from pbrs_farm.images import array_from_png
@@ -76,7 +78,8 @@ def main(argv: list[str] | None = None) -> None:
     args = parser.parse_args(argv or [])
     with tempfile.TemporaryDirectory(prefix="board-bench-") as folder:
         figures = pages(Path(folder), args.views) | relighting(Path(folder))
-    write_report("board", figures, UNITS)
+    figures |= farm_cost()
+    write_report("board", figures, UNITS | FARM_UNITS)
 
 
 @contextmanager

@@ -151,7 +151,7 @@ def throughput() -> dict[str, Any]:
         spec_houses, spec = completed(houses, new_spec(recipe_from_name("fast")))
         began = time.monotonic()
         farm.ledger.create(spec)
-        farm.ledger.load_houses(spec.job_id, map(_opened, range(N_HOUSES)))
+        farm.ledger.load_houses(spec.job_id, map(opened_house, range(N_HOUSES)))
         farm.ledger.open(spec.job_id, 5)
         load_s = time.monotonic() - began
         farm.store.put(job_key(spec.job_id), spec.model_dump_json().encode())
@@ -170,7 +170,8 @@ def throughput() -> dict[str, Any]:
         return figures
 
 
-def _opened(index: int) -> HouseState:
+def opened_house(index: int) -> HouseState:
+    """A house of the simulated job: its geometry is done, its batches are to be run."""
     batches = batches_of(f"h{index}")
     units = {str(n): ("gl", "l") for n in range(len(batches))}
     return HouseState(index, f"h{index:05d}", False, batches, {**units, "-": ("geometry", "d")})
