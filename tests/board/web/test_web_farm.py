@@ -52,6 +52,11 @@ def test_a_job_is_watched_through_a_killed_worker_paused_and_done(
             assert farm.state() == "paused"
             tab.click("text=Resume")
             tab.click("text=Yes, resume")
+            tab.select_option("select[name=to]", "1")
+            tab.click("button:has-text('Change')")
+            tab.click("text=Yes, priority")
+            until(tab, "document.querySelector('select[name=to]')?.value === '1'")
+            assert farm.farm.view(farm.job).fields["priority"] == "1"
             (farm.control / "slow").unlink()
             tab.wait_for_selector(".state.done", timeout=60_000)
             farm.wait_done()
