@@ -23,6 +23,7 @@ from pydantic import BaseModel
 from pbrs_farm.core.errors import BadInput
 
 RECIPE: Final = "recipe.json"
+RECIPE_REPLACED: Final = "recipe_replaced.json"  # there once another recipe was put in its place
 MANIFEST: Final = "manifest.jsonl"
 ATTRIBUTION: Final = "ATTRIBUTION.txt"
 DRESS: Final = "dress.json"  # of a house that was dressed

@@ -67,4 +67,6 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
         hint = "--update renders again what differs, or choose another output"
         raise BadRecipe(f"{store.url} holds another recipe: {'; '.join(differing)}", hint=hint)
     if differing:
+        # From now on a marker's name alone does not say that its step is done.
+        store.put(keys.RECIPE_REPLACED, json.dumps({"last": differing}).encode())
         store.put(keys.RECIPE, data)

@@ -6,6 +6,7 @@ left a record are tried again.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -32,15 +33,28 @@ def rebuild(
     houses: list[HouseEntry],
     progress: Callable[[str], None] = lambda _line: None,
 ) -> None:
-    """Enter every house of the job as far as its markers say. The job must have just been created."""
+    """Enter every house of the job as far as its markers say. The job must have just been created.
+
+    Where markers may be of another recipe or version every house begins anew: its tasks look into
+    each marker, and what holds is not made again.
+    """
     # One listing for all houses, then a look at each that has begun.
-    done = done_steps(store) if houses else {}
+    done = done_steps(store) if houses and names_tell(store, spec) else {}
     progress(f"{sum(map(len, done.values()))} markers of {len(done)} houses")
     numbered = iter(enumerate(houses))
     with ThreadPoolExecutor(_THREADS) as pool:
         while chunk := list(islice(numbered, _CHUNK)):
             look = partial(_state, runner, spec, done)
             _enter(ledger, spec.job_id, chunk, list(pool.map(look, chunk)))
+
+
+def names_tell(store: Store, spec: JobSpec) -> bool:
+    """Whether a marker's name says that its step is done: one recipe, one version in this root."""
+    if store.head(keys.RECIPE_REPLACED) is not None:
+        return False
+    # Every job that ever ran here left its description.
+    jobs = [key for key in store.list("jobs/") if key.endswith("/job.json")]
+    return all(json.loads(store.get(key)).get("version") == spec.version for key in jobs)
 
 
 def done_steps(store: Store) -> dict[str, frozenset[str]]:
