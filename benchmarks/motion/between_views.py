@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 from pathlib import Path
 from typing import Any, Final
@@ -29,9 +30,10 @@ from pbrs_farm.run.plan import wanted
 from pbrs_farm.truth.albedo import albedo_png
 
 HOME: Final = "Studio"
-N_PAIRS: Final = 20
+N_PAIRS: Final = int(os.environ.get("PAIRS", "20"))
 LAYERS: Final = ("depth_z", "flow_forward", "occlusion_forward", "disparity", "occlusion_stereo")
-_SUPER: Final = 4  # rays along each edge of a pixel, of the pictures that are warped
+_SUPER: Final = 3  # rays along each edge of a pixel, of the pictures that are warped
+_APART: Final = max(N_PAIRS // 4, 1)  # frames between the pairs that are warped
 _SUN: Final = np.array([0.35, 0.8, 0.49])
 
 
@@ -115,11 +117,11 @@ def _warped(house: Path, views: list[StoredView]) -> dict[str, float]:
         colour = albedo_png(hit, home, geometry, textures) / 255 * shade[..., None]
         return colour.reshape(height, _SUPER, width, _SUPER, 3).mean((1, 3))
 
-    pictures = [picture(view) for view in views[:: N_PAIRS // 4]]
+    pictures = [picture(view) for view in views[::_APART]]
     whole, within = [], []
     # Take pairs of neighbours among a few frames: one picture takes seconds.
-    for k, first in enumerate(views[: -1 : N_PAIRS // 4]):
-        second = picture(views[k * (N_PAIRS // 4) + 1])
+    for k, first in enumerate(views[:-1:_APART]):
+        second = picture(views[k * _APART + 1])
         flow, seen = (
             layer(first, "flow_forward").astype(np.float64),
             layer(first, "occlusion_forward") == SEEN,

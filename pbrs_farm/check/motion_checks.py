@@ -65,7 +65,6 @@ class Followed:
 
     motion: Floats  # (N, 2) px right and down; NaN behind the other camera
     state: NDArray[np.int64]  # (N,) SEEN, OUTSIDE or HIDDEN
-    is_tie: Bools  # (N,) another state is as right: on a border, or at an edge
 
 
 def other_view(view: StoredView, relation: str) -> OtherView | None:
@@ -90,21 +89,37 @@ def followed(
     points = origin + directions * z[:, None]
     px, _depth = other.pixels(points)
     height, width = other.size
-    # Inside the picture by more than the border's width, or outside it by more.
     with np.errstate(invalid="ignore"):
-        margin = np.minimum(px, np.array([width, height]) - px).min(axis=1)
-    inside = margin >= 0
-    is_tie = np.abs(margin) <= BORDER_PX
+        inside = (px >= 0).all(axis=1) & (px <= np.array([width, height])).all(axis=1)
     state = np.full(len(rows), OUTSIDE, np.int64)
     at = np.nonzero(inside)[0]
-    seen = _is_seen(points[at], other, rays)
-    state[at] = np.where(seen, SEEN, HIDDEN)
-    # Ask again a little beside each point, where it may matter.
+    state[at] = np.where(_is_seen(points[at], other, rays), SEEN, HIDDEN)
+    return Followed(px - np.stack([columns + 0.5, rows + 0.5], axis=1), state)
+
+
+def near_edge(
+    view: StoredView,
+    other: OtherView,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    z: Floats,
+    rays: Rays,
+) -> Bools:
+    """(N,) another state is as right: on the border of the other picture, or beside what hides it."""
+    origin, directions = view.rays(rows, columns)
+    points = origin + directions * z[:, None]
+    height, width = other.size
+    px, _depth = other.pixels(points)
+    with np.errstate(invalid="ignore"):
+        margin = np.minimum(px, np.array([width, height]) - px).min(axis=1)
+        is_tie = np.asarray(np.abs(margin) <= BORDER_PX, bool)
+    # Ask again a little beside each point: where answers differ both are right.
+    seen = _is_seen(points, other, rays, slack_m=0.01)
     for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        _o, beside = view.rays(rows[at] + JITTER_PX * dy, columns[at] + JITTER_PX * dx)
-        moved = origin + beside * z[at][:, None]
-        is_tie[at] |= _is_seen(moved, other, rays, slack_m=0.01) != seen
-    return Followed(px - np.stack([columns + 0.5, rows + 0.5], axis=1), state, is_tie)
+        _o, beside = view.rays(rows + JITTER_PX * dy, columns + JITTER_PX * dx)
+        moved = origin + beside * z[:, None]
+        is_tie |= _is_seen(moved, other, rays, slack_m=0.01) != seen
+    return is_tie
 
 
 def _is_seen(points: Floats, other: OtherView, rays: Rays, slack_m: float = REACH_M) -> Bools:
@@ -142,38 +157,35 @@ def check_motion(
             continue
         found = followed(view, other, rows, columns, z, rays)
         stored = {n: arrays[n][rows, columns].astype(np.float64) for n in names if n in arrays}
-        _judge(view, stored, found, rows, columns, tally)
+        for name, values in stored.items():
+            right, may_tie = _judged(name, values, found)
+            # Look again at what is wrong.
+            ties = np.nonzero(~right & may_tie)[0]
+            ties = ties[near_edge(view, other, rows[ties], columns[ties], z[ties], rays)]
+            right[ties] = True
+            tally.add(f"motion: {name}", len(values), ties=len(ties))
+            for k in np.nonzero(~right)[0]:
+                tally.fail(f"motion: {name}", view.place, f"row {rows[k]}, column {columns[k]}")
 
 
-def _judge(
-    view: StoredView,
-    stored: dict[str, Floats],
-    found: Followed,
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    tally: Tally,
-) -> None:
+def _judged(name: str, values: Floats, found: Followed) -> tuple[Bools, Bools]:
+    """(N,) what a layer stores is right; (N,) where it is not, an edge may be the reason."""
     in_front = np.isfinite(found.motion).all(axis=1)
     motion = np.nan_to_num(found.motion)
-    for name, values in stored.items():
-        ties = np.zeros(len(values), bool)
-        if name.startswith("occlusion"):
-            right, ties = values == found.state, found.is_tie & (values != found.state)
-        elif name.endswith("kitti"):
-            # What is valid is seen; it moves as far as the steps say.
-            valid = values[:, 2] == 1
-            close = (np.abs((values[:, :2] - 2**15) / 64 - motion) <= FLOW_PX).all(axis=1)
-            hidden = (found.state != SEEN) | (np.abs(motion) >= KITTI_REACH_PX).any(axis=1)
-            right = np.where(valid, close & (found.state == SEEN), hidden)
-            ties = found.is_tie & ~right & (close | ~valid)
-        elif name == "disparity":
-            shift = np.abs(motion[:, 0])
-            right = ~in_front | (np.abs(values / 256 - np.minimum(shift, 65535 / 256)) <= FLOW_PX)
-        else:
-            right = (np.abs(values - motion) <= FLOW_PX + half_step(motion)).all(axis=1) | ~in_front
-        tally.add(f"motion: {name}", len(values), ties=int(ties.sum()))
-        for k in np.nonzero(~(right | ties))[0]:
-            tally.fail(f"motion: {name}", view.place, f"row {rows[k]}, column {columns[k]}")
+    never = np.zeros(len(values), bool)
+    if name.startswith("occlusion"):
+        return np.asarray(values == found.state, bool), ~never
+    if name.endswith("kitti"):
+        # What is valid is seen; it moves as far as the steps say.
+        valid = values[:, 2] == 1
+        close = (np.abs((values[:, :2] - 2**15) / 64 - motion) <= FLOW_PX).all(axis=1)
+        hidden = (found.state != SEEN) | (np.abs(motion) >= KITTI_REACH_PX).any(axis=1)
+        return np.where(valid, close & (found.state == SEEN), hidden), close | ~valid
+    if name == "disparity":
+        shift = np.minimum(np.abs(motion[:, 0]), 65535 / 256)
+        return ~in_front | (np.abs(values / 256 - shift) <= FLOW_PX), never
+    slack = FLOW_PX + half_step(motion)
+    return (np.abs(values - motion) <= slack).all(axis=1) | ~in_front, never
 
 
 def half_step(values: Floats) -> Floats:

@@ -18,6 +18,7 @@ from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.file_checks import check_files, check_root_manifest
 from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_partners
+from pbrs_farm.check.pair_checks import check_pairs
 from pbrs_farm.check.pixel_checks import RAY_LAYERS, judge
 from pbrs_farm.check.plane_checks import check_planes
 from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
@@ -89,6 +90,7 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
             seen.append(SeenView(view, arrays["depth"], arrays["normal"]))
     check_reprojection(seen, tally)
     check_partners([one.view for one in seen], tally)
+    check_pairs(house, scenes.all[1], tally)
     return len(views)
 
 

@@ -15,7 +15,7 @@ from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.cameras_json import views_from_json
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
-from pbrs_farm.formats.pairs_parquet import pairs_from_parquet
+from pbrs_farm.formats.pairs_parquet import pairs_from_parquet, pairs_parquet
 from pbrs_farm.images import array_from_png, layers_from_exr, png_from_array
 from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.plan import wanted
@@ -111,6 +111,19 @@ def test_pairs_are_those_of_each_room_and_a_stereo_pair_shares_nearly_all(
     )
     assert stereo["common"] > 0.8
     assert stereo["baseline_m"] == pytest.approx(0.065)
+
+
+def test_verify_recomputes_pairs_and_finds_a_share_that_is_wrong(
+    certificate: Certificate, made: tuple[Path, Summary], tmp_path: Path
+) -> None:
+    assert certificate.counts["pairs"].checked > 50
+    root = tmp_path / "root"
+    shutil.copytree(made[0], root)
+    file = house(root) / "pairs.parquet"
+    rows = pairs_from_parquet(file.read_bytes(), "pairs.parquet")
+    file.write_bytes(pairs_parquet([row | {"a_in_b": row["a_in_b"] - 0.05} for row in rows]))
+    sign(root, house(root))
+    assert verify(root, sample=10).counts["pairs"].failed == len(rows)
 
 
 def _flow_moved(view: Path) -> None:
