@@ -185,7 +185,8 @@ def _judged(name: str, values: Floats, found: Followed) -> tuple[Bools, Bools]:
         shift = np.minimum(np.abs(motion[:, 0]), 65535 / 256)
         return ~in_front | (np.abs(values / 256 - shift) <= FLOW_PX), never
     slack = FLOW_PX + half_step(motion)
-    return (np.abs(values - motion) <= slack).all(axis=1) | ~in_front, never
+    close = (np.abs(values - motion) <= slack).all(axis=1)
+    return np.asarray(close | ~in_front, bool), never
 
 
 def half_step(values: Floats) -> Floats:

@@ -68,7 +68,7 @@ class _Camera:
         """(N, 3) through the middles of the grid's pixels, of unit depth."""
         columns, rows = np.meshgrid(np.arange(GRID[0]) + 0.5, np.arange(GRID[1]) + 0.5)
         plane = (np.stack([columns.ravel(), rows.ravel()], axis=1) - self.c) / self.f
-        return np.insert(plane, 2, 1.0, axis=1) @ self.rotation.T
+        return np.asarray(np.insert(plane, 2, 1.0, axis=1) @ self.rotation.T)
 
     def shows(self, points: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """(N,) points (N, 3) that fall into the picture."""
