@@ -16,7 +16,9 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.near_names import hint_of_choice, near_names, question
+from pbrs_farm.core.picture_fields.blur_fields import BlurFields
 from pbrs_farm.core.picture_fields.lens_fields import LensFields
+from pbrs_farm.core.picture_fields.sensor_fields import SensorFields
 from pbrs_farm.core.recipe_fields import (
     CameraFields,
     DressFields,
@@ -36,6 +38,7 @@ from pbrs_farm.core.recipe_fields import (
 
 __all__ = [
     "RECIPE_NAMES",
+    "BlurFields",
     "CameraFields",
     "DressFields",
     "EmissionFields",
@@ -49,6 +52,7 @@ __all__ = [
     "Recipe",
     "RepairFields",
     "SelectionFields",
+    "SensorFields",
     "SkyFields",
     "ToneFields",
     "changed_recipe",
@@ -69,6 +73,8 @@ class Recipe(FieldGroup):
     repair: RepairFields = RepairFields()
     cameras: CameraFields = CameraFields()
     lens: LensFields = LensFields()
+    blur: BlurFields = BlurFields()
+    sensor: SensorFields = SensorFields()
     image: ImageFields = ImageFields()
     light: LightFields = LightFields()
     sky: SkyFields = SkyFields()
@@ -88,6 +94,17 @@ class Recipe(FieldGroup):
             raise ValueError(fault)
         size = f.score_width_px, f.score_height_px
         self.lens.intrinsics(Intrinsics.from_hfov(*size, f.hfov_rad))
+        return self
+
+    @model_validator(mode="after")
+    def _blur_fits(self) -> Self:
+        """Blur is of `path`, and depth of field of a lens with an optical axis."""
+        if self.blur.is_on and self.light.integrator == "metropolis":
+            raise ValueError("group blur is of `path` alone: add --set light.integrator=path")
+        if self.blur.aperture_mm > 0 and not self.lens.lens.depth_is_planar:
+            raise ValueError(
+                f"blur.aperture_mm: lens.model {self.lens.model} has no plane of focus"
+            )
         return self
 
     def digest(self, *groups: str) -> str:
@@ -132,7 +149,9 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
         "stereo_m",
     ),
     "dress": tuple(DressFields.model_fields),
+    "blur": tuple(BlurFields.model_fields),
     "lens": tuple(LensFields.model_fields),
+    "sensor": tuple(SensorFields.model_fields),
     "repair": ("lamp_in_every_room", "lamp_lx"),
     "selection": ("min_room_lx",),
 }

@@ -46,10 +46,10 @@ STEPS: Final = {
         Step("illuminance", 3, ("sky", "emission", "materials"), ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
         Step(
-            "light", 7, ("image", "light", "sky", "emission", "materials"), ("house", "cameras"),
+            "light", 7, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
             needs=("illuminance",),
         ),
-        Step("develop", 4, ("tone", "light"), ("light",), needs=("light",)),
+        Step("develop", 4, ("tone", "light", "sensor"), ("light",), needs=("light",)),
         Step("view", 2, ("histogram",), _VIEW_READS, needs=("truth",)),
     )
 }  # fmt: skip

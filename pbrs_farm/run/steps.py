@@ -28,7 +28,7 @@ from pbrs_farm.formats.illuminance_json import illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.marker import Marker, read_marker
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
-from pbrs_farm.formats.radiance_exr import radiance_exr, radiance_from_exr
+from pbrs_farm.formats.radiance_exr import radiance_exr
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.formats.view_json import view_description, view_json
 from pbrs_farm.read.source import SourceRef
@@ -37,7 +37,6 @@ from pbrs_farm.run.dressed_house import dressed, furnished
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.house_of_source import house_of_source
 from pbrs_farm.run.light_checkpoint import LightCheckpoint
-from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, required_source, run_unless_done
 from pbrs_farm.run.view_histogram import view_histogram
@@ -243,11 +242,15 @@ def _missed(cached: CachedHouse, camera: Camera) -> Bools:
 
 def _light(work: Work) -> StepOutput:
     """radiance.exr: both light groups (and each lamp) as linear images, with the denoiser's guides."""
+    from pbrs_farm.run.blurred_camera import blurred
     from pbrs_farm.transport.lamp_layers import layer_name
 
     # Render; the seed knows all that changes the picture and nothing else.
     cached = _cached_house(work)
     view, camera = _view_at_size(work, cached)
+    if work.recipe.blur.is_on:
+        views = cached.views(work.inputs["cameras"])
+        camera = blurred(camera, view, views, work.recipe.blur, cached.caster)
     digest = work.recipe.picture_digest(*plan.STEPS["light"].groups)
     seed = keys.seed(work.house_id, view.id, "light", digest)
     # Go on from what a killed render of this step has kept.
@@ -316,18 +319,14 @@ def _illuminance(work: Work) -> StepOutput:
 
 
 def _develop(work: Work) -> StepOutput:
-    """The PNGs of the light modes: groups summed, denoised, white-balanced, tone-mapped."""
-    from pbrs_farm.run.relight import linear_aovs
-    from pbrs_farm.transport.develop.mode_pictures import develop
+    """The PNGs of the light modes."""
+    from pbrs_farm.run.develop_step import develop_step
 
-    key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
-    aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
-    denoise = work.recipe.light.denoise
-    images = develop(aovs, work.recipe.tone, denoise=denoise)
-    # Write a PNG a mode; its exposure and white balance become facts.
-    credit = attribution(work.store, work.house_id)
-    files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}
-    return StepOutput(files, {"denoised": denoise} | {m: i.facts() for m, i in images.items()})
+    def walk() -> tuple[CachedHouse, Mapping[str, View]]:
+        cached = _cached_house(work)
+        return cached, cached.views(_marker_of_house(work, "cameras").digest)
+
+    return develop_step(work, walk)
 
 
 def _view(work: Work) -> StepOutput:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.camera import Camera, CameraBlur
 from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.picture_fields.lens_fields import LensFields
 from pbrs_farm.core.recipe import LightFields, recipe_from_name
@@ -13,7 +16,8 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
-from pbrs_farm.transport.scene_tables.sky import dark_sky
+from pbrs_farm.transport.scene_tables.sky import dark_sky, uniform_sky
+from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.known_rooms import furnace
 
 pytestmark = pytest.mark.skipif(
@@ -76,3 +80,41 @@ def test_one_kernel_traces_every_lens() -> None:
         traced.append({k["hash"] for k in kernels if k["operation_count"] > 1000})
     assert len(traced[0]) == 1
     assert all(kernels == traced[0] for kernels in traced)
+
+
+def edge_spread(blur: CameraBlur | None) -> float:
+    """Standard deviation in px of the edge between a black and a white wall 2 m before a camera."""
+    wall = [
+        rooms.quad([(x, -9, 0), (x + 9, -9, 0), (x + 9, 9, 0), (x, 9, 0)], k)
+        for k, x in enumerate((-9, 0))
+    ]
+    house = rooms.house(wall, [rooms.matte("black", 0.0), rooms.matte("white", 0.8)])
+    camera = replace(rooms.camera((0, 0, 2), (0, 0, 0), 96, 16, 0.6), blur=blur)
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
+    fields = FIELDS.model_copy(update={"spp": 256})
+    albedo = scene.render(camera, "0_0", fields, 1).albedo[..., 0].mean(0)
+    # The slope of the profile is the spread's own shape.
+    slope, place = np.abs(np.diff(albedo)), np.arange(95)
+    slope[slope < 0.02 * slope.max()] = 0
+    middle = (slope * place).sum() / slope.sum()
+    return float(np.sqrt((slope * (place - middle) ** 2).sum() / slope.sum()))
+
+
+FOCAL_PX = 48 / math.tan(0.3)
+
+
+def test_what_is_out_of_focus_spreads_by_the_circle_of_confusion() -> None:
+    sharp = edge_spread(CameraBlur(aperture_radius_m=0.03, focus_m=2.0))
+    assert sharp < 0.6
+    blurred = edge_spread(CameraBlur(aperture_radius_m=0.03, focus_m=1.0))
+    # A disk's projection has a quarter of its diameter as deviation.
+    diameter = FOCAL_PX * 0.06 * abs(1 / 2.0 - 1 / 1.0)
+    assert blurred == pytest.approx(diameter / 4, rel=0.12)
+
+
+def test_a_moving_camera_spreads_an_edge_by_the_way_it_goes() -> None:
+    across = edge_spread(CameraBlur(velocity_m=(0.1, 0.0, 0.0)))
+    assert across == pytest.approx(FOCAL_PX * 0.1 / 2 / math.sqrt(12), rel=0.12)
+    turned = edge_spread(CameraBlur(turn_rad=(0.0, 0.06, 0.0)))
+    assert turned == pytest.approx(FOCAL_PX * 0.06 / math.sqrt(12), rel=0.12)
+    assert edge_spread(CameraBlur(velocity_m=(0.0, 0.1, 0.0))) < 0.6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -10,7 +11,13 @@ import numpy as np
 from pbrs_farm.core.arrays import F32, RadianceImage, Srgb8Image, UnitVectors
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group
-from pbrs_farm.core.recipe import ToneFields
+from pbrs_farm.core.recipe import SensorFields, ToneFields
+from pbrs_farm.transport.develop.camera_sensor import (
+    Exposure,
+    chosen_exposure,
+    lagged_exposure,
+    sensed,
+)
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
 from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
 
@@ -43,10 +50,30 @@ class ToneMappedImage:
     rgb_srgb8: Srgb8Image
     gains: F32  # (3,) factors of the white balance
     exposure: float  # factor before the tone curve
+    taken: Exposure | None = None  # by a sensor
 
     def facts(self) -> dict[str, Any]:
         """What view.json says of the image."""
-        return {"gains": [round(float(g), 6) for g in self.gains], "exposure": self.exposure}
+        facts = {"gains": [round(float(g), 6) for g in self.gains], "exposure": self.exposure}
+        return facts | (self.taken.facts() if self.taken else {})
+
+
+@dataclass(frozen=True, slots=True)
+class SensorShot:
+    """A sensor, its noise's seed, and the exposures that it followed until now."""
+
+    fields: SensorFields
+    seed: int
+    before: tuple[
+        Mapping[str, float], ...
+    ] = ()  # mode -> wanted factor, of earlier frames in order
+    times_s: tuple[float, ...] = ()  # of those frames; this one's is 0
+
+    def exposure(self, mode: str, wanted: float) -> Exposure:
+        """What it takes a mode's picture with, whose own wanted factor is given."""
+        path = [frame[mode] for frame in self.before]
+        lagged = lagged_exposure([*path, wanted], [*self.times_s, 0.0], self.fields.lag_s)
+        return chosen_exposure(lagged, self.fields)
 
 
 def develop(
@@ -56,11 +83,13 @@ def develop(
     denoise: bool,
     indoor: Factor = 1.0,
     outdoor: Factor = 1.0,
+    shot: SensorShot | None = None,
 ) -> dict[str, ToneMappedImage]:
     """Mode name -> image of every mode that is a sum of light groups.
 
     Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors of
     all, or of R, G and B; they scale what is denoised, so that every picture is linear in them.
+    shot: the sensor that takes the pictures, None for a perfect one.
     """
     clean = denoised(aovs) if denoise else aovs
     groups = {
@@ -74,9 +103,20 @@ def develop(
             total = sum((groups[name] for name in names), np.zeros_like(aovs.outdoor))
             gains = white_balance(total, aovs.albedo, fields.white_balance)
             exposure = exposure_of(total * gains, fields)
+            if shot is not None:
+                taken = shot.exposure(mode.value, exposure)
+                rgb = sensed(total, gains, taken, shot.fields, seed=shot.seed)
+                images[mode.value] = ToneMappedImage(rgb, gains, taken.factor, taken)
+                continue
             rgb = tone(total * gains, fields, exposure=exposure)
             images[mode.value] = ToneMappedImage(rgb, gains, exposure)
     return images
+
+
+def wanted_exposures(aovs: LinearAovs, fields: ToneFields) -> dict[str, float]:
+    """Mode -> the factor that a picture of these would be exposed by."""
+    images = develop(aovs, fields, denoise=False)
+    return {mode: image.exposure for mode, image in images.items()}
 
 
 def denoised(aovs: LinearAovs) -> LinearAovs:

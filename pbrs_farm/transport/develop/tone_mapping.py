@@ -34,7 +34,7 @@ def tone(
         linear = _reinhard(rgb, fields.key, exposure)
     else:
         factor = exposure_of(radiance, fields) if exposure is None else exposure
-        linear = _rolled_off(rgb * factor)
+        linear = rolled_off(rgb * factor)
     return np.round(np.clip(srgb_from_linear(linear), 0, 1) * 255).astype(np.uint8)
 
 
@@ -70,7 +70,7 @@ def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
     return np.asarray(rgb * ratio[..., None])
 
 
-def _rolled_off(rgb: F64) -> F64:
+def rolled_off(rgb: F64) -> F64:
     """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at _WHITE.
 
     It maps the largest component and keeps the hue; colours far beyond white fade to white.

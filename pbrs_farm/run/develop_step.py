@@ -1,0 +1,84 @@
+"""The step develop: stored radiance to the pictures of the light modes. Effects: reads the store."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import View
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.formats.layer_file import layer_bytes
+from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
+from pbrs_farm.formats.radiance_exr import radiance_from_exr
+from pbrs_farm.run.house_cache import CachedHouse
+from pbrs_farm.run.output_root import attribution
+from pbrs_farm.run.relight import linear_aovs
+from pbrs_farm.run.step_cache import StepOutput, Work
+from pbrs_farm.transport.develop.mode_pictures import (
+    LinearAovs,
+    SensorShot,
+    develop,
+    wanted_exposures,
+)
+
+Walk = Callable[[], tuple[CachedHouse, Mapping[str, View]]]
+
+_LAGS: Final = 4.0  # of what came earlier than so many lags less than 2 % is left
+_GLANCE_PX: Final = (32, 24)  # of the small pictures that tell how bright earlier frames are
+_GLANCE_SPP: Final = 16
+
+
+def develop_step(work: Work, walk: Walk) -> StepOutput:
+    """The PNGs of the light modes: groups summed, denoised, white-balanced, tone-mapped.
+
+    Through the recipe's sensor where it is on. walk: the house and its views by id, asked for only
+    where earlier frames decide the exposure.
+    """
+    key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
+    aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
+    denoise = work.recipe.light.denoise
+    shot = _sensor_shot(work, walk)
+    images = develop(aovs, work.recipe.tone, denoise=denoise, shot=shot)
+    # Write a PNG a mode; its exposure and white balance become facts.
+    credit = attribution(work.store, work.house_id)
+    files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}
+    return StepOutput(files, {"denoised": denoise} | {m: i.facts() for m, i in images.items()})
+
+
+def _sensor_shot(work: Work, walk: Walk) -> SensorShot | None:
+    fields = work.recipe.sensor
+    if not fields.is_on:
+        return None
+    seed = keys.seed(work.house_id, work.view_id or "", "sensor", work.recipe.digest("sensor"))
+    if fields.lag_s == 0:
+        return SensorShot(fields, seed)
+    house, views = walk()
+    view = views[work.view_id or ""]
+    if view.time_s is None:
+        return SensorShot(fields, seed)
+    # Glance at the frames of the same eye that are recent enough to count.
+    earlier = [
+        v
+        for v in views.values()
+        if v.time_s is not None and bool(v.left_id) == bool(view.left_id)
+        and 0 < view.time_s - v.time_s <= _LAGS * fields.lag_s
+    ]  # fmt: skip
+    earlier.sort(key=lambda v: v.time_s or 0.0)
+    wanted = [wanted_exposures(_glance(work, house, v), work.recipe.tone) for v in earlier]
+    times = [v.time_s - view.time_s for v in earlier if v.time_s is not None]
+    return SensorShot(fields, seed, tuple(wanted), tuple(times))
+
+
+def _glance(work: Work, house: CachedHouse, view: View) -> LinearAovs:
+    """A small picture of a frame, the same whether its own light is rendered yet or not."""
+    fields = work.recipe.light.model_copy(
+        update={
+            "integrator": "path", "spp": _GLANCE_SPP, "noise": 0.0, "time_budget_s": 0.0,
+            "groups": "two",
+        }
+    )  # fmt: skip
+    seed = keys.seed(work.house_id, view.id, "glance", work.recipe.seed)
+    camera = view.camera.with_size(*_GLANCE_PX)
+    light = house.light_scene.render(camera, view.room_id, fields, seed)
+    return LinearAovs(light.outdoor, light.indoor, light.albedo, light.normal)

@@ -1,0 +1,64 @@
+"""Blur moves with a walk's frames, else as the recipe says; focus is on what the middle shows."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.recipe import BlurFields, recipe_from_name
+from pbrs_farm.run.blurred_camera import blurred
+
+
+def frame(number: int | None, x: float, yaw: float = 0.0) -> View:
+    pose = np.eye(4)
+    pose[:3, :3], pose[0, 3] = rotation_y(yaw), x
+    camera = Camera(Intrinsics.from_hfov(8, 6), pose)
+    return View(str(number), "r", 0, camera, frame=number, time_s=(number or 0) * 0.1)
+
+
+CASTER: Any = SimpleNamespace(first_hit=lambda o, d: (np.array([3.5]), np.array([0])))
+
+
+def test_a_frame_moves_as_between_its_neighbours() -> None:
+    views = {v.id: v for v in (frame(0, 0.0), frame(1, 0.1, 0.05), frame(2, 0.2, 0.1))}
+    view = views["1"]
+    blur = blurred(view.camera, view, views, BlurFields(shutter_s=0.02), CASTER).blur
+    assert blur is not None
+    # 1 m/s and half a radian a second, for a fiftieth of a second.
+    assert np.allclose(blur.velocity_m, (0.02, 0, 0))
+    assert np.allclose(blur.turn_rad, (0, 0.01, 0))
+
+
+def test_a_single_view_moves_as_the_recipe_says_in_its_own_axes() -> None:
+    view = frame(None, 0.0, np.pi / 2)
+    fields = BlurFields(shutter_s=0.1, right_mps=1.0, pan_dps=90.0)
+    blur = blurred(view.camera, view, {}, fields, CASTER).blur
+    assert blur is not None
+    assert np.allclose(blur.velocity_m, (0, 0, -0.1))
+    assert np.allclose(blur.turn_rad, (0, -np.pi / 20, 0))
+
+
+def test_focus_is_on_what_the_middle_shows() -> None:
+    view = frame(None, 0.0)
+    blur = blurred(view.camera, view, {}, BlurFields(aperture_mm=20), CASTER).blur
+    assert blur is not None
+    assert (blur.aperture_radius_m, blur.focus_m) == (0.01, 3.5)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"blur.aperture_mm": "5", "light.integrator": "metropolis"},
+        {"blur.aperture_mm": "5", "lens.preset": "tum_vi",
+         "image.width_px": "512", "image.height_px": "512"},
+    ],
+)  # fmt: skip
+def test_blur_that_cannot_be_is_refused(settings: dict[str, str]) -> None:
+    with pytest.raises(BadRecipe, match="blur"):
+        recipe_from_name("fast", settings)
