@@ -1,6 +1,6 @@
 """How many views a core reads in a second: from files at 640x480, from shards at 320x240.
 
-Effects: renders four views of the built-in home into a temporary folder, or reads a root that is
+Effects: renders four views of the built-in home into out/study/loading, or reads a root that is
 named, and writes out/bench/loading.json. `python -m benchmarks.study.loading [ROOT]`.
 """
 
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pbrs_farm
 from benchmarks.figures import write_report
+from benchmarks.study.rendered import FOLDER
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.reading.view_sample import Request
@@ -40,7 +41,7 @@ def main() -> None:
 def loading_figures(root: Path | None = None) -> dict[str, float]:
     """The figures of UNITS; root: rendered at 640x480 in mlt_il_ol, None to render one."""
     with tempfile.TemporaryDirectory() as folder:
-        views = pbrs_farm.open(root or _rendered(Path(folder) / "root"))
+        views = pbrs_farm.open(root or _rendered(FOLDER / "loading"))
         figures = {"study.loader_views_s": _rate(views)}
         for colour, name in (("png", ""), ("jpeg", "_jpeg")):
             out = Path(folder) / colour
@@ -52,8 +53,11 @@ def loading_figures(root: Path | None = None) -> dict[str, float]:
 
 def _rendered(root: Path) -> Path:
     words = ["run", "builtin", "--out", str(root), "--recipe", "preview", "--size", "640x480"]
-    words += ["--views", "4", "--modes", MODE]
-    subprocess.run([sys.executable, "-m", "pbrs_farm.cli", *words], check=True, capture_output=True)
+    words += ["--views", "4", "--modes", MODE, "--set", "light.spp=16"]
+    words = [sys.executable, "-m", "pbrs_farm.cli", *words]
+    done = subprocess.run(words, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{root}: {done.stderr[-500:]}")
     return root
 
 

@@ -25,7 +25,7 @@ ROOTS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "bare_fast": (HOMES, ("--set", "cameras.preset=paper", *_OF_HOMES)),
     "bare_photo": (HOMES, _OF_HOMES),
     "dressed": (HOMES, ("--dress", "1", *_OF_HOMES)),
-    "made": (("made:1..15",), ("--dress", "1", *_MODES, "--views", "20")),
+    "made": (("made:1..18",), ("--dress", "1", *_MODES, "--views", "20")),
 }
 """Name -> homes, and the words of `run` behind them: about 1,500 views in all."""
 
