@@ -53,7 +53,8 @@ def _compare(photographs: list[str], n_seeds: int) -> None:
     words = ["ablation", *rows, "--task", "normals", "--seeds", str(n_seeds), "--views", str(VIEWS)]
     for on in (f"bare={photo}", f"dressed={dressed}", *photographs):
         words += ["--on", on]
-    pbrs_farm.cli.main([*words, "--hold-out", *HELD_OUT, "--out", str(RUNS)])
+    if pbrs_farm.cli.main([*words, "--hold-out", *HELD_OUT, "--out", str(RUNS)]):
+        raise RuntimeError("the comparison failed; what is trained is kept")
 
 
 if __name__ == "__main__":
