@@ -1,8 +1,8 @@
 """Which candidates of a home become its views: good ones, no twins, together like photographs.
 
-No effects of its own. The views of a home maximise the sum of their scores less likeness x their
-number x the distance of their mean class shares to those of photographs (likeness.py): first sector
-by sector, the best first, then by exchange.
+No effects of its own. The views of a home maximise the sum of their scores, less what their framing
+costs, less likeness x their number x the distance of their mean class shares to those of photographs
+(likeness.py): first sector by sector, the best first, then by exchange.
 """
 
 from __future__ import annotations
@@ -32,11 +32,8 @@ _TRIES: Final = 12
 _ROUNDS: Final = 3
 """How often every view may be exchanged for another of its sector."""
 
-MOST_TILT_DEG, TILT_COST = 12.0, 0.05
-"""Beside likeness: the upper quartile of NYUv2's tilts, and what a degree beyond it costs.
-
-The steepest views show least wall; without a cost they would be held as nobody holds a camera.
-"""
+MOST_WORSE: Final = 0.25
+"""By how much of score less than its sector's best a view may be taken for its likeness."""
 
 _Name = tuple[str, int]
 """A candidate's room and number."""
@@ -103,6 +100,10 @@ class PhotoChoice:
             weak[0] = False
         scored.verdict[turn.open_to[weak]] = Verdict.WEAK
         turn.open_to = turn.open_to[~weak]
+        # Likeness chooses among the better ones.
+        if f.likeness > 0 and len(turn.open_to):
+            score = scored.score[turn.open_to]
+            turn.open_to = turn.open_to[score >= score[0] - MOST_WORSE]
 
     def _fill(self, turn: _Turn) -> None:
         """Take a sector's views from the candidate worth most down, leaving out twins."""
@@ -137,11 +138,9 @@ class PhotoChoice:
         score = scored.score[numbers]
         if self.fields.likeness == 0:
             return score
-        tilt_deg = np.degrees(np.arcsin(-scored.candidates.towards[numbers, 1]))
-        steep = TILT_COST * np.maximum(tilt_deg - MOST_TILT_DEG, 0.0)
         distance = share_distance(self._shown + scored.nyu13[numbers])
-        far = self.fields.likeness * (len(self._taken) + 1) * distance
-        return np.asarray(score - steep - far)
+        unlike = self.fields.likeness * (len(self._taken) + 1) * distance
+        return np.asarray(score - scored.framing[numbers] - unlike)
 
     def _take(self, turn: _Turn, number: int) -> None:
         turn.taken.append(number)

@@ -21,7 +21,13 @@ from pbrs_farm.sample.candidates import grid_candidates
 from pbrs_farm.sample.eye_probes import Counter, counted
 from pbrs_farm.sample.paper_rules import rejections, room_grid
 from pbrs_farm.sample.photo_choice import PhotoChoice
-from pbrs_farm.sample.photo_score import PhotoShares, item_roles, photo_score, photo_shares
+from pbrs_farm.sample.photo_score import (
+    PhotoShares,
+    framing_cost,
+    item_roles,
+    photo_score,
+    photo_shares,
+)
 from pbrs_farm.sample.rejection import REJECTIONS, Verdict
 from pbrs_farm.sample.room_candidates import RoomCandidates
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE, DepthOf
@@ -57,9 +63,10 @@ class PhotoSampler:
         score[eligible] = np.where(
             verdict[eligible] == Verdict.LOWER_SCORE, photo_score(seen), -np.inf
         )
-        nyu13 = np.zeros((len(candidates), seen.nyu13.shape[1]))
-        nyu13[eligible] = seen.nyu13
-        return RoomCandidates(room, candidates, verdict, score, nyu13)
+        nyu13, framing = np.zeros((len(score), seen.nyu13.shape[1])), np.zeros(len(score))
+        tilt_deg = np.degrees(np.arcsin(-candidates.towards[eligible, 1]))
+        nyu13[eligible], framing[eligible] = seen.nyu13, framing_cost(seen, tilt_deg)
+        return RoomCandidates(room, candidates, verdict, score, nyu13, framing)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
         """(room id, sector) -> numbers of the chosen candidates; writes their verdicts."""

@@ -32,6 +32,13 @@ MOST_OPENING, OPENING_COST = 0.10, 1.5
 MOST_OF_ONE, MOST_OF_A_WALL = 0.30, 0.50
 # The median depth that costs nothing, and what a metre out of it costs.
 NEAR_M, FAR_M, NEAR_COST, FAR_COST = 1.6, 4.5, 0.5, 0.1
+# Beside likeness: the upper quartile of NYUv2's tilts and what a degree beyond it costs; what is
+# foreground, the share of it that costs nothing, and the rest; what a metre below NEAR_M costs;
+# doors and windows, which the score lets go up to MOST_OPENING.
+MOST_TILT_DEG, TILT_COST = 12.0, 0.05
+FOREGROUND_M, MOST_FOREGROUND, FOREGROUND_COST = 0.8, 0.1, 1.0
+CLOSE_COST: Final = 2.0
+FREE_OPENING, FRAMED_OPENING_COST = 0.06, 1.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +61,8 @@ class PhotoShares:
 
     largest: of the one largest piece of furniture. wall: of the largest wall. n_objects: pieces
     that cover the least share. n_classes: NYU13 classes seen. median_m: median planar depth.
-    nyu13: (N, 14) of each class, column 0 of what has none.
+    foreground: of what is nearer than FOREGROUND_M. nyu13: (N, 14) of each class, column 0 of what
+    has none.
     """
 
     furniture: F64
@@ -65,6 +73,7 @@ class PhotoShares:
     n_objects: I64
     n_classes: I64
     median_m: F64
+    foreground: F64
     nyu13: F64
 
 
@@ -106,6 +115,7 @@ def photo_shares(
         n_objects=(share[:, roles.furniture] >= least).sum(1),
         n_classes=(classes[:, 1:] >= LEAST_CLASS_SHARE).sum(1),
         median_m=median,
+        foreground=((depth_m > 0) & (depth_m < FOREGROUND_M)).mean(1),
         nyu13=classes,
     )
 
@@ -125,6 +135,19 @@ def photo_score(seen: PhotoShares) -> F64:
     score -= NEAR_COST * np.maximum(NEAR_M - seen.median_m, 0)
     score -= FAR_COST * np.maximum(seen.median_m - FAR_M, 0)
     return score
+
+
+def framing_cost(seen: PhotoShares, tilt_deg: F64) -> F64:
+    """(N,) what steep views, close ones, doors and a large foreground cost where likeness counts.
+
+    Such views show least of bare walls: without a cost likeness would prefer them. tilt_deg: (N,)
+    downwards.
+    """
+    cost = TILT_COST * np.maximum(tilt_deg - MOST_TILT_DEG, 0)
+    cost += CLOSE_COST * np.maximum(NEAR_M - seen.median_m, 0)
+    cost += FRAMED_OPENING_COST * np.maximum(seen.opening - FREE_OPENING, 0)
+    cost += FOREGROUND_COST * np.maximum(seen.foreground - MOST_FOREGROUND, 0)
+    return cost
 
 
 def _is_opening(item: Item) -> bool:

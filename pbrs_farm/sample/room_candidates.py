@@ -17,7 +17,8 @@ class RoomCandidates:
     """A room's candidates with the rule that rejected each, and what the others show.
 
     verdict: (N,) uint8 of Verdict. score: (N,) float64, -inf where a rule rejected it. nyu13:
-    (N, 14) shares of the picture of each class, 0 where it was not looked at.
+    (N, 14) shares of the picture of each class, framing: (N,) framing_cost of photo_score.py; both
+    0 where it was not looked at.
     """
 
     room: Room
@@ -25,6 +26,7 @@ class RoomCandidates:
     verdict: NDArray[np.uint8]
     score: F64
     nyu13: F64
+    framing: F64
 
     def ranked(self, sector: int) -> NDArray[np.intp]:
         """Numbers of a sector's candidates that no rule rejected, best first."""

@@ -15,7 +15,13 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.photo_sampler import PhotoSampler
-from pbrs_farm.sample.photo_score import PhotoShares, item_roles, photo_score, photo_shares
+from pbrs_farm.sample.photo_score import (
+    PhotoShares,
+    framing_cost,
+    item_roles,
+    photo_score,
+    photo_shares,
+)
 from pbrs_farm.sample.rejection import Verdict
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE, overlap, shared_part
 from tests.sample.sampled_rooms import box, furnished, room_house, shell
@@ -47,7 +53,7 @@ def shares(**changes: float) -> PhotoShares:
     """A good view of one room, but for what is changed."""
     plain = {
         "furniture": 0.4, "opening": 0.05, "largest": 0.2, "wall": 0.3, "floor": 0.1,
-        "n_objects": 5, "n_classes": 6, "median_m": 2.5,
+        "n_objects": 5, "n_classes": 6, "median_m": 2.5, "foreground": 0.05,
     }  # fmt: skip
     columns = {k: np.array([v]) for k, v in (plain | changes).items()}
     return PhotoShares(**columns, nyu13=np.zeros((1, 14)))
@@ -62,6 +68,17 @@ def shares(**changes: float) -> PhotoShares:
 )  # fmt: skip
 def test_a_view_is_worth_less(worse: dict[str, float]) -> None:
     assert photo_score(shares(**worse))[0] < photo_score(shares())[0]
+
+
+def test_steep_close_and_covered_views_cost_where_likeness_counts() -> None:
+    def cost(tilt_deg: float = 10.0, **changes: float) -> float:
+        return float(framing_cost(shares(**changes), np.array([tilt_deg]))[0])
+
+    assert cost() == 0
+    assert cost(tilt_deg=16.0) == pytest.approx(0.2)
+    assert cost(foreground=0.4) == pytest.approx(0.3)
+    assert cost(opening=0.16) == pytest.approx(0.15)
+    assert cost(median_m=1.4) == pytest.approx(0.4)
 
 
 def test_doors_curtains_and_built_in_parts_are_no_furniture() -> None:
@@ -82,6 +99,7 @@ def test_shares_are_those_of_the_pixels() -> None:
     assert (seen.n_objects[0], seen.n_classes[0], seen.median_m[0]) == (1, 1, 2.0)
     assert seen.nyu13[0, NYU13_NAMES.index("chair")] == 0.3
     assert seen.nyu13[0].sum() == pytest.approx(1)
+    assert photo_shares(counts, depth / 2, item_roles(house), 0.01).foreground[0] == 0.25
 
 
 def test_a_view_shares_all_with_itself_and_nothing_with_its_back() -> None:

@@ -12,7 +12,7 @@ from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.recipe import CameraFields, recipe_from_name
 from pbrs_farm.sample.candidates import Candidates
 from pbrs_farm.sample.likeness import NYUV2_SHARES, share_distance
-from pbrs_farm.sample.photo_choice import PhotoChoice
+from pbrs_farm.sample.photo_choice import MOST_WORSE, PhotoChoice
 from pbrs_farm.sample.rejection import Verdict
 from pbrs_farm.sample.room_candidates import RoomCandidates
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE
@@ -30,21 +30,19 @@ WALLS, LIKE_ALL = shows(wall=1.0), shows(**PHOTOGRAPH)
 
 
 def room(
-    rows: Sequence[tuple[int, float, list[float]]], name: str = "0_0", tilt_deg: float = 0.0
+    rows: Sequence[tuple[int, float, list[float]]], name: str = "0_0", framing: float = 0.0
 ) -> RoomCandidates:
     """A room of candidates (sector, score, shares), each 10 m from the next: no twins.
 
-    tilt_deg: of the first candidate; the others are level.
+    framing: what that of the first candidate costs.
     """
     n = len(rows)
-    towards = np.tile([0.0, 0.0, 1.0], (n, 1))
-    towards[0] = 0.0, -np.sin(np.radians(tilt_deg)), np.cos(np.radians(tilt_deg))
     eye = np.stack([10.0 * np.arange(n), np.full(n, 1.5), np.full(n, float(int(name[-1])))], 1)
     return RoomCandidates(
         room=room_house(shell(3, 3), 3, 3, id=name).rooms[0],
         candidates=Candidates(
             eye=eye,
-            towards=towards,
+            towards=np.tile([0.0, 0.0, 1.0], (n, 1)),
             sector=np.array([row[0] for row in rows], np.int32),
             cell=np.zeros((n, 2), np.int32),
             zoom=np.ones(n),
@@ -52,6 +50,7 @@ def room(
         verdict=np.full(n, Verdict.LOWER_SCORE, np.uint8),
         score=np.array([row[1] for row in rows]),
         nyu13=np.array([row[2] for row in rows]),
+        framing=framing * np.eye(n)[0],
     )
 
 
@@ -76,9 +75,9 @@ def test_without_likeness_the_best_score_is_chosen() -> None:
     assert scored.verdict.tolist() == [Verdict.WINNER, Verdict.LOWER_SCORE]
 
 
-def test_a_much_better_view_outweighs_likeness() -> None:
-    rows = [(0, 1.6, shows(**PHOTOGRAPH | {"wall": 0.4})), (0, 0.85, LIKE_ALL)]
-    assert chosen(room(rows), likeness=2.0) == {("0_0", 0): [0]}
+def test_a_much_better_view_is_taken_whatever_it_shows() -> None:
+    rows = [(0, 1.3, WALLS), (0, 1.3 - MOST_WORSE - 0.01, LIKE_ALL)]
+    assert chosen(room(rows), likeness=50.0) == {("0_0", 0): [0]}
 
 
 def test_views_make_up_for_one_another_across_rooms() -> None:
@@ -103,16 +102,16 @@ def test_every_room_has_a_view_however_unlike_photographs() -> None:
 
 
 def test_a_weak_view_is_not_taken_for_its_likeness() -> None:
-    scored = room([(0, 1.2, WALLS), (0, FIELDS.min_score - 0.01, LIKE_ALL)])
+    scored = room([(0, FIELDS.min_score, WALLS), (0, FIELDS.min_score - 0.01, LIKE_ALL)])
     assert chosen(scored, likeness=50.0) == {("0_0", 0): [0]}
     assert scored.verdict[1] == Verdict.WEAK
 
 
-def test_of_equal_views_the_one_held_as_people_hold_cameras_is_chosen() -> None:
+def test_a_badly_framed_view_is_not_taken_for_its_likeness() -> None:
     rows = [(0, 1.1, LIKE_ALL), (0, 1.0, LIKE_ALL)]
-    assert chosen(room(rows, tilt_deg=19.0), likeness=2.0)["0_0", 0] == [1]
-    assert chosen(room(rows, tilt_deg=12.0), likeness=2.0)["0_0", 0] == [0]
-    assert chosen(room(rows, tilt_deg=19.0), likeness=0.0)["0_0", 0] == [0]
+    assert chosen(room(rows, framing=0.3), likeness=2.0)["0_0", 0] == [1]
+    assert chosen(room(rows, framing=0.0), likeness=2.0)["0_0", 0] == [0]
+    assert chosen(room(rows, framing=0.3), likeness=0.0)["0_0", 0] == [0]
 
 
 def test_several_views_of_a_sector_are_chosen_together() -> None:
