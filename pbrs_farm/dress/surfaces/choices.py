@@ -109,9 +109,9 @@ def floor_of(
         return _carpet(rng, style)
     # Most dry rooms have one floor, laid at once.
     draw = rng.random()
-    if draw < 0.6:
+    if draw < 0.65:
         return home.dry_floors[0]
-    return home.dry_floors[1] if draw < 0.8 else _dry_floor(rng, style, kind)
+    return home.dry_floors[1] if draw < 0.92 else _dry_floor(rng, style, kind)
 
 
 def walls_of(

@@ -87,21 +87,21 @@ def tile_maps(
     grid = tile_grid(shape, size_m, laying)
     pixel_m = size_m[0] / shape[1]
     clouds = noise(rng, shape, slope=2.4, band=(2.0, 200.0))
-    # Colour each tile, then let clouds and the kiln's chance vary it.
+    # Colour each tile, then let clouds and the kiln's chance vary it; round the tiles' edges.
     if body is None:
-        picks = _picks(rng, grid, glaze)
-        colour = np.array(glaze.colours, np.float32)[picks]
+        colour = np.array(glaze.colours, np.float32)[_picks(rng, grid, glaze)]
     else:
-        colour = body
-    colour = colour * _brightness(rng, grid, glaze.variation)
-    colour *= (1.0 + np.float32(glaze.mottle) * clouds)[..., None]
-    # Sink the joints; round the tiles' edges.
-    joint = coverage(grid.edge_m, laying.joint_m / 2, pixel_m)
+        colour = body.copy()
     bevel = smoothstep(laying.joint_m / 2 + glaze.bevel_m, laying.joint_m / 2, grid.edge_m)
+    tone = _brightness(rng, grid, glaze.variation) * (1.0 + np.float32(glaze.mottle) * clouds)
+    colour *= (tone * (1.0 - 0.10 * bevel))[..., None]
+    # Fill the joints, which are a small part of the picture.
+    joint = coverage(grid.edge_m, laying.joint_m / 2, pixel_m)
     grain = noise(rng, shape, slope=0.8)
-    grout = np.array(glaze.grout, np.float32) * (1.0 + 0.035 * grain + 0.03 * clouds)[..., None]
-    colour = colour * (1.0 - 0.10 * bevel)[..., None]
-    colour += joint[..., None] * (grout * np.float32(0.93) - colour)
+    rows, columns = np.nonzero(joint)
+    shade = 0.93 * (1.0 + 0.035 * grain[rows, columns] + 0.03 * clouds[rows, columns])
+    part, grout = colour[rows, columns], shade[:, None] * np.array(glaze.grout, np.float32)
+    colour[rows, columns] = part + joint[rows, columns, None] * (grout - part)
     height = -0.0007 * bevel - 0.0006 * joint + 0.00002 * clouds + 0.00002 * joint * grain
     rough = glaze.roughness + joint * (0.85 - glaze.roughness) + 0.012 * clouds
     return surface_maps(colour, rough, height, size_m, glaze.gloss)
@@ -199,4 +199,4 @@ def _picks(rng: np.random.Generator, grid: TileGrid, glaze: Glaze) -> _INTS:
 
 def _brightness(rng: np.random.Generator, grid: TileGrid, variation: float) -> F32:
     by_tile = 1.0 + np.clip(rng.normal(0, variation, grid.n_tiles), -2 * variation, 2 * variation)
-    return np.asarray(by_tile.astype(np.float32)[grid.tile][..., None], np.float32)
+    return np.asarray(by_tile.astype(np.float32)[grid.tile], np.float32)

@@ -5,10 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 
 Shape2 = tuple[int, int]  # rows, columns
+
+_LEAST_GAIN = 2e-4  # of the strongest frequency's
 
 
 def noise(
@@ -25,22 +28,23 @@ def noise(
     longer features are along rows and along columns. band: cycles per texture that are let
     through, softly at the upper end.
     """
-    # Draw the half spectrum that a real picture has.
-    gain = _gain(shape, slope, stretch, band)
-    size = gain.shape
-    spectrum = np.empty(size, np.complex64)
-    spectrum.real = rng.standard_normal(size, np.float32)
-    spectrum.imag = rng.standard_normal(size, np.float32)
-    field = np.fft.irfft2(spectrum * gain, shape)
-    deviation = float(field.std())
-    return np.asarray(field / max(deviation, 1e-12), np.float32)
+    # Draw the half spectrum that a real picture has, where the band lets anything through.
+    rows, gain = _gain(shape, slope, stretch, band)
+    spectrum = np.zeros((shape[0], gain.shape[1]), np.complex64)
+    spectrum[rows] = rng.standard_normal(gain.shape, np.float32) * gain
+    spectrum.imag[rows] = rng.standard_normal(gain.shape, np.float32) * gain
+    # Columns that are nothing need no transform of their own: the second one fills them in.
+    field = np.fft.irfft(np.fft.ifft(spectrum, axis=0), shape[1], axis=1)
+    field *= np.float32(1 / max(float(field.std()), 1e-12))
+    return np.asarray(field, np.float32)
 
 
 @lru_cache(maxsize=32)
 def _gain(
     shape: Shape2, slope: float, stretch: tuple[float, float], band: tuple[float, float]
-) -> F32:
-    """(H, W / 2 + 1) by what each frequency of a spectrum is multiplied; read only."""
+) -> tuple[NDArray[np.intp], F32]:
+    """By what the frequencies of a spectrum are multiplied: numbers (R,) of its rows that are not
+    nothing, and (R, C) of their first columns, beyond which all is nothing; read only."""
     rows, columns = shape
     fy = np.fft.fftfreq(rows, 1.0 / rows).astype(np.float32)[:, None] * np.float32(stretch[0])
     fx = np.arange(columns // 2 + 1, dtype=np.float32)[None] * np.float32(stretch[1])
@@ -51,9 +55,12 @@ def _gain(
     if band[1] < max(shape):
         gain *= np.exp(-k2 / np.float32(band[1] ** 2))
     gain[0, 0] = 0.0
-    found: F32 = gain.astype(np.float32)
+    # Leave out what adds nothing that eight bits show.
+    some = gain > _LEAST_GAIN * gain.max()
+    used, n_columns = np.flatnonzero(some.any(1)), int(np.flatnonzero(some.any(0))[-1]) + 1
+    found: F32 = gain[used, :n_columns].astype(np.float32)
     found.flags.writeable = False
-    return found
+    return used, found
 
 
 def blurred(field: F32, sigma_px: float) -> F32:
@@ -89,4 +96,11 @@ def coverage(distance_m: F32, half_width_m: float, pixel_m: float) -> F32:
 def sampled(field: F32, rows: np.ndarray, columns: np.ndarray) -> F32:
     """field at integer pixels, wrapped at its edges."""
     h, w = field.shape
-    return np.asarray(field[rows % h, columns % w], np.float32)
+    # One number a pixel, and a mask in place of the remainder where a side is a power of two.
+    at = _wrapped(rows, h) * np.int32(w) + _wrapped(columns, w)
+    return np.asarray(field.reshape(-1)[at], np.float32)
+
+
+def _wrapped(numbers: np.ndarray, size: int) -> np.ndarray:
+    small = numbers.astype(np.int32)
+    return small & np.int32(size - 1) if size & (size - 1) == 0 else small % np.int32(size)

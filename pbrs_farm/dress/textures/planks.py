@@ -134,8 +134,8 @@ def plank_maps(
     sheet = wood_sheet(rng, wood, pixel_m=pixel_m) if sheet is None else sheet
     n = layout.n_planks
     # Cut each plank from a place of its own, one half of them turned round.
-    rows = layout.across * rng.choice([-1, 1], n)[layout.plank] + rng.integers(0, sheet.shape[0], n)[layout.plank]  # fmt: skip
-    columns = layout.along * rng.choice([-1, 1], n)[layout.plank] + rng.integers(0, sheet.shape[1], n)[layout.plank]  # fmt: skip
+    rows = _placed(rng, layout.across, layout.plank, n, sheet.shape[0])
+    columns = _placed(rng, layout.along, layout.plank, n, sheet.shape[1])
     tone = sampled(sheet.tone, rows, columns)
     # Give each plank a brightness and a warmth of its own.
     light, dark = _stained(wood, darkness)
@@ -157,6 +157,14 @@ def plank_maps(
     smudge = noise(rng, (rough.shape[0], rough.shape[1]), slope=2.5)
     rough = rough + 0.015 * np.clip(smudge, -2, 2)
     return surface_maps(colour, rough, height, size_m, look.gloss)
+
+
+def _placed(
+    rng: np.random.Generator, pixels: _INTS, plank: _INTS, n: int, most: int
+) -> NDArray[np.int32]:
+    # Pixels of each plank from a start of its own, forwards or backwards.
+    turn, start = rng.choice([-1, 1], n).astype(np.int32), rng.integers(0, most, n, np.int32)
+    return np.asarray(pixels.astype(np.int32) * turn[plank] + start[plank], np.int32)
 
 
 def grain_maps(
