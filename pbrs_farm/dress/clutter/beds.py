@@ -67,7 +67,7 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         made = cushion(rng, placing.style)
         at = float(rng.uniform(0.4, 0.6))
         n += lay_down(placing, scene, index, made, *_place(bed, at, 0.75, made), bed.level)
-    if rng.random() < 0.4 * placing.share:
+    if rng.random() < 0.65 * placing.share:
         # A folded blanket across the foot.
         made = folded_blanket(rng, placing.style)
         at = float(rng.uniform(0.35, 0.65))

@@ -29,6 +29,7 @@ from pbrs_farm.dress.parts.part_kinds import (
     is_dark,
     is_furniture,
     is_lacquered,
+    is_loud,
     is_upholstered,
     is_vivid,
     is_white,
@@ -215,7 +216,7 @@ def _lacquer(
     has_sheen = material.specular != (0.0, 0.0, 0.0) and material.shininess > 1
     own = material.diffuse
     # Screen colours are mixed down to those that paint has.
-    if is_vivid(own):
+    if is_vivid(own) or is_loud(own):
         hue, saturation, value = colorsys.rgb_to_hsv(*own)
         own = colorsys.hsv_to_rgb(hue, min(saturation, _MAX_SATURATION), min(value, _MAX_VALUE))
     if has_sheen and own == material.diffuse and max(own) > 0.1:

@@ -22,7 +22,7 @@ from pbrs_farm.dress.walls.hung_things import canvas, frame_material, framed, jp
 from pbrs_farm.dress.walls.prints import print_pixels
 from pbrs_farm.images import decode_photo
 
-MOST_PICTURES = 6  # in a room
+MOST_PICTURES = 7  # in a room
 _MOST_PRINTS = 24  # drawn for a home; further pictures show one of them again
 _EYE_M = 1.55  # height of a picture's middle above the floor
 _CEILING_M = 0.12  # kept free below the ceiling
@@ -30,7 +30,7 @@ _APART_M = 0.25  # between one group of pictures and the next
 
 # How many groups of pictures a room gets, by its use.
 _GROUPS = {
-    RoomKind.LIVING: (2, 3), RoomKind.BEDROOM: (1, 2), RoomKind.DINING: (1, 2),
+    RoomKind.LIVING: (2, 4), RoomKind.BEDROOM: (1, 3), RoomKind.DINING: (1, 2),
     RoomKind.HALL: (1, 3), RoomKind.OFFICE: (1, 2), RoomKind.OTHER: (1, 2),
     RoomKind.KITCHEN: (0, 2), RoomKind.BATHROOM: (0, 1),
 }  # fmt: skip

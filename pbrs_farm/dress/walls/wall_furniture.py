@@ -20,7 +20,7 @@ from pbrs_farm.dress.walls.kitchen_things import Fronts, open_box, wall_cupboard
 
 # How many things with shelves a room's walls get, from and to.
 _SHELVES: Final = {
-    RoomKind.LIVING: (1, 3), RoomKind.BEDROOM: (1, 3), RoomKind.OFFICE: (2, 4),
+    RoomKind.LIVING: (1, 3), RoomKind.BEDROOM: (1, 2), RoomKind.OFFICE: (1, 3),
     RoomKind.KITCHEN: (1, 2), RoomKind.DINING: (0, 2), RoomKind.HALL: (0, 2),
     RoomKind.BATHROOM: (1, 2), RoomKind.STORE: (1, 3), RoomKind.OTHER: (0, 2),
 }  # fmt: skip
