@@ -57,7 +57,7 @@ class LightScene:
         if not variant.startswith("scalar"):
             from pbrs_farm.transport.kernels.device_scene import DeviceScene
 
-            self.device_scene = DeviceScene(tables)
+            self.device_scene = DeviceScene(tables, one_scene=variant.startswith("cuda"))
 
     @staticmethod
     def load(

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from pbrs_farm.raycast.tracer import scene_from_mesh
 from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance
@@ -61,13 +62,24 @@ class SurfaceInteraction(NamedTuple):
 class DeviceScene:
     """The geometry and materials of a house on the device: Mitsuba scenes and buffers."""
 
-    def __init__(self, tables: SceneTables) -> None:
+    def __init__(self, tables: SceneTables, *, one_scene: bool = False) -> None:
+        """one_scene: all rays go through one Mitsuba scene, for OptiX, which takes one in a kernel.
+
+        It would leave out the rays of a second one, and with them the shadows, with a warning alone.
+        """
         self._all = scene_from_mesh(mi, tables.positions, tables.faces)
         transparent = tables.transparent
         self.has_transparent = bool(transparent.any())
         self._opaque = self._all
         self._transparent: Any = None
-        if self.has_transparent:
+        self._aims_again = False  # behind each transparent face, at where the shadow ray ends
+        if self.has_transparent and one_scene:
+            # Go through all faces one by one: an opaque one lets nothing through.
+            self._opaque, self._transparent = None, self._all
+            self._aims_again = True
+            faces = np.arange(len(tables.faces), dtype=np.uint32)
+            self._transparent_faces = device_array(mi.UInt32, faces)
+        elif self.has_transparent:
             # Ask the opaque faces first; go through the transparent ones one by one.
             self._transparent = scene_from_mesh(mi, tables.positions, tables.faces[transparent])
             self._transparent_faces = device_array(
@@ -100,24 +112,33 @@ class DeviceScene:
     def _through_transparent(self, o: Any, d: Any, distance: Any, clear: Any) -> Any:
         left = dr.select(clear, mi.Color3f(1), 0)
         here = mi.Point3f(o)
-        reach = mi.Float(distance)
+        reach, way = mi.Float(distance), mi.Vector3f(d)
+        end, is_finite = o + distance * d, distance < dr.inf
         go_on = mi.Bool(clear)
         n = mi.UInt32(0)
         while go_on:
             # Find the next transparent surface.
-            found = self._transparent.ray_intersect_preliminary(_ray(here, d, reach), False, go_on)
+            found = self._transparent.ray_intersect_preliminary(
+                _ray(here, way, reach), False, go_on
+            )
             met = go_on & found.is_valid()
             face = dr.gather(mi.UInt32, self._transparent_faces, found.prim_index, met)
-            si = self._interaction(face, found.prim_uv, d, met)
+            si = self._interaction(face, found.prim_uv, way, met)
             # Let through what glass does not reflect, all at a cut-out.
-            transmitted = 1 - thin_glass_reflectance(dr.dot(si.n, d))
+            transmitted = 1 - thin_glass_reflectance(dr.dot(si.n, way))
             through = dr.select(si.bsdf.kind == GLASS, si.bsdf.tau * transmitted, 0)
             through = dr.select(si.is_cutout, mi.Color3f(1), through)
             left = dr.select(met, left * through, left)
             # Go on behind it.
             beyond = offset_ray_origin(si.p, -si.ng)
-            reach = dr.select(met, reach - dr.dot(beyond - here, d), reach)
+            reach = dr.select(met, reach - dr.dot(beyond - here, way), reach)
             here = dr.select(met, beyond, here)
+            if dr.hint(self._aims_again, mode="scalar"):
+                # The step aside must not make the ray graze the small lamp it ends at.
+                to = end - here
+                aims = met & is_finite
+                reach = dr.select(aims, dr.norm(to), reach)
+                way = dr.select(aims, to / dr.maximum(reach, 1e-12), way)
             n += 1
             brightest: Any = dr.max(left)
             go_on = met & (brightest > 0) & (reach > 0) & (n < _MAX_TRANSPARENT)

@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# From a bare machine with an NVIDIA driver to a table of what it does here: every test marked gpu, then views
+# an hour, under ten minutes. `scripts/gpu_check.sh [WHEELS]`: a folder of wheels for machines without a network,
+# as `scripts/gpu_check.sh --wheels FOLDER` makes one where there is one. Writes out/bench/gpu.json.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+VENV=${VENV:-out/gpu-venv}
+PACKAGES=".[gl,transport] pytest hypothesis"
+
+if [ "${1:-}" = --wheels ]; then
+  mkdir -p "$2"
+  # shellcheck disable=SC2086
+  python3 -m pip wheel -q --wheel-dir "$2" $PACKAGES setuptools
+  du -sh "$2"
+  exit 0
+fi
+
+# The driver first: without it everything below would run on the CPU and say nothing.
+nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader || {
+  echo "gpu_check: no NVIDIA driver here (nvidia-smi fails)" >&2
+  exit 1
+}
+for library in libnvoptix.so.1 libEGL_nvidia.so.0; do
+  ldconfig -p | grep -q "$library" || echo "gpu_check: the driver lacks $library: light needs OptiX, OpenGL needs EGL" >&2
+done
+
+[ -x "$VENV/bin/python" ] || python3 -m venv "$VENV"
+if [ -n "${1:-}" ]; then
+  # shellcheck disable=SC2086
+  "$VENV/bin/pip" install -q --no-index --find-links "$1" $PACKAGES
+else
+  # shellcheck disable=SC2086
+  "$VENV/bin/pip" install -q $PACKAGES
+fi
+
+status=0
+timeout 300 "$VENV/bin/python" -m pytest -m gpu tests -rA || status=$?
+timeout 240 "$VENV/bin/python" -m benchmarks gpu || status=$?
+exit "$status"

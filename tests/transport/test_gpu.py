@@ -1,0 +1,114 @@
+"""The same light, labels and pictures on a GPU as on a CPU; `scripts/gpu_check.sh` runs those marked gpu."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import geometry_from_house
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import dark_sky
+from tests.builders import builtin_home
+from tests.transport import hard_rooms
+from tests.transport.recorded_blocks import FIELDS, N_RUNS, RECIPE, ROOMS, largest_z, measured
+
+needs_kernels = pytest.mark.skipif(
+    choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
+)
+OTHER_SEEDS = range(100, 100 + N_RUNS)
+MAX_LAUNCHES = 200
+
+
+@needs_kernels
+def test_one_scene_for_all_rays_makes_the_same_picture() -> None:
+    # What a GPU needs (OptiX traces one scene in a kernel), proved where it can be run.
+    from pbrs_farm.transport.kernels.device_scene import DeviceScene
+
+    house, camera = hard_rooms.covered_cup()
+    pictures = []
+    for one_scene in (False, True):
+        scene = LightScene.load(house, {}, RECIPE, dark_sky())
+        scene.device_scene = DeviceScene(scene.tables, one_scene=one_scene)
+        fields = FIELDS.model_copy(update={"spp": 16})
+        pictures.append(scene.render(camera.with_size(32, 24), "0_0", fields, 1).indoor)
+    # A shadow ray that goes through glass starts anew a little beside: a few samples may differ.
+    two, one = pictures
+    assert float(two.mean()) > 0
+    assert float(one.mean()) == pytest.approx(float(two.mean()), rel=1e-3)
+    assert np.isclose(one, two, rtol=1e-4, atol=1e-7).all(-1).mean() > 0.97
+
+
+@needs_kernels
+def test_a_view_is_a_bounded_number_of_launches() -> None:
+    import drjit as dr
+
+    house, camera = hard_rooms.glass_globe()
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        scene.render(camera.with_size(32, 24), "0_0", FIELDS.model_copy(update={"spp": 4}), 1)
+        kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+    assert 0 < len(kernels) <= MAX_LAUNCHES
+
+
+@needs_kernels
+def test_light_is_as_it_was_recorded() -> None:
+    # 16 blocks of each group, |z| < 5.
+    assert largest_z("cup", measured("cup", OTHER_SEEDS)) < 5
+
+
+@pytest.mark.gpu
+def test_the_gpu_is_what_is_used() -> None:
+    assert choose_variant() == "cuda_ad_rgb"
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("room", list(ROOMS))
+def test_path_on_the_gpu_has_the_light_of_the_cpu(room: str) -> None:
+    assert largest_z(room, measured(room, OTHER_SEEDS, variant="cuda_ad_rgb")) < 5
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("room", ["window", "cup"])
+def test_metropolis_on_the_gpu_has_the_light_of_the_cpu(room: str) -> None:
+    changes = {"integrator": "metropolis", "direct_spp": 64, "mutations_per_pixel": 256}
+    fields = FIELDS.model_copy(update=changes | {"chains": 4096})
+    assert largest_z(room, measured(room, OTHER_SEEDS, fields, variant="cuda_ad_rgb")) < 5
+
+
+@pytest.mark.gpu
+def test_labels_of_the_gpu_differ_from_those_of_the_cpu_in_no_more_than_edges() -> None:
+    from pbrs_farm.core.camera import Camera, Intrinsics
+    from pbrs_farm.raycast.caster import Caster
+
+    house = builtin_home()
+    stored = house.cameras[0]
+    camera = Camera.look(
+        Intrinsics.from_hfov(640, 480, stored.hfov_rad), stored.eye, stored.towards
+    )
+    geometry = geometry_from_house(house)
+    ours, theirs = (
+        Caster(geometry, variant=v).hit_record(camera) for v in ("cuda_ad_rgb", "scalar_rgb")
+    )
+    differs = ours.item != theirs.item
+    assert differs.mean() < 1e-4, f"{differs.sum()} of {differs.size} pixels"
+    same = ~differs & theirs.valid
+    np.testing.assert_allclose(ours.depth_z[same], theirs.depth_z[same], rtol=1e-3)
+
+
+@pytest.mark.gpu
+def test_a_preview_of_a_home_is_whole(tmp_path: Path) -> None:
+    from pbrs_farm.check import verify
+    from pbrs_farm.core.recipe import recipe_from_name
+    from pbrs_farm.run.local import Run, run_local
+    from pbrs_farm.run.plan import wanted
+
+    summary = run_local(
+        Run(["builtin"], str(tmp_path), recipe_from_name("preview"), wanted([], [], 2))
+    )
+    assert summary.failures == []
+    certificate = verify(tmp_path, sample=500)
+    assert certificate.is_clean, certificate.text()
