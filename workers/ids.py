@@ -66,6 +66,11 @@ def queue_of(stage: str, *, gpu: bool) -> str:
     return LIGHT_GPU if gpu and stage == LIGHT else stage
 
 
+def lane_of(stage: str, *, gpu: bool) -> str:
+    """The lease a stage's tasks hold, and the window they are sent in: light on a GPU has its own."""
+    return LIGHT_GPU if gpu and stage == LIGHT else stage
+
+
 def stages_of_queue(queue: str) -> tuple[str, ...]:
     """The stages whose tasks a queue carries."""
     return tuple(s for s in STAGES if queue in (queue_of(s, gpu=False), queue_of(s, gpu=True)))

@@ -22,8 +22,8 @@ from typing import Any, Final
 from pbrs_farm.core.errors import PbrsError
 from workers.config import FarmConfig, config_from_environment
 from workers.coordinator.progress_rates import Rates, mean_s
-from workers.coordinator.shares import Shares, n_ready
-from workers.ids import STAGES, queue_of, task_from_text
+from workers.coordinator.shares import Shares, is_in, n_ready, stage_of_lane
+from workers.ids import LEASES, STAGES, lane_of, queue_of, task_from_text
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import JobView, Ledger, LedgerUnavailable, WorkerRegistry
 from workers.ledger.worker_registry import Registry
@@ -137,37 +137,45 @@ class Coordinator:
             limited = []
             for view in rest:
                 may_send = {s: n + spare[s] for s, n in allowed[view.job_id].items()}
-                n_by_stage = self._send_of(view, may_send)
-                if n_by_stage is None:
+                n_by_lane = self._send_of(view, may_send)
+                if n_by_lane is None:
                     self.leading = False
                     return n_sent
-                n_sent += n_by_stage.total()
-                spare = {s: n - n_by_stage[s] for s, n in may_send.items()}
-                if any(n_by_stage[s] == n and n_ready(view, s) > n for s, n in may_send.items()):
+                n_sent += n_by_lane.total()
+                spare = {s: n - n_by_lane[s] for s, n in may_send.items()}
+                if any(n_by_lane[s] == n and n_ready(view, s) > n for s, n in may_send.items()):
                     limited.append(view)
             rest = limited if any(spare.values()) else []
         return n_sent
 
     def _send_of(self, view: JobView, may_send: dict[str, int]) -> Counter[str] | None:
-        """Stage -> tasks of one job that were sent, at most may_send; None: not leading."""
+        """Lane -> tasks of one job that were sent, at most may_send; None: not leading."""
+        gpu = view.fields.get("gpu") == "1"
         tasks = self._ledger.dispatch(
-            view.job_id, self._token, max_open=self._max_open(), room=may_send
+            view.job_id,
+            self._token,
+            max_open=self._max_open(),
+            room={stage: may_send[lane_of(stage, gpu=gpu)] for stage in STAGES},
         )
         if tasks is None:
             return None
         self._publish(view, tasks)
-        sent = Counter(task.rpartition("/")[2] for task in tasks)
-        for stage, n in sent.items():
-            self._shares.charge(stage, view.job_id, n)
+        sent = Counter(lane_of(task.rpartition("/")[2], gpu=gpu) for task in tasks)
+        for lane, n in sent.items():
+            self._shares.charge(lane, view.job_id, n)
         return sent
 
     def _room(self, views: list[JobView]) -> dict[str, int]:
-        """Stage -> messages that may be sent now, over all jobs."""
+        """Lane -> messages that may be sent now, over all jobs.
+
+        Light on a GPU has a window of its own: messages that no worker takes hold up no others.
+        """
         room = {}
-        for stage in STAGES:
+        for lane in LEASES:
+            stage, here = stage_of_lane(lane), [v for v in views if is_in(v, lane)]
             # What is queued or runs; the rest of the window may be filled.
-            in_flight = sum(v.counts.get(f"{stage}:{s}", 0) for v in views for s in "qr")
-            room[stage] = max(0, int(self._window(views, stage) - in_flight))
+            in_flight = sum(v.counts.get(f"{stage}:{s}", 0) for v in here for s in "qr")
+            room[lane] = max(0, int(self._window(here, stage) - in_flight))
         return room
 
     def _window(self, views: list[JobView], stage: str) -> int:

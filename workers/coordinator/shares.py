@@ -11,7 +11,7 @@ import heapq
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from workers.ids import GEOMETRY, JOB
+from workers.ids import GEOMETRY, JOB, LIGHT, LIGHT_GPU, lane_of
 from workers.job_priority import DEFAULT_PRIORITY
 from workers.ledger.task_ledger import STATES, JobView
 
@@ -27,9 +27,9 @@ class Shares:
         self._strides: dict[str, dict[str, int]] = {}
 
     def split(self, room: Mapping[str, int], views: Sequence[JobView]) -> dict[str, dict[str, int]]:
-        """Job -> stage -> how many of its tasks may be sent, together at most room[stage].
+        """Job -> lane -> how many of its tasks may be sent, together at most room[lane].
 
-        views: most urgent first. What no job has ready is left over. Charges nothing: `charge` does.
+        A lane is a stage, or light on a GPU. views: most urgent first. What no job has ready is left over. Charges nothing: `charge` does.
         """
         given = {view.job_id: dict.fromkeys(room, 0) for view in views}
         for stage, n_free in room.items():
@@ -76,10 +76,22 @@ def priority_of(view: JobView) -> int:
     return int(view.fields.get("priority", DEFAULT_PRIORITY))
 
 
-def n_ready(view: JobView, stage: str) -> int:
-    """Tasks of a stage that could be sent, those that wait for their time too."""
+def is_in(view: JobView, lane: str) -> bool:
+    """Whether the job's tasks go in the lane."""
+    gpu = view.fields.get("gpu") == "1"
+    return lane_of(stage_of_lane(lane), gpu=gpu) == lane
+
+
+def stage_of_lane(lane: str) -> str:
+    """The stage whose tasks go in the lane."""
+    return LIGHT if lane == LIGHT_GPU else lane
+
+
+def n_ready(view: JobView, lane: str) -> int:
+    """Tasks in a lane that could be sent, those that wait for their time too."""
+    stage = stage_of_lane(lane)
     # Of a job that stands still only its last merge goes on.
-    if view.state != "running" and stage != JOB:
+    if not is_in(view, lane) or (view.state != "running" and stage != JOB):
         return 0
     n = view.counts.get(f"{stage}:{STATES['READY']}", 0.0)
     # A house that is not admitted yet begins with its geometry.

@@ -59,6 +59,12 @@ def test_a_job_that_comes_late_owes_and_is_owed_nothing() -> None:
     assert sent(shares, [job("a", 5), job("b", 5)], 11) == {"a": 6, "b": 5}
 
 
+def test_light_on_a_gpu_has_a_room_of_its_own() -> None:
+    gpu = JobView("g", {"state": "running", "gpu": "1"}, {"light:w": 9}, {}, 0)
+    given = Shares().split({"light": 4, "light.gpu": 2}, [job("a", 5), gpu])
+    assert given == {"a": {"light": 4, "light.gpu": 0}, "g": {"light": 0, "light.gpu": 2}}
+
+
 def test_a_paused_job_gets_nothing() -> None:
     given = Shares().split({"light": 4}, [job("a", 0, state="paused"), job("b", 5)])
     assert (given["a"]["light"], given["b"]["light"]) == (0, 4)
