@@ -36,7 +36,13 @@ UNITS: Final = {
     "walks_homes": "homes tried",
     "speed_limit": "frames over the limit of speed or turn",
     "light_reuse": "CPU of frames 2.. over that of frame 1",
-    "lens_error_px": "px, largest against OpenCV",
+    "lens_error_px": "px, largest of the models against lens_judge",
+    **{
+        f"lens_error_px_{name}": "px, largest of 10,000 points"
+        for name in ("pinhole", "radtan", "radtan_barrel", "fisheye", "fisheye180", "equirect")
+    },
+    "lens_error_px_cubemap": "px, largest of 10,000 points",
+    "lens_judge": "what projects beside it; panoramas by their definition",
 }
 
 

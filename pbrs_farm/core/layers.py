@@ -127,6 +127,8 @@ LAYERS: Final[tuple[Layer, ...]] = (
     # Depth as other works encode or measure it.
     _optional("hha", "RGB", "uint8", "disparity, height in cm, angle with gravity (Gupta et al. 2014)"),
     _optional("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it"),
+    _optional("depth_sensor_tof", "Y", "uint16", "planar z in mm as a Kinect 2 (time of flight)"),
+    _optional("depth_sensor_stereo", "Y", "uint16", "planar z in mm as a stereo camera has it"),
     # Where surfaces lie in the next and the previous frame, and in the other picture of a pair.
     *_flow("forward", "next"),
     *_flow("backward", "previous"),

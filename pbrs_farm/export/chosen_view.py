@@ -11,8 +11,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER, LAYERS, Layer
+from pbrs_farm.core.lenses.lens import PINHOLE, lens_from_table
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
@@ -137,6 +139,21 @@ class ChosenView:
         if "layout" in facts:
             facts["layout"] = [_moved(row, x, y) for row in facts["layout"]]
         return facts
+
+
+def intrinsics_of(facts: dict[str, Any]) -> Intrinsics:
+    """Size, K and lens of a view's camera."""
+    (fx, _skew, cx), (_zero, fy, cy), _last = facts["K"]
+    lens = lens_from_table(facts["lens"]) if "lens" in facts else PINHOLE
+    return Intrinsics(facts["width_px"], facts["height_px"], fx, fy, cx, cy, lens)
+
+
+def require_lens(view: ChosenView, form: str, *models: str) -> None:
+    """BadInput for a view through a lens that the form has no words for; models: those it has."""
+    model = view.facts.get("lens", {}).get("model", "pinhole")
+    if model not in ("pinhole", *models):
+        what = f"lens.model {model}: this form knows {', '.join(('pinhole', *models))}"
+        raise BadInput(f"--to {form}", view.id, what, hint="another --to")
 
 
 def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:

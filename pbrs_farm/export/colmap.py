@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
 from pbrs_farm.export.sequences import pose_opencv, required_picture
 
 _STEP_PX: Final = 16  # between the pixels of a view that give points
@@ -48,9 +48,14 @@ def _write(file: Path, lines: Iterable[str]) -> None:
 
 
 def _camera(view: ChosenView) -> str:
-    k = np.array(view.facts["K"], np.float64)
-    size = f"{view.facts['width_px']} {view.facts['height_px']}"
-    return f"PINHOLE {size} {k[0, 0]:.9g} {k[1, 1]:.9g} {k[0, 2]:.9g} {k[1, 2]:.9g}"
+    require_lens(view, "colmap", "radtan", "fisheye")
+    i = intrinsics_of(view.facts)
+    # FULL_OPENCV has k1 k2 p1 p2 k3 and three more, which are 0.
+    model, more = {
+        "radtan": ("FULL_OPENCV", (0.0, 0.0, 0.0)), "fisheye": ("OPENCV_FISHEYE", ()),
+    }.get(i.lens.model, ("PINHOLE", ()))  # fmt: skip
+    numbers = (i.fx, i.fy, i.cx, i.cy, *i.lens.coefficients, *more)
+    return f"{model} {i.width_px} {i.height_px} " + " ".join(f"{v:.9g}" for v in numbers)
 
 
 def _pose(view: ChosenView) -> str:
@@ -68,11 +73,11 @@ def _points(view: ChosenView, picture: str) -> list[str]:
     rows, columns = (g.ravel() for g in grid)
     z = depth[rows, columns] / 1000
     rows, columns, z = rows[z > 0], columns[z > 0], z[z > 0]
-    # From pixel centres through K into the world.
-    pixels = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])
-    local = np.linalg.solve(np.array(view.facts["K"], np.float64), pixels) * z
+    # From pixel centres through the lens into the world.
+    pixels = np.stack([columns + 0.5, rows + 0.5], axis=1)
+    local = intrinsics_of(view.facts).directions(pixels) * z[:, None]
     pose = pose_opencv(view)
-    world = (pose[:3, :3] @ local).T + pose[:3, 3]
+    world = local @ pose[:3, :3].T + pose[:3, 3]
     colours = rgb[rows, columns]
     return [
         f"{x:.4f} {y:.4f} {z:.4f} {r} {g} {b}"

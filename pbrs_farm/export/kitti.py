@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
 from pbrs_farm.export.sequences import Frame, frames_by_house, required_picture
 from pbrs_farm.images import png_from_array
 
@@ -82,6 +82,7 @@ def kitti_flow(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArray[n
 
 def _calibration(frame: Frame) -> str:
     """P2 and P3: (3, 4) projections of both pictures in the left camera's frame."""
+    require_lens(frame.left, "kitti")
     k = np.array(frame.left.facts["K"], np.float64)
     lines = [_projection("P2", k, 0.0)]
     if frame.right is not None:

@@ -9,13 +9,21 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.core.lenses.lens import COEFFICIENTS
+from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
 from pbrs_farm.export.sequences import required_picture
 
 # z up, as nerfstudio has it  <-  y up.
 Z_UP_FROM_Y_UP: Final[F64] = np.array(
     [[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]], np.float64
 )
+
+
+_MODELS: Final = {
+    "pinhole": "PINHOLE", "radtan": "OPENCV", "fisheye": "OPENCV_FISHEYE",
+    "equirect": "EQUIRECTANGULAR",
+}  # fmt: skip
+"""What nerfstudio calls each lens model; a run has one."""
 
 
 def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> int:
@@ -33,7 +41,7 @@ def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> int
             frames.append(row)
             n_files += n
         transforms = {
-            "camera_model": "PINHOLE",
+            "camera_model": _MODELS[intrinsics_of(own[0].facts).lens.model],
             "orientation_override": "none",
             "depth_unit_scale_factor": 0.001,
             "applied_transform": Z_UP_FROM_Y_UP[:3].tolist(),
@@ -46,6 +54,7 @@ def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> int
 
 def _frame(view: ChosenView, folder: Path) -> tuple[dict[str, Any], int]:
     # Write the picture and, where it is exported, the depth.
+    require_lens(view, "nerfstudio", *_MODELS)
     picture, n_files = required_picture(view, "nerfstudio"), 1
     facts = view.facts
     pose = Z_UP_FROM_Y_UP @ np.array(facts["world_from_camera_opengl"], np.float64)
@@ -56,6 +65,9 @@ def _frame(view: ChosenView, folder: Path) -> tuple[dict[str, Any], int]:
         "w": facts["width_px"], "h": facts["height_px"],
         "fl_x": k[0, 0], "fl_y": k[1, 1], "cx": k[0, 2], "cy": k[1, 2],
     }  # fmt: skip
+    # Coefficients go by OpenCV's names.
+    lens = intrinsics_of(facts).lens
+    row |= dict(zip(COEFFICIENTS[lens.model], lens.coefficients, strict=True))
     files = {"images": view.data(picture)}
     if view.has("depth"):
         files["depth"] = view.data("depth")

@@ -12,8 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
 
 # Layer -> where the published data has it.
 FILES: Final = {
@@ -65,9 +64,7 @@ def _write(target: Path, data: bytes) -> None:
 
 def camera_line(view: ChosenView) -> str:
     """`vx vy vz  tx ty tz  ux uy uz  xf yf  value`: eye, towards, up, half angles in rad, score."""
-    if "lens" in view.facts:
-        what = f"lens.model {view.facts['lens']['model']}: room_camera.txt knows pin-holes only"
-        raise BadInput("--format released", view.id, what, hint="another --format")
+    require_lens(view, "released")
     pose = np.array(view.facts["world_from_camera_opengl"], np.float64)
     width, height = view.facts["width_px"], view.facts["height_px"]
     k = np.array(view.facts["K"], np.float64)

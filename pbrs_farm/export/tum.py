@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
 from pbrs_farm.export.sequences import frames_by_house, pose_opencv, required_picture, tum_row
 from pbrs_farm.images import png_from_array
 
@@ -31,6 +31,7 @@ def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> int:
             (out / house / name).mkdir(parents=True)
         rows: dict[str, list[str]] = {"rgb": [], "depth": [], "groundtruth": []}
         for view, time in timed:
+            require_lens(view, "tum", "radtan")
             name = f"{time:.6f}.png"
             picture = view.data(required_picture(view, "tum"))
             (out / house / "rgb" / name).write_bytes(picture)

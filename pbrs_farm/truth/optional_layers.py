@@ -19,6 +19,8 @@ from pbrs_farm.core.layers import LAYER
 from pbrs_farm.truth.albedo import albedo_png
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
 from pbrs_farm.truth.depth_sensor import sensor_depth
+from pbrs_farm.truth.depth_stereo import stereo_depth
+from pbrs_farm.truth.depth_time_of_flight import tof_depth
 from pbrs_farm.truth.hha import hha_png
 from pbrs_farm.truth.optical_flow import (
     Correspondence,
@@ -151,6 +153,8 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "boundary_crease": lambda s: s.boundaries[1],
     "hha": lambda s: hha_png(s.hit, s.camera),
     "depth_sensor": lambda s: sensor_depth(s.hit, s.camera, seed=s.seed),
+    "depth_sensor_tof": lambda s: tof_depth(s.hit, s.camera, seed=s.seed),
+    "depth_sensor_stereo": lambda s: stereo_depth(s.hit, s.camera, seed=s.seed),
     # Where the hits lie in other views.
     "flow_forward": lambda s: flow_exr(s.to_partners["next"]),
     "flow_forward_kitti": lambda s: flow_kitti(s.to_partners["next"]),
@@ -173,7 +177,7 @@ def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, ND
     without.
     """
     lens = inputs.camera.intrinsics.lens
-    for name in ("hha", "depth_sensor"):
+    for name in ("hha", "depth_sensor", "depth_sensor_tof", "depth_sensor_stereo"):
         if name in names and not lens.depth_is_planar:
             what = f"needs depth along the axis, which lens.model {lens.model} has not"
             raise BadInput("--layers", name, what, hint="lens.model pinhole or radtan")

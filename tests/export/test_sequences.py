@@ -2,13 +2,16 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.export.chosen_view import Choice, resized_layer
+from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens, resized_layer
+from pbrs_farm.export.colmap import _camera as colmap_camera
 from pbrs_farm.export.export_views import export
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.images import array_from_png
@@ -138,3 +141,17 @@ def test_flow_and_disparity_are_measured_in_the_pixels_of_the_new_size() -> None
         1,
     ]
     assert resized_layer("disparity", np.full((4, 8), 512, np.uint16), 4, 4)[0, 0] == 256
+
+
+def test_forms_name_the_lens_or_refuse_it() -> None:
+    facts = {"width_px": 640, "height_px": 480, "K": [[500, 0, 320], [0, 501, 240], [0, 0, 1]]}
+    radtan = {"model": "radtan", "k1": 0.1, "k2": 0.2, "p1": 0.3, "p2": 0.4, "k3": 0.5}
+    cube = {"model": "cubemap"}
+    bent, strip = (
+        cast(ChosenView, SimpleNamespace(id="a", facts=facts | {"lens": lens}))
+        for lens in (radtan, cube)
+    )
+    assert colmap_camera(bent) == "FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0 0"
+    for form, models in (("colmap", ("radtan", "fisheye")), ("kitti", ()), ("released", ())):
+        with pytest.raises(BadInput, match=r"lens\.model cubemap"):
+            require_lens(strip, form, *models)

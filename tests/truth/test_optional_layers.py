@@ -11,6 +11,8 @@ from pbrs_farm.core.house import House, Material, MaterialKind, geometry_from_ho
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.truth.depth_stereo import stereo_depth
+from pbrs_farm.truth.depth_time_of_flight import tof_depth
 from tests.truth.hits import camera, hit, house, square
 
 
@@ -273,3 +275,36 @@ def test_a_surface_without_texture_coordinates_is_flat_under_a_normal_map() -> N
     inputs = label_inputs_of(mapped, camera(), {"n": tilted_map(30)})
     layers = truth.optional_layers(("normal_shading",), inputs)
     np.testing.assert_allclose(decoded(layers["normal_shading"])[3, 4], [0, 0, 1], atol=1e-4)
+
+
+def test_a_time_of_flight_camera_has_less_noise_than_a_kinect_and_mixes_at_edges():
+    wall = hit(np.ones((60, 80)), 2.0)
+    errors = {
+        name: (layer(wall, camera(80, 60), seed=1) - 2000.0).std()
+        for name, layer in (("kinect", truth.sensor_depth), ("tof", tof_depth))
+    }
+    assert 1 < errors["tof"] < errors["kinect"]
+    # A near card on the left: the pixels beside its edge lie between the two.
+    depth_z = np.where(np.arange(80) < 40, 1.0, 3.0)[None, :].repeat(60, 0)
+    found = tof_depth(hit(np.ones((60, 80)), depth_z), camera(80, 60), seed=1)
+    assert ((found[:, 39:41] > 1050) & (found[:, 39:41] < 2950)).mean() > 0.9
+    assert ((found[:, 10:30] > 1050) & (found[:, 10:30] < 2950)).mean() == 0
+    assert not tof_depth(hit(np.ones((6, 8)), 6.0), camera(), seed=1).any()
+
+
+def test_a_stereo_cameras_noise_grows_with_the_square_of_distance_and_edges_have_a_shadow():
+    near, far = (
+        stereo_depth(hit(np.ones((60, 320)), z), camera(320, 60), seed=2)[:, 40:]
+        for z in (1.0, 3.0)
+    )
+    assert 5 < (far - 3000.0).std() / (near - 1000.0).std() < 13
+    assert near.all()
+    # What stands left of the near card's own left edge is hidden from the right camera.
+    depth_z = np.where((np.arange(320) >= 160) & (np.arange(320) < 200), 1.0, 3.0)
+    found = stereo_depth(
+        hit(np.ones((40, 320)), depth_z[None].repeat(40, 0)), camera(320, 40), seed=0
+    )
+    assert (found[:, 155:159] == 0).mean() > 0.7
+    assert found[:, 210:].all()
+    same = [stereo_depth(hit(np.ones((6, 8)), 2.0), camera(), seed=s) for s in (3, 3)]
+    assert (same[0] == same[1]).all()

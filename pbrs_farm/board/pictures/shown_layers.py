@@ -59,7 +59,7 @@ def shown_pixels(layer: str, data: bytes, place: str) -> Srgb8Image:
         return colours.instance_colours(stored)
     if layer in _MASKS:
         return colours.boundary_colours(stored)
-    if layer.endswith("depth") or layer == "depth_sensor":
+    if layer.endswith("depth") or layer.startswith("depth_sensor"):
         return colours.depth_colours(stored)
     if layer == "depth_z":
         return colours.depth_colours(np.rint(np.nan_to_num(stored) * 1000).astype(np.int64))
