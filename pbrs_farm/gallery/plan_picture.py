@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import product
 from typing import Final
 
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
-from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, PlanWall, Point, RoomType
+from pbrs_farm.generate.floor_plan import (
+    OpeningKind,
+    Plan,
+    PlanOpening,
+    PlanRoom,
+    PlanWall,
+    Point,
+    Rect,
+    RoomType,
+)
 from pbrs_farm.generate.furniture import PlacedPiece, Storey
 from pbrs_farm.generate.staircase import Stair
 
@@ -15,6 +25,7 @@ _MARGIN_M: Final = 0.6
 _PX_PER_M: Final = 60.0
 _LIVING, _SLEEPING, _COOKING, _WATER = "#f6eedd", "#efe6f2", "#fbe7d3", "#dcecf4"
 _PASSING, _KEEPING, _OUTSIDE = "#eeeeea", "#e6e6e0", "#e2efdd"
+_TEXT_M: Final = 0.3  # the height of letters
 _RAISED_M: Final = 1.2  # what hangs higher is drawn dashed
 
 
@@ -56,8 +67,8 @@ def _draw_storey(root: Element, storey: Storey, stair: Stair | None) -> None:
         element(root, "polygon", points=corners, fill="#888" if wall.height else "#333")
     for opening in plan.openings:
         _draw_opening(root, plan, opening)
-    for room in plan.rooms:
-        _label(root, room.name, room.area, room.polygon)
+    for number, room in enumerate(plan.rooms):
+        _label(root, room, [p for p in storey.pieces if p.room == number])
 
 
 def _draw_stairs(root: Element, stair: Stair) -> None:
@@ -154,13 +165,41 @@ def _into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> Point:
     return (nx, nz) if inside else (-nx, -nz)
 
 
-def _label(root: Element, name: str, area: float, polygon: Sequence[Point]) -> None:
-    xs, zs = [p[0] for p in polygon], [p[1] for p in polygon]
-    x, z = (min(xs) + max(xs)) / 2, (min(zs) + max(zs)) / 2
-    size = min(0.3, (max(xs) - min(xs)) / max(len(name), 4) * 1.5)
-    for line, text in enumerate((name, f"{area:.1f} m²")):
+def _label(root: Element, room: PlanRoom, pieces: Iterable[PlacedPiece]) -> None:
+    """A room's name and area, where they cover least of its furniture."""
+    lines = room.name, f"{room.area:.1f} m²"
+    x0, z0, x1, z1 = room.bounds
+    size = min(_TEXT_M, (x1 - x0) / max(len(room.name), 4) * 1.5)
+    half = 0.3 * size * max(len(text) for text in lines), 1.1 * size
+    grounds = [_around(piece) for piece in pieces if piece.elevation < _RAISED_M]
+
+    def cost(x: float, z: float) -> float:
+        box = x - half[0], z - half[1], x + half[0], z + half[1]
+        corners = [(box[k], box[m]) for k in (0, 2) for m in (1, 3)]
+        off_middle = abs(x - (x0 + x1) / 2) + abs(z - (z0 + z1) / 2)
+        covered = sum(_shared(box, ground) for ground in grounds)
+        return covered + 0.05 * off_middle + 2 * sum(not room.contains(c) for c in corners)
+
+    # Try places a quarter of a metre apart.
+    xs, zs = (
+        [(a + b) / 2 + k * 0.25 for k in range(-int((b - a) * 2), int((b - a) * 2) + 1)]
+        for a, b in ((x0, x1), (z0, z1))
+    )
+    x, z = min(product(xs, zs), key=lambda at: cost(*at))
+    for line, text in enumerate(lines):
         element(
             root, "text", text, x=f"{x:.2f}", y=f"{z + (line - 0.1) * size * 1.1:.2f}",
             font_size=f"{size:.2f}", text_anchor="middle", fill="#222",
-            stroke="#ffffff", stroke_width="0.05", paint_order="stroke",
+            stroke="#ffffff", stroke_width="0.08", stroke_linejoin="round", paint_order="stroke",
         )  # fmt: skip
+
+
+def _around(piece: PlacedPiece) -> Rect:
+    xs, zs = [p[0] for p in piece.corners], [p[1] for p in piece.corners]
+    return min(xs), min(zs), max(xs), max(zs)
+
+
+def _shared(a: Rect, b: Rect) -> float:
+    """Square metres that two rectangles share."""
+    width, depth = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+    return max(width, 0.0) * max(depth, 0.0)
