@@ -21,8 +21,18 @@ HELD_OUT = ("studio", "2bedroomapartment", "3bedroomhousewithattic")
 # The modes of Metropolis come from one trace, those of OpenGL cost a hundredth of it: all four.
 _MODES: Final = ("--modes", "mlt_il_ol", "opengl_dl", "mlt_ol", "opengl_il")
 _OF_HOMES: Final = (*_MODES, "--views", "45")
+# As `fast` and `preview` chose views before the preset `photo` was there (commit 69b80dd^).
+_OLD_CAMERAS: Final = {
+    "preset": "paper", "height_min_m": 1.5, "height_max_m": 1.6, "tilt_deg": 11, "tilt_sd_deg": 0,
+    "clearance_m": 0.1, "min_objects": 3, "max_item_fraction": 0.35, "max_wall_fraction": 0.55,
+    "max_opening_fraction": 1, "min_score": 0, "min_room_score": 0, "likeness": 0,
+    "hfov_rad": 1.1068, "hfov_spread": 0,
+}  # fmt: skip
+_OLD_WORDS: Final = tuple(
+    word for name, value in _OLD_CAMERAS.items() for word in ("--set", f"cameras.{name}={value}")
+)
 ROOTS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
-    "bare_fast": (HOMES, ("--set", "cameras.preset=paper", *_OF_HOMES)),
+    "bare_fast": (HOMES, (*_OLD_WORDS, *_OF_HOMES)),
     "bare_photo": (HOMES, _OF_HOMES),
     "dressed": (HOMES, ("--dress", "1", *_OF_HOMES)),
     "made": (("made:1..18",), ("--dress", "1", *_MODES, "--views", "20")),
