@@ -19,7 +19,9 @@ _FIELDS = "width_px=40 height_px=32 batch=2 steps=4 judge_every=2 threads=1 log_
 
 def test_two_processes_train_one_network(tmp_path: Path) -> None:
     fill(FolderStore(tmp_path / "root"), {"a-00000000": 2, "b-00000000": 2}, (40, 32))
-    words = "-m torch.distributed.run --standalone --nproc-per-node 2 -m pbrs_farm.cli train normals"
+    words = (
+        "-m torch.distributed.run --standalone --nproc-per-node 2 -m pbrs_farm.cli train normals"
+    )
     words += f" {tmp_path / 'root'} --hold-out b --out {tmp_path / 'run'}"
     line = [*words.split(), *(word for field in _FIELDS.split() for word in ("--set", field))]
     done = subprocess.run([sys.executable, *line], capture_output=True, text=True, timeout=300)
