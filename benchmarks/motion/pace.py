@@ -13,6 +13,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.source import resolve
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
 from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.pilot_views import pilot_of_view
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.run.steps import camera_seed, repaired_house
@@ -60,11 +61,13 @@ def _light_reuse() -> float:
     views = sample_walk(house, recipe.cameras, seed, geometry, Caster(geometry).first_hit).views
     sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
     scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
+    by_id = {view.id: view for view in views}
     cpu = []
     for view in views:
         camera = view.camera.with_size(recipe.image.width_px, recipe.image.height_px)
         began = time.process_time()
-        scene.render(camera, view.room_id, recipe.light, keys.seed(view.id))
+        pilot = pilot_of_view(view, by_id, camera, house.id, "")
+        scene.render(camera, view.room_id, recipe.light, keys.seed(view.id), pilot=pilot)
         cpu.append(time.process_time() - began)
     print("CPU of the frames' light:", [round(c, 2) for c in cpu], flush=True)
     return sum(cpu[1:]) / (len(cpu) - 1) / cpu[0]

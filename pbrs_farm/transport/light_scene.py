@@ -5,7 +5,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -38,6 +38,14 @@ _PILOT_SEED: Final = 0x5EED  # parts the pilot's random stream from the picture'
 _TRIAL_SEED: Final = 0x7A1A1  # and that of the trial of guided rays
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Pilot:
+    """A view whose pilot says how often each emitter is worth sampling."""
+
+    camera: Camera
+    seed: int  # of that view's light
+
+
 class LightScene:
     """The scene of one house under one sky.
 
@@ -53,6 +61,7 @@ class LightScene:
         self._portals = portals
         mitsuba(variant)
         self.device_scene: Any = None
+        self._piloted: tuple[Any, EmitterWeights] | None = None  # the last pilot and its weights
         self._emitters: Any = None  # built at the first view, then given each view's weights
         if not variant.startswith("scalar"):
             from pbrs_farm.transport.kernels.device_scene import DeviceScene
@@ -90,6 +99,8 @@ class LightScene:
         fields: LightFields,
         seed: int,
         checkpoint: RenderCheckpoint | None = None,
+        *,
+        pilot: Pilot | None = None,
     ) -> LightResult:
         """The radiance of both light groups in a camera's view, by the integrator of fields.
 
@@ -101,10 +112,13 @@ class LightScene:
         give equal bits on one machine (Metropolis: equal to 1e-5, it splats in parallel); with a
         time budget similar pictures. checkpoint: what an earlier render of equal arguments kept,
         and where this one keeps what it has; the picture is the same as without.
+        pilot: of another view, whose choice of emitters this one takes over; None = its own.
         Pixels without a ray are black. Raises MachineFailed for a lens or blur on a scalar variant,
         RenderFailed for blur by Metropolis.
         """
-        result = self._render(camera, room_id, fields, seed, checkpoint or NoCheckpoint())
+        # Emitters and their weights are those of the pilot's view; it is kept for the next one.
+        own = pilot or Pilot(camera, seed)
+        result = self._render(camera, room_id, fields, seed, checkpoint or NoCheckpoint(), own)
         return result if camera.blind is None else blackened(result, camera.blind)
 
     def _render(
@@ -114,13 +128,14 @@ class LightScene:
         fields: LightFields,
         seed: int,
         checkpoint: RenderCheckpoint,
+        pilot: Pilot,
     ) -> LightResult:
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
         mitsuba(self.variant)
         from pbrs_farm.transport.sample_passes import SampledView, path_sums
 
-        emitters, weights = self.emitters(camera, fields, seed)
+        emitters, weights = self._emitters_of_pilot(pilot, fields)
         view = SampledView(self.device_scene, emitters, camera, fields, seed)
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": self._weights_by_name(weights)}
         if fields.integrator == "metropolis":
@@ -236,6 +251,18 @@ class LightScene:
         guides = LightResult(black, black, np.ones_like(black), black, {}, 0, 0, {})
         facts = {"integrator": "mitsuba path", "seed": seed}
         return joined_result(None, guides, halves, 0, facts, spp=2 * half.spp)
+
+    def _emitters_of_pilot(self, pilot: Pilot, fields: LightFields) -> tuple[Any, EmitterWeights]:
+        """As emitters, by the pilot of a view; run again only when it is another one than last."""
+        camera = pilot.camera
+        key = pilot.seed, camera.intrinsics, camera.world_from_camera.tobytes(), fields
+        if self._piloted is None or self._piloted[0] != key:
+            emitters, weights = self.emitters(camera, fields, pilot.seed)
+            self._piloted = key, weights
+            return emitters, weights
+        weights = self._piloted[1]
+        portals = nearest_portals(self._portals, camera.eye)
+        return self._emitters_of_view(portals, weights), weights
 
     def emitters(
         self, camera: Camera, fields: LightFields, seed: int

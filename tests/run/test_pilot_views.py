@@ -1,0 +1,62 @@
+"""Frames of a walk take over the pilot of every tenth one: fewer pilots, and no order of rendering shows."""
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.recipe import RepairFields, recipe_from_name
+from pbrs_farm.repair import repair
+from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
+from pbrs_farm.run.pilot_views import pilot_of_view, pilot_view
+from pbrs_farm.sample.stereo_views import with_right_views
+from pbrs_farm.store import MemoryStore
+from pbrs_farm.transport.light_scene import LightScene
+from tests.builders import builtin_home
+
+
+def views() -> dict[str, View]:
+    def camera(k: int) -> Camera:
+        eye = np.array([2.5 + 0.03 * k, 1.5, 3.0])
+        return Camera.look(Intrinsics.from_hfov(24, 18), eye, np.array([-0.5, -0.2, -1.0]))
+
+    frames = [View(f"frame_{k:05d}", "0_0", 0, camera(k), "walk", frame=k) for k in range(12)]
+    return {view.id: view for view in with_right_views(frames, 0.065)}
+
+
+def test_ten_frames_have_one_pilot_left_and_right_apart() -> None:
+    every = views()
+    leads = {pilot_view(view, every).id for view in every.values()}
+    assert leads == {f"frame_000{n}{side}" for n in ("00", "10") for side in ("", "_right")}
+
+
+def test_a_view_that_is_no_frame_has_its_own() -> None:
+    alone = View("0_0_1", "0_0", 1, next(iter(views().values())).camera)
+    assert pilot_of_view(alone, {alone.id: alone}, alone.camera, "home", "") is None
+
+
+def test_whichever_frame_is_rendered_first_changes_no_picture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recipe = recipe_from_name("preview", {"light.spp": "4"})
+    house, _report = repair(builtin_home(), RepairFields())
+    sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
+    every = views()
+    frames = [every[f"frame_{k:05d}"] for k in (1, 2)]
+    n_pilots = []
+    own = LightScene.emitters
+    monkeypatch.setattr(LightScene, "emitters", lambda *args: (n_pilots.append(1), own(*args))[1])
+
+    def pictures(order: list[View]) -> dict[str, np.ndarray]:
+        scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
+        return {
+            v.id: scene.render(
+                v.camera, "0_0", recipe.light, 7,
+                pilot=pilot_of_view(v, every, v.camera, house.id, ""),
+            ).indoor
+            for v in order
+        }  # fmt: skip
+
+    there, back = pictures(frames), pictures(frames[::-1])
+    for view in frames:
+        np.testing.assert_array_equal(there[view.id], back[view.id])
+    assert len(n_pilots) == 2  # one for each scene
