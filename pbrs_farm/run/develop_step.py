@@ -39,7 +39,8 @@ def develop_step(work: Work, walk: Walk) -> StepOutput:
     aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
     denoise = work.recipe.light.denoise
     shot = _sensor_shot(work, walk)
-    images = develop(aovs, work.recipe.tone, denoise=denoise, shot=shot)
+    wraps = work.recipe.lens.model == "equirect"
+    images = develop(aovs, work.recipe.tone, denoise=denoise, shot=shot, wraps=wraps)
     # Write a PNG a mode; its exposure and white balance become facts.
     credit = attribution(work.store, work.house_id)
     files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}

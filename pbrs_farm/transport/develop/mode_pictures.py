@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from dataclasses import fields as fields_of
 from typing import Any, Final
 
 import numpy as np
@@ -26,6 +27,7 @@ Factor = float | tuple[float, float, float]
 
 _SATURATED: Final = 0.35  # (max - min) / max of an albedo from which it is a colour
 _SAME_HUE_COS: Final = 0.9  # of the angle between two chroma vectors
+_WRAPPED_PX: Final = 64  # beyond a panorama's edges, more than a denoiser looks
 _FILLED: Final = 0.5  # share of pixels from which one colour fills a view
 # Of a light, in natural logarithms of linear sRGB: green over the mean of red and blue, and red
 # over blue. Black bodies from 2,300 K on and clear skies lie within.
@@ -84,14 +86,15 @@ def develop(
     indoor: Factor = 1.0,
     outdoor: Factor = 1.0,
     shot: SensorShot | None = None,
+    wraps: bool = False,
 ) -> dict[str, ToneMappedImage]:
     """Mode name -> image of every mode that is a sum of light groups.
 
     Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors of
     all, or of R, G and B; they scale what is denoised, so that every picture is linear in them.
-    shot: the sensor that takes the pictures, None for a perfect one.
+    shot: the sensor that takes the pictures, None for a perfect one. wraps: see denoised.
     """
-    clean = denoised(aovs) if denoise else aovs
+    clean = denoised(aovs, wraps=wraps) if denoise else aovs
     groups = {
         Group.OUTDOOR: clean.outdoor * np.asarray(outdoor, np.float32),
         Group.INDOOR: clean.indoor * np.asarray(indoor, np.float32),
@@ -119,8 +122,20 @@ def wanted_exposures(aovs: LinearAovs, fields: ToneFields) -> dict[str, float]:
     return {mode: image.exposure for mode, image in images.items()}
 
 
-def denoised(aovs: LinearAovs) -> LinearAovs:
-    """The same view with each light group denoised by itself; what hits nothing stays black."""
+def denoised(aovs: LinearAovs, *, wraps: bool = False) -> LinearAovs:
+    """The same view with each light group denoised by itself; what hits nothing stays black.
+
+    wraps: the left edge adjoins the right one, as in a panorama, and must show no seam.
+    """
+    if wraps:
+        # Let the denoiser see beyond both edges what lies there.
+        n = min(_WRAPPED_PX, aovs.outdoor.shape[1])
+        wide = {
+            f.name: np.pad(getattr(aovs, f.name), ((0, 0), (n, n), (0, 0)), mode="wrap")
+            for f in fields_of(LinearAovs)
+        }
+        clean = denoised(LinearAovs(**wide))
+        return replace(aovs, outdoor=clean.outdoor[:, n:-n], indoor=clean.indoor[:, n:-n])
     # The denoiser would smear light over pixels without a surface.
     light = aovs.outdoor + aovs.indoor
     is_hit = np.any(light > 0, -1, keepdims=True) | np.any(aovs.albedo > 0, -1, keepdims=True)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.recipe import ToneFields
+from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoised
 from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
 
 
@@ -55,3 +56,21 @@ def test_the_released_tone_is_reinhards_formula() -> None:
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     ours = tone(rgb, ToneFields(preset="released", key=0.8)).astype(int)
     assert np.abs(ours - np.round(255 * srgb)).max() <= 1
+
+
+def test_a_panorama_denoises_alike_wherever_it_is_cut() -> None:
+    rng = np.random.default_rng(0)
+    light = (0.5 + 0.4 * np.sin(np.arange(128) / 128 * 2 * np.pi))[None, :, None]
+    noisy = (light * rng.gamma(4, 0.25, (64, 128, 3))).astype(np.float32)
+    white, normal = np.ones_like(noisy), np.zeros_like(noisy)
+
+    def cleaned(shift: int, *, wraps: bool) -> np.ndarray:
+        rolled = np.roll(noisy, shift, axis=1)
+        found = denoised(LinearAovs(rolled, rolled * 0, white, normal), wraps=wraps)
+        return np.roll(found.outdoor, -shift, axis=1)
+
+    def seam(wraps: bool) -> float:
+        cut, whole = cleaned(0, wraps=wraps), cleaned(64, wraps=wraps)
+        return float(np.abs(cut - whole)[:, [0, 127]].mean())
+
+    assert seam(True) < 0.5 * seam(False)
