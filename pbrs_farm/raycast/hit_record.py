@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, I32, HitRecord
+from pbrs_farm.core.arrays import F32, F64, I32, HitRecord, SurfacePoints
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
 from pbrs_farm.core.mesh import area_vectors, triangle_corners
@@ -35,7 +35,16 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: I32) -> HitR
     t, weights = _intersect(planes, local, d, axis)
     normal = planes.normal[local]
     normal[_dot(normal, d) > 0] *= -1
-    corner = geometry.faces[f][local]
+
+    # Interpolate only for layers that ask for it.
+    def interpolated() -> SurfacePoints:
+        corner = geometry.faces[f][local]
+        shading = _shading_normal(geometry, corner, weights, normal)
+        return SurfacePoints(
+            _image(planes.origin + t[:, None] * d, pixels, shape, np.float32),
+            _image(shading, pixels, shape, np.float32),
+            _image(_mixed(weights, geometry.uvs, corner), pixels, shape, np.float32),
+        )
 
     # Write the pixels that hit something into images of zeros.
     shape = face.shape
@@ -43,12 +52,8 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: I32) -> HitR
         face=np.ascontiguousarray(face, np.int32),
         item=_image(geometry.face_item[f][local], pixels, shape, np.uint32),
         depth_z=_image(t, pixels, shape, np.float32),
-        position_world=_image(planes.origin + t[:, None] * d, pixels, shape, np.float32),
         geo_normal_world=_image(normal, pixels, shape, np.float32),
-        shading_normal_world=_image(
-            _shading_normal(geometry, corner, weights, normal), pixels, shape, np.float32
-        ),
-        uv=_image(_mixed(weights, geometry.uvs, corner), pixels, shape, np.float32),
+        interpolate=interpolated,
     )
 
 

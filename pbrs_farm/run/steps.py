@@ -5,6 +5,7 @@ Effects: reads the store; run/step_cache.py writes what a step gives, and its ma
 
 from __future__ import annotations
 
+import functools
 import platform
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -373,8 +374,9 @@ def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
     return run_unless_done(name, work, _FUNCTIONS[name], attempt=attempt)
 
 
-def versions() -> dict[str, str]:
-    """Versions of what makes the pictures."""
+@functools.cache
+def versions() -> Mapping[str, str]:
+    """Versions of what makes the pictures; found once a process."""
     found = {"pbrs_farm": pbrs_farm.__version__, "python": platform.python_version()}
     for package in ("mitsuba", "drjit", "moderngl", "pyoidn", "numpy"):
         try:

@@ -36,7 +36,7 @@ def albedo_png(
             pixels = textures.get(shaded.texture_id) if shaded.texture_id else None
             linear[mask] = colour
             if pixels is not None:
-                linear[mask] *= bilinear(pixels[..., :3], hit.uv[mask], _LINEAR_OF_BYTE)
+                linear[mask] *= bilinear(pixels[..., :3], hit.points.uv[mask], _LINEAR_OF_BYTE)
     # Encode by table: 8-bit sRGB.
     steps = np.rint(np.clip(linear, 0, 1) * _STEPS).astype(np.int32)
     return np.asarray(_BYTE_OF_LINEAR[steps])

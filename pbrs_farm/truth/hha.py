@@ -31,7 +31,7 @@ def hha_png(hit: HitRecord, camera: Camera) -> NDArray[np.uint8]:
     if not hit.valid.any():
         return out.astype(np.uint8)
     # Estimate the floor's height from the lowest point in view.
-    above_eye_cm = (hit.position_world[..., 1] - np.float32(camera.eye[1])) * np.float32(100)
+    above_eye_cm = (hit.points.position_world[..., 1] - np.float32(camera.eye[1])) * np.float32(100)
     lowest_cm = float(above_eye_cm[hit.valid].min())
     floor_cm = lowest_cm if lowest_cm <= _FLOOR_IN_VIEW_CM else _ASSUMED_FLOOR_CM
     # Encode the three channels.

@@ -133,7 +133,7 @@ def _normal_shading(inputs: LabelInputs) -> NDArray[np.uint16]:
 _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     # Geometry of the hit.
     "depth_z": lambda s: s.hit.depth_z,
-    "position": lambda s: s.hit.position_world,
+    "position": lambda s: s.hit.points.position_world,
     "normal_shading": _normal_shading,
     "normal_world": lambda s: encoded_normal(s.hit.geo_normal_world),
     # Appearance and classes of the hit.

@@ -22,7 +22,7 @@ def shading_normals(
     textures: as in LabelInputs; looked up between the four nearest texels, not filtered over the
     pixel. The geometric normals of every other layer stay what they are.
     """
-    normals = hit.shading_normal_world.copy()
+    normals = hit.points.shading_normal_world.copy()
     if not len(geometry.faces):
         return normals
     # Bend material by material: each map is looked up once, for all its pixels.
@@ -33,7 +33,7 @@ def shading_normals(
         if pixels is None or pixels.ndim != 3:
             continue
         mask = material == number
-        values = bilinear(pixels[..., :3], hit.uv[mask])
+        values = bilinear(pixels[..., :3], hit.points.uv[mask])
         mapped = normals_from_picture(values, shaded.normal_scale).astype(np.float64)
         faces, seen = hit.face[mask], normals[mask].astype(np.float64)
         normals[mask] = _bent(geometry, faces, seen, mapped).astype(np.float32)

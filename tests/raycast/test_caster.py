@@ -66,11 +66,13 @@ def test_a_hit_lies_on_its_pixels_ray_and_in_its_triangle() -> None:
     origin, directions = view.rays()
     on_ray = origin + hit.depth_z[..., None] * directions
     seen = hit.valid
-    np.testing.assert_allclose(hit.position_world[seen], on_ray[seen], atol=2e-6)
+    np.testing.assert_allclose(hit.points.position_world[seen], on_ray[seen], atol=2e-6)
     a = g.positions[g.faces[hit.face[seen], 0]]
-    off_plane = ((hit.position_world[seen] - a) * hit.geo_normal_world[seen]).sum(-1)
+    off_plane = ((hit.points.position_world[seen] - a) * hit.geo_normal_world[seen]).sum(-1)
     assert np.abs(off_plane).max() < 5e-6
-    np.testing.assert_allclose(hit.uv[seen], hit.position_world[seen][:, :2], atol=2e-5)
+    np.testing.assert_allclose(
+        hit.points.uv[seen], hit.points.position_world[seen][:, :2], atol=2e-5
+    )
 
 
 def test_normals_have_unit_length_and_face_the_camera() -> None:
@@ -78,11 +80,11 @@ def test_normals_have_unit_length_and_face_the_camera() -> None:
     hit = Caster(soup(300, seed=2)).hit_record(view)
     _origin, directions = view.rays()
     seen = hit.valid
-    for normals in (hit.geo_normal_world, hit.shading_normal_world):
+    for normals in (hit.geo_normal_world, hit.points.shading_normal_world):
         np.testing.assert_allclose(np.linalg.norm(normals[seen], axis=-1), 1, atol=1e-6)
         assert not normals[~seen].any()
     assert ((hit.geo_normal_world * directions)[seen].sum(-1) <= 1e-6).all()
-    assert ((hit.geo_normal_world * hit.shading_normal_world)[seen].sum(-1) >= -1e-6).all()
+    assert ((hit.geo_normal_world * hit.points.shading_normal_world)[seen].sum(-1) >= -1e-6).all()
 
 
 def test_item_counts_are_the_item_buffers_pixels(variant: str) -> None:

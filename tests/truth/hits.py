@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pbrs_farm.core.arrays import HitRecord
+from pbrs_farm.core.arrays import HitRecord, SurfacePoints
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Material, Source, Surface
 
@@ -22,9 +22,8 @@ def hit(item: object, depth_z: object, normal: object = (0.0, 0.0, 1.0)) -> HitR
     normals = np.where(there[..., None], normals, 0).astype(np.float32)
     zeros = np.zeros((*items.shape, 3), np.float32)
     face = np.where(there, items.astype(np.int32) - 1, -1).astype(np.int32)
-    return HitRecord(
-        face, items, depths.astype(np.float32), zeros, normals, normals, zeros[..., :2].copy()
-    )
+    points = SurfacePoints(zeros, normals, zeros[..., :2].copy())
+    return HitRecord(face, items, depths.astype(np.float32), normals, lambda: points)
 
 
 def square(z: float, half: float) -> Surface:

@@ -189,7 +189,8 @@ def test_albedo_is_texture_times_colour_in_linear_light():
 def test_hha_holds_disparity_height_and_the_angle_with_gravity(normal, angle):
     record = hit([[1, 1, 0]], [[3.1, 6.2, 0.0]], normal)
     position = np.array([[[0, -1.5, 0], [0, -0.5, 0], [0, 0, 0]]], np.float32)
-    record = replace(record, position_world=position)
+    points = record.points._replace(position_world=position)
+    record = replace(record, interpolate=lambda: points)
     label_inputs = truth.LabelInputs(
         record, house(5), geometry_from_house(house(5)), camera(3, 1), lambda _: record, {}
     )
