@@ -38,6 +38,7 @@ PART: Final = "swap"
 FREE_CUBES: Final = 6  # of 2 cm, shared with neighbours beyond what the old one shared: a touch
 _TRIES: Final = 5  # pieces that are tried for a set
 _MOST_LIFT_M: Final = 0.3  # a thing that stands on it goes no farther up or down
+_ON_FLOOR_M: Final = 0.005  # what the source draws so little above a floor stands on it
 _UNDER_TABLES: Final = frozenset({"dining_table", "desk", "coffee_table"})
 
 
@@ -162,12 +163,21 @@ def _placed(
         low[2] if held is Held.BACK else (low[2] + high[2]) / 2,
     ])  # fmt: skip
     at = place.turn @ (place.held_at(held) - own)
+    if held is not Held.TOP:
+        at[1] -= _above_floor_m(draft, item, float(place.low[1]))
     new = draft.placed(
         piece, shape, at, place.turn_rad, item_id=item.id, room_id=item.room_id,
         level_id=item.level_id, scale=np.array(scale),
     )  # fmt: skip
     new = replace(new, nyu40=item.nyu40 or piece.nyu40, kind=item.kind)
     return replace(new, lights=_lights_like(item.lights, new.lights))
+
+
+def _above_floor_m(draft: Draft, item: Item, low_y: float) -> float:
+    """How much a piece stands above its room's floor where that is a few millimetres; else 0."""
+    floors = (room.floor_y for room in draft.source.rooms if room.id == item.room_id)
+    above = low_y - next(floors, low_y)
+    return above if 0 < above <= _ON_FLOOR_M else 0.0
 
 
 def _lights_like(old: tuple[LightPart, ...], new: tuple[LightPart, ...]) -> tuple[LightPart, ...]:

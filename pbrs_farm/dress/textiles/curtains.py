@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place, Shape
@@ -29,6 +30,7 @@ _HIGH_SILL_M = 1.25
 _BESIDE_M = 0.48  # how far a panel covers the wall beside a window, at most
 _MOST_OUT_M = 0.2  # of the rod from the wall
 _ROD_M = 0.012  # its radius
+_FLAT_M = 0.0015  # how far the wall may be from its face at the window where a bracket ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +136,10 @@ def _panel_place(
         inner, outer = sign * (half - cover), sign * (half + beyond)
         x0, x1 = min(inner, outer), max(inner, outer)
         corner = seen.origin + seen.along * (outer + sign * 0.04) + seen.inward * out / 2
-        if not shapely.contains_xy(free, corner[0], corner[2]):
+        # A bracket 3 cm from the panel's end must meet the wall: a round one bends away.
+        if not shapely.contains_xy(free, corner[0], corner[2]) or not is_flat(
+            free, seen, outer - sign * 0.03
+        ):
             continue
         # Before a window high in the wall only short ones hang.
         is_high = sill > seen.floor_y + _HIGH_SILL_M
@@ -146,6 +151,16 @@ def _panel_place(
             if space.is_free(low, high, without=without):
                 return x0, x1, bottom
     return None
+
+
+def is_flat(free: BaseGeometry, seen: WindowSide, x: float) -> bool:
+    """Whether the wall's face at x across the window is where it is at the window."""
+    at = seen.origin + seen.along * x
+    before, behind = at + seen.inward * _FLAT_M, at - seen.inward * _FLAT_M
+    return bool(
+        shapely.contains_xy(free, before[0], before[2])
+        and not shapely.contains_xy(free, behind[0], behind[2])
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +224,10 @@ def hang_blind(
     drop = float(rng.uniform(0.12, 0.5)) * (window.top_y - window.bottom_y) + top - window.top_y
     low, high = seen.bounds(-half, half, top - drop, top, z + 0.07)
     own = [n for n, i in enumerate(draft.items) if i.id == window.item_id]
+    free = shapely.difference(room.area, room.walls)
+    if not (is_flat(free, seen, half) and is_flat(free, seen, -half)):
+        draft.refused[f"{PART}: the wall bends beside a window"] += 1
+        return False
     if z > 0.1 or top < window.top_y + 0.01 or not space.is_free(low, high, without=own):
         draft.refused[f"{PART}: no place for a blind"] += 1
         return False

@@ -94,6 +94,13 @@ def test_a_new_model_keeps_back_axis_and_floor_within_the_old_footprint(turn_deg
     assert (np.ptp(own, axis=0) >= np.ptp(was, axis=0) * [0.75, 0.85, 0.75] - 1e-5).all()
 
 
+def test_a_thing_drawn_two_millimetres_above_the_floor_gives_way_to_one_that_stands_on_it() -> None:
+    old = _item("d", DRESSER, [2.0, 0.002, 1.5], 17)
+    draft = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
+    assert draft.items[0].source_class == "T#new"
+    assert_allclose(_corners(draft.items[0])[:, 1].min(), 0.0, atol=1e-6)
+
+
 def test_it_keeps_its_id_and_says_what_it_was_made_from() -> None:
     draft = _swapped(_catalogue(("dresser", "new", DRESSER)), _item("d", DRESSER, [2, 0, 1], 17))
     item = draft.items[0]

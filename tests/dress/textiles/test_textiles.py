@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,10 +14,11 @@ from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corners
 from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.space import house_space
+from pbrs_farm.dress.space import Passage, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.textiles import textiles_large
 from pbrs_farm.dress.textiles.cloth import Folds, bar, panel, towel_over_bar
+from pbrs_farm.dress.textiles.curtains import WindowSide, is_flat
 from pbrs_farm.dress.textiles.rug_patterns import FAMILIES, inks_of, rug_pixels
 from pbrs_farm.dress.textiles.rugs import rug
 from pbrs_farm.dress.textiles.towels import towel_rail
@@ -89,6 +91,17 @@ def test_curtains_hang_from_the_wall_over_the_window(seed: int) -> None:
         assert item.bounds[1, 1] < 2.5
         if item.nyu40 == CURTAIN:
             assert item.bounds[1, 1] > 2.1
+
+
+def test_a_bracket_finds_no_hold_where_a_round_wall_bends_away() -> None:
+    # The wall's face is z = 0, and from x = 1 on it bends 1 cm in 50 into the room.
+    free = shapely.Polygon([(-2, 0), (1, 0), (2, 0.02), (2, 3), (-2, 3)])
+    seen = WindowSide(
+        cast(Passage, None), 0, np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), 0, 2.5, 0
+    )  # fmt: skip
+    assert is_flat(free, seen, -0.9)
+    assert is_flat(free, seen, 0.95)
+    assert not is_flat(free, seen, 1.3)
 
 
 def test_each_panel_covers_a_seventh_to_a_quarter_of_its_window() -> None:
