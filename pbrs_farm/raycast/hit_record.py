@@ -25,16 +25,17 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: I32) -> HitR
     # Set up each distinct face's plane once; most pixels share a face.
     origin, directions = camera.exact_rays()
     pixels = np.flatnonzero(face.ravel() >= 0)
-    d = directions.reshape(-1, 3)[pixels]
+    d = directions.reshape(-1, 3).take(pixels, axis=0)
     f, local = _distinct(face.ravel()[pixels], len(geometry.faces))
     planes = _planes(geometry, f, origin)
 
     # Intersect every ray with its plane and turn the normal towards the camera.
     is_planar = camera.intrinsics.lens.depth_is_planar
     axis = -camera.world_from_camera[:3, 2] if is_planar else None
-    t, weights = _intersect(planes, local, d, axis)
-    normal = planes.normal[local]
-    normal[_dot(normal, d) > 0] *= -1
+    normal = planes.normal.take(local, axis=0)
+    along = _dot(normal, d)
+    t, weights = _intersect(planes, local, d, along, axis)
+    normal[along > 0] *= -1
 
     # Interpolate only for layers that ask for it.
     def interpolated() -> SurfacePoints:
@@ -81,23 +82,22 @@ def _planes(geometry: Geometry, faces: NDArray[np.intp], origin: F64) -> _Planes
 
 
 def _intersect(
-    planes: _Planes, local: NDArray[np.intp], d: F64, axis: F64 | None
+    planes: _Planes, local: NDArray[np.intp], d: F64, along: F64, axis: F64 | None
 ) -> tuple[F64, F64]:
     """(N,) t along d (N, 3) to plane local[n], and (N, 3) weights of a, b, c, all >= 0.
 
-    axis: that d has unit length along; None: d has unit length.
+    along: (N,) d along the planes' normals. axis: that d has unit length along; None: d has unit length.
     """
     # Solve the plane's equation for t and evaluate the barycentric coordinates there.
     from_a = planes.origin - planes.a
-    along = _dot(planes.normal[local], d)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = -_dot(from_a, planes.normal)[local] / along
-        w_b = _dot(from_a, planes.grad_b)[local] + t * _dot(planes.grad_b[local], d)
-        w_c = _dot(from_a, planes.grad_c)[local] + t * _dot(planes.grad_c[local], d)
-    weights = np.stack([1 - w_b - w_c, w_b, w_c], axis=1)
+        w_b = _dot(from_a, planes.grad_b)[local] + t * _dot(planes.grad_b.take(local, axis=0), d)
+        w_c = _dot(from_a, planes.grad_c)[local] + t * _dot(planes.grad_c.take(local, axis=0), d)
+    weights = np.stack([1 - w_b - w_c, w_b, w_c]).T
 
     # Clamp to the triangle what falls beside it; a ray within the plane takes its middle.
-    beside = np.flatnonzero(~((weights >= 0).all(1) & np.isfinite(t)))
+    beside = np.flatnonzero(~((weights.T >= 0).all(0) & np.isfinite(t)))
     held = np.nan_to_num(weights[beside], nan=1.0, posinf=1.0, neginf=0.0).clip(0.0, 1.0)
     held /= held.sum(1, keepdims=True)
     weights[beside] = held

@@ -48,16 +48,17 @@ def correspondence(
     # Take the points in double precision, from the ray and the depth along the axis.
     origin, directions = camera.exact_rays()
     depth = hit.depth_z.ravel()[pixels].astype(np.float64)
+    rays = directions.reshape(-1, 3).take(pixels, axis=0)
     points = np.empty((3, len(pixels))).T  # each axis lies together: half of the time
     for axis in range(3):
-        points[:, axis] = origin[axis] + depth * directions.reshape(-1, 3)[pixels, axis]
+        points[:, axis] = origin[axis] + depth * rays[:, axis]
     there, z = projected(points, other)
     # Subtract the pixel's own centre.
     rows, columns = np.divmod(pixels, shape[1])
     front = z > _NEAREST_M
-    flow = np.zeros((*shape, 2))
+    flow = np.zeros((2, hit.face.size))
     for axis, centre in enumerate((columns + 0.5, rows + 0.5)):
-        flow.reshape(-1, 2)[pixels, axis] = np.where(front, there[:, axis] - centre, 0.0)
+        flow[axis, pixels] = np.where(front, there[:, axis] - centre, 0.0)
     # What lies in the other picture is seen where no ray ends before it.
     inside = np.flatnonzero(inside_picture(there, z, other))
     seen = reaches(points.T[:, inside].T, hit.face.ravel()[pixels[inside]], other, first_hit)
@@ -66,7 +67,7 @@ def correspondence(
 
     in_front = np.zeros(shape, bool)
     in_front.ravel()[pixels] = front
-    return Correspondence(flow, states, in_front)
+    return Correspondence(np.moveaxis(flow.reshape(2, *shape), 0, -1), states, in_front)
 
 
 def projected(points: F64, camera: Camera) -> tuple[F64, F64]:
