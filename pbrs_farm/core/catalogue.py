@@ -14,6 +14,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import ItemKind, LightPart, Material, Note, Surface, Texture
+from pbrs_farm.core.mesh import points_bounds
 
 
 class Place(StrEnum):
@@ -55,8 +56,7 @@ class Shape:
     @property
     def bounds(self) -> F64:
         """(2, 3) minimum and maximum in the piece's frame, metres."""
-        points = np.concatenate([s.positions for s in self.surfaces]).astype(np.float64)
-        return np.array([points.min(0), points.max(0)])
+        return np.array(points_bounds(np.concatenate([s.positions for s in self.surfaces])))
 
 
 PRINTS = "prints"

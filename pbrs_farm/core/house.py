@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I32, Points, Points2
 from pbrs_farm.core.lighting import LightForm, PowerUnit
-from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.core.mesh import points_bounds, triangle_corners
 
 MAX_INSTANCES = 65535
 
@@ -172,10 +172,8 @@ class Item:
         points = [s.positions for s in self.surfaces if len(s.positions)]
         if not points:
             return np.full((2, 3), np.nan)
-        return np.array(
-            [np.min([p.min(0) for p in points], 0), np.max([p.max(0) for p in points], 0)],
-            np.float64,
-        )
+        ends = np.array([points_bounds(p) for p in points])
+        return np.array([ends[:, 0].min(0), ends[:, 1].max(0)])
 
     @property
     def oriented_box(self) -> Box:

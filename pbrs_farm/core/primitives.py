@@ -12,12 +12,13 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Surface
-from pbrs_farm.core.mesh import cross_products
+from pbrs_farm.core.mesh import cross_products, lengths
 
 # Corner i of a box has the sign of bit k of i along axis k; quads seen from outside.
 _BOX_QUADS = np.array(
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
 )
+_SIGNS = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
 _QUAD = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
 
@@ -26,12 +27,15 @@ def quads_surface(name: str, quads: F64, material: int) -> Surface:
     quads = np.asarray(quads, np.float64).reshape(-1, 4, 3)
     # Lay u along the first edge, v at right angles to it in the quad's plane.
     u = quads[:, 1] - quads[:, 0]
-    u = u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-12)
+    u = u / np.maximum(lengths(u)[:, None], 1e-12)
     normal = cross_products(u, quads[:, 3] - quads[:, 0])
     v = cross_products(normal, u)
-    v = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
+    v = v / np.maximum(lengths(v)[:, None], 1e-12)
     local = quads - quads[:, :1]
-    uvs = np.stack([(local * u[:, None]).sum(-1), (local * v[:, None]).sum(-1)], -1)
+    uvs = np.empty((len(quads), 4, 2))
+    for k, axis in enumerate((u, v)):
+        x, y, z = np.moveaxis(local * axis[:, None], -1, 0)
+        uvs[..., k] = x + y + z
     faces = _QUAD[None] + 4 * np.arange(len(quads), dtype=np.int32)[:, None, None]
     return Surface(
         name,
@@ -44,9 +48,8 @@ def quads_surface(name: str, quads: F64, material: int) -> Surface:
 
 def box_quads(centre: F64, half: F64, axes: F64 | None = None) -> F64:
     """(6, 4, 3) quads of an oriented box; axes: (3, 3), columns are unit, right-handed."""
-    signs = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
     axes = np.eye(3) if axes is None else axes
-    corners = np.asarray(centre) + (signs * np.asarray(half)) @ axes.T
+    corners = np.asarray(centre) + (_SIGNS * np.asarray(half)) @ axes.T
     return np.asarray(corners[_BOX_QUADS], np.float64)
 
 

@@ -8,14 +8,18 @@ from hypothesis import strategies as st
 
 from pbrs_farm.core.mesh import (
     area_vectors,
+    boxes_meeting,
     closed_edge_share,
     cross_products,
     distances_to_triangles,
     edges_are_paired,
     face_areas,
     faces_with_area,
+    lengths,
+    points_bounds,
     signed_volume,
     triangle_corners,
+    unique_points,
     unit_normals,
 )
 
@@ -42,6 +46,31 @@ def test_a_face_with_a_corner_that_is_no_number_has_no_area() -> None:
     broken = np.repeat(TRIANGLE[None], 4, axis=0)
     broken[1, 0, 0], broken[2, 0, 0], broken[3, 2, 1] = np.nan, np.inf, 1e-13
     assert faces_with_area(broken, 1e-12).tolist() == [True, False, False, False]
+
+
+@pytest.mark.parametrize("shape", [(1, 3), (257, 3), (40, 3, 3)])
+def test_lengths_are_numpys_to_the_bit(shape: tuple[int, ...]) -> None:
+    vectors = np.random.default_rng(1).normal(size=shape) * 10.0 ** np.arange(-4, 5, 4)
+    np.testing.assert_array_equal(lengths(vectors), np.linalg.norm(vectors, axis=-1))
+
+
+def test_bounds_of_points_hold_them_all_and_are_double() -> None:
+    points = np.random.default_rng(2).normal(size=(50, 3)).astype(np.float32)
+    low, high = points_bounds(points)
+    assert low.dtype == high.dtype == np.float64
+    np.testing.assert_array_equal([low, high], [points.min(0), points.max(0)])
+
+
+def test_boxes_that_touch_meet_and_one_apart_along_an_axis_does_not() -> None:
+    low = np.array([[1.0, 0, 0], [0, 1.1, 0], [0, 0, -2], [0.2, 0.2, 0.2], [np.nan] * 3])
+    meets = boxes_meeting(low, low + 1.0, np.zeros(3), np.ones(3))
+    assert meets.tolist() == [True, False, False, True, False]
+
+
+@pytest.mark.parametrize("n", [0, 1, 200])
+def test_unique_points_are_numpys_unique_rows(n: int) -> None:
+    points = np.random.default_rng(3).integers(0, 4, (n, 3)).astype(np.float64)
+    np.testing.assert_array_equal(unique_points(points), np.unique(points, axis=0))
 
 
 def box(extents: tuple[float, float, float]) -> np.ndarray:

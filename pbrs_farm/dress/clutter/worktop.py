@@ -87,7 +87,8 @@ class Worktop:
     def keep_free(self, zone: BaseGeometry) -> None:
         """Nothing can stand over a plan area."""
         plan = self.grid.centres()
-        if not zone.is_empty and shapely.box(*plan.min((0, 1)), *plan.max((0, 1))).intersects(zone):
+        corners = plan[[0, 0, -1, -1], [0, -1, 0, -1]]
+        if not zone.is_empty and shapely.box(*corners.min(0), *corners.max(0)).intersects(zone):
             self.clear[shapely.contains_xy(zone, plan[..., 0], plan[..., 1])] = 0.0
 
     def middle(self, spot: Spot) -> F64:

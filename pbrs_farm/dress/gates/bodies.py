@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import edges_are_paired, signed_volume
+from pbrs_farm.core.mesh import edges_are_paired, points_bounds, signed_volume
 from pbrs_farm.core.surface_points import item_triangles
 from pbrs_farm.dress.draft import ADDED_TAG, Draft
 
@@ -82,11 +82,11 @@ def bodies_of(
         corners = item_triangles(item)
         if not len(corners):
             continue
-        points = corners.reshape(-1, 3)
+        low, high = points_bounds(corners.reshape(-1, 3))
         # Walls are cut where rooms meet, but stand where they stood; boards lie along them.
         is_new = not item.kind.is_structure and (was is None or not has_same_mesh(item, was))
         piece = pieces.get(piece_id(item)) if is_new else None
-        found.append(Body(index, item, corners, points.min(0), points.max(0), is_new, was, piece))
+        found.append(Body(index, item, corners, low, high, is_new, was, piece))
     return found
 
 
@@ -127,7 +127,7 @@ def shells_of(corners: F64) -> list[Shell]:
 def _shell(vertices: F64, faces: Faces) -> Shell:
     used, numbers = np.unique(faces, return_inverse=True)
     vertices, faces = vertices[used], numbers.reshape(-1, 3)
-    low, high = vertices.min(0), vertices.max(0)
+    low, high = points_bounds(vertices)
     is_closed = edges_are_paired(faces)
     # Turn a closed shell that is inside out; one without volume is a sheet.
     if is_closed:

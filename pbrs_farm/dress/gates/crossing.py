@@ -28,9 +28,11 @@ def crossing_m(a: Shell, b: Shell, least_m: float) -> float:
     step = max(1, _PAIRS // max(len(corners), 1))
     for first in range(0, len(start), step):
         s, e = start[first : first + step], end[first : first + step]
-        i, j = np.nonzero(
-            ((np.minimum(s, e)[:, None] <= high) & (np.maximum(s, e)[:, None] >= low)).all(-1)
-        )
+        least, most = np.minimum(s, e), np.maximum(s, e)
+        meets = np.ones((len(s), len(corners)), np.bool_)
+        for k in range(3):
+            meets &= (least[:, k, None] <= high[:, k]) & (most[:, k, None] >= low[:, k])
+        i, j = np.nonzero(meets)
         best = max(best, float(_either_side(s[i], e[i], corners[j]).max(initial=0.0)))
     return best
 

@@ -14,7 +14,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import BLINDS, CURTAIN, FLOOR_MAT
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.core.mesh import triangle_bounds
+from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
 from pbrs_farm.core.surface_points import surface_points
 from pbrs_farm.dress.gates.bodies import Body, Shell, boxes_of
 from pbrs_farm.dress.gates.crossing import crossing_m
@@ -105,7 +105,7 @@ def _points_in(a: Shell, b: Shell) -> F64:
     """Points on one shell that lie in the box of another, spread evenly."""
     corners = a.corners
     low, high = triangle_bounds(corners)
-    meets = (low <= b.high).all(1) & (high >= b.low).all(1)
+    meets = boxes_meeting(low, high, b.low, b.high)
     points = np.concatenate([a.vertices, surface_points(corners[meets], _SPACING_M)])
     inside = ((points > b.low + MOST_M / 2) & (points < b.high - MOST_M / 2)).all(1)
     points = points[inside]

@@ -18,6 +18,8 @@ _MANY_CELLS: Final = 400  # a triangle over more goes into the next larger cells
 _NEAR_M: Final = 0.5  # above and below a body
 _STEEP: Final = 1e-9  # square metres in plan: a triangle with less stands upright
 _EDGE: Final = 1e-6  # of a triangle's extent: a place on its edge is on it
+_SPARE: Final = 1e-3  # of a triangle's extent: far beyond what _EDGE and rounding let in
+_BESIDE_M: Final = 1e-6
 
 Ints = NDArray[np.int64]
 
@@ -54,8 +56,10 @@ class Plumb:
         ab, ac = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
         lies = np.abs(ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]) > 2 * _STEEP
         self._corners, self._owner = corners[lies], owner[lies]
-        y = self._corners[:, :, 1]
-        self._low, self._high = triangle_bounds(y)
+        low, high = triangle_bounds(self._corners)
+        # Leave places on a triangle's edge in its bounds.
+        spare = _SPARE * (high - low) * [1, 0, 1]
+        self._low, self._high = (np.ascontiguousarray(b.T) for b in (low - spare, high + spare))
         # Enter each triangle into cells of a size that suits it.
         left, self._grids = np.arange(len(self._corners)), list[_Grid]()
         for cell_m in _CELLS_M:
@@ -66,10 +70,12 @@ class Plumb:
         """Every face at most reach_m above or below points (N, 3), edges included."""
         found = [grid.candidates(points[:, [0, 2]]) for grid in self._grids]
         place, triangle = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        # Leave out faces that lie too high or too low.
-        y = points[place, 1]
-        near = (self._low[triangle] < y + reach_m) & (self._high[triangle] > y - reach_m)
-        place, triangle = place[near], triangle[near]
+        # Leave out faces that lie too high or too low, then those beside the place.
+        for axis, reach in ((1, reach_m), (0, _BESIDE_M), (2, _BESIDE_M)):
+            at = np.ascontiguousarray(points[:, axis])[place]
+            near = self._low[axis][triangle] < at + reach
+            near &= self._high[axis][triangle] > at - reach
+            place, triangle = place[near], triangle[near]
         y = heights_at(points[place][:, [0, 2]], self._corners[triangle])
         with np.errstate(invalid="ignore"):
             met = np.abs(y - points[place, 1]) < reach_m

@@ -15,7 +15,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds
+from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds, unique_points
 from pbrs_farm.core.surface_points import item_triangles
 from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.gates.plumb import Plumb
@@ -115,7 +115,7 @@ def _places(body: Body) -> F64:
         ring = points
     else:
         ring = points[points[:, 1] < body.low[1] + _RING_M]
-    ring = np.unique(ring, axis=0)
+    ring = unique_points(ring)
     # Take places evenly over the sorted points; cloth, which sags, needs more of them.
     n = _MOST_PLACES * (16 if body.group in _SOFT else 1)
     rows = np.unique(np.linspace(0, len(ring) - 1, min(n, len(ring))).astype(np.int64))
@@ -156,8 +156,10 @@ def _vertices_to_faces(a: Body, b: Body) -> float:
 def _near(a: Body, b: Body, reach: float, most: int) -> tuple[F64, F64]:
     """Vertices (N, 3) of a and faces (N, 3, 3) of b whose boxes come as near as reach to each other."""
     points = a.corners.reshape(-1, 3)
-    points = points[((points > b.low - reach) & (points < b.high + reach)).all(1)]
-    points = np.unique(points, axis=0)
+    inside = np.ones(len(points), np.bool_)
+    for k in range(3):
+        inside &= (points[:, k] > b.low[k] - reach) & (points[:, k] < b.high[k] + reach)
+    points = unique_points(points[inside])
     points = points[:: max(1, len(points) // most)]
     corners = b.corners
     low, high = triangle_bounds(corners)
@@ -168,7 +170,10 @@ def _near(a: Body, b: Body, reach: float, most: int) -> tuple[F64, F64]:
     step = max(1, _PAIRS // max(len(corners), 1))
     for first in range(0, len(points), step):
         part = points[first : first + step]
-        i, j = np.nonzero(((part[:, None] > low) & (part[:, None] < high)).all(-1))
+        meets = np.ones((len(part), len(corners)), np.bool_)
+        for k in range(3):
+            meets &= (part[:, k, None] > low[:, k]) & (part[:, k, None] < high[:, k])
+        i, j = np.nonzero(meets)
         found_i.append(part[i])
         found_j.append(corners[j])
     return np.concatenate(found_i), np.concatenate(found_j)

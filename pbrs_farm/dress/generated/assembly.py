@@ -56,7 +56,7 @@ def transformed(surface: Surface, matrix: F64, offset: Sequence[float] = (0, 0, 
 
 def plain(name: str, colour: Rgb, roughness: float) -> Material:
     """An opaque material of one colour (sRGB); equal ones are shared in the house."""
-    r, g, b = (round(float(np.clip(c, 0.02, 0.95)), 3) for c in colour)
+    r, g, b = (round(float(min(max(c, 0.02), 0.95)), 3) for c in colour)
     return Material(name, diffuse=(r, g, b), roughness=roughness)
 
 

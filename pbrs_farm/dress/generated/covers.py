@@ -163,7 +163,7 @@ def _ink(colour: Rgb, rng: np.random.Generator) -> tuple[int, int, int]:
 
 
 def _bytes(colour: Rgb) -> tuple[int, int, int]:
-    r, g, b = (int(np.clip(round(255 * c), 0, 255)) for c in colour)
+    r, g, b = (min(max(round(255 * c), 0), 255) for c in colour)
     return (r, g, b)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64, I32
+from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.primitives import box
 
@@ -33,30 +33,32 @@ def turned(profile: Sequence[tuple[float, float]] | F64, *, n: int = 16) -> Surf
     angles = 2 * np.pi * np.arange(n + 1) / n
     around = np.stack([np.cos(angles), np.zeros(n + 1), -np.sin(angles)], -1)
     around[-1] = around[0]
-    positions, normals, faces = [], [], []
-    count = 0
-    for k in range(len(points) - 1):
-        for (radius, y), (across, up) in ((points[k], begin[k]), (points[k + 1], end[k])):
-            positions.append(around * radius + [0, y, 0])
-            normals.append(around * across + [0, up, 0])
-        faces.append(_ring(count, n, points[k, 0] > 0, points[k + 1, 0] > 0))
-        count += 2 * (n + 1)
-    return Surface(
-        "turned", np.concatenate(positions).astype(np.float32), np.concatenate(faces), 0,
-        None, np.concatenate(normals).astype(np.float32),
-    )  # fmt: skip
+    # Each stretch has a ring of points at its begin and one at its end.
+    ends = np.stack([points[:-1], points[1:]], 1).reshape(-1, 2)
+    slopes = np.stack([begin, end], 1).reshape(-1, 2)
+    positions, normals = (_rings(around, rows).astype(np.float32) for rows in (ends, slopes))
+    return Surface("turned", positions, _ring_faces(points[:, 0] > 0, n), 0, None, normals)
 
 
-def _ring(base: int, n: int, has_low: bool, has_high: bool) -> I32:
-    # Two triangles a side, or one where the ring ends on the axis.
-    i = np.arange(n, dtype=np.int32) + base
-    j = i + n + 1
-    parts = [np.zeros((0, 3), np.int32)]
-    if has_low:
-        parts.append(np.stack([i, i + 1, j + 1 if has_high else j], -1))
-    if has_high:
-        parts.append(np.stack([i, j + 1, j], -1))
-    return np.concatenate(parts).astype(np.int32)
+def _rings(around: F64, rows: F64) -> F64:
+    # (R * (n + 1), 3): for each (radius, height) the unit ring, so wide and so high.
+    rings = around * rows[:, 0, None, None]
+    rings += np.stack([np.zeros(len(rows)), rows[:, 1], np.zeros(len(rows))], -1)[:, None]
+    return np.asarray(rings.reshape(-1, 3))
+
+
+def _ring_faces(is_wide: Bools, n: int) -> I32:
+    # Of each stretch two triangles a side, or one where it ends on the axis.
+    has_low, has_high = is_wide[:-1], is_wide[1:]
+    i = (
+        np.arange(n, dtype=np.int32)
+        + 2 * (n + 1) * np.arange(len(has_low), dtype=np.int32)[:, None]
+    )
+    j = i + np.int32(n + 1)
+    faces = np.empty((len(has_low), 2, n, 3), np.int32)
+    faces[:, 0] = np.stack([i, i + 1, j + has_high[:, None]], -1)
+    faces[:, 1] = np.stack([i, j + 1, j], -1)
+    return np.asarray(faces[np.stack([has_low, has_high], 1)].reshape(-1, 3))
 
 
 def vessel(outside: Sequence[tuple[float, float]], wall_m: float, *, n: int = 16) -> Surface:

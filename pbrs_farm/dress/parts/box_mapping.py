@@ -45,9 +45,9 @@ def box_mapped(
         swap = extent[rows, second] > extent[rows, first]
         first, second = np.where(swap, second, first), np.where(swap, first, second)
     # Split vertices by how their faces are mapped.
-    key = np.stack([surface.faces.ravel(), np.repeat(first * 3 + second, 3)], -1)
-    unique, number = np.unique(key, axis=0, return_inverse=True)
-    vertex, way = unique[:, 0], unique[:, 1]
+    key = surface.faces.ravel().astype(np.int64) * 9 + np.repeat(first * 3 + second, 3)
+    unique, number = np.unique(key, return_inverse=True)
+    vertex, way = np.divmod(unique, 9)
     count = np.arange(len(vertex))
     u, v = local[vertex][count, way // 3], local[vertex][count, way % 3]
     # Shift each part, so that no two boards show the same knot.

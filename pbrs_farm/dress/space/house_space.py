@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import FLOOR_MAT
 from pbrs_farm.core.house import Item, ItemKind, Room
-from pbrs_farm.core.mesh import area_vectors, triangle_bounds
+from pbrs_farm.core.mesh import area_vectors, points_bounds, triangle_bounds
 from pbrs_farm.core.surface_points import item_triangles, lowest_above, surface_points
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.footprints import areal, plan_area
@@ -102,6 +102,7 @@ class _Kept:
     items: dict[int, tuple[Item, F64, F64]]  # with points on it and their bounds
     faces: dict[int, tuple[tuple[int, ...], WallFace]]  # by the empty face, with the things near it
     space: tuple[tuple[int, ...], HouseSpace] | None = None
+    reach: dict[int, F64] = field(default_factory=dict)  # by the empty face: see reach_of
     hidden: dict[tuple[int, int], Hidden | None] = field(default_factory=dict)  # by face and item
     inside: dict[tuple[str, int], bool] = field(default_factory=dict)  # by room and item
 
@@ -135,7 +136,7 @@ def _with_points(item: Item) -> tuple[Item, F64, F64]:
     if item.kind in _STRUCTURE:
         return item, np.zeros((0, 3)), np.full((2, 3), np.nan)
     points = surface_points(item_triangles(item))
-    bounds = np.array([points.min(0), points.max(0)]) if len(points) else np.full((2, 3), np.nan)
+    bounds = np.array(points_bounds(points)) if len(points) else np.full((2, 3), np.nan)
     return item, points, bounds
 
 
@@ -223,7 +224,10 @@ def _filled(
     face: WallFace, items: Sequence[Item], points: Sequence[F64], bounds: F64, kept: _Kept
 ) -> WallFace:
     """The empty face with what stands or hangs before it now; rugs do not count."""
-    near = [n for n in meeting(bounds, reach_of(face)) if items[n].nyu40 != FLOOR_MAT]
+    if id(face) not in kept.reach:
+        kept.reach[id(face)] = reach_of(face)
+    found = meeting(bounds, kept.reach[id(face)])
+    near = [n for n in found if items[n].nyu40 != FLOOR_MAT]
     key = tuple(id(items[n]) for n in near)
     known = kept.faces.get(id(face))
     if known is None or known[0] != key:

@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.house import Room
+from pbrs_farm.core.mesh import boxes_meeting
 from pbrs_farm.dress.space.footprints import areal
 from pbrs_farm.dress.space.passages import Passage
 from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M, Hidden, WallFace, WallPlane, runs
@@ -135,7 +136,7 @@ def reach_of(face: WallFace) -> F64:
 
 def meeting(bounds: F64, reach: F64) -> list[int]:
     """Numbers of the boxes (I, 2, 3) that meet the box reach (2, 3); NaN meets nothing."""
-    meets = (bounds[:, 0] <= reach[1]).all(1) & (bounds[:, 1] >= reach[0]).all(1)
+    meets = boxes_meeting(bounds[:, 0], bounds[:, 1], reach[0], reach[1])
     return [int(n) for n in np.flatnonzero(meets)]
 
 

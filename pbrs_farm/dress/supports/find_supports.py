@@ -203,10 +203,12 @@ def _open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
 
 
 def _shifted(mask: Bools, axis: int, by: int) -> Bools:
-    moved = np.roll(mask, by, axis)
-    edge: list[slice] = [slice(None), slice(None)]
-    edge[axis] = slice(0, by) if by > 0 else slice(by, None)
-    moved[tuple(edge)] = False
+    moved = np.zeros_like(mask)
+    there, here = (slice(by, None), slice(0, -by)) if by > 0 else (slice(0, by), slice(-by, None))
+    if axis == 0:
+        moved[there] = mask[here]
+    else:
+        moved[:, there] = mask[:, here]
     return moved
 
 
@@ -226,10 +228,11 @@ def _front_quarter(support: Support, room: Room, has_front: bool) -> int:
     # 0 = +z, 1 = +x, 2 = -z, 3 = -x, as quarters of a turn about +y.
     right, front, left, back = support.open_sides
     is_open = {0: front, 1: right, 2: back, 3: left}
-    reach = {q: _way_to_wall(support, q, room) for q in is_open}
+    area = Polygon(room.polygon)
     # A top that is open all around faces the room; a shelf faces where it is open.
-    if has_front and is_open[0] and reach[0] > 0.25:
+    if has_front and is_open[0] and _way_to_wall(support, 0, area) > 0.25:
         return 0
+    reach = {q: _way_to_wall(support, q, area) for q in is_open}
     choices = [q for q in is_open if is_open[q]] or list(is_open)
     rows, columns = np.nonzero(support.mask)
     depth = (np.ptp(rows), np.ptp(columns))
@@ -242,7 +245,7 @@ def _front_quarter(support: Support, room: Room, has_front: bool) -> int:
     return max(choices, key=liking)
 
 
-def _way_to_wall(support: Support, quarter: int, room: Room) -> float:
+def _way_to_wall(support: Support, quarter: int, area: Polygon) -> float:
     # How far one can go from the support's middle beyond its edge before the room ends, metres.
     grid, (rows, columns) = support.grid, np.nonzero(support.mask)
     middle = grid.plan_of(columns.mean() + 0.5, rows.mean() + 0.5)
@@ -251,7 +254,7 @@ def _way_to_wall(support: Support, quarter: int, room: Room) -> float:
     half = [np.ptp(rows) / 2, np.ptp(columns) / 2][quarter % 2] * grid.cell_m
     steps = half + np.arange(0.05, 2.0, 0.05)
     places = middle + steps[:, None] * ahead
-    outside = ~contains_xy(Polygon(room.polygon), places[:, 0], places[:, 1])
+    outside = ~contains_xy(area, places[:, 0], places[:, 1])
     return float(steps[np.argmax(outside)] - half) if outside.any() else 2.0
 
 

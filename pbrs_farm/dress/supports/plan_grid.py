@@ -15,6 +15,9 @@ _FLAT = 1e-9  # square metres in plan: a triangle with less stands upright
 _MAX_SLOPE = 50.0  # height over distance; steeper faces take their whole height in every cell
 
 
+Ints = NDArray[np.intp]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanGrid:
     """Square cells over a piece of plan; rows run along its own +z (the front), columns along +x."""
@@ -72,6 +75,15 @@ def cells_over(grid: PlanGrid, corners: F64, *, touched: bool) -> CellHits:
     touched: every cell that a triangle touches, upright ones too; else those whose middle it covers.
     """
     local = grid.local(corners)
+    triangle, row, column, doubled = _cells_over(grid, local, touched=touched)
+    steepest, half = _MAX_SLOPE * grid.cell_m, 0.5 if touched else 0.0
+    x, z = (np.asarray(cell + 0.5, np.float64) for cell in (column, row))
+    low, high = _heights(local, doubled, steepest, triangle, x, z, half)
+    return CellHits(triangle, row, column, low, high)
+
+
+def _cells_over(grid: PlanGrid, local: F64, *, touched: bool) -> tuple[Ints, Ints, Ints, F64]:
+    """Triangles, rows and columns of hits, and twice the plan area of each triangle, in cells."""
     plan = local[..., [0, 2]]
     half = 0.5 if touched else 0.0
     # List the cells of each triangle's bounds that lie in the grid.
@@ -81,33 +93,33 @@ def cells_over(grid: PlanGrid, corners: F64, *, touched: bool) -> CellHits:
     last = np.minimum(last, np.array(grid.shape[::-1]) - 1)
     n_across, n_down = (np.maximum(last - first + 1, 0)).T
     count = n_across * n_down
-    triangle = np.repeat(np.arange(len(corners)), count)
+    triangle = np.repeat(np.arange(len(local)), count)
     number = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
-    down, across = np.divmod(number, n_across[triangle])
-    column, row = first[triangle, 0] + across, first[triangle, 1] + down
+    width = n_across[triangle]
+    down = number // width
+    column, row = first[:, 0][triangle] + number - down * width, first[:, 1][triangle] + down
 
     # Keep the cells on the inner side of all three edges, or half a cell beyond them.
     edges = plan[:, [1, 2, 0]] - plan
     doubled = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     edges *= np.where(doubled < 0, -1.0, 1.0)[:, None, None]
-    beyond = half * np.abs(edges).sum(-1) + 1e-9
+    beyond = half * (np.abs(edges[..., 0]) + np.abs(edges[..., 1])) + 1e-9
     start = edges[..., 1] * plan[..., 0] - edges[..., 0] * plan[..., 1] + beyond
     x, z = column + 0.5, row + 0.5
     inside = np.ones(len(triangle), np.bool_)
     for k in range(3):
-        inside &= edges[triangle, k, 0] * z - edges[triangle, k, 1] * x >= -start[triangle, k]
-    inside &= touched | (np.abs(doubled[triangle]) * grid.cell_m**2 > _FLAT)
-    triangle, row, column = triangle[inside], row[inside], column[inside]
-    steepest = _MAX_SLOPE * grid.cell_m
-    low, high = _heights(local, doubled, steepest, triangle, column + 0.5, row + 0.5, half)
-    return CellHits(triangle, row, column, low, high)
+        along, across, least = edges[:, k, 0], edges[:, k, 1], -start[:, k]
+        inside &= along[triangle] * z - across[triangle] * x >= least[triangle]
+    if not touched:
+        inside &= (np.abs(doubled) * grid.cell_m**2 > _FLAT)[triangle]
+    return triangle[inside], row[inside], column[inside], doubled
 
 
 def covered(grid: PlanGrid, corners: F64, *, touched: bool = False) -> Bools:
     """(rows, columns) whether a triangle covers the cell's middle, or touches the cell."""
     mask = np.zeros(grid.shape, np.bool_)
-    hits = cells_over(grid, corners, touched=touched)
-    mask[hits.row, hits.column] = True
+    _triangle, row, column, _doubled = _cells_over(grid, grid.local(corners), touched=touched)
+    mask[row, column] = True
     return mask
 
 

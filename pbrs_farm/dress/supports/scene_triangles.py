@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import triangle_bounds
+from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
 from pbrs_farm.core.surface_points import item_triangles
 
 
@@ -36,7 +36,7 @@ class SceneTriangles:
 
     def items_in(self, low: F64, high: F64) -> list[int]:
         """Indices of the items whose bounds meet the box low..high (3,)."""
-        meets = np.all((self.bounds[:, 1] >= low) & (self.bounds[:, 0] <= high), axis=1)
+        meets = boxes_meeting(self.bounds[:, 0], self.bounds[:, 1], low, high)
         return [int(i) for i in np.flatnonzero(meets)]
 
     def in_box(self, low: F64, high: F64) -> tuple[F64, I32]:
@@ -45,7 +45,7 @@ class SceneTriangles:
         for index in self.items_in(low, high):
             corners = self.of_item(index)
             least, most = self._bounds_of(index)
-            meets = ((most >= low) & (least <= high)).all(1)
+            meets = boxes_meeting(least, most, low, high)
             parts.append(corners[meets])
             owners.append(np.full(int(meets.sum()), index, np.int32))
         return np.concatenate(parts), np.concatenate(owners)

@@ -377,7 +377,7 @@ def _skyline(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
 
 
 def _bytes(colour: Rgb) -> tuple[int, int, int]:
-    r, g, b = (int(np.clip(c, 0, 1) * 255) for c in colour)
+    r, g, b = (int(min(max(c, 0.0), 1.0) * 255) for c in colour)
     return (r, g, b)
 
 
