@@ -35,7 +35,7 @@ def quads_surface(name: str, quads: F64, material: int) -> Surface:
     uvs = np.empty((len(quads), 4, 2))
     for k, axis in enumerate((u, v)):
         x, y, z = np.moveaxis(local * axis[:, None], -1, 0)
-        uvs[..., k] = x + y + z
+        uvs[..., k] = x + y + z + 0.0  # no negative zero, as of numpy's sum
     faces = _QUAD[None] + 4 * np.arange(len(quads), dtype=np.int32)[:, None, None]
     return Surface(
         name,
