@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64, Points2
+from pbrs_farm.core.arrays import F64, I32, Points2
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import cross_products, lengths
 
@@ -20,6 +20,7 @@ _BOX_QUADS = np.array(
 )
 _SIGNS = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
 _QUAD = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+_BOX_FACES = (_QUAD + 4 * np.arange(6, dtype=np.int32)[:, None, None]).reshape(-1, 3)
 
 
 def quads_surface(name: str, quads: F64, material: int) -> Surface:
@@ -36,14 +37,21 @@ def quads_surface(name: str, quads: F64, material: int) -> Surface:
     for k, axis in enumerate((u, v)):
         x, y, z = np.moveaxis(local * axis[:, None], -1, 0)
         uvs[..., k] = x + y + z + 0.0  # no negative zero, as of numpy's sum
-    faces = _QUAD[None] + 4 * np.arange(len(quads), dtype=np.int32)[:, None, None]
+    faces = _faces_of_quads(len(quads))
     return Surface(
         name,
         quads.reshape(-1, 3).astype(np.float32),
-        faces.reshape(-1, 3).astype(np.int32),
+        faces,
         material,
         uvs.reshape(-1, 2).astype(np.float32),
     )
+
+
+def _faces_of_quads(n: int) -> I32:
+    if n == len(_BOX_FACES) // 2:
+        return _BOX_FACES.copy()
+    faces = _QUAD[None] + 4 * np.arange(n, dtype=np.int32)[:, None, None]
+    return np.asarray(faces.reshape(-1, 3), np.int32)
 
 
 def box_quads(centre: F64, half: F64, axes: F64 | None = None) -> F64:

@@ -9,7 +9,7 @@ import pytest
 
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, Support, supports_of_item
-from pbrs_farm.dress.supports.plan_grid import cells_over, covered
+from pbrs_farm.dress.supports.plan_grid import cells_over, covered, covered_by_each
 from tests.dress.furniture import boards, bookcase, room, solid, thin_table
 
 
@@ -87,3 +87,10 @@ def test_touched_cells_include_those_of_upright_faces() -> None:
     hits = cells_over(grid, upright, touched=True)
     assert hits.low.min() == 0
     assert hits.high.max() == 1
+
+
+def test_groups_of_faces_cover_what_each_covers_alone() -> None:
+    grid = PlanGrid(np.zeros(2), 0.3, 0.1, (20, 20))
+    groups = list(np.random.default_rng(4).uniform(0, 2, (3, 5, 3, 3)))
+    alone = [covered(grid, group) for group in groups]
+    np.testing.assert_array_equal(covered_by_each(grid, groups), alone)

@@ -15,7 +15,13 @@ from shapely import MultiPoint, Polygon, contains_xy, minimum_rotated_rectangle
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Item, ItemKind, Room
 from pbrs_farm.core.mesh import face_areas, triangle_bounds, unit_normals
-from pbrs_farm.dress.supports.plan_grid import CellHits, PlanGrid, cells_over, covered
+from pbrs_farm.dress.supports.plan_grid import (
+    CellHits,
+    PlanGrid,
+    cells_over,
+    covered,
+    covered_by_each,
+)
 from pbrs_farm.dress.supports.scene_triangles import SceneTriangles
 
 CELL_M = 0.01
@@ -64,8 +70,9 @@ def supports_of_item(scene: SceneTriangles, index: int, room: Room) -> list[Supp
     centres = grid.centres()
     indoors = contains_xy(Polygon(room.polygon), centres[..., 0], centres[..., 1])
     found = []
-    for group in groups:
-        mask = covered(grid, group) & indoors & ~around.solid
+    free = indoors & ~around.solid
+    for group, cover in zip(groups, covered_by_each(grid, groups), strict=True):
+        mask = cover & free
         found += _supports_at(around, mask, float(group[..., 1].max()), room, item.box is not None)
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,6 +122,17 @@ def covered(grid: PlanGrid, corners: F64, *, touched: bool = False) -> Bools:
     _triangle, row, column, _doubled = _cells_over(grid, grid.local(corners), touched=touched)
     mask[row, column] = True
     return mask
+
+
+def covered_by_each(grid: PlanGrid, groups: Sequence[F64]) -> Bools:
+    """(G, rows, columns) whether a triangle of each group (T, 3, 3) covers the cell's middle."""
+    masks = np.zeros((len(groups), *grid.shape), np.bool_)
+    if groups:
+        group = np.repeat(np.arange(len(groups)), [len(g) for g in groups])
+        local = grid.local(np.concatenate(groups))
+        triangle, row, column, _doubled = _cells_over(grid, local, touched=False)
+        masks[group[triangle], row, column] = True
+    return masks
 
 
 def top_heights(grid: PlanGrid, corners: F64) -> F64:

@@ -83,6 +83,8 @@ class RoomFinder:
             shared = min(high_y, room.ceiling_y) - max(low_y, room.floor_y)
             if shared < min(_LEAST_HEIGHT_M, 0.5 * (high_y - low_y)):
                 continue
+            if not (found < 0).any():
+                break
             inside = shapely.contains_xy(self.areas[k], places[:, 0], places[:, 1])
             found[(found < 0) & inside] = k
         return found
