@@ -24,6 +24,7 @@ _BACK_M = 0.15  # a back is at least so much higher than the seat
 _LEAST_DEPTH_M = 0.3  # of a seat
 _SUNK = 0.55  # of its half thickness that a cushion's middle keeps from the back
 _MOST_PRESSED_M = 0.03  # that a cushion gives way
+_SINKS_M = 0.0015  # of a cushion into the seat, so that its lowest edge touches, too
 _SIDE_M = 0.04  # kept from arms
 
 
@@ -161,7 +162,7 @@ def _settled(points: F64, corners: F64, turn: F64, centre: F64, thick: float) ->
     fall = _way_to_seat(placed, corners)
     if fall is None or abs(fall) > 0.003:
         return None
-    return np.asarray(placed - np.array([0, fall, 0]))
+    return np.asarray(placed - np.array([0, fall + _SINKS_M, 0]))
 
 
 def _way_to_back(points: F64, corners: F64, turn: F64, centre: F64, thick: float) -> float | None:

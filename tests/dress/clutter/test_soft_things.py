@@ -95,7 +95,8 @@ def test_cushions_stand_on_the_seat_and_lean_on_the_back() -> None:
     for cushion in cushions:
         points = _points(cushion)
         ground = heights_under(points[:, [0, 2]], _corners(sofa), 0.6)
-        assert (points[:, 1] - ground).min() == pytest.approx(0.0003, abs=0.0002)
+        # It gives way by 1.2 mm, so that it touches with more than its lowest edge.
+        assert (points[:, 1] - ground).min() == pytest.approx(-0.0012, abs=0.0002)
         # It is at the back, which is 20 cm deep, and between the arms.
         assert 0.1995 < points[points[:, 1] < 0.85][:, 2].min() < 0.23
         assert points[:, 0].min() > 1.15
