@@ -33,7 +33,7 @@ def measured(name: str, seed: int, parts: tuple[str, ...]) -> dict[str, Any]:
         found, house = _dressed(name, seed)
         row |= found
     if "views" in parts or "bits" in parts:
-        row |= _repaired(name, seed, house, with_views="views" in parts)
+        row |= repaired_home(name, seed, house, with_views="views" in parts)
     return row
 
 
@@ -93,7 +93,9 @@ def _area(surface: Surface) -> float:
     return float(np.linalg.norm(cross, axis=1).sum() / 2)
 
 
-def _repaired(name: str, seed: int, dressed: House | None, *, with_views: bool) -> dict[str, Any]:
+def repaired_home(
+    name: str, seed: int, dressed: House | None = None, *, with_views: bool
+) -> dict[str, Any]:
     """Repaired as a run does: leaks, size, digest, and what fast cameras see.
 
     dressed: as dressed before; None dresses it in a run's own way, from its name.

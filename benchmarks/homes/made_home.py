@@ -112,9 +112,9 @@ def _may(a: str, b: str) -> bool:
 
 def of_views(seed: int) -> dict[str, Any]:
     """What fast cameras see of the home dressed by the first seed."""
-    from benchmarks.dress.dressed_home import _repaired
+    from benchmarks.dress.dressed_home import repaired_home
 
-    return _repaired(MadeHome(seed).word, DRESS_SEED, with_views=True)
+    return repaired_home(MadeHome(seed).word, DRESS_SEED, with_views=True)
 
 
 PARTS = {"plans": of_plan, "houses": of_house, "views": of_views}
