@@ -40,7 +40,8 @@ def open_context() -> Any:
             context.enable(moderngl.DEPTH_TEST)
             return context
     text = f"no headless OpenGL 3.3 on this machine ({'; '.join(faults)})"
-    raise MachineFailed(text, hint="`pbrs-farm doctor` says what to install")
+    hint = "`pbrs-farm doctor` says what to install; on Debian libegl1 libgl1-mesa-dri"
+    raise MachineFailed(text, hint=hint)
 
 
 def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
