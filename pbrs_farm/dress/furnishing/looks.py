@@ -11,7 +11,7 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.generated.assembly import Made, metal, plain
-from pbrs_farm.dress.generated.case_goods import Boards
+from pbrs_farm.dress.generated.carcass import Boards
 from pbrs_farm.dress.parts.box_mapping import box_mapped
 from pbrs_farm.dress.parts.finish_parts import grain_pattern
 from pbrs_farm.dress.style import Rgb, Style, mix, rgb

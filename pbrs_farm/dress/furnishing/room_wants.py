@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.classes import BED, BOOKSHELF, CABINET, DESK, DRESSER, NIGHT_STAND, SHELVES
-from pbrs_farm.dress.generated import case_goods
+from pbrs_farm.dress.generated import case_goods, tables
 from pbrs_farm.dress.generated.assembly import Made
-from pbrs_farm.dress.generated.case_goods import Boards, Size
+from pbrs_farm.dress.generated.carcass import Boards, Size
 from pbrs_farm.dress.space.room_kinds import RoomKind
 
 Maker = Callable[[np.random.Generator, Boards, Size], Made]
@@ -53,9 +53,9 @@ KINDS: Final[Mapping[str, Kind]] = MappingProxyType({
     "wardrobe": Kind(case_goods.wardrobe, (0.8, 1.9), (1.9, 2.2), (0.5, 0.6), 0.45, (CABINET,), ("wardrobe",)),
     "tall cabinet": Kind(case_goods.tall_cabinet, (0.3, 0.45), (1.6, 1.95), (0.26, 0.34), 0.3, (CABINET,)),
     "shoe cabinet": Kind(case_goods.shoe_cabinet, (0.5, 1.0), (0.8, 1.15), (0.18, 0.26), 0.4),
-    "console": Kind(case_goods.console, (0.6, 1.2), (0.74, 0.82), (0.26, 0.36), 0.35),
-    "bench": Kind(case_goods.bench, (0.7, 1.3), (0.44, 0.48), (0.32, 0.4), 0.35),
-    "desk": Kind(case_goods.desk, (0.8, 1.4), (0.73, 0.75), (0.5, 0.64), 0.5, (DESK,)),
+    "console": Kind(tables.console, (0.6, 1.2), (0.74, 0.82), (0.26, 0.36), 0.35),
+    "bench": Kind(tables.bench, (0.7, 1.3), (0.44, 0.48), (0.32, 0.4), 0.35),
+    "desk": Kind(tables.desk, (0.8, 1.4), (0.73, 0.75), (0.5, 0.64), 0.5, (DESK,)),
     "nightstand": Kind(_nightstand, (0.36, 0.5), (0.45, 0.6), (0.34, 0.42), 0.15, (NIGHT_STAND,), ("nightstand",), BED),
 })  # fmt: skip
 

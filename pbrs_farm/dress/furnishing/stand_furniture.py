@@ -18,7 +18,8 @@ from pbrs_farm.dress.furnishing.looks import Look, grained, look_of
 from pbrs_farm.dress.furnishing.room_floor import LOWER_M, OUT_M, RoomFloor, Spot, spot_at
 from pbrs_farm.dress.furnishing.room_wants import KINDS, WANTED, Kind
 from pbrs_farm.dress.generated.assembly import Made
-from pbrs_farm.dress.generated.case_goods import Size, desk_chair
+from pbrs_farm.dress.generated.carcass import Size
+from pbrs_farm.dress.generated.tables import desk_chair
 from pbrs_farm.dress.space import RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.walls.hanging import next_id
