@@ -1,4 +1,4 @@
-"""Peak memory of this process alone. Effects: reads /proc.
+"""Memory and CPU time of processes: of this one alone, of others and their children. Effects: reads /proc.
 
 getrusage's ru_maxrss starts at the peak of the process that started this one: a small child of a
 large parent reports the parent's memory. VmHWM belongs to the program's own address space.
@@ -6,6 +6,8 @@ large parent reports the parent's memory. VmHWM belongs to the program's own add
 
 from __future__ import annotations
 
+import os
+import resource
 from pathlib import Path
 
 
@@ -15,3 +17,27 @@ def peak_mb() -> float:
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) * 1024 / 1e6
     raise RuntimeError("/proc/self/status holds no VmHWM")
+
+
+def descendants(pid: int) -> list[int]:
+    """Process ids of all children, theirs included."""
+    try:
+        words = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        return []
+    return [p for word in words for p in (int(word), *descendants(int(word)))]
+
+
+def cpu_s(pid: int) -> float:
+    """CPU seconds of a process and of its children that have ended."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+
+
+def resident_mb(pid: int) -> float:
+    """Memory of a process now, MB. Raises OSError when it is gone."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import resource
 import shutil
 import signal
 import socket
@@ -26,6 +25,7 @@ from typing import Any
 
 from benchmarks.farm.noop_runner import N_HOUSES, batches_of
 from benchmarks.figures import write_report
+from benchmarks.memory import cpu_s, descendants, resident_mb
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.run.processes.child_process import die_with_parent
@@ -231,7 +231,7 @@ class Watch:
         self._reads.append(time.perf_counter() - began)
         used = self._farm.ledger.client.info("memory")["used_memory"] / 1e6
         pid = self._bench.processes["coordinator"].pid
-        self._samples.append((done, used, _resident_mb(pid)))
+        self._samples.append((done, used, resident_mb(pid)))
 
     def _command(self) -> float:
         began = time.perf_counter()
@@ -242,7 +242,7 @@ class Watch:
 
     def _cpu(self) -> float:
         pids = [p.pid for p in self._bench.processes.values()]
-        return sum(_cpu_s(p) for pid in pids for p in (pid, *descendants(pid)))
+        return sum(cpu_s(p) for pid in pids for p in (pid, *descendants(pid)))
 
 
 def recover_s(farm: Farm, job: str) -> float:
@@ -376,26 +376,3 @@ def _plain(store: FolderStore, key: str) -> object:
 
 
 _OF_THE_RUN = {"seconds", "worker", "attempt", "finished_utc"}
-
-
-def descendants(pid: int) -> list[int]:
-    """Process ids of all children, theirs included."""
-    try:
-        words = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    except OSError:
-        return []
-    return [p for word in words for p in (int(word), *descendants(int(word)))]
-
-
-def _cpu_s(pid: int) -> float:
-    """CPU seconds of a process and of its children that have ended."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return 0.0
-    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
-
-
-def _resident_mb(pid: int) -> float:
-    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    return pages * resource.getpagesize() / 1e6

@@ -85,12 +85,9 @@ def followed(
     rays: Rays,
 ) -> Followed:
     """The surfaces at depth z (N,) metres behind pixels' centres, looked for in the other picture."""
-    origin, directions = view.rays(rows, columns)
-    points = origin + directions * z[:, None]
-    px, _depth = other.pixels(points)
-    height, width = other.size
+    points, px, margin = _points_of(view, other, rows, columns, z)
     with np.errstate(invalid="ignore"):
-        inside = (px >= 0).all(axis=1) & (px <= np.array([width, height])).all(axis=1)
+        inside = margin >= 0
     state = np.full(len(rows), OUTSIDE, np.int64)
     at = np.nonzero(inside)[0]
     state[at] = np.where(_is_seen(points[at], other, rays), SEEN, HIDDEN)
@@ -106,20 +103,33 @@ def near_edge(
     rays: Rays,
 ) -> Bools:
     """(N,) another state is as right: on the border of the other picture, or beside what hides it."""
-    origin, directions = view.rays(rows, columns)
-    points = origin + directions * z[:, None]
-    height, width = other.size
-    px, _depth = other.pixels(points)
+    points, _px, margin = _points_of(view, other, rows, columns, z)
     with np.errstate(invalid="ignore"):
-        margin = np.minimum(px, np.array([width, height]) - px).min(axis=1)
         is_tie = np.asarray(np.abs(margin) <= BORDER_PX, bool)
     # Ask again a little beside each point: where answers differ both are right.
     seen = _is_seen(points, other, rays, slack_m=0.01)
     for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        _o, beside = view.rays(rows + JITTER_PX * dy, columns + JITTER_PX * dx)
+        origin, beside = view.rays(rows + JITTER_PX * dy, columns + JITTER_PX * dx)
         moved = origin + beside * z[:, None]
         is_tie |= _is_seen(moved, other, rays, slack_m=0.01) != seen
     return is_tie
+
+
+def _points_of(
+    view: StoredView,
+    other: OtherView,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    z: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    """(N, 3) surface points, their (N, 2) px in the other picture, (N,) px inside its border."""
+    origin, directions = view.rays(rows, columns)
+    points = origin + directions * z[:, None]
+    px, _depth = other.pixels(points)
+    height, width = other.size
+    with np.errstate(invalid="ignore"):
+        margin = np.minimum(px, np.array([width, height]) - px).min(axis=1)
+    return points, px, margin
 
 
 def _is_seen(points: Floats, other: OtherView, rays: Rays, slack_m: float = REACH_M) -> Bools:

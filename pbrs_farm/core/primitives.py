@@ -5,6 +5,7 @@ Every solid's faces are counter-clockwise seen from outside. Texture coordinates
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -14,6 +15,8 @@ from pbrs_farm.core.arrays import F64, I32, Points2
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import cross_products, lengths
 
+Triple = tuple[float, float, float]
+
 # Corner i of a box has the sign of bit k of i along axis k; quads seen from outside.
 _BOX_QUADS = np.array(
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
@@ -21,6 +24,13 @@ _BOX_QUADS = np.array(
 _SIGNS = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
 _QUAD = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 _BOX_FACES = (_QUAD + 4 * np.arange(6, dtype=np.int32)[:, None, None]).reshape(-1, 3)
+
+
+def boxes_surface(name: str, boxes: Sequence[tuple[Triple, Triple]], material: int) -> Surface:
+    """A surface of boxes along the axes, each by its low and its high corner in metres."""
+    corners = np.asarray(boxes, np.float64).reshape(-1, 2, 3)
+    quads = [box_quads((low + high) / 2, (high - low) / 2) for low, high in corners]
+    return quads_surface(name, np.concatenate(quads), material)
 
 
 def quads_surface(name: str, quads: F64, material: int) -> Surface:

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
-from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
-from pbrs_farm.core.house import Material, MaterialKind, Surface
-from pbrs_farm.core.primitives import box_quads, quads_surface
+from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.core.primitives import Triple, boxes_surface
 from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
 
 _FRAME_M: Final = 0.06  # breadth of a frame's posts
@@ -22,7 +19,6 @@ _SASH_M: Final = 0.05  # breadth of a sash's bars
 _PANE_M: Final = 0.006
 _WIDEST_SASH_M: Final = 0.95
 
-Triple = tuple[float, float, float]
 _Box = tuple[Triple, Triple]  # low and high corner
 
 
@@ -37,19 +33,11 @@ def joinery(opening: PlanOpening, wall_m: float, colour: Triple) -> Shape:
     if opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE):
         leaf = _leaf(w, h, d)
         handles = _handles(w, d, opening.hinge_at_start)
-        surfaces = (_boxes("frame", [*frame, *leaf], 0), _boxes("handle", handles, 1))
+        surfaces = (boxes_surface("frame", [*frame, *leaf], 0), boxes_surface("handle", handles, 1))
         return Shape(surfaces, (paint, metal))
     bars, panes = _sashes(w, h)
-    surfaces = (_boxes("frame", [*frame, *bars], 0), _boxes("pane", panes, 1))
+    surfaces = (boxes_surface("frame", [*frame, *bars], 0), boxes_surface("pane", panes, 1))
     return Shape(surfaces, (paint, glass))
-
-
-def _boxes(name: str, boxes: list[_Box], material: int) -> Surface:
-    quads: list[F64] = []
-    for low, high in boxes:
-        a, b = np.asarray(low, np.float64), np.asarray(high, np.float64)
-        quads.append(box_quads((a + b) / 2, (b - a) / 2))
-    return quads_surface(name, np.concatenate(quads), material)
 
 
 def _frame(w: float, h: float, d: float, *, has_sill: bool) -> list[_Box]:

@@ -15,8 +15,8 @@ from shapely.geometry import Polygon
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
-from pbrs_farm.core.house import Material, Surface
-from pbrs_farm.core.primitives import box_quads, quads_surface
+from pbrs_farm.core.house import Material
+from pbrs_farm.core.primitives import Triple, box_quads, boxes_surface, quads_surface
 from pbrs_farm.generate.floor_plan import Plan, Point, Rect, RoomType
 from pbrs_farm.generate.plan_walls import largest_rectangle
 
@@ -26,8 +26,6 @@ _TREAD_M: Final = 0.04  # thickness of a tread
 _POST_M: Final = 0.035
 _APART_M: Final = 0.11  # from post to post
 _WOOD: Final = (0.62, 0.45, 0.29)
-
-Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,21 +92,13 @@ def staircase(stair: Stair, rise: float, paint: Triple) -> Shape:
     wood = Material("treads", diffuse=_WOOD, specular=(0.2, 0.2, 0.2), shininess=30.0)
     painted = Material("stairs", diffuse=paint, specular=(0.2, 0.2, 0.2), shininess=30.0)
     surfaces = (
-        _boxes("risers", boards, 0), _boxes("treads", [tread for _, tread in steps], 1),
-        _boxes("railing", rails, 0), quads_surface("handrail", slope, 1),
+        boxes_surface("risers", boards, 0), boxes_surface("treads", [tread for _, tread in steps], 1),
+        boxes_surface("railing", rails, 0), quads_surface("handrail", slope, 1),
     )  # fmt: skip
     return Shape(surfaces, (painted, wood))
 
 
 _Box = tuple[Triple, Triple]  # low and high corner
-
-
-def _boxes(name: str, boxes: list[_Box], material: int) -> Surface:
-    quads: list[F64] = []
-    for low, high in boxes:
-        a, b = np.asarray(low, np.float64), np.asarray(high, np.float64)
-        quads.append(box_quads((a + b) / 2, (b - a) / 2))
-    return quads_surface(name, np.concatenate(quads), material)
 
 
 def _step(at: Point, size: Point, top: float) -> tuple[_Box, _Box]:

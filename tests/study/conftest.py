@@ -14,3 +14,12 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
         return None
     is_marked = "\npytestmark = pytest.mark.study\n" in collection_path.read_text(encoding="utf-8")
     return True if is_marked else None
+
+
+@pytest.fixture(autouse=True)
+def one_thread(request: pytest.FixtureRequest) -> None:
+    """Tests of torch use one thread: sums of several differ in their last bits."""
+    if request.node.get_closest_marker("study"):
+        import torch
+
+        torch.set_num_threads(1)

@@ -91,15 +91,8 @@ def train_network(
         done = step + 1
         if not share.is_first:
             continue
-        # Means since the last row: loss, and views a second.
         if done % plan.log_every == 0 or done == plan.steps:
-            seconds = max(time.monotonic() - started, 1e-9)
-            row = {
-                "step": done,
-                "loss": loss_sum / n_summed,
-                "rate": rate_at(plan, step),
-                "views_s": round(n_summed * plan.batch / seconds, 2),
-            }
+            row = _row_since(plan, step, loss_sum, n_summed, time.monotonic() - started)
             folder.add_metrics(row)
             observe(row)
             started, loss_sum, n_summed = time.monotonic(), 0.0, 0
@@ -113,6 +106,18 @@ def train_network(
     if share.is_first:
         save_weights(folder.weights, network, _at(where, plan.steps))
     return network
+
+
+def _row_since(
+    plan: Plan, step: int, loss_sum: float, n_summed: int, seconds: float
+) -> dict[str, float]:
+    """A row of the metrics: means since the last one of the loss, and views a second."""
+    return {
+        "step": step + 1,
+        "loss": loss_sum / n_summed,
+        "rate": rate_at(plan, step),
+        "views_s": round(n_summed * plan.batch / max(seconds, 1e-9), 2),
+    }
 
 
 def _at(position: Position, step: int) -> Position:

@@ -8,7 +8,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-import torch
 
 from pbrs_farm.cli import main
 
@@ -19,7 +18,6 @@ _RENDER = (
 
 
 def test_four_lights_are_compared_on_a_home_that_never_trained(tmp_path: Path) -> None:
-    torch.set_num_threads(1)
     assert main([*_RENDER.split(), "--out", str(tmp_path / "root")]) == 0
     # Let the same rooms stand for another home.
     (house,) = (tmp_path / "root" / "houses").iterdir()

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
@@ -24,21 +23,11 @@ from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.tasks.task_choice import task_of
 from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views
 from tests.study.small_roots import fill
-from tests.study.training.made_views import small_plan
+from tests.study.training.made_views import TINY, small_plan
 
 pytestmark = pytest.mark.study
 SIZE = (40, 32)
 HOMES = {f"home-{k}-00000000": 3 for k in range(3)}
-TINY = [
-    word
-    for field in ("width_px=40", "height_px=32", "batch=2", "steps=3", "threads=1", "log_every=1")
-    for word in ("--set", field)
-]  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _one_thread() -> None:
-    torch.set_num_threads(1)
 
 
 @pytest.fixture(scope="module")

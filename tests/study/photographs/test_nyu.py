@@ -8,7 +8,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-import torch
 from scipy.io import savemat
 
 from pbrs_farm.cli import main
@@ -18,19 +17,9 @@ from pbrs_farm.study.judging.judged_places import judged_place
 from pbrs_farm.study.tasks.task_choice import task_of
 from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views
 from tests.study.small_roots import fill
-from tests.study.training.made_views import small_plan
+from tests.study.training.made_views import TINY, small_plan
 
 pytestmark = pytest.mark.study
-TINY = [
-    word
-    for field in ("width_px=40", "height_px=32", "batch=2", "steps=3", "threads=1", "log_every=1")
-    for word in ("--set", field)
-]  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _one_thread() -> None:
-    torch.set_num_threads(1)
 
 
 @pytest.fixture

@@ -15,6 +15,14 @@ SMALL = {
 }  # fmt: skip
 
 
+TINY = [
+    word
+    for field in ("width_px=40", "height_px=32", "batch=2", "steps=3", "threads=1", "log_every=1")
+    for word in ("--set", field)
+]  # fmt: skip
+"""The same for three steps, as words of the command line."""
+
+
 def small_plan(task: str = "normals", **changed: str) -> Plan:
     """Plan tiny at 40x32 for six steps of two views."""
     return plan_of(task, "tiny", SMALL | changed)

@@ -24,11 +24,6 @@ pytestmark = pytest.mark.study
 HOMES = {f"home-{k}-00000000": 3 for k in range(4)}
 
 
-@pytest.fixture(autouse=True)
-def _one_thread() -> None:
-    torch.set_num_threads(1)
-
-
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Twelve views of four homes."""

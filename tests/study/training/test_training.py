@@ -50,11 +50,6 @@ train(Job(plan, Path(sys.argv[1])), views(3, plan), views(2, plan))
 """
 
 
-@pytest.fixture(autouse=True)
-def _one_thread() -> None:
-    torch.set_num_threads(1)
-
-
 @pytest.mark.parametrize("task", ["normals", "boundaries"])
 def test_a_killed_run_goes_on_to_the_same_weights(task: str, tmp_path: Path) -> None:
     plan = small_plan(task)
