@@ -79,6 +79,9 @@ def train_network(
     # What a checkpoint must agree with to be gone on from.
     where = Position(0, task.name, plan_digest(plan), views.digest(), seed)
     first = _resumed(folder, network, optimiser, where)
+    if share.is_first:
+        # Rows of steps after the checkpoint go: these steps are run again.
+        folder.keep_metrics_until(first)
     model = nn.parallel.DistributedDataParallel(network) if share.of > 1 else network
     loop = _Loop(model, optimiser, task, plan, seed, share)
 
@@ -127,15 +130,12 @@ def _at(position: Position, step: int) -> Position:
 def _resumed(
     folder: RunFolder, network: nn.Module, optimiser: torch.optim.Optimizer, where: Position
 ) -> int:
-    """Take up the checkpoint, if there is one; the number of steps that are done."""
+    """Take up the checkpoint, if there is one; the number of steps that are done. Writes nothing."""
     if not folder.checkpoint.exists():
-        folder.keep_metrics_until(0)
         return 0
     position = load_checkpoint(folder.checkpoint, network, optimiser)
     if _at(position, 0) != where:
         raise BadInput(folder.checkpoint, "", "a checkpoint of another task, plan, seed or views")
-    # Rows of steps after the checkpoint go: these steps are run again.
-    folder.keep_metrics_until(position.step)
     return position.step
 
 

@@ -10,8 +10,12 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.training.run_folder import finished_run
+from pbrs_farm.study.networks.network_choice import network_of
+from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.training.run_folder import RunFolder, finished_run
+from pbrs_farm.study.training.training_loop import Share, train_network
 from tests.study.small_roots import fill
+from tests.study.training.made_views import small_plan, views
 
 pytestmark = pytest.mark.study
 _FIELDS = "width_px=40 height_px=32 batch=2 steps=4 judge_every=2 threads=1 log_every=1"
@@ -31,3 +35,15 @@ def test_two_processes_train_one_network(tmp_path: Path) -> None:
     rows = [json.loads(line) for line in (folder.root / "metrics.jsonl").read_text().splitlines()]
     assert [row["step"] for row in rows if "loss" in row] == [1, 2, 3, 4]
     assert [row["step"] for row in rows if "held_out_error" in row] == [2, 4]
+
+
+def test_a_process_that_is_not_the_first_writes_no_file(tmp_path: Path) -> None:
+    plan = small_plan(steps="2", judge_every="1")
+    task = task_of("normals")
+    folder = RunFolder(tmp_path)
+    network = network_of(plan.network, task.n_out(plan))
+    train_network(
+        network, views(3, plan), task, plan, seed=0, folder=folder, observe=lambda _row: None,
+        judge=lambda _network: {}, share=Share(rank=1, of=1),
+    )  # fmt: skip
+    assert list(tmp_path.iterdir()) == []
