@@ -57,7 +57,7 @@ test-study: setup ## the study's tests that need torch; installs its CPU build (
 	$(BIN)/pytest -m "study and not slow and not gpu"
 
 bench: setup ## measure everything but house, dress, made, light, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
-	@$(if $(filter study lived_in,$(NAME)),$(study-packages))
+	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## light transport: path, metropolis, denoiser

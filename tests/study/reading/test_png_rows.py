@@ -1,9 +1,20 @@
+from importlib import import_module
+
 import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import array_from_png, png_from_array
+from pbrs_farm.study.reading import png_rows
 from pbrs_farm.study.reading.png_rows import array_of_rows, png_of_rows
+
+
+@pytest.fixture(
+    params=["zlib", pytest.param("zlib_ng.zlib_ng", marks=pytest.mark.study)], autouse=True
+)
+def _inflating(request, monkeypatch):
+    """Every test of this file with either library, whichever is installed beside the other."""
+    monkeypatch.setattr(png_rows, "inflating", import_module(request.param))
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
