@@ -6,6 +6,7 @@ import { toneOf } from "./tone.js";
 
 const SAMPLE = 6000; // pixels that tell the exposure while a slider moves
 const SETTLE_MS = 120; // then all of them do
+const TELL_MS = 200; // between two commands shown: new text costs a frame as much as the picture
 const SLOW_MS = 30; // between two pictures: a machine that takes longer draws fewer pixels
 const MOST_STEP = 3; // every so many-th pixel, while a slider moves
 const by = (id) => document.getElementById(id);
@@ -57,7 +58,7 @@ class Relight {
     this.controls = controlsOf(light, said, (control) => this.change(control));
     by("controls").replaceChildren(...this.controls.map((c) => c.element));
     for (const button of document.querySelectorAll("[data-preset]")) button.addEventListener("click", () => this.preset(button.dataset.preset));
-    by("copy").addEventListener("click", () => navigator.clipboard?.writeText(by("command").textContent));
+    by("copy").addEventListener("click", () => navigator.clipboard?.writeText(commandOf(this.controls)));
     by("save").addEventListener("click", () => this.save(canvas));
     by("status").textContent = "";
     this.change();
@@ -71,17 +72,26 @@ class Relight {
   // control: the only one that moved, or none for several.
   change(control) {
     stage.dataset.settled = "";
-    by("command").textContent = commandOf(this.controls);
     lastState = this.controls;
-    keepInAddress(this.controls, by("denoise").checked);
+    if (control) this.telling ||= setTimeout(() => this.#tell(), TELL_MS);
+    else this.#tell();
     if (control !== this.moved) this.held = null;
     this.moved = control;
     clearTimeout(this.settling);
     this.waiting ||= requestAnimationFrame((now) => this.#frame(now));
   }
 
+  // The command that makes this picture, and the address that shows it again.
+  #tell() {
+    clearTimeout(this.telling);
+    this.telling = 0;
+    by("command").textContent = commandOf(this.controls);
+    keepInAddress(this.controls, by("denoise").checked);
+  }
+
   settle() {
     clearTimeout(this.settling);
+    this.#tell();
     this.all ??= this.#numbers(1);
     const { albedo, layers } = this.all;
     const factors = factorsOf(this.controls, this.names);
