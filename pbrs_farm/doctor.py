@@ -169,7 +169,7 @@ def check_variant(name: str) -> str:
 
     # Dr.Jit would load an old LLVM and crash.
     if name.startswith("llvm") and not variant.find_llvm():
-        raise SystemExit("no LLVM of version 17 or later")
+        raise SystemExit(f"no LLVM of version {variant.MIN_LLVM} or later")
     variant.choose_variant()
     if not variant.works(name):
         raise SystemExit("does not work here")

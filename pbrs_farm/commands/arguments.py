@@ -179,7 +179,10 @@ def views_wanted(args: argparse.Namespace) -> int:
 
 
 def home_arguments(homes: list[str], houses: str | None) -> list[str]:
-    """The homes asked for, ranges of made ones one by one; with --houses, those of the list below the SUNCG root."""
+    """The homes asked for, ranges of made ones one by one.
+
+    houses: a list of SUNCG houses, and homes their root alone. Raises BadInput.
+    """
     from pbrs_farm.core.made_home import expanded
     from pbrs_farm.read.source import suncg_list
 

@@ -91,7 +91,7 @@ def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
     add = p.add_argument
     text = "processes (default 1; each view uses all cores)"
     add("--jobs", type=int, default=1, metavar="N", help=text)
-    text = "seconds a step may take"
+    text = "seconds a step may take (default 3600)"
     add("--step-timeout", type=float, default=3600.0, metavar="S", help=text)
     text = "seconds a process may say nothing (default: those of a step)"
     add("--silence", type=float, default=0.0, metavar="S", help=text)

@@ -25,6 +25,7 @@ from pbrs_farm.commands.arguments import (
     views_wanted,
     warn,
 )
+from workers.job_priority import DEFAULT_PRIORITY, LEAST_URGENT
 
 if TYPE_CHECKING:
     from workers.job import JobSpec
@@ -44,8 +45,9 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--reference", type=Path, help="reference file: select when the job ends")
     p.add_argument("--gpu", action="store_true", help="light goes to the queue light.gpu")
     p.add_argument(
-        "--priority", type=int, default=5, choices=range(10), help="0 goes first, 9 last"
-    )
+        "--priority", type=int, default=DEFAULT_PRIORITY, choices=range(LEAST_URGENT + 1),
+        help=f"0 goes first, {LEAST_URGENT} last",
+    )  # fmt: skip
     p.add_argument("--update", action="store_true", help="give the store this recipe")
     p.add_argument("--dry-run", action="store_true", help="print tasks, hours, storage; do nothing")
     p.add_argument("--slots", type=int, default=2, help="for --dry-run: tasks at once")

@@ -83,12 +83,9 @@ class CameraBlur:
 
     aperture_radius_m: float = 0.0  # of the entrance pupil; 0 = all depths are sharp
     focus_m: float = 1.0  # depth_z that is sharp
-    velocity_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # world, while the shutter is open
-    turn_rad: tuple[float, float, float] = (
-        0.0,
-        0.0,
-        0.0,
-    )  # the same, about the axis through the eye
+    # World frame, from the shutter's opening to its closing; the turn about the axis through the eye.
+    velocity_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,8 @@ PbrsError                 every error a user can meet; one clear line, no traceb
 ├── RenderFailed          a picture could not be made: view, mode and seed reproduce it
 ├── StoreFailed           an object could not be read or written: its key
 │   ├── ObjectMissing     there is no object under that key
-│   └── StoreRefused      the whole store is closed to us: credentials, bucket, read-only
+│   ├── StoreRefused      the whole store is closed to us: credentials, bucket, read-only
+│   └── StoreUnavailable  the store did not answer; Transient
 └── MachineFailed         this machine lacks something: LLVM, EGL, a package
 
 Transient                 a second base; only errors that carry it are worth another try

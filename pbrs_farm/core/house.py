@@ -256,7 +256,7 @@ class StoredCamera:
 class Source:
     """Where a house came from and under which terms; "" where nothing is known."""
 
-    kind: str  # "sweethome3d", "suncg", "gltf" or "builtin"
+    kind: str  # "sweethome3d", "suncg", "gltf", "object" or "builtin"
     file: str
     sha256: str  # of the source's bytes
     package: str = ""  # distribution package and version it was fetched from

@@ -22,9 +22,8 @@ class Layer:
     nodata: str  # what a pixel holds that sees nothing
     step: str  # the step of run/plan.py that writes it
     optional: bool = False  # only when --layers names it
-    partner: str = (
-        ""  # "next", "previous" or "stereo": the view without which there is no such file
-    )
+    # "next", "previous" or "stereo": the view without which there is no such file.
+    partner: str = ""
 
 
 def _picture(name: str, step: str) -> Layer:

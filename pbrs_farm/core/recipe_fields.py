@@ -93,7 +93,7 @@ class CameraFields(FieldGroup):
     preset: Literal["paper", "released", "photo"] = Field(
         "paper", description="whose rules and score; photo: as people photograph rooms"
     )
-    n_sectors: int = Field(6, ge=1, le=360, description="per room, 60 degrees each")
+    n_sectors: int = Field(6, ge=1, le=360, description="of a room, equal angles each")
     cell_m: float = Field(0.25, ge=0.05, le=100, description="edge of the viewpoint grid")
     height_min_m: float = Field(1.5, gt=0, le=100, description="eye above the floor's surface")
     height_max_m: float = Field(1.6, gt=0, le=100)
@@ -152,7 +152,7 @@ class CameraFields(FieldGroup):
 
 
 class ImageFields(FieldGroup):
-    """Size and modes of the pictures."""
+    """Size of the pictures."""
 
     width_px: int = Field(640, gt=0, le=16384)
     height_px: int = Field(480, gt=0, le=16384)
@@ -249,9 +249,9 @@ class EmissionFields(FieldGroup):
     compensate_shades: bool = Field(True, description="flux is what leaves the lamp, shade and all")
     lamp_kelvin_min: float = Field(2700.0, ge=500, le=40_000)
     lamp_kelvin_max: float = Field(3000.0, ge=500, le=40_000)
-    released_bulb: float = Field(400.0, ge=0, le=1e7)
-    released_shade: float = Field(0.5, ge=0, le=1e7)
-    released_sky: float = Field(75.0, ge=0, le=1e7)
+    released_bulb: float = Field(400.0, ge=0, le=1e7, description="radiance, W m-2 sr-1")
+    released_shade: float = Field(0.5, ge=0, le=1e7, description="radiance, W m-2 sr-1")
+    released_sky: float = Field(75.0, ge=0, le=1e7, description="factor of the sky's picture")
 
 
 class MaterialFields(FieldGroup):
@@ -264,7 +264,7 @@ class ToneFields(FieldGroup):
     """Radiance to 8 bits."""
 
     preset: Literal["photo", "released"] = "photo"
-    key: float = Field(0.18, gt=0, le=1000)
+    key: float = Field(0.18, gt=0, le=1000, description="released: Reinhard's key value")
     white_balance: float = Field(
         0.7,
         ge=0,

@@ -1,1 +1,1 @@
-"""An output folder in the forms other tools read: COCO, HDF5, WebDataset, the released layout."""
+"""An output folder in the forms other tools read; export_views.py lists them, a module each."""

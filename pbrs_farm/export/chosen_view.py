@@ -1,4 +1,7 @@
-"""What of a view is exported, and at which size: its layers as bytes and arrays, its table. Effects: reads the view."""
+"""What of a view is exported, and at which size: its layers as bytes and arrays, its table.
+
+Effects: reads the view.
+"""
 
 from __future__ import annotations
 

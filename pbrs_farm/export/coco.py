@@ -22,9 +22,9 @@ _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructu
 def write_coco(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """annotations.json, images/<house>/<view>.png and the panoptic form; the number of files.
 
-    Categories are NYU40's; an instance without a class is left out. Masks are compressed
-    run lengths (as pycocotools reads them), iscrowd 0. Fields of
-    our own: house, view, K, lens and depth (where no pin-hole), world_from_camera_opencv, instance_id, visible_fraction, truncated.
+    Categories are NYU40's; an instance without a class is left out. Masks are compressed run
+    lengths (as pycocotools reads them), iscrowd 0. Fields of our own: house, view, K, lens and
+    depth (where no pin-hole), world_from_camera_opencv, instance_id, visible_fraction, truncated.
     """
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []

@@ -31,9 +31,8 @@ class Marker(Record):
     view_id: str | None = None
     digest: str  # of ids, the recipe's fields in use, the step's version, its inputs' digests
     files: tuple[StoredFile, ...] = ()
-    facts: dict[str, Any] = Field(
-        default_factory=dict
-    )  # for later steps and view.json; equal for equal inputs
+    # For later steps and view.json; equal for equal inputs.
+    facts: dict[str, Any] = Field(default_factory=dict)
     # The only clocks in the whole output:
     seconds: float = 0.0
     worker: str = ""

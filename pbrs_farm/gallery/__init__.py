@@ -1,1 +1,1 @@
-"""Contact sheet, HTML gallery and label sheet of an output folder."""
+"""Pictures of an output folder for people: sheets, gallery, plans, films, before and after."""

@@ -72,7 +72,7 @@ class Rasterizer:
         self._light_features = light_features(house)
         self._programs: dict[tuple[str, int], tuple[Any, Any]] = {}  # (mode, kind) -> program, VAO
         self._queries = [self._context.query(samples=True) for _ in range(self._mesh.n_draws)]
-        self._targets: dict[tuple[int, int], RenderTarget] = {}  # (width, height, kind)
+        self._targets: dict[tuple[int, int], RenderTarget] = {}  # (width, height)
         self._upload(house, textures, n_lights)
 
     def _upload(

@@ -41,9 +41,10 @@ SourceKind = Literal["builtin", "made", "example", "sweethome3d", "suncg", "gltf
 class SourceRef(Record):
     """A house before it is read.
 
-    location: a path, an example home's name, "builtin" or the word of a made home; of an object without context the JSON
-    of its ObjectModel. sha256: of the file's bytes (SUNCG: of house.json). companions: digest of
-    all other files that reading opens, "" = none, None = not known (named by an earlier version).
+    location: a path, an example home's name, "builtin" or the word of a made home; of an object
+    without context the JSON of its ObjectModel. sha256: of the file's bytes (SUNCG: of
+    house.json). companions: digest of all other files that reading opens, "" = none, None = not
+    known (named by an earlier version).
     dress_seed: what it is dressed by between reading and repair; its id then ends in `-d<seed>`.
     """
 
@@ -303,7 +304,7 @@ def _read_object(source: SourceRef, fields: ReadFields) -> House:
 
 
 def check_unchanged(source: SourceRef) -> None:
-    """Raise BadHouse or MachineFailed where a file of the source is not what it was when the source was named."""
+    """Raise BadHouse or MachineFailed where a file is not what it was when the source was named."""
     # Name the source again and compare the digests, where both are known.
     now = _reference(source.kind, source.location, SourceFiles())
     is_known = source.companions is not None

@@ -155,7 +155,7 @@ class RepairReport(Record):
     structure: StructureReport = StructureReport()
     sources: tuple[SourceRepair, ...] = ()
     fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one: nothing lit them
-    added_lamps: tuple[str, ...] = ()  # ids of the rooms that got one: daylight, no lamp
+    added_lamps: tuple[str, ...] = ()  # ids of rooms with no lamp, or too weak ones
     rooms: tuple[RoomAudit, ...] = ()
     is_leaking: bool | None = None  # None = not measured
     leaks: LeakReport | None = None

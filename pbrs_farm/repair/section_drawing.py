@@ -20,8 +20,8 @@ _TEXT_M = 0.25  # height of letters
 def section_svg(before: House, after: House, level_id: str) -> str:
     """Side by side: every wall of before with its outline, and the solid walls of after.
 
-    The cut goes through doors and windows. What is wrong shows before: walls that overlap, miss each other or have no thickness. SVG, plan with
-    x right and z down, one unit a metre.
+    The cut goes through doors and windows. What is wrong shows before: walls that overlap, miss
+    each other or have no thickness. SVG, plan with x right and z down, one unit a metre.
     """
     # Cut wall by wall before repair, all of the structure at once after it.
     y = before.level(level_id).elevation + _CUT_M

@@ -21,8 +21,8 @@ NYUV2_SHARES: Final[Mapping[str, float]] = {
 }  # fmt: skip
 """Shares of pixels over NYUv2's 1,449 labelled frames, unlabelled pixels counted."""
 
-# (14,) the same of the labelled pixels alone.
 _PHOTOGRAPHS: Final[F64] = np.array([NYUV2_SHARES.get(name, 0.0) for name in NYU13_NAMES])
+# (14,) the same of the labelled pixels alone.
 _OF_LABELLED: Final[F64] = _PHOTOGRAPHS / _PHOTOGRAPHS.sum()
 
 

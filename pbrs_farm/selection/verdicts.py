@@ -80,9 +80,8 @@ _NUMBERS: Final = (
     "colour_score", "depth_score",
 )  # fmt: skip
 
-_BLACK: Final = (
-    1.5 / 255
-)  # median luma of a picture in which nothing is seen, whatever the thresholds
+# Median luma of a picture in which nothing is seen, whatever the thresholds.
+_BLACK: Final = 1.5 / 255
 
 
 def _floats(scores: Any, name: str) -> F64:

@@ -18,8 +18,9 @@ def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, 
     """A row per corner of the room's polygon, at its floor and at its nominal ceiling.
 
     corner: number in the polygon. at: "floor" or "ceiling". world: (x, y, z) in metres. pixel:
-    (x, y) in px, also beyond the picture's edges; None where the lens does not see it. visible: it lies in the
-    picture and nothing in depth_z (H, W) occludes it. A sloped or stepped ceiling is not followed.
+    (x, y) in px, also beyond the picture's edges; None where the lens does not see it. visible:
+    it lies in the picture and nothing in depth_z (H, W) occludes it. A sloped or stepped ceiling
+    is not followed.
     """
     # List the polygon's corners at both heights, with their pixels and depths.
     rows = []

@@ -15,9 +15,8 @@ from pbrs_farm.core.house import MAX_INSTANCES, House
 from pbrs_farm.truth.boundary import instance_boundary
 
 DEPTH_MAX_MM = 65535  # the largest 16-bit value
-UNIT_TOLERANCE = (
-    0.1  # n is valid while | |n|^2 - 1 | <= this: the published rule (docs/spec/suncg.md section 5)
-)
+# n is valid while | |n|^2 - 1 | <= this: the published rule (docs/spec/suncg.md section 5).
+UNIT_TOLERANCE = 0.1
 
 
 def depth_mm(depth_z: DepthZ) -> NDArray[np.uint16]:

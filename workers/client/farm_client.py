@@ -257,7 +257,7 @@ class Farm:
         return self._steer(job, "reduce")
 
     def set_priority(self, job: str, priority: int) -> str:
-        """Feed the job by another number, 0 first; from the coordinator's next turn. Its state."""
+        """Dispatch the job by another priority, 0 first, from the coordinator's next turn; its state."""
         state = self._steer(job, "priority", str(priority))
         # A job that is recovered keeps it; who only steers may do without a store.
         if self.config.store_url:

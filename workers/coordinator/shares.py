@@ -29,7 +29,8 @@ class Shares:
     def split(self, room: Mapping[str, int], views: Sequence[JobView]) -> dict[str, dict[str, int]]:
         """Job -> lane -> how many of its tasks may be sent, together at most room[lane].
 
-        A lane is a stage, or light on a GPU. views: most urgent first. What no job has ready is left over. Charges nothing: `charge` does.
+        A lane is a stage, or light on a GPU. views: most urgent first. What no job has ready is
+        left over. Charges nothing: `charge` does.
         """
         given = {view.job_id: dict.fromkeys(room, 0) for view in views}
         for stage, n_free in room.items():

@@ -1,1 +1,1 @@
-"""Triangle meshes: OBJ and MTL, triangulation, shading normals, primitive solids."""
+"""Triangle meshes: OBJ and MTL, triangulation, shading normals, level areas in plan."""

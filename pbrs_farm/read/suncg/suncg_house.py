@@ -1,4 +1,7 @@
-"""A SUNCG house (v1, or v2 by its arch.json) -> House (docs/spec/suncg.md sections 1 and 2). Effect: reads files below root."""
+"""A SUNCG house (v1, or v2 by its arch.json) -> House; docs/spec/suncg.md sections 1 and 2.
+
+Effects: reads files below the root.
+"""
 
 from __future__ import annotations
 

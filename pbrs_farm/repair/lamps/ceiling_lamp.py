@@ -1,7 +1,6 @@
 """The lamp that repair hangs in a room: where, and what it looks like; no effects.
 
-`ceiling_lamp` is the one place that says what an added lamp is: a ball of light. A source whose
-catalogue has pendants can give one of those instead.
+`ceiling_lamp` is the one place that says what an added lamp is: a ball of light.
 """
 
 from __future__ import annotations

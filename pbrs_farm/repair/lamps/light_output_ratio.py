@@ -24,9 +24,8 @@ _SEE_THROUGH = frozenset({MaterialKind.GLASS, MaterialKind.PANE, MaterialKind.BU
 _SPACING_M = 30.0  # between lamps, so that none meets another's rays
 _REACH_M = 14.0  # a ray that gets this far has left its lamp
 _MAX_LAYERS = 12  # of shade that one ray passes, or bounces off the structure
-_AT_LAMP_M = (
-    0.05  # structure this near the lamp's bounds bounces its light, farther off is the room
-)
+# Structure this near the lamp's bounds bounces its light; what is farther off is the room's.
+_AT_LAMP_M = 0.05
 _NEAR_M = 0.5  # a bulb that sees structure from behind this near is inside of it
 _BOUNCE = 0.7  # reflectance of structure: a light paint
 _STRUCTURE = -1  # in part_of_face

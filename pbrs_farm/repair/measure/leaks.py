@@ -48,7 +48,8 @@ def leaks_of_house(
 ) -> LeakReport:
     """Count, for each closed space, the rays that reach the sky. The house is a repaired one.
 
-    interiors: by room id. plugs: fill its openings. Only structure and plugs stop rays: furniture hides no leak.
+    interiors: by room id. plugs: fill its openings. Only structure and plugs stop rays: furniture
+    hides no leak.
     """
     meter = LeakMeter() if meter is None else meter
     # Trace rays against the structure alone, its openings filled.

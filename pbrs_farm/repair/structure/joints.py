@@ -29,9 +29,8 @@ def joints_between_walls(
 ) -> tuple[list[tuple[Wall, Manifold]], int]:
     """A solid across each place where two walls come within GAP_M, with the wall it belongs to.
 
-    rooms: plan area of all rooms, into which no corner is filled.
-
-    Second: how many of them bridge a gap (the others lie inside walls that touch).
+    Second: how many of them bridge a gap (the others lie inside walls that touch). rooms: plan
+    area of all rooms, into which no corner is filled.
     """
     found: list[tuple[Wall, Manifold]] = []
     n_gaps = 0

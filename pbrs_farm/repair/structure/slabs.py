@@ -77,7 +77,7 @@ def visible_areas(
 ) -> list[plan.Shape]:
     """For each surface the part of its footprint it shows: where surfaces overlap, the later one.
 
-    Under walls, where two footprints meet, the earlier one. FloorsAndCeilings at other heights do not count.
+    Under walls, where two footprints meet, the earlier one. Surfaces at other heights do not count.
     """
     own = []
     for i, surface in enumerate(surfaces):

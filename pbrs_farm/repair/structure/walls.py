@@ -77,9 +77,8 @@ def walls_from_house(
 def _wall(
     item: Item, index: int, solid: Manifold, patches: Sequence[Patch], *, thickened: bool = False
 ) -> Wall:
-    named = {
-        s.name: s.material for s in reversed(item.surfaces)
-    }  # the first surface of a name counts
+    # The first surface of a name counts.
+    named = {s.name: s.material for s in reversed(item.surfaces)}
     low, high = bounds(solid)
     footprint, top = _footprint_and_top(patches, float(high[1]))
     return Wall(

@@ -1,7 +1,7 @@
 """A home file's bytes -> its XML tree and the contents it names; no effects.
 
 Nothing in the file is trusted: entity definitions and external entities are rejected unexpanded,
-zip entries are bounded (read.resources), and no class of a Java stream is loaded (java_stream).
+zip entries are bounded (resources.py), and no class of a Java stream is loaded (java_stream).
 """
 
 from __future__ import annotations

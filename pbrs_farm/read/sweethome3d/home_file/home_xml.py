@@ -139,7 +139,7 @@ class PlanPiece:
     angle: float  # about y, radians
     pitch: float  # about x
     roll: float  # about z
-    size: tuple[float, float, float]  # width, height, depth, m
+    size: tuple[float, float, float]  # width, depth, height, m
     height_in_plan: float | None
     is_mirrored: bool
     rotation: Matrix3 | None  # of the model in its box

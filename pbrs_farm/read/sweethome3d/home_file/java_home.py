@@ -1,7 +1,7 @@
 """The serialised entry `Home` of old .sh3d files -> the tree of the Home.xml that says the same.
 
-No effects. The elements are those that parse.py reads; fields that a version of the program did
-not have yet are left out, so that the same defaults hold.
+No effects. The elements are those that parse_home.py and parse_pieces.py read; fields that a
+version of the program did not have yet are left out, so that the same defaults hold.
 """
 
 from __future__ import annotations
