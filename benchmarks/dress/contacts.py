@@ -74,7 +74,11 @@ def things_of(house: House, source: House) -> list[Thing]:
 
 
 def _equal(a: Floats, b: Floats) -> bool:
-    return a.shape == b.shape and bool(np.array_equal(a, b))
+    # Doors are parted into leaf and frame: the same triangles in another order.
+    if a.shape != b.shape:
+        return False
+    rows = [x.reshape(len(x), 9) for x in (a, b)]
+    return bool(np.array_equal(*(r[np.lexsort(r.T[::-1])] for r in rows)))
 
 
 def penetrations(things: Sequence[Thing]) -> list[tuple[str, str, float]]:

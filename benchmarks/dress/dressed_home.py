@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrs_farm.core.house import House, Surface, geometry_from_house
+from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.dressing import dress
 from pbrs_farm.read.source import read_house, resolve, variants
@@ -40,6 +40,7 @@ def measured(name: str, seed: int, parts: tuple[str, ...]) -> dict[str, Any]:
 def _dressed(name: str, seed: int) -> tuple[dict[str, Any], House]:
     """Dress on one core, look at every contact, and say what each surface is made of."""
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    from benchmarks.dress.changed import looks_of
     from benchmarks.dress.contacts import blocked_doors, floating, penetrations, things_of
     from pbrs_farm.run.dressed_house import catalogue_of
 
@@ -62,8 +63,7 @@ def _dressed(name: str, seed: int) -> tuple[dict[str, Any], House]:
         "doors_blocked": blocked_doors(house, things),
         "gates": {g.name: [g.n_checked, g.n_taken_out, g.n_left] for g in report.gates},
         "added": report.added,
-        "surfaces": _signatures(house, len(source.items)),
-    }, house
+    } | looks_of(house, source), house
 
 
 def house_as_a_run_has_it(name: str) -> House:
@@ -72,25 +72,6 @@ def house_as_a_run_has_it(name: str) -> House:
 
     recipe = recipe_from_name("fast")
     return kept(read_house(resolve(name), recipe.read), recipe)
-
-
-def _signatures(house: House, n_source: int) -> list[list[Any]]:
-    """(item, surface, square metres, what it is and of what) of the things the home came with."""
-    rows: list[list[Any]] = []
-    for k, item in enumerate(house.items[:n_source]):
-        mesh = hashlib.sha256(b"".join(s.positions.tobytes() for s in item.surfaces)).hexdigest()
-        for j, surface in enumerate(item.surfaces):
-            material = repr(house.materials[surface.material])
-            uvs = hashlib.sha256(b"" if surface.uvs is None else surface.uvs.tobytes()).hexdigest()
-            text = hashlib.sha256(f"{mesh} {material} {uvs}".encode()).hexdigest()[:12]
-            rows.append([k, j, round(_area(surface), 4), text])
-    return rows
-
-
-def _area(surface: Surface) -> float:
-    corners = surface.positions[surface.faces].astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return float(np.linalg.norm(cross, axis=1).sum() / 2)
 
 
 def repaired_home(

@@ -19,6 +19,7 @@ from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.draft import CHANGED_TAG, Draft
 from pbrs_farm.dress.furnishing import furniture
 from pbrs_farm.dress.gates import group_of, keep_gates, part_of, piece_id
+from pbrs_farm.dress.joinery import joinery
 from pbrs_farm.dress.lamps import lamps
 from pbrs_farm.dress.parts import parts
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
@@ -39,6 +40,7 @@ _FURNITURE: Final[tuple[tuple[str, Part], ...]] = (
 """Field of the recipe that holds the part's share, and the part, in the order they are done."""
 
 _THINGS: Final[tuple[tuple[str, Part], ...]] = (
+    ("surfaces", joinery),
     ("parts", parts),
     ("lamps", lamps),
     ("textiles", textiles_large),

@@ -96,15 +96,21 @@ def piece_id(item: Item) -> str:
 
 
 def has_same_mesh(a: Item, b: Item) -> bool:
-    """Whether two items have the same triangles, whatever they are made of."""
+    """Whether two items have the same triangles, whatever they are made of and in which order."""
     if a is b or a.surfaces is b.surfaces:
         return True
-    return len(a.surfaces) == len(b.surfaces) and all(
+    if a.n_faces != b.n_faces:
+        return False
+    if len(a.surfaces) == len(b.surfaces) and all(
         s is t
         or (s.positions is t.positions and s.faces is t.faces)
         or np.array_equal(s.positions[s.faces], t.positions[t.faces])
         for s, t in zip(a.surfaces, b.surfaces, strict=True)
-    )
+    ):
+        return True
+    # Doors are parted into leaf and frame: their triangles come in another order.
+    rows = [item_triangles(x).reshape(-1, 9) for x in (a, b)]
+    return np.array_equal(*(r[np.lexsort(r.T[::-1])] for r in rows))
 
 
 def shells_of(corners: F64) -> list[Shell]:

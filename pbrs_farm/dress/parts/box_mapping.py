@@ -62,6 +62,11 @@ def box_mapped(
     )
 
 
+def connected_parts(surface: Surface, axes: F64) -> Int:
+    """(V,) number of the connected part of each vertex of a surface; equal places are one."""
+    return _parts_of(surface.positions.astype(np.float64) @ axes, surface.faces)
+
+
 def _parts_of(local: F64, faces: NDArray[np.int32]) -> Int:
     """(V,) number of the connected part of each vertex; equal positions are one."""
     places = np.rint(local / _WELD_M).astype(np.int64).reshape(-1, 3)

@@ -60,7 +60,7 @@ _BRIGHT: Final = 0.75
 _KINDS: Final = (ItemKind.OBJECT, ItemKind.LAMP, ItemKind.DOOR)
 
 _WORDS: Final = (
-    (PartKind.OTHER, "glass verre mirror screen plastic pane paper light bulb lens led"),
+    (PartKind.OTHER, "glass verre mirror screen plastic pane paper light bulb lens led coated"),
     (PartKind.METAL, "metal chrome chromed steel iron aluminium aluminum alu inox brass silver "
      "gold copper bronze nickel acier"),
     (PartKind.WOOD, "wood wooden oak pine bois holz madera legno walnut beech teak cherry birch "

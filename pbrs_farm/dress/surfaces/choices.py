@@ -12,14 +12,16 @@ from typing import TypeVar
 import numpy as np
 
 from pbrs_farm.dress.space.room_kinds import RoomKind
-from pbrs_farm.dress.style import WOODS, Rgb, Style, mix, rgb, shade
+from pbrs_farm.dress.style import WOODS, Rgb, Style, mix, rgb
 from pbrs_farm.dress.textures.families import Pattern
 from pbrs_farm.dress.textures.wallpaper import inks
 
 _T = TypeVar("_T")
 _TILED_FLOORS = (RoomKind.BATHROOM, RoomKind.KITCHEN)
-_WOOD = ("planks", "strip", "laminate", "herringbone", "chevron")
-_WHITES = tuple(rgb(c) for c in ("f4f3ef", "f2efe8", "efece4", "f3f3f2", "edeae0"))
+WOOD_FLOORS = ("planks", "strip", "laminate", "herringbone", "chevron")
+_WHITES = tuple(
+    rgb(c) for c in ("f4f3ef", "f2efe8", "efece4", "f5f6f6", "edeae0", "f3ead9", "e9e8e4", "e9e2d3")
+)
 _SOFT = tuple(
     rgb(c) for c in ("f0dfb4", "eacb95", "e9c4a4", "e3b9a6", "e8cfc6", "d9b7bb", "cfc3d6", "bfc8dc", "b3cbd9", "b8d3d3", "bcd4c2", "c9d6ad", "dcdcb0", "d6cbb6", "c8b8a3", "bdb9b3")
 )  # fmt: skip
@@ -66,13 +68,13 @@ class HomeFinish:
     wet_floor: Floor
     ceiling: Pattern
     wall: Rgb  # the paint of most walls
-    board: Rgb | None  # colour of skirting boards, None = the floor's wood
+    has_floor_boards: bool  # skirting boards of the floor's wood, not of the doors'
     board_m: float  # height of the boards that are added
 
 
 def home_finish(rng: np.random.Generator, style: Style) -> HomeFinish:
     """What the home's builder chose."""
-    wood = [f for f in style.floors if f in _WOOD] or ["planks"]
+    wood = [f for f in style.floors if f in WOOD_FLOORS] or ["planks"]
     usual = _wood_floor(rng, style, wood[0] if rng.random() < 0.6 else _one(rng, wood))
     second = _dry_floor(rng, style, RoomKind.OTHER)
     white = _one(rng, _WHITES)
@@ -80,13 +82,12 @@ def home_finish(rng: np.random.Generator, style: Style) -> HomeFinish:
     if rng.random() < 0.06 and style.name in ("country", "warm wood", "nordic"):
         ceiling = replace(_wood_floor(rng, style, "planks").pattern, darkness=-0.4)
     wall = white if rng.random() < 0.45 else style.palette[int(rng.integers(2))]
-    boards: tuple[Rgb | None, ...] = (_one(rng, _WHITES), shade(style.palette[3], 0.75), None)
     return HomeFinish(
         dry_floors=(usual, second),
         wet_floor=_tile_floor(rng, style),
         ceiling=ceiling,
         wall=wall,
-        board=boards[int(rng.choice(3, p=[0.62, 0.08, 0.30]))],
+        has_floor_boards=bool(rng.random() < 0.25),
         board_m=float(rng.choice([0.06, 0.07, 0.08, 0.10])),
     )
 

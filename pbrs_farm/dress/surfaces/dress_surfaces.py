@@ -11,12 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.house import Item, ItemKind, Material
+from pbrs_farm.core.frames import srgb_from_linear
+from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.joinery.coating import coated_item, plain_material
+from pbrs_farm.dress.joinery.scheme import Coat, JoineryScheme, joinery_scheme
 from pbrs_farm.dress.space.house_space import RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
-from pbrs_farm.dress.style import Rgb, Style, room_style
+from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.surfaces.choices import (
+    WOOD_FLOORS,
     Floor,
     HomeFinish,
     WallFinish,
@@ -26,7 +30,7 @@ from pbrs_farm.dress.surfaces.choices import (
 )
 from pbrs_farm.dress.surfaces.floor_materials import laid
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
-from pbrs_farm.dress.surfaces.wall_materials import RoomWalls, painted_wall
+from pbrs_farm.dress.surfaces.wall_materials import REVEAL, RestOfWall, RoomWalls, painted_wall
 from pbrs_farm.dress.surfaces.wall_sides import RoomFinder, SidedWall, sided_wall
 from pbrs_farm.dress.textures.families import (
     Pattern,
@@ -38,7 +42,6 @@ from pbrs_farm.dress.textures.families import (
 PART = "surfaces"
 
 _KEPT_SHARE = 0.1  # of photographed floors and walls that stay
-_BOARD_ROUGHNESS = 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +58,9 @@ def surfaces(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> 
     home = home_finish(draft.rng(PART, "home"), style)
     finishes = [_room_finish(draft, catalogue, style, home, room, share) for room in rooms]
     _lay_floors(draft, home, finishes)
-    _paint_walls(draft, finishes)
-    _set_boards(draft, home, finishes)
+    scheme = joinery_scheme(draft, style)
+    _paint_walls(draft, scheme, finishes)
+    _set_boards(draft, home, scheme, finishes)
 
 
 def _room_finish(
@@ -114,7 +118,7 @@ def _lay_floors(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> 
         draft.done[f"{PART}: {pattern.family} {item.kind}"] += 1
 
 
-def _paint_walls(draft: Draft, finishes: list[_RoomFinish]) -> None:
+def _paint_walls(draft: Draft, scheme: JoineryScheme, finishes: list[_RoomFinish]) -> None:
     house = draft.source
     finder = RoomFinder(house.rooms, [f.space.area for f in finishes])
     walls = {
@@ -123,7 +127,11 @@ def _paint_walls(draft: Draft, finishes: list[_RoomFinish]) -> None:
         if item.kind is ItemKind.WALL and item.n_faces and BASEBOARD not in item.tags
     }
     accents = _accent_runs(walls, finishes)
-    foot = draft.material(_plain("reveal", (0.93, 0.925, 0.91), 0.6))
+    rest = RestOfWall(
+        foot=plain_material(draft, replace(scheme.plaster, name=REVEAL)),
+        flat=plain_material(draft, scheme.plaster),
+    )
+    render = PatternMaterial(plain_material(draft, scheme.render), (1.0, 1.0), scheme.render.paint)
     for index, wall in walls.items():
         looks = {
             (k, r): _room_walls(draft, finishes[run.room], is_accent=(index, k, r) in accents)
@@ -131,11 +139,23 @@ def _paint_walls(draft: Draft, finishes: list[_RoomFinish]) -> None:
             for r, run in enumerate(side.runs)
             if run.room is not None and finishes[run.room].walls is not None
         }
+        # Outdoors the home has one render, but for walls with a picture.
+        if looks and _is_untextured(draft, draft.items[index]):
+            looks |= {
+                (k, r): RoomWalls(render, side.low_y)
+                for k, side in enumerate(wall.sides)
+                for r, run in enumerate(side.runs)
+                if run.room is None or finishes[run.room].space.kind is RoomKind.OUTDOOR
+            }
         if looks:
-            draft.change(index, painted_wall(draft.items[index], wall, looks, foot), PART)
+            draft.change(index, painted_wall(draft.items[index], wall, looks, rest), PART)
     for finish in finishes:
         if finish.walls is not None:
             draft.done[f"{PART}: {(finish.walls.low or finish.walls.main).family} walls"] += 1
+
+
+def _is_untextured(draft: Draft, item: Item) -> bool:
+    return all(draft.materials[s.material].texture_id is None for s in item.surfaces)
 
 
 def _room_walls(draft: Draft, finish: _RoomFinish, *, is_accent: bool) -> RoomWalls:
@@ -172,24 +192,29 @@ def _accent_runs(
 _NO_ACCENT = WallFinish(Pattern("paint", 0))
 
 
-def _set_boards(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> None:
+def _set_boards(
+    draft: Draft, home: HomeFinish, scheme: JoineryScheme, finishes: list[_RoomFinish]
+) -> None:
     if has_boards(draft.source):
-        _paint_boards(draft, home, finishes)
+        _paint_boards(draft, home, scheme, finishes)
         return
     walls = wall_plans(draft.source)
     for finish in finishes:
         room = finish.space.room
         if finish.walls is None or finish.walls.is_tiled or finish.space.kind is RoomKind.STORE:
             continue
-        material = _board_material(draft, home, finish)
-        board = skirting_board(draft.source, room, finish.space.area, walls, home.board_m, material)
+        coat = _board_coat(draft, home, scheme, finish)
+        board = skirting_board(draft.source, room, finish.space.area, walls, home.board_m, 0)
         if board is not None:
+            board = coated_item(draft, board, coat)
             draft.add(replace(board, tags=(*board.tags, f"seed:{draft.seed}")), PART)
             draft.done[f"{PART}: skirting board"] += 1
 
 
-def _paint_boards(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> None:
-    """Give the source's boards the home's colour; before tiles, the tiles'."""
+def _paint_boards(
+    draft: Draft, home: HomeFinish, scheme: JoineryScheme, finishes: list[_RoomFinish]
+) -> None:
+    """Give the source's boards the home's coat; before tiles, the tiles'."""
     finder = RoomFinder(draft.source.rooms, [f.space.area for f in finishes])
     for index, item in enumerate(draft.items):
         if BASEBOARD not in item.tags or item.kind is not ItemKind.WALL or not item.n_faces:
@@ -198,9 +223,8 @@ def _paint_boards(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -
         if not rooms or all(finishes[k].walls is None for k in rooms):
             continue
         finish = next(finishes[k] for k in rooms if finishes[k].walls is not None)
-        material = _board_material(draft, home, finish)
-        painted = tuple(replace(s, material=material) for s in item.surfaces)
-        draft.change(index, replace(item, surfaces=painted), PART)
+        coat = _board_coat(draft, home, scheme, finish)
+        draft.change(index, coated_item(draft, item, coat), PART)
 
 
 def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:
@@ -214,23 +238,15 @@ def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:
     return sorted(lengths, key=lambda k: (-lengths[k], k))
 
 
-def _board_material(draft: Draft, home: HomeFinish, finish: _RoomFinish) -> int:
+def _board_coat(draft: Draft, home: HomeFinish, scheme: JoineryScheme, finish: _RoomFinish) -> Coat:
     walls, floor = finish.walls, finish.floor
     if walls is not None and walls.is_tiled:
         # Tiled rooms have a skirting of tiles.
-        return draft.material(_plain("skirting tile", (walls.low or walls.main).tints[0], 0.15))
-    if home.board is not None:
-        return draft.material(_plain("skirting", home.board, _BOARD_ROUGHNESS))
-    if floor is None or floor.pattern.family not in ("planks", "strip", "laminate", "herringbone", "chevron"):  # fmt: skip
-        return draft.material(_plain("skirting", (0.94, 0.935, 0.92), _BOARD_ROUGHNESS))
-    material: PatternMaterial = pattern_material(draft, floor.pattern)
-    r, g, b = (float(np.clip(1.055 * c ** (1 / 2.4) - 0.055, 0, 1)) for c in material.mean_rgb)
-    return draft.material(_plain("skirting wood", (r, g, b), _BOARD_ROUGHNESS))
-
-
-def _plain(name: str, colour: Rgb, roughness: float) -> Material:
-    r, g, b = (round(c, 4) for c in colour)
-    return Material(
-        f"{name} {r:.2f} {g:.2f} {b:.2f}", diffuse=(r, g, b), specular=(0.4, 0.4, 0.4),
-        shininess=round(2.0 / roughness**4 - 2.0, 1), roughness=roughness,
-    )  # fmt: skip
+        return Coat("skirting tile", (walls.low or walls.main).tints[0], 0.15)
+    if not home.has_floor_boards:
+        return scheme.trim
+    if floor is None or floor.pattern.family not in WOOD_FLOORS:
+        return scheme.trim
+    made: PatternMaterial = pattern_material(draft, floor.pattern)
+    r, g, b = srgb_from_linear(np.array(made.mean_rgb)).tolist()
+    return Coat("skirting wood", (r, g, b))

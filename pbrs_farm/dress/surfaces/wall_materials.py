@@ -17,6 +17,7 @@ from pbrs_farm.dress.textures.families import PatternMaterial
 REVEAL = "reveal"
 """Name of the faces by whose material repair paints the sides of openings."""
 
+_LEVEL = 0.9  # |cosine| to the vertical of what lies flat
 _LEAST_CUT_M = 0.02  # cuts nearer to a side's end than this are left out
 
 
@@ -28,6 +29,14 @@ class RoomWalls:
     floor_y: float  # where v begins
     low: PatternMaterial | None = None  # below low_y
     low_y: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RestOfWall:
+    """Numbers of the materials of what no room sees."""
+
+    foot: int  # of faces that look down, which carry the name that repair paints reveals by
+    flat: int  # of other level faces: tops of low walls
 
 
 LooksOf = Mapping[tuple[int, int], RoomWalls]
@@ -44,11 +53,8 @@ class _Part:
     floor_y: float  # and v here
 
 
-def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, foot_material: int) -> Item:
-    """The wall with the materials of its rooms; what faces none keeps its own and its uv.
-
-    foot_material: of faces that look down, which carry the name that repair paints reveals by.
-    """
+def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, rest: RestOfWall) -> Item:
+    """The wall with the materials of its rooms; upright faces without a look keep their own and their uv."""
     rows, surface, side = wall.rows, wall.surface, wall.side
     # Cut the whole wall, so that it stays closed; what is no solid is painted by whole triangles.
     for normal, offset in _cuts(wall, looks) if wall.is_closed else ():
@@ -61,14 +67,19 @@ def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, foot_material: int
         for n in np.unique(surface[part.members]).tolist():
             mine = rows[part.members & (surface == n)]
             found.append(_surface(item.surfaces[n].name, part.material.number, _in_metres(mine, part)))  # fmt: skip
-    # Keep what is left as it is, but for the feet.
-    feet = left & (unit_normals(rows[..., :3])[:, 1] < -0.9)
-    if feet.any():
-        found.append(_surface(REVEAL, foot_material, rows[feet]))
+    # Level faces are of plaster; what else is left stays as it is.
+    height = unit_normals(rows[..., :3])[:, 1]
+    for mine, name, material in (
+        (left & (height < -_LEVEL), REVEAL, rest.foot),
+        (left & (height > _LEVEL), "top", rest.flat),
+    ):
+        left &= ~mine
+        if mine.any():
+            found.append(_surface(name, material, rows[mine]))
     for n, source in enumerate(item.surfaces):
-        mine = rows[left & ~feet & (surface == n)]
-        if len(mine):
-            found.append(_surface(source.name, source.material, mine))
+        mine = left & (surface == n)
+        if mine.any():
+            found.append(_surface(source.name, source.material, rows[mine]))
     return replace(item, surfaces=tuple(found))
 
 

@@ -1,0 +1,188 @@
+"""Doors, windows, stairs, railings, radiators, appliances and steps of one home in its scheme.
+
+What has a picture of its own, and glass, stay. Effects: on the draft.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.classes import DOOR, OTHERFURNITURE, OTHERSTRUCTURE, REFRIGERATOR
+from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.core.mesh import face_areas, triangle_corners
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.joinery.coating import coated, coated_item, is_plain, part_of_surface
+from pbrs_farm.dress.joinery.scheme import Coat, JoineryScheme, joinery_scheme
+from pbrs_farm.dress.parts.box_mapping import connected_parts
+from pbrs_farm.dress.style import Style
+
+PART: Final = "joinery"
+_SMALL_M: Final = 0.25  # handles and hinges; what is larger belongs to the frame or the leaf
+_FRAME: Final = 0.97  # of the width: what reaches so far is the frame
+_SLENDER_M: Final = 0.13  # rails, balusters and pipes: their second longest side
+_FRONT_SHARE: Final = 0.3  # of an appliance's faces: a part that has more is its body
+_RADIATORS: Final = ("radiator", "heater", "heizk", "radiateur")
+_APPLIANCES: Final = (
+    "cooker",
+    "dishwasher",
+    "washer",
+    "hood",
+    "oven",
+    "dryer",
+    "fridge",
+    "freezer",
+)
+_TO_STREET: Final = ("front", "garage", "entrance")
+
+
+def joinery(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Give what carpenters and fitters bring the coats of the home's one scheme.
+
+    share: of the kinds of things (all doors, all windows, ...) that are changed.
+    """
+    scheme = joinery_scheme(draft, style)
+    kinds = {
+        kind: float(draft.rng(PART, kind).random()) < share
+        for kind in ("door", "window", "stairs", "railing", "radiator", "appliance", "spotlight")
+    }
+    for index, item in enumerate(draft.items):
+        if item.kind.is_structure or not item.n_faces:
+            continue
+        kind = _kind(item)
+        if not kinds.get(kind, False):
+            continue
+        made = _in_scheme(draft, item, kind, scheme)
+        if made is not item:
+            draft.change(index, made, PART)
+            draft.done[f"{PART}: {kind}"] += 1
+
+
+def _kind(item: Item) -> str:
+    """Which of the scheme's kinds of things it is, "" for none."""
+    said = f"{item.name} {item.source_class}".casefold()
+    if item.kind is ItemKind.WINDOW:
+        return "window"
+    if item.kind is ItemKind.DOOR or item.nyu40 == DOOR:
+        return "door"
+    if item.kind is ItemKind.STAIRS:
+        return "stairs"
+    if item.nyu40 == OTHERSTRUCTURE:
+        return "railing"
+    if item.kind is ItemKind.LAMP:
+        return "spotlight" if "spot" in said else ""
+    if item.nyu40 == OTHERFURNITURE and any(word in said for word in _RADIATORS):
+        return "radiator"
+    is_appliance = item.nyu40 in (OTHERFURNITURE, REFRIGERATOR)
+    return "appliance" if is_appliance and any(word in said for word in _APPLIANCES) else ""
+
+
+def _in_scheme(draft: Draft, item: Item, kind: str, scheme: JoineryScheme) -> Item:
+    if kind == "door":
+        said = f"{item.name} {item.source_class}".casefold()
+        is_front = any(word in said for word in _TO_STREET)
+        return _fitted(draft, item, scheme, scheme.front if is_front else scheme.leaf, scheme.trim)
+    if kind == "window":
+        return _fitted(draft, item, scheme, scheme.window, scheme.window)
+    if kind == "stairs":
+        coat = scheme.stone if item.room_id is None and len(item.surfaces) > 1 else scheme.stair
+        return coated_item(draft, item, coat)
+    if kind == "railing":
+        return coated_item(draft, item, _coat_of_structure(item, scheme))
+    if kind == "radiator":
+        return coated_item(draft, item, scheme.radiator)
+    if kind == "spotlight":
+        return _spotlight(draft, item, scheme)
+    return _appliance(draft, item, scheme)
+
+
+def _coat_of_structure(item: Item, scheme: JoineryScheme) -> Coat:
+    # Rails and balusters are thin two ways; what is not is built of stone.
+    if float(np.sort(item.oriented_box.half * 2)[1]) > _SLENDER_M:
+        return scheme.stone
+    return scheme.pipe if "pipe" in item.name.casefold() else scheme.railing
+
+
+def _fitted(draft: Draft, item: Item, scheme: JoineryScheme, leaf: Coat, frame: Coat) -> Item:
+    """A door or window by its connected parts: what spans its width is frame, small parts fittings."""
+    box = item.oriented_box
+    wide = float(box.half[0] * 2)
+    found: list[Surface] = []
+    for surface in item.surfaces:
+        if not is_plain(draft.materials[surface.material]):
+            found.append(surface)
+            continue
+        for part, size in _parts(surface, box.axes):
+            is_frame = size[0] > _FRAME * wide and frame != leaf
+            coat = scheme.fitting if size.max() < _SMALL_M else frame if is_frame else leaf
+            found.append(coated(draft, part, coat, box.axes))
+    return replace(item, surfaces=tuple(_merged(found)))
+
+
+def _parts(surface: Surface, axes: F64) -> Iterator[tuple[Surface, F64]]:
+    """Each connected part of a surface, and its size along the axes (3,)."""
+    part = connected_parts(surface, axes)[surface.faces[:, 0]]
+    for k in range(int(part.max(initial=-1)) + 1):
+        mine = part_of_surface(surface, part == k)
+        if len(mine.faces):
+            yield mine, np.ptp(mine.positions.astype(np.float64) @ axes, axis=0)
+
+
+def _merged(surfaces: list[Surface]) -> list[Surface]:
+    """Surfaces of one name and material as one, in the order they are first met."""
+    groups: dict[tuple[str, int], list[Surface]] = {}
+    for surface in surfaces:
+        groups.setdefault((surface.name, surface.material), []).append(surface)
+    return [_joined(some) for some in groups.values()]
+
+
+def _joined(some: list[Surface]) -> Surface:
+    if len(some) == 1:
+        return some[0]
+    starts = np.cumsum([0, *(len(s.positions) for s in some)])
+    uvs = [s.uvs for s in some if s.uvs is not None]
+    normals = [s.normals for s in some if s.normals is not None]
+    return replace(
+        some[0],
+        positions=np.concatenate([s.positions for s in some]),
+        faces=np.concatenate([s.faces + n for s, n in zip(some, starts, strict=False)]).astype(np.int32),
+        uvs=np.concatenate(uvs) if len(uvs) == len(some) else None,
+        normals=np.concatenate(normals) if len(normals) == len(some) else None,
+    )  # fmt: skip
+
+
+def _appliance(draft: Draft, item: Item, scheme: JoineryScheme) -> Item:
+    # The body alone: plates, doors and panels keep their glass and black.
+    areas = [float(face_areas(triangle_corners(s.positions, s.faces)).sum()) for s in item.surfaces]
+    return _with_coat(
+        draft, item, scheme.appliance,
+        [a >= _FRONT_SHARE * sum(areas) and _is_bright(draft, s)
+         for a, s in zip(areas, item.surfaces, strict=True)],
+    )  # fmt: skip
+
+
+def _spotlight(draft: Draft, item: Item, scheme: JoineryScheme) -> Item:
+    emitting = {k for light in item.lights for k in light.emitting}
+    return _with_coat(
+        draft, item, scheme.spotlight, [k not in emitting for k in range(len(item.surfaces))]
+    )
+
+
+def _with_coat(draft: Draft, item: Item, coat: Coat, covers: list[bool]) -> Item:
+    axes = item.oriented_box.axes
+    surfaces = tuple(
+        coated(draft, s, coat, axes) if is_mine and is_plain(draft.materials[s.material]) else s
+        for s, is_mine in zip(item.surfaces, covers, strict=True)
+    )
+    if all(a is b for a, b in zip(surfaces, item.surfaces, strict=True)):
+        return item
+    return replace(item, surfaces=surfaces)
+
+
+def _is_bright(draft: Draft, surface: Surface) -> bool:
+    return max(draft.materials[surface.material].diffuse) > 0.25

@@ -1,0 +1,110 @@
+"""One scheme of joinery a home: doors, windows, stairs and what is fitted have its coats."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
+from pbrs_farm.core.recipe import DressFields
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.dressing import dress
+from pbrs_farm.dress.gates.bodies import has_same_mesh
+from pbrs_farm.dress.joinery import joinery
+from pbrs_farm.dress.joinery.scheme import joinery_scheme
+from pbrs_farm.dress.style import style_for
+from tests.builders import builtin_home
+from tests.dress.furniture import boards, house
+
+FRAME = [
+    ([0.0, 0.0, 0.0], [0.9, 2.1, 0.05]), ([0.05, 0.0, 0.06], [0.85, 2.0, 0.1]),
+    ([0.7, 1.0, 0.12], [0.8, 1.02, 0.15]),
+]  # fmt: skip
+
+
+def door() -> Item:
+    """A door whose frame, leaf and handle are one surface of one colour."""
+    item = boards("door", FRAME, 8)
+    starts = np.cumsum([0, *(len(s.positions) for s in item.surfaces)])
+    one = replace(
+        item.surfaces[0],
+        positions=np.concatenate([s.positions for s in item.surfaces]),
+        faces=np.concatenate([s.faces + n for s, n in zip(item.surfaces, starts, strict=False)]),
+        uvs=None,
+        normals=None,
+    )
+    return replace(item, name="Door", kind=ItemKind.DOOR, surfaces=(one,))
+
+
+def joined(source: House, seed: int, share: float = 1.0) -> House:
+    draft = Draft(source, seed)
+    joinery(draft, EMPTY, style_for(draft.rng("style")), share)
+    return draft.house()
+
+
+def materials_of(home: House, index: int = 0) -> list[Material]:
+    return [home.materials[s.material] for s in home.items[index].surfaces]
+
+
+def test_a_door_is_parted_into_frame_leaf_and_handle_and_keeps_its_mesh() -> None:
+    counts = set()
+    for seed in range(1, 9):
+        home = joined(house(door()), seed)
+        assert has_same_mesh(home.items[0], door())
+        counts.add(len(home.items[0].surfaces))
+        assert any(m.specular[0] > 0.1 for m in materials_of(home))
+    # Some homes have a leaf like its frame, others another one.
+    assert counts == {2, 3}
+
+
+def test_one_home_has_one_scheme_and_seeds_have_several() -> None:
+    two = house(door(), replace(door(), id="another"))
+    looks = set()
+    for seed in range(1, 7):
+        home = joined(two, seed)
+        assert materials_of(home, 0) == materials_of(home, 1)
+        looks.add(materials_of(home)[0].name)
+    assert len(looks) >= 5
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        Material("glass", MaterialKind.PANE),
+        Material("carved", texture_id="0123456789abcdef"),
+        Material("etched", opacity=0.5),
+    ],
+)
+def test_panes_and_pictures_of_a_door_stay(material: Material) -> None:
+    source = replace(house(door()), materials=(material,))
+    home = joined(source, 1)
+    assert materials_of(home) == [material]
+
+
+def test_the_gates_take_a_parted_door_for_what_was_drawn() -> None:
+    moved = replace(door(), surfaces=tuple(replace(s, positions=s.positions + 0.01) for s in door().surfaces))  # fmt: skip
+    assert not has_same_mesh(door(), moved)
+
+
+def test_a_share_of_nothing_changes_no_door() -> None:
+    source = house(door())
+    assert joined(source, 1, share=0.0).items[0].tags == source.items[0].tags
+
+
+def test_the_scheme_does_not_depend_on_who_asks_first() -> None:
+    draft = Draft(house(door()), 3)
+    style = style_for(draft.rng("style"))
+    first = joinery_scheme(draft, style)
+    draft.rng("surfaces").random(100)
+    assert joinery_scheme(draft, style) == first
+
+
+def test_furniture_parts_leave_coats_as_they_are() -> None:
+    home, report = dress(builtin_home(), EMPTY, DressFields(), 2)
+    doors = [i for i in home.items if i.kind is ItemKind.DOOR]
+    assert doors
+    for item in doors:
+        assert "changed:joinery" in item.tags
+        assert "changed:parts" not in item.tags
+    assert report.changed["joinery"] >= len(doors)
