@@ -109,8 +109,9 @@ def has_same_mesh(a: Item, b: Item) -> bool:
     ):
         return True
     # Doors are parted into leaf and frame: their triangles come in another order.
-    rows = [item_triangles(x).reshape(-1, 9) for x in (a, b)]
-    return np.array_equal(*(r[np.lexsort(r.T[::-1])] for r in rows))
+    mine, other = (item_triangles(x).reshape(-1, 9) for x in (a, b))
+    order, other_order = (np.lexsort(rows.T[::-1]) for rows in (mine, other))
+    return np.array_equal(mine[order], other[other_order])
 
 
 def shells_of(corners: F64) -> list[Shell]:
