@@ -8,6 +8,7 @@ PBRS_STUDY_FOLDER). Every view and every training is kept: what is cut off goes 
     python -m benchmarks.study.lived_in --render bare_fast made    some roots alone
     python -m benchmarks.study.lived_in --train --seeds 1          what is rendered, with fewer seeds
     python -m benchmarks.study.lived_in --on photos=/my/rgbd       photographs judge, too
+    python -m benchmarks.study.lived_in --train --rows bare_fast bare_photo --set steps=600
 """
 
 from __future__ import annotations
@@ -19,6 +20,14 @@ import pbrs_farm.cli
 from benchmarks.study.rendered import FOLDER, HELD_OUT, ROOTS, rendered
 
 VIEWS = 250  # of each set, at most: all sets have as many as the smallest
+ROWS = {
+    "bare_fast": "{bare_fast}@mlt_il_ol",
+    "bare_photo": "{bare_photo}@mlt_il_ol",
+    "dressed": "{dressed}@mlt_il_ol",
+    "dressed_opengl_dl": "{dressed}@opengl_dl",
+    "made_and_dressed": "{dressed}+{made}@mlt_il_ol",
+}
+"""Set of views -> roots and light."""
 RUNS = FOLDER / "lived_in"
 
 
@@ -29,7 +38,7 @@ def main(words: list[str] | None = None) -> None:
     for name in wanted:
         rendered(name, jobs=args.jobs)
     if args.render is None:
-        _compare(args.on, args.seeds)
+        _compare(args)
 
 
 def _arguments(words: list[str]) -> argparse.Namespace:
@@ -39,20 +48,24 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--jobs", type=int, default=2, help="processes that render")
     parser.add_argument("--on", nargs="+", default=[], metavar="PHOTOGRAPHS")
+    parser.add_argument("--rows", nargs="+", choices=list(ROWS), default=list(ROWS))
+    parser.add_argument("--views", type=int, default=VIEWS, help="of each set, at most")
+    parser.add_argument("--set", nargs="+", default=[], metavar="FIELD=VALUE", help="of the plan")
     return parser.parse_args(words)
 
 
-def _compare(photographs: list[str], n_seeds: int) -> None:
+def _compare(args: argparse.Namespace) -> None:
     roots = {name: FOLDER / name for name in ROOTS}
-    fast, photo, dressed, made = roots.values()
-    rows = [
-        f"bare_fast={fast}@mlt_il_ol", f"bare_photo={photo}@mlt_il_ol",
-        f"dressed={dressed}@mlt_il_ol", f"dressed_opengl_dl={dressed}@opengl_dl",
-        f"made_and_dressed={dressed}+{made}@mlt_il_ol",
-    ]  # fmt: skip
-    words = ["ablation", *rows, "--task", "normals", "--seeds", str(n_seeds), "--views", str(VIEWS)]
-    for on in (f"bare={photo}", f"dressed={dressed}", *photographs):
-        words += ["--on", on]
+    rows = [f"{name}={ROWS[name].format(**roots)}" for name in args.rows]
+    words = ["ablation", *rows, "--task", "normals", "--seeds", str(args.seeds)]
+    words += ["--views", str(args.views)]
+    # Homes judge as far as they are rendered.
+    judges = {"bare": roots["bare_photo"], "dressed": roots["dressed"]}
+    on = [f"{name}={root}" for name, root in judges.items() if root.exists()]
+    for place in (*on, *args.on):
+        words += ["--on", place]
+    for field in args.set:
+        words += ["--set", field]
     if pbrs_farm.cli.main([*words, "--hold-out", *HELD_OUT, "--out", str(RUNS)]):
         raise RuntimeError("the comparison failed; what is trained is kept")
 
