@@ -27,6 +27,7 @@ from pbrs_farm.board.pictures.shown_layers import (
     thumbnail_jpeg,
     title_of,
 )
+from pbrs_farm.board.recipe_words import recipe_words
 from pbrs_farm.board.root_reader import MAX_PICTURE_BYTES, RootReader
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, PbrsError
@@ -59,6 +60,7 @@ def view(request: Request) -> Response:
         first=found.shown_layer() or "",
         instances=_instances(facts),
         facts=_camera_facts(facts),
+        recipe=recipe_words(board.reader),
         seconds=_seconds(board.reader, found),
         files=_files(board.reader, found),
         before=before,
@@ -214,7 +216,7 @@ def _number(value: Any) -> float:
 
 def _camera_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """What is worth reading of a view.json, as name and text."""
-    rows = [(name, facts.get(name)) for name in ("room", "sector", "origin", "score", "recipe")]
+    rows = [(name, facts.get(name)) for name in ("room", "sector", "origin", "score")]
     size = f"{facts.get('width_px')} x {facts.get('height_px')} px"
     light = _object(_object(facts, "modes"), "light")
     lux, noise = _object(light, "floor_lux"), _object(light, "noise")
@@ -226,6 +228,7 @@ def _camera_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
         ("floor, lamps", _with_unit(lux.get("indoor"), "lx")),
         ("floor, daylight", _with_unit(lux.get("outdoor"), "lx")),
         ("seed", light.get("seed")),
+        ("recipe's digest", facts.get("recipe")),
     ]
     return [(name, str(value)) for name, value in rows if value not in (None, "")]
 
