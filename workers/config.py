@@ -1,6 +1,6 @@
 """How this process takes part in a farm: Settings plus limits, from the environment.
 
-Effects: reads environment variables and secret files, through pbrs_farm.settings.
+Effects: reads environment variables and secret files, through pbrs_farm.settings; makes scratch.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote, urlsplit, urlunsplit
 
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
 from pbrs_farm.settings import settings_from_environment, value_or_file
 from pbrs_farm.store.secret import Secret
@@ -137,6 +137,20 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
         webhook=Secret(value_or_file(env, "PBRS_WEBHOOK")),
         limits=Limits(**_read(Limits, of_limits, limits)),
     )
+
+
+def make_scratch(config: FarmConfig) -> None:
+    """The scratch folder, made where there is none. Raises MachineFailed where it cannot be written."""
+    fault = ""
+    try:
+        config.scratch.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fault = error.strerror or type(error).__name__
+    if not fault and not os.access(config.scratch, os.W_OK | os.X_OK):
+        fault = "cannot be written"
+    if fault:
+        hint = "PBRS_FARM_SCRATCH names another folder"
+        raise MachineFailed(f"{config.scratch}: {fault}", hint=hint)
 
 
 # Type of a field -> its value from text.

@@ -1,9 +1,13 @@
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
-from workers.config import FarmConfig, Limits
+import pytest
+
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.store.secret import Secret
+from workers.config import FarmConfig, Limits, make_scratch
 
 
 def test_every_setting_stands_in_the_docs() -> None:
@@ -12,3 +16,13 @@ def test_every_setting_stands_in_the_docs() -> None:
     names = {f"_{f.name.upper()}" for f in fields(FarmConfig) if f.name not in elsewhere}
     names |= {f"_{f.name.upper()}" for f in fields(Limits)}
     assert sorted(n for n in names if f"{n}`" not in docs) == []
+
+
+def test_scratch_is_made_and_a_file_in_its_place_is_one_line(tmp_path: Path) -> None:
+    config = FarmConfig(Secret(""), worker="w", scratch=tmp_path / "deep" / "scratch")
+    make_scratch(config)
+    assert config.scratch.is_dir()
+    (tmp_path / "file").write_text("")
+    for scratch in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(MachineFailed, match="PBRS_FARM_SCRATCH"):
+            make_scratch(replace(config, scratch=scratch))

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from pbrs_farm.core.errors import PbrsError
-from workers.config import FarmConfig, config_from_environment
+from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.coordinator.progress_rates import Rates, mean_s
 from workers.coordinator.shares import Shares, is_in, n_ready, stage_of_lane
 from workers.ids import LEASES, STAGES, lane_of, queue_of, task_from_text
@@ -270,6 +270,7 @@ def main() -> int:
     log_to_stderr()
     try:
         config = config_from_environment()
+        make_scratch(config)
         ledger = RedisLedger(config)
         ledger.ping()
         notice = _notice(config, ledger)

@@ -25,7 +25,7 @@ from pbrs_farm.core.errors import MachineFailed, PbrsError
 from pbrs_farm.run.processes.child_process import die_with_parent
 from pbrs_farm.run.processes.limits import tree_mb
 from pbrs_farm.store import store_from_url
-from workers.config import FarmConfig, config_from_environment
+from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.ids import QUEUES
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import LedgerUnavailable
@@ -207,6 +207,7 @@ def main(arguments: list[str] | None = None) -> int:
     log_to_stderr()
     try:
         config = config_from_environment()
+        make_scratch(config)
         sweep(config)
         check_machine(config)
         config = _with_store_id(config)
