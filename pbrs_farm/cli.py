@@ -135,6 +135,9 @@ def build_parser(module: str | None = None) -> Parser:
         sub.set_defaults(handler=handler)
         return sub
 
+    if not _has_farm():
+        farm = "submit, status, workers and the other verbs of a farm need celery and redis"
+        parser.epilog = f"{farm}: {install_command('workers')}"
     for name in [module] if module else MODULES:
         if name not in _OF_THE_FARM or _has_farm():
             import_module(f"pbrs_farm.commands.{name}").add_verbs(verb)

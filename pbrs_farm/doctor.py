@@ -5,6 +5,7 @@ Effects: starts a process per part that could crash (LLVM, GL), reads versions.
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from pbrs_farm.installation import EXTRA_OF, install_command, is_installed, syst
 
 State = Literal["ok", "degraded", "missing"]
 PROBE_TIMEOUT_S: Final = 120
+_EXCEPTION: Final = re.compile(r"^(pbrs_farm\.[\w.]+|\w+Error): ")  # before a traceback's last text
 
 _PACKAGES: Final = (
     "numpy", "pydantic", "mitsuba", "drjit", "moderngl", "trimesh", "manifold3d", "pyoidn",
@@ -160,6 +162,8 @@ def _probe(
     # The last line of a traceback, or of SystemExit, is the fault.
     lines = [line for line in done.stderr.splitlines() if line.strip()]
     text = lines[-1] if lines else f"ended with exit code {done.returncode}"
+    # Neither the name of the exception nor its own remedy is news to a reader.
+    text = _EXCEPTION.sub("", text).removesuffix(f" ({remedy})")
     return Finding(part, state, text[:200], remedy, needed)
 
 

@@ -51,6 +51,7 @@ class Parser(argparse.ArgumentParser):
                 formatter.start_section(title)
                 formatter.add_arguments(known)
                 formatter.end_section()
+        formatter.add_text(self.epilog)
         formatter.add_text("`pbrs-farm VERB --help` lists a verb's options.")
         return formatter.format_help()
 

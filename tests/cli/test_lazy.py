@@ -30,6 +30,13 @@ def test_the_help_names_every_verb() -> None:
     assert all(f"\n  {verb}" in text for verb in every)
 
 
+def test_the_help_says_what_the_farms_verbs_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pbrs_farm.cli._has_farm", lambda: False)
+    text = " ".join(build_parser().format_help().split())
+    assert "the other verbs of a farm need celery and redis: " in text
+    assert "[workers]" in text
+
+
 @pytest.mark.parametrize("words", ["status", "why h/0/gl", "pause", "workers"])
 def test_the_farms_small_verbs_import_nothing_heavy(words: str) -> None:
     code = f"""

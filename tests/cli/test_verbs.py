@@ -71,6 +71,7 @@ def test_a_check_that_crashes_or_exits_is_a_finding():
     assert (crashed.state, crashed.remedy) == ("missing", "do this")
     unknown = doctor._probe("store", doctor.check_store, "look", argument="ftp://x", needed=True)
     assert "not a store" in unknown.text
+    assert "errors." not in unknown.text
     assert not doctor.can_run([unknown])
 
 
