@@ -153,7 +153,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "lens": tuple(LensFields.model_fields),
     "sensor": tuple(SensorFields.model_fields),
     "repair": ("lamp_in_every_room", "lamp_lx"),
-    "selection": ("min_room_lx",),
+    "selection": ("min_room_lx", "black_modes"),
 }
 
 _PHOTO: Mapping[str, Any] = {

@@ -318,6 +318,9 @@ class SelectionFields(FieldGroup):
         "none", description="take of the kept views those that balance the classes"
     )
     balance_share: float = Field(0.5, gt=0, le=1, description="share of the kept views taken")
+    black_modes: Literal["scored", "light", "all"] = Field(
+        "scored", description="modes whose picture must not be black: scored, path-traced, all"
+    )
     min_brightness: float = Field(0.06, ge=0, le=1, description="median sRGB luma; too dark below")
     max_blown: float = Field(0.50, ge=0, le=1, description="share of saturated pixels")
     max_surface: float = Field(0.85, ge=0, le=1, description="share of the largest instance")

@@ -82,6 +82,7 @@ class ViewRecord(Record):
     depth: SparseCounts
     # Only SCORED_MODE where the view has it, else every mode it has, for `--score-mode` to choose.
     colour: dict[Mode, SparseCounts]
+    # Every mode the view has; of views stored before version 3 of the step, those of colour.
     picture: dict[Mode, PictureQuality]
     scene: SceneQuality
 
@@ -91,8 +92,8 @@ class ViewRecord(Record):
         sizes = {c.size for c in self.colour.values()} - {self.settings.colour_bins**3}
         if sizes or self.depth.size != self.settings.depth_bins:
             raise ValueError("the histograms do not have the bins that settings say")
-        if self.colour.keys() != self.picture.keys():
-            raise ValueError("colour and picture must hold the same modes")
+        if not self.colour.keys() <= self.picture.keys():
+            raise ValueError("picture lacks a mode of colour")
         return self
 
     def json_bytes(self) -> bytes:

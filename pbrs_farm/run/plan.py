@@ -50,7 +50,7 @@ STEPS: Final = {
             needs=("illuminance",),
         ),
         Step("develop", 4, ("tone", "light", "sensor"), ("light",), needs=("light",)),
-        Step("view", 2, ("histogram",), _VIEW_READS, needs=("truth",)),
+        Step("view", 3, ("histogram",), _VIEW_READS, needs=("truth",)),
     )
 }  # fmt: skip
 

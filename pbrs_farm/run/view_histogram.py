@@ -13,7 +13,6 @@ from pbrs_farm.core.house import Note
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
-from pbrs_farm.formats.histogram_json import SCORED_MODE
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.selection import scene_quality, view_record
 from pbrs_farm.selection.view_record import ViewPlace
@@ -32,8 +31,8 @@ def view_histogram(
 ) -> bytes:
     """Bytes of histogram.json of one view (formats.histogram_json.ViewRecord).
 
-    place: "house", "view", "room" and "room_type" (the room's name). modes: those rendered; only
-    SCORED_MODE is opened where it is one of them. view_json: its "instances" and, where light was
+    place: "house", "view", "room" and "room_type" (the room's name). modes: those rendered.
+    view_json: its "instances" and, where light was
     traced, "noise" of the sum of both groups anywhere below "modes". notes: of the house.
     Raises BadInput when a picture cannot be read.
     """
@@ -42,9 +41,6 @@ def view_histogram(
         key = keys.view_key(place["house"], place["view"], LAYER[layer].file)
         return layer_from_bytes(layer, store.get(key), key)
 
-    wanted = set(modes)
-    # Open one picture where one decides.
-    wanted = {SCORED_MODE} if SCORED_MODE in wanted else wanted
     depth = picture("depth")
     if depth.ndim != 2 or depth.dtype != np.uint16:
         raise BadInput(keys.view_key(place["house"], place["view"], "depth.png"), "", "no depth")
@@ -56,7 +52,7 @@ def view_histogram(
         noise=_noise(view_json),
         missing_textures=sum(note.kind in _MISSING_TEXTURE for note in notes),
     )
-    pictures = {mode: picture(mode.value) for mode in sorted(wanted)}
+    pictures = {mode: picture(mode.value) for mode in sorted(set(modes))}
     return view_record(place, pictures, depth, scene, settings).json_bytes()
 
 

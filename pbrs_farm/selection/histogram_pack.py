@@ -21,11 +21,13 @@ from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.formats.histogram_json import SCORED_MODE, ViewRecord
 
-_FORMAT: Final = "pbrs_farm pack 2"
-_TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes")  # columns
+_FORMAT: Final = "pbrs_farm pack 3"
+_TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes", "black")  # columns
 
 _OF_PICTURE: Final = ("brightness", "blown")
 _OF_SCENE: Final = ("surface", "near", "n_objects", "noise", "missing_textures")
+# Median luma of a picture in which nothing is seen, whatever the thresholds.
+BLACK: Final = 1.5 / 255
 # Columns of HistogramPack.quality: attributes of PictureQuality and SceneQuality.
 QUALITIES: Final = (*_OF_PICTURE, *_OF_SCENE)
 
@@ -43,6 +45,7 @@ class HistogramPack:
     modes: tuple[str, ...]  # lighting mode that is scored, "" = none
     faults: tuple[str, ...]  # why the view cannot be scored, "" = it can
     classes: tuple[str, ...]  # "1:0.53 2:0.21": share of the picture of each NYU40 class
+    black: tuple[str, ...]  # "mlt_ol opengl_dl": modes in whose picture nothing is seen
     colour: NDArray[np.uint32]  # (n, colour bins) counts, zero where there are none
     depth: NDArray[np.uint32]  # (n, depth bins) the same
     quality: F32  # (n, len(QUALITIES)), NaN where not known
@@ -91,6 +94,7 @@ def pack_house(
         modes=(*(str(m or "") for m in modes), *blank),
         faults=(*("" if m else "unscored" for m in modes), *(fault for _view, fault in lost)),
         classes=(*(_classes(r) for r in rows), *blank),
+        black=(*(_black(r) for r in rows), *blank),
         colour=colour,
         depth=depth,
         quality=quality,
@@ -99,6 +103,11 @@ def pack_house(
 
 def _classes(record: ViewRecord) -> str:
     return " ".join(f"{nyu40}:{share:g}" for nyu40, share in record.scene.classes.items())
+
+
+def _black(record: ViewRecord) -> str:
+    black = (m for m, q in record.picture.items() if q.brightness <= BLACK)
+    return " ".join(sorted(str(mode) for mode in black))
 
 
 def _mode(record: ViewRecord, score_mode: Mode) -> Mode | None:

@@ -31,6 +31,7 @@ SCORES: Final[Any] = pa.schema(
         ("depth_reference", pa.string()),
         *((name, pa.float32()) for name in QUALITIES),
         ("classes", pa.string()),  # as HistogramPack.classes
+        ("black", pa.string()),  # as HistogramPack.black
         ("fault", pa.string()),  # "", "unscored", or why the view cannot be read
         ("source", pa.string()),  # digest of the house's histograms
     ]
@@ -84,6 +85,7 @@ class Scorer:
             "colour_reference": c_best,
             "depth_reference": d_best,
             "classes": [c for p in packs for c in p.classes],
+            "black": [b for p in packs for b in p.black],
             "fault": [f for p in packs for f in p.faults],
             "source": [p.source for p in packs for _ in p.views],
         }

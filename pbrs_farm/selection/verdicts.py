@@ -14,8 +14,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from pbrs_farm.core.arrays import F64, I64, Bools
+from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.selection.balance import balanced, class_shares
+from pbrs_farm.selection.histogram_pack import BLACK
 
 # Why a view is rejected, in the order in which the first is named.
 REASONS: Final = (
@@ -62,7 +64,7 @@ def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, Bools]:
         return {
             "failed": failed,
             "unscored": unscored,
-            "black": number["brightness"] <= _BLACK,
+            "black": _black(scores, number["brightness"], fields),
             "too-dark": number["brightness"] < fields.min_brightness,
             "blown": number["blown"] > fields.max_blown,
             "one-surface": number["surface"] > fields.max_surface,
@@ -75,13 +77,23 @@ def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, Bools]:
         }
 
 
+_LIGHT_MODES: Final = {str(mode) for mode in Mode if mode.groups}
+
 _NUMBERS: Final = (
     "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
     "colour_score", "depth_score",
 )  # fmt: skip
 
-# Median luma of a picture in which nothing is seen, whatever the thresholds.
-_BLACK: Final = 1.5 / 255
+
+def _black(scores: Any, brightness: F64, fields: SelectionFields) -> Bools:
+    """(n,) bool: nothing is seen in the scored picture or in one of a mode that must not be black."""
+    black = np.asarray(brightness <= BLACK, bool)
+    if fields.black_modes == "scored":
+        return black
+    # Of the other modes only their names are stored, with each view.
+    found = [set(modes.split()) for modes in scores["black"].to_pylist()]
+    wanted = _LIGHT_MODES if fields.black_modes == "light" else set(Mode)
+    return np.asarray(black | np.array([bool(modes & wanted) for modes in found], bool), bool)
 
 
 def _floats(scores: Any, name: str) -> F64:

@@ -36,6 +36,6 @@ def view_record(
         room_type=place["room_type"],
         depth=SparseCounts.of(depth_counts(depth_mm, settings)),
         colour={m: SparseCounts.of(colour_counts(pictures[m], settings)) for m in modes},
-        picture={m: picture_quality(pictures[m]) for m in modes},
+        picture={m: picture_quality(pictures[m]) for m in sorted(pictures)},
         scene=scene,
     )

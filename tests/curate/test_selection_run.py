@@ -203,7 +203,9 @@ def test_the_view_step_writes_what_selection_reads() -> None:
     picture = np.full((6, 8, 3), 90, np.uint8)
     depth = np.full((6, 8), 1500, np.uint16)
     key = "houses/h/views/0_0_1/"
-    store.put(f"{key}mlt_il_ol.png", images.png_from_array(picture))
+    for mode in Mode:
+        shade = 0 if mode is Mode.MLT_OL else 1
+        store.put(f"{key}{mode}.png", images.png_from_array(shade * picture))
     store.put(f"{key}depth.png", images.png_from_array(depth))
     place = {"house": "h", "view": "0_0_1", "room": "0_0", "room_type": "Kitchen"}
     facts = {
@@ -214,7 +216,9 @@ def test_the_view_step_writes_what_selection_reads() -> None:
     data = view_histogram(store, place, tuple(Mode), facts, notes, fields)
     read = record_from_json(data, "x")
     assert (read.room_type, read.scene.noise, read.scene.missing_textures) == ("Kitchen", 0.125, 1)
+    assert set(read.colour) == {Mode.MLT_IL_OL}
     assert read.colour[Mode.MLT_IL_OL].counts == (48,)
+    assert {m for m, quality in read.picture.items() if quality.brightness == 0} == {Mode.MLT_OL}
     assert read.depth.dense()[1500 * 128 // 10000] == 48
     assert fields != FIELDS
 

@@ -146,6 +146,14 @@ def test_the_scored_mode_is_kept_alone_and_the_others_only_without_it() -> None:
     assert set(record(rest).colour) == set(rest)
 
 
+def test_every_modes_brightness_is_kept_and_a_record_of_before_is_read() -> None:
+    whole = record(tuple(Mode))
+    assert set(whole.picture) == set(Mode)
+    former = json.loads(whole.json_bytes())
+    former["picture"] = {Mode.MLT_IL_OL: former["picture"][Mode.MLT_IL_OL]}
+    assert set(record_from_json(json.dumps(former), "x").picture) == {Mode.MLT_IL_OL}
+
+
 def test_a_damaged_record_is_named() -> None:
     plain = json.loads(record().json_bytes())
     wrong = [

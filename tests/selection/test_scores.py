@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
+from pbrs_farm.formats.histogram_json import PictureQuality
 from pbrs_farm.selection.histogram_pack import (
     bytes_from_pack,
     pack_from_bytes,
@@ -139,6 +140,16 @@ def test_a_view_without_the_mode_is_scored_on_another_only_when_told() -> None:
     assert told["colour_score"].null_count == 0
 
 
+def test_modes_in_whose_picture_nothing_is_seen_are_named() -> None:
+    row = record("a", "0_0_0", np.random.default_rng(0))
+    dark = {Mode.MLT_OL: 1 / 255, Mode.OPENGL_IL: 0.0, Mode.OPENGL_DL: 2 / 255}
+    others = {m: PictureQuality(brightness=round(b, 5), blown=0.0) for m, b in dark.items()}
+    row = row.model_copy(update={"picture": row.picture | others})
+    assert score([pack_house("a", "s", FIELDS, [row])], reference())["black"].to_pylist() == [
+        "mlt_ol opengl_il"
+    ]
+
+
 def test_a_view_that_cannot_be_read_is_marked_and_the_rest_is_scored() -> None:
     rows = [record("a", "0_0_1", np.random.default_rng(0))]
     house = pack_house("a", "s", FIELDS, rows, failed={"0_0_0": "damaged"})
@@ -162,7 +173,7 @@ def test_a_pack_survives_its_bytes() -> None:
 
 def test_a_damaged_pack_is_named() -> None:
     data = bytes_from_pack(pack("a", 3))
-    for wrong in (b"", b"{}\n", data[:-9], data.replace(b"pack 2", b"pack 9"), data[:40]):
+    for wrong in (b"", b"{}\n", data[:-9], data.replace(b"pack 3", b"pack 9"), data[:40]):
         with pytest.raises(BadInput, match="house a"):
             pack_from_bytes(wrong, "house a")
 

@@ -19,7 +19,7 @@ GOOD: dict[str, Any] = {
     "house": "a", "view": "0_0_0", "room": "0_0", "room_type": "Kitchen", "mode": "mlt_il_ol",
     "colour_score": 0.8, "depth_score": 0.9, "colour_reference": "p", "depth_reference": "q",
     "brightness": 0.5, "blown": 0.0, "surface": 0.4, "near": 0.0, "n_objects": 4.0, "noise": 0.1,
-    "missing_textures": 0.0, "classes": "1:0.5 5:0.1", "fault": "", "source": "s",
+    "missing_textures": 0.0, "classes": "1:0.5 5:0.1", "black": "", "fault": "", "source": "s",
 }  # fmt: skip
 
 
@@ -64,6 +64,13 @@ def test_each_number_beyond_its_threshold_rejects_with_its_reason(
 
 def test_a_black_picture_is_refused_whatever_the_thresholds() -> None:
     assert reasons({"brightness": 0.0}, {"brightness": 0.01}, min_brightness=0.0) == ["black", ""]
+
+
+def test_a_picture_that_is_black_in_another_mode_is_refused_where_the_recipe_asks() -> None:
+    rows = {"black": "mlt_ol"}, {"black": "opengl_dl"}, {"black": "opengl_dl mlt_ol"}, {"black": ""}
+    assert reasons(*rows) == ["", "", "", ""]
+    assert reasons(*rows, black_modes="light") == ["black", "", "black", ""]
+    assert reasons(*rows, black_modes="all") == ["black", "black", "black", ""]
 
 
 def test_a_score_at_the_threshold_is_not_above_it() -> None:
