@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, no_targets
 from pbrs_farm.transport.kernels.packets import point
 from pbrs_farm.transport.kernels.sampler import device_array
@@ -58,6 +58,22 @@ class NearbyLamps(NamedTuple):
     is_guided: Any  # Bool: rays of this view are guided at all
 
 
+class _Slot(NamedTuple):
+    """One of the strongest lamps of a view, as numbers that all lanes share."""
+
+    lamp: Any  # UInt32
+    counts: Any  # 0 where the house has fewer lamps
+    rows: _LampRows
+
+
+class _LampRows(NamedTuple):
+    """What is known of a lamp: packets of four floats."""
+
+    sphere: Any
+    strength: Any  # weight, guided share, 0, 0
+    interior: Any
+
+
 class NearbyLampSampler:
     """Bounding spheres of all lamps on the device, with the weights of one view."""
 
@@ -65,7 +81,8 @@ class NearbyLampSampler:
         spheres = bounding_spheres(tables)
         spheres[:, 3] = np.maximum(spheres[:, 3], _MIN_RADIUS_M)
         self._n = len(spheres)
-        self._spheres = _rows(spheres)
+        self._host_spheres = _padded(spheres)
+        self._spheres = device_array(mi.Float, self._host_spheres.ravel())
         self._weights = np.zeros(self._n)
         self.set_guided(True)
         self.set_targets(no_targets(self._n))
@@ -82,67 +99,96 @@ class NearbyLampSampler:
     def set_targets(self, targets: GuidingTargets) -> None:
         """Set what of each lamp's light guided rays can find."""
         self._shares = targets.shares
-        self._interiors = _rows(targets.interiors)
+        self._host_interiors = _padded(targets.interiors)
+        self._interiors = device_array(mi.Float, self._host_interiors.ravel())
         self._update()
 
     def _update(self) -> None:
         # Keep the strongest lamps of the view; the others have importance 0.
         order = np.argsort(-self._weights, kind="stable")[:MAX_NEAR]
-        chosen, counts = np.zeros(MAX_NEAR, np.uint32), np.zeros(MAX_NEAR, np.float32)
-        chosen[: len(order)], counts[: len(order)] = order, 1
         rows = np.zeros((self._n, 4))  # weight, guided share, 0, 0
         rows[order, 0] = self._weights[order]
         rows[:, 1] = self._shares
-        self._chosen, self._counts = device_array(mi.UInt32, chosen), device_array(mi.Float, counts)
-        self._strengths = _rows(rows)
+        strengths = _padded(rows)
+        self._strengths = device_array(mi.Float, strengths.ravel())
+        # Let all lanes share their numbers: cheaper than gathered ones.
+        chosen = np.append(order, np.zeros(MAX_NEAR - len(order), order.dtype))
+        tables = self._host_spheres, strengths, self._host_interiors
+        self._slots = [
+            _Slot(
+                dr.opaque(mi.UInt32, int(lamp)),
+                dr.opaque(mi.Float, float(k < len(order))),
+                _LampRows(*(_shared(table[lamp]) for table in tables)),
+            )
+            for k, lamp in enumerate(chosen)
+        ]
 
     def at_vertex(self, p: Any, n: Any, counted: Any, active: Any) -> NearbyLamps:
         """The lamps from p on a surface of normal n. counted: the one lamp that counts, or -1."""
-        lamps, importances, guided = [], [], []
+        lamps, importances, guided, interiors = [], [], [], []
         total, guided_total = mi.Float(0), mi.Float(0)
         for k in range(MAX_NEAR):
-            lamp = dr.gather(mi.UInt32, self._chosen, mi.UInt32(k))
-            counts = dr.gather(mi.Float, self._counts, mi.UInt32(k))
-            lamp = dr.select(counted >= 0, mi.UInt32(counted), lamp)
-            counts = dr.select(counted >= 0, 1.0 if k == 0 else 0.0, counts)
-            importance, aimed = self.importance(lamp, p, n, counted, active)
+            lamp, counts, rows = self._slot(k, counted, active)
+            importance, aimed = _importance(rows, lamp, p, n, counted, active)
             lamps.append(lamp)
+            interiors.append(rows.interior)
             importances.append(counts * importance)
             guided.append(counts * aimed)
             total += importances[-1]
             guided_total += guided[-1]
         reference = ReferencePoint(mi.Point3f(p), n, total, guided_total)
-        cones = self._cones(p, lamps, guided, active)
+        cones = _cones(p, interiors, guided)
         return NearbyLamps(reference, lamps, importances, guided, cones, self._is_guided)
 
     def importance(self, lamp: Any, p: Any, n: Any, counted: Any, active: Any) -> tuple[Any, Any]:
         """(importance, guided importance) of one lamp as in NearbyLamps; 0 for the weak ones."""
         sphere = dr.gather(mi.Vector4f, self._spheres, lamp, active)
-        row = dr.gather(mi.Vector4f, self._strengths, lamp, active)
-        alone = dr.select(mi.UInt32(counted) == lamp, mi.Float(1), 0)
-        weight = dr.select(counted >= 0, alone, row[0])
-        # Weigh by 1 / distance^2, held at the sphere's radius, and by the part in front.
-        to = point(sphere) - p
-        d = dr.sqrt(dr.maximum(dr.squared_norm(to), dr.square(sphere[3])))
-        is_two_sided = dr.squared_norm(n) < 0.5
-        cos = dr.select(is_two_sided, 1, dr.maximum(dr.dot(n, to) + sphere[3], 0) / d)
-        importance = dr.select(active, weight * cos / dr.square(d), 0)
-        return importance, importance * row[1]
+        strength = dr.gather(mi.Vector4f, self._strengths, lamp, active)
+        rows = _LampRows(sphere, strength, None)
+        return _importance(rows, lamp, p, n, counted, active)
 
-    def _cones(self, p: Any, lamps: list[Any], guided: list[Any], active: Any) -> Cones:
-        importances, axes, heights = [], [], []
-        total = mi.Float(0)
-        for lamp, aimed in zip(lamps, guided, strict=True):
-            sphere = dr.gather(mi.Vector4f, self._interiors, lamp, active)
-            to = point(sphere) - p
-            d2 = dr.maximum(dr.squared_norm(to), 1e-8)
-            sin2 = dr.square(sphere[3]) / d2
-            importances.append(dr.select((sin2 > 0) & (sin2 < _MAX_SIN2), aimed, 0))
-            total += importances[-1]
-            axes.append(to * dr.rsqrt(d2))
-            # 1 - cosine without the digits that float32 loses near 1.
-            heights.append(sin2 / (1 + dr.safe_sqrt(1 - sin2)))
-        return Cones(importances, total, axes, heights)
+    def _slot(self, k: int, counted: Any, active: Any) -> _Slot:
+        """A slot; for the lamp that is asked for alone the first one, where the others count nothing."""
+        slot, is_asked = self._slots[k], counted >= 0
+        if k > 0:
+            return slot._replace(counts=dr.select(is_asked, 0.0, slot.counts))
+        lamp = dr.select(is_asked, mi.UInt32(counted), slot.lamp)
+        tables = self._spheres, self._strengths, self._interiors
+        asked = (dr.gather(mi.Vector4f, table, lamp, active & is_asked) for table in tables)
+        rows = (dr.select(is_asked, a, b) for a, b in zip(asked, slot.rows, strict=True))
+        return _Slot(lamp, dr.select(is_asked, 1.0, slot.counts), _LampRows(*rows))
+
+
+def _importance(
+    rows: _LampRows, lamp: Any, p: Any, n: Any, counted: Any, active: Any
+) -> tuple[Any, Any]:
+    """(importance, guided importance) of a lamp from p on a surface of normal n."""
+    sphere, row = rows.sphere, rows.strength
+    alone = dr.select(mi.UInt32(counted) == lamp, mi.Float(1), 0)
+    weight = dr.select(counted >= 0, alone, row[0])
+    # Weigh by 1 / distance^2, held at the sphere's radius, and by the part in front.
+    to = point(sphere) - p
+    d = dr.sqrt(dr.maximum(dr.squared_norm(to), dr.square(sphere[3])))
+    is_two_sided = dr.squared_norm(n) < 0.5
+    cos = dr.select(is_two_sided, 1, dr.maximum(dr.dot(n, to) + sphere[3], 0) / d)
+    importance = dr.select(active, weight * cos / dr.square(d), 0)
+    return importance, importance * row[1]
+
+
+def _cones(p: Any, interiors: list[Any], guided: list[Any]) -> Cones:
+    """The cones from p around lamp interiors (centre, radius), by what guided rays find there."""
+    importances, axes, heights = [], [], []
+    total = mi.Float(0)
+    for sphere, aimed in zip(interiors, guided, strict=True):
+        to = point(sphere) - p
+        d2 = dr.maximum(dr.squared_norm(to), 1e-8)
+        sin2 = dr.square(sphere[3]) / d2
+        importances.append(dr.select((sin2 > 0) & (sin2 < _MAX_SIN2), aimed, 0))
+        total += importances[-1]
+        axes.append(to * dr.rsqrt(d2))
+        # 1 - cosine without the digits that float32 loses near 1.
+        heights.append(sin2 / (1 + dr.safe_sqrt(1 - sin2)))
+    return Cones(importances, total, axes, heights)
 
 
 def no_reference(p: Any) -> ReferencePoint:
@@ -183,6 +229,11 @@ def cone_pdf(cones: Cones, d: Any) -> Any:
     return pdf / dr.maximum(cones.total, 1e-30)
 
 
-def _rows(rows: F64) -> Any:
-    """(L + 1, 4) rows on the device: one more, so that a house without lamps has a row, too."""
-    return device_array(mi.Float, np.append(rows, np.zeros((1, 4)), 0).astype(np.float32).ravel())
+def _padded(rows: F64) -> F32:
+    """(L + 1, 4) rows: one more, so that a house without lamps has a row, too."""
+    return np.append(rows, np.zeros((1, 4)), 0).astype(np.float32)
+
+
+def _shared(row: F32) -> Any:
+    """A packet of four floats that all lanes share."""
+    return mi.Vector4f(*(dr.opaque(mi.Float, float(x)) for x in row))

@@ -205,8 +205,8 @@ class Emitters:
         free = counted < 0
         pdf = dr.select(free, self._dome_weight, dr.select(counted == DOME, 1, 0)) * texel_pdf
         for k in range(MAX_PORTALS):
-            weight = dr.gather(mi.Float, self._portal_weights, mi.UInt32(k))
-            weight = dr.select(free, weight, dr.select(counted == FIRST_PORTAL + k, 1, 0))
+            asked = dr.select(counted == FIRST_PORTAL + k, 1, 0)
+            weight = dr.select(free, self._portal_weights[k], asked)
             pdf += weight * self._portal_pdf(k, p, d)
         return dr.select(counted == SUN, 0, radiance), pdf
 
@@ -218,7 +218,7 @@ class Emitters:
         return dr.select(length > 1e-6, to / length, mi.Vector3f(0, 1, 0))
 
     def _portal_pdf(self, k: int, p: Any, d: Any) -> Any:
-        corner, a, b = self._portal(mi.UInt32(k))
+        corner, a, b = self._portal_edges[k]
         # Intersect the ray with the portal's plane: q in its edges' coordinates.
         n = dr.cross(a, b)
         along = dr.dot(n, d)
@@ -229,8 +229,8 @@ class Emitters:
         # |n| is the portal's area: its pdf per area, times distance^2 / cosine.
         return dr.select(crosses, dr.square(t) / dr.abs(along), 0)
 
-    def _portal(self, k: Any, active: Any = True) -> tuple[Any, ...]:
-        """(corner, first edge, second edge) of a portal."""
+    def _portal(self, k: Any, active: Any) -> tuple[Any, ...]:
+        """(corner, first edge, second edge) of a portal, another one for each lane."""
         first = k * _PORTAL_PACKETS
         rows = [dr.gather(mi.Vector4f, self._portals, first + j, active) for j in range(3)]
         return tuple(vector(row) for row in rows)
@@ -296,6 +296,11 @@ class Emitters:
         rows[: len(portals), 4:7] = portals[:, 1] - portals[:, 0]
         rows[: len(portals), 8:11] = portals[:, 3] - portals[:, 0]
         self._portals = device_array(mi.Float, rows.ravel())
+        # The same as numbers that all lanes share: cheaper than gathered ones.
+        self._portal_edges = [
+            tuple(opaque3(mi.Vector3f, row[4 * j : 4 * j + 3]) for j in range(_PORTAL_PACKETS))
+            for row in rows
+        ]
 
     def _set_lamp_weights(self, weights: F64) -> None:
         padded = weights if len(weights) else np.ones(1)
@@ -308,7 +313,7 @@ class Emitters:
         self._outdoor_alias = device_array(mi.Float, alias_rows(weights).ravel())
         portal = np.zeros(MAX_PORTALS, np.float32)
         portal[: len(weights) - FIRST_PORTAL] = weights[FIRST_PORTAL:]
-        self._portal_weights = device_array(mi.Float, portal)
+        self._portal_weights = [dr.opaque(mi.Float, float(w)) for w in portal]
         self._sun_weight = dr.opaque(mi.Float, float(weights[SUN]))
         self._dome_weight = dr.opaque(mi.Float, float(weights[DOME]))
 
