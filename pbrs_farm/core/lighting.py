@@ -39,6 +39,8 @@ GROUPS_OF_MODE: Final = MappingProxyType(
 
 ALL_MODES: Final = tuple(Mode)
 
+BULB_RADIUS_M: Final = 0.0325  # of a lamp whose source does not tell: a bulb 65 mm across
+
 
 class LightForm(StrEnum):
     """The shape of a lamp's light source as its model describes it."""

@@ -6,6 +6,8 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from pbrs_farm.core.lighting import BULB_RADIUS_M
+
 MAX_SAMPLES: Final = 2**20
 """Of samples, mutations and chains: far above what anyone waits for, far below what never ends."""
 
@@ -84,7 +86,7 @@ class RepairFields(FieldGroup):
     )
     shade_transmission: float = Field(0.4, ge=0, le=1, description="diffuse, of enclosing shades")
     min_escape: float = Field(0.2, ge=0, le=1, description="share of light below which a shade is")
-    bulb_radius_m: float = Field(0.0325, gt=0, le=1, description="where the source gives none")
+    bulb_radius_m: float = Field(BULB_RADIUS_M, gt=0, le=1, description="where none is given")
 
 
 class CameraFields(FieldGroup):

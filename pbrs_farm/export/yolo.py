@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import CEILING, FLOOR, NYU40_NAMES, WALL
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 
 # What surrounds the whole picture is no object: it has no boxes.
-_NO_BOX: Final = tuple(map(NYU40_NAMES.index, ("none", "wall", "floor", "ceiling")))
+_NO_BOX: Final = (0, WALL, FLOOR, CEILING)
 
 
 def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> int:

@@ -124,18 +124,18 @@ def _write_textures(
 def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
     alpha, mode = _alpha(material)
     # Say what glTF knows of the material: colour, metal or not, roughness.
-    look: dict[str, Any] = {
+    pbr: dict[str, Any] = {
         "baseColorFactor": [*_linear(material.diffuse), alpha],
         "metallicFactor": 1.0 if material.kind is MaterialKind.MIRROR else 0.0,
         "roughnessFactor": _roughness(material),
     }
     if material.texture_id in images:
-        look["baseColorTexture"] = {"index": images[material.texture_id]}
+        pbr["baseColorTexture"] = {"index": images[material.texture_id]}
     if material.roughness_texture_id in images:
-        look["metallicRoughnessTexture"] = {"index": images[material.roughness_texture_id]}
+        pbr["metallicRoughnessTexture"] = {"index": images[material.roughness_texture_id]}
     gltf_material: dict[str, Any] = {
         "name": material.name,
-        "pbrMetallicRoughness": look,
+        "pbrMetallicRoughness": pbr,
         "doubleSided": True,
         "alphaMode": mode,
         "extras": {"kind": material.kind.value},

@@ -14,11 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I64, Bools
-from pbrs_farm.core.classes import DOOR, NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES, WINDOW
+from pbrs_farm.core.classes import (
+    BLINDS,
+    CURTAIN,
+    DOOR,
+    NYU13_FROM_NYU40,
+    NYU13_NAMES,
+    OTHERSTRUCTURE,
+    WINDOW,
+)
 from pbrs_farm.core.house import House, Item, ItemKind
 
 # NYU40 classes of what hangs at openings or is built in: no furniture.
-NO_FURNITURE: Final = tuple(map(NYU40_NAMES.index, ("blinds", "curtain", "otherstructure")))
+NO_FURNITURE: Final = (BLINDS, CURTAIN, OTHERSTRUCTURE)
 
 # Shares of the picture above which furniture and floor earn nothing more.
 MOST_FURNITURE: Final = 0.45

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house import (
     House,
     Item,
@@ -146,7 +147,7 @@ def _walls(index: dict[str, int]) -> tuple[Item, ...]:
                 left, right, 0.0, top, top,
                 (index[sides[0]], index[sides[1]], index["wall_default"]),
             ),
-            nyu40=1,
+            nyu40=WALL,
         )
         for k, (left, right, sides) in enumerate(outlines)
     )  # fmt: skip
@@ -155,11 +156,11 @@ def _walls(index: dict[str, int]) -> tuple[Item, ...]:
 def _planes(index: dict[str, int]) -> list[Item]:
     items = []
     for room_id, rect, floor in (("0_0", LIVING, "floor_planks"), ("0_1", BEDROOM, "carpet")):
-        # A floor and a ceiling of the room's outline (NYU40 2 and 22).
+        # A floor and a ceiling of the room's outline.
         polygons = [[_rectangle(rect)]]
         for kind, nyu40, y, material, up in (
-            (ItemKind.FLOOR, 2, 0.0, floor, True),
-            (ItemKind.CEILING, 22, WALL_HEIGHT_M, "ceiling_default", False),
+            (ItemKind.FLOOR, FLOOR, 0.0, floor, True),
+            (ItemKind.CEILING, CEILING, WALL_HEIGHT_M, "ceiling_default", False),
         ):
             surface = horizontal(str(kind), polygons, y, index[material], up=up)
             items.append(

@@ -14,7 +14,7 @@ from functools import cache, lru_cache
 from importlib.resources import files
 from typing import Final
 
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_NAMES, PERSON, WINDOW
 from pbrs_farm.core.house import ItemKind
 
 CLASS_TAG: Final = "class:"
@@ -249,9 +249,9 @@ def kind_of(piece: PieceClass, nyu40: int, *, is_opening: bool, is_light: bool) 
     nyu40: the class the item gets, which the source's element may have decided.
     """
     if is_opening:
-        return ItemKind.WINDOW if nyu40 == NYU40_NAMES.index("window") else ItemKind.DOOR
+        return ItemKind.WINDOW if nyu40 == WINDOW else ItemKind.DOOR
     if is_light:
         return ItemKind.LAMP
-    if nyu40 == NYU40_NAMES.index("person"):
+    if nyu40 == PERSON:
         return ItemKind.PERSON
     return {_STAIRS: ItemKind.STAIRS, _PLANT: ItemKind.PLANT}.get(piece.word, ItemKind.OBJECT)

@@ -15,6 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, I64, Bools
+from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors, closed_edge_share, face_areas, signed_volume
 from pbrs_farm.read.common.placed_mesh import part_of
@@ -30,7 +31,7 @@ _THICKER_THAN_BLOCKS_M: Final = 0.5
 _LEVEL: Final = 0.7  # least |y| of the normal of a floor, a ceiling or a roof
 
 # NYU40 class of each kind.
-CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: 1, ItemKind.FLOOR: 2, ItemKind.CEILING: 22}
+CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}
 
 
 def room_parts(item: Item, others: F64) -> tuple[Item, ...]:

@@ -194,6 +194,12 @@ def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:
     return np.array(value, np.float64)
 
 
+def object_at(holder: dict[str, Any], key: str) -> dict[str, Any]:
+    """The JSON object under a key, {} where there is none: what is optional may be missing or odd."""
+    value = holder.get(key)
+    return value if isinstance(value, dict) else {}
+
+
 def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]:
     """The textures of a material that are looked at, by their key in glTF, the leading one first.
 
@@ -202,18 +208,16 @@ def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]
     if material is None:
         return {}
     fields_json = entry(gltf, "materials", material)
-    look = fields_json.get("pbrMetallicRoughness")
-    look = look if isinstance(look, dict) else {}
+    pbr = object_at(fields_json, "pbrMetallicRoughness")
     found = {
-        "baseColorTexture": look.get("baseColorTexture"),
+        "baseColorTexture": pbr.get("baseColorTexture"),
         "normalTexture": fields_json.get("normalTexture"),
-        "metallicRoughnessTexture": look.get("metallicRoughnessTexture"),
+        "metallicRoughnessTexture": pbr.get("metallicRoughnessTexture"),
     }
     return {key: info for key, info in found.items() if isinstance(info, dict)}
 
 
 def texture_layout(info: dict[str, Any]) -> tuple[Any, Any]:
     """What places a texture on a surface: its set of texture coordinates and their transform."""
-    extensions = info.get("extensions")
-    turn = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
+    turn = object_at(info, "extensions").get("KHR_texture_transform")
     return info.get("texCoord", 0), turn

@@ -9,7 +9,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, accessor_array, entry
-from pbrs_farm.read.gltf.document import numbers, texture_slots
+from pbrs_farm.read.gltf.document import numbers, object_at, texture_slots
 from pbrs_farm.read.mesh.obj import Mesh
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
@@ -53,11 +53,11 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     if not len(faces):
         return None
     # Take the texture coordinates that the leading picture uses.
-    look = next(iter(texture_slots(gltf, primitive.get("material")).values()), {})
-    name, uvs = f"TEXCOORD_{look.get('texCoord', 0)}", None
+    leading = next(iter(texture_slots(gltf, primitive.get("material")).values()), {})
+    name, uvs = f"TEXCOORD_{leading.get('texCoord', 0)}", None
     if name in attributes:
         uvs = _floats(gltf, attributes[name], 2, f"{place}.TEXCOORD")
-        uvs = _transformed(gltf, uvs, look, place) * [1, -1] + [0, 1]  # v up
+        uvs = _transformed(gltf, uvs, leading, place) * [1, -1] + [0, 1]  # v up
     normals = np.zeros_like(positions)  # zero: flat, as glTF asks where there are none
     if "NORMAL" in attributes:
         normals = _floats(gltf, attributes["NORMAL"], 3, f"{place}.NORMAL")
@@ -108,8 +108,7 @@ def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> I32:
 
 def _transformed(gltf: Gltf, uvs: F64, info: dict[str, Any], place: str) -> F64:
     """uvs after KHR_texture_transform: translation x rotation x scale, v still down."""
-    extensions = info.get("extensions")
-    turn = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
+    turn = object_at(info, "extensions").get("KHR_texture_transform")
     if not isinstance(turn, dict):
         return uvs
     offset = numbers(gltf, turn.get("offset", [0, 0]), 2, f"{place}: texture offset")

@@ -12,13 +12,21 @@ from fnmatch import fnmatchcase
 from itertools import chain
 from typing import Any, Final
 
-from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
+from pbrs_farm.core.classes import (
+    DOOR,
+    FLOOR,
+    LAMP,
+    NYU40_NAMES,
+    OTHERPROP,
+    OTHERSTRUCTURE,
+    REFRIGERATOR,
+    WINDOW,
+)
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of, nyu40_of, words_of
 
-_OTHERSTRUCTURE: Final = NYU40_NAMES.index("otherstructure")
 _WALL_WORDS: Final = "wall wallpaper wand waende tapete mur muro pared parete parede"
 _CEILING_WORDS: Final = "ceiling zimmerdecke decke plafond techo soffitto teto"
 _FLOOR_WORDS: Final = (
@@ -41,7 +49,7 @@ _KIND_OF_CLASS: Final[dict[str, ItemKind]] = {
 }
 # Class names without spaces and dashes -> NYU40 id.
 _IDS: Final = {re.sub(r"[ _-]", "", name): i for i, name in enumerate(NYU40_NAMES)} | {
-    "refridgerator": NYU40_NAMES.index("refrigerator"),
+    "refridgerator": REFRIGERATOR,
     "void": 0,
 }
 
@@ -135,18 +143,17 @@ def class_of_node_name(name: str) -> NodeClass | None:
     """What the words of a node's or a material's name say, if anything."""
     piece = class_of_piece("", name)
     nyu40 = piece.nyu40
-    if nyu40 is None or nyu40 == _OTHERSTRUCTURE:
+    if nyu40 is None or nyu40 == OTHERSTRUCTURE:
         # Look for structure where the name says nothing more special.
         words = words_of(name)
         for word, kind in _STRUCTURE_WORDS.items():
             if word in words:
-                # The ground outside is labelled floor (2).
-                label = 2 if kind is ItemKind.GROUND else NYU40_NAMES.index(kind.value)
+                # The ground outside is labelled floor.
+                label = FLOOR if kind is ItemKind.GROUND else NYU40_NAMES.index(kind.value)
                 return NodeClass(label, kind, is_tagged=False)
     if nyu40 is None:
         return None
     # A name tells openings and lamps only by their class.
-    is_lamp = NYU40_NAMES[nyu40] == "lamp"
-    is_opening = NYU40_NAMES[nyu40] in ("door", "window")
-    kind = kind_of(piece, nyu40, is_opening=is_opening, is_light=is_lamp)
+    is_opening = nyu40 in (DOOR, WINDOW)
+    kind = kind_of(piece, nyu40, is_opening=is_opening, is_light=nyu40 == LAMP)
     return NodeClass(nyu40, kind, is_tagged=False)

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm.core.frames import srgb_from_linear
+from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
@@ -17,6 +17,7 @@ from pbrs_farm.read.gltf.document import (
     MissingFile,
     image_bytes,
     numbers,
+    object_at,
     texture_layout,
     texture_slots,
 )
@@ -45,16 +46,16 @@ class SceneMaterials:
             return Material("default", is_default=True), None
         fields_json = entry(self._gltf, "materials", number)
         place = f"materials[{number}]"
-        look = _object(fields_json, "pbrMetallicRoughness")
-        factor = numbers(self._gltf, look.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
+        pbr = object_at(fields_json, "pbrMetallicRoughness")
+        factor = numbers(self._gltf, pbr.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
         # The metallic-roughness factors; of a texture of them metal is not looked at.
-        metallic = self._fraction(look, "metallicFactor", 1.0, place)
-        roughness = self._fraction(look, "roughnessFactor", 1.0, place)
-        if "metallicRoughnessTexture" in look:
+        metallic = self._fraction(pbr, "metallicFactor", 1.0, place)
+        roughness = self._fraction(pbr, "roughnessFactor", 1.0, place)
+        if "metallicRoughnessTexture" in pbr:
             metallic = 0.0  # its factor only scales what this reader does not look at
-        found = self._texture(look.get("baseColorTexture"), place)
+        found = self._texture(pbr.get("baseColorTexture"), place)
         maps = self._maps(number, place)
-        transmission = _object(_object(fields_json, "extensions"), "KHR_materials_transmission")
+        transmission = object_at(object_at(fields_json, "extensions"), "KHR_materials_transmission")
         passes = self._fraction(transmission, "transmissionFactor", 0.0, place)
         # Opacity is what blending lets through, or transmission, whichever is less.
         mode = fields_json.get("alphaMode", "OPAQUE")
@@ -80,7 +81,7 @@ class SceneMaterials:
             roughness_texture_id=maps.get("metallicRoughnessTexture"),
             normal_texture_id=maps.get("normalTexture"),
             normal_scale=self._normal_scale(fields_json, place) if "normalTexture" in maps else 1.0,
-            is_default=found is None and "baseColorFactor" not in look,
+            is_default=found is None and "baseColorFactor" not in pbr,
         )
         return material, self._emission(fields_json, place)
 
@@ -102,7 +103,7 @@ class SceneMaterials:
         return maps
 
     def _normal_scale(self, fields_json: dict[str, Any], place: str) -> float:
-        scale = _object(fields_json, "normalTexture").get("scale", 1.0)
+        scale = object_at(fields_json, "normalTexture").get("scale", 1.0)
         (value,) = numbers(self._gltf, [scale], 1, f"{place}: scale of the normal map")
         return float(value)
 
@@ -114,7 +115,7 @@ class SceneMaterials:
         metallic: float,
         roughness: float,
     ) -> MaterialKind:
-        word = _object(fields_json, "extras").get("kind")
+        word = object_at(fields_json, "extras").get("kind")
         tagged = next((k for k in MaterialKind if k.value == word), None)
         # What extras say goes first, then opacity, then the factors.
         if tagged is not None:
@@ -131,12 +132,14 @@ class SceneMaterials:
         )
         if not (factor > 0).any():
             return None
-        strength = _object(_object(fields_json, "extensions"), "KHR_materials_emissive_strength")
+        strength = object_at(
+            object_at(fields_json, "extensions"), "KHR_materials_emissive_strength"
+        )
         if "emissiveStrength" not in strength:
             return 0.0
         # Take luminance for the strength: its Rec. 709 weights.
         (value,) = numbers(self._gltf, [strength["emissiveStrength"]], 1, f"{place}: emission")
-        return float(max(value, 0.0) * (factor @ [0.2126, 0.7152, 0.0722]))
+        return float(max(value, 0.0) * (factor @ LUMINANCE))
 
     def _fraction(self, holder: dict[str, Any], key: str, default: float, place: str) -> float:
         (value,) = numbers(self._gltf, [holder.get(key, default)], 1, f"{place}: {key}")
@@ -147,7 +150,7 @@ class SceneMaterials:
             return None
         texture = entry(self._gltf, "textures", info.get("index"))
         # Prefer the WebP picture: the other is a fallback for readers without it.
-        webp = _object(_object(texture, "extensions"), "EXT_texture_webp")
+        webp = object_at(object_at(texture, "extensions"), "EXT_texture_webp")
         source = webp.get("source", texture.get("source"))
         if type(source) is not int:
             self._notes.add("unreadable-texture", place, "its picture is of an unknown kind")
@@ -170,18 +173,13 @@ class SceneMaterials:
 
     def is_tagged(self, number: int | None) -> bool:
         """Whether the material's extras say its kind, as those of house.glb do."""
-        return number is not None and "kind" in _object(
+        return number is not None and "kind" in object_at(
             entry(self._gltf, "materials", number), "extras"
         )
 
     def as_bulb(self, material: Material) -> int:
         """The index of the material as one that emits."""
         return self.library.index(replace(material, kind=MaterialKind.BULB))
-
-
-def _object(holder: dict[str, Any], key: str) -> dict[str, Any]:
-    value = holder.get(key)
-    return value if isinstance(value, dict) else {}
 
 
 def _encoded(linear: Any) -> tuple[float, float, float]:

@@ -10,15 +10,13 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.house import Item, LightPart, Surface, corners_of_surfaces
-from pbrs_farm.core.lighting import LightForm, PowerUnit
+from pbrs_farm.core.lighting import BULB_RADIUS_M, LightForm, PowerUnit
 from pbrs_farm.core.mesh import face_areas
 from pbrs_farm.formats.glb import Gltf
-from pbrs_farm.read.gltf.document import numbers
+from pbrs_farm.read.gltf.document import numbers, object_at
 
 # Flux of a lamp whose strength the scene does not tell: a 60 W incandescent bulb's.
 ASSUMED_LM: Final = 800.0
-
-_RADIUS_M: Final = 0.0325  # of the bulb that stands for a point: 65 mm across
 
 
 def punctual_light(
@@ -26,8 +24,8 @@ def punctual_light(
 ) -> LightPart | None:
     """The point or spot light of a node; None if it has none, or a directional one (the sun)."""
     # A node names its light by number; the lights stand at the file's top.
-    number = _at(_at(node, "extensions"), "KHR_lights_punctual").get("light")
-    lights = _at(_at(gltf.document, "extensions"), "KHR_lights_punctual").get("lights")
+    number = object_at(object_at(node, "extensions"), "KHR_lights_punctual").get("light")
+    lights = object_at(object_at(gltf.document, "extensions"), "KHR_lights_punctual").get("lights")
     if type(number) is not int or not isinstance(lights, list) or not 0 <= number < len(lights):
         return None
     fields_json = lights[number]
@@ -40,14 +38,14 @@ def punctual_light(
     # A point light shines everywhere, a spot within its outer cone.
     cutoff = math.pi
     if fields_json["type"] == "spot":
-        angle = _at(fields_json, "spot").get("outerConeAngle", math.pi / 4)
+        angle = object_at(fields_json, "spot").get("outerConeAngle", math.pi / 4)
         cutoff = float(np.clip(numbers(gltf, [angle], 1, f"{place}: cone")[0], 0.01, math.pi))
     # Candela times the cone's solid angle are lumens; a light looks along -z.
     solid_angle = 2 * math.pi * (1 - math.cos(cutoff))
     direction = -world_from_node[:3, 2] / max(float(np.linalg.norm(world_from_node[:3, 2])), 1e-12)
     return LightPart(
         position=triple(world_from_node[:3, 3]),
-        radius_m=_RADIUS_M,
+        radius_m=BULB_RADIUS_M,
         power=max(float(intensity), 0.0) * solid_angle,
         unit=PowerUnit.LUMEN,
         rgb_linear=triple(colour / max(float(colour.max()), 1e-6)),
@@ -84,13 +82,8 @@ def emitted(surfaces: Sequence[Surface], luminance: dict[int, float]) -> tuple[L
 def assumed_light(item: Item) -> LightPart:
     """A light in the middle of a lamp about which the scene tells nothing."""
     centre = item.bounds.mean(0)
-    return LightPart(triple(centre), _RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
+    return LightPart(triple(centre), BULB_RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
 
 
 def _area(surface: Surface) -> float:
     return float(face_areas(corners_of_surfaces([surface])).sum())
-
-
-def _at(holder: dict[str, Any], key: str) -> dict[str, Any]:
-    value = holder.get(key)
-    return value if isinstance(value, dict) else {}

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm.core.classes import OTHERPROP
+from pbrs_farm.core.classes import LAMP, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import (
@@ -26,7 +26,7 @@ from pbrs_farm.read.common.material_library import PANE_OPACITY
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import oriented_box, placed
 from pbrs_farm.read.common.planar_walls import planar_parts
-from pbrs_farm.read.gltf.document import Placed, placed_nodes
+from pbrs_farm.read.gltf.document import Placed, object_at, placed_nodes
 from pbrs_farm.read.gltf.mesh_primitives import meshes_of
 from pbrs_farm.read.gltf.node_classes import Mapping, NodeClass, class_of_node, collection_of
 from pbrs_farm.read.gltf.pbr_materials import SceneMaterials
@@ -106,7 +106,7 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
     for node in placed_nodes(gltf):
         fields_json = entry(gltf, "nodes", node.index)
         name = str(fields_json.get("name", ""))[:200]
-        extras = fields_json["extras"] if isinstance(fields_json.get("extras"), dict) else {}
+        extras = object_at(fields_json, "extras")
         above = owner.get(node.path[:-1])
         seen = class_of_node(name, extras, mapping) or members.get(node.path[:-1])
         # A group whose name means several things is no item.
@@ -117,8 +117,7 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
                 if grouped.nyu40 and above is None:
                     members[node.path] = grouped
         # Leave out empty nodes without a class: they only hold others.
-        extensions = fields_json.get("extensions")
-        has_light = isinstance(extensions, dict) and "KHR_lights_punctual" in extensions
+        has_light = "KHR_lights_punctual" in object_at(fields_json, "extensions")
         has_part = "mesh" in fields_json or has_light
         # Begin an item at the outermost node of a class, and at tagged ones below it.
         if (seen and (above is None or seen.is_tagged)) or (above is None and has_part):
@@ -231,8 +230,8 @@ def _finished(
 ) -> Item:
     seen = thing.seen
     if lights and not surfaces:
-        # A light without a shape is a lamp (NYU40 35).
-        seen = replace(seen, kind=ItemKind.LAMP, nyu40=35)
+        # A light without a shape is a lamp.
+        seen = replace(seen, kind=ItemKind.LAMP, nyu40=LAMP)
     tags = [UNMAPPED] if seen is _UNMAPPED else []
     if any(np.linalg.det(p.world_from_node[:3, :3]) < 0 for p in thing.parts):
         tags.append("mirrored")

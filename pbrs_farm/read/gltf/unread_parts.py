@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.gltf.document import UNDERSTOOD
+from pbrs_farm.read.gltf.document import UNDERSTOOD, object_at
 from pbrs_farm.read.gltf.mesh_primitives import has_surface
 
 UNREAD: Final = "unread-part"
@@ -23,7 +23,7 @@ _UNSEEN: Final = frozenset({
 _Row = dict[str, Any]
 _PRIMITIVES: Final[dict[str, Callable[[_Row], bool]]] = {
     "points or lines": lambda row: not has_surface(row),
-    "vertex colours": lambda row: "COLOR_0" in _dict(row.get("attributes")),
+    "vertex colours": lambda row: "COLOR_0" in object_at(row, "attributes"),
     "morph targets": lambda row: bool(row.get("targets")),
 }
 
@@ -46,7 +46,3 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
 
 def _rows(value: Any) -> list[_Row]:
     return [row for row in value if isinstance(row, dict)] if isinstance(value, list) else []
-
-
-def _dict(value: Any) -> _Row:
-    return value if isinstance(value, dict) else {}

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.read.gltf.document import object_at
 
 # Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
 _GLASS: Final = frozenset(
@@ -52,6 +53,5 @@ def words_of_name(name: str) -> frozenset[str]:
 
 
 def _lets_light_through(row: dict[str, Any]) -> bool:
-    extensions = row.get("extensions")
-    has_transmission = isinstance(extensions, dict) and "KHR_materials_transmission" in extensions
+    has_transmission = "KHR_materials_transmission" in object_at(row, "extensions")
     return row.get("alphaMode") == "BLEND" or has_transmission

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
+from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP, REFRIGERATOR
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import ItemKind, LightPart
@@ -29,7 +29,7 @@ LIGHT_TABLE: Final = "suncgModelLights.json"
 _MAX_TABLE_BYTES: Final = 32_000_000
 _NYU40_IDS: Final = {name.replace(" ", "_"): i for i, name in enumerate(NYU40_NAMES)} | {
     "void": 0,
-    "refridgerator": NYU40_NAMES.index("refrigerator"),
+    "refridgerator": REFRIGERATOR,
 }
 _KIND_OF_CLASS: Final = {
     "window": ItemKind.WINDOW,

@@ -10,12 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.core.mesh import area_vectors, triangle_corners
 from pbrs_farm.read.suncg.model_files import ParsedModel
 
-MIRROR: Final = NYU40_NAMES.index("mirror")
 _REFLECTANCE: Final = 0.9
 _FLAT_COS: Final = 0.98  # of the angle to the glass's normal, within which a face lies flat
 _FLAT_SHARE: Final = 0.45  # of a material's area: a pane with a back and edges has half

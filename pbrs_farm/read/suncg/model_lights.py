@@ -12,13 +12,11 @@ from scipy.sparse.csgraph import connected_components
 from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import LightPart, Surface
-from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.read.common.placed_mesh import part_of
 
 # Power of a lamp that has bulbs but no row in suncgModelLights.json; shared by its bulbs.
 ASSUMED_WATT = 60.0
-
-_FALLBACK_RADIUS_M = 0.0325
 
 
 def placed_light(light: LightPart, world_from_model: F64) -> LightPart:
@@ -68,7 +66,7 @@ def with_emitting_bulbs(
     repair adds them.
     """
     if not bulbs:
-        return tuple(replace(light, radius_m=_FALLBACK_RADIUS_M) for light in lights)
+        return tuple(replace(light, radius_m=BULB_RADIUS_M) for light in lights)
     # Centre and mean radius of each bulb.
     bounds = [(surfaces[b].positions.min(0), surfaces[b].positions.max(0)) for b in bulbs]
     centres = np.array([(low + high) / 2 for low, high in bounds], np.float64)

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
 from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
 from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
@@ -147,7 +148,7 @@ def _floor(room: ReadRoom, parts: list[shapely.Polygon], materials: HomeMaterial
     rings = [_rings(p) for p in parts]
     surface = horizontal("floor", rings, room.level.elevation, material, up=True)
     surface = _textured(surface, room.plan.floor)
-    return [_item(room, ItemKind.FLOOR, 2, surface)]
+    return [_item(room, ItemKind.FLOOR, FLOOR, surface)]
 
 
 def _ceiling(
@@ -159,7 +160,7 @@ def _ceiling(
     surface = ceilings.surface(
         room.level, [_rings(p) for p in parts], material, is_flat=room.plan.is_ceiling_flat
     )
-    return [_item(room, ItemKind.CEILING, 22, _textured(surface, room.plan.ceiling))]
+    return [_item(room, ItemKind.CEILING, CEILING, _textured(surface, room.plan.ceiling))]
 
 
 def _item(room: ReadRoom, kind: ItemKind, nyu40: int, surface: Surface) -> Item:

@@ -7,11 +7,9 @@ import numpy as np
 from pbrs_farm.core.arrays import triple
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import LightPart
-from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanPiece
 from pbrs_farm.read.sweethome3d.placement import PieceFrame
-
-DEFAULT_RADIUS_M = 0.0325
 
 
 def light_parts(
@@ -35,13 +33,13 @@ def light_parts(
                 ]
             ),
             s.colour,
-            DEFAULT_RADIUS_M if s.diameter is None else s.diameter * width / 2,
+            BULB_RADIUS_M if s.diameter is None else s.diameter * width / 2,
         )
         for s in piece.lights
     ]
     # A lamp that only has a glowing mesh gets a source in its middle.
     if not sources and emitting:
-        sources = [(np.zeros(3), (1.0, 1.0, 1.0), DEFAULT_RADIUS_M)]
+        sources = [(np.zeros(3), (1.0, 1.0, 1.0), BULB_RADIUS_M)]
     # Share the lamp's power by the sources' brightness; colours keep their hue at full value.
     strength = [max(colour) for _, colour, _ in sources]
     total = sum(strength)

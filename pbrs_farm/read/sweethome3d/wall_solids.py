@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import WALL
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.primitives import wall_prism
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
@@ -94,7 +95,7 @@ def _wall_item(
         kind=ItemKind.WALL,
         level_id=level_id,
         surfaces=painted,
-        nyu40=1,
+        nyu40=WALL,
         source_class="wall",
         tags=("arc",) if abs(wall.arc) > 1e-3 else (),
     )
@@ -129,7 +130,7 @@ def _baseboard_item(
         kind=ItemKind.WALL,
         level_id=level_id,
         surfaces=tuple(_textured(s, paint, level.elevation) for s in surfaces),
-        nyu40=1,
+        nyu40=WALL,
         source_class="baseboard",
         tags=("baseboard", f"baseboard_of:wall_{wall.id}"),
     )

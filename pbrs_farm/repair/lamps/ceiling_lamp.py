@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room, corners_of_surfaces
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.mesh import distances_to_triangles
@@ -16,7 +17,6 @@ from pbrs_farm.repair.lamps.bulbs import icosphere
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of
 
-LAMP_NYU40 = 35  # class "lamp" of NYU40
 ADDED_LAMP = "added"  # tag of every lamp that repair adds
 _BELOW_CEILING_M = 0.2  # centre of the lamp
 _TALL_M = 0.5  # what reaches this near the ceiling takes part of it
@@ -62,7 +62,7 @@ def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: flo
         kind=ItemKind.LAMP,
         level_id=room.level_id,
         surfaces=(icosphere("bulb", centre, radius, material),),
-        nyu40=LAMP_NYU40,
+        nyu40=LAMP,
         source_class=tag,
         room_id=room.id,
         lights=(light,),
