@@ -68,10 +68,11 @@ def _dressed(name: str, seed: int) -> tuple[dict[str, Any], House]:
 
 def house_as_a_run_has_it(name: str) -> House:
     """The home as read, without what its recipe removes: nothing makes way for plants."""
-    from pbrs_farm.run.dressed_house import kept
+    from pbrs_farm.repair.cleaning import without_persons_and_plants
 
     recipe = recipe_from_name("fast")
-    return kept(read_house(resolve(name), recipe.read), recipe)
+    house = read_house(resolve(name), recipe.read)
+    return without_persons_and_plants(house, recipe.repair)[0]
 
 
 def repaired_home(

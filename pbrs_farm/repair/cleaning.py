@@ -11,9 +11,8 @@ from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.repair_report import FacesReport, Removed
+from pbrs_farm.repair.structure.sliver_removal import MIN_AREA_M2
 from pbrs_farm.repair.structure.walls import BASEBOARD
-
-_MIN_AREA_M2 = 1e-12  # as booleans.py drops: float32 holds no smaller face
 
 
 def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
@@ -81,7 +80,7 @@ def with_sound_faces(house: House) -> tuple[House, FacesReport]:
 def _sound(surface: Surface) -> tuple[Surface, int, int]:
     faces = surface.faces
     # Drop faces without area before their normals are asked for.
-    keep = faces_with_area(triangle_corners(surface.positions, faces), _MIN_AREA_M2)
+    keep = faces_with_area(triangle_corners(surface.positions, faces), MIN_AREA_M2)
     faces = faces[keep]
     against = _against_normals(surface, faces)
     n_dropped, n_turned = int((~keep).sum()), int(against.sum())

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64, Bools
-from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 
 _CUT_M = 1.2  # above the level's floor
@@ -69,8 +69,7 @@ def _xy(point: Sequence[float] | F64) -> str:
 
 def section_of_items(items: Sequence[Item], y: float) -> F64:
     """(N, 2, 2) plan segments in which the items' triangles meet the height y."""
-    triangles = [s.positions.astype(np.float64)[s.faces] for i in items for s in i.surfaces]
-    corners = np.concatenate([np.zeros((0, 3, 3)), *triangles])
+    corners = corners_of_surfaces(s for i in items for s in i.surfaces)
     # Keep the triangles with corners on both sides of the cut.
     above = corners[:, :, 1] > y
     crossing = above.any(1) & ~above.all(1)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.house import House, ItemKind
+from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as MADE_VERSION
 from pbrs_farm.core.recipe import DressFields, Recipe
 from pbrs_farm.read.source import SourceRef
@@ -60,17 +60,12 @@ def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, Dre
     if not seed:
         return house, None
     from pbrs_farm.dress.dressing import dress
+    from pbrs_farm.repair.cleaning import without_persons_and_plants
 
     doing(source.location, "dress")
-    return dress(kept(house, recipe), catalogue_of(recipe.dress), recipe.dress, seed)
-
-
-def kept(house: House, recipe: Recipe) -> House:
-    """The house without the people and plants that repair will take out: nothing makes way for them."""
-    gone = {ItemKind.PERSON} if recipe.repair.remove_persons else set()
-    if recipe.repair.remove_plants:
-        gone.add(ItemKind.PLANT)
-    return house.with_items(item for item in house.items if item.kind not in gone)
+    # Nothing makes way for people and plants that repair will take out.
+    bare, _removed = without_persons_and_plants(house, recipe.repair)
+    return dress(bare, catalogue_of(recipe.dress), recipe.dress, seed)
 
 
 def dressing_digest(source: SourceRef, recipe: Recipe) -> str:

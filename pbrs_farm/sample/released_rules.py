@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, Bools
-from pbrs_farm.core.house import Geometry, House, Item, ItemKind, Room
+from pbrs_farm.core.house import Geometry, House, Item, ItemKind, Room, corners_of_surfaces
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.candidates import Candidates, Grid
 from pbrs_farm.sample.eye_probes import Counter
@@ -112,8 +112,7 @@ def _is_obstacle(item: Item, room: Room) -> bool:
 
 
 def _triangles(items: list[Item]) -> F64:
-    parts = [s.positions[s.faces].astype(np.float64) for i in items for s in i.surfaces]
-    return np.concatenate([np.zeros((0, 3, 3)), *parts])
+    return corners_of_surfaces(s for i in items for s in i.surfaces)
 
 
 def _plan_shapes(triangles: F64) -> NDArray[np.object_]:

@@ -22,7 +22,7 @@ from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.mesh import edges_are_paired, signed_volume
 from pbrs_farm.repair.structure.sliver_removal import without_slivers
 
-_WELD_M = 1e-5  # corners nearer than this become one where exact ones do not close
+WELD_M = 1e-5  # corners nearer than this become one where exact ones do not close
 _NUMBER_OF_PROPERTIES = 8  # x y z, u v, nx ny nz
 
 
@@ -69,7 +69,7 @@ def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | 
     if not patches:
         return None
     # Weld equal corners alone first: a larger weld may close a gap that is meant.
-    for weld_m in (0.0, _WELD_M):
+    for weld_m in (0.0, WELD_M):
         solid = _solid(patches, table, weld_m)
         if solid is not None:
             return solid

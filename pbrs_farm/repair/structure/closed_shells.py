@@ -15,6 +15,7 @@ from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import face_areas, signed_volume, unit_normals
 from pbrs_farm.repair.structure.booleans import (
+    WELD_M,
     Patch,
     TagTable,
     faces_of_patches,
@@ -24,7 +25,6 @@ from pbrs_farm.repair.structure.patches import patch_from_surface
 
 _FLAT_M = 1e-3  # how far corners may lie off the plane of a planar wall
 _LEAST_FACES = 4  # of a closed solid
-_WELD_M = 1e-5  # as booleans.py welds
 _THICKER_THAN_WALLS_M = 0.4  # what is thinner and looks inward is a wall wound the wrong way
 
 ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was made of
@@ -80,7 +80,7 @@ def components(patches: Sequence[Patch]) -> list[I64]:
     """For each patch the shell (F,) of each face; shells are faces joined at their corners."""
     positions = np.concatenate([p.positions for p in patches])
     # Number the places of corners through all patches.
-    keys = np.round(positions / _WELD_M)
+    keys = np.round(positions / WELD_M)
     _, inverse = np.unique(keys, axis=0, return_inverse=True)
     node = np.ravel(inverse)
     faces = node[faces_of_patches(patches)]

@@ -7,8 +7,7 @@ import numpy as np
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners
 from pbrs_farm.repair.structure.booleans import Patch, Tag
-
-_MIN_AREA_M2 = 1e-12  # float32 holds no smaller face
+from pbrs_farm.repair.structure.sliver_removal import MIN_AREA_M2
 
 
 def patch_from_surface(surface: Surface, item: int) -> Patch:
@@ -27,7 +26,7 @@ def patch_from_surface(surface: Surface, item: int) -> Patch:
 def surface_from_patch(patch: Patch) -> Surface | None:
     """The patch in single precision, faces of no area left out; None if nothing is left."""
     positions = patch.positions.astype(np.float32)
-    keep = faces_with_area(triangle_corners(positions, patch.faces), _MIN_AREA_M2)
+    keep = faces_with_area(triangle_corners(positions, patch.faces), MIN_AREA_M2)
     if not keep.any():
         return None
     # Keep the vertices that the remaining faces use.

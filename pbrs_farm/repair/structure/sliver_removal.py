@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.mesh import face_areas
 
-MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver
+MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver: float32 holds no smaller one
 _MERGE_M = 4e-6  # a few steps of float32 ten metres from the origin
 _MAX_ROUNDS = 8  # splitting may leave new slivers
 
