@@ -83,7 +83,7 @@ def _holder(
     """How long the lease of a running task lasts, and how long its holder has been silent."""
     stage = task_from_text(row["task"]).stage
     # Light on a GPU has a lease of its own length.
-    gpu = stage == LIGHT and view.fields.get("gpu") == "1"
+    gpu = stage == LIGHT and view.uses_gpu
     left_s = ledger.lease_left_s(view.job_id, row["task"], LIGHT_GPU if gpu else stage)
     seen = {w.name: w.age_s for w in registry.workers()}
     found: dict[str, Any] = {} if left_s is None else {"lease_s": round(max(0.0, left_s), 1)}
@@ -100,7 +100,7 @@ def _obstacle(registry: Registry, view: JobView, task: str) -> str:
     if reason := registry.breaker():
         return f"storage is unhealthy: {reason}"
     # Then the workers: none takes its queue, or all are leaving.
-    queue = queue_of(task_from_text(task).stage, gpu=view.fields.get("gpu") == "1")
+    queue = queue_of(task_from_text(task).stage, gpu=view.uses_gpu)
     takers = [
         w
         for w in registry.workers()

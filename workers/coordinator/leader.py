@@ -150,7 +150,7 @@ class Coordinator:
 
     def _send_of(self, view: JobView, may_send: dict[str, int]) -> Counter[str] | None:
         """Lane -> tasks of one job that were sent, at most may_send; None: not leading."""
-        gpu = view.fields.get("gpu") == "1"
+        gpu = view.uses_gpu
         tasks = self._ledger.dispatch(
             view.job_id,
             self._token,
@@ -203,7 +203,7 @@ class Coordinator:
         for view in views:
             for stage in STAGES:
                 # A message that waits on its queue is late, not lost.
-                queue = queue_of(stage, gpu=view.fields.get("gpu") == "1")
+                queue = queue_of(stage, gpu=view.uses_gpu)
                 if not view.counts.get(f"{stage}:q") or self._ledger.queue_length(queue):
                     continue
                 tasks = self._ledger.resend(view.job_id, self._token, stage, self._config.resend_s)
@@ -214,7 +214,7 @@ class Coordinator:
         return n_sent
 
     def _publish(self, view: JobView, tasks: list[str]) -> None:
-        gpu = view.fields.get("gpu") == "1"
+        gpu = view.uses_gpu
         recipe = view.fields["recipe"]
         self._send(
             (queue_of(task_from_text(task).stage, gpu=gpu), view.job_id, task, recipe)

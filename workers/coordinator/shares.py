@@ -79,7 +79,7 @@ def priority_of(view: JobView) -> int:
 
 def is_in(view: JobView, lane: str) -> bool:
     """Whether the job's tasks go in the lane."""
-    gpu = view.fields.get("gpu") == "1"
+    gpu = view.uses_gpu
     return lane_of(stage_of_lane(lane), gpu=gpu) == lane
 
 

@@ -125,6 +125,11 @@ class JobView:
         return WITH_FAILURES if self.state == "done" and self.n_failed else self.state
 
     @property
+    def uses_gpu(self) -> bool:
+        """Whether its light goes to the queue of GPUs."""
+        return self.fields.get("gpu") == "1"
+
+    @property
     def n_failed(self) -> int:
         """Tasks that failed for good."""
         return int(sum(self.counts.get(f"{s}:{STATES['FAILED']}", 0) for s in STAGES))
