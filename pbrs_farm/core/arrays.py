@@ -31,6 +31,10 @@ Points2 = NDArray[np.float64]  # (N, 2) float64, metres, plan: columns are world
 Matrix4 = NDArray[np.float64]  # (4, 4) float64, affine, column vectors: p_a = a_from_b @ p_b
 
 
+FirstHit = Callable[[F64, F64], tuple[F32, I32]]
+"""Origins and directions (N, 3) -> distance in lengths of the direction, and face (-1 = nothing)."""
+
+
 def triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
     """Three numbers as a value that can be compared and hashed; ValueError for more or fewer."""
     x, y, z = (float(v) for v in values)

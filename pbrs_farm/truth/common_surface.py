@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, FirstHit
 from pbrs_farm.core.camera import View
-from pbrs_farm.truth.optical_flow import FirstHit, inside_picture, projected, reaches
+from pbrs_farm.truth.optical_flow import inside_picture, projected, reaches
 
 POINTS_SIZE: Final = (32, 24)
 """Width and height of the grid of rays whose ends stand for what a view shows."""

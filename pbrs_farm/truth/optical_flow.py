@@ -6,18 +6,14 @@ surface point stays where it is and all motion is the camera's.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, I32, Bools, HitRecord
+from pbrs_farm.core.arrays import F32, F64, I32, Bools, FirstHit, HitRecord
 from pbrs_farm.core.camera import Camera
-
-FirstHit = Callable[[F64, F64], tuple[F32, I32]]
-"""Origins and directions (N, 3) -> distance in lengths of the direction, and face (-1 = nothing)."""
 
 SEEN: Final = 0
 OUTSIDE: Final = 128  # outside the other picture, or behind the other camera

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import HitRecord, Mask
+from pbrs_farm.core.arrays import FirstHit, HitRecord, Mask
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.classes import NYU13_FROM_NYU40
 from pbrs_farm.core.errors import BadHouse, BadInput
@@ -24,7 +24,6 @@ from pbrs_farm.truth.depth_time_of_flight import tof_depth
 from pbrs_farm.truth.hha import hha_png
 from pbrs_farm.truth.optical_flow import (
     Correspondence,
-    FirstHit,
     correspondence,
     disparity_png,
     flow_exr,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,12 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pbrs_farm.core.arrays import F32, F64, I32, Bools
+from pbrs_farm.core.arrays import F64, Bools, FirstHit
 from pbrs_farm.core.house import Geometry, House
 from pbrs_farm.sample.walks.walk_space import is_door_item
-
-FirstHit = Callable[[F64, F64], tuple[F32, I32]]
-"""Rays of the house: origins and directions (N, 3) -> distance in lengths of the direction, face or -1."""
 
 _FIXATION_S: Final = (1.2, 2.8)  # how long one thing is looked at
 _DISTANCE_M: Final = (0.9, 5.5)  # of a thing that is looked at

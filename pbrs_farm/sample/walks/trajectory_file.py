@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.arrays import F64, Bools, FirstHit
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
@@ -18,7 +18,6 @@ from pbrs_farm.core.house import Geometry, House, ItemKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
-from pbrs_farm.sample.walks.gaze import FirstHit
 
 MAX_ROWS: Final = 100_000
 ORIGIN: Final = "trajectory"

@@ -12,14 +12,14 @@ import numpy as np
 from scipy import ndimage
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64, I64
+from pbrs_farm.core.arrays import F64, I64, FirstHit
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import Geometry, House
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.stored_cameras import OUTSIDE, sector_of
-from pbrs_farm.sample.walks.gaze import FirstHit, Walker, gaze, things_of
+from pbrs_farm.sample.walks.gaze import Walker, gaze, things_of
 from pbrs_farm.sample.walks.hand_shake import Shake, shake
 from pbrs_farm.sample.walks.smooth_path import relaxed, spline_through, walked
 from pbrs_farm.sample.walks.walk_space import WalkSpace, shut_doors, walk_spaces
