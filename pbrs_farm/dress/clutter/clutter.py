@@ -56,7 +56,7 @@ def house_bias(rng: np.random.Generator) -> float:
 def _door_zone(room: RoomSpace) -> BaseGeometry:
     """Where leaves swing and people go: nothing is put there, not even on a shelf."""
     sides = [(door, door.side_of(room.room.id)) for door in room.doors]
-    zones = [d.before(s).union(d.swing(s)) for d, s in sides if s is not None]
+    zones = [d.before(s, d.clear_m).union(d.swing(s)) for d, s in sides if s is not None]
     return shapely.union_all(zones).buffer(_DOOR_MARGIN_M)
 
 

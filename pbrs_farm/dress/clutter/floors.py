@@ -13,6 +13,7 @@ from pbrs_farm.core.walkable import CELL_M
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.clutter.worktop import LIFT_M
 from pbrs_farm.dress.generated.assembly import Made
+from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.floor_bitmaps import (
     FloorBitmap,
     doors_are_joined,
@@ -66,6 +67,10 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
         kind for kind, chance in _USUAL.get(room.kind, ()) if rng.random() < chance * placing.share
     ]
     floor = _floor(scene, space, room) if wanted else None
+    flights = flights_of(placing.draft, room.room, room.area)
+    if floor is not None and not flights.before.is_empty:
+        plan = floor.grid.centres()
+        floor.free &= ~shapely.contains_xy(flights.before, plan[..., 0], plan[..., 1])
     if floor is None or not floor.free.any():
         return 0
     n = 0

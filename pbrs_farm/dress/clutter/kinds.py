@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +17,7 @@ from pbrs_farm.dress.generated.things import GENERATORS
 from pbrs_farm.dress.style import Style
 
 _MOST_FACES: Final = 1500  # of a small thing from a catalogue, and of most kinds
+_MOST_OF_MODEL: Final = 12_000  # faces of all things of one model in a home
 _GENERATED_SHARE: Final = 0.5  # where there are both
 _DESIGNS: Final = 1  # of a kind in one home
 _MOST_TRIES: Final = 2  # models that are loaded to find them
@@ -90,6 +92,7 @@ class Stock:
         self._catalogue = catalogue
         self._seed = seed
         self._designs: dict[str, list[Made]] = {}
+        self._faces: Counter[str] = Counter()  # of the things taken so far, by piece
 
     def take(self, rng: np.random.Generator, kind: str, style: Style) -> Made | None:
         """A thing of that kind; None where there is none that can be used."""
@@ -103,8 +106,12 @@ class Stock:
         found = _KINDS[kind]
         is_made, number = rng.random() < _GENERATED_SHARE, int(rng.integers(1 << 30))
         designs = [] if found.made and is_made else self._owned(kind)
+        # Of one detailed model there are few in a home.
+        designs = [d for d in designs if self._faces[d[0].id] + _n_faces(d[1]) <= _MOST_OF_MODEL]
         if designs:
-            return designs[number % len(designs)]
+            piece, shape = designs[number % len(designs)]
+            self._faces[piece.id] += _n_faces(shape)
+            return piece, shape
         own = np.random.default_rng(number)
         return GENERATORS[found.made](own, style) if found.made else None
 
@@ -141,9 +148,12 @@ def is_known(kind: str) -> bool:
     return kind in _KINDS or kind in ("book", "magazines")
 
 
+def _n_faces(shape: Shape) -> int:
+    return sum(len(s.faces) for s in shape.surfaces)
+
+
 def _is_usable(shape: Shape, kind: Kind) -> bool:
-    n_faces = sum(len(s.faces) for s in shape.surfaces)
-    if not 0 < n_faces <= kind.most_faces:
+    if not 0 < _n_faces(shape) <= kind.most_faces:
         return False
     low, high = shape.bounds
     return bool(np.isfinite([low, high]).all() and (high - low).max() <= kind.most_m + 0.05)

@@ -13,6 +13,7 @@ from pbrs_farm.core.arrays import Bools
 from pbrs_farm.core.walkable import CELL_M, FloorGrid
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import FloorBitmap, HouseSpace, RoomSpace, WallFace
+from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.floor_bitmaps import doors_are_joined, floor_bitmap, with_body
 from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
 from pbrs_farm.dress.walls.hanging import Hanging
@@ -78,6 +79,8 @@ class RoomFloor:
             if side is not None and is_walked:
                 zones.append(passage.before(side))
                 zones += [] if passage.is_window else [passage.swing(side)]
+        flights = flights_of(draft, room.room, room.area)
+        zones += [flights.under, flights.before]
         # Count the wall before which one could stand something.
         faces = Hanging(draft, room, "furniture").faces
         low, high = room.room.floor_y + LOWER_M, room.room.floor_y + 0.9

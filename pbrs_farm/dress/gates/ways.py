@@ -16,7 +16,6 @@ from pbrs_farm.core.classes import BLINDS, CURTAIN, FLOOR_MAT, SHOWER_CURTAIN
 from pbrs_farm.core.mesh import clipped_to_box
 from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace, doors_are_joined, floor_bitmap
-from pbrs_farm.dress.space.passages import BEFORE_DOOR_M
 
 MOST_COVERED: Final = 0.2  # of a window
 _HEAD_M: Final = 2.0  # above the floor: what is higher blocks no door
@@ -50,9 +49,10 @@ def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[
         for side in sides:
             n += 1
             floor_y = space.room(door.room_ids[side] or "").room.floor_y
-            depth = max(BEFORE_DOOR_M, min(door.width, 1.0))
             low = np.array([-door.width / 2 + _BESIDE_M, floor_y + _STEP_M, _FACE_M])
-            high = np.array([door.width / 2 - _BESIDE_M, min(door.top_y, floor_y + _HEAD_M), depth])
+            high = np.array(
+                [door.width / 2 - _BESIDE_M, min(door.top_y, floor_y + _HEAD_M), door.clear_m]
+            )
             for k in np.flatnonzero(_may_enter(boxes, door, side, low, high)).tolist():
                 if _counts(bodies[k]) and _enters(bodies[k], door, side, low, high):
                     found.append(Blocked(door.id, bodies[k].index))

@@ -29,8 +29,9 @@ def bed_pillow(rng: np.random.Generator, style: Style) -> Made:
     # A long pillow (0.68 x 0.46 m) or a square one, white or nearly so.
     wide, deep = (0.68, 0.46) if rng.random() < 0.6 else (0.58, 0.58)
     colour: Rgb = (0.91, 0.9, 0.88)
+    # Bed linen is of calm colours, washed pale.
     if rng.random() < 0.4:
-        colour = mix(colour, style.textiles[int(rng.integers(len(style.textiles)))], 0.6)
+        colour = mix(colour, style.textiles[int(rng.integers(min(3, len(style.textiles))))], 0.35)
     surface = bulged((wide, float(rng.uniform(0.12, 0.16)), deep), bulge=2.6)
     material = plain("pillow", colour, 0.95)
     return made("pillow", [(surface, material)], group="pillow", nyu40=PILLOW)

@@ -56,6 +56,11 @@ class Passage:
         half = self.along[[0, 2]] * self.width / 2
         return shapely.Polygon([face - half, face + half, face + half + out, face - half + out])
 
+    @property
+    def clear_m(self) -> float:
+        """How far before the hole nothing may stand: 0.8 m, or as far as a leaf of a wider door swings."""
+        return max(BEFORE_DOOR_M, min(self.width, 1.0))
+
     def swing(self, side: int) -> BaseGeometry:
         """The plan area a leaf of the hole's width sweeps, hung on either end (which is unknown)."""
         middle, half = self.face_point(side)[[0, 2]], self.along[[0, 2]] * self.width / 2

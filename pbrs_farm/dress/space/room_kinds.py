@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from functools import lru_cache
 
-from pbrs_farm.core.classes import BATHTUB, BED, DESK, REFRIGERATOR, SINK, SOFA, TABLE, TOILET
+from pbrs_farm.core.classes import (
+    BATHTUB,
+    BED,
+    CABINET,
+    DESK,
+    OTHERFURNITURE,
+    REFRIGERATOR,
+    SINK,
+    SOFA,
+    TABLE,
+    TOILET,
+)
 from pbrs_farm.core.house import Item, Room
 
 
@@ -79,14 +90,32 @@ _WITHIN = (
 )
 
 _LARGE_M2 = 9.0
+_COOKED_AT = re.compile("cooker|stove|oven|hob|hood|dishwasher|herd|backofen|fridge|refrigerator")
+
+
+def is_cooked_in(items: Iterable[Item]) -> bool:
+    """Whether a cooker, a hood, a dishwasher or a fridge stands among them."""
+    return any(
+        item.nyu40 == REFRIGERATOR
+        or (
+            item.nyu40 in (CABINET, OTHERFURNITURE)
+            and _COOKED_AT.search(f"{item.name} {item.source_class}".casefold()) is not None
+        )
+        for item in items
+    )
 
 
 def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
     """What the room is for: what it is called, else what the items (those in it) say."""
     named = _named(" ".join((*room.types, room.name)))
+    has = {item.nyu40 for item in items}
+    # A studio is a study in some languages and a home of one room in others.
+    if named is RoomKind.OFFICE and (BED in has or is_cooked_in(items)):
+        return RoomKind.LIVING
     if named is not None:
         return named
-    has = {item.nyu40 for item in items}
+    if not has & {TOILET, BATHTUB, BED} and is_cooked_in(items):
+        return RoomKind.KITCHEN
     for kind, classes in (
         (RoomKind.BATHROOM, {TOILET, BATHTUB}),
         (RoomKind.BEDROOM, {BED}),

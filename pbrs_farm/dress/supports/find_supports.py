@@ -31,7 +31,8 @@ MOST_FREE_M = 3.0  # what is higher above a support is nobody's business
 _LEAST_NORMAL_Y = 0.95
 _FLAT_M = 0.0006  # heights of one support differ by less
 _BORDER = 5  # cells of the grid around a support
-_NEAR_M = 0.003  # a face this near to the support's height lies on it
+_NEAR_M = 0.003  # a face of another thing this near to the support's height lies on it
+_LEVEL_M = 0.0002  # its own face this near belongs to it; a higher one is a board beside it
 _OPEN_SHARE = 0.5  # of a side's length
 _OUT_OF_REACH_M = 2.35  # above the floor
 
@@ -127,7 +128,7 @@ class Surroundings:
         """
         hits = self.hits
         # Let every face that rises above the support lower what is free in its cells.
-        stands = hits.high > height + np.where(self.is_own, _NEAR_M, -_NEAR_M)
+        stands = hits.high > height + np.where(self.is_own, _LEVEL_M, -_NEAR_M)
         clear = np.full(self.grid.shape, MOST_FREE_M)
         free = np.maximum(hits.low[stands] - height, 0.0)
         cell = hits.row[stands] * clear.shape[1] + hits.column[stands]

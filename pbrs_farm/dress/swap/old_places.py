@@ -15,12 +15,14 @@ from pbrs_farm.core.catalogue import Catalogue, Piece
 from pbrs_farm.core.classes import TABLE
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import triangle_bounds
 
 _UPRIGHT: Final = 0.999  # cosine to the vertical of what is not tilted
 _HIGH_PART: Final = 0.25  # of the height, at the top: where the back of a seat is
 _CLEAR: Final = 0.12  # of the depth: how far the top must lie behind the middle
 _BOARD_M: Final = 0.04  # a thicker one is no skirting board
 _APART_M: Final = 0.0005
+_OFF_WALL_M: Final = 0.03
 _HIGH_TABLE_M: Final = 0.62  # one eats or works at what is higher
 _BACKED: Final = frozenset({"chair", "office_chair", "armchair", "sofa", "bed"})
 
@@ -117,6 +119,26 @@ def before_boards(place: OldPlace, boards: Sequence[F64]) -> OldPlace:
         if runs_along and behind and beside and last[1] > place.low[1]:
             low[2] = max(low[2], last[2] + _APART_M)
     return replace(place, low=low)
+
+
+def at_wall(place: OldPlace, walls: Sequence[F64]) -> OldPlace:
+    """The place moved to the wall face at its back, where it was drawn a little before it or in it.
+
+    walls: (F, 3, 3) triangles of each wall in the world.
+    """
+    back, faces = float(place.low[2]), [np.zeros(0)]
+    for corners in walls:
+        local = place.local(corners.reshape(-1, 3)).reshape(-1, 3, 3)
+        low, high = triangle_bounds(local)
+        # Faces across its front direction, within 3 cm of its back.
+        level = (high[:, 2] - low[:, 2] < _APART_M) & (np.abs(high[:, 2] - back) < _OFF_WALL_M)
+        beside = (high[:, :2] > place.low[:2]).all(1) & (low[:, :2] < place.high[:2]).all(1)
+        faces.append(high[level & beside, 2])
+    found = np.concatenate(faces)
+    if not len(found):
+        return place
+    step = np.array([0.0, 0.0, float(found.max()) + _APART_M - back])
+    return replace(place, low=place.low + step, high=place.high + step)
 
 
 def _boxed(points: F64, turn_rad: float) -> OldPlace:

@@ -15,7 +15,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import CHAIR
-from pbrs_farm.core.house import Box, Item, LightPart, Surface
+from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Surface
 from pbrs_farm.core.surface_points import item_triangles
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import Style
@@ -25,6 +25,7 @@ from pbrs_farm.dress.swap.old_places import (
     HELD,
     Held,
     OldPlace,
+    at_wall,
     before_boards,
     group_of_item,
     old_place,
@@ -39,6 +40,8 @@ FREE_CUBES: Final = 6  # of 2 cm, shared with neighbours beyond what the old one
 _TRIES: Final = 5  # pieces that are tried for a set
 _MOST_LIFT_M: Final = 0.3  # a thing that stands on it goes no farther up or down
 _ON_FLOOR_M: Final = 0.005  # what the source draws so little above a floor stands on it
+_ON_WALLS: Final = frozenset({"radiator", "wall_lamp"})
+_NEAR_WALL_M: Final = 0.05
 _UNDER_TABLES: Final = frozenset({"dining_table", "desk", "coffee_table"})
 
 
@@ -100,6 +103,8 @@ def _members(
             return None
         if HELD[group] is Held.BACK:
             place = before_boards(place, _boards_near(draft, item))
+        if group in _ON_WALLS:
+            place = at_wall(place, _walls_near(draft, item))
         found.append(_Member(index, item, place, tuple(on)))
     return found
 
@@ -116,6 +121,18 @@ def _boards_near(draft: Draft, item: Item) -> list[F64]:
             points = np.concatenate([s.positions for s in board.surfaces])
             boards.append(points.astype(np.float64))
     return boards
+
+
+def _walls_near(draft: Draft, item: Item) -> list[F64]:
+    """(F, 3, 3) triangles of each wall whose bounds come near the item's."""
+    low, high = item.bounds + np.array([[-_NEAR_WALL_M], [_NEAR_WALL_M]])
+    found = []
+    for wall in draft.items:
+        if wall.kind is ItemKind.WALL and BASEBOARD not in wall.tags and wall.n_faces:
+            least, most = wall.bounds
+            if (least < high).all() and (most > low).all():
+                found.append(item_triangles(wall))
+    return found
 
 
 def _swap_set(

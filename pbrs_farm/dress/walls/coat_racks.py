@@ -10,7 +10,7 @@ from pbrs_farm.core.classes import CLOTHES
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.generated.assembly import Made, Part, any_colour, metal, plain, transformed
 from pbrs_farm.dress.generated.turned import slab, smooth
-from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.space.room_kinds import RoomKind, is_cooked_in
 from pbrs_farm.dress.style import Rgb, Style, mix
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.dress.walls.hung_things import hung
@@ -31,6 +31,10 @@ def hang_coats(hanging: Hanging, style: Style, share: float) -> None:
     kind = hanging.room.kind
     rng = hanging.draft.rng("coats", hanging.room.room.id)
     if rng.random() >= _RACKS.get(kind, 0.0) * share:
+        return
+    # Nobody hangs coats where it smells of cooking.
+    items = hanging.draft.items
+    if is_cooked_in(items[k] for k in hanging.room.items if k < len(items)):
         return
     for n in range(_MOST[kind], 0, -1):
         piece, shape = coat_rack(rng, style, n, is_bath=kind is RoomKind.BATHROOM)

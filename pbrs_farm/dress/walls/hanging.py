@@ -14,12 +14,15 @@ from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import RoomSpace, WallFace
+from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M
 
 GAP_M = 0.0008  # between a wall's face and the back of what hangs on it
 _LEAF_M = (0.03, 0.12, 0.22)  # before a wall: where the leaf of a door would stand
 _WAY_M = (0.36, 0.5, 0.7, 0.9)  # farther out it is in the way of deep things alone
 _DEEP_M = 0.06  # what comes farther out of a wall is in the way of the walls beside it
+_BESIDE_STAIRS_M = 0.1
+_OVER_STAIRS_M = 2.1  # above the floor
 IN_FRONT_M = 0.35  # that a picture needs free to be seen
 
 
@@ -35,6 +38,10 @@ class Hanging:
     def __post_init__(self) -> None:
         sides = [(d, d.side_of(self.room.room.id)) for d in self.room.doors]
         doors = [(d.swing(s).union(d.before(s)), d.top_y) for d, s in sides if s is not None]
+        # Nobody reaches what hangs over stairs.
+        flights = flights_of(self.draft, self.room.room, self.room.area)
+        if not flights.under.is_empty:
+            doors.append((flights.under.buffer(_BESIDE_STAIRS_M), self.floor_y + _OVER_STAIRS_M))
         self.faces = [_clear_of_doors(face, doors) for face in self.room.faces]
 
     @property
