@@ -50,13 +50,14 @@ def flights_of(draft: Draft, room: Room, area: BaseGeometry) -> Flights:
 def _stairs(draft: Draft) -> list[tuple[F64, BaseGeometry]]:
     """Level triangles (F, 3, 3) of each stairs of the source, and their plan; found once a draft."""
     kept = draft.kept.get("stairs")
-    if not isinstance(kept, list):
-        kept = []
-        for item in draft.source.items:
-            if item.kind is ItemKind.STAIRS and item.n_faces:
-                corners = item_triangles(item)
-                treads = corners[np.abs(unit_normals(corners)[:, 1]) > _FLAT]
-                if len(treads):
-                    kept.append((treads, plan_area(treads, upright=False).simplify(_COARSE_M)))
-        draft.kept["stairs"] = kept
-    return kept
+    if isinstance(kept, list):
+        return kept
+    found: list[tuple[F64, BaseGeometry]] = []
+    for item in draft.source.items:
+        if item.kind is ItemKind.STAIRS and item.n_faces:
+            corners = item_triangles(item)
+            treads = corners[np.abs(unit_normals(corners)[:, 1]) > _FLAT]
+            if len(treads):
+                found.append((treads, plan_area(treads, upright=False).simplify(_COARSE_M)))
+    draft.kept["stairs"] = found
+    return found
