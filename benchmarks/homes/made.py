@@ -12,8 +12,9 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import numpy as np
 
@@ -59,25 +60,39 @@ def _fill(path: Path, part: str, seeds: Iterable[int]) -> None:
     missing = [s for s in seeds if s not in there]
     chunks = [missing[k : k + _CHUNK] for k in range(0, len(missing), _CHUNK)]
     n_jobs = int(os.environ.get("PBRS_BENCH_JOBS", "1"))
+    _end_last_row(path)
     for k in range(0, len(chunks), n_jobs):
-        running = [_started(part, chunk) for chunk in chunks[k : k + n_jobs]]
+        # Each process adds a row as soon as it is measured: a bench that is killed loses none.
         with path.open("a") as file:
-            for process in running:
-                out, error = process.communicate()
-                file.write(out)
-                if process.returncode:
-                    raise RuntimeError(error.strip().splitlines()[-1:])
+            running = [_started(part, chunk, file) for chunk in chunks[k : k + n_jobs]]
+        for process in running:
+            _, error = process.communicate()
+            if process.returncode:
+                raise RuntimeError(error.strip().splitlines()[-1:])
         print(f"{part}: {min((k + n_jobs) * _CHUNK, len(missing))} of {len(missing)}", flush=True)
 
 
-def _started(part: str, seeds: list[int]) -> subprocess.Popen[str]:
-    words = [part, str(seeds[0]), str(seeds[-1])]
+def _started(part: str, seeds: list[int], rows: TextIO) -> subprocess.Popen[str]:
+    words = [part, *(str(seed) for seed in seeds)]
     command = [sys.executable, "-m", "benchmarks.homes.made_home", *words]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, stdout=rows, stderr=subprocess.PIPE, text=True)
+
+
+def _end_last_row(path: Path) -> None:
+    """Begin a new line where a process was killed in the middle of one."""
+    text = path.read_text() if path.exists() else ""
+    if text and not text.endswith("\n"):
+        path.write_text(text + "\n")
 
 
 def _rows(path: Path) -> Rows:
-    return [json.loads(x) for x in path.read_text().splitlines()] if path.exists() else []
+    """The rows of a file, each seed once; a line that was cut off counts for nothing."""
+    found: dict[int, dict[str, Any]] = {}
+    for line in path.read_text().splitlines() if path.exists() else ():
+        with suppress(json.JSONDecodeError):
+            row = json.loads(line)
+            found[row["seed"]] = row
+    return [found[seed] for seed in sorted(found)]
 
 
 def _of_plans(rows: Rows, again: dict[int, str]) -> dict[str, Any]:
