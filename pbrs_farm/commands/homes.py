@@ -148,7 +148,13 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
         raise BadInput("--apartment", args.apartment, "needs --plan FILE.csv")
     options = [f"{k}={v}" for k in ("rooms", "area", "style", "storeys") if (v := getattr(args, k))]
     options += ["furniture=none"] * args.empty
-    given = [f"--{k}" for k in ("rooms", "area", "storeys") if args.programme and getattr(args, k)]
+    given = [f"--{k}" for k in ("rooms", "area") if args.programme and getattr(args, k)]
+    if args.programme and args.storeys not in (None, "1"):
+        raise BadInput(
+            "--programme", str(args.programme),
+            "names the rooms of one storey and not which of them lie above",
+            hint="leave out --storeys, or ask for a house by --storeys 2 --rooms 2..4 --area 90..150",
+        )  # fmt: skip
     if given:
         raise BadInput("--programme", str(args.programme), f"leaves no choice of {given[0]}")
     first, last = args.seed, args.seed + args.count - 1

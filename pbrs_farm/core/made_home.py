@@ -13,6 +13,9 @@ PREFIX: Final = "made:"
 VERSION: Final = 3
 """Of the generator: part of a made home's id. Raised when it makes another home of a seed."""
 
+VERSION_OF_STOREYS: Final = 2
+"""The same of what only homes of two storeys have: raised, it leaves the others what they are."""
+
 MAX_SEED: Final = 2**31 - 1
 MAX_HOMES: Final = 1_000_000
 """Of one word."""
@@ -64,9 +67,14 @@ class MadeHome:
         return f"made-{self.seed}"
 
     @property
+    def version(self) -> int | str:
+        """Of what makes it."""
+        return VERSION if self.storeys == 1 else f"{VERSION}.{VERSION_OF_STOREYS}"
+
+    @property
     def digest(self) -> str:
         """Digest of all that makes it, but for the furniture's catalogue."""
-        return keys.digest("made", VERSION, self.word)
+        return keys.digest("made", self.version, self.word)
 
 
 def is_made(word: str) -> bool:

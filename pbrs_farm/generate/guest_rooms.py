@@ -32,6 +32,7 @@ _CUT_FROM: Final = {
     RoomType.WC: (RoomType.BATHROOM, RoomType.BEDROOM),
     RoomType.BATHROOM: (RoomType.BEDROOM,),  # the second one
 }  # what a small room is cut from, the preferred type first
+_WC_BELOW: Final = (RoomType.LIVING,)  # where the bathrooms are on another storey
 _STRIP_ASPECT: Final = 2.15  # of a small room along the whole side of another
 _CORNER_ASPECTS: Final = (1.3, 1.6, 1.0)
 _ARM_M: Final = 1.0  # the narrowest part of a host that its guest leaves
@@ -44,10 +45,11 @@ def hosts_of(programme: Programme) -> dict[int, int]:
     hosts: dict[int, int] = {}
     bathrooms = (i for i, wish in enumerate(programme.rooms) if wish.type is RoomType.BATHROOM)
     first = next(bathrooms, -1)
+    cut_from = _CUT_FROM if first >= 0 else {**_CUT_FROM, RoomType.WC: _WC_BELOW}
     # What lies beside a certain room is a rectangle of its own.
     wished = {k for room, others in programme.adjacent for k in (room, *others)}
     for number, wish in enumerate(programme.rooms):
-        types = _CUT_FROM.get(wish.type, ()) if number not in wished else ()
+        types = cut_from.get(wish.type, ()) if number not in wished else ()
         if wish.type is RoomType.BATHROOM and first == number:
             continue
         free = [
@@ -113,6 +115,12 @@ def _keeps_rules(
             return False
     elif _shared(rest, halls) < door_m(host.type):
         return False
+    # What is left of a living room keeps the way to its kitchen.
+    if host.type is RoomType.LIVING:
+        kitchen = parts[first_of(programme, RoomType.KITCHEN)]
+        ways = rest if programme.open_kitchen else (*rest, *halls)
+        if _shared(kitchen, ways) < (2.0 if programme.open_kitchen else DOOR_WALL_M):
+            return False
     # A wardrobe is entered from its bedroom, a store of a kitchen from there.
     if _opens_to_hall(wish, host) and _shared((inner,), halls) < door_m(wish.type):
         return False

@@ -24,11 +24,12 @@ from pbrs_farm.generate.guest_rooms import (
     hosts_of,
 )
 from pbrs_farm.generate.programme import Programme, RoomWish
-from pbrs_farm.generate.slicing import N_TRIES, solved
+from pbrs_farm.generate.slicing import N_MOVES, N_TRIES, solved
 from pbrs_farm.generate.slicing_rules import STEP_M, Contact, IntRect, Leaf
 
 _BESIDE_M: Final = 0.8  # of wall that rooms which lie beside each other share
 _FIXED_TRIES: Final = 4  # times as many for what a user wrote
+_STOREY_MOVES: Final = 300
 _PATIENCE: Final = 3  # plans that meet the rules but for a small room
 
 
@@ -104,7 +105,10 @@ def _easier(programme: Programme) -> list[tuple[str, Programme]]:
 def storey_layout(
     programme: Programme, core: Core, n_tries: int, rng: np.random.Generator
 ) -> Layout | None:
-    """Rectangles for one storey of several around their core; None where annealing finds none."""
+    """Rectangles for one storey of several around their core; None where annealing finds none.
+
+    A storey has few leaves, and many cores have no plan: each is annealed for a short while.
+    """
     return _solved_layout(programme, rng, is_fixed=True, core=core, n_tries=n_tries)
 
 
@@ -126,12 +130,12 @@ def _solved_layout(
     if programme.notch:
         leaves.append(Leaf(programme.notch, 1.5, 2.5, is_corner=True))
     lit = core.lit_sides if core else lit_sides(programme.n_blind_sides, rng)
-    outline = (core.width, core.depth) if core else None
+    outline, n_moves = ((core.width, core.depth), _STOREY_MOVES) if core else (None, N_MOVES)
     contacts = _contacts(programme, owner, hosts)
     n_solved = 0
     hall = owner.index(first_of(programme, RoomType.HALL))
     for _ in range(n_tries):
-        found = solved(tuple(leaves), contacts, hall, lit, rng, outline)
+        found = solved(tuple(leaves), contacts, hall, lit, rng, outline, n_moves)
         if found is None:
             continue
         brief, rects = found

@@ -39,7 +39,7 @@ def made(home: MadeHome, catalogue: Catalogue, programme: Programme | None = Non
     wishes = Wishes(home.bedrooms, (float(home.area[0]), float(home.area[1])), home.storeys)
     # All randomness comes from one stream that the wishes and the version name.
     words = (home.word,) if programme is None else (home.word, repr(programme))
-    rng = np.random.default_rng(keys.seed("made", VERSION, *words))
+    rng = np.random.default_rng(keys.seed("made", home.version, *words))
     shelf = catalogue if home.furniture else EMPTY
     drawn = drawn_home(rng, shelf, wishes=wishes, programme=programme, style=home.style)
     said = origin(home, shelf, programme)
@@ -50,7 +50,8 @@ def made(home: MadeHome, catalogue: Catalogue, programme: Programme | None = Non
 def origin(home: MadeHome, catalogue: Catalogue, programme: Programme | None = None) -> str:
     """What tells a made home from every other, in its file: its word and a digest of the rest."""
     shelf = catalogue if home.furniture else EMPTY
-    return f"{home.word} {keys.digest('made', VERSION, home.word, repr(programme), shelf.digest)}"
+    digest = keys.digest("made", home.version, home.word, repr(programme), shelf.digest)
+    return f"{home.word} {digest}"
 
 
 def made_of_plan(

@@ -13,7 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.generate.slicing_rules import STEP_M, Brief, Contact, IntRect, Leaf, Rules
+from pbrs_farm.generate.slicing_rules import (
+    STEP_M,
+    Brief,
+    Contact,
+    IntRect,
+    Leaf,
+    Rules,
+    given_places,
+)
 
 N_MOVES: Final = 3000
 N_TRIES: Final = 10
@@ -62,15 +70,15 @@ def solved(
     lit_sides: tuple[bool, bool, bool, bool],
     rng: np.random.Generator,
     outline: tuple[int, int] | None = None,
+    n_moves: int = N_MOVES,
 ) -> tuple[Brief, list[IntRect]] | None:
     """An outline and a rectangle for each leaf that meet every hard rule; None if annealing fails.
 
     outline: its width and depth in steps; another one of the leaves' area each time if not told.
     """
     w, d = outline or drawn_outline(sum(leaf.area for leaf in leaves), rng)
-    pinned = next((i for i, leaf in enumerate(leaves) if leaf.pinned), -1)
-    brief = Brief(leaves, contacts, hall, w, d, lit_sides, pinned)
-    rects, unmet = _annealed(brief, _Random(rng))
+    brief = Brief(leaves, contacts, hall, w, d, lit_sides, given_places(leaves))
+    rects, unmet = _annealed(brief, _Random(rng), n_moves)
     return None if unmet else (brief, rects)
 
 
@@ -90,16 +98,16 @@ class _Random:
         return int(self() * n)
 
 
-def _annealed(brief: Brief, draw: _Random) -> tuple[list[IntRect], int]:
+def _annealed(brief: Brief, draw: _Random, n_moves: int) -> tuple[list[IntRect], int]:
     """The best rectangles of one annealing and how many hard rules they break."""
     tree = _spine_tree(brief, draw)
     rules = Rules(brief)
     rects = _laid_out(tree, brief)
     cost, unmet = rules.judge(rects)
     best, best_score = rects, (unmet, cost)
-    cooling = (_T_END / _T_START) ** (1 / N_MOVES)
+    cooling = (_T_END / _T_START) ** (1 / n_moves)
     temperature = _T_START
-    for _ in range(N_MOVES):
+    for _ in range(n_moves):
         temperature *= cooling
         moved = _moved(tree, draw)
         new_rects = _laid_out(moved, brief)
@@ -199,7 +207,7 @@ def _laid_out(tree: _Tree, brief: Brief) -> list[IntRect]:
     for k in reversed(order):
         a, b = children[k]
         area[k] = area[a] + area[b]
-    above_pin = _above_pin(tree, brief, order)
+    limits = _limits(tree, brief, order)
     # Go down from the outline.
     rects: list[IntRect] = [(0, 0, 0, 0)] * (n_cuts + 1)
     stack = [(n_cuts - 1, 0, 0, brief.width, brief.depth)]
@@ -212,39 +220,40 @@ def _laid_out(tree: _Tree, brief: Brief) -> list[IntRect]:
         share = area[a] / area[k]
         if tree.vertical[k]:
             cut = x0 + round((x1 - x0) * share)
-            if k in above_pin:
-                cut = _off_pin(cut, k, above_pin, tree, brief)
+            if k in limits:
+                cut = _kept_off(cut, limits[k])
             stack += ((a, x0, z0, cut, z1), (b, cut, z0, x1, z1))
         else:
             cut = z0 + round((z1 - z0) * share)
-            if k in above_pin:
-                cut = _off_pin(cut, k, above_pin, tree, brief)
+            if k in limits:
+                cut = _kept_off(cut, limits[k])
             stack += ((a, x0, z0, x1, cut), (b, x0, cut, x1, z1))
     return rects
 
 
-def _above_pin(tree: _Tree, brief: Brief, order: list[int]) -> dict[int, int]:
-    """Each cut around the pinned leaf -> its child towards it; empty where no leaf is pinned."""
-    if brief.pinned < 0:
-        return {}
-    found: dict[int, int] = {}
-    wanted = len(tree.children) + tree.leaf_at.index(brief.pinned)
-    # From the leaves up to the root: every cut stands in the order before its children.
-    for k in reversed(order):
-        if wanted in tree.children[k]:
-            found[k] = wanted
-            wanted = k
+_Limit = tuple[int, bool, float]  # of a cut: a side, whether it is the least one, its reach
+
+
+def _limits(tree: _Tree, brief: Brief, order: list[int]) -> dict[int, list[_Limit]]:
+    """What the cuts around leaves with a given place must keep off, the pinned leaf's last."""
+    found: dict[int, list[_Limit]] = {}
+    n_cuts = len(tree.children)
+    for leaf, place, is_exact in brief.places:
+        wanted = n_cuts + tree.leaf_at.index(leaf)
+        # From the leaves up to the root: every cut stands in the order before its children.
+        for k in reversed(order):
+            if wanted in tree.children[k]:
+                is_first = wanted == tree.children[k][0]
+                side = place[2 * is_first + (not tree.vertical[k])]
+                reach = 0 if not is_exact else math.inf if wanted >= n_cuts else _SNAP
+                found.setdefault(k, []).append((side, is_first, reach))
+                wanted = k
     return found
 
 
-def _off_pin(cut: int, k: int, above_pin: dict[int, int], tree: _Tree, brief: Brief) -> int:
-    """A cut moved to the pinned rectangle's side where it is near it, or would run through it."""
-    pin = brief.leaves[brief.pinned].pinned
-    assert pin is not None
-    low, high = (pin[0], pin[2]) if tree.vertical[k] else (pin[1], pin[3])
-    child = above_pin[k]
-    is_first, is_leaf = child == tree.children[k][0], child >= len(tree.children)
-    side = high if is_first else low
-    if is_leaf or abs(cut - side) <= _SNAP:
-        return side
-    return max(cut, side) if is_first else min(cut, side)
+def _kept_off(cut: int, limits: list[_Limit]) -> int:
+    """A cut moved to each side that it is near to, or to the one that it would lie beyond."""
+    for side, is_least, reach in limits:
+        if abs(cut - side) <= reach or (cut < side) == is_least:
+            cut = side
+    return cut

@@ -7,6 +7,7 @@ share its numbers exactly.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -52,7 +53,13 @@ class Brief:
     width: int  # of the outline, steps
     depth: int
     lit_sides: tuple[bool, bool, bool, bool]  # left, top, right, bottom: daylight comes in there
-    pinned: int = -1  # the leaf whose place is given; -1 = none
+    places: tuple[tuple[int, IntRect, bool], ...] = ()  # given to leaves: (leaf, place, exactly)
+
+
+def given_places(leaves: Sequence[Leaf]) -> tuple[tuple[int, IntRect, bool], ...]:
+    """(leaf, its place, whether it lies exactly there) of those that have one, the exact last."""
+    around = [(i, leaf.holds, False) for i, leaf in enumerate(leaves) if leaf.holds]
+    return (*around, *((i, leaf.pinned, True) for i, leaf in enumerate(leaves) if leaf.pinned))
 
 
 class Rules:
@@ -85,7 +92,7 @@ class Rules:
                 total += min(2 * (aspect - max_aspect), 6.0)
                 unmet += aspect > 1.3 * max_aspect
             # Only cuts that keep off a pinned leaf divide by other shares than those of areas.
-            if self._brief.pinned >= 0:
+            if self._brief.places:
                 missed = _missed_area(leaf, rect)
                 total += missed
                 unmet += missed > 0

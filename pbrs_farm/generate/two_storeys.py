@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from pbrs_farm.generate.floor_plan import Plan, RoomType
 from pbrs_farm.generate.layout import Core, lit_sides, storey_layout
 from pbrs_farm.generate.programme import (
     AREA_RANGE,
+    MEDIAN_AREA,
     Programme,
     RoomWish,
     Wishes,
@@ -27,7 +29,7 @@ _STAIRS: Final = (44, 58)  # across its front and from front to back, steps, wal
 _LANDING: Final = 22  # before it, steps
 _BESIDE: Final = 56  # between stairs and a corner they do not lie in: a room's width, steps
 _WALLS: Final = 1.13  # floor with the walls it needs, by floor alone
-_CORES: Final = 100  # that are tried
+_CORES: Final = 400  # that are tried
 _TRIES: Final = (2, 6)  # of each storey, a core
 _BEDROOMS: Final = (2, 3, 4)
 _BEDROOM_SHARES: Final = (0.25, 0.5, 0.25)
@@ -81,11 +83,21 @@ def _programmes(rng: np.random.Generator, wishes: Wishes) -> tuple[Programme, Pr
     areas = [sum(r.area for r in rooms) for rooms in storeys]
     # Both have the area between, or half of what is wished.
     whole = float(np.clip(sum(areas), *wishes.area))
-    lower, upper = (tuple(scaled_rooms(rooms, whole / 2)) for rooms in storeys)
+    lower, upper = (
+        tuple(_with_room_for_toilet(wish) for wish in scaled_rooms(rooms, whole / 2))
+        for rooms in storeys
+    )
     open_kitchen = bool(rng.random() < 0.4)
     return Programme(lower, open_kitchen=open_kitchen, balcony=False), Programme(
         upper, is_upper=True
     )
+
+
+def _with_room_for_toilet(wish: RoomWish) -> RoomWish:
+    """A WC in the corner of another room, its door on any side, needs more than the least area."""
+    if wish.type is not RoomType.WC:
+        return wish
+    return replace(wish, area=max(wish.area, MEDIAN_AREA[RoomType.WC]))
 
 
 def _rooms(rng: np.random.Generator, types: list[RoomType]) -> list[RoomWish]:

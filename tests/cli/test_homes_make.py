@@ -59,6 +59,7 @@ def test_a_plan_of_ones_own_becomes_a_home_of_its_name(tmp_path: Path) -> None:
         (["0"], "expected 1 home or more"),
         (["--programme", "none.json"], "none.json"),
         (["--apartment", "7"], "needs --plan FILE.csv"),
+        (["--programme", "none.json", "--storeys", "2"], "the rooms of one storey"),
         (["--plan", "none.json", "--rooms", "2"], "leaves no choice of --rooms"),
     ],
 )
