@@ -75,7 +75,7 @@ def notice(view: JobView) -> dict[str, Any]:
     text = f"pbrs_farm: job {view.job_id} {view.outcome}{f': {reason}' if reason else ''}"
     text += f"; {row['houses_done']} of {row['houses']} houses, {row['views']} views"
     if view.n_failed:
-        text += f", {view.n_failed} tasks failed"
+        text += f", {view.n_failed} task{'s' if view.n_failed > 1 else ''} failed"
     return row | {"text": text}
 
 
