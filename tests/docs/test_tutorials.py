@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,18 @@ def test_a_page_shows_verbs_that_exist_and_no_folder_a_clone_lacks(page: Path) -
     assert "../shared" not in text
     for link in re.findall(r"\]\(([^)#:]+)\)", text):
         assert (page.parent / link).exists(), link
+
+
+def test_the_packagers_table_names_the_extras_that_there_are() -> None:
+    text = (REPO / "docs/tutorials/packager.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \| ([^|]+) \|", text, re.MULTILINE))
+    project = tomllib.loads((REPO / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    assert rows.keys() == extras.keys() - {"study-peers", "bench", "docs", "dev"}
+    for extra, said in rows.items():
+        if extra != "all":
+            packages = [re.split(r"[\[>]", words)[0] for words in extras[extra]]
+            assert set(said.split(", ")) <= {p.removesuffix("-cpu") for p in packages}
 
 
 def test_every_page_stands_in_the_sites_navigation() -> None:
