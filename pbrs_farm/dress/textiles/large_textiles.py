@@ -10,6 +10,7 @@ from pbrs_farm.dress.space import RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.textiles.curtains import hang_blind, hang_curtains, room_cloth, window_side
+from pbrs_farm.dress.textiles.drawn_rugs import cover_drawn_rugs
 from pbrs_farm.dress.textiles.rugs import lay_rugs
 from pbrs_farm.dress.textiles.towels import hang_towels
 
@@ -26,6 +27,7 @@ _BLINDS = {
 
 def textiles_large(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Hang curtains, blinds and towels, lay rugs. share: 0..1 of what rooms would get."""
+    cover_drawn_rugs(draft, style, share)
     for room_id in [r.room.id for r in house_space(draft).rooms]:
         room = house_space(draft).room(room_id)
         if room.kind in (RoomKind.OUTDOOR, RoomKind.STORE) or room.area.is_empty:

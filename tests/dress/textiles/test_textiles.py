@@ -201,3 +201,19 @@ def test_a_seed_decides_every_bit_and_no_share_adds_nothing() -> None:
             assert np.array_equal(s.positions, t.positions)
     assert a.textures.keys() == b.textures.keys()
     assert len(_dressed(3, share=0.0).items) == len(_bare().items)
+
+
+def test_a_drawn_rug_of_one_colour_gets_a_picture_that_covers_it_once() -> None:
+    home = builtin_home()
+    (place,) = (k for k, i in enumerate(home.items) if i.nyu40 == RUG)
+    plain = tuple(replace(m, texture_id=None) for m in home.materials)
+    # What has a picture keeps it.
+    assert _dressed(3, home).items[place] is home.items[place]
+    draft = _dressed(3, replace(home, materials=plain))
+    item = draft.items[place]
+    assert draft.materials[item.surfaces[0].material].texture_id is not None
+    for now, was in zip(item.surfaces, home.items[place].surfaces, strict=True):
+        assert np.array_equal(now.positions, was.positions)
+        assert now.uvs is not None
+        assert now.uvs.min() >= 0
+        assert now.uvs.max() <= 1
