@@ -1,30 +1,37 @@
 """Cost of a sample as a home grows: triangles up to 4 million, lamps up to 500; CPU of all threads.
 
-A room of 6x6x3 m with a table of ever finer waves, seen by one camera, 160x120, 16 samples; then the same
-room at the coarsest with ever more bulbs below its ceiling, their light the same in sum. The pilot, whose lanes are
-one for each lamp, is a view's own: it is measured apart, and the ratios are of a whole view of recipe `fast` (640x480, 64
-samples), reckoned from both. Three minutes on two quiet cores.
+A room of 6x6x3 m with a table of ever finer waves, seen by one camera, 160x120, 16 samples. Then ten bulbs below its
+ceiling and ever more in a hall next door (`lamps`), and ever more in the room itself (`lamps_of_a_room`), their light
+the same in sum, bulbs and waves together always of TRIANGLES_OF_LAMPS, so that lamps alone grow. The pilot, whose lanes
+are one for each lamp, is a view's own: it is measured apart, and the ratios are of a whole view of recipe `fast`
+(640x480, 64 samples), reckoned from both. Four minutes on two quiet cores.
 """
 
 from __future__ import annotations
 
 import resource
 import time
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from benchmarks.figures import write_report
-from pbrs_farm.core.house import House, Surface
+from pbrs_farm.core.house import House, Item, Surface
 from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.repair.lamps.bulbs import icosphere
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sunsky
 from pbrs_farm.transport.validation import known_rooms as rooms
 
 TRIANGLES: Final = (100_000, 1_000_000, 4_000_000)
 LAMPS: Final = (10, 100, 500)
+TRIANGLES_OF_LAMPS: Final = 300_000  # of the room in which lamps grow, bulbs included
+BULB_TRIANGLES: Final = 320  # of a bulb as repair makes it
 SIZE: Final = (160, 120)
 SPP: Final = 16
+_BULB_M: Final = 0.03
+_HALL_M: Final = 30.0
 _LUMEN: Final = 4000.0  # of all bulbs together
 _FAST_SAMPLES: Final = 640 * 480 * 64
 
@@ -35,7 +42,8 @@ def main() -> None:
     units: dict[str, str] = {}
     for name, values, make in (
         ("triangles", TRIANGLES, lambda n: waves_room(n, 1)),
-        ("lamps", LAMPS, lambda n: waves_room(20_000, n)),
+        ("lamps", LAMPS, lambda n: waves_room(_without_bulbs(n), n, LAMPS[0])),
+        ("lamps_of_a_room", LAMPS, lambda n: waves_room(_without_bulbs(n), n)),
     ):
         costs = []
         for value in values:
@@ -47,7 +55,8 @@ def main() -> None:
             units |= {f"{key}_us": "microseconds of CPU a sample", f"{key}_pilot_s": "s CPU"}
             units[f"{key}_load_s"] = "s CPU"
             print(
-                f"{value:>9} {name:<10}{sample_us:>8.2f} us a sample, pilot {pilot_s:.2f} s",
+                f"{value:>9} {name:<16}{sample_us:>8.2f} us a sample, pilot {pilot_s:.2f} s,"
+                f" {load_s:.1f} s to load",
                 flush=True,
             )
         figures[f"light.by_{name}"] = round(costs[-1] / costs[0], 3)
@@ -59,19 +68,42 @@ def main() -> None:
     write_report("growth", figures, units)
 
 
-def waves_room(n_triangles: int, n_lamps: int) -> House:
-    """A closed room with a window, a waved table of n_triangles and n_lamps bulbs."""
+def _without_bulbs(n_lamps: int) -> int:
+    """Triangles of the waves where all triangles are TRIANGLES_OF_LAMPS."""
+    return TRIANGLES_OF_LAMPS - BULB_TRIANGLES * n_lamps
+
+
+def waves_room(n_triangles: int, n_lamps: int, n_in_room: int = 0) -> House:
+    """A closed room with a window, a waved table of n_triangles and n_lamps bulbs.
+
+    n_in_room: how many of them, the others in a hall next door; 0 = all.
+    """
     surfaces = rooms.shell((6.0, 3.0, 6.0), 0, front=False)
     surfaces += rooms.panel((0, 0, -0.1), (6.0, 3.0, 0.0), (2.0, 1.0, 4.0, 2.0), 0)
     surfaces.append(_waves(n_triangles))
-    side = int(np.ceil(np.sqrt(n_lamps)))
-    step = 5.0 / side
-    centres = [
-        (0.5 + (k % side + 0.5) * step, 2.7, 0.5 + (k // side + 0.5) * step) for k in range(n_lamps)
-    ]
-    lamps = [rooms.bulb(c, 2, _LUMEN / n_lamps, radius=0.03) for c in centres]
+    # Behind the wall, out of sight, stands a closed hall with all but the first lamps of the room.
+    n_here = min(n_lamps, n_in_room or n_lamps)
+    lamps = _bulbs(n_here, (0.0, 6.0), _LUMEN / n_here)
+    if n_lamps > n_here:
+        hall = rooms.shell((_HALL_M, 3.0, _HALL_M), 0, front=True)
+        surfaces += [replace(s, positions=s.positions + np.float32([7, 0, 0])) for s in hall]
+        lamps += _bulbs(n_lamps - n_here, (7.0, _HALL_M), _LUMEN / n_here)
     materials = [rooms.matte("wall", 0.7), rooms.matte("table", 0.4, 0.3, 0.2), rooms.BULB]
     return rooms.house(surfaces, materials, lamps=lamps)
+
+
+def _bulbs(n: int, along: tuple[float, float], lumen: float) -> list[Item]:
+    """n bulbs of repair's kind in a square grid below the ceiling. along: begin and length in m."""
+    begin, length = along
+    side = int(np.ceil(np.sqrt(n)))
+    step = (length - 1) / side
+    bulbs = []
+    for k in range(n):
+        x, z = begin + 0.5 + (k % side + 0.5) * step, 0.5 + (k // side + 0.5) * step
+        surfaces = (icosphere("bulb", np.array([x, 2.7, z]), _BULB_M, 2),)
+        lamp = rooms.bulb((x, 2.7, z), 2, lumen, radius=_BULB_M)
+        bulbs.append(replace(lamp, surfaces=surfaces))
+    return bulbs
 
 
 def _waves(n_triangles: int) -> Surface:

@@ -22,11 +22,14 @@ from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, EmitterWeights
 from pbrs_farm.transport.path_tracer import Lanes, SampleSums, trace
 
-# Least weights: what no pilot path has found may still be there.
+# Least weights: what no pilot path has found may still be there. Those of many lamps are less, or
+# they would leave nothing to what the pilot has found.
 LAMP_FLOOR: Final = 0.01
+_ALL_FLOORS: Final = 0.5
 _SUN_FLOOR: Final = 0.1
 _DOME_FLOOR: Final = 0.05
 _PILOT_SIZE: Final = (32, 24)  # px
+_MAX_LANES: Final = 1 << 17  # of the pilot: it halves its size where there are very many emitters
 # Of the trial of guided rays: its samples of a pixel (of 16, one trial in six missed the rare bright
 # paths of a home), the samples of a view from which it pays, the CPU of a guided sample over a plain
 # one's, and the part of the mean light below which a pixel's noise counts less.
@@ -49,8 +52,21 @@ def weights_by_distance(spheres: F64, place: F64, n_portals: int) -> EmitterWeig
     spheres: (L, 4) centre and radius of each lamp.
     """
     squared = ((spheres[:, :3] - place) ** 2).sum(1)
-    lamps = _with_floors(1 / np.maximum(squared, 1), np.full(len(spheres), LAMP_FLOOR))
+    lamps = _with_floors(1 / np.maximum(squared, 1), lamp_floors(len(spheres)))
     return EmitterWeights(lamps, uniform_weights(0, n_portals).outdoor)
+
+
+def lamp_floors(n_lamps: int) -> F64:
+    """(L,) least weight of each lamp."""
+    return np.full(n_lamps, min(LAMP_FLOOR, _ALL_FLOORS / max(n_lamps, 1)))
+
+
+def pilot_size(n_emitters: int) -> tuple[int, int]:
+    """(width, height) in px of a pilot that renders each of n_emitters alone."""
+    width, height = _PILOT_SIZE
+    while width * height * n_emitters > _MAX_LANES and height % 2 == 0:
+        width, height = width // 2, height // 2
+    return width, height
 
 
 def pilot_weights(
@@ -65,7 +81,7 @@ def pilot_weights(
     """Weights for a view; those that emitters carry already change the pilot's noise only."""
     # Render the view small, a lane for each pixel and emitter.
     n_outdoor = FIRST_PORTAL + n_portals
-    width, height = _PILOT_SIZE
+    width, height = pilot_size(n_lamps + n_outdoor)
     lanes = Lanes(
         width, height, 0, fields.pilot_spp, seed, n_only_lamps=n_lamps, n_only_outdoor=n_outdoor
     )
@@ -77,7 +93,7 @@ def pilot_weights(
     bright = brought.sum(1, keepdims=True)
     relative = brought / (bright + max(float(bright.mean()), 1e-12))
     strength = np.sqrt((relative.astype(np.float64) ** 2).mean(0))
-    lamps = _with_floors(strength[:n_lamps], np.full(n_lamps, LAMP_FLOOR))
+    lamps = _with_floors(strength[:n_lamps], lamp_floors(n_lamps))
     return EmitterWeights(lamps, outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0)))
 
 

@@ -1,0 +1,34 @@
+"""The pilot of very many lamps: what it leaves to those it found, and how small it gets."""
+
+from __future__ import annotations
+
+import pytest
+
+from pbrs_farm.raycast.variant import choose_variant
+
+if choose_variant().startswith("scalar"):
+    pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)
+
+
+def test_the_least_weights_of_many_lamps_leave_half_to_what_the_pilot_found() -> None:
+    from pbrs_farm.transport.guiding.pilot import LAMP_FLOOR, lamp_floors
+
+    assert lamp_floors(500).sum() == pytest.approx(0.5)
+    assert (lamp_floors(18) == LAMP_FLOOR).all()
+    assert len(lamp_floors(0)) == 0
+
+
+@pytest.mark.parametrize("n_emitters", [1, 18, 170])
+def test_the_pilot_of_a_home_is_whole(n_emitters: int) -> None:
+    from pbrs_farm.transport.guiding.pilot import pilot_size
+
+    assert pilot_size(n_emitters) == (32, 24)
+
+
+@pytest.mark.parametrize("n_emitters", [171, 508, 2000])
+def test_the_pilot_of_very_many_emitters_is_smaller(n_emitters: int) -> None:
+    from pbrs_farm.transport.guiding.pilot import pilot_size
+
+    width, height = pilot_size(n_emitters)
+    assert width * height * n_emitters <= 1 << 17
+    assert width * 3 == height * 4
