@@ -114,6 +114,8 @@ def add_cameras(p: argparse.ArgumentParser) -> None:
     add("--trajectory", type=Path, metavar="FILE", help=text)
     add("--frames", type=int, metavar="N", help="frames of a walk (default 150)")
     add("--fps", type=float, metavar="F", help="frames a second of a walk (default 30)")
+    text = "open: doors between rooms stand open, where their model has a hinge (read.doors)"
+    add("--doors", choices=("drawn", "open"), help=text)
     text = "a second view to the right of each, so many metres off, e.g. 0.065"
     add("--stereo", type=float, metavar="B", help=text)
 
@@ -204,6 +206,7 @@ _SHORT_FORMS: Final = {
     "frames": "cameras.walk_frames",
     "fps": "cameras.walk_fps",
     "stereo": "cameras.stereo_m",
+    "doors": "read.doors",
 }
 
 

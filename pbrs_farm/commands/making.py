@@ -142,16 +142,22 @@ def _run_homes(
 
 
 def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[SourceRef]) -> Run:
-    """The run that the options describe."""
+    """The run that the options describe; BadInput before anything is stored."""
+    from pbrs_farm.run.chosen_cameras import check_camera_file
     from pbrs_farm.run.local import Run
     from pbrs_farm.run.plan import wanted
     from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.truth.optional_layers import check_lens
 
+    recipe = recipe_of(args)
+    want = wanted(args.modes, args.layers, views_wanted(args), pairs=args.pairs)
+    check_lens(want.layers, recipe.lens.lens)
+    check_camera_file(recipe.cameras)
     return Run(
         homes=homes,
         store_url=args.out,
-        recipe=recipe_of(args),
-        want=wanted(args.modes, args.layers, views_wanted(args), pairs=args.pairs),
+        recipe=recipe,
+        want=want,
         n_jobs=args.jobs,
         update=args.update,
         step_timeout_s=args.step_timeout,

@@ -36,6 +36,9 @@ class ReadFields(FieldGroup):
         1_000.0, gt=0, le=100_000.0, description="a piece farther out is refused"
     )
     hidden_levels: bool = Field(False, description="Sweet Home 3D: read levels not shown, too")
+    doors: Literal["drawn", "open"] = Field(
+        "drawn", description="Sweet Home 3D: `open` swings shut doors between rooms open"
+    )
     strict: bool = Field(
         False, description="notes of a source are errors but the harmless kinds, docs/houses.md"
     )

@@ -35,6 +35,15 @@ def chosen_cameras(house: House, fields: CameraFields, seed: int, caster: Caster
     return replace(sampling, views=views, report=report)
 
 
+def check_camera_file(fields: CameraFields) -> None:
+    """Raise BadInput for a camera file or trajectory that cannot be read, before a home is."""
+    if fields.source == "trajectory":
+        poses_from_tum(camera_file_text(fields), fields.file)
+    elif fields.source == "file":
+        text, size = camera_file_text(fields), (fields.score_width_px, fields.score_height_px)
+        cameras_from_file_text(text, fields.file, *size)
+
+
 def with_lens(view: View, lens: LensFields) -> View:
     """The view, which was chosen through a pin-hole, through the recipe's lens; BadInput for a fold."""
     try:

@@ -16,6 +16,7 @@ from pbrs_farm.core.classes import NYU13_FROM_NYU40
 from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Geometry, House, MaterialKind
 from pbrs_farm.core.layers import LAYER
+from pbrs_farm.core.lenses.lens import Lens
 from pbrs_farm.truth.albedo import albedo_png
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
 from pbrs_farm.truth.depth_sensor import sensor_depth
@@ -175,7 +176,13 @@ def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, ND
     name that is no optional label layer, BadInput for one that needs planar depth from a lens
     without.
     """
-    lens = inputs.camera.intrinsics.lens
+    check_lens(names, inputs.camera.intrinsics.lens)
+    made = [n for n in names if not LAYER[n].partner or LAYER[n].partner in inputs.to_partners]
+    return {name: _LAYER_FUNCTIONS[name](inputs) for name in made}
+
+
+def check_lens(names: Collection[str], lens: Lens) -> None:
+    """Raise BadInput for a named layer that a lens cannot have."""
     for name in ("hha", "depth_sensor", "depth_sensor_tof", "depth_sensor_stereo"):
         if name in names and not lens.depth_is_planar:
             what = f"needs depth along the axis, which lens.model {lens.model} has not"
@@ -183,8 +190,6 @@ def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, ND
     if "disparity" in names and not lens.is_pinhole:
         what = f"needs rows that correspond, which lens.model {lens.model} has not"
         raise BadInput("--layers", "disparity", what, hint="lens.model pinhole")
-    made = [n for n in names if not LAYER[n].partner or LAYER[n].partner in inputs.to_partners]
-    return {name: _LAYER_FUNCTIONS[name](inputs) for name in made}
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:

@@ -181,3 +181,30 @@ def test_every_shell_gets_a_script_of_every_verb(
     program = shutil.which(shell)
     if program:
         subprocess.run([program, "-n"], input=script, text=True, check=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--trajectory", "rows.txt"], "rows.txt: line 2: x is not finite"),
+        (["--trajectory", "none.txt"], "none.txt: no such file"),
+        (["--camera-file", "rows.txt"], "rows.txt"),
+        (
+            ["--set", "lens.preset=fisheye180", "--size", "64x64", "--layers", "disparity"],
+            "--layers: disparity: needs rows that correspond",
+        ),
+        (["--doors", "ajar"], "--doors"),
+    ],
+)
+def test_what_no_view_could_be_made_of_is_refused_before_anything_is_stored(
+    options: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("rows.txt").write_text("0 1 1.5 1 0 0 0 1\n0.1 nan 1.5 1 0 0 0 1\n")
+    code = 2 if "--doors" in options else 1
+    assert words in refusal(capsys, "run", "builtin", "--out", "out", *options, code=code)
+    assert not Path("out").exists()

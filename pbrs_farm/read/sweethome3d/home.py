@@ -22,6 +22,7 @@ from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, Plan, PlanLevel
 from pbrs_farm.read.sweethome3d.home_file.parse_home import parse_plan
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom, plane_items, read_rooms, room_nouns
+from pbrs_farm.read.sweethome3d.open_doors import PlacedPiece, opened_doors
 from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 from pbrs_farm.read.sweethome3d.piece_items import piece_item, piece_opening
 from pbrs_farm.read.sweethome3d.piece_models import PieceModels
@@ -166,7 +167,7 @@ def _furniture(
     models = PieceModels(materials, file, fields.max_model_triangles)
     walls = _standing_walls(plan, outlines)
     cutter_material = materials.painted(Paint(), "cut", "")
-    items: list[Item] = []
+    found: list[PlacedPiece] = []
     openings: list[Opening] = []
     n_faces = n_pieces = 0
     for number, piece in enumerate(plan.pieces):
@@ -186,18 +187,20 @@ def _furniture(
                 file, piece.place, f"more than {fields.max_triangles} triangles in the house",
                 hint="raise read.max_triangles",
             )  # fmt: skip
-        items.append(item)
+        found.append(PlacedPiece(piece, level, item, frame))
         opening = piece_opening(piece, item, frame, walls, materials, cutter_material)
         if opening is not None:
             openings.append(opening)
     # A home that lost all its models is no home to render.
     missing = materials.notes.count("missing-model")
-    if n_pieces and missing and not items:
+    if n_pieces and missing and not found:
         raise BadHouse(
             file, "", f"none of its {n_pieces} models can be found",
             hint="save the home as .sh3d with its contents, or fetch the program's: pbrs-farm homes",
         )  # fmt: skip
-    return items, tuple(openings)
+    if fields.doors == "open":
+        return opened_doors(found, models, materials, rooms, walls), tuple(openings)
+    return [placed.item for placed in found], tuple(openings)
 
 
 def _standing_walls(plan: Plan, outlines: dict[str, Outline]) -> list[StandingWall]:

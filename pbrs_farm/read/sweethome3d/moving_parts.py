@@ -16,7 +16,8 @@ from pbrs_farm.read.mesh.obj import Mesh
 
 _JOINT = re.compile(r"(?:^|_)((?:hinge|rail)_\d+|unique_rail)(?:_|$)")
 
-_FIXED = ("sweethome3d_hinge_", "sweethome3d_rail_", "sweethome3d_unique")
+HINGE = "sweethome3d_hinge_"
+_FIXED = (HINGE, "sweethome3d_rail_", "sweethome3d_unique")
 Transformations = tuple[tuple[str, tuple[float, ...]], ...]  # (name, 12 numbers)
 
 
@@ -43,6 +44,12 @@ def _moved(mesh: Mesh, by_joint: dict[str, tuple[float, ...]]) -> Mesh:
             continue
         return _transformed(mesh, np.array(by_joint[joint]).reshape(3, 4))
     return mesh
+
+
+def hangs_on(mesh: Mesh, joints: frozenset[str]) -> bool:
+    """Whether a mesh is moved by one of some joints; the hinge or rail itself is not."""
+    words = mesh.group.split()
+    return any(joint_of(w) in joints and not w.startswith(_FIXED) for w in words)
 
 
 def _transformed(mesh: Mesh, matrix: F64) -> Mesh:

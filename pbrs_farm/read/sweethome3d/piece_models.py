@@ -12,7 +12,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, ObjModel, parse_obj
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
-from pbrs_farm.read.sweethome3d.moving_parts import Transformations, moved
+from pbrs_farm.read.sweethome3d.moving_parts import Transformations, hangs_on, moved
 
 PANE, MIRROR, LIGHT = "pane", "mirror", "light"
 # Beginning of a group's name -> what the program makes of it.
@@ -68,6 +68,27 @@ class PieceModels:
                 parsed = replace(parsed, meshes=moved(parsed.meshes, transformations))
             self._models[key] = self._model(parsed, name)
         return self._models[key]
+
+    def meshes(self, name: str) -> tuple[Mesh, ...]:
+        """The meshes of a model as its file has them, with their groups; none if it is not there."""
+        parsed = self._parsed.get(name)
+        return parsed.meshes if parsed is not None else ()
+
+    def add_opened(self, name: str, moves: Transformations, out: frozenset[str]) -> Transformations:
+        """The transformations under which `get` gives the model with doors moved or left out.
+
+        out: joints whose parts are left out. Its box stays that of the shut model, which the
+        piece's size is of.
+        """
+        parsed = self._parsed[name]
+        assert parsed is not None
+        key = (*moves, *((f"out:{joint}", ()) for joint in sorted(out)))
+        if (name, key) not in self._models:
+            shut = self._models[(name, ())]
+            kept = tuple(m for m in parsed.meshes if not hangs_on(m, out))
+            opened = self._model(replace(parsed, meshes=moved(kept, moves)), name)
+            self._models[(name, key)] = replace(opened, low=shut.low, high=shut.high)
+        return key
 
     def _load(self, name: str, place: str) -> ObjModel | None:
         note, what = self._materials.notes.add, f"{name[:120]!r}"

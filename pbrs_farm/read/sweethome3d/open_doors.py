@@ -1,0 +1,206 @@
+"""Doors between rooms, swung open about the hinges that their models name; no effects.
+
+A model's leaf hangs on a hinge ("sweethome3d_opening_on_hinge_1_door" on "sweethome3d_hinge_1_2"), and
+swings to the side on which the hinge stands out of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Box, Item, ItemKind
+from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
+from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPiece
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
+from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
+from pbrs_farm.read.sweethome3d.moving_parts import HINGE, Transformations, joint_of
+from pbrs_farm.read.sweethome3d.piece_items import piece_item
+from pbrs_farm.read.sweethome3d.piece_models import PieceModels
+from pbrs_farm.read.sweethome3d.placement import PieceFrame, local_from_model
+
+ANGLES_DEG: Final = (85.0, 70.0, 55.0)  # the widest that nothing stands in the way of
+_SHUT: Final = 2.5  # times as wide as it reaches out of the wall, handles included
+_SIDE_M: Final = 0.5  # from a door's middle, where its rooms have begun
+_OFF_MIDDLE_M: Final = np.array([0.011, 0.017])
+_IN_WALL: Final = 0.15  # of a leaf's plan, that may lie in walls: in its own, beside the hinge
+_IN_THING: Final = 0.01  # of a leaf's plan, that may lie in a piece: they touch
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leaf:
+    """A shut leaf in its piece's frame, metres."""
+
+    joint: str  # "hinge_1"
+    hinge: F64  # (2,) x, z of the axis, which is upright
+    points: F64  # (N, 3)
+    turn: float  # 1 or -1: the sense about y that opens it
+
+
+def shut_leaves(meshes: Iterable[Mesh], matrix: F64) -> tuple[Leaf, ...]:
+    """The leaves of a door's model that hang on an upright hinge and lie in the wall.
+
+    matrix: (4, 4) from the model's frame to the piece's.
+    """
+    leaves: dict[str, list[F64]] = {}
+    hinges: dict[str, list[F64]] = {}
+    for mesh in meshes:
+        for word in mesh.group.split():
+            joint = joint_of(word)
+            if joint.startswith("hinge_") and len(mesh.positions):
+                points = mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]
+                kind = hinges if word.startswith(HINGE) else leaves
+                kind.setdefault(joint, []).append(points)
+                break
+    found = [_leaf(j, leaves[j], hinges[j]) for j in sorted(leaves) if j in hinges]
+    return tuple(leaf for leaf in found if leaf is not None)
+
+
+def _leaf(joint: str, parts: list[F64], hinge_parts: list[F64]) -> Leaf | None:
+    points, hinge = np.concatenate(parts), np.concatenate(hinge_parts)
+    axis = (hinge.min(0) + hinge.max(0))[[0, 2]] / 2
+    low, high = points.min(0), points.max(0)
+    # Leave what stands open, and what hangs on a lying hinge: a flap.
+    width, _height, out = high - low
+    if width < _SHUT * out or np.ptp(hinge[:, 0]) > np.ptp(hinge[:, 1]):
+        return None
+    # The leaf's far end goes to the side on which the hinge stands out of its plane.
+    away = np.sign((low + high)[0] / 2 - axis[0]) or 1.0
+    side = np.sign(axis[1] - np.median(points[:, 2])) or 1.0
+    return Leaf(joint, axis, points, float(-away * side))
+
+
+def _fills_its_hole(meshes: Iterable[Mesh], matrix: F64) -> bool:
+    """Whether a triangle lies across the middle of a door: one without is a frame alone."""
+    corners = [m.positions[m.faces] @ matrix[:3, :3].T + matrix[:3, 3] for m in meshes]
+    a, b, c = np.moveaxis(np.concatenate(corners)[:, :, :2] - _OFF_MIDDLE_M, 1, 0)
+    # A place beside the middle, where diagonals meet, is on the same side of all three edges.
+    sides = [p[:, 0] * (q - p)[:, 1] - p[:, 1] * (q - p)[:, 0] for p, q in ((a, b), (b, c), (c, a))]
+    signs = np.sign(sides)
+    return bool(((signs > 0).all(0) | (signs < 0).all(0)).any())
+
+
+def joins_rooms(frame: PieceFrame, level_id: str, rooms: Sequence[ReadRoom]) -> bool:
+    """Whether rooms with ceilings lie on both sides of a door: one that leads outdoors stays shut."""
+    reach = frame.half[2] + _SIDE_M
+    sides = frame.world(np.array([[0.0, 0.0, -reach], [0.0, 0.0, reach]]))
+    indoors = [r for r in rooms if r.level_id == level_id and r.plan.has_ceiling]
+    return all(any(r.outline.contains(shapely.Point(p[[0, 2]])) for r in indoors) for p in sides)
+
+
+def swung(leaf: Leaf, angle_deg: float) -> F64:
+    """(4, 4) that turns a leaf about its hinge, in the piece's frame."""
+    turn = np.eye(4)
+    turn[:3, :3] = rotation_y(np.radians(angle_deg) * leaf.turn)
+    axis = np.array([leaf.hinge[0], 0.0, leaf.hinge[1]])
+    turn[:3, 3] = axis - turn[:3, :3] @ axis
+    return turn
+
+
+def opening_angle(
+    leaf: Leaf, frame: PieceFrame, items: Iterable[Item], walls: Iterable[StandingWall]
+) -> float | None:
+    """The widest of ANGLES_DEG at which the leaf meets nothing; None where each of them does.
+
+    items: those of the storey but the door; their oriented boxes are asked.
+    """
+    low, high = frame.world(leaf.points)[:, 1].min(), frame.world(leaf.points)[:, 1].max()
+    things = [i.oriented_box.corners for i in items if i.n_faces and not i.kind.is_structure]
+    plans = [
+        shapely.MultiPoint(c[:, [0, 2]]).convex_hull
+        for c in things
+        if c[:, 1].max() > low and c[:, 1].min() < high
+    ]
+    solid = shapely.union_all([w.polygon for w in walls if w.high > low and w.low < high])
+    for angle in ANGLES_DEG:
+        turn = swung(leaf, angle)
+        points = frame.world(leaf.points @ turn[:3, :3].T + turn[:3, 3])
+        plan = shapely.MultiPoint(points[:, [0, 2]]).convex_hull
+        in_wall = plan.intersection(solid).area / plan.area
+        if in_wall <= _IN_WALL and all(
+            plan.intersection(p).area <= _IN_THING * plan.area for p in plans
+        ):
+            return angle
+    return None
+
+
+def model_moves(turns: Iterable[tuple[str, F64]], matrix: F64) -> Transformations:
+    """Moves of the piece's frame (joint, (4, 4)) as those of its model, which matrix places."""
+    back = np.linalg.inv(matrix)
+    return tuple(
+        (f"sweethome3d_{joint}", tuple((back @ turn @ matrix)[:3].ravel().tolist()))
+        for joint, turn in turns
+    )
+
+
+def around_everything(item: Item, frame: PieceFrame) -> Item:
+    """The item in a box of its frame that holds its open leaf, too."""
+    points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
+    local = (points - frame.origin) @ frame.axes
+    low, high = local.min(0), local.max(0)
+    middle = frame.world((low + high)[None] / 2)[0]
+    return replace(item, box=Box(middle, (high - low) / 2, frame.axes))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedPiece:
+    """A piece of the plan and the item it became."""
+
+    piece: PlanPiece
+    level: PlanLevel
+    item: Item
+    frame: PieceFrame
+
+
+def opened_doors(
+    placed: Sequence[PlacedPiece],
+    models: PieceModels,
+    materials: HomeMaterials,
+    rooms: list[ReadRoom],
+    walls: Sequence[StandingWall],
+) -> list[Item]:
+    """The items of placed pieces, the shut doors between rooms among them swung open.
+
+    A leaf that would meet a wall or a thing at every one of ANGLES_DEG is left out, with a note; a
+    door whose model names no hinge stays as it is drawn, with a note.
+    """
+    items = [p.item for p in placed]
+    for k, door in enumerate(placed):
+        piece, item = door.piece, door.item
+        if item.kind is not ItemKind.DOOR or not joins_rooms(door.frame, item.level_id, rooms):
+            continue
+        # A tilted or turned model is no plain door.
+        model = models.get(piece.model, piece.place)
+        is_plain = not (piece.transformations or piece.rotation or piece.pitch or piece.roll)
+        if model is None or not is_plain:
+            continue
+        matrix, meshes = local_from_model(piece, model), models.meshes(piece.model)
+        leaves = shut_leaves(meshes, matrix)
+        if not leaves:
+            if _fills_its_hole(meshes, matrix) and not any(HINGE in m.group for m in meshes):
+                text = "its model names no hinge: stays as it is drawn"
+                materials.notes.add("door-without-hinge", piece.place, text)
+            continue
+        # Ask of each leaf how far it can go, and move it, or leave it out.
+        others = [i for n, i in enumerate(items) if n != k and i.level_id == item.level_id]
+        angles = [(leaf, opening_angle(leaf, door.frame, others, walls)) for leaf in leaves]
+        turns = [(leaf.joint, swung(leaf, angle)) for leaf, angle in angles if angle is not None]
+        out = frozenset(leaf.joint for leaf, angle in angles if angle is None)
+        if out:
+            text = "something stands where its leaf would: left out"
+            materials.notes.add("door-leaf-left-out", piece.place, text)
+        moves = models.add_opened(piece.model, model_moves(turns, matrix), out)
+        ids = item.id, item.level_id
+        again = piece_item(
+            replace(piece, transformations=moves), door.level, models, materials, ids, rooms
+        )
+        if again is not None:
+            items[k] = around_everything(again[0], door.frame)
+    return items

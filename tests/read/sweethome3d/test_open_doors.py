@@ -1,0 +1,130 @@
+"""`read.doors=open`: leaves swing about their hinges, and nothing else changes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import House, Item
+from pbrs_farm.core.recipe import ReadFields, Recipe
+from pbrs_farm.read.sweethome3d import read_home
+from tests.read.sweethome3d.sh3d_source import home_xml, piece, sh3d
+
+WALL = "<wall id='w' xStart='0' yStart='0' xEnd='400' yEnd='0' thickness='10'/>"
+NORTH = (
+    "<room><point x='0' y='-300'/><point x='400' y='-300'/>"
+    "<point x='400' y='0'/><point x='0' y='0'/></room>"
+)
+SOUTH = (
+    "<room><point x='0' y='0'/><point x='400' y='0'/>"
+    "<point x='400' y='300'/><point x='0' y='300'/></room>"
+)
+
+
+def box(group: str, low: tuple[float, ...], high: tuple[float, ...], first: int) -> str:
+    """An OBJ group of a box whose vertices are numbered from `first`."""
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    ends = np.array([low, high])
+    lines = [f"g {group}"]
+    lines += ["v " + " ".join(str(ends[i, k]) for k, i in enumerate(c)) for c in corners]
+    faces = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")
+    lines += ["f " + " ".join(str(int(n) + first - 1) for n in f.split()) for f in faces]
+    return "\n".join(lines) + "\n"
+
+
+LEAF = box("sweethome3d_opening_on_hinge_1_door", (-0.4, 0, -0.02), (0.4, 2, 0.02), 1)
+FRAME = box("frame", (-0.5, 2, -0.1), (0.5, 2.1, 0.1), 9)
+HINGED = LEAF + FRAME + box("sweethome3d_hinge_1_1", (-0.42, 1, 0.02), (-0.4, 1.1, 0.04), 17)
+UNHINGED = LEAF.replace("sweethome3d_opening_on_hinge_1_door", "leaf") + FRAME
+
+
+def read(
+    doors: str, rooms: str = NORTH + SOUTH, obj: str = HINGED, more: str = "", **given: str
+) -> House:
+    attributes = " ".join(f"{k}='{v}'" for k, v in given.items())
+    door = piece(
+        f"{attributes} catalogId='eTeks#door' x='200' y='0' width='100' depth='20' height='210'"
+        " wallCutOutOnBothSides='true'",
+        tag="doorOrWindow",
+    )
+    home = home_xml(WALL + door + more, room=rooms)
+    fields = ReadFields.model_validate({"doors": doors})
+    return read_home(sh3d(home, {"1": obj.encode()}), "test.sh3d", fields=fields)
+
+
+def door_of(house: House) -> Item:
+    return next(i for i in house.items if i.id == "piece_0")
+
+
+def leaf_points(house: House) -> np.ndarray:
+    """The door's points below the frame's head."""
+    points = np.concatenate([s.positions for s in door_of(house).surfaces])
+    return points[points[:, 1] < 0.5]
+
+
+def test_an_open_leaf_stands_on_the_side_of_its_hinge() -> None:
+    low, high = leaf_points(read("open")).min(0), leaf_points(read("open")).max(0)
+    # It hangs at x = 1.59 and reaches 0.8 m into the room in front: 85 degrees.
+    assert high[2] == pytest.approx(0.03 + 0.81 * np.sin(np.radians(85)), abs=0.01)
+    assert low[0] > 1.55
+    assert high[0] < 1.75
+    shut = leaf_points(read("drawn"))
+    assert np.ptp(shut[:, 0]) == pytest.approx(0.8, abs=1e-5)
+
+
+def test_a_mirrored_door_opens_to_the_same_room_from_its_other_end() -> None:
+    points = leaf_points(read("open", modelMirrored="true"))
+    assert points[:, 2].max() > 0.8
+    assert points[:, 0].min() > 2.25
+
+
+def test_a_turned_door_opens_to_the_room_behind() -> None:
+    assert leaf_points(read("open", angle=str(np.pi)))[:, 2].min() < -0.8
+
+
+def test_the_box_of_an_open_door_holds_its_leaf() -> None:
+    door = door_of(read("open"))
+    box = door.oriented_box
+    for surface in door.surfaces:
+        local = (surface.positions - box.centre) @ box.axes
+        assert (np.abs(local) <= box.half + 1e-5).all()
+
+
+def test_hole_and_frame_stay_where_they_are() -> None:
+    drawn, opened = read("drawn"), read("open")
+    assert np.array_equal(drawn.openings[0].cutter.positions, opened.openings[0].cutter.positions)
+    heads = [
+        np.sort(np.concatenate([s.positions for s in door_of(h).surfaces])[:, 1])[-8:]
+        for h in (drawn, opened)
+    ]
+    assert np.array_equal(*heads)
+
+
+@pytest.mark.parametrize("north", ["", NORTH.replace("<room>", "<room ceilingVisible='false'>")])
+def test_a_door_that_leads_outdoors_stays_shut(north: str) -> None:
+    drawn, asked = read("drawn", SOUTH + north), read("open", SOUTH + north)
+    assert np.array_equal(leaf_points(drawn), leaf_points(asked))
+
+
+def test_a_leaf_that_furniture_blocks_is_left_out_with_a_note() -> None:
+    chest = piece("x='200' y='40' width='150' depth='40' height='100'")
+    house = read("open", more=chest)
+    assert len(leaf_points(house)) == 0
+    assert house.notes[-1].kind == "door-leaf-left-out"
+
+
+def test_a_door_without_a_hinge_stays_as_drawn_with_a_note() -> None:
+    house = read("open", obj=UNHINGED)
+    assert np.array_equal(leaf_points(house), leaf_points(read("drawn", obj=UNHINGED)))
+    assert [n.kind for n in house.notes] == ["door-without-hinge"]
+
+
+def test_an_archway_has_nothing_to_open() -> None:
+    left = box("frame", (-0.5, 0, -0.1), (-0.45, 2.1, 0.1), 1)
+    right = box("frame", (0.45, 0, -0.1), (0.5, 2.1, 0.1), 9)
+    assert read("open", obj=left + right).notes == ()
+
+
+def test_doors_as_drawn_keep_the_digest_of_before() -> None:
+    assert Recipe().digest("read") == Recipe(read=ReadFields(doors="drawn")).digest("read")
+    assert Recipe().digest("read") != Recipe(read=ReadFields(doors="open")).digest("read")
