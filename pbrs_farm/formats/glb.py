@@ -20,14 +20,16 @@ _BIN_CHUNK: Final = 0x004E4942  # "BIN"
 _ARRAY_BUFFER: Final = 34962  # vertices, in OpenGL's numbers
 _ELEMENT_ARRAY_BUFFER: Final = 34963  # indices
 
+_UINT, _FLOAT = 5125, 5126  # component types, in OpenGL's numbers
+
 # Component type of an accessor -> dtype.
 DTYPES: Final[dict[int, np.dtype[Any]]] = {
     5120: np.dtype("<i1"),
     5121: np.dtype("<u1"),
     5122: np.dtype("<i2"),
     5123: np.dtype("<u2"),
-    5125: np.dtype("<u4"),
-    5126: np.dtype("<f4"),
+    _UINT: np.dtype("<u4"),
+    _FLOAT: np.dtype("<f4"),
 }
 
 # Type of an accessor -> components per element (matrices are not geometry).
@@ -66,7 +68,7 @@ class GlbWriter:
         # Give bounds where glTF asks for them: of positions.
         accessor = {
             "bufferView": self.add_bytes(_little(array, "<f4"), target=_ARRAY_BUFFER),
-            "componentType": 5126,
+            "componentType": _FLOAT,
             "count": len(array),
             "type": f"VEC{array.shape[1]}",
         }
@@ -81,7 +83,7 @@ class GlbWriter:
         self._accessors.append(
             {
                 "bufferView": self.add_bytes(_little(faces, "<u4"), target=_ELEMENT_ARRAY_BUFFER),
-                "componentType": 5125,
+                "componentType": _UINT,
                 "count": faces.size,
                 "type": "SCALAR",
             }

@@ -23,6 +23,10 @@ GLTF_IMAGES: Final = ("image/png", "image/jpeg")
 # (u, v up) times this is (u, v down), one texture higher; and back.
 V_DOWN: Final[F32] = np.array([1, -1], np.float32)
 
+# OpenGL's numbers: of a sampler's wrapping, of a primitive's mode.
+_REPEAT: Final = 10497
+_POINTS, _TRIANGLES = 0, 4
+
 _PANE_ALPHA: Final = 0.3  # of glass whose source says opaque
 
 
@@ -53,7 +57,7 @@ def glb_from_house(house: House) -> bytes:
             "meshes": meshes,
             "materials": [_gltf_material(m, images) for m in house.materials],
             "images": [image for image in kept if "name" in image],
-            "samplers": [{"wrapS": 10497, "wrapT": 10497}] if images else [],
+            "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
             "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
             "extras": {"house": house.id, "textures": [x["bufferView"] for x in kept]},
         }
@@ -101,9 +105,9 @@ def _primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> d
         attributes["TEXCOORD_0"] = writer.add_vertices(s.uvs * V_DOWN)
     primitive: dict[str, Any] = {"attributes": attributes, "material": int(s.material)}
     if len(s.faces):
-        return primitive | {"indices": writer.add_faces(s.faces), "mode": 4}
+        return primitive | {"indices": writer.add_faces(s.faces), "mode": _TRIANGLES}
     # Keep vertices without faces as points.
-    return primitive | {"mode": 0}
+    return primitive | {"mode": _POINTS}
 
 
 def _write_textures(

@@ -12,6 +12,8 @@ from pbrs_farm.store.object_store import Head, Store
 
 T = TypeVar("T")  # what the call gives
 
+_FIRST_PAUSE_S = 0.2  # at most; each further pause is twice as long
+
 
 def retried(
     call: Callable[[int], T],
@@ -31,7 +33,7 @@ def retried(
         try:
             return call(n_tries)
         except StoreUnavailable as error:
-            pause_s = random.uniform(*jitter) * min(max_pause_s, 0.2 * 2**n_tries)
+            pause_s = random.uniform(*jitter) * min(max_pause_s, _FIRST_PAUSE_S * 2**n_tries)
             if time.monotonic() + pause_s > deadline:
                 raise
             on_wait(str(error))

@@ -14,13 +14,14 @@ from scipy import ndimage
 from pbrs_farm.core.arrays import F64, HitRecord, Mask
 from pbrs_farm.core.camera import Camera
 
-FOCAL_PX = 447.0  # 848 pixels over 87 degrees
+WIDTH_PX = 848  # of its picture
+FOCAL_PX = 447.0  # that width over 87 degrees
 BASELINE_M = 0.05
 DISPARITY_NOISE_PX = 0.08  # standard deviation of sub-pixel matching on a textured wall
 STEPS_PER_PX = 32  # quantisation of disparity
 MAX_DISPARITY_PX = 126.0  # of the search: what is nearer has no depth
 FARTHEST_M = 10.0
-WINDOW = 5  # px of 848 across, of a matched block
+WINDOW = 5  # px of WIDTH_PX, of a matched block
 NOISE_GRAIN_PX = 1.5  # neighbouring blocks overlap: their noise is alike
 
 
@@ -32,7 +33,7 @@ def stereo_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uin
     """
     # A block takes the nearest of what lies in it: objects grow by half a block.
     rng = np.random.default_rng(seed)
-    size = max(round(WINDOW * hit.face.shape[1] / 848) | 1, 3)
+    size = max(round(WINDOW * hit.face.shape[1] / WIDTH_PX) | 1, 3)
     z = np.where(hit.valid, hit.depth_z.astype(np.float64), np.inf)
     fattened = ndimage.minimum_filter(z, size=size, mode="nearest")
     hidden = _hidden_from_right(fattened, camera)

@@ -15,7 +15,7 @@ from pbrs_farm.read.common.placed_mesh import part_of
 
 MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
 
-_WELD_M: Final = 1e-4
+_WELD_M: Final = 1e-4  # corners this near are one
 
 
 def planar_parts(item: Item) -> tuple[Item, ...]:

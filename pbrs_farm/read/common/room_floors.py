@@ -22,6 +22,8 @@ MAX_OUTLINE_FACES: Final = 20_000
 _SAME_HEIGHT_M: Final = 0.02  # of faces that are one floor
 _CRACK_M: Final = 1e-4  # between triangles that should touch
 _SLACK_M: Final = 0.002  # of an outline's corners
+_UPRIGHT_UP: Final = 0.3  # |y| of a wall's normal, at most
+_LEVEL_UP: Final = 0.7  # of a floor's or a ceiling's, at least
 _TRACE_M: Final = 0.005  # half the width of the strip that a planar wall cuts
 
 
@@ -93,7 +95,7 @@ def _traces(walls: Sequence[Surface]) -> Any:
     found = []
     for surface in walls:
         p = triangle_corners(surface.positions, surface.faces)
-        upright = np.abs(area_vectors(p)[:, 1]) < 0.3 * (2 * face_areas(p))
+        upright = np.abs(area_vectors(p)[:, 1]) < _UPRIGHT_UP * (2 * face_areas(p))
         found.append(p[upright][:, :, [0, 2]])
     plan = np.concatenate([np.zeros((0, 3, 2)), *found])[:MAX_OUTLINE_FACES]
     lines: Any = shapely.linestrings(plan)
@@ -130,7 +132,7 @@ def _facing(surfaces: Sequence[Surface], sign: int) -> F64:
     found = [np.zeros((0, 3, 3))]
     for surface in surfaces:
         p = triangle_corners(surface.positions, surface.faces)
-        found.append(p[sign * area_vectors(p)[:, 1] > 0.7 * (2 * face_areas(p))])
+        found.append(p[sign * area_vectors(p)[:, 1] > _LEVEL_UP * (2 * face_areas(p))])
     return np.concatenate(found)
 
 

@@ -21,9 +21,10 @@ from pbrs_farm.core.mesh import area_vectors, closed_edge_share, face_areas, sig
 from pbrs_farm.read.common.placed_mesh import part_of
 from pbrs_farm.read.common.planar_walls import plane_of_faces
 
-_WELD_M: Final = 1e-4
+_WELD_M: Final = 1e-4  # corners this near are one
 _LEAST_HEIGHT_M: Final = 1.8  # of a room
 _LEAST_SIDE_M, _LARGEST_SIDE_M = 0.6, 200.0  # of a room in plan; a larger box is a sky
+_LEVEL_UP, _UPRIGHT_UP = 0.98, 0.1  # |y| of the normal: above is level, below is upright
 _LEAST_BOXY: Final = 0.7  # share of a room's area that is level or upright
 # Twice the volume over the area is the thickness of a plate: a wall has less, a room more.
 _THICKER_THAN_WALLS_M: Final = 0.3
@@ -88,7 +89,7 @@ def _facing(corners: F64, others: F64) -> int:
     # A room is made of level and upright faces.
     areas = face_areas(corners)
     up = np.abs(area_vectors(corners)[:, 1]) / np.maximum(2 * areas, 1e-12)
-    boxy = float(areas[(up > 0.98) | (up < 0.1)].sum() / max(areas.sum(), 1e-12))
+    boxy = float(areas[(up > _LEVEL_UP) | (up < _UPRIGHT_UP)].sum() / max(areas.sum(), 1e-12))
     if boxy < _LEAST_BOXY:
         return 0
     thickness_m = 2 * signed_volume(corners, (low + high) / 2) / float(areas.sum())

@@ -27,13 +27,15 @@ from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.suncg.house_json import JsonReader, Node, Override, world_from_house_of
 from pbrs_farm.read.suncg.model_materials import ModelMaterials
-from pbrs_farm.read.suncg.wall_holes import CUTTER_REACH_M, box_between
+from pbrs_farm.read.suncg.wall_holes import CUTTER_REACH_M, LEAST_HOLE_M, box_between
 
+# Thickness where an element tells none.
 WALL_DEPTH_M: Final = 0.10
 SLAB_DEPTH_M: Final = 0.05
 MAX_ELEMENTS: Final = 100_000
-_EDGE: Final = ObjMaterial("edge", (0.50196, 0.50196, 0.50196))
-_BESIDE_M: Final = 0.15
+_EDGE: Final = ObjMaterial("edge", (0.50196, 0.50196, 0.50196))  # sRGB 128: no element tells it
+_BESIDE_M: Final = 0.15  # a hole's middle lies no farther out of its door's bounds
+_LEAST_SILL_M: Final = 0.2  # a hole that begins lower is a door's
 _MODEL_ROOM: Final = re.compile(r"fr_(\d+)(?:rm|gd)_(\d+)")
 _KINDS: Final = {
     "Floor": ItemKind.FLOOR,
@@ -182,7 +184,7 @@ def arch_openings(
                 continue
             for k, hole in enumerate(e.holes):
                 opening = _opening(arch, e, frame, hole, f"{item_id}_hole{k}", node.level_id)
-                found += [_with_body(opening, items)] if opening is not None else []
+                found += [_with_leaf(opening, items)] if opening is not None else []
     return tuple(found)
 
 
@@ -310,7 +312,7 @@ def _opening(
     level_id: str,
 ) -> Opening | None:
     u0, v0, u1, v1 = hole
-    if u1 - u0 < 0.05 or v1 - v0 < 0.05:
+    if u1 - u0 < LEAST_HOLE_M or v1 - v0 < LEAST_HOLE_M:
         return None
     # Bring the wall's axes into the world, right-handed.
     scale = np.linalg.norm(arch.world_from_house[:3, 0])
@@ -326,14 +328,14 @@ def _opening(
         id=opening_id,
         level_id=level_id,
         item_id=None,
-        is_window=v0 > 0.2,
+        is_window=v0 > _LEAST_SILL_M,
         cutter=box_between(local.min(0) - reach, local.max(0) + reach, world_axes),
         quad=quad,
         normal=world_axes[:, 2],
     )
 
 
-def _with_body(opening: Opening, items: Sequence[Item]) -> Opening:
+def _with_leaf(opening: Opening, items: Sequence[Item]) -> Opening:
     """The opening with the door or window whose bounds hold its middle, if there is one."""
     middle = opening.quad.mean(0)
     for item in items:

@@ -21,6 +21,7 @@ CUTTER_REACH_M: Final = 0.02  # that a cutter stands out of either side of a wal
 _OVERLAP_M: Final = 0.002  # of a plug and the wall around it
 _HOLE_MARGIN_M: Final = 0.10  # a hole's rim lies no farther from the door's outline
 _RIM_M: Final = 0.02  # from a hole's rim to the wall's end, and the least size of a hole
+LEAST_HOLE_M: Final = 0.05  # width and height; a smaller one is a flaw of the mesh
 _BESIDE_M: Final = 0.15  # a wall's faces lie no farther from the door's own plane
 _PLANAR_M: Final = 0.01  # a wall that is thinner has one face
 _THICKER_M: Final = 0.15  # what such a wall's cutter reaches to either side
@@ -74,14 +75,14 @@ def _axes(normal: F64) -> F64:
     return np.stack([np.cross(_UP, normal), _UP, normal], 1)
 
 
-def _opening(item: Item, body: Box, frames: Sequence[_WallFrame]) -> Opening | None:
-    normal = body.axes[:, 2] * [1, 0, 1]  # a model's front is +z, whatever its leaf does
+def _opening(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Opening | None:
+    normal = leaf.axes[:, 2] * [1, 0, 1]  # a model's front is +z, whatever its leaf does
     if np.linalg.norm(normal) < 0.5:
         return None  # lies flat: a roof window, which no wall holds
     normal = normal / np.linalg.norm(normal)
     axes = _axes(normal)
     # Bound the door in the axes along, up and across, and find the walls it stands in.
-    corners = body.corners @ axes
+    corners = leaf.corners @ axes
     low, high = corners.min(0), corners.max(0)
     standing = [p for f in frames if f.level_id == item.level_id for p in _wall(f, axes, low, high)]
     if not standing:
@@ -96,7 +97,7 @@ def _opening(item: Item, body: Box, frames: Sequence[_WallFrame]) -> Opening | N
     high[2] = max(p[:, 2].max() for p in standing)
     if high[2] - low[2] < _PLANAR_M:  # repair makes it a solid, to either side
         low[2], high[2] = low[2] - _THICKER_M, high[2] + _THICKER_M
-    if (high - low)[:2].min() < 0.05:
+    if (high - low)[:2].min() < LEAST_HOLE_M:
         return None
     # Lay the quad in the middle; a plug overlaps its hole, a cutter reaches out of the wall.
     middle = (low[2] + high[2]) / 2

@@ -23,6 +23,7 @@ from pbrs_farm.repair.structure import plan_geometry as plan
 FALLBACK = "fallback"
 _WEAK = 0.25  # share of the flux a room wants, up to which its own lamps are too weak
 _LEAST_ESCAPE = 0.01  # light output ratio below which a lamp counts as none
+_HEIGHT_SLACK_M = 0.05  # a lamp or opening may lie so far outside the room's heights
 _BY_THE_ROOM_M = 0.6  # an opening nearer than this is in a wall of the room
 _SKY_POINTS = 64  # of a room without a ceiling, looked up from
 _LEAST_SKY = 0.1  # share of them that see no structure above
@@ -120,9 +121,14 @@ def _flux_in(lamp: Item, room: Room, area: plan.Shape) -> float:
         * (1 if light.escape is None else light.escape)
         for light in lamp.lights
         if _shines(light)
-        and room.floor_y - 0.05 <= light.position[1] <= room.ceiling_y + 0.05
+        and _is_between(room, light.position[1])
         and shapely.contains_xy(area, light.position[0], light.position[2])
     )
+
+
+def _is_between(room: Room, y: float) -> bool:
+    """Whether a height is between the room's floor and its ceiling, or almost."""
+    return room.floor_y - _HEIGHT_SLACK_M <= y <= room.ceiling_y + _HEIGHT_SLACK_M
 
 
 def _shines(light: LightPart) -> bool:
@@ -135,6 +141,6 @@ def _opens_on(opening: Opening, room: Room, area: plan.Shape, glazed: set[str]) 
     if not opening.is_window and opening.item_id not in glazed:
         return False
     middle = opening.quad.mean(0)
-    if not room.floor_y - 0.05 <= middle[1] <= room.ceiling_y + 0.05:
+    if not _is_between(room, float(middle[1])):
         return False
     return bool(area.distance(shapely.Point(middle[0], middle[2])) < _BY_THE_ROOM_M)

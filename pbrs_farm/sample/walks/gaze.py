@@ -26,6 +26,9 @@ _SEEN_SHARE: Final = 0.9  # of the way to a thing's middle that nothing may stan
 _OPEN_M: Final = 3.0  # as far as anything need be
 _FAN_AZIMUTH: Final = np.radians([-24.0, -12.0, 0.0, 12.0, 24.0])
 _FAN_TILT: Final = np.radians([-8.0, 8.0, 24.0])
+_N_REMEMBERED: Final = 4  # things looked at last, which draw the eye less
+_REMEMBERED_WEIGHT: Final = 0.05  # of theirs
+_LEAST_OPEN: Final = 0.05  # of the share of _OPEN_M; its cube prefers far sights
 _YAW_PART, _TILT_PART = 0.95, 0.3  # of the turn that is allowed: together below 1
 
 
@@ -127,8 +130,8 @@ def _chosen(
     candidates = np.flatnonzero(ahead & near)
     candidates = candidates[_in_sight(eye, candidates, things, geometry, first_hit)]
     # What was looked at lately draws the eye less, and a wall close before it least of all.
-    seen_lately = np.isin(candidates, looked_at[-4:])
-    weights = things.weights[candidates] * np.where(seen_lately, 0.05, 1.0)
+    seen_lately = np.isin(candidates, looked_at[-_N_REMEMBERED:])
+    weights = things.weights[candidates] * np.where(seen_lately, _REMEMBERED_WEIGHT, 1.0)
     towards = np.concatenate([to[candidates][:, [0, 2]], heading[None]])
     weights = np.append(weights, 1.0) * _openness(eye, towards, first_hit)
     # The last of them is the way ahead.
@@ -146,7 +149,7 @@ def _openness(eye: F64, towards: F64, first_hit: FirstHit) -> F64:
     ).reshape(-1, 3)
     t, _face = first_hit(np.broadcast_to(eye, rays.shape), rays)
     distance = np.minimum(t, _OPEN_M).reshape(len(towards), -1)
-    return np.asarray(np.maximum(np.median(distance, axis=1) / _OPEN_M, 0.05) ** 3)
+    return np.asarray(np.maximum(np.median(distance, axis=1) / _OPEN_M, _LEAST_OPEN) ** 3)
 
 
 def _in_sight(

@@ -17,7 +17,9 @@ _CONTROL_M: Final = 0.2  # between the control points of the spline
 _DENSE_M: Final = 0.005  # between the points that speed is measured at
 _ACROSS_MPS2: Final = 0.8  # acceleration in a turn, at most
 _ALONG_MPS2: Final = 0.6  # of setting off and slowing down, at most
-_LEAST_MPS: Final = 0.05
+_LEAST_MPS: Final = 0.05  # also at rest, so that the way ends
+_CURVE_M: Final = 0.05  # of way before and after a place that tell its curvature
+_HEADING_M: Final = 0.2  # and its heading
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +99,7 @@ def walked(path: F64, times: F64, speed_mps: float) -> Motion:
 
 def _curvature(path: F64) -> F64:
     """(M,) 1/m, over 10 cm: a point of the polyline has none."""
-    n = max(int(0.05 / _DENSE_M), 1)
+    n = max(int(_CURVE_M / _DENSE_M), 1)
     if len(path) <= 2 * n:
         return np.zeros(len(path))
     back, ahead = path[n:-n] - path[: -2 * n], path[2 * n :] - path[n:-n]
@@ -110,7 +112,7 @@ def _heading(path: F64, along: F64, at: F64) -> F64:
     """(N, 2) unit direction at lengths at, over 20 cm ahead and behind."""
     ends = [
         np.stack([np.interp(at + d, along, path[:, k]) for k in range(2)], axis=1)
-        for d in (-0.2, 0.2)
+        for d in (-_HEADING_M, _HEADING_M)
     ]
     direction = ends[1] - ends[0]
     length = np.linalg.norm(direction, axis=1, keepdims=True)

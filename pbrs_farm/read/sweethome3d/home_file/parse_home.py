@@ -18,9 +18,10 @@ from pbrs_farm.read.sweethome3d.home_file.home_xml import (
 from pbrs_farm.read.sweethome3d.home_file.paints import baseboard_of, room_paint, wall_paint
 from pbrs_farm.read.sweethome3d.home_file.parse_pieces import parse_piece
 
-MAX_PIECES = 20_000
-MAX_WALLS = 10_000
-MAX_ROOMS = 5_000
+# Of the file, hidden levels included; plan_bounds.py and room_bounds.py say how many are read.
+MAX_PIECE_ELEMENTS = 20_000
+MAX_WALL_ELEMENTS = 10_000
+MAX_ROOM_ELEMENTS = 5_000
 MAX_ROOM_POINTS = 100_000
 _PIECES = frozenset({"pieceOfFurniture", "doorOrWindow", "light", "shelfUnit"})
 FALLBACK_HEIGHT_M = 2.5  # of walls and levels that tell none
@@ -30,7 +31,11 @@ def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
     """Read every element the pipeline uses; BadHouse names the element that is wrong."""
     home = Attributes(file, "home", root, max_extent_m)
     # Bound the work before any element is read.
-    for tag, most in (("wall", MAX_WALLS), ("room", MAX_ROOMS), ("room/point", MAX_ROOM_POINTS)):
+    for tag, most in (
+        ("wall", MAX_WALL_ELEMENTS),
+        ("room", MAX_ROOM_ELEMENTS),
+        ("room/point", MAX_ROOM_POINTS),
+    ):
         if len(root.findall(tag)) > most:
             raise BadHouse(file, "", f"more than {most} <{tag}> elements")
     wall_height = home.length("wallHeight", FALLBACK_HEIGHT_M)
@@ -84,8 +89,8 @@ def _furniture(root: Element, file: str) -> Iterator[tuple[Element, str, str]]:
                 stack += [(e, level, inner) for e in reversed(list(element))]
         elif element.tag in _PIECES:
             n += 1
-            if n > MAX_PIECES:
-                raise BadHouse(file, "", f"more than {MAX_PIECES} pieces of furniture")
+            if n > MAX_PIECE_ELEMENTS:
+                raise BadHouse(file, "", f"more than {MAX_PIECE_ELEMENTS} pieces of furniture")
             yield element, level, group
 
 
