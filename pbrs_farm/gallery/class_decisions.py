@@ -13,8 +13,8 @@ from typing import Any, Final
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import shown
+from pbrs_farm.read.common.furniture_classes import CLASS_TAG
 
-_TAG: Final = "class:"
 _RULES: Final = ("source", "catalogue", "element", "name", "group", "id", "inner-word")  # by trust
 _STRUCTURE: Final = frozenset({"wall", "floor", "ceiling", "ground"})  # kinds, always the source's
 
@@ -77,5 +77,5 @@ def _cell(text: str) -> str:
 
 def _rule(item: Mapping[str, Any]) -> str:
     tags = [str(t) for t in item.get("tags", ())]
-    found = next((t.removeprefix(_TAG) for t in tags if t.startswith(_TAG)), None)
+    found = next((t.removeprefix(CLASS_TAG) for t in tags if t.startswith(CLASS_TAG)), None)
     return found or ("none" if "unmapped" in tags else "source")

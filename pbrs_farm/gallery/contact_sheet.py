@@ -114,9 +114,9 @@ def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown:
     # Write what the sheet shows, then a title over each column.
     n_houses = len({view.house.id for view in views})
     draw.text((_MARGIN_PX, 22), "pbrs_farm", INK, _font(30))
-    shown = "" if n_shown == len(views) else f"{n_shown} of "
+    part = "" if n_shown == len(views) else f"{n_shown} of "
     text = (
-        f"{shown}{len(views)} view{'s'[: len(views) != 1]}, "
+        f"{part}{len(views)} view{'s'[: len(views) != 1]}, "
         f"{n_houses} house{'s'[: n_houses != 1]}: four lighting modes, labels of the same pixels"
     )
     draw.text((_MARGIN_PX + 172, 34), text, _FAINT, _font(16))

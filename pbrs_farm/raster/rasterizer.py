@@ -65,12 +65,13 @@ class Rasterizer:
         self._mesh = mesh_from_house(house)
         self._white_per_lx = brightness_scale(house, n_lights)
         self._sky = tuple(linear_from_srgb(np.array(SKY_SRGB)))
-        kinds = [
+        features = [
             features_of_material(m, is_textured=m.texture_id in textures) for m in house.materials
         ]
-        self._kind = np.array(kinds, int)  # feature bits of each material
+        self._features = np.array(features, int)  # feature bits of each material
         self._light_features = light_features(house)
-        self._programs: dict[tuple[str, int], tuple[Any, Any]] = {}  # (mode, kind) -> program, VAO
+        # (mode, feature bits) -> program, vertex array
+        self._programs: dict[tuple[str, int], tuple[Any, Any]] = {}
         self._queries = [self._context.query(samples=True) for _ in range(self._mesh.n_draws)]
         self._targets: dict[tuple[int, int], RenderTarget] = {}  # (width, height)
         self._upload(house, textures, n_lights)
@@ -145,17 +146,17 @@ class Rasterizer:
             if mode == "il":
                 order = self._visible_draws(target, order, clip)
             # Draw opaque surfaces program by program, then blend the transparent ones over them.
-            kind = self._kind[self._mesh.draw_material[order]]
+            features = self._features[self._mesh.draw_material[order]]
             target.begin((*self._sky, 1.0))
-            for number in np.unique(kind):
-                self._begin_surfaces(mode, int(number), camera, clip, forward)
-                if number & Feature.TRANSPARENT:
+            for bits in np.unique(features):
+                self._begin_surfaces(mode, int(bits), camera, clip, forward)
+                if bits & Feature.TRANSPARENT:
                     continue
-                for draw in order[kind == number]:
+                for draw in order[features == bits]:
                     self._bind(mode, int(draw))
-                    self._draw(self._program(mode, int(number))[1], int(draw))
-            if (kind & Feature.TRANSPARENT).any():
-                self._blend_transparent(mode, order[(kind & Feature.TRANSPARENT) > 0], camera)
+                    self._draw(self._program(mode, int(bits))[1], int(draw))
+            if (features & Feature.TRANSPARENT).any():
+                self._blend_transparent(mode, order[(features & Feature.TRANSPARENT) > 0], camera)
             return srgb8_from_half(target.read())
 
     @property
@@ -178,7 +179,7 @@ class Rasterizer:
         program, vao = self._program("depth", 0)
         _set(program, clip_from_world=clip)
         see_through = Feature.TRANSPARENT | Feature.ALPHA_CUTOUT
-        is_solid = (self._kind[self._mesh.draw_material[draws]] & see_through) == 0
+        is_solid = (self._features[self._mesh.draw_material[draws]] & see_through) == 0
         target.begin_depth_prepass()
         for draw in draws[is_solid]:
             with self._queries[draw]:
@@ -190,10 +191,10 @@ class Rasterizer:
         return np.asarray(draws[kept])
 
     def _begin_surfaces(
-        self, mode: str, kind: int, camera: Camera, clip: F64, forward: F64
+        self, mode: str, features: int, camera: Camera, clip: F64, forward: F64
     ) -> None:
         _set(
-            self._program(mode, kind)[0],
+            self._program(mode, features)[0],
             clip_from_world=clip,
             eye=camera.eye,
             forward=forward,
@@ -231,9 +232,9 @@ class Rasterizer:
 
         # Build an index buffer in that order, and a vertex array for each program.
         indices = gl.buffer(np.ascontiguousarray(mesh.indices[triangle]).tobytes())
-        kinds = self._kind[mesh.draw_material[owner]]
+        features = self._features[mesh.draw_material[owner]]
         vaos = {
-            int(k): self._vao(self._program(mode, int(k))[0], indices) for k in np.unique(kinds)
+            int(b): self._vao(self._program(mode, int(b))[0], indices) for b in np.unique(features)
         }
         # Draw runs of triangles that share a draw; colours are premultiplied by alpha.
         gl.enable(gl.BLEND)
@@ -242,32 +243,32 @@ class Rasterizer:
         starts = np.nonzero(np.diff(owner, prepend=-1))[0]
         for start, end in zip(starts, [*starts[1:], len(owner)], strict=True):
             self._bind(mode, int(owner[start]))
-            vaos[int(kinds[start])].render(vertices=3 * int(end - start), first=3 * int(start))
+            vaos[int(features[start])].render(vertices=3 * int(end - start), first=3 * int(start))
         gl.depth_mask = True
         gl.disable(gl.BLEND)
         for vao in vaos.values():
             vao.release()
         indices.release()
 
-    def _program(self, mode: str, kind: int) -> tuple[Any, Any]:
-        """Program and vertex array of a mode ("dl", "il", "depth") for feature bits kind."""
-        if (mode, kind) not in self._programs:
+    def _program(self, mode: str, features: int) -> tuple[Any, Any]:
+        """Program and vertex array of a mode ("dl", "il", "depth") for feature bits."""
+        if (mode, features) not in self._programs:
             if mode == "depth":
                 program = depth_program(self._context)
             else:
                 # Features become #defines: a program has no code that its surfaces do not need.
-                features = [f"MODE_{mode.upper()}", *feature_names(kind)]
-                features += self._light_features if mode == "il" else []
+                defines = [f"MODE_{mode.upper()}", *feature_names(features)]
+                defines += self._light_features if mode == "il" else []
                 n_lights = self._fields.lights_per_object
-                program = surface_program(self._context, features, n_lights, self._samples)
+                program = surface_program(self._context, defines, n_lights, self._samples)
                 # The compiler drops uniforms that no feature uses, so ask for each.
                 if "prepass_depth" in program:
                     program["prepass_depth"] = 1
                 for block, binding in (("Material", 0), ("Lights", 1)):
                     if block in program:
                         program[block].binding = binding
-            self._programs[mode, kind] = program, self._vao(program, self._indices)
-        return self._programs[mode, kind]
+            self._programs[mode, features] = program, self._vao(program, self._indices)
+        return self._programs[mode, features]
 
     def _vao(self, program: Any, indices: Any) -> Any:
         # Skip the bytes of attributes that the program does not read.

@@ -117,13 +117,13 @@ class JitTracer:
     ) -> NDArray[np.uint32]:
         # Launch as many cameras of one size together as memory allows.
         counts = np.zeros((len(cameras), n_labels), np.uint32)
-        for i, members in _by_intrinsics(cameras).items():
-            if not i.lens.is_pinhole:
+        for intrinsics, members in _by_intrinsics(cameras).items():
+            if not intrinsics.lens.is_pinhole:
                 for k in members:
                     face = self.faces_of_camera(cameras[k])
                     counts[k] = counted_labels(face, face_label, n_labels)
                 continue
-            n_pixels = i.width_px * i.height_px
+            n_pixels = intrinsics.width_px * intrinsics.height_px
             most = max(1, min(_RAYS_PER_LAUNCH // n_pixels, _COUNTS_PER_LAUNCH // n_labels))
             for start in range(0, len(members), most):
                 part = members[start : start + most]

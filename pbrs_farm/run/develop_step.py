@@ -22,23 +22,23 @@ from pbrs_farm.transport.develop.mode_pictures import (
     wanted_exposures,
 )
 
-Walk = Callable[[], tuple[CachedHouse, Mapping[str, View]]]
+HouseAndViews = Callable[[], tuple[CachedHouse, Mapping[str, View]]]
 
 _LAGS: Final = 4.0  # of what came earlier than so many lags less than 2 % is left
 _GLANCE_PX: Final = (32, 24)  # of the small pictures that tell how bright earlier frames are
 _GLANCE_SPP: Final = 16
 
 
-def develop_step(work: Work, walk: Walk) -> StepOutput:
+def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     """The PNGs of the light modes: groups summed, denoised, white-balanced, tone-mapped.
 
-    Through the recipe's sensor where it is on. walk: the house and its views by id, asked for only
-    where earlier frames decide the exposure.
+    Through the recipe's sensor where it is on. cached: the house and its views by id, asked for
+    only where earlier frames decide the exposure.
     """
     key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
     aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
     denoise = work.recipe.light.denoise
-    shot = _sensor_shot(work, walk)
+    shot = _sensor_shot(work, cached)
     wraps = work.recipe.lens.model == "equirect"
     images = develop(aovs, work.recipe.tone, denoise=denoise, shot=shot, wraps=wraps)
     # Write a PNG a mode; its exposure and white balance become facts.
@@ -47,14 +47,14 @@ def develop_step(work: Work, walk: Walk) -> StepOutput:
     return StepOutput(files, {"denoised": denoise} | {m: i.facts() for m, i in images.items()})
 
 
-def _sensor_shot(work: Work, walk: Walk) -> SensorShot | None:
+def _sensor_shot(work: Work, cached: HouseAndViews) -> SensorShot | None:
     fields = work.recipe.sensor
     if not fields.is_on:
         return None
     seed = keys.seed(work.house_id, work.view_id or "", "sensor", work.recipe.digest("sensor"))
     if fields.lag_s == 0:
         return SensorShot(fields, seed)
-    house, views = walk()
+    house, views = cached()
     view = views[work.view_id or ""]
     if view.time_s is None:
         return SensorShot(fields, seed)

@@ -50,15 +50,15 @@ def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator
     chosen = set(plan.spread(rows, n_views))
     # Take one sky for both houses, so that only the dressing differs.
     sky = CachedHouse(MemoryStore(), recipe, bare.id, "").sky
-    scenes = [_Lit(house, recipe, sky) for house in (bare, dressed)]
+    scenes = [_LoadedHouse(house, recipe, sky) for house in (bare, dressed)]
     for view in views:
         if view.id in chosen:
             before, after = (scene.picture(view) for scene in scenes)
             yield ViewPair(view, before, after)
 
 
-class _Lit:
-    """A house that is held in memory, and the pictures of it."""
+class _LoadedHouse:
+    """A house in memory with its light scene, and the pictures of it."""
 
     def __init__(self, house: House, recipe: Recipe, sky: Sky) -> None:
         from pbrs_farm.transport.light_scene import LightScene

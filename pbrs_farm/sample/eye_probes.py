@@ -17,7 +17,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, ItemKind
 from pbrs_farm.sample.candidates import cameras_looking
 
-Counter = Callable[[Sequence[Camera]], NDArray[np.uint32]]
+ItemCounter = Callable[[Sequence[Camera]], NDArray[np.uint32]]
 """Pixels of each item in each camera: (n_cameras, n_items + 1), column 0 = nothing."""
 
 # An object that covers more of all directions, and whose box holds the eye, encloses it.
@@ -34,7 +34,7 @@ _AXES: Final = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, 
 
 
 def counted(
-    counter: Counter, cameras: Sequence[Camera], n_items: int, *, group: int = 1
+    counter: ItemCounter, cameras: Sequence[Camera], n_items: int, *, group: int = 1
 ) -> Iterator[tuple[slice, NDArray[np.uint32]]]:
     """(which cameras, their rows (n, n_items + 1)) in parts of bounded size.
 
@@ -51,7 +51,7 @@ def counted(
         yield part, padded
 
 
-def not_above_floor(house: House, eyes: F64, counter: Counter) -> Bools:
+def not_above_floor(house: House, eyes: F64, counter: ItemCounter) -> Bools:
     """(N,) bool: straight below the eye (N, 3) the first thing is a wall or a ceiling.
 
     So it is above a low or sloped ceiling, above a wall, or inside one.
@@ -67,7 +67,7 @@ def not_above_floor(house: House, eyes: F64, counter: Counter) -> Bools:
     return above
 
 
-def enclosed(house: House, eyes: F64, counter: Counter) -> Bools:
+def enclosed(house: House, eyes: F64, counter: ItemCounter) -> Bools:
     """(N,) bool: one item all around the eye (N, 3): a wardrobe's inside, a solid wall's.
 
     Counts the pixels of the six faces of a cube around the eye.

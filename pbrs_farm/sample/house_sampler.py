@@ -11,7 +11,7 @@ from pbrs_farm.core.camera import View
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import CameraReport, RoomReport, total_rejected
-from pbrs_farm.sample.eye_probes import Counter
+from pbrs_farm.sample.eye_probes import ItemCounter
 from pbrs_farm.sample.photo_sampler import PhotoSampler, room_report
 from pbrs_farm.sample.room_candidates import RoomCandidates
 from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
@@ -29,7 +29,11 @@ class Sampling:
 
 
 def cameras(
-    house: House, fields: CameraFields, seed: int, counter: Counter, depth_of: DepthOf | None = None
+    house: House,
+    fields: CameraFields,
+    seed: int,
+    counter: ItemCounter,
+    depth_of: DepthOf | None = None,
 ) -> tuple[tuple[View, ...], CameraReport]:
     """The views of a house and why every other candidate was rejected; see sample_cameras."""
     sampling = sample_cameras(house, fields, seed, counter, depth_of)
@@ -37,7 +41,11 @@ def cameras(
 
 
 def sample_cameras(
-    house: House, fields: CameraFields, seed: int, counter: Counter, depth_of: DepthOf | None = None
+    house: House,
+    fields: CameraFields,
+    seed: int,
+    counter: ItemCounter,
+    depth_of: DepthOf | None = None,
 ) -> Sampling:
     """The best view of each sector of each room that something lights (paper section 3.1).
 
@@ -101,7 +109,7 @@ def _photographed(sampler: PhotoSampler) -> Sampling:
     )
 
 
-def _stored(house: House, fields: CameraFields, counter: Counter) -> Sampling:
+def _stored(house: House, fields: CameraFields, counter: ItemCounter) -> Sampling:
     views, notes = stored_views(house, fields, counter)
     return Sampling(views, _report(fields, list(views), (), notes), ())
 

@@ -13,7 +13,7 @@ from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.candidates import Candidates, Grid
 from pbrs_farm.sample.clearance import near_any_triangle
-from pbrs_farm.sample.eye_probes import Counter, enclosed, not_above_floor
+from pbrs_farm.sample.eye_probes import ItemCounter, enclosed, not_above_floor
 from pbrs_farm.sample.rejection import Verdict
 
 _CHUNK = 4096  # candidates judged at once: bounds memory
@@ -38,7 +38,7 @@ def rejections(
     fields: CameraFields,
     candidates: Candidates,
     geometry: Geometry,
-    counter: Counter,
+    counter: ItemCounter,
 ) -> NDArray[np.uint8]:
     """(N,) verdict of each candidate: the first rule of place that rejects it, or LOWER_SCORE.
 

@@ -40,12 +40,12 @@ _Name = tuple[str, int]
 
 
 @dataclass(slots=True, eq=False)
-class _Turn:
+class _Sector:
     """A sector that may have views: its candidates, best first, and the numbers of those taken."""
 
-    scored: RoomCandidates
-    sector: int
-    open_to: NDArray[np.intp]
+    scored: RoomCandidates  # of its room
+    number: int  # in its room
+    candidates: NDArray[np.intp]
     taken: list[int] = field(default_factory=list)
 
 
@@ -70,70 +70,70 @@ class PhotoChoice:
         one stays.
         """
         # Let every sector that has a candidate take its turn, the best first.
-        turns = [
-            _Turn(scored, sector, ranked)
+        sectors = [
+            _Sector(scored, number, ranked)
             for scored in rooms
-            for sector in range(self.fields.n_sectors)
-            if len(ranked := scored.ranked(sector))
+            for number in range(self.fields.n_sectors)
+            if len(ranked := scored.ranked(number))
         ]
-        turns.sort(key=lambda turn: -turn.scored.score[turn.open_to[0]])
+        sectors.sort(key=lambda sector: -sector.scored.score[sector.candidates[0]])
         # Give each its views, compared with those of all rooms that are taken already.
         with_view: set[str] = set()
-        for turn in turns:
-            self._leave_out_weak(turn, is_first=turn.scored.room.id not in with_view)
-            self._fill(turn)
-            if turn.taken:
-                with_view.add(turn.scored.room.id)
+        for sector in sectors:
+            self._leave_out_weak(sector, is_first=sector.scored.room.id not in with_view)
+            self._fill(sector)
+            if sector.taken:
+                with_view.add(sector.scored.room.id)
         # Exchange views for others that bring all of them nearer to photographs.
         for _ in range(_ROUNDS if self.fields.likeness > 0 else 0):
-            if not sum(self._exchange(turn) for turn in turns):
+            if not sum(self._exchange(sector) for sector in sectors):
                 break
-        for turn in turns:
-            turn.scored.verdict[turn.taken] = Verdict.WINNER
-        return {(turn.scored.room.id, turn.sector): turn.taken for turn in turns}
+        for sector in sectors:
+            sector.scored.verdict[sector.taken] = Verdict.WINNER
+        return {(sector.scored.room.id, sector.number): sector.taken for sector in sectors}
 
-    def _leave_out_weak(self, turn: _Turn, *, is_first: bool) -> None:
+    def _leave_out_weak(self, sector: _Sector, *, is_first: bool) -> None:
         """Close a sector to weak candidates; a room's first view, its best, may be weaker."""
-        f, scored = self.fields, turn.scored
-        weak = scored.score[turn.open_to] < f.min_score
-        if is_first and scored.score[turn.open_to[0]] >= f.min_room_score:
+        f, scored = self.fields, sector.scored
+        weak = scored.score[sector.candidates] < f.min_score
+        if is_first and scored.score[sector.candidates[0]] >= f.min_room_score:
             weak[0] = False
-        scored.verdict[turn.open_to[weak]] = Verdict.WEAK
-        turn.open_to = turn.open_to[~weak]
+        scored.verdict[sector.candidates[weak]] = Verdict.WEAK
+        sector.candidates = sector.candidates[~weak]
         # Likeness chooses among the better ones.
-        if f.likeness > 0 and len(turn.open_to):
-            score = scored.score[turn.open_to]
-            turn.open_to = turn.open_to[score >= score[0] - MOST_WORSE]
+        if f.likeness > 0 and len(sector.candidates):
+            score = scored.score[sector.candidates]
+            sector.candidates = sector.candidates[score >= score[0] - MOST_WORSE]
 
-    def _fill(self, turn: _Turn) -> None:
-        """Take a sector's views from the candidate worth most down, leaving out twins."""
-        left = turn.open_to
+    def _fill(self, sector: _Sector) -> None:
+        """Take a sector's views, the candidate that adds most first, leaving out twins."""
+        left = sector.candidates
         for _ in range(_TRIES * self.fields.per_sector):
-            if len(turn.taken) == self.fields.per_sector or not len(left):
+            if len(sector.taken) == self.fields.per_sector or not len(left):
                 return
-            # Rank again after each: what is worth most depends on what is taken.
-            at = int(np.argmax(self._worth(turn.scored, left)))
+            # Rank again after each: what a view adds depends on those that are taken.
+            at = int(np.argmax(self._gain(sector.scored, left)))
             number, left = int(left[at]), np.delete(left, at)
-            if self._is_twin(turn.scored, number):
-                turn.scored.verdict[number] = Verdict.TWIN
+            if self._is_twin(sector.scored, number):
+                sector.scored.verdict[number] = Verdict.TWIN
             else:
-                self._take(turn, number)
+                self._take(sector, number)
 
-    def _exchange(self, turn: _Turn) -> bool:
-        """Give each view of a sector up for the candidate that is then worth most."""
-        before = list(turn.taken)
+    def _exchange(self, sector: _Sector) -> bool:
+        """Give each view of a sector up for the candidate that then adds most."""
+        before = list(sector.taken)
         for number in before:
-            self._give_up(turn, number)
-            others = np.setdiff1d(turn.open_to, turn.taken)
-            worth = self._worth(turn.scored, others)
+            self._give_up(sector, number)
+            others = np.setdiff1d(sector.candidates, sector.taken)
+            gain = self._gain(sector.scored, others)
             # Try the better ones from the best down; itself is no twin of any.
-            order = others[np.argsort(-worth, kind="stable")][:_TRIES].tolist()
+            order = others[np.argsort(-gain, kind="stable")][:_TRIES].tolist()
             better = order[: order.index(number)] if number in order else order
-            free = (k for k in better if not self._is_twin(turn.scored, k))
-            self._take(turn, next(free, number))
-        return set(before) != set(turn.taken)
+            free = (k for k in better if not self._is_twin(sector.scored, k))
+            self._take(sector, next(free, number))
+        return set(before) != set(sector.taken)
 
-    def _worth(self, scored: RoomCandidates, numbers: NDArray[np.intp]) -> F64:
+    def _gain(self, scored: RoomCandidates, numbers: NDArray[np.intp]) -> F64:
         """(M,) what candidates would add to the views that are taken."""
         score = scored.score[numbers]
         if self.fields.likeness == 0:
@@ -142,15 +142,15 @@ class PhotoChoice:
         unlike = self.fields.likeness * (len(self._taken) + 1) * distance
         return np.asarray(score - scored.framing[numbers] - unlike)
 
-    def _take(self, turn: _Turn, number: int) -> None:
-        turn.taken.append(number)
-        self._taken[turn.scored.room.id, number] = self._look(turn.scored, number)
-        self._shown = self._shown + turn.scored.nyu13[number]
+    def _take(self, sector: _Sector, number: int) -> None:
+        sector.taken.append(number)
+        self._taken[sector.scored.room.id, number] = self._look(sector.scored, number)
+        self._shown = self._shown + sector.scored.nyu13[number]
 
-    def _give_up(self, turn: _Turn, number: int) -> None:
-        turn.taken.remove(number)
-        del self._taken[turn.scored.room.id, number]
-        self._shown = self._shown - turn.scored.nyu13[number]
+    def _give_up(self, sector: _Sector, number: int) -> None:
+        sector.taken.remove(number)
+        del self._taken[sector.scored.room.id, number]
+        self._shown = self._shown - sector.scored.nyu13[number]
 
     def _is_twin(self, scored: RoomCandidates, number: int) -> bool:
         camera, depth = self._look(scored, number)

@@ -6,7 +6,7 @@ the score of photo_score.py from a small picture; photo_choice.py chooses among 
 
 from __future__ import annotations
 
-import collections
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import RoomReport, SectorReport
 from pbrs_farm.sample.candidates import grid_candidates
-from pbrs_farm.sample.eye_probes import Counter, counted
+from pbrs_farm.sample.eye_probes import ItemCounter, counted
 from pbrs_farm.sample.paper_rules import rejections, room_grid
 from pbrs_farm.sample.photo_choice import PhotoChoice
 from pbrs_farm.sample.photo_score import (
@@ -40,7 +40,7 @@ class PhotoSampler:
     house: House
     fields: CameraFields
     seed: int
-    counter: Counter
+    counter: ItemCounter
     depth_of: DepthOf
     geometry: Geometry
 
@@ -115,7 +115,7 @@ def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) ->
     """How many candidates of a sector each rule rejected, and its view."""
     verdict = scored.verdict[scored.candidates.sector == sector]
     # Count by the first rule that rejected; name the commonest where no view is left.
-    tally = collections.Counter(verdict.tolist())
+    tally = Counter(verdict.tolist())
     refused = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
     ranked = scored.ranked(sector)
     winners = np.flatnonzero(scored.verdict[ranked] == Verdict.WINNER)

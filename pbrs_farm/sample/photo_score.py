@@ -32,8 +32,8 @@ NO_FURNITURE: Final = (BLINDS, CURTAIN, OTHERSTRUCTURE)
 MOST_FURNITURE: Final = 0.45
 MOST_FLOOR: Final = 0.08
 # What each object and class earns, and how many do.
-OBJECT_WORTH, MOST_OBJECTS = 0.05, 8
-CLASS_WORTH, MOST_CLASSES = 0.06, 8
+SCORE_OF_OBJECT, MOST_OBJECTS = 0.05, 8
+SCORE_OF_CLASS, MOST_CLASSES = 0.06, 8
 LEAST_CLASS_SHARE: Final = 0.005  # of the picture, that a class is seen at all
 # Shares from which doors and windows, one piece, one wall cost.
 MOST_OPENING, OPENING_COST = 0.10, 1.5
@@ -132,8 +132,8 @@ def photo_score(seen: PhotoShares) -> F64:
     """(N,) score: furniture, things and classes count; doors, close-ups and bare walls cost."""
     # Reward what people photograph, up to what is enough.
     score = np.minimum(seen.furniture, MOST_FURNITURE)
-    score += OBJECT_WORTH * np.minimum(seen.n_objects, MOST_OBJECTS)
-    score += CLASS_WORTH * np.minimum(seen.n_classes, MOST_CLASSES)
+    score += SCORE_OF_OBJECT * np.minimum(seen.n_objects, MOST_OBJECTS)
+    score += SCORE_OF_CLASS * np.minimum(seen.n_classes, MOST_CLASSES)
     score += np.minimum(seen.floor, MOST_FLOOR)
     # Charge what fills a picture without telling of the room.
     score -= OPENING_COST * np.maximum(seen.opening - MOST_OPENING, 0)

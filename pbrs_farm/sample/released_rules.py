@@ -11,7 +11,7 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Geometry, House, Item, ItemKind, Room, corners_of_surfaces
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.candidates import Candidates, Grid
-from pbrs_farm.sample.eye_probes import Counter
+from pbrs_farm.sample.eye_probes import ItemCounter
 from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.rejection import Verdict
 
@@ -35,7 +35,7 @@ def rejections(
     fields: CameraFields,
     candidates: Candidates,
     geometry: Geometry,
-    counter: Counter,
+    counter: ItemCounter,
 ) -> NDArray[np.uint8]:
     """(N,) verdict: outside the floor's mask, on an obstacle's projection, or LOWER_SCORE.
 

@@ -5,7 +5,7 @@ No effects of its own: pictures come from the counter it is given.
 
 from __future__ import annotations
 
-import collections
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import paper_rules, released_rules
 from pbrs_farm.sample.camera_report import RoomReport, SectorReport
 from pbrs_farm.sample.candidates import Candidates, Grid, grid_candidates, n_cells
-from pbrs_farm.sample.eye_probes import Counter, counted
+from pbrs_farm.sample.eye_probes import ItemCounter, counted
 from pbrs_farm.sample.rejection import REJECTIONS, Verdict
 from pbrs_farm.sample.sector_choice import (
     COARSE_MARGIN_PX,
@@ -59,7 +59,7 @@ class RoomSampler:
     room: Room
     fields: CameraFields
     seed: int
-    counter: Counter
+    counter: ItemCounter
     geometry: Geometry
 
     def explain_rejection(self) -> str:
@@ -235,7 +235,7 @@ class RoomSampler:
     def _report(
         self, sector: int, verdict: NDArray[np.uint8], full: FullScores, views: list[View]
     ) -> SectorReport:
-        tally = collections.Counter(verdict.tolist())
+        tally = Counter(verdict.tolist())
         ranking = full.ranking
         rejected = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
         return SectorReport(

@@ -13,7 +13,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import CameraFields
-from pbrs_farm.sample.eye_probes import Counter, counted
+from pbrs_farm.sample.eye_probes import ItemCounter, counted
 from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.view_score import object_columns
 
@@ -21,7 +21,7 @@ OUTSIDE = "out"  # room id in the views of cameras that stand in no room
 
 
 def stored_views(
-    house: House, fields: CameraFields, counter: Counter
+    house: House, fields: CameraFields, counter: ItemCounter
 ) -> tuple[tuple[View, ...], tuple[str, ...]]:
     """The cameras kept in the house's source as views, and notes on those that were left out.
 
@@ -50,7 +50,7 @@ def views_from_cameras(
     house: House,
     cameras: Sequence[tuple[Camera, str | None]],
     fields: CameraFields,
-    counter: Counter,
+    counter: ItemCounter,
     *,
     origin: str,
 ) -> tuple[View, ...]:

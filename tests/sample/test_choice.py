@@ -6,14 +6,14 @@ import pytest
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import sample_cameras
-from pbrs_farm.sample.eye_probes import Counter
+from pbrs_farm.sample.eye_probes import ItemCounter
 from pbrs_farm.sample.sector_choice import Coarse, FullScores, best_first
 from tests.builders import builtin_home
 from tests.sample.sampled_rooms import QUICK, IndependentLook, counter_of, furnished
 
 
 def winners(
-    house: House, fields: CameraFields, seed: int, counter: Counter | None = None
+    house: House, fields: CameraFields, seed: int, counter: ItemCounter | None = None
 ) -> dict[str, bytes]:
     views = sample_cameras(house, fields, seed, counter or counter_of(house)).views
     return {v.id: v.camera.world_from_camera.tobytes() for v in views}
