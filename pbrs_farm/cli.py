@@ -135,6 +135,7 @@ def build_parser(module: str | None = None) -> Parser:
         sub.set_defaults(handler=handler)
         return sub
 
+    # A base installation has no verb of the farm, and says how to get them.
     if not _has_farm():
         farm = "submit, status, workers and the other verbs of a farm need celery and redis"
         parser.epilog = f"{farm}: {install_command('workers')}"

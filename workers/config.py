@@ -141,6 +141,7 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
 
 def make_scratch(config: FarmConfig) -> None:
     """The scratch folder, made where there is none. Raises MachineFailed where it cannot be written."""
+    # A file in its place, a folder that is read-only or another user's: all are one line.
     fault = ""
     try:
         config.scratch.mkdir(parents=True, exist_ok=True)

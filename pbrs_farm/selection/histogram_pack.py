@@ -106,6 +106,7 @@ def _classes(record: ViewRecord) -> str:
 
 
 def _black(record: ViewRecord) -> str:
+    # Records of before version 3 of the step hold the scored modes alone.
     black = (m for m, q in record.picture.items() if q.brightness <= BLACK)
     return " ".join(sorted(str(mode) for mode in black))
 

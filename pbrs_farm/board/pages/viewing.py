@@ -45,6 +45,7 @@ def view(request: Request) -> Response:
     found = asked_view(request)
     board = board_of(request)
     facts = board.reader.json_object(keys.view_key(found.house, found.id, "view.json"))
+    # Light is no picture: it is shown by relighting.
     layers = [
         {"name": x.name, "title": title_of(x.name), "label": is_label(x.name), "unit": x.unit}
         for x in LAYERS
@@ -173,6 +174,7 @@ def _picture(
 
 def _instances(facts: dict[str, Any]) -> list[dict[str, Any]]:
     """The rows of a view.json's instances that have what the page shows, the largest first."""
+    # A stranger's view.json may hold anything: rows without id or box are left out.
     rows = facts.get("instances")
     good = [r for r in rows if isinstance(r, dict)] if isinstance(rows, list) else []
     kept = [r for r in good if isinstance(r.get("id"), int) and _is_box(r.get("box2d"))]
@@ -217,6 +219,7 @@ def _number(value: Any) -> float:
 def _camera_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """What is worth reading of a view.json, as name and text."""
     rows = [(name, facts.get(name)) for name in ("room", "sector", "origin", "score")]
+    # What light was made with stands below its mode; views of OpenGL alone have none.
     size = f"{facts.get('width_px')} x {facts.get('height_px')} px"
     light = _object(_object(facts, "modes"), "light")
     lux, noise = _object(light, "floor_lux"), _object(light, "noise")
@@ -248,6 +251,7 @@ def _with_unit(value: Any, unit: str) -> str | None:
 
 def _seconds(reader: RootReader, found: ListedView) -> list[tuple[str, float, str]]:
     """(step, seconds, worker) of the view's steps that are done."""
+    # A step that is not done, or whose marker is damaged, has no row.
     rows = []
     for step in _STEPS:
         marker = reader.json_object(keys.marker_key(found.house, step, found.id))
