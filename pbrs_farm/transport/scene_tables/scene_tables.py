@@ -28,6 +28,8 @@ NORMALS = slice(16, 19), slice(20, 23), slice(24, 27)  # of the corners
 FRONT_PDF, BACK_PDF, TARGET_EMITTER = 19, 23, 27  # filled by guiding; column 15 is free
 NO_LAMP: Final = 0xFFFF  # upper half of a face's tag that does not emit
 
+_FACES_AT_ONCE: Final = 1 << 14  # in the making of rows, against memory
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneTables:
@@ -99,6 +101,15 @@ def _solid_faces(geometry: Geometry) -> Bools:
 
 
 def _face_rows(geometry: Geometry, faces: I32) -> F32:
+    """(F, FACE_FLOATS) what a ray needs to know of each face, by parts that stay in the cache."""
+    rows = np.zeros((len(faces), FACE_FLOATS), np.float32)
+    for start in range(0, len(faces), _FACES_AT_ONCE):
+        part = slice(start, start + _FACES_AT_ONCE)
+        _fill_rows(rows[part], geometry, faces[part])
+    return rows
+
+
+def _fill_rows(rows: F32, geometry: Geometry, faces: I32) -> None:
     corners = triangle_corners(geometry.positions, faces)
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     flat = unit_normals(corners)
@@ -110,7 +121,7 @@ def _face_rows(geometry: Geometry, faces: I32) -> F32:
         normals = np.where((length > 0.5) & (length < 2), normals / length, flat[:, None])
     # Turn all three to the front; replace one that leans to the back by the face's own.
     side = np.sign((normals.sum(1) * flat).sum(1))
-    normals = np.where(((normals.sum(1) * flat).sum(1) < 0)[:, None, None], -normals, normals)
+    normals = np.where((side < 0)[:, None, None], -normals, normals)
     lean = (normals * flat[:, None]).sum(2, keepdims=True)
     normals = np.where((lean > 0.05) & (side != 0)[:, None, None], normals, flat[:, None])
 
@@ -119,12 +130,10 @@ def _face_rows(geometry: Geometry, faces: I32) -> F32:
     uvs -= np.floor(uvs.min(1, keepdims=True))
     duv = uvs[:, 1:] - uvs[:, :1]
 
-    rows = np.zeros((len(faces), FACE_FLOATS), np.float32)
     rows[:, ORIGIN], rows[:, EDGE1], rows[:, EDGE2] = corners[:, 0], e1, e2
     rows[:, UV0], rows[:, DUV1], rows[:, DUV2] = uvs[:, 0], duv[:, 0], duv[:, 1]
     for k, columns in enumerate(NORMALS):
         rows[:, columns] = normals[:, k]
-    return rows
 
 
 def _lamp_triangles(
