@@ -69,6 +69,9 @@ def home_file(
         "version": VERSION, "name": f"{name}.sh3d", "camera": "topCamera",
         "wallHeight": _cm(plan.height),
     })  # fmt: skip
+    # Without a level that is shown, the program's plan would be blank.
+    if stair is not None:
+        home.set("selectedLevel", "level-0")
     contents = _Contents()
     _add_properties(home, placed, origin)
     _add_surroundings(home, plan)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import xml.etree.ElementTree as ET
+import zipfile
 from functools import cache
 
 import numpy as np
@@ -122,3 +125,11 @@ def test_steps_are_equal_and_low_and_end_at_the_upper_floor() -> None:
 def test_two_storeys_without_enough_bedrooms_are_refused_with_the_nearest() -> None:
     with pytest.raises(BadInput, match="2 to 4 bedrooms"):
         Wishes(bedrooms=(0, 1), storeys=2)
+
+
+def test_the_file_says_which_storey_the_program_shows_first() -> None:
+    plans, stair = home(0)
+    rng = np.random.default_rng(0)
+    data = home_file([Storey(plan, ()) for plan in plans], EMPTY, rng, stair)
+    xml = ET.fromstring(zipfile.ZipFile(io.BytesIO(data)).read("Home.xml"))
+    assert xml.get("selectedLevel") == xml.findall("level")[0].get("id")
