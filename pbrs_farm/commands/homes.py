@@ -157,6 +157,8 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
         )  # fmt: skip
     if given:
         raise BadInput("--programme", str(args.programme), f"leaves no choice of {given[0]}")
+    if args.seed < 0:
+        raise BadInput("--seed", str(args.seed), "is below 0", hint="--seed 1")
     first, last = args.seed, args.seed + args.count - 1
     homes = made_homes(",".join((f"made:{first}..{last}", *options)))
     # Say at once what no seed can meet.

@@ -103,7 +103,7 @@ def made_homes(word: str) -> list[MadeHome]:
                 )
             home = replace(home, style=value)
         elif key == "storeys":
-            home = replace(home, storeys=_range(word, value, 2)[1])
+            home = replace(home, storeys=_range(word, value, 99)[1])
         elif key == "furniture" and value == "none":
             home = replace(home, furniture=False)
         else:

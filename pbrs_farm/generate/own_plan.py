@@ -146,7 +146,9 @@ def _room(path: Path, number: int, row: object) -> tuple[RoomType, str, Polygon]
         raise BadInput(path, place, text, hint=f"one of {', '.join(types)}")
     points = _points(row.get("polygon"))
     if points is None or len(set(points)) < 3:
-        raise BadInput(path, place, "has no polygon: a list of three points [x, y] or more")
+        raise BadInput(
+            path, place, "has no polygon: a list of three points [x, y] or more, all finite"
+        )
     if max(abs(c) for p in points for c in p) > 1e5:
         raise BadInput(path, place, "lies far from the origin", hint="metres from a corner")
     shape = Polygon(points)

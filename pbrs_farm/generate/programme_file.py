@@ -30,6 +30,8 @@ def json_from_file(path: Path) -> Any:
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
     except (ValueError, RecursionError) as error:
+        if not path.stat().st_size:
+            raise BadInput(path, "", "is empty") from None
         raise BadInput(path, "", f"is no JSON: {error}") from None
 
 

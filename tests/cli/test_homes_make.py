@@ -60,6 +60,8 @@ def test_a_plan_of_ones_own_becomes_a_home_of_its_name(tmp_path: Path) -> None:
         (["--programme", "none.json"], "none.json"),
         (["--apartment", "7"], "needs --plan FILE.csv"),
         (["--programme", "none.json", "--storeys", "2"], "the rooms of one storey"),
+        (["--seed", "-1"], "is below 0: try --seed 1"),
+        (["--storeys", "5"], "one storey or two: try storeys=2"),
         (["--plan", "none.json", "--rooms", "2"], "leaves no choice of --rooms"),
     ],
 )

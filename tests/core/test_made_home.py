@@ -27,7 +27,7 @@ def test_a_word_says_all_of_its_home() -> None:
         ("made:9..3", "downwards"),
         ("made:1,rooms=5", "above 4"),
         ("made:1,walls=3", "no option"),
-        ("made:1,storeys=3", "above 2"),
+        ("made:1,storeys=3", "one storey or two"),
         ("made:1,storeys=2,rooms=1", "2 to 4 bedrooms"),
         ("made:1..2000000", "at most"),
     ],
