@@ -1,10 +1,10 @@
 """Cost of a sample as a home grows: triangles up to 4 million, lamps up to 500; CPU of all threads.
 
-A room of 6x6x3 m with a table of ever finer waves, seen by one camera, 160x120, 16 samples. Then ten bulbs below its
-ceiling and ever more in a hall next door (`lamps`), and ever more in the room itself (`lamps_of_a_room`), their light
-the same in sum, bulbs and waves together always of TRIANGLES_OF_LAMPS, so that lamps alone grow. The pilot, whose lanes
-are one for each lamp, is a view's own: it is measured apart, and the ratios are of a whole view of recipe `fast`
-(640x480, 64 samples), reckoned from both. Four minutes on two quiet cores.
+A room of 6x6x3 m with a table of ever finer waves, seen by one camera, 160x120, 16 samples. Then ever more bulbs below
+its ceiling (`lamps`), and ten there with ever more in a hall next door (`lamps_of_a_home`), their light the same in
+sum, bulbs and waves together always of TRIANGLES_OF_LAMPS, so that lamps alone grow. The pilot, whose lanes are one for
+each lamp, is a view's own: it is measured apart, and the ratios are of a whole view of recipe `fast` (640x480, 64
+samples), reckoned from both. Four minutes on two quiet cores.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def main() -> None:
     units: dict[str, str] = {}
     for name, values, make in (
         ("triangles", TRIANGLES, lambda n: waves_room(n, 1)),
-        ("lamps", LAMPS, lambda n: waves_room(_without_bulbs(n), n, LAMPS[0])),
-        ("lamps_of_a_room", LAMPS, lambda n: waves_room(_without_bulbs(n), n)),
+        ("lamps", LAMPS, lambda n: waves_room(_without_bulbs(n), n)),
+        ("lamps_of_a_home", LAMPS, lambda n: waves_room(_without_bulbs(n), n, LAMPS[0])),
     ):
         costs = []
         for value in values:
