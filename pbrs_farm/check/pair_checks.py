@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats, Rays
+from pbrs_farm.check.lens_rays import StoredLens
 from pbrs_farm.check.stored_file import BadFile, stored_bytes, stored_object
 
 SHARE = 0.01  # of 768 points: those on edges may fall either way
@@ -26,7 +27,7 @@ COLUMNS = ("room", "view_a", "view_b", "a_in_b", "b_in_a", "common", "baseline_m
 
 
 def check_pairs(house: Path, rays: Rays, tally: Tally) -> None:
-    """Recompute the shares of some pairs of a house that has the file; lenses apart from pin-holes."""
+    """Recompute the shares of some pairs of a house that has the file."""
     file = house / "pairs.parquet"
     if not file.is_file():
         return
@@ -43,8 +44,6 @@ def check_pairs(house: Path, rays: Rays, tally: Tally) -> None:
     chosen = rng.permutation(len(rows))[:MOST_PAIRS]
     for row in (rows[int(k)] for k in sorted(chosen)):
         a, b = views[row["view_a"]], views[row["view_b"]]
-        if "lens" in a["intrinsics"] or "lens" in b["intrinsics"]:
-            continue
         for key, one, other in (("a_in_b", a, b), ("b_in_a", b, a)):
             share = _share(_Camera(one), _Camera(other), rays)
             place = f"{house.name}: {row['view_a']}, {row['view_b']}"
@@ -53,30 +52,37 @@ def check_pairs(house: Path, rays: Rays, tally: Tally) -> None:
 
 
 class _Camera:
-    """A pin-hole of cameras.json with the grid's pixels."""
+    """A camera of cameras.json with the grid's pixels."""
 
     def __init__(self, row: dict[str, Any]) -> None:
         i = row["intrinsics"]
         x, y = GRID[0] / i["width_px"], GRID[1] / i["height_px"]
         self.f = np.array([i["fx"] * x, i["fy"] * y])
         self.c = np.array([i["cx"] * x, i["cy"] * y])
+        self.lens = StoredLens.of(i["lens"]) if "lens" in i else None
         # OpenGL axes to x right, y down, z forward.
         pose = np.array(row["world_from_camera_opengl"], np.float64) @ np.diag([1.0, -1, -1, 1])
         self.rotation, self.eye = pose[:3, :3], pose[:3, 3]
 
     def directions(self) -> Floats:
-        """(N, 3) through the middles of the grid's pixels, of unit depth."""
+        """(N, 3) through the middles of the grid's pixels that see anything, of unit depth."""
         columns, rows = np.meshgrid(np.arange(GRID[0]) + 0.5, np.arange(GRID[1]) + 0.5)
         plane = (np.stack([columns.ravel(), rows.ravel()], axis=1) - self.c) / self.f
-        return np.asarray(np.insert(plane, 2, 1.0, axis=1) @ self.rotation.T)
+        if self.lens is None:
+            return np.asarray(np.insert(plane, 2, 1.0, axis=1) @ self.rotation.T)
+        local = self.lens.rays(plane)
+        return np.asarray(local[np.abs(local).sum(1) > 0] @ self.rotation.T)
 
     def shows(self, points: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """(N,) points (N, 3) that fall into the picture."""
         local = (points - self.eye) @ self.rotation
         with np.errstate(divide="ignore", invalid="ignore"):
-            px = local[:, :2] / local[:, 2:] * self.f + self.c
+            plane, depth = local[:, :2] / local[:, 2:], local[:, 2]
+            if self.lens is not None:
+                plane, depth = self.lens.plane_and_depth(local)
+            px = plane * self.f + self.c
             inside = ((px >= 0) & (px < GRID)).all(axis=1)
-        return np.asarray(inside & (local[:, 2] > 1e-3), bool)
+            return np.asarray(inside & (depth > 1e-3), bool)
 
 
 def _share(one: _Camera, other: _Camera, rays: Rays) -> float:

@@ -126,6 +126,24 @@ def test_verify_recomputes_pairs_and_finds_a_share_that_is_wrong(
     assert verify(root, sample=10).counts["pairs"].failed == len(rows)
 
 
+@pytest.mark.parametrize(
+    "lens",
+    [
+        {"lens.model": "radtan", "lens.k1": "-0.2"},
+        {"lens.preset": "fisheye180", "image.width_px": "64", "image.height_px": "64"},
+        {"lens.model": "equirect", "image.width_px": "64", "image.height_px": "32"},
+    ],
+    ids=lambda fields: fields.get("lens.model", "fisheye"),
+)
+def test_verify_recomputes_pairs_through_any_lens(lens: dict[str, str], tmp_path: Path) -> None:
+    fields = FIELDS | {"cameras.walk_frames": "3", "cameras.stereo_m": "0"} | lens
+    want = wanted(["opengl_dl"], [], pairs=True)
+    run_local(Run(["builtin"], str(tmp_path), recipe_from_name("preview", fields), want))
+    pairs = verify(tmp_path, sample=10).counts["pairs"]
+    # Three pairs have two shares each; the names of the views are one check more.
+    assert (pairs.checked, pairs.failed) == (7, 0)
+
+
 def _flow_moved(view: Path) -> None:
     file = view / "flow_forward.exr"
     planes = layers_from_exr(file.read_bytes())
