@@ -66,7 +66,8 @@ def _sensor_shot(work: Work, cached: HouseAndViews) -> SensorShot | None:
         and 0 < view.time_s - v.time_s <= _LAGS * fields.lag_s
     ]  # fmt: skip
     earlier.sort(key=lambda v: v.time_s or 0.0)
-    wanted = [wanted_exposures(_glance(work, house, v), work.recipe.tone) for v in earlier]
+    tone, denoise = work.recipe.tone, work.recipe.light.denoise
+    wanted = [wanted_exposures(_glance(work, house, v), tone, denoise=denoise) for v in earlier]
     times = [v.time_s - view.time_s for v in earlier if v.time_s is not None]
     return SensorShot(fields, seed, tuple(wanted), tuple(times))
 

@@ -116,9 +116,12 @@ def develop(
     return images
 
 
-def wanted_exposures(aovs: LinearAovs, fields: ToneFields) -> dict[str, float]:
-    """Mode -> the factor that a picture of these would be exposed by."""
-    images = develop(aovs, fields, denoise=False)
+def wanted_exposures(aovs: LinearAovs, fields: ToneFields, *, denoise: bool) -> dict[str, float]:
+    """Mode -> the factor that a picture of these would be exposed by.
+
+    denoise: as the picture is; noise lowers the mean of logarithms, and so brightens.
+    """
+    images = develop(aovs, fields, denoise=denoise)
     return {mode: image.exposure for mode, image in images.items()}
 
 

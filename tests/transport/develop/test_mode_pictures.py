@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.recipe import ToneFields
-from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoised
+from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoised, wanted_exposures
 from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
 
 
@@ -74,3 +74,19 @@ def test_a_panorama_denoises_alike_wherever_it_is_cut() -> None:
         return float(np.abs(cut - whole)[:, [0, 127]].mean())
 
     assert seam(True) < 0.5 * seam(False)
+
+
+def test_noise_does_not_brighten_the_exposure_that_earlier_frames_ask_for() -> None:
+    rng = np.random.default_rng(0)
+    noisy = rng.gamma(0.3, 1 / 0.3, (24, 32, 1)).repeat(3, -1).astype(np.float32)
+    normal = np.zeros((24, 32, 3), np.float32)
+    normal[..., 2] = 1
+    asked = {
+        (name, denoise): wanted_exposures(
+            LinearAovs(light, light * 0, normal * 0 + 0.5, normal), ToneFields(), denoise=denoise
+        )["mlt_ol"]
+        for name, light in (("noisy", noisy), ("clean", noisy * 0 + 1))
+        for denoise in (True, False)
+    }
+    assert abs(asked["noisy", True] / asked["clean", False] - 1) < 0.2
+    assert asked["noisy", False] / asked["clean", False] > 1.3
