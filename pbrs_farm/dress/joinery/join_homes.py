@@ -13,8 +13,8 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.classes import DOOR, OTHERFURNITURE, OTHERSTRUCTURE, REFRIGERATOR
-from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.core.classes import DOOR, MIRROR, OTHERFURNITURE, OTHERSTRUCTURE, REFRIGERATOR
+from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.joinery.coating import coated, coated_item, is_plain, part_of_surface
@@ -49,7 +49,16 @@ def joinery(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> N
     scheme = joinery_scheme(draft, style)
     kinds = {
         kind: float(draft.rng(PART, kind).random()) < share
-        for kind in ("door", "window", "stairs", "railing", "radiator", "appliance", "spotlight")
+        for kind in (
+            "door",
+            "window",
+            "stairs",
+            "railing",
+            "radiator",
+            "appliance",
+            "spotlight",
+            "mirror",
+        )
     }
     for index, item in enumerate(draft.items):
         if item.kind.is_structure or not item.n_faces:
@@ -72,6 +81,8 @@ def _kind(item: Item) -> str:
         return "door"
     if item.kind is ItemKind.STAIRS:
         return "stairs"
+    if item.nyu40 == MIRROR:
+        return "mirror"
     if item.nyu40 == OTHERSTRUCTURE:
         return "railing"
     if item.kind is ItemKind.LAMP:
@@ -96,6 +107,8 @@ def _in_scheme(draft: Draft, item: Item, kind: str, scheme: JoineryScheme) -> It
         return coated_item(draft, item, _coat_of_structure(item, scheme))
     if kind == "radiator":
         return coated_item(draft, item, scheme.radiator)
+    if kind == "mirror":
+        return _framed_mirror(draft, item, scheme)
     if kind == "spotlight":
         return _spotlight(draft, item, scheme)
     return _appliance(draft, item, scheme)
@@ -164,6 +177,14 @@ def _appliance(draft: Draft, item: Item, scheme: JoineryScheme) -> Item:
         [a >= _FRONT_SHARE * sum(areas) and _is_bright(draft, s)
          for a, s in zip(areas, item.surfaces, strict=True)],
     )  # fmt: skip
+
+
+def _framed_mirror(draft: Draft, item: Item, scheme: JoineryScheme) -> Item:
+    # Where no surface is known to be glass, all of it may be.
+    materials = [draft.materials[s.material] for s in item.surfaces]
+    if not any(m.kind is MaterialKind.MIRROR for m in materials):
+        return item
+    return coated_item(draft, item, scheme.trim)
 
 
 def _spotlight(draft: Draft, item: Item, scheme: JoineryScheme) -> Item:

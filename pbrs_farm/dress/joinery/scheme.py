@@ -93,9 +93,9 @@ def joinery_scheme(draft: Draft, style: Style) -> JoineryScheme:
             rng, (0.35, _metal("brushed steel")), (0.2, _metal("black steel")), (0.2, _white(rng)),
             (0.25, Coat("metal", metal=style.metal)),
         ),
-        stone=Coat("stone", _near(rng, _one(rng, _STONES)), 0.6),
-        render=Coat("render", _near(rng, _one(rng, _RENDERS)), 0.85),
-        plaster=Coat("plaster", _near(rng, _one(rng, WHITES)), 0.7),
+        stone=Coat("stone", aged(rng, _one(rng, _STONES)), 0.6),
+        render=Coat("render", aged(rng, _one(rng, _RENDERS)), 0.85),
+        plaster=Coat("plaster", aged(rng, _one(rng, (*WHITES, *_GREYS[:3], *_RENDERS))), 0.7),
     )  # fmt: skip
 
 
@@ -103,7 +103,7 @@ def _trim(rng: np.random.Generator, style: Style) -> Coat:
     wood = (
         style.wood if rng.random() < 0.5 else WOODS[_one(rng, ("oak", "pine", "beech", "walnut"))]
     )
-    grey, painted = _near(rng, _one(rng, _GREYS)), _painted(rng, style)
+    grey, painted = aged(rng, _one(rng, _GREYS)), _painted(rng, style)
     return _one_of(
         rng, (0.5, _white(rng)), (0.12, Coat("paint", grey)), (0.12, Coat("paint", painted)),
         (0.26, Coat("wood", wood=wood)),
@@ -119,19 +119,19 @@ def _leaf(rng: np.random.Generator, style: Style, trim: Coat) -> Coat:
 
 def _front(rng: np.random.Generator, leaf: Coat) -> Coat:
     wood = WOODS[_one(rng, ("oak", "teak", "mahogany", "walnut"))]
-    painted = Coat("paint", _near(rng, _one(rng, _FRONT_DOORS)))
+    painted = Coat("paint", aged(rng, _one(rng, _FRONT_DOORS)))
     return _one_of(rng, (0.5, painted), (0.3, Coat("wood", wood=wood)), (0.2, leaf))
 
 
 def _window(rng: np.random.Generator, style: Style, trim: Coat) -> Coat:
-    dark = Coat("paint", _near(rng, _one(rng, _DARKS)), 0.45)
+    dark = Coat("paint", aged(rng, _one(rng, _DARKS)), 0.45)
     wood = Coat("wood", wood=style.wood)
     return _one_of(rng, (0.45, _white(rng, 0.3)), (0.3, trim), (0.15, dark), (0.1, wood))
 
 
 def _stair(rng: np.random.Generator, style: Style, trim: Coat) -> Coat:
     wood = style.wood if rng.random() < 0.5 else WOODS[_one(rng, _FLOOR_WOODS)]
-    stone = Coat("stone", _near(rng, _one(rng, _STONES)), 0.5)
+    stone = Coat("stone", aged(rng, _one(rng, _STONES)), 0.5)
     return _one_of(rng, (0.72, Coat("wood", wood=wood)), (0.14, trim), (0.14, stone))
 
 
@@ -143,7 +143,7 @@ def _railing(rng: np.random.Generator, style: Style, trim: Coat) -> Coat:
 
 
 def _radiator(rng: np.random.Generator, trim: Coat) -> Coat:
-    dark = Coat("paint", _near(rng, _one(rng, _DARKS)), 0.45)
+    dark = Coat("paint", aged(rng, _one(rng, _DARKS)), 0.45)
     # Few paint them as they paint their doors.
     like_trim = _white(rng, 0.3) if trim.wood else trim
     return _one_of(
@@ -152,8 +152,8 @@ def _radiator(rng: np.random.Generator, trim: Coat) -> Coat:
 
 
 def _appliance(rng: np.random.Generator) -> Coat:
-    dark = Coat("paint", _near(rng, _one(rng, _DARKS)), 0.25)
-    cream = Coat("paint", _near(rng, rgb("e6dcc3")), 0.25)
+    dark = Coat("paint", aged(rng, _one(rng, _DARKS)), 0.25)
+    cream = Coat("paint", aged(rng, rgb("e6dcc3")), 0.25)
     return _one_of(
         rng, (0.5, _white(rng, 0.25)), (0.3, _metal("brushed steel")), (0.12, dark), (0.08, cream)
     )
@@ -164,16 +164,16 @@ def _painted(rng: np.random.Generator, style: Style) -> Rgb:
     own = mix(shade(style.palette[2], 0.9), rgb("a8a49a"), 0.3)
     draw = rng.random()
     if draw < 0.35:
-        return _near(rng, own)
-    return _near(rng, _one(rng, _DARKS if draw > 0.85 else _PAINTS))
+        return aged(rng, own)
+    return aged(rng, _one(rng, _DARKS if draw > 0.85 else _PAINTS))
 
 
 def _white(rng: np.random.Generator, roughness: float = 0.4) -> Coat:
-    return Coat("paint", _near(rng, _one(rng, WHITES)), roughness)
+    return Coat("paint", aged(rng, _one(rng, WHITES)), roughness)
 
 
-def _near(rng: np.random.Generator, colour: Rgb) -> Rgb:
-    # Another maker's tin of that colour, some years old: lighter or darker, and warmer or colder.
+def aged(rng: np.random.Generator, colour: Rgb) -> Rgb:
+    """Another maker's tin of that colour, some years old: lighter or darker, warmer or colder."""
     light, warm = rng.normal(0, 0.018), rng.normal(0, 0.008)
     shifts = (light + warm, light, light - warm)
     r, g, b = (

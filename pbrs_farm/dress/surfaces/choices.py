@@ -11,6 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from pbrs_farm.dress.joinery.scheme import aged
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import WOODS, Rgb, Style, mix, rgb
 from pbrs_farm.dress.textures.families import Pattern
@@ -77,7 +78,7 @@ def home_finish(rng: np.random.Generator, style: Style) -> HomeFinish:
     wood = [f for f in style.floors if f in WOOD_FLOORS] or ["planks"]
     usual = _wood_floor(rng, style, wood[0] if rng.random() < 0.6 else _one(rng, wood))
     second = _dry_floor(rng, style, RoomKind.OTHER)
-    white = _one(rng, _WHITES)
+    white = aged(rng, _one(rng, _WHITES))
     ceiling = Pattern("smooth plaster", _seed(rng), (white,))
     if rng.random() < 0.06 and style.name in ("country", "warm wood", "nordic"):
         ceiling = replace(_wood_floor(rng, style, "planks").pattern, darkness=-0.4)

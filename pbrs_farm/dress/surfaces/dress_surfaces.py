@@ -132,6 +132,7 @@ def _paint_walls(draft: Draft, scheme: JoineryScheme, finishes: list[_RoomFinish
         flat=plain_material(draft, scheme.plaster),
     )
     render = PatternMaterial(plain_material(draft, scheme.render), (1.0, 1.0), scheme.render.paint)
+    is_painted = any(f.walls is not None for f in finishes)
     for index, wall in walls.items():
         looks = {
             (k, r): _room_walls(draft, finishes[run.room], is_accent=(index, k, r) in accents)
@@ -140,7 +141,7 @@ def _paint_walls(draft: Draft, scheme: JoineryScheme, finishes: list[_RoomFinish
             if run.room is not None and finishes[run.room].walls is not None
         }
         # Outdoors the home has one render, but for walls with a picture.
-        if looks and _is_untextured(draft, draft.items[index]):
+        if is_painted and _is_untextured(draft, draft.items[index]):
             looks |= {
                 (k, r): RoomWalls(render, side.low_y)
                 for k, side in enumerate(wall.sides)
