@@ -13,7 +13,7 @@ PREFIX: Final = "made:"
 VERSION: Final = 3
 """Of the generator: part of a made home's id. Raised when it makes another home of a seed."""
 
-VERSION_OF_STOREYS: Final = 2
+VERSION_OF_STOREYS: Final = 3
 """The same of what only homes of two storeys have: raised, it leaves the others what they are."""
 
 MAX_SEED: Final = 2**31 - 1

@@ -29,7 +29,7 @@ _STAIRS: Final = (44, 58)  # across its front and from front to back, steps, wal
 _LANDING: Final = 22  # before it, steps
 _BESIDE: Final = 56  # between stairs and a corner they do not lie in: a room's width, steps
 _WALLS: Final = 1.13  # floor with the walls it needs, by floor alone
-_CORES: Final = 400  # that are tried
+_CORES: Final = 1000  # that are tried
 _TRIES: Final = (2, 6)  # of each storey, a core
 _BEDROOMS: Final = (2, 3, 4)
 _BEDROOM_SHARES: Final = (0.25, 0.5, 0.25)
@@ -37,8 +37,9 @@ _BEDROOM_SHARES: Final = (0.25, 0.5, 0.25)
 
 def drawn_storeys(rng: np.random.Generator, wishes: Wishes) -> tuple[tuple[Plan, Plan], Stair]:
     """The lower and the upper plan of a home, and its stairs. Raises BadInput if none is found."""
+    n_bedrooms = _drawn_bedrooms(rng, wishes)
     for _ in range(_CORES):
-        lower, upper = _programmes(rng, wishes)
+        lower, upper = _programmes(rng, wishes, n_bedrooms)
         core = _drawn_core(rng, lower, upper)
         # The upper storey is asked for only where the lower one has a plan.
         layouts = []
@@ -61,13 +62,17 @@ def drawn_storeys(rng: np.random.Generator, wishes: Wishes) -> tuple[tuple[Plan,
     )
 
 
-def _programmes(rng: np.random.Generator, wishes: Wishes) -> tuple[Programme, Programme]:
-    """What lies below and above: to live and to cook, to sleep and to bathe; equally large."""
+def _drawn_bedrooms(rng: np.random.Generator, wishes: Wishes) -> int:
+    """How many the home has: drawn once, so that homes whose plans are rare are none the rarer."""
     low, high = max(wishes.bedrooms[0], _BEDROOMS[0]), wishes.bedrooms[1]
     shares = np.array(
         [s for n, s in zip(_BEDROOMS, _BEDROOM_SHARES, strict=True) if low <= n <= high]
     )
-    n = int(rng.choice(np.arange(low, high + 1), p=shares / shares.sum()))
+    return int(rng.choice(np.arange(low, high + 1), p=shares / shares.sum()))
+
+
+def _programmes(rng: np.random.Generator, wishes: Wishes, n: int) -> tuple[Programme, Programme]:
+    """What lies below and above: to live and to cook, to sleep (n bedrooms) and to bathe; equally large."""
     below = [RoomType.LIVING, RoomType.KITCHEN, RoomType.WC]
     above = [RoomType.BEDROOM] * n + [RoomType.BATHROOM]
     # Move a bedroom down where there are many; add the small rooms of larger homes.
