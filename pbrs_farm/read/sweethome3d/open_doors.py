@@ -32,6 +32,8 @@ _SIDE_M: Final = 0.5  # from a door's middle, where its rooms have begun
 _OFF_MIDDLE_M: Final = np.array([0.011, 0.017])
 _IN_WALL: Final = 0.15  # of a leaf's plan, that may lie in walls: in its own, beside the hinge
 _IN_THING: Final = 0.01  # of a leaf's plan, that may lie in a piece: they touch
+_SHEET_M2: Final = 1e-4  # a leaf whose plan is smaller is drawn as a sheet,
+_SHEET_M: Final = 0.005  # which counts as so far on either side of it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,6 +125,8 @@ def opening_angle(
         turn = swung(leaf, angle)
         points = frame.world(leaf.points @ turn[:3, :3].T + turn[:3, 3])
         plan = shapely.MultiPoint(points[:, [0, 2]]).convex_hull
+        if plan.area < _SHEET_M2:
+            plan = plan.buffer(_SHEET_M)
         in_wall = plan.intersection(solid).area / plan.area
         if in_wall <= _IN_WALL and all(
             plan.intersection(p).area <= _IN_THING * plan.area for p in plans

@@ -119,6 +119,16 @@ def test_a_door_without_a_hinge_stays_as_drawn_with_a_note() -> None:
     assert [n.kind for n in house.notes] == ["door-without-hinge"]
 
 
+@pytest.mark.parametrize("angle", ["0", "0.4"])
+def test_a_leaf_that_is_a_sheet_swings_open_too(angle: str) -> None:
+    corners = "v -0.4 0 0\nv 0.4 0 0\nv 0.4 2 0\nv -0.4 2 0\nf 1 2 3 4\n"
+    sheet = f"g sweethome3d_opening_on_hinge_1_door\n{corners}"
+    frame = box("frame", (-0.5, 2, -0.1), (0.5, 2.1, 0.1), 5)
+    hinge = box("sweethome3d_hinge_1_1", (-0.42, 1, 0.0), (-0.4, 1.1, 0.02), 13)
+    points = leaf_points(read("open", obj=sheet + frame + hinge, angle=angle))
+    assert np.ptp(points[:, 2]) > 0.6
+
+
 def test_an_archway_has_nothing_to_open() -> None:
     left = box("frame", (-0.5, 0, -0.1), (-0.45, 2.1, 0.1), 1)
     right = box("frame", (0.45, 0, -0.1), (0.5, 2.1, 0.1), 9)
