@@ -19,6 +19,7 @@ from pbrs_farm.core.house import House, Item, ItemKind
 Floats = NDArray[np.float64]
 
 DEEP_M, GAP_M = 0.01, 0.002
+_NO_WALL_M = 0.05  # half a wall, where none is found beside a door
 N_POINTS = 250  # of a thing that are looked for inside another
 FLAT = 0.5  # cosine to a face's normal below which an edge only grazes it
 _STRUCTURE = (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.PERSON)
@@ -251,7 +252,7 @@ def blocked_doors(house: House, things: Sequence[Thing]) -> list[tuple[str, str]
         width, bottom = float(np.ptp(s)), float(quad[:, 1].min())
         floor = min(floors, key=lambda y, b=bottom: abs(y - b))
         for out in (normal, -normal):
-            face = _half_wall(walls, centre, along, out, width)
+            face = half_wall(walls, centre, along, out, width)
             starts = centre + out * (face + 0.03)
             places = [
                 starts + along * x + np.array([0, y - centre[1], 0])
@@ -268,17 +269,17 @@ def blocked_doors(house: House, things: Sequence[Thing]) -> list[tuple[str, str]
     return found
 
 
-def _half_wall(
+def half_wall(
     walls: Sequence[Thing], centre: Floats, along: Floats, out: Floats, width: float
 ) -> float:
     """How far the wall reaches on one side of a door's middle plane, beside the door."""
-    best = 0.05
+    beside = []
     for x in (-width / 2 - 0.08, width / 2 + 0.08):
         place = centre + along * x
         # The wall that the place lies in is left through a face that looks out.
-        reach = [t for wall in walls if 0 < (t := _way_out(wall, place, out)) < 0.6]
-        best = max(best, min(reach, default=0.0))
-    return best
+        beside += [t for wall in walls if 0 < (t := _way_out(wall, place, out)) < 0.6]
+    # At a corner one place lies in the wall across, which reaches farther than the door's own.
+    return min(beside, default=_NO_WALL_M)
 
 
 def _way_out(wall: Thing, place: Floats, way: Floats) -> float:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from benchmarks.dress.contacts import blocked_doors, floating, penetrations, things_of
-from pbrs_farm.core.house import House, Item
+from benchmarks.dress.contacts import blocked_doors, floating, half_wall, penetrations, things_of
+from pbrs_farm.core.house import House, Item, ItemKind
 from tests.builders import builtin_home
 from tests.dress.furniture import bookcase, house, solid
 
@@ -53,3 +56,12 @@ def test_what_stands_before_a_door_is_found() -> None:
     dressed = with_new(home, before, beside)
     found = {thing for _door, thing in blocked_doors(dressed, things_of(dressed, home))}
     assert found == {"dress-clutter-1"}
+
+
+def test_a_door_at_a_corner_counts_from_its_own_wall() -> None:
+    # The door's wall lies on one side of the hole alone; on the other begins the wall across.
+    own = replace(solid("own", [1.0, 0, -0.04], [3.0, 2.5, 0.04]), kind=ItemKind.WALL)
+    across = replace(solid("across", [-0.2, 0, -0.5], [0.0, 2.5, 0.5]), kind=ItemKind.WALL)
+    walls = things_of(house(own, across), house(own, across))
+    centre, along, out = np.array([0.5, 1.0, 0.0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
+    assert half_wall(walls, centre, along, out, 0.9) == pytest.approx(0.04)
