@@ -77,6 +77,8 @@ def cameras_from_file_text(
         raise BadInput(file, "", f"holds {n_cameras} cameras, at most {MAX_CAMERAS} are read")
     if not is_json:
         lines = cameras_from_text(text, file, width_px, height_px)
+        if not lines:
+            raise BadInput(file, "", "holds no camera")
         return [(line.camera, line.room_id) for line in lines]
     try:
         given = _CAMERAS.validate_json(text)
@@ -85,4 +87,6 @@ def cameras_from_file_text(
         first = error.errors()[0]
         place = "camera " + ".".join(str(part) for part in first["loc"])
         raise BadInput(file, place, first["msg"]) from None
+    if not given:
+        raise BadInput(file, "", "holds no camera")
     return [(camera.camera(width_px, height_px), camera.room) for camera in given]

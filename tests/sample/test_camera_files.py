@@ -69,6 +69,8 @@ def test_a_users_file_gives_cameras_by_look_or_by_matrix() -> None:
         '[{"world_from_camera": [[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]',
         '[{"eye": [1, 2, 3], "towards": [0, 0, 1], "fov": 3}]',
         "[",
+        "",
+        "[]",
     ],
 )
 def test_a_users_file_that_gives_no_pose_is_rejected(text: str) -> None:
