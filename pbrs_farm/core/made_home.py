@@ -30,7 +30,7 @@ _AREA_OF_TWO_STOREYS: Final = {2: (76, 150), 3: (84, 190), 4: (96, 230)}
 """The same of both storeys together."""
 
 _HINT: Final = "made:12, made:1..1000 or made:1..100,rooms=2..4,area=60..90"
-_RANGE: Final = re.compile(r"(\d{1,10})(?:\.\.(\d{1,10}))?")
+_RANGE: Final = re.compile(r"(\d{1,40})(?:\.\.(\d{1,40}))?")
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ def test_a_word_says_all_of_its_home() -> None:
         ("made:", "no number"),
         ("made:x", "no number"),
         ("made:9..3", "downwards"),
+        ("made:99999999999", "above 2147483647"),
         ("made:1,rooms=5", "above 4"),
         ("made:1,walls=3", "no option"),
         ("made:1,storeys=3", "one storey or two"),
