@@ -26,7 +26,7 @@ STYLES: Final = ("classic", "mixed", "modern", "nordic", "vintage")
 _AREA_OF_HOMES: Final = ((28, 60), (36, 85), (48, 115), (62, 150), (76, 180))
 """Smallest and largest floor of all rooms, square metres, by the number of bedrooms."""
 
-_AREA_OF_TWO_STOREYS: Final = {2: (76, 150), 3: (84, 190), 4: (96, 230)}
+AREA_OF_TWO_STOREYS: Final = {2: (76, 150), 3: (84, 190), 4: (96, 230)}
 """The same of both storeys together."""
 
 _HINT: Final = "made:12, made:1..1000 or made:1..100,rooms=2..4,area=60..90"
@@ -124,11 +124,11 @@ def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float], storeys: 
         raise BadInput("storeys", str(storeys), "homes have one storey or two", hint="storeys=2")
     least, most = _AREA_OF_HOMES[low][0], _AREA_OF_HOMES[high][1]
     if storeys == 2:
-        if high < min(_AREA_OF_TWO_STOREYS):
+        if high < min(AREA_OF_TWO_STOREYS):
             text = "homes of two storeys have 2 to 4 bedrooms"
             raise BadInput("rooms", f"{low}..{high}", text, hint="rooms=2..4")
-        low = max(low, min(_AREA_OF_TWO_STOREYS))
-        least, most = _AREA_OF_TWO_STOREYS[low][0], _AREA_OF_TWO_STOREYS[high][1]
+        low = max(low, min(AREA_OF_TWO_STOREYS))
+        least, most = AREA_OF_TWO_STOREYS[low][0], AREA_OF_TWO_STOREYS[high][1]
     if area[1] < least or area[0] > most:
         of = f"{low}" if low == high else f"{low} to {high}"
         raise BadInput(

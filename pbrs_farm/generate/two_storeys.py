@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.made_home import AREA_OF_TWO_STOREYS
 from pbrs_farm.generate.drawing import drawn_height, plan_of_layout
 from pbrs_farm.generate.floor_plan import Plan, RoomType
 from pbrs_farm.generate.layout import Core, lit_sides, storey_layout
@@ -68,7 +69,11 @@ def _drawn_bedrooms(rng: np.random.Generator, wishes: Wishes) -> int:
     shares = np.array(
         [s for n, s in zip(_BEDROOMS, _BEDROOM_SHARES, strict=True) if low <= n <= high]
     )
-    return int(rng.choice(np.arange(low, high + 1), p=shares / shares.sum()))
+    # Draw again what has no plan in the wished area; some number always has one.
+    while True:
+        n = int(rng.choice(np.arange(low, high + 1), p=shares / shares.sum()))
+        if AREA_OF_TWO_STOREYS[n][0] <= wishes.area[1]:
+            return n
 
 
 def _programmes(rng: np.random.Generator, wishes: Wishes, n: int) -> tuple[Programme, Programme]:

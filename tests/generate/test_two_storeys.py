@@ -127,6 +127,14 @@ def test_two_storeys_without_enough_bedrooms_are_refused_with_the_nearest() -> N
         Wishes(bedrooms=(0, 1), storeys=2)
 
 
+def test_a_small_area_leaves_fewer_bedrooms_rather_than_no_plan() -> None:
+    # Seeds that would draw four bedrooms, which need 96 m2.
+    for seed in (4, 5, 9):
+        plans, _stair = drawn_storeys(np.random.default_rng(seed), Wishes(area=(84, 92), storeys=2))
+        n = sum(room.type is RoomType.BEDROOM for plan in plans for room in plan.rooms)
+        assert n in (2, 3)
+
+
 def test_the_file_says_which_storey_the_program_shows_first() -> None:
     plans, stair = home(0)
     rng = np.random.default_rng(0)
