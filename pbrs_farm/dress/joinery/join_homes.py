@@ -123,6 +123,9 @@ def _coat_of_structure(item: Item, scheme: JoineryScheme) -> Coat:
 
 def _fitted(draft: Draft, item: Item, scheme: JoineryScheme, leaf: Coat, frame: Coat) -> Item:
     """A door or window by its connected parts: what spans its width is frame, small parts fittings."""
+    # What lights is named by the number of its surface, which parting would change.
+    if any(light.emitting for light in item.lights):
+        return item
     box = item.oriented_box
     wide = float(box.half[0] * 2)
     found: list[Surface] = []

@@ -14,7 +14,7 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.joinery.coating import coated_item, plain_material
+from pbrs_farm.dress.joinery.coating import coated, coated_item, is_plain, plain_material
 from pbrs_farm.dress.joinery.scheme import Coat, JoineryScheme, joinery_scheme
 from pbrs_farm.dress.space.house_space import RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
@@ -141,7 +141,7 @@ def _paint_walls(draft: Draft, scheme: JoineryScheme, finishes: list[_RoomFinish
             if run.room is not None and finishes[run.room].walls is not None
         }
         # Outdoors the home has one render, but for walls with a picture.
-        if is_painted and _is_untextured(draft, draft.items[index]):
+        if is_painted and _is_bare(draft, draft.items[index]):
             looks |= {
                 (k, r): RoomWalls(render, side.low_y)
                 for k, side in enumerate(wall.sides)
@@ -155,8 +155,9 @@ def _paint_walls(draft: Draft, scheme: JoineryScheme, finishes: list[_RoomFinish
             draft.done[f"{PART}: {(finish.walls.low or finish.walls.main).family} walls"] += 1
 
 
-def _is_untextured(draft: Draft, item: Item) -> bool:
-    return all(draft.materials[s.material].texture_id is None for s in item.surfaces)
+def _is_bare(draft: Draft, item: Item) -> bool:
+    """Whether all of a wall may be rendered: neither pictures nor glass."""
+    return all(is_plain(draft.materials[s.material]) for s in item.surfaces)
 
 
 def _room_walls(draft: Draft, finish: _RoomFinish, *, is_accent: bool) -> RoomWalls:
@@ -207,7 +208,9 @@ def _set_boards(
         coat = _board_coat(draft, home, scheme, finish)
         board = skirting_board(draft.source, room, finish.space.area, walls, home.board_m, 0)
         if board is not None:
-            board = coated_item(draft, board, coat)
+            # A new board has no look of its own yet: the coat covers all of it.
+            looks = tuple(coated(draft, s, coat, np.eye(3)) for s in board.surfaces)
+            board = replace(board, surfaces=looks)
             draft.add(replace(board, tags=(*board.tags, f"seed:{draft.seed}")), PART)
             draft.done[f"{PART}: skirting board"] += 1
 

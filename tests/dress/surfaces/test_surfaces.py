@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from pbrs_farm.core.catalogue import EMPTY
-from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.core.mesh import edges_are_paired, face_areas, triangle_corners
 from pbrs_farm.core.primitives import wall_prism
 from pbrs_farm.core.recipe import RepairFields
@@ -152,3 +152,18 @@ def test_repair_takes_added_boards_as_boards() -> None:
     _, report = repair(dressed(2, bare), RepairFields())
     assert report.structure.walls_lost == ()
     assert report.structure.left_as_is == ()
+
+
+def test_added_boards_have_their_coat_where_the_first_material_is_glass() -> None:
+    source = builtin_home()
+    bare = source.with_items(i for i in source.items if "baseboard" not in i.tags)
+    # Put glass first; every surface keeps its material by its number, one higher.
+    items = [
+        replace(i, surfaces=tuple(replace(s, material=s.material + 1) for s in i.surfaces))
+        for i in bare.items
+    ]
+    glass = Material("glass", kind=MaterialKind.GLASS)
+    house = dressed(2, replace(bare, materials=(glass, *bare.materials), items=tuple(items)))
+    boards = [i for i in house.items if i.id.startswith("dress-skirting-")]
+    assert boards
+    assert all(house.materials[s.material].name != "glass" for b in boards for s in b.surfaces)
