@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.memory import descendants
 from pbrs_farm.cli import MODULES, main
 from tests.docs.test_tutorials import REPO, blocks
 from tests.workers.redis_server import free_port
-from tests.workers.small_farm import descendants
 
 
 def lines_of(page: str) -> list[list[str]]:

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+from benchmarks.memory import descendants
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.run.processes.child_process import die_with_parent
 from pbrs_farm.settings import settings_from_environment
@@ -193,12 +194,3 @@ class SmallFarm:
         n_extra = sum(n - 1 for n in starts.values())
         assert n_extra <= n_repeats, [t for t, n in starts.items() if n > 1]
         return n_extra
-
-
-def descendants(pid: int) -> list[int]:
-    """Process ids of all children, theirs included."""
-    try:
-        words = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    except OSError:
-        return []
-    return [p for word in words for p in (int(word), *descendants(int(word)))]

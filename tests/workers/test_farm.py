@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.memory import descendants
 from pbrs_farm.core.errors import BadInput
-from tests.workers.small_farm import SmallFarm, descendants
+from tests.workers.small_farm import SmallFarm
 from workers.config import config_from_environment
 from workers.logs import NoSecrets
 from workers.node.supervisor import command
