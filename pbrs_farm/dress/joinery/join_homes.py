@@ -19,6 +19,7 @@ from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.joinery.coating import coated, coated_item, is_plain, part_of_surface
 from pbrs_farm.dress.joinery.scheme import Coat, JoineryScheme, joinery_scheme
+from pbrs_farm.dress.name_words import RADIATORS, words_of_item
 from pbrs_farm.dress.parts.box_mapping import connected_parts
 from pbrs_farm.dress.style import Style
 
@@ -27,16 +28,8 @@ _SMALL_M: Final = 0.25  # handles and hinges; what is larger belongs to the fram
 _FRAME: Final = 0.97  # of the width: what reaches so far is the frame
 _SLENDER_M: Final = 0.13  # rails, balusters and pipes: their second longest side
 _FRONT_SHARE: Final = 0.3  # of an appliance's faces: a part that has more is its body
-_RADIATORS: Final = ("radiator", "heater", "heizk", "radiateur")
-_APPLIANCES: Final = (
-    "cooker",
-    "dishwasher",
-    "washer",
-    "hood",
-    "oven",
-    "dryer",
-    "fridge",
-    "freezer",
+_APPLIANCES: Final = frozenset(
+    {"cooker", "dishwasher", "washer", "hood", "oven", "dryer", "fridge", "freezer"}
 )
 _TO_STREET: Final = ("front", "garage", "entrance")
 
@@ -74,7 +67,7 @@ def joinery(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> N
 
 def _kind(item: Item) -> str:
     """Which of the scheme's kinds of things it is, "" for none."""
-    said = f"{item.name} {item.source_class}".casefold()
+    words = words_of_item(item)
     if item.kind is ItemKind.WINDOW:
         return "window"
     if item.kind is ItemKind.DOOR or item.nyu40 == DOOR:
@@ -86,11 +79,11 @@ def _kind(item: Item) -> str:
     if item.nyu40 == OTHERSTRUCTURE:
         return "railing"
     if item.kind is ItemKind.LAMP:
-        return "spotlight" if "spot" in said else ""
-    if item.nyu40 == OTHERFURNITURE and any(word in said for word in _RADIATORS):
+        return "spotlight" if any("spot" in word for word in words) else ""
+    if item.nyu40 == OTHERFURNITURE and words & RADIATORS:
         return "radiator"
     is_appliance = item.nyu40 in (OTHERFURNITURE, REFRIGERATOR)
-    return "appliance" if is_appliance and any(word in said for word in _APPLIANCES) else ""
+    return "appliance" if is_appliance and words & _APPLIANCES else ""
 
 
 def _in_scheme(draft: Draft, item: Item, kind: str, scheme: JoineryScheme) -> Item:

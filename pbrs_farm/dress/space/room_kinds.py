@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from functools import lru_cache
@@ -21,6 +19,7 @@ from pbrs_farm.core.classes import (
     TOILET,
 )
 from pbrs_farm.core.house import Item, Room
+from pbrs_farm.dress.name_words import folded, words_of, words_of_item
 
 
 class RoomKind(StrEnum):
@@ -90,17 +89,17 @@ _WITHIN = (
 )
 
 _LARGE_M2 = 9.0
-_COOKED_AT = re.compile("cooker|stove|oven|hob|hood|dishwasher|herd|backofen|fridge|refrigerator")
+_COOKED_AT = frozenset({
+    "cooker", "stove", "stovetop", "oven", "hob", "hood", "dishwasher", "fridge", "refrigerator",
+    "herd", "gasherd", "elektroherd", "backofen",
+})  # fmt: skip
 
 
 def is_cooked_in(items: Iterable[Item]) -> bool:
     """Whether a cooker, a hood, a dishwasher or a fridge stands among them."""
     return any(
         item.nyu40 == REFRIGERATOR
-        or (
-            item.nyu40 in (CABINET, OTHERFURNITURE)
-            and _COOKED_AT.search(f"{item.name} {item.source_class}".casefold()) is not None
-        )
+        or (item.nyu40 in (CABINET, OTHERFURNITURE) and words_of_item(item) & _COOKED_AT)
         for item in items
     )
 
@@ -138,19 +137,11 @@ def named_kind(name: str) -> RoomKind | None:
 
 @lru_cache(1024)
 def _named(said: str) -> RoomKind | None:
-    words = set(re.findall(r"[^\W\d]+", _folded(said)))
-    words |= {w.removesuffix("s") for w in words}
+    words = words_of(said)
     for kind, names in _WORDS:
-        if words & {_folded(n) for n in names.split()}:
+        if words & {folded(n) for n in names.split()}:
             return kind
     for kind, names in _WITHIN:
         if any(n in said for n in names.split()):
             return kind
     return None
-
-
-def _folded(text: str) -> str:
-    # Without accents; what that takes apart besides (Hangul) is composed again.
-    taken_apart = unicodedata.normalize("NFKD", text.casefold().replace("_", " "))
-    plain = "".join(c for c in taken_apart if not unicodedata.combining(c))
-    return unicodedata.normalize("NFC", plain)

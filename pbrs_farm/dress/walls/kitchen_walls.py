@@ -8,6 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, SHELVES, SINK
 from pbrs_farm.dress.generated.assembly import metal, plain
+from pbrs_farm.dress.name_words import words_of_item
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style, mix
@@ -18,7 +19,7 @@ _WORKTOPS: Final = frozenset({CABINET, COUNTER, OTHERFURNITURE, SINK})
 _TOP_M: Final = (0.7, 1.15)  # heights of worktops
 _OVER_M: Final = 1.42  # above the floor: the lower edge of cupboards
 _BEFORE_M: Final = 0.38
-_HOT: Final = ("cooker", "stove", "hob", "oven")  # nothing hangs over them
+_HOT: Final = frozenset({"cooker", "stove", "hob", "oven"})  # nothing hangs over them
 _CHANCE, _RAIL, _OPEN = 0.75, 0.6, 0.3
 _LEAST_M: Final = 0.35
 
@@ -48,9 +49,8 @@ def _runs(hanging: Hanging, space: HouseSpace) -> list[tuple[int, float, float]]
     pieces: dict[int, list[tuple[float, float]]] = {}
     for number in hanging.room.items:
         item, (low, high) = hanging.draft.items[number], space.bounds[number]
-        name = f"{item.name} {item.source_class}".casefold()
         is_top = _TOP_M[0] < high[1] - hanging.floor_y < _TOP_M[1] and item.nyu40 in _WORKTOPS
-        if is_top and not any(word in name for word in _HOT):
+        if is_top and not words_of_item(item) & _HOT:
             for k, s0, s1 in faces_behind(hanging.room, low, high)[:1]:
                 pieces.setdefault(k, []).append((s0, s1))
     runs: list[tuple[int, float, float]] = []

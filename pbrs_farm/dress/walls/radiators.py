@@ -8,6 +8,7 @@ from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.generated.assembly import Made, Part, plain
 from pbrs_farm.dress.generated.turned import slab
+from pbrs_farm.dress.name_words import RADIATORS, words_of_item
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.dress.walls.hung_things import hung
@@ -16,16 +17,13 @@ _HEATED: Final = 0.75  # of homes without any, that are heated so
 _LOW_M, _SPACE_M = 0.12, 0.1  # above the floor; below the sill
 _LEAST_SILL_M: Final = 0.6
 _DEPTH_M: Final = 0.11
+_OTHER_HEAT: Final = frozenset({"fireplace", "stove"})
 _UNHEATED = (RoomKind.STORE, RoomKind.OUTDOOR)
 
 
 def wants_radiators(draft: Draft) -> bool:
     """Whether the home is heated neither by what was drawn nor from its floors."""
-    drawn = any(
-        word in f"{item.name} {item.source_class}".casefold()
-        for item in draft.source.items
-        for word in ("radiator", "heater", "heizk", "radiateur", "fireplace", "stove")
-    )
+    drawn = any(words_of_item(item) & (RADIATORS | _OTHER_HEAT) for item in draft.source.items)
     return not drawn and float(draft.rng("radiators").random()) < _HEATED
 
 

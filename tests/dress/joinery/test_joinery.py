@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.core.recipe import DressFields
 from pbrs_farm.dress.draft import Draft
@@ -15,7 +16,7 @@ from pbrs_farm.dress.joinery import joinery
 from pbrs_farm.dress.joinery.scheme import joinery_scheme
 from pbrs_farm.dress.style import style_for
 from tests.builders import builtin_home
-from tests.dress.furniture import boards, house
+from tests.dress.furniture import boards, house, solid
 
 FRAME = [
     ([0.0, 0.0, 0.0], [0.9, 2.1, 0.05]), ([0.05, 0.0, 0.06], [0.85, 2.0, 0.1]),
@@ -80,6 +81,16 @@ def test_panes_and_pictures_of_a_door_stay(material: Material) -> None:
     source = replace(house(door()), materials=(material,))
     home = joined(source, 1)
     assert materials_of(home) == [material]
+
+
+@pytest.mark.parametrize(
+    ("name", "is_coated"),
+    [("Woven basket", False), ("Home theater", False), ("Oven", True), ("panelHeater", True)],
+)
+def test_a_thing_is_coated_by_whole_words_of_its_name(name: str, is_coated: bool) -> None:
+    thing = replace(solid("thing", [0.0, 0.0, 0.0], [0.6, 0.8, 0.6], OTHERFURNITURE), name=name)
+    home = joined(house(thing), 1)
+    assert ("changed:joinery" in home.items[0].tags) is is_coated
 
 
 def test_the_gates_take_a_parted_door_for_what_was_drawn() -> None:
