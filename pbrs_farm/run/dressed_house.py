@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
 
 
-VERSION: Final = 11
+VERSION: Final = 12
 """Of the stage: part of a dressed house's digest. Raised when it makes another house."""
 
 

@@ -31,7 +31,9 @@ def coated(draft: Draft, surface: Surface, coat: Coat, axes: F64) -> Surface:
 
 
 def coated_item(draft: Draft, item: Item, coat: Coat) -> Item:
-    """The item with every plain opaque surface under the coat."""
+    """The item with every plain opaque surface under the coat; itself where it has none."""
+    if not has_plain(draft, item):
+        return item
     axes = np.eye(3) if item.box is None else item.box.axes
     return replace(
         item,
@@ -40,6 +42,11 @@ def coated_item(draft: Draft, item: Item, coat: Coat) -> Item:
             for s in item.surfaces
         ),
     )
+
+
+def has_plain(draft: Draft, item: Item) -> bool:
+    """Whether a coat would cover any of its surfaces."""
+    return any(is_plain(draft.materials[s.material]) for s in item.surfaces)
 
 
 def is_plain(material: Material) -> bool:

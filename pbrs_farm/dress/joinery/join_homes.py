@@ -17,7 +17,13 @@ from pbrs_farm.core.classes import DOOR, MIRROR, OTHERFURNITURE, OTHERSTRUCTURE,
 from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.joinery.coating import coated, coated_item, is_plain, part_of_surface
+from pbrs_farm.dress.joinery.coating import (
+    coated,
+    coated_item,
+    has_plain,
+    is_plain,
+    part_of_surface,
+)
 from pbrs_farm.dress.joinery.scheme import Coat, JoineryScheme, joinery_scheme
 from pbrs_farm.dress.name_words import RADIATORS, words_of_item
 from pbrs_farm.dress.parts.box_mapping import connected_parts
@@ -117,7 +123,7 @@ def _coat_of_structure(item: Item, scheme: JoineryScheme) -> Coat:
 def _fitted(draft: Draft, item: Item, scheme: JoineryScheme, leaf: Coat, frame: Coat) -> Item:
     """A door or window by its connected parts: what spans its width is frame, small parts fittings."""
     # What lights is named by the number of its surface, which parting would change.
-    if any(light.emitting for light in item.lights):
+    if any(light.emitting for light in item.lights) or not has_plain(draft, item):
         return item
     box = item.oriented_box
     wide = float(box.half[0] * 2)

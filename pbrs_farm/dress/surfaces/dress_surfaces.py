@@ -228,7 +228,9 @@ def _paint_boards(
             continue
         finish = next(finishes[k] for k in rooms if finishes[k].walls is not None)
         coat = _board_coat(draft, home, scheme, finish)
-        draft.change(index, coated_item(draft, item, coat), PART)
+        made = coated_item(draft, item, coat)
+        if made is not item:
+            draft.change(index, made, PART)
 
 
 def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:

@@ -81,6 +81,7 @@ def test_panes_and_pictures_of_a_door_stay(material: Material) -> None:
     source = replace(house(door()), materials=(material,))
     home = joined(source, 1)
     assert materials_of(home) == [material]
+    assert home.items[0].tags == source.items[0].tags
 
 
 @pytest.mark.parametrize(
@@ -91,6 +92,13 @@ def test_a_thing_is_coated_by_whole_words_of_its_name(name: str, is_coated: bool
     thing = replace(solid("thing", [0.0, 0.0, 0.0], [0.6, 0.8, 0.6], OTHERFURNITURE), name=name)
     home = joined(house(thing), 1)
     assert ("changed:joinery" in home.items[0].tags) is is_coated
+
+
+@pytest.mark.parametrize("name", ["Radiator", "Oven"])
+def test_a_thing_that_no_coat_covers_counts_as_unchanged(name: str) -> None:
+    thing = replace(solid("thing", [0.0, 0.0, 0.0], [0.6, 0.8, 0.6], OTHERFURNITURE), name=name)
+    source = replace(house(thing), materials=(Material("print", texture_id="0123456789abcdef"),))
+    assert joined(source, 1).items[0].tags == thing.tags
 
 
 def test_the_gates_take_a_parted_door_for_what_was_drawn() -> None:
