@@ -11,7 +11,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.core.recipe import DressFields
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.dressing import dress
-from pbrs_farm.dress.gates.bodies import has_same_mesh
+from pbrs_farm.dress.gates.bodies import bodies_of, has_same_mesh
 from pbrs_farm.dress.joinery import joinery
 from pbrs_farm.dress.joinery.scheme import joinery_scheme
 from pbrs_farm.dress.style import style_for
@@ -104,6 +104,13 @@ def test_a_thing_that_no_coat_covers_counts_as_unchanged(name: str) -> None:
 def test_the_gates_take_a_parted_door_for_what_was_drawn() -> None:
     moved = replace(door(), surfaces=tuple(replace(s, positions=s.positions + 0.01) for s in door().surfaces))  # fmt: skip
     assert not has_same_mesh(door(), moved)
+    parted = joined(house(door()), 1).items[0]
+    assert len(parted.surfaces) > 1
+    assert has_same_mesh(parted, door())
+    # Nothing that the home had is measured as if dressing had put it there.
+    draft = Draft(house(door(), replace(door(), id="moved")), 1)
+    draft.items = [parted, replace(moved, id="moved")]
+    assert [body.is_new for body in bodies_of(draft, {})] == [False, True]
 
 
 def test_a_share_of_nothing_changes_no_door() -> None:
