@@ -70,10 +70,15 @@ def part_of_surface(surface: Surface, faces: Bools) -> Surface:
 
 def plain_material(draft: Draft, coat: Coat) -> int:
     """The number of the material of a coat without a picture; wood counts as its mean colour."""
+    return draft.material(coat_material(coat))
+
+
+def coat_material(coat: Coat) -> Material:
+    """The material of a coat without a picture; wood counts as its mean colour."""
     if coat.metal is not None:
-        return draft.material(_polished(coat.metal))
+        return _polished(coat.metal)
     paint = coat.paint if coat.wood is None else coat.wood.mean
-    return draft.material(_painted(coat.name, paint, coat.roughness))
+    return _painted(coat.name, paint, coat.roughness)
 
 
 def _painted(name: str, colour: Rgb, roughness: float) -> Material:

@@ -34,7 +34,7 @@ def walls(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
         # What has one right place comes first.
         hang_mirrors(hanging, space, style, share)
         if is_heated:
-            hang_radiators(hanging, share)
+            hang_radiators(hanging, style, share)
         fit_switches(hanging, catalogue, style, share)
         hang_kitchen(hanging, space, style, share)
         hang_coats(hanging, style, share)

@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import Final
 
 from pbrs_farm.core.classes import OTHERFURNITURE
+from pbrs_farm.core.house import Material
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.generated.assembly import Made, Part, plain
 from pbrs_farm.dress.generated.turned import slab
+from pbrs_farm.dress.joinery.coating import coat_material
+from pbrs_farm.dress.joinery.scheme import joinery_scheme
 from pbrs_farm.dress.name_words import RADIATORS, words_of_item
 from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.dress.walls.hung_things import hung
 
@@ -27,11 +31,12 @@ def wants_radiators(draft: Draft) -> bool:
     return not drawn and float(draft.rng("radiators").random()) < _HEATED
 
 
-def hang_radiators(hanging: Hanging, share: float) -> None:
-    """A radiator below each window of the room whose wall is free there."""
+def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
+    """A radiator below each window of the room whose wall is free there, in the home's scheme."""
     room, rng = hanging.room, hanging.draft.rng("radiators", hanging.room.room.id)
     if room.kind in _UNHEATED or rng.random() >= share:
         return
+    paint = coat_material(joinery_scheme(hanging.draft, style).radiator)
     for window in room.windows:
         side = window.side_of(room.room.id)
         sill = window.bottom_y - hanging.floor_y
@@ -42,11 +47,15 @@ def hang_radiators(hanging: Hanging, share: float) -> None:
         for k, face in enumerate(hanging.faces):
             if face.normal @ window.inward(side) < 0.99 or abs(face.out_of(at[None])[0]) > 0.03:
                 continue
-            if _hang_below(hanging, k, float(face.s_of(at[None])[0]), window.width, height):
+            s, width = float(face.s_of(at[None])[0]), window.width
+            if _hang_below(hanging, k, s, (width, height), paint):
                 break
 
 
-def _hang_below(hanging: Hanging, face: int, s: float, width: float, height: float) -> bool:
+def _hang_below(
+    hanging: Hanging, face: int, s: float, size: tuple[float, float], paint: Material
+) -> bool:
+    width, height = size
     low = hanging.floor_y + _LOW_M
     for factor in (0.85, 0.6, 0.45):
         wide = round(min(width * factor, 1.6) / 0.1) * 0.1
@@ -57,26 +66,25 @@ def _hang_below(hanging: Hanging, face: int, s: float, width: float, height: flo
             hanging.faces[face].free_m(s - half, s + half, hanging.floor_y + 0.05, low + height)
             > 0.3
         ):
-            hanging.hang(*radiator(wide, height), face, s, low, margin_m=0.02)
+            hanging.hang(*radiator(wide, height, paint), face, s, low, margin_m=0.02)
             return True
     return False
 
 
-def radiator(width: float, height: float) -> Made:
-    """A white panel with ribs, a grille on top and a valve; hung by two brackets."""
-    white = plain("radiator", (0.92, 0.915, 0.9), 0.3)
+def radiator(width: float, height: float, paint: Material) -> Made:
+    """A painted panel with ribs, a grille on top and a white valve; hung by two brackets."""
     front, back = _DEPTH_M, 0.035
     half = width / 2
-    parts: list[Part] = [(slab((-half, 0.0, back), (half, height, front - 0.008)), white)]
+    parts: list[Part] = [(slab((-half, 0.0, back), (half, height, front - 0.008)), paint)]
     # Press ribs into the front, 4 cm apart.
     n = max(4, round(width / 0.04))
     step = width / n
     for k in range(n):
         x = -half + (k + 0.5) * step
         rib = slab((x - 0.3 * step, 0.02, front - 0.008), (x + 0.3 * step, height - 0.03, front))
-        parts.append((rib, white))
+        parts.append((rib, paint))
     for x in (-half + 0.1, half - 0.1):
-        parts.append((slab((x - 0.015, 0.1, 0.0), (x + 0.015, height - 0.1, back)), white))
+        parts.append((slab((x - 0.015, 0.1, 0.0), (x + 0.015, height - 0.1, back)), paint))
     dark = plain("radiator grille", (0.55, 0.55, 0.54), 0.6)
     for k in range(max(3, round(width / 0.06))):
         x = -half + 0.03 + k * 0.06

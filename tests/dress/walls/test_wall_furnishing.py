@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import EMPTY
-from pbrs_farm.core.house import Item
+from pbrs_farm.core.house import Item, ItemKind, Material
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.generated.assembly import Made
+from pbrs_farm.dress.joinery.coating import coat_material
+from pbrs_farm.dress.joinery.scheme import joinery_scheme
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.walls import walls
 from pbrs_farm.dress.walls.coat_racks import coat_rack
+from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.dress.walls.pin_boards import pin_board
-from pbrs_farm.dress.walls.radiators import radiator, wants_radiators
+from pbrs_farm.dress.walls.radiators import hang_radiators, radiator, wants_radiators
 from tests.builders import builtin_home
 
 
@@ -32,6 +35,17 @@ def _drafts(n: int = 8) -> list[Draft]:
     return drafts
 
 
+def _bare_drafts(n: int) -> list[Draft]:
+    """Drafts of a home without furniture, radiators hung below its windows."""
+    home = builtin_home()
+    bare = home.with_items(i for i in home.items if i.kind is not ItemKind.OBJECT)
+    drafts = [Draft(bare, seed) for seed in range(1, n)]
+    for draft in drafts:
+        for room in house_space(draft).rooms if wants_radiators(draft) else ():
+            hang_radiators(Hanging(draft, room, "walls"), _style(), 1.0)
+    return drafts
+
+
 def _named(draft: Draft, name: str) -> list[Item]:
     return [i for i in draft.items if i.name == name]
 
@@ -39,7 +53,7 @@ def _named(draft: Draft, name: str) -> list[Item]:
 @pytest.mark.parametrize(
     "made",
     [
-        radiator(1.0, 0.5),
+        radiator(1.0, 0.5, Material("paint")),
         coat_rack(np.random.default_rng(1), _style(), 3, is_bath=False),
         pin_board(np.random.default_rng(1), _style(), 0.8, 0.5),
     ],
@@ -53,18 +67,28 @@ def test_what_hangs_begins_at_its_wall_and_faces_outwards(made: Made) -> None:
 
 
 def test_radiators_hang_below_windows_in_most_homes_and_not_in_all() -> None:
-    drafts = _drafts()
+    drafts = _bare_drafts(9)
     wanted = [wants_radiators(draft) for draft in drafts]
     assert len(set(wanted)) == 2
     for draft, wants in zip(drafts, wanted, strict=True):
         found = _named(draft, "Panel radiator")
-        assert bool(found) <= wants
+        assert bool(found) == wants
         for item in found:
             windows = [w for r in house_space(draft).rooms for w in r.windows]
             middle = item.bounds.mean(0)
             nearest = min(windows, key=lambda w, m=middle: float(np.linalg.norm((w.centre - m)[[0, 2]])))  # fmt: skip
             assert item.bounds[1, 1] < nearest.bottom_y
             assert abs(float((middle - nearest.centre) @ nearest.along)) < 0.05
+
+
+def test_added_radiators_have_the_coat_of_the_home() -> None:
+    coats = set()
+    for draft in _bare_drafts(24):
+        coat = coat_material(joinery_scheme(draft, _style()).radiator)
+        for item in _named(draft, "Panel radiator"):
+            assert coat in [draft.materials[s.material] for s in item.surfaces]
+            coats.add(coat)
+    assert len(coats) > 2
 
 
 def test_a_home_that_has_a_radiator_gets_none() -> None:
