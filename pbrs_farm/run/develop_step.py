@@ -39,12 +39,16 @@ def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
     denoise = work.recipe.light.denoise
     shot = _sensor_shot(work, cached)
-    wraps = work.recipe.lens.model == "equirect"
-    images = develop(aovs, work.recipe.tone, denoise=denoise, shot=shot, wraps=wraps)
+    images = develop(aovs, work.recipe.tone, denoise=denoise, shot=shot, wraps=_wraps(work))
     # Write a PNG a mode; its exposure and white balance become facts.
     credit = attribution(work.store, work.house_id)
     files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}
     return StepOutput(files, {"denoised": denoise} | {m: i.facts() for m, i in images.items()})
+
+
+def _wraps(work: Work) -> bool:
+    # Whether the left edge of its pictures adjoins the right one.
+    return work.recipe.lens.model == "equirect"
 
 
 def _sensor_shot(work: Work, cached: HouseAndViews) -> SensorShot | None:
@@ -67,7 +71,10 @@ def _sensor_shot(work: Work, cached: HouseAndViews) -> SensorShot | None:
     ]  # fmt: skip
     earlier.sort(key=lambda v: v.time_s or 0.0)
     tone, denoise = work.recipe.tone, work.recipe.light.denoise
-    wanted = [wanted_exposures(_glance(work, house, v), tone, denoise=denoise) for v in earlier]
+    wanted = [
+        wanted_exposures(_glance(work, house, v), tone, denoise=denoise, wraps=_wraps(work))
+        for v in earlier
+    ]
     times = [v.time_s - view.time_s for v in earlier if v.time_s is not None]
     return SensorShot(fields, seed, tuple(wanted), tuple(times))
 

@@ -116,12 +116,14 @@ def develop(
     return images
 
 
-def wanted_exposures(aovs: LinearAovs, fields: ToneFields, *, denoise: bool) -> dict[str, float]:
+def wanted_exposures(
+    aovs: LinearAovs, fields: ToneFields, *, denoise: bool, wraps: bool = False
+) -> dict[str, float]:
     """Mode -> the factor that a picture of these would be exposed by.
 
-    denoise: as the picture is; noise lowers the mean of logarithms, and so brightens.
+    denoise, wraps: as of the picture; noise lowers the mean of logarithms, and so brightens.
     """
-    images = develop(aovs, fields, denoise=denoise)
+    images = develop(aovs, fields, denoise=denoise, wraps=wraps)
     return {mode: image.exposure for mode, image in images.items()}
 
 
