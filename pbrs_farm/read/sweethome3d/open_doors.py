@@ -23,6 +23,7 @@ from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
 from pbrs_farm.read.sweethome3d.moving_parts import HINGE, Transformations, joint_of
 from pbrs_farm.read.sweethome3d.piece_items import piece_item
+from pbrs_farm.read.sweethome3d.piece_materials import piece_material
 from pbrs_farm.read.sweethome3d.piece_models import PieceModels
 from pbrs_farm.read.sweethome3d.placement import PieceFrame, local_from_model
 
@@ -201,10 +202,22 @@ def opened_doors(
             text = "something stands where its leaf would: left out"
             materials.notes.add("door-leaf-left-out", piece.place, text)
         moves = models.add_opened(piece.model, model_moves(turns, matrix), out)
-        ids = item.id, item.level_id
-        again = piece_item(
-            replace(piece, transformations=moves), door.level, models, materials, ids, rooms
-        )
-        if again is not None:
-            items[k] = around_everything(again[0], door.frame)
+        opened = replace(door, piece=replace(piece, transformations=moves))
+        items[k] = _opened(opened, models, materials, rooms)
     return items
+
+
+def _opened(
+    door: PlacedPiece, models: PieceModels, materials: HomeMaterials, rooms: list[ReadRoom]
+) -> Item:
+    """The item of a door whose leaves are moved or left out; without surfaces where nothing is left."""
+    piece, item = door.piece, door.item
+    # The home may hide all but the leaf: then the doorway is an empty hole.
+    model = models.get(piece.model, piece.place, piece.transformations)
+    meshes = model.meshes if model is not None else ()
+    if model is None or not any(piece_material(piece, m, model, materials) for m in meshes):
+        return replace(item, surfaces=())
+    ids = item.id, item.level_id
+    again = piece_item(piece, door.level, models, materials, ids, rooms)
+    assert again is not None, piece.place
+    return around_everything(again[0], door.frame)

@@ -39,12 +39,14 @@ UNHINGED = LEAF.replace("sweethome3d_opening_on_hinge_1_door", "leaf") + FRAME
 
 
 def read(
-    doors: str, rooms: str = NORTH + SOUTH, obj: str = HINGED, more: str = "", **given: str
-) -> House:
+    doors: str, rooms: str = NORTH + SOUTH, obj: str = HINGED, more: str = "", inner: str = "",
+    **given: str,
+) -> House:  # fmt: skip
     attributes = " ".join(f"{k}='{v}'" for k, v in given.items())
     door = piece(
         f"{attributes} catalogId='eTeks#door' x='200' y='0' width='100' depth='20' height='210'"
         " wallCutOutOnBothSides='true'",
+        inner,
         tag="doorOrWindow",
     )
     home = home_xml(WALL + door + more, room=rooms)
@@ -111,6 +113,19 @@ def test_a_leaf_that_furniture_blocks_is_left_out_with_a_note() -> None:
     house = read("open", more=chest)
     assert len(leaf_points(house)) == 0
     assert house.notes[-1].kind == "door-leaf-left-out"
+
+
+def test_a_blocked_leaf_of_which_alone_a_door_is_shown_leaves_an_empty_doorway() -> None:
+    chest = piece("x='200' y='40' width='150' depth='40' height='100'")
+    parts = HINGED.replace("g sweethome3d_opening", "usemtl white\ng sweethome3d_opening")
+    parts = parts.replace("g frame", "usemtl redwood\ng frame")
+    hidden = "<material name='redwood' color='00FFFFFF'/>"
+    assert len(leaf_points(read("drawn", obj=parts, inner=hidden))) > 0
+    house = read("open", obj=parts, inner=hidden, more=chest)
+    assert door_of(house).surfaces == ()
+    assert [n.kind for n in house.notes] == ["unmapped-class", "door-leaf-left-out"]
+    # Repair cuts the doorway all the same.
+    assert [o.item_id for o in house.openings] == ["piece_0"]
 
 
 def test_a_door_without_a_hinge_stays_as_drawn_with_a_note() -> None:
