@@ -104,7 +104,7 @@ def bootstrap_chains(
         light=dr.gather(mi.Color3f, paths.light, at),
         target=dr.gather(mi.Float, paths.target, at),
         pixel=dr.gather(mi.UInt32, paths.pixel, at),
-        is_reconnectable=dr.gather(mi.Bool, paths.is_reconnectable, at),
+        shared=dr.gather(mi.Float, paths.shared, at),
         suffixes=dr.gather(mi.Float, paths.suffixes, source),
     )
     dr.eval(*chains)

@@ -37,7 +37,7 @@ class Chains(NamedTuple):
     light: Any  # Color3f
     target: Any  # target function of the light
     pixel: Any  # UInt32
-    is_reconnectable: Any  # Bool: the path's suffix can be seen from other pixels
+    shared: Any  # share of the light that is shown to other pixels, 0 = all its own pixel's
     suffixes: Any  # (SUFFIX_FLOATS * N,), column by column (reconnection.py)
 
 

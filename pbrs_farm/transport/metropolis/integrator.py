@@ -14,13 +14,14 @@ The importance is about 1 / the light expected at a pixel, from paths of its own
 stages, 1997): dark corners get their share.
 
 Instead of 3., a path whose first two vertices are rough and see each other is shown, every few
-steps, to a thousand other pixels that see its second vertex too (reconnection.py).
+steps, to a thousand other pixels that see its second vertex too (reconnection.py); what two close
+vertices send each other stays mostly with 3.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import drjit as dr
 import mitsuba as mi
@@ -43,7 +44,12 @@ from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.metropolis.bootstrap import bootstrap_chains, flat_film, with_importance
 from pbrs_farm.transport.metropolis.film import ChainContext, Chains
 from pbrs_farm.transport.metropolis.markov_chains import ChainSums, Mutations, mutate
-from pbrs_farm.transport.metropolis.reconnection import reconnect, stratified_groups, trace_prefixes
+from pbrs_farm.transport.metropolis.reconnection import (
+    Prefixes,
+    reconnect,
+    stratified_groups,
+    trace_prefixes,
+)
 from pbrs_farm.transport.render_checkpoint import Arrays
 from pbrs_farm.transport.sample_passes import SampledView
 
@@ -51,7 +57,7 @@ STEPS_PER_LAUNCH: Final = 16
 MIN_STEPS: Final = 64  # of a chain
 _MIN_RR_DEPTH: Final = 3
 _MIN_RECONNECT_SEGMENTS: Final = 3
-_STEPS_PER_PREFIX: Final = 4 * STEPS_PER_LAUNCH
+_MUTATIONS_PER_PREFIX: Final = 4  # of a pixel; a prefix costs a tenth of one
 _MIN_BOOTSTRAP, _MAX_BOOTSTRAP = 1 << 14, 1 << 18  # paths
 
 
@@ -102,7 +108,7 @@ class ChainRun:
         self._seed = view.seed
         self._n_shared = fields.tail_pixels if min_segments >= _MIN_RECONNECT_SEGMENTS else 0
         self._p_large = dr.opaque(mi.Float, fields.large_step)
-        self._prefixes: Any = None
+        self._prefixes: Prefixes | None = None
         self.n_chains = int(dr.width(self._chains.target))
         self.n_wanted = -(-_wanted(view) // self.n_chains)  # steps of each chain
 
@@ -113,7 +119,7 @@ class ChainRun:
 
     def advance(self, n_steps: int) -> None:
         """Make n_steps more of every chain, in one launch, and share their suffixes."""
-        first, seed, n_pixels = self.n_steps, self._seed, self._shape[0] * self._shape[1]
+        first, seed = self.n_steps, self._seed
         steps = dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, first + n_steps)
         mutation_seed = dr.opaque(
             mi.UInt32, (seed ^ 0x3C6EF372) & 0xFFFFFFFF
@@ -124,14 +130,22 @@ class ChainRun:
         film = self._context.film
         dr.eval(*self._chains, sums, film.splats)
         if self._n_shared > 0:
-            # Trace the prefixes anew now and then; those of a resumed run are traced again.
-            block = first - first % _STEPS_PER_PREFIX
-            if self._prefixes is None or first == block:
-                self._prefixes = trace_prefixes(self._context, n_pixels, seed + block)
+            prefixes = self._prefixes_of(first // STEPS_PER_LAUNCH)
             groups = stratified_groups(*self._shape, self._n_shared, seed + first)
             scene, weight = self._context.paths.scene, dr.opaque(mi.Float, n_steps)
-            reconnect(scene, film, self._prefixes, groups, self._chains, weight)
+            reconnect(scene, film, prefixes, groups, self._chains, weight)
         self._totals.add(sums, n_steps)
+
+    def _prefixes_of(self, launch: int) -> Prefixes:
+        """The prefixes of a launch, traced anew where they are due and for a resumed run."""
+        n_pixels = self._shape[0] * self._shape[1]
+        due = self.n_chains * STEPS_PER_LAUNCH / (n_pixels * _MUTATIONS_PER_PREFIX)
+        n_sets, every = max(round(due), 1), max(round(1 / due), 1)
+        if self._prefixes is None or launch % every == 0:
+            first = launch // every * n_sets
+            sets = range(first, first + n_sets)
+            self._prefixes = trace_prefixes(self._context, n_pixels, sets, self._seed)
+        return self._prefixes
 
     def estimate(self) -> Estimate:
         """The light so far, scaled to the mean of the target function."""
@@ -200,13 +214,13 @@ def _restored(context: ChainContext, kept: Arrays) -> tuple[ChainContext, _Start
         importance=device_array(mi.Float, kept["importance"]),
     )
     floats = {
-        name: device_array(mi.Float, kept[name]) for name in ("samples", "target", "suffixes")
+        name: device_array(mi.Float, kept[name])
+        for name in ("samples", "target", "shared", "suffixes")
     }
     chains = Chains(
         **floats,
         light=mi.Color3f(*(device_array(mi.Float, row) for row in kept["light"])),
         pixel=device_array(mi.UInt32, kept["pixel"]),
-        is_reconnectable=device_array(mi.UInt32, kept["is_reconnectable"].astype(np.uint32)) > 0,
     )
     dr.eval(*chains)
     target, n_paths, n_accepted, n_bad, n_steps = (float(v) for v in kept["sums"])

@@ -39,7 +39,6 @@ from pbrs_farm.transport.metropolis.film import (
     target_function,
 )
 from pbrs_farm.transport.metropolis.reconnection import (
-    MIN_DISTANCE_M,
     SUFFIX_FLOATS,
     finish_suffix,
     pass_probability,
@@ -88,7 +87,7 @@ class SplitPath:
     suffix_light: mi.Color3f  # from beyond, the prefix's throughput not counted
     is_straight: mi.Bool  # the first vertex is rough; since, only glass and cut-outs were passed
     passed: mi.Float  # probability of having passed those
-    is_reconnectable: mi.Bool
+    shared: mi.Float  # share of the light that its suffix shows to other pixels
 
 
 @dataclass
@@ -98,7 +97,7 @@ class _State:
     light: Any
     target: Any
     pixel: Any
-    is_reconnectable: Any
+    shared: Any
     weight: Any  # expected number of steps spent here, to splat
 
 
@@ -137,8 +136,7 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
     x_samples = _load(chains.samples, STORED_DIMS, n_chains)
     x_suffix = _load(chains.suffixes, SUFFIX_FLOATS, n_chains)
     y_suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
-    is_reconnectable = mi.Bool(chains.is_reconnectable)
-    x = _State(chains.light, chains.target, chains.pixel, is_reconnectable, mi.Float(0))
+    x = _State(chains.light, chains.target, chains.pixel, mi.Float(chains.shared), mi.Float(0))
     corner = mi.Point2f(mi.Float(0) * mi.Float(lane), 0)
     y = _camera_split_path(context.camera, corner, mi.Point2f(0))
     sums = ChainSums(mi.Float(0), mi.Float(0), mi.Float(0), mi.UInt32(0))
@@ -165,7 +163,7 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
         sums.add(proposed.target, done & is_large, accept, done & ~good)
 
         # 3. Splat the path that is left behind; move on, or stay.
-        keeps_suffix = accept & proposed.is_reconnectable
+        keeps_suffix = accept & (proposed.shared > 0)
         finish_suffix(y_suffix, proposed.light, y.suffix_light, keeps_suffix)
         x = _move(film, lane, x, proposed, a, accept, done)
         x_samples = _accept_samples(x_samples, proposal, accept)
@@ -175,10 +173,10 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
         fresh = mi.Bool(done)
         active = step < how.last
 
-    _splat_state(film, lane, x, ~x.is_reconnectable)
+    _splat_state(film, lane, x, True)
     samples = _store(x_samples, STORED_DIMS, n_chains)
     suffixes = _store(x_suffix, SUFFIX_FLOATS, n_chains)
-    return Chains(samples, x.light, x.target, x.pixel, x.is_reconnectable, suffixes), sums
+    return Chains(samples, x.light, x.target, x.pixel, x.shared, suffixes), sums
 
 
 @dr.syntax
@@ -198,9 +196,9 @@ def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
     light = y.light + y.prefix_beta * y.suffix_light
     target = target_function(film, pixel, light)
     target = dr.select(dr.isfinite(target), target, 0)
-    finish_suffix(suffix, light, y.suffix_light, y.is_reconnectable)
+    finish_suffix(suffix, light, y.suffix_light, y.shared > 0)
     suffixes = _store(suffix, SUFFIX_FLOATS, n)
-    return Chains(mi.Float(0), light, target, pixel, y.is_reconnectable, suffixes)
+    return Chains(mi.Float(0), light, target, pixel, y.shared, suffixes)
 
 
 def _camera_split_path(camera: DeviceCamera | LensCamera, corner: Any, offset: Any) -> SplitPath:
@@ -212,7 +210,7 @@ def _camera_split_path(camera: DeviceCamera | LensCamera, corner: Any, offset: A
         suffix_light=mi.Color3f(0),
         is_straight=mi.Bool(False),
         passed=mi.Float(1),
-        is_reconnectable=mi.Bool(False),
+        shared=mi.Float(0),
     )
 
 
@@ -235,14 +233,13 @@ def _extend(
     is_beyond = before >= 2
     is_second = active & (before < 2) & (following.depth == 2)
     is_independent, asked = result.is_view_independent, context.paths.emitter_filter
-    record_suffix(suffix, result, path, split.passed, asked, is_second & is_independent)
+    bounded = record_suffix(suffix, result, path, split.passed, asked, is_second & is_independent)
     prefix_beta = dr.select(is_second, following.beta, split.prefix_beta)
     following.beta = dr.select(is_second, 1, following.beta)
 
-    # Reconnect only rough vertices apart; what reflects, glass too, forgets the direction's pdf.
-    is_far = dr.squared_norm(result.si.p - path.reference.p) > MIN_DISTANCE_M**2
+    # Share only what joins rough vertices; what reflects, glass too, forgets the direction's pdf.
     stays_straight = split.is_straight & (following.bsdf_pdf > 0)
-    can_reconnect = is_independent & (result.pdf > 0) & is_far
+    can_reconnect = is_independent & (result.pdf > 0)
     return SplitPath(
         path=following,
         light=split.light + dr.select(is_beyond, 0, emitted + direct),
@@ -250,7 +247,7 @@ def _extend(
         suffix_light=split.suffix_light + dr.select(is_beyond, emitted + direct, 0),
         is_straight=dr.select(before == 0, result.is_rough, stays_straight),
         passed=split.passed * dr.select(before == 1, pass_probability(result.si, path.d), 1),
-        is_reconnectable=dr.select(is_second, can_reconnect, split.is_reconnectable),
+        shared=dr.select(is_second, dr.select(can_reconnect, bounded, 0), split.shared),
     ), alive
 
 
@@ -260,7 +257,7 @@ def _proposed_state(film: Film, y: SplitPath, pixel: Any, reconnects: Any) -> tu
     good = dr.isfinite(luminance(light))
     light = dr.select(good, light, 0)
     target = target_function(film, pixel, light)
-    return _State(light, target, pixel, y.is_reconnectable & reconnects, mi.Float(0)), good
+    return _State(light, target, pixel, dr.select(reconnects, y.shared, 0), mi.Float(0)), good
 
 
 def _move(
@@ -269,19 +266,19 @@ def _move(
     """Where a chain stands after a step that is accepted with probability a.
 
     Splats what is left behind: the old path with all the weight it has gathered, or the rejected
-    one. What is reconnectable waits for the launch's end (reconnection.py).
+    one. The share that is for other pixels, too, waits for the launch's end (reconnection.py).
     """
     x.weight += dr.select(done, 1 - a, 0)
     proposed.weight = a
     left = dr.select(accept, x, proposed)
-    _splat_state(film, chain, left, done & ~left.is_reconnectable)
+    _splat_state(film, chain, left, done)
     return dr.select(accept, proposed, x)
 
 
 def _splat_state(film: Film, chain: Any, state: _State, active: Any) -> None:
-    """Splat the light of a state, brought from its target function to its weight."""
-    active = active & (state.target > 0) & (state.weight > 0)
-    scale = state.weight / dr.select(state.target > 0, state.target, 1)
+    """Splat what is a state's own pixel's alone, brought from its target function to its weight."""
+    active = active & (state.target > 0) & (state.weight > 0) & (state.shared < 1)
+    scale = state.weight * (1 - state.shared) / dr.select(state.target > 0, state.target, 1)
     splat(film, chain, state.pixel, state.light * scale, active)
 
 

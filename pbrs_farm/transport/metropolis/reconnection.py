@@ -16,9 +16,17 @@ group's sum (a Gibbs step over the prefix, every outcome counted at once: it kee
 of the chain). So one suffix, hard to find, lights as many pixels as the group has, for one shadow
 ray each: the lens mutations of Veach and Guibas 1997, all outcomes at once.
 
+K has no bound where x1' and x2 are close. So a path's light is parted in two: the share
+
+    s(x1', x2) = min(1, MAX_SHARED_PDF / p),   p = p1(x1' -> x2) cos2' / |x1' - x2|^2,
+
+p the pdf by which x1' draws x2 per area, is reconnected, s_j K_j at every prefix j of the group,
+times s of the chain's own; the rest, 1 - s, stays with the path's own pixel. Each share keeps its
+mean, so no distance is left out, and s K is bounded (Keller's instant radiosity and its bounded
+geometry terms, Kollig and Keller 2006, with the rest by paths of the chain).
+
 Thin glass and cut-outs between x1 and x2 let a suffix through, with the share of the light they let
-through. A mirror at x1, a reflection between the two, or less than MIN_DISTANCE_M between them
-leave a path to its own pixel.
+through. A mirror at x1 or a reflection between the two leave a path to its own pixel.
 """
 
 from __future__ import annotations
@@ -40,7 +48,7 @@ from pbrs_farm.transport.kernels.device_scene import (
 from pbrs_farm.transport.kernels.packets import colour, point, vector
 from pbrs_farm.transport.kernels.path_state import EmitterFilter, PathState, StepResult, camera_path
 from pbrs_farm.transport.kernels.path_step import advance
-from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
+from pbrs_farm.transport.kernels.sampler import Sampler, SobolSampler, device_array, stream_key
 from pbrs_farm.transport.metropolis.film import (
     ChainContext,
     Chains,
@@ -52,11 +60,14 @@ from pbrs_farm.transport.metropolis.film import (
 from pbrs_farm.transport.scene_tables.material_rows import GLASS
 
 SUFFIX_FLOATS: Final = 36
-MIN_DISTANCE_M: Final = 0.1  # nearer, 1 / distance^2 makes fireflies
+MAX_SHARED_PDF: Final = 4.0  # 1 / m2; by a matte surface, 0.28 m straight before it
+_MIN_DISTANCE2: Final = 1e-10  # m2; nearer, float32 knows no direction
 _SUFFIX_PACKETS: Final = SUFFIX_FLOATS // 4
 _PREFIX_PACKETS: Final = 7
+_PREFIX_FLOATS: Final = 4 * _PREFIX_PACKETS
 _LANES_PER_LAUNCH: Final = 1 << 22  # pairs of chain and pixel, against memory
 _NO_PIXEL: Final = 0xFFFFFFFF
+_PREFIX_SEED: Final = 0x6A09E667  # not the chains'
 
 # Columns of a suffix that are written one by one; record_suffix lists the others.
 _PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT = 3, 28, 31, 32
@@ -68,6 +79,13 @@ class PixelGroups(NamedTuple):
     slots: Any  # (pixels,) slot of each
     pixels: Any  # (slots,) pixel of each, _NO_PIXEL = none
     n: int
+
+
+class Prefixes(NamedTuple):
+    """Prefixes of every pixel, in sets of one each."""
+
+    rows: Any  # (sets * pixels * 28,) floats
+    n_sets: Any  # UInt32, opaque
 
 
 @dataclass
@@ -113,14 +131,16 @@ def stratified_groups(height: int, width: int, n: int, seed: int) -> PixelGroups
     )
 
 
-def trace_prefixes(context: ChainContext, n_pixels: int, seed: int) -> Any:
-    """(pixels * 28,) floats: a prefix of each pixel through a random place in it.
+def trace_prefixes(context: ChainContext, n_pixels: int, sets: range, seed: int) -> Prefixes:
+    """Sets of prefixes, those of a pixel through places spread over it.
 
-    Invalid where a pixel does not see a rough surface first.
+    sets: numbers of the sets, in the order of a run. Invalid where a pixel does not see a rough
+    surface first.
     """
-    key = stream_key(dr.arange(mi.UInt32, n_pixels), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
-    sampler = HashedSampler(key, dr.opaque(mi.UInt32, 7))
-    pixel = dr.arange(mi.UInt32, n_pixels)
+    row, in_set = dr.arange(mi.UInt32, n_pixels * len(sets)), dr.opaque(mi.UInt32, n_pixels)
+    pixel, number = row % in_set, row // in_set + dr.opaque(mi.UInt32, sets.start)
+    key = stream_key(pixel, dr.opaque(mi.UInt32, (seed ^ _PREFIX_SEED) & 0xFFFFFFFF))
+    sampler = SobolSampler(key, number)
     prefix = _trace_prefix(context, sampler, pixel)
     kd, f0, tau, wi = prefix.kd, prefix.f0, prefix.tau, prefix.wi
     values = (
@@ -132,15 +152,15 @@ def trace_prefixes(context: ChainContext, n_pixels: int, seed: int) -> Any:
         *_rgb(tau), mi.Float(0),
         *_rgb(prefix.beta), mi.Float(0),
     )  # fmt: skip
-    rows = dr.zeros(mi.Float, n_pixels * len(values))
+    rows = dr.empty(mi.Float, n_pixels * len(sets) * len(values))
     for k, value in enumerate(values):
-        dr.scatter(rows, value, pixel * len(values) + k)
+        dr.scatter(rows, value, row * len(values) + k)
     dr.eval(rows)
-    return rows
+    return Prefixes(rows, dr.opaque(mi.UInt32, len(sets)))
 
 
 @dr.syntax
-def _trace_prefix(context: ChainContext, sampler: HashedSampler, pixel: Any) -> _Prefix:
+def _trace_prefix(context: ChainContext, sampler: Sampler, pixel: Any) -> _Prefix:
     """Follow mirrors and glass to the first rough surface; no emitter counts."""
     paths = context.paths._replace(emitter_filter=EmitterFilter(None, None))
     u = sampler.get_2d(mi.UInt32(0))
@@ -185,11 +205,11 @@ def record_suffix(
     passed: Any,
     emitter_filter: EmitterFilter,
     active: Any,
-) -> None:
+) -> Any:
     """Record, in local memory, the second vertex of a path just after it was made.
 
-    path: as it was when it set out from the first vertex, or from the last sheet of glass on the
-    way; passed: probability of having passed those.
+    The share of its light to reconnect. path: as it was when it set out from the first vertex, or
+    from the last sheet of glass on the way; passed: probability of having passed those.
     """
     si, bsdf, d = result.si, result.si.bsdf, result.scattered_d
     direct = result.outdoor_sample if emitter_filter.indoor is None else result.indoor_sample
@@ -197,7 +217,8 @@ def record_suffix(
     # between.
     cos = dr.abs(dr.dot(si.ng, path.d))
     distance2 = dr.squared_norm(si.p - path.reference.p)
-    pdfs = path.bsdf_pdf * cos / distance2 * result.pdf * passed
+    area_pdf = path.bsdf_pdf * cos / distance2
+    pdfs = area_pdf * result.pdf * passed
     values = (
         *_xyz(si.p), pdfs,
         *_xyz(si.n_interpolated), bsdf.alpha,
@@ -210,6 +231,12 @@ def record_suffix(
     for k, value in enumerate(values):
         suffix.write(value, mi.UInt32(k), active)
     suffix.write(direct.d.z, mi.UInt32(_EMITTER_Z), active)
+    return _shared_share(area_pdf)
+
+
+def _shared_share(area_pdf: Any) -> Any:
+    """Share of the light between two vertices that is reconnected: little where they are close."""
+    return MAX_SHARED_PDF / dr.maximum(area_pdf, MAX_SHARED_PDF)
 
 
 def finish_suffix(suffix: Any, light: Any, arriving: Any, active: Any) -> None:
@@ -221,14 +248,19 @@ def finish_suffix(suffix: Any, light: Any, arriving: Any, active: Any) -> None:
 
 
 def reconnect(
-    scene: DeviceScene, film: Film, prefixes: Any, groups: PixelGroups, chains: Chains, weight: Any
+    scene: DeviceScene,
+    film: Film,
+    prefixes: Prefixes,
+    groups: PixelGroups,
+    chains: Chains,
+    weight: Any,
 ) -> None:
-    """Splat every chain's suffix at all prefixes of its pixel's group.
+    """Splat the shared light of every chain at all prefixes of its pixel's group.
 
-    prefixes: rows of trace_prefixes(); weight: what each chain has to splat.
+    weight: what each chain has to splat.
     """
     # Choose the chains whose suffix can be seen from elsewhere.
-    chosen = dr.compress(chains.is_reconnectable)
+    chosen = dr.compress(chains.shared > 0)
     n_chains = dr.width(chosen)
     # Transpose: a row a suffix.
     n = dr.width(chains.pixel)
@@ -241,54 +273,49 @@ def reconnect(
         some = dr.arange(mi.UInt32, min(per_launch, n_chains - first))
         chain = dr.gather(mi.UInt32, chosen, some + dr.opaque(mi.UInt32, first))
         dr.eval(chain)
-        _reconnect_some(scene, film, prefixes, groups, suffixes, chains.pixel, chain, weight)
+        _reconnect_some(scene, film, prefixes, groups, suffixes, chains, chain, weight)
 
 
 def _reconnect_some(
     scene: DeviceScene,
     film: Film,
-    prefixes: Any,
+    prefixes: Prefixes,
     groups: PixelGroups,
     suffixes: Any,
-    chain_pixels: Any,
-    chains: Any,
+    states: Chains,
+    chosen: Any,
     weight: Any,
 ) -> None:
     """Splat the suffixes of some chains, a lane a pair of chain and pixel."""
     # Pair each chain with the pixels of its own pixel's group.
     n = dr.opaque(mi.UInt32, groups.n)
-    lane = dr.arange(mi.UInt32, dr.width(chains) * groups.n)
+    lane = dr.arange(mi.UInt32, dr.width(chosen) * groups.n)
     row, k = lane // n, lane % n
-    chain = dr.gather(mi.UInt32, chains, row)
-    own_pixel = dr.gather(mi.UInt32, chain_pixels, chain)
+    chain = dr.gather(mi.UInt32, chosen, row)
+    own_pixel = dr.gather(mi.UInt32, states.pixel, chain)
     slot = dr.gather(mi.UInt32, groups.slots, own_pixel)
     pixel = dr.gather(mi.UInt32, groups.pixels, slot - slot % n + k)
     is_pixel = pixel != _NO_PIXEL
-    value = _contribution(scene, prefixes, suffixes, chain, pixel, pixel != own_pixel, is_pixel)
+    # Let neighbouring chains take different sets, so that the film's halves share no prefix.
+    prefix = chain % prefixes.n_sets * (film.width * film.height) + pixel
+    x1 = _packets(prefixes.rows, prefix, _PREFIX_PACKETS, is_pixel)
+    x2 = _packets(suffixes, chain, _SUFFIX_PACKETS, True)
+    is_own, shared = pixel == own_pixel, dr.gather(mi.Float, states.shared, chain)
+    others = _shared_light(scene, x1, x2, is_pixel & ~is_own)
+    value = dr.select(is_own, colour(x2[8]) * shared, others)
     # Weigh each by its target function over the group's sum.
     target = target_function(film, pixel, value, is_pixel)
     good = (target > 0) & dr.isfinite(target)
-    total = dr.zeros(mi.Float, dr.width(chains))
+    total = dr.zeros(mi.Float, dr.width(chosen))
     dr.scatter_add(total, target, row, good)
     dr.eval(total, value, good, pixel, chain, row)
-    value *= weight / dr.maximum(dr.gather(mi.Float, total, row), 1e-37)
+    value *= weight * shared / dr.maximum(dr.gather(mi.Float, total, row), 1e-37)
     splat(film, chain, pixel, value, good)
     dr.eval(film.splats)
 
 
-def _contribution(
-    scene: DeviceScene,
-    prefixes: Any,
-    suffixes: Any,
-    chain: Any,
-    pixel: Any,
-    is_other: Any,
-    active: Any,
-) -> Any:
-    """K of a chain's suffix at a prefix; at its own prefix, as the chain has found it."""
-    # Gather both vertices.
-    x1 = _packets(prefixes, pixel, _PREFIX_PACKETS, active)
-    x2 = _packets(suffixes, chain, _SUFFIX_PACKETS, True)
+def _shared_light(scene: DeviceScene, x1: list[Any], x2: list[Any], active: Any) -> Any:
+    """s K of a suffix at a prefix, from the packets of both; 0 behind a wall."""
     p1, p2 = point(x1[0]), point(x2[0])
     ng1, ng2 = vector(x1[2]), vector(x2[2])
     wi1 = mi.Vector3f(x1[2][3], x1[3][3], x1[4][3])
@@ -303,8 +330,8 @@ def _contribution(
     out = frame1.to_local(d)
     value1, pdf1 = evaluate_bsdf(_bsdf(x1), local, out)
     side, cos2 = dr.dot(ng1, d), -dr.dot(ng2, d)
-    valid = is_other & active & (x1[0][3] > 0)
-    valid &= (distance2 > MIN_DISTANCE_M**2) & (side * out.z > 0)
+    valid = active & (x1[0][3] > 0) & (distance2 > _MIN_DISTANCE2)
+    valid &= side * out.z > 0
     valid &= (pdf1 > 0) & (dr.max(value1) > 0) & (cos2 > 0)
 
     # At x2: towards the emitter, and along the suffix.
@@ -317,7 +344,7 @@ def _contribution(
     reach = dr.norm(to)
     clear = scene.transmittance(begin, to / reach, reach * (1 - 1e-4), valid)
     value = colour(x1[6]) * value1 * inner * clear * (cos2 / distance2)
-    return dr.select(is_other, dr.select(valid, value, 0), colour(x2[8]))
+    return dr.select(valid, value * _shared_share(pdf1 * cos2 / distance2), 0)
 
 
 def _scattered_suffix(x2: list[Any], ng: Any, d: Any) -> tuple[Any, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -87,9 +89,24 @@ def coated_room() -> tuple[House, Camera]:
     )
 
 
-def test_suffixes_of_every_material_leave_the_mean_as_path_has_it() -> None:
+def slot_room() -> tuple[House, Camera]:
+    """A slot of 6 cm between two boxes, seen from its open end: most light in it goes a hand's way."""
+    surfaces = rooms.shell((4.0, 2.5, 4.0), 0)
+    surfaces.append(rooms.box((1.0, 0.0, 2.4), (1.97, 0.6, 3.2), 1, "left"))
+    surfaces.append(rooms.box((2.03, 0.0, 2.4), (3.0, 0.6, 3.2), 1, "right"))
+    materials = [rooms.matte("wall", 0.7), rooms.matte("box", 0.8), rooms.BULB]
+    lamps = [rooms.bulb((2.3, 1.9, 1.6), 2, 900.0)]
+    return rooms.house(surfaces, materials, lamps=lamps), rooms.camera(
+        (2, 0.5, 1.9), (2, 0.25, 2.6)
+    )
+
+
+@pytest.mark.parametrize("room", [coated_room, slot_room])
+def test_reconnected_suffixes_leave_the_mean_as_path_has_it(
+    room: Callable[[], tuple[House, Camera]],
+) -> None:
     # Significance: 16 blocks, |z| < 5: missed by chance once in 100,000 runs.
-    house, camera = coated_room()
+    house, camera = room()
     scene = LightScene.load(house, {}, RECIPE, dark_sky())
     camera = camera.with_size(32, 24)
     plain = FIELDS.model_copy(update={"spp": 512, "pilot_spp": 4})
