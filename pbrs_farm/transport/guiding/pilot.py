@@ -29,6 +29,8 @@ _ALL_FLOORS: Final = 0.5
 _SUN_FLOOR: Final = 0.1
 _DOME_FLOOR: Final = 0.05
 _PILOT_SIZE: Final = (32, 24)  # px
+# A shadow ray that can bring less than this share of a view's light, group by group, is cast by chance.
+SHADOW_SHARE: Final = 0.5
 _MAX_LANES: Final = 1 << 17  # of the pilot: it halves its size where there are very many emitters
 # Of the trial of guided rays: its samples of a pixel (of 16, one trial in six missed the rare bright
 # paths of a home), the samples of a view from which it pays, the CPU of a guided sample over a plain
@@ -94,7 +96,24 @@ def pilot_weights(
     relative = brought / (bright + max(float(bright.mean()), 1e-12))
     strength = np.sqrt((relative.astype(np.float64) ** 2).mean(0))
     lamps = _with_floors(strength[:n_lamps], lamp_floors(n_lamps))
-    return EmitterWeights(lamps, outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0)))
+    outdoor = outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0))
+    weights = EmitterWeights(lamps, outdoor)
+    # Cast weak shadow rays by chance; Metropolis casts them all, its paths need them.
+    if fields.integrator != "path":
+        return weights
+    return replace(weights, shadow_thresholds=_shadow_thresholds(brought, n_lamps))
+
+
+def _shadow_thresholds(brought: NDArray[np.floating], n_lamps: int) -> tuple[float, float]:
+    """SHADOW_SHARE of the mean outdoor and indoor light of a view.
+
+    brought: (N, L + outdoor techniques) luminance that each emitter alone brings to a pixel.
+    """
+    # Leave portals out: they are another way to draw the dome.
+    outdoor = brought[:, n_lamps + SUN] + brought[:, n_lamps + DOME]
+    groups = outdoor, brought[:, :n_lamps].sum(1)
+    outdoor_mean, indoor_mean = (float(light.astype(np.float64).mean()) for light in groups)
+    return SHADOW_SHARE * outdoor_mean, SHADOW_SHARE * indoor_mean
 
 
 def guiding_pays(

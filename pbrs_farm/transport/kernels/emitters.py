@@ -51,6 +51,9 @@ class EmitterWeights:
     lamps: F64  # (L,)
     outdoor: F64  # (2 + number of portals,)
     is_guided: bool = True  # a part of the rays is guided into lamps
+    # Luminance of outdoor and indoor light that a shadow ray must be able to bring, or it is cast by
+    # chance (shadow_roulette.py); 0 = all are cast.
+    shadow_thresholds: tuple[float, float] = (0.0, 0.0)
 
 
 class DirectionSample(NamedTuple):
@@ -80,6 +83,7 @@ class Emitters:
         self._set_dome(sky)
         self._set_portals(portals)
         self._set_outdoor_weights(weights.outdoor)
+        self._set_shadow_thresholds(weights)
         self._set_sun(sky)
         shines = bool(sky.dome.max() > 0 or sky.sun_irradiance.max() > 0)
         self.has_sky = dr.opaque(mi.Bool, shines)
@@ -99,6 +103,7 @@ class Emitters:
         self._set_lamp_weights(weights.lamps)
         self._set_outdoor_weights(weights.outdoor)
         self.nearby.set_guided(weights.is_guided)
+        self._set_shadow_thresholds(weights)
 
     def set_targets(self, targets: GuidingTargets) -> None:
         """Set what guided rays aim at."""
@@ -316,6 +321,10 @@ class Emitters:
         self._portal_weights = [dr.opaque(mi.Float, float(w)) for w in portal]
         self._sun_weight = dr.opaque(mi.Float, float(weights[SUN]))
         self._dome_weight = dr.opaque(mi.Float, float(weights[DOME]))
+
+    def _set_shadow_thresholds(self, weights: EmitterWeights) -> None:
+        outdoor, indoor = weights.shadow_thresholds
+        self.shadow_thresholds = dr.opaque(mi.Float, outdoor), dr.opaque(mi.Float, indoor)
 
     def _set_sun(self, sky: Sky) -> None:
         self._sun_frame = mi.Frame3f(opaque3(mi.Vector3f, sky.sun_direction))

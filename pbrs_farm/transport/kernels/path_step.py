@@ -48,6 +48,7 @@ from pbrs_farm.transport.kernels.path_state import (
     Vertex,
 )
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, VERTEX_DIMS, Sampler
+from pbrs_farm.transport.kernels.shadow_roulette import ShadowRoulette, shadow_roulettes
 from pbrs_farm.transport.scene_tables.material_rows import GLASS, MIRROR
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
@@ -66,6 +67,7 @@ class Strategy(NamedTuple):
     guiding: Guiding | None = None
     bsdf_share: Any = 1.0  # of the scattered rays, those that the surface draws itself
     is_view_independent: Any = False  # Bool: the MIS weights do not depend on wi
+    beta: Any = None  # throughput up to the vertex, for shadow rays' roulette; None = all are cast
 
 
 class _Lobe(NamedTuple):
@@ -196,7 +198,7 @@ def _strategy(
         return Strategy()
     may_aim = goes_on & (vertex.depth + 1 < context.fields.max_depth)
     guiding = guiding_at(vertex.near, vertex.si.bsdf, path.beta, may_aim)
-    return Strategy(vertex.near, guiding, 1 - guiding.share)
+    return Strategy(vertex.near, guiding, 1 - guiding.share, beta=path.beta)
 
 
 def _emitted_light(
@@ -237,7 +239,7 @@ def _emitted_light(
 def sample_direct_light(
     context: PathContext, sampler: Sampler, vertex: Vertex, strategy: Strategy, active: Any
 ) -> tuple[DirectLightSample, DirectLightSample]:
-    """(outdoor, indoor) light scattered back along the path, one shadow ray each."""
+    """(outdoor, indoor) light scattered back along the path, a shadow ray each or none."""
     emitters, emitter_filter, dim = context.emitters, context.emitter_filter, vertex.dim
     outdoor = indoor = None
     if emitter_filter.outdoor is not None:
@@ -251,10 +253,13 @@ def sample_direct_light(
             context.scene, vertex.near, u, uv, emitter_filter.indoor, is_asked
         )
     # A portal asked for alone has no light of scattered rays to be weighted against.
-    is_alone = False if emitter_filter.outdoor is None else emitter_filter.outdoor >= FIRST_PORTAL
+    if emitter_filter.outdoor is not None:
+        share = dr.select(emitter_filter.outdoor >= FIRST_PORTAL, 0, strategy.bsdf_share)
+        strategy = strategy._replace(bsdf_share=share)
+    first, second = shadow_roulettes(strategy.beta, emitters.shadow_thresholds, sampler, dim)
     return (
-        _direct_light(context.scene, vertex, strategy, outdoor, is_alone),
-        _direct_light(context.scene, vertex, strategy, indoor, is_alone),
+        _direct_light(context.scene, vertex, strategy, outdoor, first),
+        _direct_light(context.scene, vertex, strategy, indoor, second),
     )
 
 
@@ -263,9 +268,9 @@ def _direct_light(
     vertex: Vertex,
     strategy: Strategy,
     sample: DirectionSample | None,
-    is_alone: Any,
+    roulette: ShadowRoulette | None,
 ) -> DirectLightSample:
-    """What one shadow ray brings."""
+    """What one shadow ray brings; nothing where its roulette casts none."""
     if sample is None:
         return DirectLightSample(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
     si, is_independent = vertex.si, strategy.is_view_independent
@@ -283,7 +288,10 @@ def _direct_light(
         contributes = dr.select(is_independent, (side > 0) | (dr.max(si.bsdf.tau) > 0), contributes)
     contributes = contributes & sample.valid & (sample.pdf > 0)
     # Weigh by the balance heuristic; the sample's own pdf cancels with the estimator's.
-    weight = 1 / (sample.pdf + dr.select(is_alone, 0, pdf))
+    weight = 1 / (sample.pdf + pdf)
+    if roulette is not None:
+        is_cast, chance = roulette.cast_by_chance(value * sample.radiance * weight)
+        contributes, weight = contributes & is_cast, weight / chance
 
     # Aim again from the offset origin: a lamp near by must not shadow itself.
     begin = offset_ray_origin(si.p, dr.select(side > 0, si.ng, -si.ng))

@@ -1,0 +1,50 @@
+"""Russian roulette of shadow rays: one that can bring little is cast by chance; kernels, no effects.
+
+A shadow ray costs the same whatever it can bring. What it would bring if nothing stood in its way is
+known before it is cast. Below a threshold it is cast with a chance in proportion to that, and what
+it brings is divided by the chance, so that the mean stays (Arvo and Kirk 1990). The chance has a
+least value: without it dark corners of a bright view had spots as bright as the threshold.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from pbrs_farm.transport.kernels.bsdf import luminance
+from pbrs_farm.transport.kernels.sampler import Sampler
+
+LEAST_CHANCE: Final = 0.1
+# Random dimensions beyond all of the vertices' own: Metropolis, which has no such roulette, keeps its
+# stored numbers.
+_FIRST_DIM: Final = 1 << 16
+
+
+class ShadowRoulette(NamedTuple):
+    """Whether a shadow ray is cast at a vertex."""
+
+    beta: Any  # Color3f, throughput of the path up to the vertex
+    threshold: Any  # luminance from which on every ray is cast; 0 = every ray is
+    u: Any  # random number
+
+    def cast_by_chance(self, unshadowed: Any) -> tuple[Any, Any]:
+        """(Bool: the ray is cast, chance of that) by what it would bring, before the throughput."""
+        most = luminance(self.beta * unshadowed)
+        chance = dr.maximum(most / self.threshold, LEAST_CHANCE)
+        chance = dr.select(most < self.threshold, chance, mi.Float(1))
+        return self.u < chance, chance
+
+
+def shadow_roulettes(
+    beta: Any, thresholds: tuple[Any, Any], sampler: Sampler, dim: Any
+) -> tuple[ShadowRoulette | None, ShadowRoulette | None]:
+    """The roulettes of a vertex's outdoor and indoor shadow ray; none without a throughput.
+
+    dim: the first random dimension of the vertex.
+    """
+    if beta is None:
+        return None, None
+    outdoor, indoor = (sampler.get_1d(dim + (_FIRST_DIM + k)) for k in range(2))
+    return ShadowRoulette(beta, thresholds[0], outdoor), ShadowRoulette(beta, thresholds[1], indoor)
