@@ -26,13 +26,16 @@ from pbrs_farm.core.classes import (
     TOILET,
 )
 from pbrs_farm.core.house import Item, ItemKind
+from pbrs_farm.dress.name_words import words_of_item
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.supports import Support
 
 _HOLDS_NOTHING = (
     "shower", "bathtub", "bath tub", "radiator", "fireplace", "pool", "treadmill",
 )  # fmt: skip
-_MACHINES = ("cooker", "stove", "oven", "washer", "washing", "dryer", "dishwasher", "fridge")
+_COOKERS = frozenset({"cooker", "stove", "hob", "oven"})
+_WASHERS = frozenset({"washer", "washing", "dryer", "dishwasher"})
+_MACHINES = _COOKERS | _WASHERS | {"fridge"}
 _HOLDERS = frozenset({
     CABINET, TABLE, BOOKSHELF, COUNTER, DESK, SHELVES, DRESSER, REFRIGERATOR, TELEVISION, NIGHT_STAND,
     TOILET, SINK, OTHERFURNITURE, OTHERPROP,
@@ -87,7 +90,7 @@ def receptacle_of(item: Item, support: Support, kind: RoomKind) -> str:
     if item.nyu40 in (BOOKSHELF, SHELVES):
         return "bath_shelf" if kind is RoomKind.BATHROOM else "shelf"
     is_inner = float(item.bounds[1, 1]) - support.height > 0.1
-    if is_inner and at < 0.8 and any(word in name for word in _MACHINES):
+    if is_inner and at < 0.8 and words_of_item(item) & _MACHINES:
         return ""
     if (
         is_inner
@@ -110,11 +113,12 @@ def _top_of(item: Item, name: str, at: float, kind: RoomKind) -> str:
         return "sink" if kind is RoomKind.KITCHEN or kind is RoomKind.LIVING else "basin"
     if item.nyu40 == REFRIGERATOR:
         return "fridge_top" if at > 1.0 else "counter"
-    if any(word in name for word in ("cooker", "stove", "hob", "oven")):
+    words = words_of_item(item)
+    if words & _COOKERS:
         return "stove" if 0.75 < at < 1.0 else ""
-    if any(word in name for word in ("washer", "washing", "dryer")):
+    if words & _WASHERS:
         return "counter" if kind is RoomKind.KITCHEN else "washer"
-    if "dishwasher" in name or item.nyu40 == COUNTER:
+    if item.nyu40 == COUNTER:
         return "counter" if 0.7 < at < 1.2 else ""
     if "piano" in name:
         return "piano" if at > 0.7 else ""

@@ -10,14 +10,17 @@ import pytest
 from manifold3d import Manifold, Mesh
 
 from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.clutter.kinds import is_known
-from pbrs_farm.dress.clutter.receptacles import shares
+from pbrs_farm.dress.clutter.receptacles import receptacle_of, shares
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import style_for
-from tests.dress.furniture import bookcase, house, solid
+from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from tests.dress.furniture import bookcase, house, room, solid
 
 _BOOKS = 23
 
@@ -47,6 +50,13 @@ def _body(item: Item) -> Manifold:
     places, number = np.unique(np.round(corners.reshape(-1, 3), 6), axis=0, return_inverse=True)
     faces = number.reshape(-1, 3).astype(np.uint32)
     return Manifold(Mesh(places.astype(np.float32), faces))
+
+
+@pytest.mark.parametrize(("name", "holds"), [("Woven basket", "other_top"), ("Oven", "stove")])
+def test_a_top_holds_what_whole_words_of_its_name_say(name: str, holds: str) -> None:
+    item = replace(solid("thing", [0, 0, 0], [0.6, 0.9, 0.6], OTHERFURNITURE), name=name)
+    (top,) = supports_of_item(SceneTriangles([item]), 0, room())
+    assert receptacle_of(item, top, RoomKind.LIVING) == holds
 
 
 def test_every_thing_touches_what_it_stands_on() -> None:
