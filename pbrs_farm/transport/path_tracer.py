@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera
@@ -21,6 +22,7 @@ from pbrs_farm.transport.kernels.bsdf import luminance
 from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera, device_camera
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
+from pbrs_farm.transport.kernels.outdoor_choice import TechniqueCounts
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,
@@ -47,6 +49,7 @@ class SampleSums:
     normal: F32  # the same surface's
     n_bad: int  # paths that were not finite, left out
     lamps: F32 | None = None  # (N, L, 3) indoor light by lamp, if asked for
+    counts: NDArray[np.uint32] | None = None  # TechniqueCounts.numpy(), of the pilot
 
     def __add__(self, other: SampleSums) -> SampleSums:
         def total(name: str) -> Any:
@@ -101,6 +104,13 @@ class _LampSums(NamedTuple):
     first: Any  # the lane's first place there
 
 
+class _Beside(NamedTuple):
+    """Where a lane adds what is not its pixel's sum."""
+
+    lamps: _LampSums | None
+    counts: TechniqueCounts
+
+
 @dataclass
 class _LaneSums:
     """Sums over the samples of a lane, as SampleSums."""
@@ -147,6 +157,7 @@ def trace(
     if lanes.n_lamps > 0:
         sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
         lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
+    counts = emitters.outdoor_choice.no_counts()
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(
@@ -156,9 +167,9 @@ def trace(
         dr.opaque(mi.UInt32, lanes.first_sample),
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
         stream_key(lane, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF)),
-        lamp_sums,
+        _Beside(lamp_sums, counts),
     )
-    dr.eval(total)
+    dr.eval(total, counts)
     # Device layout is (channels, lanes); images are (lanes, channels).
     rows = {
         f.name: np.ascontiguousarray(getattr(total, f.name).numpy().T, np.float32)
@@ -168,7 +179,9 @@ def trace(
     lamps = None
     if lamp_sums is not None:
         lamps = lamp_sums.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
-    return SampleSums(**rows, n_bad=int(np.sum(total.n_bad.numpy(), dtype=np.int64)), lamps=lamps)
+    n_bad = int(np.sum(total.n_bad.numpy(), dtype=np.int64))
+    of_pilot = counts.numpy() if lanes.n_only_outdoor > 0 else None
+    return SampleSums(**rows, n_bad=n_bad, lamps=lamps, counts=of_pilot)
 
 
 def _pixels_and_emitters(lane: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:
@@ -193,7 +206,7 @@ def _trace(
     first: Any,
     last: Any,
     key: Any,
-    lamp_sums: _LampSums | None,
+    beside: _Beside,
 ) -> _LaneSums:
     sums = _LaneSums(
         mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Vector3f(0),
@@ -220,7 +233,8 @@ def _trace(
         path, result, alive = advance(context, sampler, path, active)
         l_out += result.emitted_outdoor + result.direct_outdoor
         l_in += result.emitted_indoor + result.direct_indoor
-        _add_by_lamp(lamp_sums, result, active)
+        _add_by_lamp(beside.lamps, result, active)
+        _count_techniques(beside.counts, context, result, active)
         first_rough = result.is_rough & ~seen
         sums.add_guides(result, seen, first_rough)
         seen = seen | first_rough
@@ -233,6 +247,16 @@ def _trace(
         active = s < last
 
     return sums
+
+
+def _count_techniques(
+    counts: TechniqueCounts, context: PathContext, result: StepResult, active: Any
+) -> None:
+    """Count the vertices of a lane that asks for one outdoor technique, and those it lights."""
+    technique = context.emitter_filter.outdoor
+    is_lit = luminance(result.direct_outdoor) > 0
+    choice = context.emitters.outdoor_choice
+    choice.count(counts, result.si.p, technique, active & result.is_rough, is_lit)
 
 
 def _add_by_lamp(lamp_sums: _LampSums | None, result: StepResult, active: Any) -> None:

@@ -20,6 +20,7 @@ from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, EmitterWeights
+from pbrs_farm.transport.kernels.outdoor_choice import weights_by_place
 from pbrs_farm.transport.path_tracer import Lanes, SampleSums, trace
 
 # Least weights: what no pilot path has found may still be there. Those of many lamps are less, or
@@ -98,10 +99,13 @@ def pilot_weights(
     lamps = _with_floors(strength[:n_lamps], lamp_floors(n_lamps))
     outdoor = outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0))
     weights = EmitterWeights(lamps, outdoor)
-    # Cast weak shadow rays by chance; Metropolis casts them all, its paths need them.
+    # Choose outdoor techniques by place, cast weak shadow rays by chance; Metropolis does neither.
     if fields.integrator != "path":
         return weights
-    return replace(weights, shadow_thresholds=_shadow_thresholds(brought, n_lamps))
+    assert sums.counts is not None
+    by_place = weights_by_place(weights.outdoor, sums.counts)
+    thresholds = _shadow_thresholds(brought, n_lamps)
+    return replace(weights, outdoor_by_place=by_place, shadow_thresholds=thresholds)
 
 
 def _shadow_thresholds(brought: NDArray[np.floating], n_lamps: int) -> tuple[float, float]:

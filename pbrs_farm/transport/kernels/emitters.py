@@ -29,6 +29,7 @@ from pbrs_farm.transport.guiding.nearby_lamps import (
 )
 from pbrs_farm.transport.kernels.alias_table import alias_rows, sample_alias_table
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
+from pbrs_farm.transport.kernels.outdoor_choice import OutdoorChoice, choose_technique
 from pbrs_farm.transport.kernels.packets import colour, vector
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
@@ -50,6 +51,7 @@ class EmitterWeights:
 
     lamps: F64  # (L,)
     outdoor: F64  # (2 + number of portals,)
+    outdoor_by_place: F64 | None = None  # the same by voxel (outdoor_choice.py), None = everywhere
     is_guided: bool = True  # a part of the rays is guided into lamps
     # Luminance of outdoor and indoor light that a shadow ray must be able to bring, or it is cast by
     # chance (shadow_roulette.py); 0 = all are cast.
@@ -78,11 +80,12 @@ class Emitters:
         self, tables: SceneTables, sky: Sky, portals: F64, weights: EmitterWeights
     ) -> None:
         self.nearby = NearbyLampSampler(tables)
+        self.outdoor_choice = OutdoorChoice(tables.positions)
         self.targets = TargetSampler(no_targets(len(tables.lamps)))
         self._set_lamps(tables, weights.lamps)
         self._set_dome(sky)
         self._set_portals(portals)
-        self._set_outdoor_weights(weights.outdoor)
+        self._set_outdoor_weights(weights)
         self._set_shadow_thresholds(weights)
         self._set_sun(sky)
         shines = bool(sky.dome.max() > 0 or sky.sun_irradiance.max() > 0)
@@ -101,7 +104,7 @@ class Emitters:
     def set_weights(self, weights: EmitterWeights) -> None:
         """Set other weights; the scene stays."""
         self._set_lamp_weights(weights.lamps)
-        self._set_outdoor_weights(weights.outdoor)
+        self._set_outdoor_weights(weights)
         self.nearby.set_guided(weights.is_guided)
         self._set_shadow_thresholds(weights)
 
@@ -180,9 +183,8 @@ class Emitters:
     def sample_outdoor(self, p: Any, u: Any, uv: Any, counted: Any, active: Any) -> DirectionSample:
         """A direction in which outdoor light may come to p."""
         active = active & self.has_sky
-        technique, u = sample_alias_table(
-            self._outdoor_alias, mi.UInt32(0), self._n_outdoor, u, active
-        )
+        chances = self.outdoor_choice.chances(p, active)
+        technique, u = choose_technique(chances, u)
         technique = dr.select(counted >= 0, mi.UInt32(counted), technique)
         is_sun = technique == SUN
         # Draw a direction by every technique, and take one.
@@ -192,26 +194,28 @@ class Emitters:
         to_portal = self._portal_direction(p, technique, uv, active)
         d = dr.select(is_sun, to_sun, dr.select(technique == DOME, to_dome, to_portal))
         # The sun and the dome are two emitters, each with a pdf of its own.
-        sun, sun_pdf = self.eval_sun(d, counted)
-        dome, dome_pdf = self.eval_dome(p, d, counted, active)
+        sun, sun_pdf = self.eval_sun(chances, d, counted)
+        dome, dome_pdf = self.eval_dome(chances, p, d, counted, active)
         radiance, pdf = dr.select(is_sun, sun, dome), dr.select(is_sun, sun_pdf, dome_pdf)
         return DirectionSample(d, mi.Float(dr.inf), radiance, pdf, active)
 
-    def eval_sun(self, d: Any, counted: Any) -> tuple[Any, Any]:
-        """(radiance of the sun's disc in direction d, pdf of sampling it)."""
+    def eval_sun(self, chances: list[Any], d: Any, counted: Any) -> tuple[Any, Any]:
+        """(radiance of the sun's disc in direction d, pdf of sampling it by the techniques' chances)."""
         inside = dr.dot(d, self._sun_frame.n) >= self._sun_cos - 1e-7
-        weight = dr.select(counted >= 0, 1, self._sun_weight)
+        weight = dr.select(counted >= 0, 1, chances[SUN])
         counts = (counted < 0) | (counted == SUN)
         return dr.select(inside & counts, self._sun_rgb, 0), weight * self._sun_pdf
 
-    def eval_dome(self, p: Any, d: Any, counted: Any, active: Any) -> tuple[Any, Any]:
+    def eval_dome(
+        self, chances: list[Any], p: Any, d: Any, counted: Any, active: Any
+    ) -> tuple[Any, Any]:
         """(radiance of the dome in direction d, pdf of sampling d from p, sun not counted)."""
         radiance, texel_pdf = self._dome_row(d, active)
         free = counted < 0
-        pdf = dr.select(free, self._dome_weight, dr.select(counted == DOME, 1, 0)) * texel_pdf
+        pdf = dr.select(free, chances[DOME], dr.select(counted == DOME, 1, 0)) * texel_pdf
         for k in range(MAX_PORTALS):
             asked = dr.select(counted == FIRST_PORTAL + k, 1, 0)
-            weight = dr.select(free, self._portal_weights[k], asked)
+            weight = dr.select(free, chances[FIRST_PORTAL + k], asked)
             pdf += weight * self._portal_pdf(k, p, d)
         return dr.select(counted == SUN, 0, radiance), pdf
 
@@ -313,14 +317,9 @@ class Emitters:
         self._lamp_weights = device_array(mi.Float, padded.astype(np.float32))
         self._lamp_alias = device_array(mi.Float, alias_rows(padded).ravel())
 
-    def _set_outdoor_weights(self, weights: F64) -> None:
-        self._n_outdoor = dr.opaque(mi.UInt32, len(weights))
-        self._outdoor_alias = device_array(mi.Float, alias_rows(weights).ravel())
-        portal = np.zeros(MAX_PORTALS, np.float32)
-        portal[: len(weights) - FIRST_PORTAL] = weights[FIRST_PORTAL:]
-        self._portal_weights = [dr.opaque(mi.Float, float(w)) for w in portal]
-        self._sun_weight = dr.opaque(mi.Float, float(weights[SUN]))
-        self._dome_weight = dr.opaque(mi.Float, float(weights[DOME]))
+    def _set_outdoor_weights(self, weights: EmitterWeights) -> None:
+        by_place = weights.outdoor_by_place
+        self.outdoor_choice.set_weights(weights.outdoor if by_place is None else by_place)
 
     def _set_shadow_thresholds(self, weights: EmitterWeights) -> None:
         outdoor, indoor = weights.shadow_thresholds

@@ -217,12 +217,12 @@ def _emitted_light(
         counts |= False if asked is None else asked == ALL_EMITTERS
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     if emitter_filter.outdoor is not None:
-        sun, sun_pdf = emitters.eval_sun(path.d, emitter_filter.outdoor)
-        dome, dome_pdf = emitters.eval_dome(
-            path.reference.p, path.d, emitter_filter.outdoor, missed
-        )
+        here, asked = path.reference.p, emitter_filter.outdoor
+        chances = emitters.outdoor_choice.chances(here, missed)
+        sun, sun_pdf = emitters.eval_sun(chances, path.d, asked)
+        dome, dome_pdf = emitters.eval_dome(chances, here, path.d, asked, missed)
         # Where a portal is asked for, count only what is drawn through it.
-        is_asked = (emitter_filter.outdoor > NO_EMITTERS) & (emitter_filter.outdoor < FIRST_PORTAL)
+        is_asked = (asked > NO_EMITTERS) & (asked < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & is_asked
         sky = sun * balanced(sun_pdf) + dome * balanced(dome_pdf)
         outdoor = dr.select(sees_sky, path.beta * sky, 0)

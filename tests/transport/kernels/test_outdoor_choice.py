@@ -1,0 +1,78 @@
+"""The choice of outdoor techniques by place: its grid, its weights, and that it changes no mean."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.lighting import Group
+from pbrs_farm.core.recipe import LightFields, recipe_from_name
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import sunsky
+from pbrs_farm.transport.validation import known_rooms as rooms
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
+
+if choose_variant().startswith("scalar"):
+    pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)
+
+RECIPE = recipe_from_name("fast")
+FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "spp": 64})
+
+
+@pytest.mark.parametrize(
+    ("size", "edge", "shape"),
+    [((4.0, 2.4, 0.2), 0.5, (9, 5, 1)), ((0.0, 0.0, 0.0), 0.5, (1, 1, 1))],
+)
+def test_voxels_are_half_a_metre(
+    size: tuple[float, ...], edge: float, shape: tuple[int, ...]
+) -> None:
+    from pbrs_farm.transport.kernels.outdoor_choice import voxel_grid
+
+    corners = np.add([np.zeros(3), size], (1, 2, 3)).astype(np.float32)
+    low, found, found_edge = voxel_grid(corners)
+    assert (tuple(low), tuple(found), found_edge) == ((1, 2, 3), shape, edge)
+
+
+def test_a_vast_home_has_no_more_voxels_than_fit() -> None:
+    from pbrs_farm.transport.kernels.outdoor_choice import voxel_grid
+
+    _low, shape, edge = voxel_grid(np.float32([(0, 0, 0), (900, 30, 700)]))
+    assert shape.prod() <= 1 << 16
+    assert (shape * edge >= (900, 30, 700)).all()
+
+
+def test_a_voxel_has_more_of_what_lights_it_and_something_of_everything() -> None:
+    from pbrs_farm.transport.kernels.outdoor_choice import MAX_TECHNIQUES, weights_by_place
+
+    weights = np.array([0.2, 0.3, 0.5])
+    counts = np.zeros((2, 3, MAX_TECHNIQUES), np.uint32)
+    counts[0, :2, :3] = 100  # vertices in two of three voxels
+    counts[1, 0, 1], counts[1, 1, 2] = 80, 40
+    rows = weights_by_place(weights, counts)
+    assert np.allclose(rows.sum(1), 1)
+    assert rows[0, 1] > 0.7
+    assert rows[1, 2] > 0.7
+    # Where no vertex was, the view's own weights hold; nowhere is a technique forgotten.
+    assert np.allclose(rows[2], weights, atol=1e-5)
+    assert (rows >= 0.19 * weights).all()
+
+
+def test_weights_by_place_leave_the_mean_alone_and_cut_the_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
+    from pbrs_farm.transport.guiding import pilot
+
+    house, camera = rooms.window_room(0.7)
+    camera = camera.with_size(32, 24)
+    scene = LightScene.load(house, {}, RECIPE, sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.35))
+    by_place = [scene.render(camera, "-", FIELDS, seed) for seed in range(10, 18)]
+    again = scene.render(camera, "-", FIELDS, 10)
+    np.testing.assert_array_equal(again.outdoor, by_place[0].outdoor)
+    monkeypatch.setattr(pilot, "weights_by_place", lambda _weights, _counts: None)
+    everywhere = [scene.render(camera, "-", FIELDS, seed) for seed in range(10, 18)]
+    sums = [[blocks(r.group(Group.OUTDOOR)) for r in runs] for runs in (by_place, everywhere)]
+    assert np.abs(z_scores(*sums)).max() < 4.5
+    noises = [np.mean([r.noise["outdoor"] ** 2 for r in runs]) for runs in (by_place, everywhere)]
+    assert noises[0] < noises[1]
