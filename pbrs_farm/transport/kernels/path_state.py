@@ -81,6 +81,20 @@ class Vertex(NamedTuple):
     near: NearbyLamps | None  # None: lamps do not count
 
 
+class ScatteredRay(NamedTuple):
+    """Where a path goes on from a vertex: at most one of bounced, mirrored and passed."""
+
+    d: Any  # direction drawn at a rough surface
+    value: Any  # f |cos| of it
+    pdf: Any  # of the surface drawing it
+    is_guided: Any
+    target_face: Any
+    bounced: Any  # Bool: goes on in direction d
+    mirrored: Any  # Bool: goes on in direction mirror_d
+    mirror_d: Any
+    passed: Any  # Bool: goes straight on, through glass or a cut-out
+
+
 class DirectLightSample(NamedTuple):
     """What one shadow ray brings to a vertex."""
 
@@ -88,6 +102,15 @@ class DirectLightSample(NamedTuple):
     d: Any  # unit direction to the emitter
     incident: Any  # radiance times visibility and MIS weight, over the pdf
     emitter: Any = None  # number of the lamp, None for the sky
+
+
+@dataclass
+class DirectionPdfs:
+    """How a path's direction out of a vertex was drawn; pdfs per solid angle."""
+
+    bsdf: mi.Float  # by the surface alone, 0 = it does not go on
+    share: mi.Float  # of the scattered rays, those that the surface draws itself
+    techniques: mi.Float  # by surface and cones together, with their shares
 
 
 class StepResult(NamedTuple):
@@ -104,7 +127,9 @@ class StepResult(NamedTuple):
     albedo: Any
     si: SurfaceInteraction
     scattered_d: Any  # direction drawn at the vertex
-    pdf: Any  # of the surface drawing it, 0 = it does not go on
+    pdfs: DirectionPdfs  # of drawing it
+    guided_weight: Any  # of the ray that met the vertex; `path` has it in its throughput
+    pass_probability: Any  # of going straight through what was met, 1 if that is no glass
     outdoor_sample: DirectLightSample
     indoor_sample: DirectLightSample
     is_view_independent: Any  # Bool: weighted by view_independent_pdf (bsdf.py)

@@ -41,9 +41,11 @@ from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, DirectionSample
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,
+    DirectionPdfs,
     DirectLightSample,
     PathContext,
     PathState,
+    ScatteredRay,
     StepResult,
     Vertex,
 )
@@ -90,40 +92,26 @@ class _Step(NamedTuple):
     lobe: _Lobe
 
 
-class _Scattered(NamedTuple):
-    """Where a path goes on from a vertex: at most one of bounced, mirrored and passed."""
-
-    d: Any  # direction drawn at a rough surface
-    value: Any  # f |cos| of it
-    pdf: Any  # of the surface drawing it
-    is_guided: Any
-    target_face: Any
-    bounced: Any  # Bool: goes on in direction d
-    mirrored: Any  # Bool: goes on in direction mirror_d
-    mirror_d: Any
-    passed: Any  # Bool: goes straight on, through glass or a cut-out
-
-
 def advance(
     context: PathContext, sampler: Sampler, path: PathState, active: Any, may_reconnect: Any = False
 ) -> tuple[PathState, StepResult, Any]:
     """(the path one vertex on, what that brought, whether it goes on).
 
     may_reconnect: Bool, the path's suffix from this vertex on may be reconnected to other prefixes
-    (reconnection.py), so the MIS weights here must not depend on where the path came from. False:
-    no path's; only then are rays guided.
+    (reconnection.py), so the MIS weights here must not depend on where the path came from, and the
+    caller applies the weight of guided rays. False: no path's.
     """
     vertex = _next_vertex(context, path, active)
     si, bsdf = vertex.si, vertex.si.bsdf
     missed = active & ~si.valid
-    near = vertex.near if may_reconnect is False else None
-    lobe = _choose_lobe(vertex, path, near, sampler.get_1d(vertex.dim + _LOBE))
+    lobe = _choose_lobe(vertex, path, sampler.get_1d(vertex.dim + _LOBE))
 
     # Weigh what a guided ray has met; add the light of an emitter there.
-    if near is not None:
+    weight: Any = mi.Float(1)
+    if vertex.near is not None:
         counted, ends = context.emitter_filter.indoor, missed | lobe.reflected
         weight = guided_mis_weight(context.emitters, path, si, counted, ends, vertex.is_rough)
-        path = replace(path, beta=path.beta * weight)
+        path = replace(path, beta=path.beta * weight) if may_reconnect is False else path
     emitted_outdoor, emitted_indoor = _emitted_light(context, path, si, missed)
 
     # Send shadow rays, and go on.
@@ -132,7 +120,7 @@ def advance(
     outdoor, indoor = sample_direct_light(context, sampler, vertex, strategy, goes_on)
     step = _Step(context, sampler, path, vertex, strategy, lobe)
     scattered = _scatter(step, goes_on)
-    following, alive = _follow(step, scattered)
+    following, pdfs, alive = _follow(step, scattered)
     result = StepResult(
         emitted_outdoor=emitted_outdoor,
         emitted_indoor=emitted_indoor,
@@ -143,7 +131,9 @@ def advance(
         albedo=dr.minimum(bsdf.kd + bsdf.f0 + bsdf.tau, 1),
         si=si,
         scattered_d=scattered.d,
-        pdf=dr.select(scattered.bounced, scattered.pdf, 0),
+        pdfs=pdfs,
+        guided_weight=weight,
+        pass_probability=dr.select(vertex.is_glass, 1 - lobe.probability, 1),
         outdoor_sample=outdoor,
         indoor_sample=indoor,
         is_view_independent=strategy.is_view_independent,
@@ -176,12 +166,12 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near)
 
 
-def _choose_lobe(vertex: Vertex, path: PathState, near: NearbyLamps | None, u: Any) -> _Lobe:
+def _choose_lobe(vertex: Vertex, path: PathState, u: Any) -> _Lobe:
     """Reflect more of the rays at glass near lamps; _throughput makes them weigh less."""
     reflectance = thin_glass_reflectance(vertex.wi.z)
     probability = reflectance
-    if near is not None:
-        often = reflection_probability(reflectance, survival_boost(near))
+    if vertex.near is not None:
+        often = reflection_probability(reflectance, survival_boost(vertex.near))
         probability = dr.select(path.bsdf_pdf > 0, often, reflectance)
     reflected = vertex.is_mirror | (vertex.is_glass & (u < probability))
     return _Lobe(u, reflectance, probability, reflected)
@@ -191,14 +181,17 @@ def _strategy(
     context: PathContext, path: PathState, vertex: Vertex, goes_on: Any, may_reconnect: Any
 ) -> Strategy:
     """How the rays that leave a vertex are sampled."""
+    is_independent, beta = False, path.beta
     if may_reconnect is not False:
+        # Guide by what the suffix itself knows; cast all shadow rays.
         is_independent = may_reconnect & vertex.is_rough & is_reconnectable(vertex.si.bsdf)
-        return Strategy(is_view_independent=is_independent)
+        beta = dr.select(is_independent, mi.Color3f(1), beta)
     if vertex.near is None:
-        return Strategy()
+        return Strategy(is_view_independent=is_independent)
     may_aim = goes_on & (vertex.depth + 1 < context.fields.max_depth)
-    guiding = guiding_at(vertex.near, vertex.si.bsdf, path.beta, may_aim)
-    return Strategy(vertex.near, guiding, 1 - guiding.share, beta=path.beta)
+    guiding = guiding_at(vertex.near, vertex.si.bsdf, beta, may_aim)
+    throughput = path.beta if may_reconnect is False else None
+    return Strategy(vertex.near, guiding, 1 - guiding.share, is_independent, beta=throughput)
 
 
 def _emitted_light(
@@ -306,7 +299,7 @@ def _direct_light(
     return DirectLightSample(light, sample.d, incident, sample.emitter)
 
 
-def _scatter(step: _Step, goes_on: Any) -> _Scattered:
+def _scatter(step: _Step, goes_on: Any) -> ScatteredRay:
     """Draw a direction at a rough surface; mirrors and glass keep one, and glass is no vertex."""
     context, path, vertex, lobe = step.context, step.path, step.vertex, step.lobe
     si, frame, guiding = vertex.si, vertex.frame, step.strategy.guiding
@@ -330,11 +323,11 @@ def _scatter(step: _Step, goes_on: Any) -> _Scattered:
     may_reflect = may_pass & (vertex.depth < context.fields.max_depth)
     mirrored = lobe.reflected & may_reflect & (dr.dot(mirror_d, si.ng) > 0)
     passed = ((vertex.is_glass & ~lobe.reflected) | (si.valid & si.is_cutout)) & may_pass
-    return _Scattered(d, value, pdf, is_guided, target_face, bounced, mirrored, mirror_d, passed)
+    return ScatteredRay(d, value, pdf, is_guided, target_face, bounced, mirrored, mirror_d, passed)
 
 
-def _follow(step: _Step, scattered: _Scattered) -> tuple[PathState, Any]:
-    """(the path behind the vertex, whether it goes on)."""
+def _follow(step: _Step, scattered: ScatteredRay) -> tuple[PathState, DirectionPdfs, Any]:
+    """(the path behind the vertex, how it was drawn, whether it goes on)."""
     path, vertex, strategy, si = step.path, step.vertex, step.strategy, step.vertex.si
     bounced, mirrored, passed = scattered.bounced, scattered.mirrored, scattered.passed
     beta = _throughput(step, scattered)
@@ -352,27 +345,33 @@ def _follow(step: _Step, scattered: _Scattered) -> tuple[PathState, Any]:
     pdf, is_independent = scattered.pdf * strategy.bsdf_share, strategy.is_view_independent
     if is_independent is not False:
         independent = view_independent_pdf(si.bsdf, si.ng, scattered.d)
-        pdf = dr.select(is_independent, independent, scattered.pdf)
+        pdf = dr.select(is_independent, independent, pdf)
     straight_d = dr.select(mirrored, mi.Vector3f(scattered.mirror_d), path.d)
     d = dr.select(bounced, scattered.d, straight_d)
     outward = dr.select(dr.dot(d, si.ng) > 0, si.ng, -si.ng)
     here = no_reference(si.p) if vertex.near is None else vertex.near.reference
     is_null = passed | (vertex.is_glass & mirrored)
     target_face = dr.select(mirrored, NO_FACE, path.target_face)
-    return PathState(
-        o=offset_ray_origin(si.p, outward),
-        d=d,
-        beta=beta,
-        depth=vertex.depth,
-        n_nulls=path.n_nulls + dr.select(is_null, mi.UInt32(1), 0),
-        reference=dr.select(bounced, here, path.reference),
-        bsdf_pdf=dr.select(bounced, pdf, dr.select(mirrored, 0, path.bsdf_pdf)),
-        guiding_odds=dr.select(bounced, odds, dr.select(mirrored, 0, path.guiding_odds)),
-        target_face=dr.select(bounced, scattered.target_face, target_face),
-    ), alive
+    pdf_by_surface = dr.select(bounced, scattered.pdf, 0)
+    pdfs = DirectionPdfs(pdf_by_surface, mi.Float(strategy.bsdf_share), ratio * scattered.pdf)
+    return (
+        PathState(
+            o=offset_ray_origin(si.p, outward),
+            d=d,
+            beta=beta,
+            depth=vertex.depth,
+            n_nulls=path.n_nulls + dr.select(is_null, mi.UInt32(1), 0),
+            reference=dr.select(bounced, here, path.reference),
+            bsdf_pdf=dr.select(bounced, pdf, dr.select(mirrored, 0, path.bsdf_pdf)),
+            guiding_odds=dr.select(bounced, odds, dr.select(mirrored, 0, path.guiding_odds)),
+            target_face=dr.select(bounced, scattered.target_face, target_face),
+        ),
+        pdfs,
+        alive,
+    )
 
 
-def _roulette(step: _Step, scattered: _Scattered, beta: Any) -> tuple[Any, Any]:
+def _roulette(step: _Step, scattered: ScatteredRay, beta: Any) -> tuple[Any, Any]:
     """(probability to survive, Bool: survives) of Russian roulette, of what the surface draws."""
     q = dr.max(beta) / step.strategy.bsdf_share
     if step.strategy.near is not None:
@@ -384,7 +383,7 @@ def _roulette(step: _Step, scattered: _Scattered, beta: Any) -> tuple[Any, Any]:
     return dr.select(tested, dr.maximum(q, 1e-6), 1), survives
 
 
-def _throughput(step: _Step, scattered: _Scattered) -> Any:
+def _throughput(step: _Step, scattered: ScatteredRay) -> Any:
     """The path's throughput times f |cos| / pdf, or times the share of a mirror or glass."""
     vertex, lobe, bsdf = step.vertex, step.lobe, step.vertex.si.bsdf
     factor = dr.select(vertex.is_rough, scattered.value / scattered.pdf, mi.Color3f(1))

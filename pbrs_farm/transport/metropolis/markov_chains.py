@@ -19,7 +19,7 @@ import numpy as np
 
 from pbrs_farm.transport.kernels.bsdf import luminance
 from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera
-from pbrs_farm.transport.kernels.path_state import PathState, camera_path
+from pbrs_farm.transport.kernels.path_state import camera_path
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import (
     CAMERA_DIMS,
@@ -38,12 +38,8 @@ from pbrs_farm.transport.metropolis.film import (
     splat,
     target_function,
 )
-from pbrs_farm.transport.metropolis.reconnection import (
-    SUFFIX_FLOATS,
-    finish_suffix,
-    pass_probability,
-    record_suffix,
-)
+from pbrs_farm.transport.metropolis.reconnection import SUFFIX_FLOATS, finish_suffix, record_suffix
+from pbrs_farm.transport.metropolis.split_path import SplitPath, no_direction
 
 STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 7
 _MIN_STEP, _MAX_STEP = 1 / 1024, 1 / 64  # of a small mutation
@@ -75,19 +71,6 @@ class MutatedSampler:
     def get_2d(self, dim: Any) -> Any:
         """Point2f of dimensions dim and dim + 1."""
         return mi.Point2f(self.get_1d(dim), self.get_1d(mi.UInt32(dim) + 1))
-
-
-@dataclass
-class SplitPath:
-    """A path under way, split at its second vertex into prefix and suffix."""
-
-    path: PathState  # beyond the second vertex its throughput is the suffix's own
-    light: mi.Color3f  # of paths that end at the second vertex or before
-    prefix_beta: mi.Color3f  # throughput up to the second vertex
-    suffix_light: mi.Color3f  # from beyond, the prefix's throughput not counted
-    is_straight: mi.Bool  # the first vertex is rough; since, only glass and cut-outs were passed
-    passed: mi.Float  # probability of having passed those
-    shared: mi.Float  # share of the light that its suffix shows to other pixels
 
 
 @dataclass
@@ -164,7 +147,7 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
 
         # 3. Splat the path that is left behind; move on, or stay.
         keeps_suffix = accept & (proposed.shared > 0)
-        finish_suffix(y_suffix, proposed.light, y.suffix_light, keeps_suffix)
+        finish_suffix(y_suffix, proposed.light, y, keeps_suffix)
         x = _move(film, lane, x, proposed, a, accept, done)
         x_samples = _accept_samples(x_samples, proposal, accept)
         x_suffix = _copy(y_suffix, x_suffix, SUFFIX_FLOATS, keeps_suffix)
@@ -193,10 +176,10 @@ def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
         y, alive = _extend(context, sampler, y, suffix, active)
         active = active & alive
     # The suffix's light was gathered without the prefix's throughput.
-    light = y.light + y.prefix_beta * y.suffix_light
+    light: Any = _path_light(y)
     target = target_function(film, pixel, light)
     target = dr.select(dr.isfinite(target), target, 0)
-    finish_suffix(suffix, light, y.suffix_light, y.shared > 0)
+    finish_suffix(suffix, light, y, y.shared > 0)
     suffixes = _store(suffix, SUFFIX_FLOATS, n)
     return Chains(mi.Float(0), light, target, pixel, y.shared, suffixes)
 
@@ -210,6 +193,9 @@ def _camera_split_path(camera: DeviceCamera | LensCamera, corner: Any, offset: A
         suffix_light=mi.Color3f(0),
         is_straight=mi.Bool(False),
         passed=mi.Float(1),
+        first=no_direction(),
+        second=no_direction(),
+        suffix_weight=mi.Float(1),
         shared=mi.Float(0),
     )
 
@@ -223,37 +209,54 @@ def _extend(
     may_reconnect = split.is_straight & (before == 1)
     following, result, alive = advance(context.paths, sampler, path, active, may_reconnect)
 
+    # Apply the weight of guided rays; that of the suffix's first ray depends on its prefix.
+    is_first = before == 2
+    weight = dr.select(is_first, 1, result.guided_weight)
+    following.beta *= weight
+    alive &= result.guided_weight > 0
+
     # Count the light of paths that are long enough.
     emitted = result.emitted_outdoor + result.emitted_indoor
     direct = result.direct_outdoor + result.direct_indoor
-    emitted = dr.select(before + 1 >= least, emitted, 0)
-    direct = dr.select(following.depth + 1 >= least, direct, 0)
+    emitted = dr.select(before + 1 >= least, emitted * weight, 0)
+    direct = dr.select(following.depth + 1 >= least, direct * weight, 0)
 
     # Split the path where it makes its second vertex.
     is_beyond = before >= 2
     is_second = active & (before < 2) & (following.depth == 2)
     is_independent, asked = result.is_view_independent, context.paths.emitter_filter
-    bounded = record_suffix(suffix, result, path, split.passed, asked, is_second & is_independent)
+    reach = split.first, split.passed
+    bounded = record_suffix(suffix, result, path, reach, asked, is_second & is_independent)
     prefix_beta = dr.select(is_second, following.beta, split.prefix_beta)
     following.beta = dr.select(is_second, 1, following.beta)
 
     # Share only what joins rough vertices; what reflects, glass too, forgets the direction's pdf.
     stays_straight = split.is_straight & (following.bsdf_pdf > 0)
-    can_reconnect = is_independent & (result.pdf > 0)
+    can_reconnect = is_independent & (result.pdfs.bsdf > 0) & (weight > 0)
+    first_weight = dr.select(is_first, result.guided_weight, 1)
     return SplitPath(
         path=following,
         light=split.light + dr.select(is_beyond, 0, emitted + direct),
         prefix_beta=prefix_beta,
         suffix_light=split.suffix_light + dr.select(is_beyond, emitted + direct, 0),
         is_straight=dr.select(before == 0, result.is_rough, stays_straight),
-        passed=split.passed * dr.select(before == 1, pass_probability(result.si, path.d), 1),
+        passed=split.passed * dr.select(before == 1, result.pass_probability, 1),
+        first=dr.select(before == 0, result.pdfs, split.first),
+        second=dr.select(is_second, result.pdfs, split.second),
+        suffix_weight=split.suffix_weight * first_weight,
         shared=dr.select(is_second, dr.select(can_reconnect, bounded, 0), split.shared),
     ), alive
 
 
+def _path_light(y: SplitPath) -> Any:
+    """The light of a path that has ended."""
+    suffix_beta: Any = y.prefix_beta
+    return y.light + suffix_beta * y.suffix_weight * y.suffix_light
+
+
 def _proposed_state(film: Film, y: SplitPath, pixel: Any, reconnects: Any) -> tuple[_State, Any]:
     """(the state of a path that has ended, whether its light is finite; black where not)."""
-    light = y.light + y.prefix_beta * y.suffix_light
+    light = _path_light(y)
     good = dr.isfinite(luminance(light))
     light = dr.select(good, light, 0)
     target = target_function(film, pixel, light)

@@ -25,6 +25,8 @@ times s of the chain's own; the rest, 1 - s, stays with the path's own pixel. Ea
 mean, so no distance is left out, and s K is bounded (Keller's instant radiosity and its bounded
 geometry terms, Kollig and Keller 2006, with the rest by paths of the chain).
 
+Rays are guided (guided_rays.py): p2 is the pdf by all techniques, of which only the surface's own
+depends on the prefix. A ray that was aimed at a face and met another keeps p2 = 1 and has no T.
 Thin glass and cut-outs between x1 and x2 let a suffix through, with the share of the light they let
 through. A mirror at x1 or a reflection between the two leave a path to its own pixel.
 """
@@ -38,15 +40,16 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from pbrs_farm.transport.kernels.bsdf import Bsdf, evaluate_bsdf, thin_glass_reflectance
-from pbrs_farm.transport.kernels.device_scene import (
-    DeviceScene,
-    SurfaceInteraction,
-    bend_normal,
-    offset_ray_origin,
-)
+from pbrs_farm.transport.kernels.bsdf import Bsdf, evaluate_bsdf
+from pbrs_farm.transport.kernels.device_scene import DeviceScene, bend_normal, offset_ray_origin
 from pbrs_farm.transport.kernels.packets import colour, point, vector
-from pbrs_farm.transport.kernels.path_state import EmitterFilter, PathState, StepResult, camera_path
+from pbrs_farm.transport.kernels.path_state import (
+    DirectionPdfs,
+    EmitterFilter,
+    PathState,
+    StepResult,
+    camera_path,
+)
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import Sampler, SobolSampler, device_array, stream_key
 from pbrs_farm.transport.metropolis.film import (
@@ -57,7 +60,7 @@ from pbrs_farm.transport.metropolis.film import (
     splat,
     target_function,
 )
-from pbrs_farm.transport.scene_tables.material_rows import GLASS
+from pbrs_farm.transport.metropolis.split_path import SplitPath
 
 SUFFIX_FLOATS: Final = 36
 MAX_SHARED_PDF: Final = 4.0  # 1 / m2; by a matte surface, 0.28 m straight before it
@@ -70,7 +73,8 @@ _NO_PIXEL: Final = 0xFFFFFFFF
 _PREFIX_SEED: Final = 0x6A09E667  # not the chains'
 
 # Columns of a suffix that are written one by one; record_suffix lists the others.
-_PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT = 3, 28, 31, 32
+# At the end _PDFS holds the share of p2 that the surface draws, _GUIDED_PDF the rest of p2.
+_PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT, _GUIDED_PDF = 3, 28, 31, 32, 35
 
 
 class PixelGroups(NamedTuple):
@@ -192,33 +196,29 @@ def _trace_prefix(context: ChainContext, sampler: Sampler, pixel: Any) -> _Prefi
     return prefix
 
 
-def pass_probability(si: SurfaceInteraction, d: Any) -> Any:
-    """Probability that a path goes straight through what it met: below 1 for glass, else 1."""
-    is_glass = si.valid & ~si.is_cutout & (si.bsdf.kind == GLASS)
-    return dr.select(is_glass, 1 - thin_glass_reflectance(dr.dot(si.n, d)), 1)
-
-
 def record_suffix(
     suffix: Any,
     result: StepResult,
     path: PathState,
-    passed: Any,
+    reach: tuple[DirectionPdfs, Any],
     emitter_filter: EmitterFilter,
     active: Any,
 ) -> Any:
     """Record, in local memory, the second vertex of a path just after it was made.
 
     The share of its light to reconnect. path: as it was when it set out from the first vertex, or
-    from the last sheet of glass on the way; passed: probability of having passed those.
+    from the last sheet of glass on the way; reach: how the first vertex was left, and the
+    probability of having passed those sheets.
     """
     si, bsdf, d = result.si, result.si.bsdf, result.scattered_d
     direct = result.outdoor_sample if emitter_filter.indoor is None else result.indoor_sample
-    # Convert to K's measure: by the pdfs of x2 and of leaving it, and the probability of the glass
-    # between.
+    # Convert to K's measure: by the pdf of x2 by all techniques, and the probability of the glass
+    # between. That of leaving x2 is known only where the ray ends.
+    left, passed = reach
     cos = dr.abs(dr.dot(si.ng, path.d))
     distance2 = dr.squared_norm(si.p - path.reference.p)
-    area_pdf = path.bsdf_pdf * cos / distance2
-    pdfs = area_pdf * result.pdf * passed
+    measure = cos / distance2
+    pdfs = left.techniques / dr.maximum(result.guided_weight, 1e-30) * measure * passed
     values = (
         *_xyz(si.p), pdfs,
         *_xyz(si.n_interpolated), bsdf.alpha,
@@ -231,7 +231,7 @@ def record_suffix(
     for k, value in enumerate(values):
         suffix.write(value, mi.UInt32(k), active)
     suffix.write(direct.d.z, mi.UInt32(_EMITTER_Z), active)
-    return _shared_share(area_pdf)
+    return _shared_share(left.bsdf * measure)
 
 
 def _shared_share(area_pdf: Any) -> Any:
@@ -239,12 +239,21 @@ def _shared_share(area_pdf: Any) -> Any:
     return MAX_SHARED_PDF / dr.maximum(area_pdf, MAX_SHARED_PDF)
 
 
-def finish_suffix(suffix: Any, light: Any, arriving: Any, active: Any) -> None:
-    """Add what is known at a path's end: its light, and what arrived at x2 from x3 (T)."""
-    own = light * suffix.read(mi.UInt32(_PDFS), active)
+def finish_suffix(suffix: Any, light: Any, split: SplitPath, active: Any) -> None:
+    """Add what is known at a path's end: its light, what arrived at x2 from x3 (T), p2's parts."""
+    # Find the pdf of leaving x2: share * bsdf + guided; of a ray that missed its target, 1.
+    second, weight = split.second, split.suffix_weight
+    is_known = weight > 0
+    pdf = dr.select(is_known, second.techniques / dr.maximum(weight, 1e-30), 1)
+    share = dr.select(is_known, second.share, 0)
+    guided = dr.maximum(pdf - share * second.bsdf, 0)
+    arriving = dr.select(is_known, split.suffix_light, 0)
+    own = light * (suffix.read(mi.UInt32(_PDFS), active) * pdf)
     for c in range(3):
         suffix.write(arriving[c], mi.UInt32(_ARRIVING + c), active)
         suffix.write(own[c], mi.UInt32(_OWN_LIGHT + c), active)
+    suffix.write(share, mi.UInt32(_PDFS), active)
+    suffix.write(guided, mi.UInt32(_GUIDED_PDF), active)
 
 
 def reconnect(
@@ -356,7 +365,8 @@ def _scattered_suffix(x2: list[Any], ng: Any, d: Any) -> tuple[Any, Any]:
     to_x3 = mi.Vector3f(x2[2][3], x2[3][3], x2[4][3])
     from_emitter, _pdf = _evaluate_consistent(bsdf, frame, ng, wi, to_emitter)
     from_x3, pdf = _evaluate_consistent(bsdf, frame, ng, wi, to_x3)
-    return from_emitter * colour(x2[6]) * pdf + from_x3 * colour(x2[7]), pdf
+    p2 = x2[0][3] * pdf + x2[8][3]
+    return from_emitter * colour(x2[6]) * p2 + from_x3 * colour(x2[7]), pdf
 
 
 def _evaluate_consistent(bsdf: Bsdf, frame: Any, ng: Any, wi: Any, d: Any) -> tuple[Any, Any]:

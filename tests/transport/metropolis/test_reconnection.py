@@ -15,6 +15,7 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from tests.transport import hard_rooms
 from tests.transport.metropolis.test_metropolis import METROPOLIS
 from tests.transport.test_path_tracer import FIELDS, RECIPE
 
@@ -101,9 +102,35 @@ def slot_room() -> tuple[House, Camera]:
     )
 
 
-@pytest.mark.parametrize("room", [coated_room, slot_room])
+def shaded_room() -> tuple[House, Camera]:
+    """A bulb deep in a shade, another in a cup in a globe: rays are guided; coated walls and boxes."""
+    surfaces = rooms.shell((4.0, 2.5, 4.0), 0)
+    surfaces.append(hard_rooms.cylinder((2.0, 1.3, 2.2), 0.12, 0.35, 1))
+    surfaces.append(rooms.box((2.4, 0.0, 2.4), (3.2, 0.6, 3.2), 2, "glossy"))
+    surfaces.append(hard_rooms.cylinder((0.9, 1.42, 2.8), 0.06, 0.1, 1))
+    surfaces.append(rooms.sphere((0.9, 1.5, 2.8), 0.12, 3, n=16))
+    materials = [
+        Material("coat", diffuse=(0.6, 0.6, 0.5), specular=(0.6, 0.6, 0.6), shininess=60.0),
+        rooms.matte("white", 0.7),
+        Material("glossy", diffuse=(0.3, 0.3, 0.3), specular=(0.9, 0.9, 0.9), shininess=150.0),
+        Material("glass", kind=MaterialKind.GLASS, opacity=0.1),
+        rooms.BULB,
+    ]
+    lamps = [
+        rooms.bulb((2.0, 1.45, 2.2), 4, 800.0, radius=0.03),
+        rooms.bulb((0.9, 1.47, 2.8), 4, 300.0, radius=0.02),
+    ]
+    return rooms.house(surfaces, materials, lamps=lamps), rooms.camera(
+        (0.5, 1.5, 0.4), (2.2, 0.8, 2.6)
+    )
+
+
+# The tolerance of the mean is above 4 standard deviations of four pictures of each.
+@pytest.mark.parametrize(
+    ("room", "tolerance"), [(coated_room, 0.02), (slot_room, 0.02), (shaded_room, 0.08)]
+)
 def test_reconnected_suffixes_leave_the_mean_as_path_has_it(
-    room: Callable[[], tuple[House, Camera]],
+    room: Callable[[], tuple[House, Camera]], tolerance: float
 ) -> None:
     # Significance: 16 blocks, |z| < 5: missed by chance once in 100,000 runs.
     house, camera = room()
@@ -117,7 +144,7 @@ def test_reconnected_suffixes_leave_the_mean_as_path_has_it(
     theirs = [blocks(r.group(Group.INDOOR)) for r in paths]
     z = z_scores(ours, theirs)
     assert np.abs(z).max() < 5
-    assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.02)
+    assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=tolerance)
 
 
 def test_reconnecting_suffixes_cuts_the_error_of_the_same_chains() -> None:
