@@ -57,6 +57,7 @@ class Plan:
     gain: float = 0.2  # brightness times 1 +- gain
     gamma: float = 0.2  # brightness to the power of 1 +- gamma
     tint: float = 0.08  # each channel times 1 +- tint
+    hue: float = 0.0  # colours turned about grey by +- hue of half a turn, 1 = any
     noise: float = 0.02  # sd of noise, of 1
     # Machine
     device: str = "auto"  # auto, cpu, cuda
@@ -79,8 +80,9 @@ class Plan:
                             ("judge_views", 1), ("final_views", 1)):  # fmt: skip
             if getattr(self, name) < least:
                 raise BadInput("plan", name, f"expected {least} or more, got {getattr(self, name)}")
-        if self.network == "small" and (self.width_px % 2 or self.height_px % 2):
-            text = f"{self.width_px}x{self.height_px}: network small wants even numbers"
+        halved = self.network in ("small", "residual")
+        if halved and (self.width_px % 2 or self.height_px % 2):
+            text = f"{self.width_px}x{self.height_px}: network {self.network} wants even numbers"
             raise BadInput("plan", "width_px, height_px", text)
         if self.memory_gb < 0:
             raise BadInput("plan", "memory_gb", f"expected 0 or more, got {self.memory_gb}")

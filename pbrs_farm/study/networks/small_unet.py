@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from pbrs_farm.study.networks.vgg import start_he
 
-_FOLD = 2
+FOLD = 2
 
 
 class SmallUnet(nn.Module):  # type: ignore[misc]
@@ -23,19 +23,19 @@ class SmallUnet(nn.Module):  # type: ignore[misc]
 
     def __init__(self, n_out: int = 3, widths: tuple[int, ...] = (32, 64, 112, 160)) -> None:
         super().__init__()
-        n_in = 3 * _FOLD**2 + 2
+        n_in = 3 * FOLD**2 + 2
         self.stem = _block(n_in, widths[0])
         pairs = list(itertools.pairwise(widths))
         self.down = nn.ModuleList(_block(a, b) for a, b in pairs)
         self.context = nn.Linear(widths[-1], widths[-1])
         self.up = nn.ModuleList(_block(a + b, a) for a, b in reversed(pairs))
         start_he(self)
-        self.head = nn.Conv2d(widths[0], n_out * _FOLD**2, 3, padding=1)
+        self.head = nn.Conv2d(widths[0], n_out * FOLD**2, 3, padding=1)
 
     def forward(self, x: Tensor) -> Tensor:
         """The map, of no particular length."""
-        x = functional.pixel_unshuffle(x, _FOLD)
-        x = self.stem(torch.cat([x, _rows_and_columns(x)], 1))
+        x = functional.pixel_unshuffle(x, FOLD)
+        x = self.stem(torch.cat([x, rows_and_columns(x)], 1))
         # Go down, keep each stage; let the deepest know the whole picture's mean.
         kept: list[Tensor] = []
         for down in self.down:
@@ -48,7 +48,7 @@ class SmallUnet(nn.Module):  # type: ignore[misc]
             size = beside.shape[-2:]
             x = functional.interpolate(x, size, mode="bilinear", align_corners=False)
             x = up(torch.cat([x, beside], 1))
-        return functional.pixel_shuffle(self.head(x), _FOLD)
+        return functional.pixel_shuffle(self.head(x), FOLD)
 
 
 def _block(n_in: int, n_out: int) -> nn.Sequential:
@@ -59,7 +59,7 @@ def _block(n_in: int, n_out: int) -> nn.Sequential:
     return nn.Sequential(*layers)
 
 
-def _rows_and_columns(x: Tensor) -> Tensor:
+def rows_and_columns(x: Tensor) -> Tensor:
     """(B, 2, H, W): -1 to 1 down the rows, and along the columns."""
     batch, _, height, width = x.shape
     rows = torch.linspace(-1, 1, height, dtype=x.dtype, device=x.device)

@@ -1,6 +1,8 @@
-"""Random changes to a batch that leave its labels true: mirror, enlarge, light; torch, no effects."""
+"""Random changes to a batch that leave its labels true: mirror, enlarge, hue, light; torch, no effects."""
 
 from __future__ import annotations
+
+from math import pi, sqrt
 
 import torch
 from torch import Tensor
@@ -24,11 +26,24 @@ def augmented(batch: Batch, task: Task, plan: Plan, dice: torch.Generator) -> Ba
         batch["colour"] = torch.where(flips.view(-1, 1, 1, 1), colour.flip(3), colour)
     if plan.zoom > 1:
         batch = _enlarged(batch, 1 / (1 + drawn() * (plan.zoom - 1)), 2 * drawn(2) - 1)
+    if plan.hue > 0:
+        batch["colour"] = turned_hue(batch["colour"], plan.hue * pi * (2 * drawn() - 1))
     batch["colour"] = _relit(batch["colour"], plan, drawn)
     if plan.noise > 0:
         noise = torch.randn(batch["colour"].shape, generator=dice).to(device)
         batch["colour"] = batch["colour"] + plan.noise * noise
     return batch
+
+
+def turned_hue(colour: Tensor, angles: Tensor) -> Tensor:
+    """Colours (B, 3, H, W) turned about the grey axis by angles (B,), radians: other paint, same light."""
+    cos, sin = torch.cos(angles), torch.sin(angles)
+    # Rodrigues' formula about (1, 1, 1) / sqrt(3): three numbers that go round.
+    same = cos + (1 - cos) / 3
+    next_, last = (1 - cos) / 3 - sin / sqrt(3), (1 - cos) / 3 + sin / sqrt(3)
+    rows = torch.stack([same, next_, last], 1)
+    turn = torch.stack([rows, rows.roll(1, 1), rows.roll(2, 1)], 1)
+    return torch.einsum("bij,bjhw->bihw", turn, colour).clamp(0, 1)
 
 
 def _relit(colour: Tensor, plan: Plan, drawn: object) -> Tensor:

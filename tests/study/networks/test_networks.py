@@ -39,8 +39,23 @@ def test_the_small_network_has_about_1_2_million_weights() -> None:
     assert 1.0e6 < n_weights(network_of("small", 3)) < 1.4e6
 
 
+def test_the_residual_network_has_about_2_3_million_weights() -> None:
+    assert 2.2e6 < n_weights(network_of("residual", 3)) < 2.5e6
+
+
+def test_a_far_corner_of_the_picture_changes_what_the_residual_network_says() -> None:
+    torch.manual_seed(0)
+    network = network_of("residual", 3).eval()
+    picture = torch.rand(1, 3, 480, 640)
+    other = picture.clone()
+    other[:, :, 470:, 630:] = 1 - other[:, :, 470:, 630:]
+    with torch.no_grad():
+        before, after = network(picture), network(other)
+    assert not torch.equal(before[..., :32, :32], after[..., :32, :32])
+
+
 @pytest.mark.parametrize(
-    "name", ["small", "paper_tiny", "dilated_tiny", "dilated_small", "hed_tiny"]
+    "name", ["small", "residual", "paper_tiny", "dilated_tiny", "dilated_small", "hed_tiny"]
 )
 @pytest.mark.parametrize("size", [(48, 64), (50, 70)])
 def test_a_map_is_as_large_as_its_picture(name: str, size: tuple[int, int]) -> None:
