@@ -21,7 +21,7 @@ HELD_OUT = ("studio", "2bedroomapartment", "3bedroomhousewithattic")
 # The modes of Metropolis come from one trace, those of OpenGL cost a hundredth of it: all four.
 _MODES: Final = ("--modes", "mlt_il_ol", "opengl_dl", "mlt_ol", "opengl_il")
 _OF_HOMES: Final = (*_MODES, "--views", "45")
-_OF_DRESSED: Final = ("--dress", "1", *_MODES, "--views", "20")
+_OF_DRESSED: Final = ("--dress", "1..2", *_MODES, "--views", "32")
 # As `fast` and `preview` chose views before the preset `photo` was there (commit 69b80dd^).
 _OLD_CAMERAS: Final = {
     "preset": "paper", "height_min_m": 1.5, "height_max_m": 1.6, "tilt_deg": 11, "tilt_sd_deg": 0,
@@ -36,7 +36,7 @@ ROOTS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "bare_fast": (HOMES, (*_OLD_WORDS, *_OF_HOMES)),
     "bare_photo": (HOMES, _OF_HOMES),
     "dressed": (HOMES, _OF_DRESSED),
-    "made": (("made:1..12",), ("--dress", "1", *_MODES, "--views", "12")),
+    "made": (("made:1..16",), ("--dress", "1", *_MODES, "--views", "20")),
 }
 """Name -> homes, and the words of `run` behind them."""
 

@@ -133,10 +133,11 @@ _H200: Final[dict[str, Any]] = {
     "name": "h200", "device": "cuda", "bf16": True, "checkpoint_every": 1000, "log_every": 100,
     "judge_every": 1000, "memory_gb": 32.0, "workers": 8,
 }  # fmt: skip
-# Chord and strong changes of light were the better ones of seven short trials (docs/study.md).
+# The best of sixteen trials on homes that never trained (docs/study.md).
 _TINY_NORMALS = Plan(
-    "tiny", "normals", "small", loss="chord", gain=0.4, gamma=0.4, tint=0.15, judge_every=110
-)
+    "tiny", "normals", "residual", steps=3000, rate=1.5e-3, weight_decay=0.1, gain=0.3, gamma=0.3,
+    tint=0.1, hue=1.0, judge_every=300,
+)  # fmt: skip
 _TINY_CLASSES = Plan("tiny", "segmentation", "small", steps=1500, judge_every=150)
 _TINY_EDGES = Plan(
     "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01,
@@ -201,7 +202,9 @@ def plan_as_json(plan: Plan) -> dict[str, Any]:
 
 def plan_as_trained(plan: Plan) -> dict[str, Any]:
     """Every field that weights or figures depend on: what a run that goes on must share."""
-    return {name: value for name, value in asdict(plan).items() if name not in _FREE}
+    row = {name: value for name, value in asdict(plan).items() if name not in _FREE}
+    # A field that came later is left out where it changes nothing: runs of before go on.
+    return row if plan.hue else {name: value for name, value in row.items() if name != "hue"}
 
 
 def plan_from_json(row: dict[str, Any], file: str) -> Plan:

@@ -73,7 +73,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(task: str, tmp_path: Path) -> 
 
 
 def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
-    plan = small_plan(steps="2")
+    plan = small_plan(steps="2", hue="0")
     first = train(Job(plan, tmp_path), views(3, plan))
     steps: list[dict[str, float]] = []
     assert train(Job(plan, tmp_path), views(3, plan), observe=steps.append) == json.loads(
@@ -158,7 +158,7 @@ def test_four_views_can_be_learnt_by_heart(tmp_path: Path) -> None:
     plan = plan_of(
         "normals", "tiny",
         {"width_px": "80", "height_px": "60", "batch": "4", "steps": "60", "threads": "1",
-         "flip": "false", "gain": "0", "gamma": "0", "tint": "0", "noise": "0"},
+         "flip": "false", "gain": "0", "gamma": "0", "tint": "0", "hue": "0", "noise": "0"},
     )  # fmt: skip
     figures = train(Job(plan, tmp_path), views(4, plan))
     assert figures["network"]["train"]["mean_deg"] < 12
@@ -181,10 +181,10 @@ def test_errors_on_training_and_held_out_views_are_drawn(tmp_path: Path) -> None
 
 
 def test_a_run_of_before_a_field_was_there_goes_on(tmp_path: Path) -> None:
-    plan = small_plan(steps="2")
+    plan = small_plan(steps="2", hue="0")
     first = train(Job(plan, tmp_path), views(3, plan))
     record = RunFolder(tmp_path).record()
-    for name in ("workers", "memory_gb", "judge_every", "judge_views", "final_views"):
+    for name in ("hue", "workers", "memory_gb", "judge_every", "judge_views", "final_views"):
         del record["plan"][name]
     RunFolder(tmp_path).write("run.json", record)
     assert train(Job(plan, tmp_path), views(3, plan))["network"] == first["network"]
@@ -198,9 +198,10 @@ def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:
             train(Job(plan, out), views(3, plan))
 
 
-def test_a_size_that_the_small_network_cannot_halve_is_one_line() -> None:
-    with pytest.raises(BadInput, match="33x32: network small wants even numbers"):
-        small_plan(width_px="33")
+@pytest.mark.parametrize("network", ["small", "residual"])
+def test_a_size_that_the_network_cannot_halve_is_one_line(network: str) -> None:
+    with pytest.raises(BadInput, match=f"33x32: network {network} wants even numbers"):
+        small_plan(width_px="33", network=network)
     assert small_plan("boundaries", width_px="33").width_px == 33
 
 
