@@ -28,6 +28,7 @@ OWN_TARGET: Final = {
     "dress": "dress.dress",
     "made": "homes.made",
     "light": "light.equal_time",
+    "light_pictures": "light.light_pictures",
     "denoised": "light.denoised",
     "growth": "light.growth",
     "guided": "light.guided",

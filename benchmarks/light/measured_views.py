@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.read.source import resolve, variants
 from pbrs_farm.run.house_cache import decoded_textures
@@ -41,14 +42,25 @@ EIGHT: Final = tuple(
 def loaded(
     views: tuple[MeasuredView, ...], recipe: Recipe, size: tuple[int, int]
 ) -> Iterator[tuple[MeasuredView, LightScene, Camera]]:
-    """Each view with the scene of its house and its camera; one scene at a time is held."""
+    """Each view with the scene of its house and its camera; one scene at a time is held.
+
+    Views of one house that follow each other share its scene.
+    """
+    held: tuple[str, int] | None = None
     for view in views:
-        (source,) = variants(resolve(view.home), [view.dress_seed])
-        house, _report = repaired_house(source, recipe)
-        textures, _unreadable = decoded_textures(house)
-        # The sky of the bare home, so that dressing changes no light from outdoors.
-        sky = sky_for_house(recipe, resolve(view.home).house_id)
-        scene = LightScene.load(house, textures, recipe, sky)
+        if held != (view.home, view.dress_seed):
+            house, scene = _loaded_house(view, recipe)
+            held = view.home, view.dress_seed
         stored = house.cameras[view.camera]
         intrinsics = Intrinsics.from_hfov(*size, stored.hfov_rad)
         yield view, scene, Camera.look(intrinsics, stored.eye, stored.towards)
+
+
+def _loaded_house(view: MeasuredView, recipe: Recipe) -> tuple[House, LightScene]:
+    (source,) = variants(resolve(view.home), [view.dress_seed])
+    house, _report = repaired_house(source, recipe)
+    textures, _unreadable = decoded_textures(house)
+    # The sky of the bare home, so that dressing changes no light from outdoors.
+    sky = sky_for_house(recipe, resolve(view.home).house_id)
+    scene = LightScene.load(house, textures, recipe, sky)
+    return house, scene

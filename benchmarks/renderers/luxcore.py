@@ -5,7 +5,7 @@ are written to out/bench/luxcore as the tables that our own kernels gather from;
 benchmarks/renderers/luxcore_scene.py, a process of its own, renders them: LuxCore's PATHCPU and BIDIRCPU, each
 with its Sobol and with its Metropolis sampler. LUXCORE_SCENES="door home" names some scenes.
 
-Scenes: the rooms of benchmarks/light/equal_time.py and the first stored camera of an example home, its coats
+Scenes: the rooms of benchmarks/light/shots.py and the first stored camera of an example home, its coats
 taken off. Both engines: the sum of all light, 64x48 pixels, box filter, 12 segments, no denoiser, no
 clamping, all cores. LuxCore's roulette is on where its pictures stay right with it: in PATHCPU where
 no sky shines (docs/light.md).

@@ -1,4 +1,4 @@
-"""Rooms in which light is hard to find, for the Metropolis tests and benchmarks/light/equal_time.py."""
+"""Rooms in which light is hard to find, for the Metropolis tests and benchmarks/light/shots.py."""
 
 from __future__ import annotations
 
