@@ -36,7 +36,7 @@ ROOTS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "bare_fast": (HOMES, (*_OLD_WORDS, *_OF_HOMES)),
     "bare_photo": (HOMES, _OF_HOMES),
     "dressed": (HOMES, _OF_DRESSED),
-    "made": (("made:1..16",), ("--dress", "1", *_MODES, "--views", "20")),
+    "made": (("made:1..22",), ("--dress", "1", *_MODES, "--views", "20")),
 }
 """Name -> homes, and the words of `run` behind them."""
 

@@ -138,7 +138,10 @@ _TINY_NORMALS = Plan(
     "tiny", "normals", "residual", steps=4000, rate=1.5e-3, weight_decay=0.1, gain=0.3, gamma=0.3,
     tint=0.1, hue=1.0, judge_every=400,
 )  # fmt: skip
-_TINY_CLASSES = Plan("tiny", "segmentation", "small", steps=1500, judge_every=150)
+_TINY_CLASSES = Plan(
+    "tiny", "segmentation", "residual", steps=1500, rate=2e-3, weight_decay=0.1, hue=0.3,
+    judge_every=150,
+)  # fmt: skip
 _TINY_EDGES = Plan(
     "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01,
     judge_every=200, **_EDGE_JUDGING,
