@@ -77,8 +77,11 @@ class OutdoorChoice:
         """Count vertices at p; technique: the one that is asked for alone, or less than 0."""
         counted = active & (technique >= 0)
         place = self._voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
-        dr.scatter_add(counts.vertices, mi.UInt32(1), place, counted)
-        dr.scatter_add(counts.lit, mi.UInt32(1), place, counted & is_lit)
+        # Add in place: a copy for each thread would put the number of voxels into the kernel, and
+        # every home would compile one of its own.
+        one, mode = mi.UInt32(1), dr.ReduceMode.Direct
+        dr.scatter_add(counts.vertices, one, place, counted, mode=mode)
+        dr.scatter_add(counts.lit, one, place, counted & is_lit, mode=mode)
 
     def _voxel(self, p: Any) -> Any:
         at = dr.maximum((mi.Vector3f(p) - self._low) * self._scale, 0)

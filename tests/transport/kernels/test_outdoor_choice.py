@@ -71,8 +71,31 @@ def test_weights_by_place_leave_the_mean_alone_and_cut_the_noise(
     again = scene.render(camera, "-", FIELDS, 10)
     np.testing.assert_array_equal(again.outdoor, by_place[0].outdoor)
     monkeypatch.setattr(pilot, "weights_by_place", lambda _weights, _counts: None)
-    everywhere = [scene.render(camera, "-", FIELDS, seed) for seed in range(10, 18)]
+    everywhere = [scene.render(camera, "-", FIELDS, seed) for seed in range(20, 28)]
     sums = [[blocks(r.group(Group.OUTDOOR)) for r in runs] for runs in (by_place, everywhere)]
     assert np.abs(z_scores(*sums)).max() < 4.5
     noises = [np.mean([r.noise["outdoor"] ** 2 for r in runs]) for runs in (by_place, everywhere)]
     assert noises[0] < noises[1]
+
+
+def test_a_home_of_another_size_is_traced_by_the_same_kernel() -> None:
+    import drjit as dr
+
+    traced = []
+    for size in ((4.0, 2.5, 4.0), (9.0, 2.5, 7.0), (31.0, 6.0, 23.0)):
+        lamp = rooms.bulb((1.0, 2.0, 1.0), 1, 900.0)
+        house = rooms.house(
+            rooms.shell(size, 0), [rooms.matte("wall", 0.7), rooms.BULB], lamps=[lamp]
+        )
+        sky = sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.35)
+        scene = LightScene.load(house, {}, RECIPE, sky)
+        camera = rooms.camera((0.5, 1.5, 0.5), (2.0, 1.0, 2.0)).with_size(16, 12)
+        scene.emitters(camera, FIELDS, 1)  # the first view measures lampshades
+        dr.kernel_history_clear()
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            scene.render(camera, "-", FIELDS.model_copy(update={"spp": 1}), 2)
+            kernels = dr.kernel_history([dr.KernelType.JIT])
+        # The other kernels are copies of a few operations.
+        traced.append({k["hash"] for k in kernels if k["operation_count"] > 1000})
+    assert len(traced[0]) == 1
+    assert all(kernels == traced[0] for kernels in traced)
