@@ -119,7 +119,9 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
     x_samples = _load(chains.samples, STORED_DIMS, n_chains)
     x_suffix = _load(chains.suffixes, SUFFIX_FLOATS, n_chains)
     y_suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
-    x = _State(chains.light, chains.target, chains.pixel, mi.Float(chains.shared), mi.Float(0))
+    # Bootstrap paths have a share for other pixels even where there are none to share with.
+    shared = dr.select(how.reconnects, chains.shared, 0)
+    x = _State(chains.light, chains.target, chains.pixel, mi.Float(shared), mi.Float(0))
     corner = mi.Point2f(mi.Float(0) * mi.Float(lane), 0)
     y = _camera_split_path(context.camera, corner, mi.Point2f(0))
     sums = ChainSums(mi.Float(0), mi.Float(0), mi.Float(0), mi.UInt32(0))

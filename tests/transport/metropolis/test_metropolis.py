@@ -104,3 +104,24 @@ def test_direct_samples_and_mutations_never_pose_as_samples_of_path() -> None:
     assert "spp" not in result.facts
     assert result.facts["direct_spp"] == 3
     assert result.facts["indoor"]["mutations"] > 0
+
+
+@pytest.mark.parametrize(("tail_pixels", "min_segments"), [(0, 3), (256, 1)])
+def test_chains_that_share_nothing_splat_every_step(tail_pixels: int, min_segments: int) -> None:
+    from pbrs_farm.transport.metropolis.integrator import chain_run
+    from pbrs_farm.transport.sample_passes import SampledView
+
+    house, camera = rooms.window_room(0.7, lumen=800)
+    camera = camera.with_size(32, 24)
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    fields = METROPOLIS.model_copy(update={"tail_pixels": tail_pixels})
+    emitters, _weights = scene.emitters(camera, fields, 1)
+    view = SampledView(scene.device_scene, emitters, camera, fields, 1)
+    run = chain_run(view, Group.INDOOR, min_segments=min_segments)
+    assert run is not None
+    run.advance(4)
+    # Each step leaves light of target function 1 in all, where it was and where it was to go.
+    state = run.state()
+    luminance = state["splats"].reshape(2, -1, 3).sum(0) @ LUMINANCE
+    left = float((luminance * state["importance"]).sum())
+    assert left == pytest.approx(4 * run.n_chains, rel=1e-3)
