@@ -139,8 +139,7 @@ class ChainRun:
     def _prefixes_of(self, launch: int) -> Prefixes:
         """The prefixes of a launch, traced anew where they are due and for a resumed run."""
         n_pixels = self._shape[0] * self._shape[1]
-        due = self.n_chains * STEPS_PER_LAUNCH / (n_pixels * _MUTATIONS_PER_PREFIX)
-        n_sets, every = max(round(due), 1), max(round(1 / due), 1)
+        n_sets, every = prefix_schedule(self.n_chains, n_pixels)
         if self._prefixes is None or launch % every == 0:
             first = launch // every * n_sets
             sets = range(first, first + n_sets)
@@ -171,6 +170,18 @@ class ChainRun:
 
 
 _Started = tuple[Chains, _Totals]
+
+
+def prefix_schedule(n_chains: int, n_pixels: int) -> tuple[int, int]:
+    """(sets of prefixes to trace at once, launches from one time to the next).
+
+    A set for every _MUTATIONS_PER_PREFIX mutations of a pixel, about; their number is even.
+    """
+    # Chain c takes set c modulo n_sets, and its parity is its half of the film: with an odd number
+    # the halves share prefixes, whose noise their difference does not show.
+    due = n_chains * STEPS_PER_LAUNCH / (n_pixels * _MUTATIONS_PER_PREFIX)
+    n_sets = 2 * max(round(due / 2), 1)
+    return n_sets, max(round(n_sets / due), 1)
 
 
 def chain_run(

@@ -305,7 +305,8 @@ def _reconnect_some(
     slot = dr.gather(mi.UInt32, groups.slots, own_pixel)
     pixel = dr.gather(mi.UInt32, groups.pixels, slot - slot % n + k)
     is_pixel = pixel != _NO_PIXEL
-    # Let neighbouring chains take different sets, so that the film's halves share no prefix.
+    # Let neighbouring chains take different sets: they are even in number, so that the film's
+    # halves, of even and of odd chains, share no prefix.
     prefix = chain % prefixes.n_sets * (film.width * film.height) + pixel
     x1 = _packets(prefixes.rows, prefix, _PREFIX_PACKETS, is_pixel)
     x2 = _packets(suffixes, chain, _SUFFIX_PACKETS, True)

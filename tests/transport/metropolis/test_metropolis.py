@@ -125,3 +125,15 @@ def test_chains_that_share_nothing_splat_every_step(tail_pixels: int, min_segmen
     luminance = state["splats"].reshape(2, -1, 3).sum(0) @ LUMINANCE
     left = float((luminance * state["importance"]).sum())
     assert left == pytest.approx(4 * run.n_chains, rel=1e-3)
+
+
+@pytest.mark.parametrize("n_chains", [192, 1344, 32768])
+@pytest.mark.parametrize("n_pixels", [768, 19200, 307200, 2073600])
+def test_the_halves_of_the_film_share_no_prefix(n_chains: int, n_pixels: int) -> None:
+    from pbrs_farm.transport.metropolis.integrator import STEPS_PER_LAUNCH, prefix_schedule
+
+    n_sets, every = prefix_schedule(n_chains, n_pixels)
+    assert n_sets > 0
+    assert n_sets % 2 == 0
+    mutations_per_prefix = every * n_chains * STEPS_PER_LAUNCH / (n_pixels * n_sets)
+    assert 2 < mutations_per_prefix < 8
