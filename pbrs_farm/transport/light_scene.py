@@ -279,7 +279,7 @@ class LightScene:
             weights = pilot_weights(
                 self.device_scene, emitters, camera, *n, fields, seed ^ _PILOT_SEED
             )
-            # Guide the rays where that pays; Metropolis guides none.
+            # Guide the rays where that pays; Metropolis always guides its own.
             if self.n_lamps > 0 and fields.integrator == "path":
                 trial_seed = seed ^ _TRIAL_SEED
                 pays = guiding_pays(
