@@ -97,6 +97,8 @@ def choose_technique(chances: list[Any], u: Any) -> tuple[Any, Any]:
 
 def voxel_grid(positions: F32) -> tuple[F64, NDArray[np.int64], float]:
     """(lowest corner, number of voxels along each axis, edge in m) of a grid around positions."""
+    # Leave out corners that are not finite: their faces are no part of the scene.
+    positions = positions[np.isfinite(positions).all(1)]
     low, high = positions.min(0).astype(np.float64), positions.max(0).astype(np.float64)
     edge = _EDGE_M
     while np.prod(shape := np.floor((high - low) / edge) + 1) > _MAX_VOXELS:

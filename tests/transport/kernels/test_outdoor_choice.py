@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,21 @@ def test_a_vast_home_has_no_more_voxels_than_fit() -> None:
     _low, shape, edge = voxel_grid(np.float32([(0, 0, 0), (900, 30, 700)]))
     assert shape.prod() <= 1 << 16
     assert (shape * edge >= (900, 30, 700)).all()
+
+
+def test_a_corner_that_is_nowhere_has_no_voxel() -> None:
+    # Both a face that is left out of the light and corners of no face.
+    surfaces = rooms.shell((4.0, 2.5, 4.0), 0, front=False)
+    box = rooms.box((1.5, 0.0, 2.2), (2.5, 0.6, 2.9), 0)
+    corners = np.float32([*box.positions, (np.nan, 0, 0), (np.inf, 0, 1), (0, 1, 0)])
+    faces = np.int32([*box.faces, np.arange(3) + len(box.positions)])
+    surfaces.append(replace(box, positions=corners, faces=faces))
+    house = rooms.house(surfaces, [rooms.matte("wall", 0.7)])
+    camera = rooms.camera((2, 1.5, 0.3), (2, 0.5, 3))
+    scene = LightScene.load(house, {}, RECIPE, sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.35))
+    assert scene.notes == ("1 degenerate faces left out of the light",)
+    result = scene.render(camera.with_size(8, 6), "-", FIELDS.model_copy(update={"spp": 4}), 1)
+    assert result.outdoor.mean() > 0
 
 
 def test_a_voxel_has_more_of_what_lights_it_and_something_of_everything() -> None:
