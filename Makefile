@@ -60,7 +60,7 @@ bench: setup ## measure everything but house, dress, made, light, cycles, luxcor
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
 	$(BIN)/python -m benchmarks $(NAME)
 
-bench-light: setup ## path and Metropolis at equal CPU in ten scenes, ten minutes (python -m benchmarks light_pictures draws)
+bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 11 minutes of CPU (python -m benchmarks light_pictures draws)
 	$(BIN)/python -m benchmarks light
 
 bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): 15 minutes

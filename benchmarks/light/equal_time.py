@@ -10,7 +10,7 @@ the median pixel's error x sqrt(CPU); `..._spread` is a ratio's standard error a
 error `fast` reaches, its bias with it, against the mean of all pictures.
 
 `light.homes_ratio`: the median of relmse_ratio over six cameras of homes. LIGHT_SCENES="door shade" measures
-only some scenes. Ten minutes on two quiet cores.
+only some scenes. 11 minutes of CPU, and as many on two quiet cores at most.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def _fast_figures(
 ) -> dict[str, float]:
     """Error and CPU of 64 denoised samples, and how much more CPU Metropolis takes for that error.
 
-    CPU is that of as many of path's samples: pilot and denoiser, much of a picture this small, are 3 % of a view.
+    CPU is that of as many of path's samples: the denoiser, much of a picture this small, takes 3 % of a view's.
     """
     fields = PLAIN.model_copy(update={"spp": FAST_SPP})
     pictures = [
