@@ -84,6 +84,12 @@ class Plan:
         if halved and (self.width_px % 2 or self.height_px % 2):
             text = f"{self.width_px}x{self.height_px}: network {self.network} wants even numbers"
             raise BadInput("plan", "width_px, height_px", text)
+        # Its deepest stage would be one cell, whose spread over a batch of one is none.
+        if self.network == "residual" and max(self.width_px, self.height_px) <= 32:
+            text = (
+                f"{self.width_px}x{self.height_px}: network residual wants a side above 32 pixels"
+            )
+            raise BadInput("plan", "width_px, height_px", text)
         if self.memory_gb < 0:
             raise BadInput("plan", "memory_gb", f"expected 0 or more, got {self.memory_gb}")
         for name, choices in _CHOICES.items():

@@ -205,6 +205,13 @@ def test_a_size_that_the_network_cannot_halve_is_one_line(network: str) -> None:
     assert small_plan("boundaries", width_px="33").width_px == 33
 
 
+def test_pictures_of_32_pixels_are_too_small_for_the_residual_network(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="32x32: network residual wants a side above 32 pixels"):
+        small_plan(width_px="32", height_px="32")
+    least = small_plan(width_px="34", height_px="32", batch="1", steps="1")
+    assert train(Job(least, tmp_path), views(1, least))["network"]["train"]["mean_deg"] < 180
+
+
 def test_a_plans_fields_are_set_and_checked() -> None:
     assert plan_of("normals", "paper", {"rate": "0.01", "bf16": "true"}).rate == 0.01
     for name, text in (("rate", "fast"), ("colour", "1"), ("batch", "0"), ("device", "tpu")):
