@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.figures import FOLDER, write_report
+from benchmarks.light.shots import Shot
 from benchmarks.renderers.exchange import home_without_coats, without_coats, write_scene
 from benchmarks.renderers.picture_noise import blocks
 from pbrs_farm.core.camera import Camera, Intrinsics
@@ -72,16 +73,6 @@ PAIRS = {"": ("metropolis", "lux_bidir_metropolis"), "path_": ("path", "lux_path
 PYTHON = Path("out/luxcore-venv/bin/python")
 SCRIPT = Path(__file__).with_name("luxcore_scene.py")
 FILES = FOLDER / "luxcore"
-
-
-@dataclass(frozen=True, slots=True)
-class Shot:
-    """A scene and a camera. key: the part of the figures' names; name: for people."""
-
-    key: str
-    name: str
-    scene: LightScene
-    camera: Camera
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from pbrs_farm.study.networks.small_unet import FOLD, rows_and_columns
+from pbrs_farm.study.networks.small_unet import FOLD, gone_down, gone_up, rows_and_columns
 from pbrs_farm.study.networks.vgg import start_he
 
 
@@ -37,23 +37,13 @@ class ResidualUnet(nn.Module):  # type: ignore[misc]
         """The map, of no particular length."""
         x = functional.pixel_unshuffle(x, FOLD)
         x = self.stem(torch.cat([x, rows_and_columns(x)], 1))
-        # Go down, keep each stage.
-        kept: list[Tensor] = []
-        for down in self.down:
-            kept.append(x)
-            x = down(functional.avg_pool2d(x, 2, ceil_mode=True))
+        x, kept = gone_down(self.down, x)
         # Let every cell of the deepest stage look at all others.
         cells = x.flatten(2).mT + self.place(rows_and_columns(x).flatten(2).mT)
         for attention in self.attention:
             cells = attention(cells)
         x = cells.mT.reshape(x.shape).contiguous(memory_format=torch.channels_last)
-        # Go up beside what was kept.
-        for up in self.up:
-            beside = kept.pop()
-            size = beside.shape[-2:]
-            x = functional.interpolate(x, size, mode="bilinear", align_corners=False)
-            x = up(torch.cat([x, beside], 1))
-        return functional.pixel_shuffle(self.head(x), FOLD)
+        return functional.pixel_shuffle(self.head(gone_up(self.up, x, kept)), FOLD)
 
 
 class _Residual(nn.Module):  # type: ignore[misc]

@@ -37,18 +37,27 @@ class SmallUnet(nn.Module):  # type: ignore[misc]
         x = functional.pixel_unshuffle(x, FOLD)
         x = self.stem(torch.cat([x, rows_and_columns(x)], 1))
         # Go down, keep each stage; let the deepest know the whole picture's mean.
-        kept: list[Tensor] = []
-        for down in self.down:
-            kept.append(x)
-            x = down(functional.avg_pool2d(x, 2, ceil_mode=True))
+        x, kept = gone_down(self.down, x)
         x = x + self.context(x.mean((2, 3)))[..., None, None]
-        # Go up beside what was kept.
-        for up in self.up:
-            beside = kept.pop()
-            size = beside.shape[-2:]
-            x = functional.interpolate(x, size, mode="bilinear", align_corners=False)
-            x = up(torch.cat([x, beside], 1))
-        return functional.pixel_shuffle(self.head(x), FOLD)
+        return functional.pixel_shuffle(self.head(gone_up(self.up, x, kept)), FOLD)
+
+
+def gone_down(stages: nn.ModuleList, x: Tensor) -> tuple[Tensor, list[Tensor]]:
+    """(what the deepest stage says of x, what each stage was given at its larger size)."""
+    kept: list[Tensor] = []
+    for stage in stages:
+        kept.append(x)
+        x = stage(functional.avg_pool2d(x, 2, ceil_mode=True))
+    return x, kept
+
+
+def gone_up(stages: nn.ModuleList, x: Tensor, kept: list[Tensor]) -> Tensor:
+    """The map at full size: each stage sees the one below, enlarged, beside what was kept."""
+    for stage, beside in zip(stages, reversed(kept), strict=True):
+        size = beside.shape[-2:]
+        x = functional.interpolate(x, size, mode="bilinear", align_corners=False)
+        x = stage(torch.cat([x, beside], 1))
+    return x
 
 
 def _block(n_in: int, n_out: int) -> nn.Sequential:
