@@ -11,8 +11,9 @@ light through to its base than Ashikhmin and Shirley's.
 Method. Both engines render the sum of all light, box filter, no denoiser, no clamping, paths of at
 most the recipe's segments, all cores. For each: one long picture as its own reference, and some
 short ones of other seeds; relMSE = mean over pixels of (y - ref)^2 / (ref^2 + 1e-3 mean(ref)^2) of
-luminance. Variance falls with 1 / samples, so CPU to a noise is relMSE x CPU time, and the figure
-is Cycles' product over ours. CPU time is that of all threads and of the samples alone: the time of
+luminance. Variance falls with 1 / samples, so that the reference's own adds spp / reference_spp to
+each error, which is taken off; CPU to a noise is relMSE x CPU time, and the figure is Cycles'
+product over ours. CPU time is that of all threads and of the samples alone: the time of
 a picture of one sample (loading, BVH, compiling, pilot) is taken off both; it is reported beside.
 Metropolis is measured beside, all of its CPU time (bootstrap, direct light) counted.
 relMSE hangs on fireflies (one pixel in a hundred makes nine tenths of it), so the same ratio of the
@@ -68,7 +69,7 @@ class Effort:
     n_short: int
 
 
-EFFORT = Effort(112, 84, 32, 2048, 8)
+EFFORT = Effort(112, 84, 32, 1024, 8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +101,7 @@ def main() -> None:
     units: dict[str, str] = {}
     theirs = _their_runs(cameras, fields, e)
     for k, (a, b) in enumerate(zip(ours, theirs, strict=True), 1):
-        for name, value, unit in _compared(a, b):
+        for name, value, unit in _compared(a, b, e):
             figures[f"light.cycles_{k}_{name}"] = value
             units[f"light.cycles_{k}_{name}"] = unit
         relmse, cpu_s = chains[k - 1]
@@ -231,9 +232,11 @@ def _run(
     return Run(reference, [p for p, _s in short], (cpu_s - setup_s) * e.spp / (e.spp - 1), setup_s)
 
 
-def _compared(ours: Run, theirs: Run) -> list[tuple[str, float, str]]:
+def _compared(ours: Run, theirs: Run, e: Effort) -> list[tuple[str, float, str]]:
+    of_reference = 1 + e.spp / e.reference_spp
     a, b = (
-        np.stack([relative_square(p, run.reference) for p in run.short]) for run in (ours, theirs)
+        np.stack([relative_square(p, run.reference) for p in run.short]) / of_reference
+        for run in (ours, theirs)
     )
     mean = float((ours.reference @ LUMINANCE).mean()), float((theirs.reference @ LUMINANCE).mean())
     parts = [blocks(run.reference @ LUMINANCE) for run in (ours, theirs)]
