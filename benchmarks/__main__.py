@@ -29,6 +29,7 @@ OWN_TARGET: Final = {
     "made": "homes.made",
     "light": "light.equal_time",
     "light_pictures": "light.light_pictures",
+    "light_tables": "light.light_tables",
     "denoised": "light.denoised",
     "growth": "light.growth",
     "guided": "light.guided",

@@ -42,6 +42,7 @@ from benchmarks.light.shots import (
     room_shot,
     timed,
 )
+from benchmarks.light.table_rows import light_head, light_row
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.develop.denoiser import denoise
@@ -58,10 +59,10 @@ def main() -> None:
     """Measure, print a table in markdown, write out/bench/light.json."""
     figures: dict[str, Any] = {}
     found: dict[str, Comparison] = {}
-    rows = [head_of_table()]
+    rows = light_head()
     for shot in _shots(os.environ.get("LIGHT_SCENES", "").split() or [*ROOMS, *_CAMERAS]):
         found[shot.key], measured = measured_shot(shot)
-        rows.append(row_of_table(shot.name, measured))
+        rows.append(light_row(shot.name, measured))
         print(rows[-1], flush=True)
         figures |= {f"light.{shot.key}_{name}": value for name, value in measured.items()}
     if found.keys() >= _CAMERAS:  # no median of some
@@ -159,34 +160,6 @@ def homes_figures(cameras: list[Comparison]) -> dict[str, float]:
 
 def _unit(name: str) -> str:
     return next((unit for end, unit in _UNITS.items() if name.endswith(end)), "-")
-
-
-def head_of_table() -> str:
-    """The first two lines of the table in docs/light.md."""
-    cells = (
-        "", "CPU", "`path`: samples, relMSE, median pixel", "Metropolis: relMSE, median pixel",
-        "relMSE, Metropolis / `path`", "median pixel, Metropolis / `path`", "`fast`: CPU, relMSE",
-        "Metropolis / `fast`, CPU to equal relMSE",
-    )  # fmt: skip
-    return f"| {' | '.join(cells)} |\n" + "|---" * len(cells) + "|"
-
-
-def row_of_table(name: str, f: dict[str, float]) -> str:
-    """A scene's line of that table; a ratio stands with its standard error."""
-    ratios = [
-        f"{f[f'{r}_ratio']:.2f} ± {f[f'{r}_ratio'] * f[f'{r}_ratio_spread']:.2f}"
-        for r in ("relmse", "median")
-    ]
-    cells = [
-        name,
-        f"{f['metropolis_s']:.1f} s",
-        f"{f['path_spp']:.0f}, {f['path_relmse']:.2g}, {f['path_median']:.2g}",
-        f"{f['metropolis_relmse']:.2g}, {f['metropolis_median']:.2g}",
-        *ratios,
-        f"{f['fast_s']:.1f} s, {f['fast_relmse']:.2g}",
-        f"{f['fast_times_cheaper']:.1f}",
-    ]
-    return f"| {' | '.join(cells)} |"
 
 
 if __name__ == "__main__":

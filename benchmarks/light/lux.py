@@ -23,27 +23,36 @@ def main() -> None:
     from pbrs_farm.assets import homes_package
 
     homes_package.fetch()
-    rows: list[dict[str, Any]] = []
-    for home in homes_package.example_homes():
-        rows += _rooms_of(home.name)
-    lamps = [r for r in rows if {"lamps", "fallback", "added"} & set(r["lit_by"])]
-    day = [r for r in rows if "windows" in r["lit_by"]]
-    figures: dict[str, Any] = {"lux.rooms": len(rows)}
+    homes = {h.name: _rooms_of(h.name) for h in homes_package.example_homes()}
+    every = [room for rooms in homes.values() for room in rooms]
+    figures: dict[str, Any] = {"lux.rooms": len(every)}
     units = {"lux.rooms": "rooms"}
+    for name, rooms in ({"": every} | homes).items():
+        prefix = f"lux.{name.lower()}_" if name else "lux."
+        for end, (value, unit) in _figures_of(rooms).items():
+            figures[prefix + end], units[prefix + end] = value, unit
+    write_report("lux", figures, units)
+
+
+def _figures_of(rooms: list[dict[str, Any]]) -> dict[str, tuple[float, str]]:
+    """End of a figure's name -> (value, unit), of rooms that have lamps and of those with windows."""
+    lamps = [r for r in rooms if {"lamps", "fallback", "added"} & set(r["lit_by"])]
+    day = [r for r in rooms if "windows" in r["lit_by"]]
+    found: dict[str, tuple[float, str]] = {}
     for key, some, group, (low, high) in (
         ("lamps", lamps, "indoor", LAMPS_LX),
         ("daylight", day, "outdoor", DAYLIGHT_LX),
     ):
-        values = [r[group] for r in some]
-        found = {
-            "rooms": (len(values), "rooms that have that light"),
-            "median": (round(statistics.median(values), 1), "lx"),
-            "below": (sum(v < low for v in values), f"rooms below {low:g} lx"),
-            "above": (sum(v > high for v in values), f"rooms above {high:g} lx"),
+        values = [r[group] for r in some] or [0.0]
+        found |= {
+            f"{key}_rooms": (len(some), "rooms that have that light"),
+            f"{key}_least": (round(min(values), 1), "lx"),
+            f"{key}_median": (round(statistics.median(values), 1), "lx"),
+            f"{key}_most": (round(max(values), 1), "lx"),
+            f"{key}_below": (sum(r[group] < low for r in some), f"rooms below {low:g} lx"),
+            f"{key}_above": (sum(r[group] > high for r in some), f"rooms above {high:g} lx"),
         }
-        for name, (value, unit) in found.items():
-            figures[f"lux.{key}_{name}"], units[f"lux.{key}_{name}"] = value, unit
-    write_report("lux", figures, units)
+    return found
 
 
 def _rooms_of(name: str) -> list[dict[str, Any]]:

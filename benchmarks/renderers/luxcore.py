@@ -8,7 +8,7 @@ with its Sobol and with its Metropolis sampler. LUXCORE_SCENES="door home" names
 Scenes: the rooms of benchmarks/light/shots.py and the first stored camera of an example home, its coats
 taken off. Both engines: the sum of all light, 64x48 pixels, box filter, 12 segments, no denoiser, no
 clamping, all cores. LuxCore's roulette is on where its pictures stay right with it: in PATHCPU where
-no sky shines (docs/light.md).
+no sky shines (docs/light_costs.md).
 
 Method. Our Metropolis with its usual settings and MUTATIONS a pixel says how much CPU time a picture
 has; `path` gets as many samples as fit into it, LuxCore's threads are stopped when they have had
@@ -38,6 +38,13 @@ from numpy.typing import NDArray
 
 from benchmarks.figures import FOLDER, write_report
 from benchmarks.light.shots import Shot
+from benchmarks.light.table_rows import (
+    LUXCORE_SCENES,
+    luxcore_costs_head,
+    luxcore_costs_row,
+    luxcore_lights_head,
+    luxcore_lights_row,
+)
 from benchmarks.renderers.exchange import home_without_coats, without_coats, write_scene
 from benchmarks.renderers.picture_noise import blocks
 from pbrs_farm.core.camera import Camera, Intrinsics
@@ -86,14 +93,14 @@ class Run:
 def main() -> None:
     """Measure, print tables in markdown, write out/bench/luxcore.json and luxcore.png."""
     figures: dict[str, float] = {}
-    costs, lights, rows = [_head_of_costs()], [_head_of_lights()], []
+    costs, lights, rows = luxcore_costs_head(), luxcore_lights_head(), []
     makers = _shot_makers()
     for key in os.environ.get("LUXCORE_SCENES", "").split() or makers:
         shot = makers[key]()
         reference, runs = _runs(shot)
         found = _figures(reference, runs)
-        costs.append(_row_of_costs(shot.name, found))
-        lights.append(_row_of_lights(shot.name, found))
+        costs.append(luxcore_costs_row(shot.name, found))
+        lights.append(luxcore_lights_row(shot.name, found))
         print("\n".join((costs[-1], lights[-1])), flush=True)
         names = ("path", "metropolis", "lux_path", "lux_bidir_metropolis")
         rows.append([*(runs[n].pictures[0] for n in names), reference])
@@ -110,24 +117,20 @@ def main() -> None:
 def _shot_makers() -> dict[str, Callable[[], Shot]]:
     sun = sunsky(Recipe(), elevation_rad=0.6, azimuth_rad=0.35)
     return {
-        "door": lambda: _room("door", "door ajar by 6 cm", hard_rooms.door_ajar(), dark_sky()),
-        "globe": lambda: _room(
-            "globe", "bulb in a glass globe", hard_rooms.glass_globe(), dark_sky()
-        ),
-        "sunlit": lambda: _room("sunlit", "sunlit room", hard_rooms.sunlit(), sun),
-        "shade": lambda: _room(
-            "shade", "lamp in an open shade", hard_rooms.open_shade(), dark_sky()
-        ),
+        "door": lambda: _room("door", hard_rooms.door_ajar(), dark_sky()),
+        "globe": lambda: _room("globe", hard_rooms.glass_globe(), dark_sky()),
+        "sunlit": lambda: _room("sunlit", hard_rooms.sunlit(), sun),
+        "shade": lambda: _room("shade", hard_rooms.open_shade(), dark_sky()),
         "home": _home,
     }
 
 
-def _room(key: str, name: str, room: tuple[House, Camera], sky: Sky) -> Shot:
+def _room(key: str, room: tuple[House, Camera], sky: Sky) -> Shot:
     house, camera = room
     tables = without_coats(tables_from_house(house, {}, Recipe()))
     scene = LightScene(tables, sky, portals_of_house(house), choose_variant())
     _export(key, scene, house, {})
-    return Shot(key, name, scene, camera.with_size(*SIZE))
+    return Shot(key, LUXCORE_SCENES[key], scene, camera.with_size(*SIZE))
 
 
 def _home() -> Shot:
@@ -136,7 +139,7 @@ def _home() -> Shot:
     stored = house.cameras[0]
     intrinsics = Intrinsics.from_hfov(*SIZE, stored.hfov_rad)
     camera = Camera.look(intrinsics, stored.eye, stored.towards)
-    return Shot("home", f"{HOME}, camera 1", scene, camera)
+    return Shot("home", LUXCORE_SCENES["home"], scene, camera)
 
 
 def _export(
@@ -252,36 +255,7 @@ def _figures(reference: NDArray[np.float64], runs: dict[str, Run]) -> dict[str, 
     return found
 
 
-# What is printed and drawn.
-
-
-def _head_of_costs() -> str:
-    return (
-        "| relMSE, median pixel's error | CPU | our `path` | our Metropolis | LuxCore path | path, "
-        "Metropolis | bidirectional | bidirectional, Metropolis | our Metropolis / LuxCore's "
-        "bidirectional | our `path` / LuxCore's |\n|" + "---|" * 10
-    )
-
-
-def _row_of_costs(name: str, f: dict[str, float]) -> str:
-    engines = ("path", "metropolis", *THEIRS)
-    errors = [f"{f[f'{e}_relmse']:.2g}, {f[f'{e}_median']:.2g}" for e in engines]
-    ratios = [f"{f[f'{p}relmse_ratio']:.2g}, {f[f'{p}median_ratio']:.2g}" for p in PAIRS]
-    cells = [name, f"{f['cpu_s']:.1f} s", *errors, *ratios]
-    return f"| {' | '.join(cells)} |"
-
-
-def _head_of_lights() -> str:
-    return (
-        "| over our `path`: mean, median of 48 blocks | our Metropolis | LuxCore path | path, "
-        "Metropolis | bidirectional | bidirectional, Metropolis |\n|" + "---|" * 6
-    )
-
-
-def _row_of_lights(name: str, f: dict[str, float]) -> str:
-    engines = ("metropolis", *THEIRS)
-    cells = [f"{f[f'{e}_mean_over_path']:.3f}, {f[f'{e}_blocks_over_path']:.3f}" for e in engines]
-    return f"| {' | '.join([name, *cells])} |"
+# What is drawn.
 
 
 def _write_rows(rows: Sequence[Sequence[NDArray[np.float64]]]) -> None:

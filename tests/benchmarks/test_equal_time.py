@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.light import equal_time
+from benchmarks.light import equal_time, table_rows
 from benchmarks.light.picture_variance import Comparison, Run, compared
 
 MEASURED = {
@@ -40,8 +40,8 @@ def test_homes_are_told_by_the_median_camera() -> None:
 
 
 def test_the_table_has_a_cell_for_every_head() -> None:
-    head, rule = equal_time.head_of_table().split("\n")
-    row = equal_time.row_of_table("door ajar", MEASURED)
+    head, rule = table_rows.light_head()
+    row = table_rows.light_row("door ajar", MEASURED)
     assert head.count("|") == rule.count("|") == row.count("|")
     assert "| 0.20 ± 0.02 |" in row
 

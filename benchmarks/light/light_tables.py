@@ -1,0 +1,94 @@
+"""Write the measured tables into the docs: `python -m benchmarks light_tables`.
+
+A table stands in a page between `<!-- bench:NAME -->` and `<!-- /bench -->`, NAME one of table_rows.TABLES. Below it
+stands the command that measures it, and of out/bench/*.json the commit, the machine and its load. A table whose JSON is
+missing, or lacks a figure, stays as it is and is named; so are tables of different commits. Effects: writes docs/*.md.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.figures import FOLDER
+from benchmarks.light.table_rows import TABLES, Table
+
+DOCS: Final = Path("docs")
+_BLOCK: Final = re.compile(r"<!-- bench:(\w+) -->\n(.*?)<!-- /bench -->", re.DOTALL)
+
+
+def main() -> None:
+    """Write all tables and say which ones stay as they are."""
+    for line in written_tables(DOCS, FOLDER):
+        print(line)
+
+
+def written_tables(docs: Path, reports: Path) -> list[str]:
+    """Write each table of the pages below docs from reports/*.json; what there is to say of them.
+
+    Raises ValueError when a page names a table that there is not.
+    """
+    said: list[str] = []
+    commits: dict[str, set[str]] = {}
+    for page in sorted(docs.rglob("*.md")):
+        text = page.read_text(encoding="utf-8")
+
+        def replaced(block: re.Match[str], page: Path = page) -> str:
+            name = block[1]
+            if name not in TABLES:
+                raise ValueError(f"{page}: no table {name!r}; of {', '.join(TABLES)}")
+            lines, problem = table_lines(TABLES[name], reports)
+            if problem:
+                said.append(f"{page}: {name} stays as it is: {problem} ({TABLES[name].command})")
+                return block[0]
+            for bench in TABLES[name].benches:
+                commits.setdefault(_report(bench, reports)["commit"], set()).add(bench)
+            body = "\n".join(lines)
+            said.append(f"{page}: {name} written")
+            return f"<!-- bench:{name} -->\n\n{body}\n\n<!-- /bench -->"
+
+        new = _BLOCK.sub(replaced, text)
+        if new != text:
+            page.write_text(new, encoding="utf-8")
+    if len(commits) > 1:
+        of_each = "; ".join(f"{c}: {', '.join(sorted(b))}" for c, b in sorted(commits.items()))
+        said.append(f"tables are of {len(commits)} commits: {of_each}")
+    return said
+
+
+def table_lines(table: Table, reports: Path) -> tuple[list[str], str]:
+    """(lines of a table and the line of its making, ""), or ([], what is missing)."""
+    figures: dict[str, Any] = {}
+    makings: dict[str, list[str]] = {}
+    for bench in table.benches:
+        if not (reports / f"{bench}.json").exists():
+            return [], f"there is no {reports / bench}.json"
+        report = _report(bench, reports)
+        figures |= report["figures"]
+        makings.setdefault(_commit_and_machine(report), []).append(
+            f"{report['machine']['load_1min']:.1f}"
+        )
+    try:
+        lines = table.lines(figures)
+    except KeyError as error:
+        return [], f"{', '.join(table.benches)}: no figure {error.args[0]}"
+    made = "; ".join(f"{where}, load {', '.join(loads)}" for where, loads in makings.items())
+    return [*lines, "", f"*`{table.command}` ({made}, the bench's own included).*"], ""
+
+
+def _report(bench: str, reports: Path) -> dict[str, Any]:
+    """What write_report wrote."""
+    report: dict[str, Any] = json.loads((reports / f"{bench}.json").read_text(encoding="utf-8"))
+    return report
+
+
+def _commit_and_machine(report: dict[str, Any]) -> str:
+    machine, commit = report["machine"], report["commit"]
+    changed = "+" if commit.endswith("+") else ""
+    return f"{commit[:7]}{changed}: {machine['cores']} cores of {machine['cpu']}"
+
+
+if __name__ == "__main__":
+    main()
