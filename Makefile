@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 NAME ?=
 HOME_NAME ?= Studio
 
-.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study bench bench-light bench-cycles bench-luxcore bench-farm docs format clean
+.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm docs format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -56,14 +56,20 @@ test-study: setup ## the study's tests that need torch; installs its CPU build (
 	@$(study-packages)
 	$(BIN)/pytest -m "study and not slow and not gpu"
 
-bench: setup ## measure everything but house, dress, made, light, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
+bench: setup ## measure everything but house, dress, made, light and its tables, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 11 minutes of CPU (python -m benchmarks light_pictures draws)
 	$(BIN)/python -m benchmarks light
 
-bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): 15 minutes
+bench-light-tables: setup ## every bench of docs/light_costs.md, one after another, then its tables: 45 quiet minutes
+	@$(BIN)/python -c "import flip_evaluator" 2>/dev/null || $(BIN)/pip install -q -e ".[bench]"
+	@for name in view demo light guided growth denoised presets lux; do $(BIN)/python -m benchmarks $$name; done
+	@$(MAKE) --no-print-directory bench-cycles bench-luxcore
+	$(BIN)/python -m benchmarks light_tables
+
+bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): 8 minutes
 	@test -x out/cycles-venv/bin/python || python3.11 -m venv out/cycles-venv
 	@out/cycles-venv/bin/python -c "import bpy" 2>/dev/null || out/cycles-venv/bin/pip install -q "bpy==5.0.1"
 	$(BIN)/python -m benchmarks cycles
