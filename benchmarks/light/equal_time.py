@@ -22,6 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.figures import write_report
+from benchmarks.light.launches import launch_figures
 from benchmarks.light.mutation_cost import compiled_by_another_camera, mutation_cost
 from benchmarks.light.picture_variance import (
     F64,
@@ -52,7 +53,12 @@ PICTURES: Final = 6
 FAST_SPP, FAST_PICTURES = 64, 2
 TRIAL_SPP: Final = 128
 _CAMERAS: Final = frozenset(view.key for view in SIX)
-_UNITS: Final = {"_s": "s CPU", "_spp": "samples a pixel", "_spread": "of the ratio"}
+_UNITS: Final = {
+    "_launches": "kernels of a view of 640x480, on a GPU",
+    "_s": "s CPU",
+    "_spp": "samples a pixel",
+    "_spread": "of the ratio",
+}
 
 
 def main() -> None:
@@ -69,6 +75,7 @@ def main() -> None:
         figures |= homes_figures([found[key] for key in sorted(_CAMERAS)])
     figures["light.mutation_cost"] = mutation_cost()
     figures["light.compiled_by_another_camera"] = compiled_by_another_camera()
+    figures |= launch_figures()
     units = {name: _unit(name) for name in figures}
     units["light.mutation_cost"] = "path samples of the same depth"
     units["light.compiled_by_another_camera"] = "kernels"

@@ -17,7 +17,8 @@ def mutation_cost() -> float:
 
     With 99 % large steps a proposal is a path like any other, so that depths are the same.
     """
-    from pbrs_farm.transport.metropolis.integrator import STEPS_PER_LAUNCH, chain_run
+    from pbrs_farm.transport.metropolis.film import ROUND_STEPS
+    from pbrs_farm.transport.metropolis.integrator import chain_run
     from pbrs_farm.transport.sample_passes import SampledView
 
     fields = METROPOLIS.model_copy(
@@ -34,7 +35,7 @@ def mutation_cost() -> float:
         run = chain_run(view, Group.OUTDOOR, min_segments=1)
         assert run is not None
         while run.n_steps < run.n_wanted:
-            run.advance(min(STEPS_PER_LAUNCH, run.n_wanted - run.n_steps))
+            run.advance(min(ROUND_STEPS, run.n_wanted - run.n_steps))
         return run.estimate().n_mutations
 
     # The bootstrap is the same for both counts and drops out of the difference.

@@ -216,7 +216,7 @@ class LightFields(FieldGroup):
     tail_pixels: int = Field(
         1024,
         ge=0,
-        le=MAX_SAMPLES,
+        le=4096,
         description="pixels that a Metropolis path's suffix is shown to; 0 = its own alone",
     )
     denoise: bool = True

@@ -170,9 +170,9 @@ def trace(
         _Beside(lamp_sums, counts),
     )
     dr.eval(total, counts)
-    # Device layout is (channels, lanes); images are (lanes, channels).
+    # Read channel by channel: of all three at once Dr.Jit makes a copy, by a kernel of its own.
     rows = {
-        f.name: np.ascontiguousarray(getattr(total, f.name).numpy().T, np.float32)
+        f.name: np.stack([c.numpy() for c in getattr(total, f.name)], axis=-1)
         for f in fields(total)
         if f.name != "n_bad"
     }

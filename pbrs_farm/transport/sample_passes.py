@@ -119,5 +119,9 @@ def _state_of(total: SampleSums, spp: int) -> Callable[[], Arrays]:
 
 
 def _samples_per_launch(camera: Camera) -> int:
+    return samples_per_launch(camera.intrinsics.width_px * camera.intrinsics.height_px)
+
+
+def samples_per_launch(n_pixels: int) -> int:
     """Samples of every pixel that fit into the memory of one launch."""
-    return max(_SAMPLES_PER_LAUNCH // (camera.intrinsics.width_px * camera.intrinsics.height_px), 1)
+    return max(_SAMPLES_PER_LAUNCH // n_pixels, 1)

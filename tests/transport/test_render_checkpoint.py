@@ -22,6 +22,7 @@ pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
 )
 
+METROPOLIS_VIEW = "pbrs_farm.transport.metropolis.metropolis_view"
 PIXELS = 32 * 24
 METROPOLIS: LightFields = FIELDS.model_copy(
     update={
@@ -82,6 +83,8 @@ def gone_on(fields: LightFields, n: int) -> LightResult:
 @pytest.fixture
 def _short_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pbrs_farm.transport.sample_passes._SAMPLES_PER_LAUNCH", 4 * PIXELS)
+    one_round = METROPOLIS.chains
+    monkeypatch.setattr(f"{METROPOLIS_VIEW}.chain_rounds_per_launch", lambda: one_round)
 
 
 @pytest.mark.usefixtures("_short_launches")
@@ -110,6 +113,7 @@ def test_metropolis_goes_on_to_the_same_picture(n: int) -> None:
         np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-5 * float(b.mean()))
 
 
+@pytest.mark.usefixtures("_short_launches")
 def test_the_share_that_is_done_grows_to_one() -> None:
     memory = Memory()
     rendered(METROPOLIS, memory)

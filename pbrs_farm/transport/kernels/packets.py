@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
+
+
+def gather_packets(rows: Any, index: Any, n: int, active: Any = True) -> list[Any]:
+    """The n packets of each lane's row, by its index."""
+    return [dr.gather(mi.Vector4f, rows, index * n + k, active) for k in range(n)]
 
 
 def point(packet: Any) -> Any:
@@ -20,3 +26,13 @@ def vector(packet: Any) -> Any:
 def colour(packet: Any) -> Any:
     """Color3f of a packet's first three floats."""
     return mi.Color3f(packet[0], packet[1], packet[2])
+
+
+def xyz(v: Any) -> tuple[Any, Any, Any]:
+    """The components of a vector or point, to be written."""
+    return v.x, v.y, v.z
+
+
+def rgb(c: Any) -> tuple[Any, Any, Any]:
+    """The components of a colour, to be written."""
+    return c[0], c[1], c[2]

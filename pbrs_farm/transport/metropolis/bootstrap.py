@@ -13,7 +13,7 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
 from pbrs_farm.transport.metropolis.film import ChainContext, Chains, Film
 from pbrs_farm.transport.metropolis.markov_chains import STORED_DIMS, draw_paths
-from pbrs_farm.transport.metropolis.reconnection import SUFFIX_FLOATS
+from pbrs_farm.transport.metropolis.suffixes import SUFFIX_FLOATS
 
 _PATHS_PER_TILE: Final = 256  # of the importance
 _MIN_RELATIVE_LIGHT: Final = 0.05  # of the mean, in the importance
@@ -95,12 +95,13 @@ def bootstrap_chains(
     at = mi.UInt32(chosen.astype(np.uint32))
 
     # Draw the numbers of the chosen paths again; copy what the paths are.
+    n, n_paths = dr.opaque(mi.UInt32, n_chains), dr.opaque(mi.UInt32, n_bootstrap)
     index = dr.arange(mi.UInt32, STORED_DIMS * n_chains)
-    keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, at, index % n_chains))
+    keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, at, index % n))
     column = dr.arange(mi.UInt32, SUFFIX_FLOATS * n_chains)
-    source = column // n_chains * n_bootstrap + dr.gather(mi.UInt32, at, column % n_chains)
+    source = column // n * n_paths + dr.gather(mi.UInt32, at, column % n)
     chains = Chains(
-        samples=HashedSampler(keys, mi.UInt32(0)).get_1d(index // n_chains),
+        samples=HashedSampler(keys, mi.UInt32(0)).get_1d(index // n),
         light=dr.gather(mi.Color3f, paths.light, at),
         target=dr.gather(mi.Float, paths.target, at),
         pixel=dr.gather(mi.UInt32, paths.pixel, at),

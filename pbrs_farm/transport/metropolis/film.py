@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -10,6 +10,8 @@ import mitsuba as mi
 from pbrs_farm.transport.kernels.bsdf import luminance
 from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera
 from pbrs_farm.transport.kernels.path_state import PathContext, film_position
+
+ROUND_STEPS: Final = 16  # of a chain, from one reconnection to the next
 
 
 class Film(NamedTuple):
@@ -66,4 +68,5 @@ def splat(film: Film, chain: Any, pixel: Any, value: Any, active: Any) -> None:
     """Add a value to a pixel of the half that the chain belongs to."""
     first = ((chain & 1) * (film.width * film.height) + pixel) * 3
     for c in range(3):
-        dr.scatter_add(film.splats, value[c], first + c, active)
+        # In this mode the kernel does not depend on the picture's size.
+        dr.scatter_add(film.splats, value[c], first + c, active, mode=dr.ReduceMode.Direct)

@@ -42,22 +42,18 @@ from pbrs_farm.transport.kernels.path_state import (
 )
 from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.metropolis.bootstrap import bootstrap_chains, flat_film, with_importance
-from pbrs_farm.transport.metropolis.film import ChainContext, Chains
+from pbrs_farm.transport.metropolis.film import ROUND_STEPS, ChainContext, Chains
 from pbrs_farm.transport.metropolis.markov_chains import ChainSums, Mutations, mutate
-from pbrs_farm.transport.metropolis.reconnection import (
-    Prefixes,
-    reconnect,
-    stratified_groups,
-    trace_prefixes,
-)
+from pbrs_farm.transport.metropolis.pixel_groups import stratified_groups
+from pbrs_farm.transport.metropolis.prefixes import Prefixes, prefix_schedule, trace_prefixes
+from pbrs_farm.transport.metropolis.reconnection import Rounds, reconnect
+from pbrs_farm.transport.metropolis.suffixes import no_records
 from pbrs_farm.transport.render_checkpoint import Arrays
 from pbrs_farm.transport.sample_passes import SampledView
 
-STEPS_PER_LAUNCH: Final = 16
 MIN_STEPS: Final = 64  # of a chain
 _MIN_RR_DEPTH: Final = 3
 _MIN_RECONNECT_SEGMENTS: Final = 3
-_MUTATIONS_PER_PREFIX: Final = 4  # of a pixel; a prefix costs a tenth of one
 _MIN_BOOTSTRAP, _MAX_BOOTSTRAP = 1 << 14, 1 << 18  # paths
 
 
@@ -102,7 +98,7 @@ class ChainRun:
         self, view: SampledView, context: ChainContext, min_segments: int, started: _Started
     ) -> None:
         i, fields = view.camera.intrinsics, view.fields
-        self._shape = (i.height_px, i.width_px)
+        self._shape, self._n_pixels = (i.height_px, i.width_px), i.height_px * i.width_px
         self._context = context
         self._chains, self._totals = started
         self._seed = view.seed
@@ -118,40 +114,51 @@ class ChainRun:
         return self._totals.n_steps
 
     def advance(self, n_steps: int) -> None:
-        """Make n_steps more of every chain, in one launch, and share their suffixes."""
-        first, seed = self.n_steps, self._seed
-        steps = dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, first + n_steps)
-        mutation_seed = dr.opaque(
-            mi.UInt32, (seed ^ 0x3C6EF372) & 0xFFFFFFFF
-        )  # not the bootstrap's
-        reconnects = dr.opaque(mi.Bool, self._n_shared > 0)
-        how = Mutations(*steps, self._p_large, mutation_seed, reconnects)
+        """Make n_steps more of every chain, in one launch, and share their suffixes in another.
+
+        Suffixes are shared once in ROUND_STEPS: n_steps is whole rounds, or the last steps of all.
+        """
+        first = self.n_steps
+        n_rounds = -(-n_steps // ROUND_STEPS) if self._n_shared > 0 else 0
+        records = no_records(max(n_rounds, 1), self.n_chains)
+        how = Mutations(
+            first=dr.opaque(mi.UInt32, first),
+            last=dr.opaque(mi.UInt32, first + n_steps),
+            p_large=self._p_large,
+            seed=dr.opaque(mi.UInt32, (self._seed ^ 0x3C6EF372) & 0xFFFFFFFF),  # no bootstrap's
+            reconnects=dr.opaque(mi.Bool, n_rounds > 0),
+            records=records,
+        )
         self._chains, sums = mutate(self._context, self._chains, how)
         film = self._context.film
-        dr.eval(*self._chains, sums, film.splats)
-        if self._n_shared > 0:
-            prefixes = self._prefixes_of(first // STEPS_PER_LAUNCH)
-            groups = stratified_groups(*self._shape, self._n_shared, seed + first)
-            scene, weight = self._context.paths.scene, dr.opaque(mi.Float, n_steps)
-            reconnect(scene, film, prefixes, groups, self._chains, weight)
+        dr.eval(*self._chains, sums, film.splats, records)
+        if n_rounds > 0:
+            start = first // ROUND_STEPS
+            schedule = prefix_schedule(self.n_chains, self._n_pixels)
+            numbers = range(start, start + n_rounds)
+            rounds = Rounds(numbers, n_steps, self._n_shared, schedule)
+            groups = [
+                stratified_groups(*self._shape, self._n_shared, self._seed + r * ROUND_STEPS)
+                for r in numbers
+            ]
+            prefixes = self._prefixes_of(schedule.sets_of(numbers))
+            scene = self._context.paths.scene
+            reconnect(scene, film, prefixes, groups, records, rounds)
         self._totals.add(sums, n_steps)
 
-    def _prefixes_of(self, launch: int) -> Prefixes:
-        """The prefixes of a launch, traced anew where they are due and for a resumed run."""
-        n_pixels = self._shape[0] * self._shape[1]
-        n_sets, every = prefix_schedule(self.n_chains, n_pixels)
-        if self._prefixes is None or launch % every == 0:
-            first = launch // every * n_sets
-            sets = range(first, first + n_sets)
-            self._prefixes = trace_prefixes(self._context, n_pixels, sets, self._seed)
-        return self._prefixes
+    def _prefixes_of(self, sets: range) -> Prefixes:
+        """These sets of prefixes, traced unless the last launch had them all."""
+        held = self._prefixes
+        if held is None or sets.start < held.sets.start or sets.stop > held.sets.stop:
+            held = trace_prefixes(self._context, self._n_pixels, sets, self._seed)
+        self._prefixes = held
+        return held
 
     def estimate(self) -> Estimate:
         """The light so far, scaled to the mean of the target function."""
         totals, film = self._totals, self._context.film
         n_mutations = totals.n_steps * self.n_chains
-        n_pixels = self._shape[0] * self._shape[1]
-        scale = np.float32(totals.target / totals.n_paths * n_pixels / (n_mutations / 2))
+        scale = np.float32(totals.target / totals.n_paths * self._n_pixels / (n_mutations / 2))
         splats = film.splats.numpy().reshape(2, *self._shape, 3)
         halves = splats[0] * scale, splats[1] * scale
         mean = float(np.mean((halves[0] + halves[1]) @ LUMINANCE) / 2)
@@ -170,18 +177,6 @@ class ChainRun:
 
 
 _Started = tuple[Chains, _Totals]
-
-
-def prefix_schedule(n_chains: int, n_pixels: int) -> tuple[int, int]:
-    """(sets of prefixes to trace at once, launches from one time to the next).
-
-    A set for every _MUTATIONS_PER_PREFIX mutations of a pixel, about; their number is even.
-    """
-    # Chain c takes set c modulo n_sets, and its parity is its half of the film: with an odd number
-    # the halves share prefixes, whose noise their difference does not show.
-    due = n_chains * STEPS_PER_LAUNCH / (n_pixels * _MUTATIONS_PER_PREFIX)
-    n_sets = 2 * max(round(due / 2), 1)
-    return n_sets, max(round(n_sets / due), 1)
 
 
 def chain_run(
@@ -203,13 +198,18 @@ def chain_run(
         return ChainRun(view, context, min_segments, started)
     # Bootstrap the importance, then the chains.
     wanted = _wanted(view)
-    n_chains = int(np.clip(wanted // MIN_STEPS, 16, view.fields.chains)) & ~1
+    n_chains = n_chains_of(wanted, view.fields)
     n_paths = int(np.clip(wanted, _MIN_BOOTSTRAP, _MAX_BOOTSTRAP))
     context = with_importance(context, shape, n_paths // 4, view.seed ^ 0x5BD1E995)
     chains, target = bootstrap_chains(context, n_paths, n_chains, view.seed)
     if chains is None:
         return None
     return ChainRun(view, context, min_segments, (chains, _Totals(target, n_paths)))
+
+
+def n_chains_of(n_mutations: int, fields: LightFields) -> int:
+    """Chains that make as many mutations together, an even number."""
+    return int(np.clip(n_mutations // MIN_STEPS, 16, fields.chains)) & ~1
 
 
 def _wanted(view: SampledView) -> int:

@@ -31,6 +31,7 @@ from pbrs_farm.transport.kernels.sampler import (
     unit_float,
 )
 from pbrs_farm.transport.metropolis.film import (
+    ROUND_STEPS,
     ChainContext,
     Chains,
     Film,
@@ -38,8 +39,13 @@ from pbrs_farm.transport.metropolis.film import (
     splat,
     target_function,
 )
-from pbrs_farm.transport.metropolis.reconnection import SUFFIX_FLOATS, finish_suffix, record_suffix
 from pbrs_farm.transport.metropolis.split_path import SplitPath, no_direction
+from pbrs_farm.transport.metropolis.suffixes import (
+    SUFFIX_FLOATS,
+    SuffixRecords,
+    finish_suffix,
+    record_suffix,
+)
 
 STORED_DIMS: Final = CAMERA_DIMS + VERTEX_DIMS * 7
 _MIN_STEP, _MAX_STEP = 1 / 1024, 1 / 64  # of a small mutation
@@ -109,15 +115,15 @@ class Mutations(NamedTuple):
     p_large: Any  # probability of a fresh path
     seed: Any
     reconnects: Any  # Bool: suffixes are reconnected after the launch
+    records: SuffixRecords  # where they are left
 
 
 @dr.syntax
 def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chains, ChainSums]:
     """Make the steps of every chain; splat the paths that are their own pixel's alone."""
-    film, n_chains = context.film, dr.width(chains.target)
-    lane = dr.arange(mi.UInt32, n_chains)
-    x_samples = _load(chains.samples, STORED_DIMS, n_chains)
-    x_suffix = _load(chains.suffixes, SUFFIX_FLOATS, n_chains)
+    film, lane = context.film, dr.arange(mi.UInt32, dr.width(chains.target))
+    x_samples = _load(chains.samples, STORED_DIMS, lane)
+    x_suffix = _load(chains.suffixes, SUFFIX_FLOATS, lane)
     y_suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
     # Bootstrap paths have a share for other pixels even where there are none to share with.
     shared = dr.select(how.reconnects, chains.shared, 0)
@@ -158,9 +164,14 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
         fresh = mi.Bool(done)
         active = step < how.last
 
+        # Leave the suffix for reconnection where a round ends.
+        in_round = (step - how.first) % ROUND_STEPS
+        is_end = done & how.reconnects & ((in_round == 0) | ~active)
+        _record(how, lane, step, x, x_suffix, is_end)
+
     _splat_state(film, lane, x, True)
-    samples = _store(x_samples, STORED_DIMS, n_chains)
-    suffixes = _store(x_suffix, SUFFIX_FLOATS, n_chains)
+    samples = _store(x_samples, STORED_DIMS, lane)
+    suffixes = _store(x_suffix, SUFFIX_FLOATS, lane)
     return Chains(samples, x.light, x.target, x.pixel, x.shared, suffixes), sums
 
 
@@ -182,7 +193,7 @@ def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
     target = target_function(film, pixel, light)
     target = dr.select(dr.isfinite(target), target, 0)
     finish_suffix(suffix, light, y, y.shared > 0)
-    suffixes = _store(suffix, SUFFIX_FLOATS, n)
+    suffixes = _store(suffix, SUFFIX_FLOATS, dr.arange(mi.UInt32, n))
     return Chains(mi.Float(0), light, target, pixel, y.shared, suffixes)
 
 
@@ -288,23 +299,23 @@ def _splat_state(film: Film, chain: Any, state: _State, active: Any) -> None:
 
 
 @dr.syntax
-def _load(rows: Any, n: int, n_chains: int) -> Any:
+def _load(rows: Any, n: int, chain: Any) -> Any:
     """Local memory with n numbers of each chain."""
-    local, lane = dr.alloc_local(mi.Float, n), dr.arange(mi.UInt32, n_chains)
+    local, n_chains = dr.alloc_local(mi.Float, n), dr.opaque(mi.UInt32, dr.width(chain))
     k = mi.UInt32(0)
     while k < n:
-        local.write(dr.gather(mi.Float, rows, k * n_chains + lane), k)
+        local.write(dr.gather(mi.Float, rows, k * n_chains + chain), k)
         k += 1
     return local
 
 
 @dr.syntax
-def _store(local: Any, n: int, n_chains: int) -> Any:
+def _store(local: Any, n: int, chain: Any) -> Any:
     """(n * N,) numbers of all chains, from local memory."""
-    rows, lane = dr.empty(mi.Float, n * n_chains), dr.arange(mi.UInt32, n_chains)
+    rows, n_chains = dr.empty(mi.Float, n * dr.width(chain)), dr.opaque(mi.UInt32, dr.width(chain))
     k = mi.UInt32(0)
     while k < n:
-        dr.scatter(rows, local.read(k), k * n_chains + lane)
+        dr.scatter(rows, local.read(k), k * n_chains + chain)
         k += 1
     return rows
 
@@ -319,6 +330,22 @@ def _copy(source: Any, target: Any, n: int, active: Any) -> Any:
         k += 1
         updating = updating & (k < n)
     return target
+
+
+@dr.syntax
+def _record(how: Mutations, chain: Any, step: Any, x: _State, suffix: Any, active: Any) -> None:
+    """Leave what a chain stands at after a round's last step, where active."""
+    records = how.records
+    row = (step - 1 - how.first) // ROUND_STEPS * records.n_chains + chain
+    dr.scatter(records.pixel, x.pixel, row, active)
+    dr.scatter(records.shared, x.shared, row, active)
+    dr.scatter(records.is_shared, x.shared > 0, row, active)
+    k = mi.UInt32(0)
+    writing = mi.Bool(active)
+    while writing:
+        dr.scatter(records.rows, suffix.read(k), row * SUFFIX_FLOATS + k, writing)
+        k += 1
+        writing = writing & (k < SUFFIX_FLOATS)
 
 
 @dr.syntax

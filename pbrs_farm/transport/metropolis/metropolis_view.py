@@ -9,22 +9,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.transport.light_result import LightResult, joined_result, result_from_sums
-from pbrs_farm.transport.metropolis.integrator import (
-    MIN_STEPS,
-    STEPS_PER_LAUNCH,
-    ChainRun,
-    Estimate,
-    chain_run,
-)
+from pbrs_farm.transport.metropolis.film import ROUND_STEPS
+from pbrs_farm.transport.metropolis.integrator import MIN_STEPS, ChainRun, Estimate, chain_run
 from pbrs_farm.transport.render_checkpoint import Arrays, RenderCheckpoint
 from pbrs_farm.transport.sample_passes import SampledView, direct_sums
 from pbrs_farm.transport.time_budget import TimeBudget
 
 _DIRECT_COST: Final = 0.05  # of a direct sample, in mutations of both groups; for the share done
+GPU_CHAIN_ROUNDS: Final = 1 << 20  # 0.7 GB: suffixes of 160 bytes, prefixes of 448
+_CHAIN_ROUNDS_PER_THREAD: Final = 1 << 16  # some ten seconds
 _NO_END: Final = 1 << 31  # steps of a chain where time alone decides
 
 Runs = Mapping[Group, ChainRun]
@@ -51,8 +50,9 @@ def render_groups(
     wanted = max((run.n_wanted for run in runs.values()), default=0)
     goal = _NO_END if runs and budget.is_limited else wanted
     left = _noise_left(view, direct, runs, n_steps)
+    steps = ROUND_STEPS * _rounds_per_launch(view, runs)
     while n_steps < goal and left > 1 and (n_steps == 0 or budget.left_s > 0):
-        n = min(STEPS_PER_LAUNCH, goal - n_steps)
+        n = min(steps, goal - n_steps)
         for run in runs.values():
             run.advance(n)
         n_steps += n
@@ -75,6 +75,22 @@ def _runs(view: SampledView, kept: Arrays) -> dict[Group, ChainRun]:
         if run is not None:
             runs[group] = run
     return runs
+
+
+def _rounds_per_launch(view: SampledView, runs: Runs) -> int:
+    """Rounds of the chains that are one launch; the picture is the same to 1e-5 whatever it is."""
+    if view.fields.noise > 0 or view.fields.time_budget_s > 0:
+        return 1  # either may end the chains after any round
+    n_chains = max((run.n_chains for run in runs.values()), default=1)
+    return max(chain_rounds_per_launch() // n_chains, 1)
+
+
+def chain_rounds_per_launch() -> int:
+    """Chains times rounds of a launch: on a GPU as memory allows, on a CPU some seconds of work."""
+    is_gpu = dr.backend_v(mi.Float) == dr.JitBackend.CUDA
+    if is_gpu:
+        return GPU_CHAIN_ROUNDS
+    return min(_CHAIN_ROUNDS_PER_THREAD * int(dr.thread_count()), GPU_CHAIN_ROUNDS)
 
 
 def _state_of(runs: Runs) -> Callable[[], Arrays]:

@@ -33,7 +33,6 @@ through. A mirror at x1 or a reflection between the two leave a path to its own 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import drjit as dr
@@ -42,286 +41,136 @@ import numpy as np
 
 from pbrs_farm.transport.kernels.bsdf import Bsdf, evaluate_bsdf
 from pbrs_farm.transport.kernels.device_scene import DeviceScene, bend_normal, offset_ray_origin
-from pbrs_farm.transport.kernels.packets import colour, point, vector
-from pbrs_farm.transport.kernels.path_state import (
-    DirectionPdfs,
-    EmitterFilter,
-    PathState,
-    StepResult,
-    camera_path,
-)
-from pbrs_farm.transport.kernels.path_step import advance
-from pbrs_farm.transport.kernels.sampler import Sampler, SobolSampler, device_array, stream_key
-from pbrs_farm.transport.metropolis.film import (
-    ChainContext,
-    Chains,
-    Film,
-    sample_pixel,
-    splat,
-    target_function,
-)
-from pbrs_farm.transport.metropolis.split_path import SplitPath
+from pbrs_farm.transport.kernels.packets import colour, gather_packets, point, vector
+from pbrs_farm.transport.metropolis.film import ROUND_STEPS, Film, splat, target_function
+from pbrs_farm.transport.metropolis.pixel_groups import NO_PIXEL, PixelGroups
+from pbrs_farm.transport.metropolis.prefixes import PREFIX_PACKETS, Prefixes, PrefixSchedule
+from pbrs_farm.transport.metropolis.suffixes import SUFFIX_PACKETS, SuffixRecords, shared_share
 
-SUFFIX_FLOATS: Final = 36
-MAX_SHARED_PDF: Final = 4.0  # 1 / m2; by a matte surface, 0.28 m straight before it
 _MIN_DISTANCE2: Final = 1e-10  # m2; nearer, float32 knows no direction
-_SUFFIX_PACKETS: Final = SUFFIX_FLOATS // 4
-_PREFIX_PACKETS: Final = 7
-_PREFIX_FLOATS: Final = 4 * _PREFIX_PACKETS
-_LANES_PER_LAUNCH: Final = 1 << 22  # pairs of chain and pixel, against memory
-_NO_PIXEL: Final = 0xFFFFFFFF
-_PREFIX_SEED: Final = 0x6A09E667  # not the chains'
-
-# Columns of a suffix that are written one by one; record_suffix lists the others.
-# At the end _PDFS holds the share of p2 that the surface draws, _GUIDED_PDF the rest of p2.
-_PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT, _GUIDED_PDF = 3, 28, 31, 32, 35
 
 
-class PixelGroups(NamedTuple):
-    """The pixels in groups of n; a group's slots are neighbours."""
+class Rounds(NamedTuple):
+    """The rounds of the chains that a launch reconnects."""
 
-    slots: Any  # (pixels,) slot of each
-    pixels: Any  # (slots,) pixel of each, _NO_PIXEL = none
-    n: int
-
-
-class Prefixes(NamedTuple):
-    """Prefixes of every pixel, in sets of one each."""
-
-    rows: Any  # (sets * pixels * 28,) floats
-    n_sets: Any  # UInt32, opaque
+    numbers: range  # in the order of a run
+    n_steps: int  # of all together; the last round may have less than ROUND_STEPS
+    max_n: int  # pixels of a group at most, whatever the picture's size: the kernel depends on it
+    schedule: PrefixSchedule
 
 
-@dataclass
-class _Prefix:
-    """The first rough vertex that a pixel sees."""
+class _Launch(NamedTuple):
+    """What the lanes of a launch share."""
 
-    p: mi.Point3f
-    n: mi.Vector3f  # shading normal
-    ng: mi.Vector3f  # face normal
-    wi: mi.Vector3f  # world direction back along the ray
-    kd: mi.Color3f
-    f0: mi.Color3f
-    tau: mi.Color3f
-    alpha: mi.Float
-    beta: mi.Color3f  # throughput from the eye
-    is_valid: mi.Bool
+    scene: DeviceScene
+    film: Film
+    prefix_rows: Any
+    group_pixels: Any  # (rounds * slots,) pixel of each slot, NO_PIXEL = none
+    n: Any  # pixels of a group
 
 
-def stratified_groups(height: int, width: int, n: int, seed: int) -> PixelGroups:
-    """Groups of at most n pixels (of one, where n is 0), each spread over the whole picture.
+class _Lane(NamedTuple):
+    """A suffix that a chain had at a round's end, and where it is shown."""
 
-    The picture is cut into as many square cells as a group may have pixels; every cell gives its
-    pixels to different groups, at random, so that neighbours do not share their noise.
-    """
-    # Find the smallest cells of which there are no more than n.
-    side = 1
-    while -(-height // side) * -(-width // side) > max(n, 1):
-        side += 1
-    rows, columns = -(-height // side), -(-width // side)
-    n_cells = rows * columns
-    # Number the pixels of each cell at random: the number is the group, the cell the place in it.
-    rng = np.random.default_rng(seed)
-    order = rng.permuted(np.tile(np.arange(side * side), (n_cells, 1)), axis=1)
-    y, x = np.mgrid[0:height, 0:width]
-    cell = y // side * columns + x // side
-    slots = order[cell, y % side * side + x % side] * n_cells + cell
-    pixels = np.full(side * side * n_cells, _NO_PIXEL, np.uint32)
-    pixels[slots.ravel()] = np.arange(width * height, dtype=np.uint32)
-    return PixelGroups(
-        device_array(mi.UInt32, slots.ravel().astype(np.uint32)),
-        device_array(mi.UInt32, pixels),
-        n_cells,
-    )
-
-
-def trace_prefixes(context: ChainContext, n_pixels: int, sets: range, seed: int) -> Prefixes:
-    """Sets of prefixes, those of a pixel through places spread over it.
-
-    sets: numbers of the sets, in the order of a run. Invalid where a pixel does not see a rough
-    surface first.
-    """
-    row, in_set = dr.arange(mi.UInt32, n_pixels * len(sets)), dr.opaque(mi.UInt32, n_pixels)
-    pixel, number = row % in_set, row // in_set + dr.opaque(mi.UInt32, sets.start)
-    key = stream_key(pixel, dr.opaque(mi.UInt32, (seed ^ _PREFIX_SEED) & 0xFFFFFFFF))
-    sampler = SobolSampler(key, number)
-    prefix = _trace_prefix(context, sampler, pixel)
-    kd, f0, tau, wi = prefix.kd, prefix.f0, prefix.tau, prefix.wi
-    values = (
-        *_xyz(prefix.p), dr.select(prefix.is_valid, mi.Float(1), 0),
-        *_xyz(prefix.n), prefix.alpha,
-        *_xyz(prefix.ng), wi.x,
-        *_rgb(kd), wi.y,
-        *_rgb(f0), wi.z,
-        *_rgb(tau), mi.Float(0),
-        *_rgb(prefix.beta), mi.Float(0),
-    )  # fmt: skip
-    rows = dr.empty(mi.Float, n_pixels * len(sets) * len(values))
-    for k, value in enumerate(values):
-        dr.scatter(rows, value, row * len(values) + k)
-    dr.eval(rows)
-    return Prefixes(rows, dr.opaque(mi.UInt32, len(sets)))
-
-
-@dr.syntax
-def _trace_prefix(context: ChainContext, sampler: Sampler, pixel: Any) -> _Prefix:
-    """Follow mirrors and glass to the first rough surface; no emitter counts."""
-    paths = context.paths._replace(emitter_filter=EmitterFilter(None, None))
-    u = sampler.get_2d(mi.UInt32(0))
-    corner, at = sample_pixel(context.film, pixel, u, paths.fields.is_tent)
-    path = camera_path(context.camera, corner, at)
-    prefix = _Prefix(
-        mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Color3f(0),
-        mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.Color3f(0), mi.Bool(False),
-    )  # fmt: skip
-    active = mi.Bool(True)
-    while active:
-        beta, d = mi.Color3f(path.beta), mi.Vector3f(path.d)
-        path, result, alive = advance(paths, sampler, path, active)
-        si, bsdf = result.si, result.si.bsdf
-        found = _Prefix(
-            mi.Point3f(si.p),
-            si.n,
-            si.ng,
-            -d,
-            bsdf.kd,
-            bsdf.f0,
-            bsdf.tau,
-            bsdf.alpha,
-            beta,
-            mi.Bool(True),
-        )
-        prefix = dr.select(active & result.is_rough & (path.depth == 1), found, prefix)
-        active = active & alive & (path.depth == 0)
-    return prefix
-
-
-def record_suffix(
-    suffix: Any,
-    result: StepResult,
-    path: PathState,
-    reach: tuple[DirectionPdfs, Any],
-    emitter_filter: EmitterFilter,
-    active: Any,
-) -> Any:
-    """Record, in local memory, the second vertex of a path just after it was made.
-
-    The share of its light to reconnect. path: as it was when it set out from the first vertex, or
-    from the last sheet of glass on the way; reach: how the first vertex was left, and the
-    probability of having passed those sheets.
-    """
-    si, bsdf, d = result.si, result.si.bsdf, result.scattered_d
-    direct = result.outdoor_sample if emitter_filter.indoor is None else result.indoor_sample
-    # Convert to K's measure: by the pdf of x2 by all techniques, and the probability of the glass
-    # between. That of leaving x2 is known only where the ray ends.
-    left, passed = reach
-    cos = dr.abs(dr.dot(si.ng, path.d))
-    distance2 = dr.squared_norm(si.p - path.reference.p)
-    measure = cos / distance2
-    pdfs = left.techniques / dr.maximum(result.guided_weight, 1e-30) * measure * passed
-    values = (
-        *_xyz(si.p), pdfs,
-        *_xyz(si.n_interpolated), bsdf.alpha,
-        *_xyz(si.ng), d.x,
-        *_rgb(bsdf.kd), d.y,
-        *_rgb(bsdf.f0), d.z,
-        *_rgb(bsdf.tau), direct.d.x,
-        *_rgb(direct.incident), direct.d.y,
-    )  # fmt: skip
-    for k, value in enumerate(values):
-        suffix.write(value, mi.UInt32(k), active)
-    suffix.write(direct.d.z, mi.UInt32(_EMITTER_Z), active)
-    return _shared_share(left.bsdf * measure)
-
-
-def _shared_share(area_pdf: Any) -> Any:
-    """Share of the light between two vertices that is reconnected: little where they are close."""
-    return MAX_SHARED_PDF / dr.maximum(area_pdf, MAX_SHARED_PDF)
-
-
-def finish_suffix(suffix: Any, light: Any, split: SplitPath, active: Any) -> None:
-    """Add what is known at a path's end: its light, what arrived at x2 from x3 (T), p2's parts."""
-    # Find the pdf of leaving x2: share * bsdf + guided; of a ray that missed its target, 1.
-    second, weight = split.second, split.suffix_weight
-    is_known = weight > 0
-    pdf = dr.select(is_known, second.techniques / dr.maximum(weight, 1e-30), 1)
-    share = dr.select(is_known, second.share, 0)
-    guided = dr.maximum(pdf - share * second.bsdf, 0)
-    arriving = dr.select(is_known, split.suffix_light, 0)
-    own = light * (suffix.read(mi.UInt32(_PDFS), active) * pdf)
-    for c in range(3):
-        suffix.write(arriving[c], mi.UInt32(_ARRIVING + c), active)
-        suffix.write(own[c], mi.UInt32(_OWN_LIGHT + c), active)
-    suffix.write(share, mi.UInt32(_PDFS), active)
-    suffix.write(guided, mi.UInt32(_GUIDED_PDF), active)
+    x2: list[Any]  # its packets
+    chain: Any
+    own_pixel: Any
+    shared: Any
+    weight: Any  # steps of the round
+    first_slot: Any  # of its own pixel's group in that round
+    first_prefix: Any  # of its set
 
 
 def reconnect(
     scene: DeviceScene,
     film: Film,
     prefixes: Prefixes,
-    groups: PixelGroups,
-    chains: Chains,
-    weight: Any,
+    groups: list[PixelGroups],
+    records: SuffixRecords,
+    rounds: Rounds,
 ) -> None:
-    """Splat the shared light of every chain at all prefixes of its pixel's group.
+    """Splat the shared light of every record at all prefixes of its pixel's group, in one launch.
 
-    weight: what each chain has to splat.
+    groups: of each round.
     """
-    # Choose the chains whose suffix can be seen from elsewhere.
-    chosen = dr.compress(chains.shared > 0)
-    n_chains = dr.width(chosen)
-    # Transpose: a row a suffix.
-    n = dr.width(chains.pixel)
-    index = dr.arange(mi.UInt32, SUFFIX_FLOATS * n)
-    source = index % SUFFIX_FLOATS * n + index // SUFFIX_FLOATS
-    suffixes = dr.gather(mi.Float, chains.suffixes, source)
-    dr.eval(suffixes)
-    per_launch = max(_LANES_PER_LAUNCH // groups.n, 1)
-    for first in range(0, n_chains, per_launch):
-        some = dr.arange(mi.UInt32, min(per_launch, n_chains - first))
-        chain = dr.gather(mi.UInt32, chosen, some + dr.opaque(mi.UInt32, first))
-        dr.eval(chain)
-        _reconnect_some(scene, film, prefixes, groups, suffixes, chains, chain, weight)
+    # Choose the records whose suffix can be seen from elsewhere.
+    chosen = dr.compress(records.is_shared)
+    if dr.width(chosen) == 0:
+        return
+    pixels = mi.UInt32(np.concatenate([g.pixels for g in groups]))
+    slots = mi.UInt32(np.concatenate([g.slots for g in groups]))
+    launch = _Launch(scene, film, prefixes.rows, pixels, dr.opaque(mi.UInt32, groups[0].n))
+    n_slots = dr.opaque(mi.UInt32, len(groups[0].pixels))
+    lane = _lane_of(launch, (slots, n_slots), prefixes, records, rounds, chosen)
+    _splat_seen(launch, lane, *_seen(launch, lane, rounds.max_n))
+    dr.eval(film.splats)
 
 
-def _reconnect_some(
-    scene: DeviceScene,
-    film: Film,
+def _lane_of(
+    launch: _Launch,
+    slots: tuple[Any, Any],
     prefixes: Prefixes,
-    groups: PixelGroups,
-    suffixes: Any,
-    states: Chains,
-    chosen: Any,
-    weight: Any,
-) -> None:
-    """Splat the suffixes of some chains, a lane a pair of chain and pixel."""
-    # Pair each chain with the pixels of its own pixel's group.
-    n = dr.opaque(mi.UInt32, groups.n)
-    lane = dr.arange(mi.UInt32, dr.width(chosen) * groups.n)
-    row, k = lane // n, lane % n
-    chain = dr.gather(mi.UInt32, chosen, row)
-    own_pixel = dr.gather(mi.UInt32, states.pixel, chain)
-    slot = dr.gather(mi.UInt32, groups.slots, own_pixel)
-    pixel = dr.gather(mi.UInt32, groups.pixels, slot - slot % n + k)
-    is_pixel = pixel != _NO_PIXEL
+    records: SuffixRecords,
+    rounds: Rounds,
+    record: Any,
+) -> _Lane:
+    """The lane of a record. slots: those of all pixels, round by round, and their number in a round."""
+    slot_of_pixel, n_slots = slots
+    n_pixels = launch.film.width * launch.film.height
+    number, chain = record // records.n_chains, record % records.n_chains
+    own_pixel = dr.gather(mi.UInt32, records.pixel, record)
+    # Find the pixels of its own pixel's group in that round.
+    slot = dr.gather(mi.UInt32, slot_of_pixel, number * n_pixels + own_pixel)
+    first_slot = number * n_slots + slot - slot % launch.n
     # Let neighbouring chains take different sets: they are even in number, so that the film's
     # halves, of even and of odd chains, share no prefix.
-    prefix = chain % prefixes.n_sets * (film.width * film.height) + pixel
-    x1 = _packets(prefixes.rows, prefix, _PREFIX_PACKETS, is_pixel)
-    x2 = _packets(suffixes, chain, _SUFFIX_PACKETS, True)
-    is_own, shared = pixel == own_pixel, dr.gather(mi.Float, states.shared, chain)
-    others = _shared_light(scene, x1, x2, is_pixel & ~is_own)
-    value = dr.select(is_own, colour(x2[8]) * shared, others)
-    # Weigh each by its target function over the group's sum.
-    target = target_function(film, pixel, value, is_pixel)
-    good = (target > 0) & dr.isfinite(target)
-    total = dr.zeros(mi.Float, dr.width(chosen))
-    dr.scatter_add(total, target, row, good)
-    dr.eval(total, value, good, pixel, chain, row)
-    value *= weight * shared / dr.maximum(dr.gather(mi.Float, total, row), 1e-37)
-    splat(film, chain, pixel, value, good)
-    dr.eval(film.splats)
+    n_sets, every = (dr.opaque(mi.UInt32, v) for v in rounds.schedule)
+    block = (dr.opaque(mi.UInt32, rounds.numbers.start) + number) // every
+    in_run = block * n_sets + chain % n_sets
+    left = dr.opaque(mi.UInt32, rounds.n_steps) - number * ROUND_STEPS
+    return _Lane(
+        x2=gather_packets(records.rows, record, SUFFIX_PACKETS),
+        chain=chain,
+        own_pixel=own_pixel,
+        shared=dr.gather(mi.Float, records.shared, record),
+        weight=mi.Float(dr.minimum(left, ROUND_STEPS)),
+        first_slot=first_slot,
+        first_prefix=(in_run - dr.opaque(mi.UInt32, prefixes.sets.start)) * n_pixels,
+    )
+
+
+@dr.syntax
+def _seen(launch: _Launch, lane: _Lane, max_n: int) -> tuple[Any, Any]:
+    """(what each pixel of the group sees of the suffix, in local memory; the sum of their targets)."""
+    values, total = dr.alloc_local(mi.Float, 3 * max_n), mi.Float(0)
+    k = mi.UInt32(0)
+    while k < launch.n:
+        pixel = dr.gather(mi.UInt32, launch.group_pixels, lane.first_slot + k)
+        is_pixel, is_own = pixel != NO_PIXEL, pixel == lane.own_pixel
+        row = lane.first_prefix + pixel
+        x1 = gather_packets(launch.prefix_rows, row, PREFIX_PACKETS, is_pixel)
+        others = _shared_light(launch.scene, x1, lane.x2, is_pixel & ~is_own)
+        value = dr.select(is_own, colour(lane.x2[8]) * lane.shared, others)
+        # Leave out what is not finite.
+        target = target_function(launch.film, pixel, value, is_pixel)
+        good = (target > 0) & dr.isfinite(target)
+        total += dr.select(good, target, 0)
+        for c in range(3):
+            values.write(dr.select(good, value[c], 0), 3 * k + c)
+        k += 1
+    return values, total
+
+
+@dr.syntax
+def _splat_seen(launch: _Launch, lane: _Lane, values: Any, total: Any) -> None:
+    """Weigh what each pixel sees by its target function over the group's sum, and splat it."""
+    scale = lane.weight * lane.shared / dr.maximum(total, 1e-37)
+    k = mi.UInt32(0)
+    while k < launch.n:
+        pixel = dr.gather(mi.UInt32, launch.group_pixels, lane.first_slot + k)
+        value = mi.Color3f(values.read(3 * k), values.read(3 * k + 1), values.read(3 * k + 2))
+        splat(launch.film, lane.chain, pixel, value * scale, dr.max(value) > 0)
+        k += 1
 
 
 def _shared_light(scene: DeviceScene, x1: list[Any], x2: list[Any], active: Any) -> Any:
@@ -354,7 +203,7 @@ def _shared_light(scene: DeviceScene, x1: list[Any], x2: list[Any], active: Any)
     reach = dr.norm(to)
     clear = scene.transmittance(begin, to / reach, reach * (1 - 1e-4), valid)
     value = colour(x1[6]) * value1 * inner * clear * (cos2 / distance2)
-    return dr.select(valid, value * _shared_share(pdf1 * cos2 / distance2), 0)
+    return dr.select(valid, value * shared_share(pdf1 * cos2 / distance2), 0)
 
 
 def _scattered_suffix(x2: list[Any], ng: Any, d: Any) -> tuple[Any, Any]:
@@ -378,18 +227,6 @@ def _evaluate_consistent(bsdf: Bsdf, frame: Any, ng: Any, wi: Any, d: Any) -> tu
     return dr.select(is_consistent, value, 0), dr.select(is_consistent, pdf, 0)
 
 
-def _packets(rows: Any, index: Any, n: int, active: Any) -> list[Any]:
-    return [dr.gather(mi.Vector4f, rows, index * n + k, active) for k in range(n)]
-
-
 def _bsdf(row: list[Any]) -> Bsdf:
     """The material of a prefix or suffix: both keep it in the same columns."""
     return Bsdf(colour(row[3]), colour(row[4]), colour(row[5]), row[1][3], mi.UInt32(0))
-
-
-def _xyz(v: Any) -> tuple[Any, Any, Any]:
-    return v.x, v.y, v.z
-
-
-def _rgb(c: Any) -> tuple[Any, Any, Any]:
-    return c[0], c[1], c[2]

@@ -127,13 +127,57 @@ def test_chains_that_share_nothing_splat_every_step(tail_pixels: int, min_segmen
     assert left == pytest.approx(4 * run.n_chains, rel=1e-3)
 
 
+def test_another_size_of_picture_compiles_nothing() -> None:
+    import drjit as dr
+
+    house, camera = rooms.window_room(0.7, lumen=800)
+    sky = sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.35)
+    scene = LightScene.load(house, {}, RECIPE, sky)
+    fields = METROPOLIS.model_copy(update={"direct_spp": 1, "mutations_per_pixel": 8})
+    scene.render(camera.with_size(32, 24), "0_0", fields, 1)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for size in ((24, 32), (47, 31), (160, 120)):
+            scene.render(camera.with_size(*size), "0_0", fields, 2)
+        kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+    assert kernels
+    assert [k["operation_count"] for k in kernels if not k["cache_hit"]] == []
+
+
+def test_the_rounds_of_a_launch_change_no_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    from pbrs_farm.transport.metropolis import metropolis_view
+
+    house, camera = rooms.window_room(0.7, lumen=800)
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    # 102 steps of each chain are six rounds and a part of one.
+    fields = METROPOLIS.model_copy(update={"chains": 384, "mutations_per_pixel": 51})
+    pictures = []
+    for n in (1, 4 * 384, 1 << 20):
+        monkeypatch.setattr(metropolis_view, "chain_rounds_per_launch", lambda n=n: n)
+        pictures.append(scene.render(camera.with_size(32, 24), "0_0", fields, 3).indoor)
+    mean = float(pictures[0].mean())
+    assert mean > 0
+    for picture in pictures[1:]:
+        np.testing.assert_allclose(picture, pictures[0], rtol=1e-5, atol=1e-5 * mean)
+
+
 @pytest.mark.parametrize("n_chains", [192, 1344, 32768])
 @pytest.mark.parametrize("n_pixels", [768, 19200, 307200, 2073600])
 def test_the_halves_of_the_film_share_no_prefix(n_chains: int, n_pixels: int) -> None:
-    from pbrs_farm.transport.metropolis.integrator import STEPS_PER_LAUNCH, prefix_schedule
+    from pbrs_farm.transport.metropolis.film import ROUND_STEPS
+    from pbrs_farm.transport.metropolis.prefixes import prefix_schedule
 
     n_sets, every = prefix_schedule(n_chains, n_pixels)
     assert n_sets > 0
     assert n_sets % 2 == 0
-    mutations_per_prefix = every * n_chains * STEPS_PER_LAUNCH / (n_pixels * n_sets)
+    mutations_per_prefix = every * n_chains * ROUND_STEPS / (n_pixels * n_sets)
     assert 2 < mutations_per_prefix < 8
+
+
+def test_a_launch_has_every_set_of_prefixes_of_its_rounds() -> None:
+    from pbrs_farm.transport.metropolis.prefixes import PrefixSchedule
+
+    schedule = PrefixSchedule(n_sets=2, every=5)
+    assert schedule.sets_of(range(5)) == range(2)
+    assert schedule.sets_of(range(3, 11)) == range(6)
+    assert schedule.sets_of(range(5, 6)) == range(2, 4)

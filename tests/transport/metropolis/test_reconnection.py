@@ -30,10 +30,10 @@ pytestmark = pytest.mark.skipif(
 def test_every_pixel_is_in_one_group_and_groups_are_no_larger_than_asked(
     height: int, width: int, n: int
 ) -> None:
-    from pbrs_farm.transport.metropolis.reconnection import stratified_groups
+    from pbrs_farm.transport.metropolis.pixel_groups import stratified_groups
 
     groups = stratified_groups(height, width, n, seed=3)
-    slots, pixels = groups.slots.numpy(), groups.pixels.numpy()
+    slots, pixels = groups.slots, groups.pixels
     assert groups.n <= max(n, 1)
     assert len(pixels) % groups.n == 0
     assert np.array_equal(pixels[slots], np.arange(height * width))
@@ -41,10 +41,10 @@ def test_every_pixel_is_in_one_group_and_groups_are_no_larger_than_asked(
 
 
 def test_groups_are_spread_and_neighbours_are_apart() -> None:
-    from pbrs_farm.transport.metropolis.reconnection import stratified_groups
+    from pbrs_farm.transport.metropolis.pixel_groups import stratified_groups
 
     groups = stratified_groups(64, 64, 256, seed=1)
-    group = (groups.slots.numpy() // groups.n).reshape(64, 64)
+    group = (groups.slots // groups.n).reshape(64, 64)
     cells = group.reshape(16, 4, 16, 4).swapaxes(1, 2).reshape(256, 16)
     assert np.array_equal(np.sort(cells, 1), np.tile(np.arange(16), (256, 1)))
 
