@@ -11,7 +11,7 @@ With t the CPU of a trial over the plain view's, choosing over never guiding is
 Where no trial guides, both ways are one estimator, the same seed gives the same bits, and all that choosing costs is
 the trial: 1 + t, no quotient of two noises, and only the CPU of a plain picture is measured. Its standard error is
 the jackknife's over the pictures. `light.guide_worst` is the largest ratio of the views, `light.guide_worst_error`
-its standard error, `light.guide_chosen` how many views most trials guide. Five minutes on two quiet cores.
+its standard error, `light.guide_chosen` how many views most trials guide. Seven minutes on two quiet cores.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from pbrs_farm.transport.light_scene import LightScene
 VIEW: Final = (640, 480)  # px, of the view whose CPU is reckoned
 SIZE: Final = (160, 120)  # px, of the pictures that are rendered for it
 TRIALS: Final = 16
-RUNS: Final = 8  # pictures of each way
+RUNS: Final = 12  # pictures of each way
 _PLAIN_RUNS: Final = 2  # of a view that stays plain, for its CPU alone
 
 
