@@ -14,6 +14,7 @@ from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
+from pbrs_farm.transport.kernels.direct_light import Strategy, sample_direct_light
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
@@ -24,7 +25,7 @@ from pbrs_farm.transport.kernels.path_state import (
     surface_path,
     white_vertex,
 )
-from pbrs_farm.transport.kernels.path_step import Strategy, advance, sample_direct_light
+from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
 
 LAMPS_LX: Final = (30.0, 1000.0)  # expected mean illuminance of a floor by lamps (docs/spec/sky.md)

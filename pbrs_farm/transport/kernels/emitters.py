@@ -32,6 +32,7 @@ from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.outdoor_choice import OutdoorChoice, choose_technique
 from pbrs_farm.transport.kernels.packets import colour, vector
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
+from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky, solid_angles
@@ -80,7 +81,7 @@ class Emitters:
         self, tables: SceneTables, sky: Sky, portals: F64, weights: EmitterWeights
     ) -> None:
         self.nearby = NearbyLampSampler(tables)
-        self.outdoor_choice = OutdoorChoice(tables.positions)
+        self.outdoor_choice = OutdoorChoice(VoxelGrid(tables.positions))
         self.targets = TargetSampler(no_targets(len(tables.lamps)))
         self._set_lamps(tables, weights.lamps)
         self._set_dome(sky)

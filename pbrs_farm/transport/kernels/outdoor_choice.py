@@ -16,14 +16,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.transport.guiding.nearby_lamps import sample_discrete
-from pbrs_farm.transport.kernels.sampler import device_array, opaque3
+from pbrs_farm.transport.kernels.sampler import device_array
+from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
 
 MAX_TECHNIQUES: Final = 8  # floats of a row: two packets
-_EDGE_M: Final = 0.5  # of a voxel, longer where a home would have more than _MAX_VOXELS
-_MAX_VOXELS: Final = 1 << 16
 # A voxel counts as if it had so many vertices more, seen as the view's are; and so much of its weights
 # is the view's, for what no vertex has found.
 _PRIOR: Final = 4.0
@@ -46,29 +45,25 @@ class TechniqueCounts(NamedTuple):
 class OutdoorChoice:
     """The weights of all outdoor techniques in every voxel of a home, for one view."""
 
-    def __init__(self, positions: F32) -> None:
-        """positions: (N, 3) of all that there is."""
-        low, shape, edge = voxel_grid(positions)
-        self._n_voxels = int(np.prod(shape))
-        self._low, self._scale = opaque3(mi.Vector3f, low), dr.opaque(mi.Float, 1 / edge)
-        self._shape = [dr.opaque(mi.UInt32, int(n)) for n in shape]
+    def __init__(self, grid: VoxelGrid) -> None:
+        self._grid = grid
         self.set_weights(np.ones(1))
 
     def set_weights(self, weights: F64) -> None:
         """Set the weights of a view: (techniques,), or (voxels, techniques); rows sum to 1."""
-        rows = np.zeros((self._n_voxels, MAX_TECHNIQUES), np.float32)
+        rows = np.zeros((self._grid.n_voxels, MAX_TECHNIQUES), np.float32)
         rows[:, : weights.shape[-1]] = weights
         self._rows = device_array(mi.Float, rows.ravel())
 
     def chances(self, p: Any, active: Any) -> list[Any]:
         """The chance of each technique at p, a list entry each; 0 of those a view does not have."""
-        first = self._voxel(p) * (MAX_TECHNIQUES // 4)
+        first = self._grid.voxel(p) * (MAX_TECHNIQUES // 4)
         rows = [dr.gather(mi.Vector4f, self._rows, first + k, active) for k in range(2)]
         return [row[k] for row in rows for k in range(4)]
 
     def no_counts(self) -> TechniqueCounts:
         """Where nothing was counted yet."""
-        n = self._n_voxels * MAX_TECHNIQUES
+        n = self._grid.n_voxels * MAX_TECHNIQUES
         return TechniqueCounts(dr.zeros(mi.UInt32, n), dr.zeros(mi.UInt32, n))
 
     def count(
@@ -76,34 +71,18 @@ class OutdoorChoice:
     ) -> None:
         """Count vertices at p; technique: the one that is asked for alone, or less than 0."""
         counted = active & (technique >= 0)
-        place = self._voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
+        place = self._grid.voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
         # Add in place: a copy for each thread would put the number of voxels into the kernel, and
         # every home would compile one of its own.
         one, mode = mi.UInt32(1), dr.ReduceMode.Direct
         dr.scatter_add(counts.vertices, one, place, counted, mode=mode)
         dr.scatter_add(counts.lit, one, place, counted & is_lit, mode=mode)
 
-    def _voxel(self, p: Any) -> Any:
-        at = dr.maximum((mi.Vector3f(p) - self._low) * self._scale, 0)
-        x, y, z = (dr.minimum(mi.UInt32(at[k]), self._shape[k] - 1) for k in range(3))
-        return (x * self._shape[1] + y) * self._shape[2] + z
-
 
 def choose_technique(chances: list[Any], u: Any) -> tuple[Any, Any]:
     """(number of a technique, drawn by its chance, u made uniform again)."""
     numbers = [mi.UInt32(k) for k in range(len(chances))]
     return sample_discrete(numbers, chances, mi.Float(1), dr.minimum(u, 1 - 1e-6))
-
-
-def voxel_grid(positions: F32) -> tuple[F64, NDArray[np.int64], float]:
-    """(lowest corner, number of voxels along each axis, edge in m) of a grid around positions."""
-    # Leave out corners that are not finite: their faces are no part of the scene.
-    positions = positions[np.isfinite(positions).all(1)]
-    low, high = positions.min(0).astype(np.float64), positions.max(0).astype(np.float64)
-    edge = _EDGE_M
-    while np.prod(shape := np.floor((high - low) / edge) + 1) > _MAX_VOXELS:
-        edge *= 1.25
-    return low, shape.astype(np.int64), edge
 
 
 def weights_by_place(weights: F64, counts: NDArray[np.uint32]) -> F64:

@@ -14,7 +14,6 @@ import drjit as dr
 import mitsuba as mi
 
 from pbrs_farm.transport.guiding.guided_rays import (
-    Guiding,
     cone_technique_pdf,
     guided_mis_weight,
     guiding_at,
@@ -24,7 +23,7 @@ from pbrs_farm.transport.guiding.guided_rays import (
     target_technique_share,
 )
 from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
-from pbrs_farm.transport.guiding.nearby_lamps import NearbyLamps, no_reference
+from pbrs_farm.transport.guiding.nearby_lamps import no_reference
 from pbrs_farm.transport.kernels.bsdf import (
     evaluate_bsdf,
     is_reconnectable,
@@ -32,17 +31,13 @@ from pbrs_farm.transport.kernels.bsdf import (
     thin_glass_reflectance,
     view_independent_pdf,
 )
-from pbrs_farm.transport.kernels.device_scene import (
-    DeviceScene,
-    SurfaceInteraction,
-    offset_ray_origin,
-)
-from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, DirectionSample
+from pbrs_farm.transport.kernels.device_scene import SurfaceInteraction, offset_ray_origin
+from pbrs_farm.transport.kernels.direct_light import Strategy, sample_direct_light
+from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,
     DirectionPdfs,
-    DirectLightSample,
     PathContext,
     PathState,
     ScatteredRay,
@@ -50,7 +45,6 @@ from pbrs_farm.transport.kernels.path_state import (
     Vertex,
 )
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, VERTEX_DIMS, Sampler
-from pbrs_farm.transport.kernels.shadow_roulette import ShadowRoulette, shadow_roulettes
 from pbrs_farm.transport.scene_tables.material_rows import GLASS, MIRROR
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
@@ -58,18 +52,8 @@ MAX_NULLS = 32
 _MAX_COUNT = 64  # vertices with random dimensions of their own
 _MAX_SURVIVAL = 0.95
 
-# Random dimensions of a vertex: one or two numbers each, VERTEX_DIMS in all.
-_LOBE, _SCATTER, _ROULETTE, _LAMP, _LAMP_UV, _OUT, _OUT_UV = 0, 1, 3, 4, 5, 7, 8
-
-
-class Strategy(NamedTuple):
-    """How the rays of a vertex are sampled and weighted."""
-
-    near: NearbyLamps | None = None  # the lamps that guide its rays, None = unguided
-    guiding: Guiding | None = None
-    bsdf_share: Any = 1.0  # of the scattered rays, those that the surface draws itself
-    is_view_independent: Any = False  # Bool: the MIS weights do not depend on wi
-    beta: Any = None  # throughput up to the vertex, for shadow rays' roulette; None = all are cast
+# Random dimensions of a vertex, one or two numbers each; direct_light.py has the others.
+_LOBE, _SCATTER, _ROULETTE = 0, 1, 3
 
 
 class _Lobe(NamedTuple):
@@ -227,76 +211,6 @@ def _emitted_light(
         )
         indoor = dr.select(shines, path.beta * radiance * balanced(lamp_pdf), 0)
     return outdoor, indoor
-
-
-def sample_direct_light(
-    context: PathContext, sampler: Sampler, vertex: Vertex, strategy: Strategy, active: Any
-) -> tuple[DirectLightSample, DirectLightSample]:
-    """(outdoor, indoor) light scattered back along the path, a shadow ray each or none."""
-    emitters, emitter_filter, dim = context.emitters, context.emitter_filter, vertex.dim
-    outdoor = indoor = None
-    if emitter_filter.outdoor is not None:
-        u, uv = sampler.get_1d(dim + _OUT), sampler.get_2d(dim + _OUT_UV)
-        is_asked = active & (emitter_filter.outdoor > NO_EMITTERS)
-        outdoor = emitters.sample_outdoor(vertex.si.p, u, uv, emitter_filter.outdoor, is_asked)
-    if emitter_filter.indoor is not None and vertex.near is not None:
-        u, uv = sampler.get_1d(dim + _LAMP), sampler.get_2d(dim + _LAMP_UV)
-        is_asked = active & (emitter_filter.indoor > NO_EMITTERS)
-        indoor = emitters.sample_lamp(
-            context.scene, vertex.near, u, uv, emitter_filter.indoor, is_asked
-        )
-    # A portal asked for alone has no light of scattered rays to be weighted against.
-    if emitter_filter.outdoor is not None:
-        share = dr.select(emitter_filter.outdoor >= FIRST_PORTAL, 0, strategy.bsdf_share)
-        strategy = strategy._replace(bsdf_share=share)
-    first, second = shadow_roulettes(strategy.beta, emitters.shadow_thresholds, sampler, dim)
-    return (
-        _direct_light(context.scene, vertex, strategy, outdoor, first),
-        _direct_light(context.scene, vertex, strategy, indoor, second),
-    )
-
-
-def _direct_light(
-    scene: DeviceScene,
-    vertex: Vertex,
-    strategy: Strategy,
-    sample: DirectionSample | None,
-    roulette: ShadowRoulette | None,
-) -> DirectLightSample:
-    """What one shadow ray brings; nothing where its roulette casts none."""
-    if sample is None:
-        return DirectLightSample(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
-    si, is_independent = vertex.si, strategy.is_view_independent
-    wo = vertex.frame.to_local(sample.d)
-    value, pdf = evaluate_bsdf(si.bsdf, vertex.wi, wo)
-    pdf *= strategy.bsdf_share
-
-    # Refuse light through the face where the shading normal says that it does not pass.
-    side = dr.dot(si.ng, sample.d)
-    is_consistent = side * wo.z > 0
-    contributes = is_consistent & (dr.max(value) > 0)
-    if is_independent is not False:
-        # Ask for what could contribute from some wi, whatever this wi is.
-        pdf = dr.select(is_independent, view_independent_pdf(si.bsdf, si.ng, sample.d), pdf)
-        contributes = dr.select(is_independent, (side > 0) | (dr.max(si.bsdf.tau) > 0), contributes)
-    contributes = contributes & sample.valid & (sample.pdf > 0)
-    # Weigh by the balance heuristic; the sample's own pdf cancels with the estimator's.
-    weight = 1 / (sample.pdf + pdf)
-    if roulette is not None:
-        is_cast, chance = roulette.cast_by_chance(value * sample.radiance * weight)
-        contributes, weight = contributes & is_cast, weight / chance
-
-    # Aim again from the offset origin: a lamp near by must not shadow itself.
-    begin = offset_ray_origin(si.p, dr.select(side > 0, si.ng, -si.ng))
-    to = si.p + sample.d * sample.distance - begin
-    distance = dr.norm(to)
-    is_finite = sample.distance < dr.inf
-    d = dr.select(is_finite, to / distance, sample.d)
-    reach = dr.select(is_finite, distance * (1 - 1e-4), dr.inf)
-    clear = scene.transmittance(begin, d, reach, contributes)
-    incident = dr.select(contributes, sample.radiance * clear * weight, 0)
-    light = dr.select(contributes & is_consistent, value * incident, 0)
-    return DirectLightSample(light, sample.d, incident, sample.emitter)
 
 
 def _scatter(step: _Step, goes_on: Any) -> ScatteredRay:
