@@ -157,7 +157,7 @@ def _radiosity(context: PathContext, p: Any, normal: Any, key: Any, spp: Any) ->
         # Add direct light at the point.
         sampler = SobolSampler(key, s)
         counted = context.emitter_filter.indoor
-        near = context.emitters.nearby.at_vertex(p, normal, counted, mi.Bool(True))
+        near = context.emitters.near_lamps(p, normal, counted, mi.Bool(True))
         vertex = white_vertex(p, normal, near)
         sky, lamp = sample_direct_light(context, sampler, vertex, Strategy(), mi.Bool(True))
         l_out, l_in = sky.light, lamp.light

@@ -5,7 +5,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -268,7 +268,7 @@ class LightScene:
         self, camera: Camera, fields: LightFields, seed: int
     ) -> tuple[Any, EmitterWeights]:
         """(emitters, their EmitterWeights) with the sampling weights of this view."""
-        from pbrs_farm.transport.guiding.pilot import guiding_pays, pilot_weights, uniform_weights
+        from pbrs_farm.transport.guiding.pilot import pilot_weights, trial_weights, uniform_weights
 
         # Start from uniform weights; a pilot measures what each emitter brings to the view.
         portals = nearest_portals(self._portals, camera.eye)
@@ -282,10 +282,9 @@ class LightScene:
             # Guide the rays where that pays; Metropolis always guides its own.
             if self.n_lamps > 0 and fields.integrator == "path":
                 trial_seed = seed ^ _TRIAL_SEED
-                pays = guiding_pays(
+                weights = trial_weights(
                     self.device_scene, emitters, camera, weights, fields, trial_seed
                 )
-                weights = replace(weights, is_guided=pays)
             emitters.set_weights(weights)
         return emitters, weights
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.transport.kernels.arrival_rates import ArrivalCounts
 from pbrs_farm.transport.kernels.bsdf import luminance
 from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera, device_camera
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
@@ -50,6 +51,7 @@ class SampleSums:
     n_bad: int  # paths that were not finite, left out
     lamps: F32 | None = None  # (N, L, 3) indoor light by lamp, if asked for
     counts: NDArray[np.uint32] | None = None  # TechniqueCounts.numpy(), of the pilot
+    arrivals: NDArray[np.uint32] | None = None  # ArrivalCounts.numpy(), of a trial
 
     def __add__(self, other: SampleSums) -> SampleSums:
         def total(name: str) -> Any:
@@ -85,6 +87,7 @@ class Lanes:
     n_only_lamps: int = 0  # 0, or the lamps that the pilot asks for one by one
     n_only_outdoor: int = 0  # the same, outdoor techniques
     n_lamps: int = 0  # 0, or the number of all lamps, to sum the light of each by itself
+    counts_arrivals: bool = False  # count the shadow rays that arrive
 
     @property
     def n_only(self) -> int:
@@ -109,6 +112,8 @@ class _Beside(NamedTuple):
 
     lamps: _LampSums | None
     counts: TechniqueCounts
+    arrivals: ArrivalCounts
+    counts_arrivals: Any  # Bool
 
 
 @dataclass
@@ -157,7 +162,8 @@ def trace(
     if lanes.n_lamps > 0:
         sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
         lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
-    counts = emitters.outdoor_choice.no_counts()
+    counts, arrivals = emitters.outdoor_choice.no_counts(), emitters.arrival.no_counts()
+    counts_arrivals = dr.opaque(mi.Bool, lanes.counts_arrivals)
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(
@@ -167,9 +173,9 @@ def trace(
         dr.opaque(mi.UInt32, lanes.first_sample),
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
         stream_key(lane, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF)),
-        _Beside(lamp_sums, counts),
+        _Beside(lamp_sums, counts, arrivals, counts_arrivals),
     )
-    dr.eval(total, counts)
+    dr.eval(total, counts, arrivals)
     # Read channel by channel: of all three at once Dr.Jit makes a copy, by a kernel of its own.
     rows = {
         f.name: np.stack([c.numpy() for c in getattr(total, f.name)], axis=-1)
@@ -181,7 +187,8 @@ def trace(
         lamps = lamp_sums.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
     n_bad = int(np.sum(total.n_bad.numpy(), dtype=np.int64))
     of_pilot = counts.numpy() if lanes.n_only_outdoor > 0 else None
-    return SampleSums(**rows, n_bad=n_bad, lamps=lamps, counts=of_pilot)
+    of_trial = arrivals.numpy() if lanes.counts_arrivals else None
+    return SampleSums(**rows, n_bad=n_bad, lamps=lamps, counts=of_pilot, arrivals=of_trial)
 
 
 def _pixels_and_emitters(lane: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:
@@ -235,6 +242,7 @@ def _trace(
         l_in += result.emitted_indoor + result.direct_indoor
         _add_by_lamp(beside.lamps, result, active)
         _count_techniques(beside.counts, context, result, active)
+        _count_arrivals(beside, context, result, active)
         first_rough = result.is_rough & ~seen
         sums.add_guides(result, seen, first_rough)
         seen = seen | first_rough
@@ -257,6 +265,15 @@ def _count_techniques(
     is_lit = luminance(result.direct_outdoor) > 0
     choice = context.emitters.outdoor_choice
     choice.count(counts, result.si.p, technique, active & result.is_rough, is_lit)
+
+
+def _count_arrivals(beside: _Beside, context: PathContext, result: StepResult, active: Any) -> None:
+    """Count the shadow rays that a step has cast, and those that arrived."""
+    for sample in (result.outdoor_sample, result.indoor_sample):
+        if sample.kind is not None:
+            is_cast = active & beside.counts_arrivals & sample.is_cast
+            arrival = context.emitters.arrival
+            arrival.count(beside.arrivals, result.si.p, sample.kind, is_cast, sample.arrives)
 
 
 def _add_by_lamp(lamp_sums: _LampSums | None, result: StepResult, active: Any) -> None:

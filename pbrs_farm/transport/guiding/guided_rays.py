@@ -79,9 +79,7 @@ def guiding_at(near: NearbyLamps, bsdf: Bsdf, beta: Any, may_aim: Any) -> Guidin
     least = MIN_SHARE * near.cones.total / dr.maximum(reference.guided_total, 1e-30)
     spare = dr.clip(1 - 0.95 * survival_boost(near) * dr.max(beta * albedo), least, MAX_SHARE)
     # Where lamps send little out by way of their interiors, there is little to find.
-    gain = dr.minimum(
-        _FULL_GUIDING * reference.guided_total / dr.maximum(reference.total, 1e-30), 1
-    )
+    gain = dr.minimum(_FULL_GUIDING * reference.guided_total / dr.maximum(near.closeness, 1e-30), 1)
     may_aim = may_aim & near.is_guided & (reference.guided_total > 0)
     share = dr.select(may_aim, spare * gain, 0)
     return Guiding(near, share, dr.select(near.cones.total > 0, mi.Float(CONE_SHARE), 0))
@@ -89,7 +87,7 @@ def guiding_at(near: NearbyLamps, bsdf: Bsdf, beta: Any, may_aim: Any) -> Guidin
 
 def survival_boost(near: NearbyLamps) -> Any:
     """How much less often roulette ends a path here: more than 1 near lamps, where it is bright."""
-    boost = dr.clip(_BOOST_M2 * near.reference.total, 1, _MAX_BOOST)
+    boost = dr.clip(_BOOST_M2 * near.closeness, 1, _MAX_BOOST)
     return dr.select(near.is_guided, boost, 1)
 
 

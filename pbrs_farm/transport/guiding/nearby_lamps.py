@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, no_targets
 from pbrs_farm.transport.kernels.packets import point
 from pbrs_farm.transport.kernels.sampler import device_array
@@ -34,7 +35,7 @@ class ReferencePoint:
 
     p: mi.Point3f
     n: mi.Vector3f  # normal, 0 where light may come from both sides
-    total: mi.Float  # sum of importances
+    total: mi.Float  # sum of the chances of shadow rays
     guided_total: mi.Float  # sum of guided importances
 
 
@@ -52,8 +53,9 @@ class NearbyLamps(NamedTuple):
 
     reference: ReferencePoint
     lamps: list[Any]  # UInt32
-    importances: list[Any]  # weight of the view times closeness
-    guided: list[Any]  # the same, times the share of light that guided rays can find
+    closeness: Any  # sum of importances: weight of the view times closeness
+    chances: list[Any]  # of shadow rays to each: importance times how often such a ray arrives
+    guided: list[Any]  # importances times the share of light that guided rays can find
     cones: Cones
     is_guided: Any  # Bool: rays of this view are guided at all
 
@@ -70,7 +72,7 @@ class _LampRows(NamedTuple):
     """What is known of a lamp: packets of four floats."""
 
     sphere: Any
-    strength: Any  # weight, guided share, 0, 0
+    strength: Any  # weight, guided share, slot or MAX_NEAR, flux over weight
     interior: Any
 
 
@@ -83,13 +85,19 @@ class NearbyLampSampler:
         self._n = len(spheres)
         self._host_spheres = _padded(spheres)
         self._spheres = device_array(mi.Float, self._host_spheres.ravel())
-        self._weights = np.zeros(self._n)
+        self._fluxes = (
+            tables.lamp_rows[:, :3].astype(np.float64) @ LUMINANCE * tables.lamp_rows[:, 3]
+        )
+        self._weights, self._by_flux = np.zeros(self._n), False
         self.set_guided(True)
         self.set_targets(no_targets(self._n))
 
-    def set_weights(self, weights: F64) -> None:
-        """Set the weights of another view, (L,)."""
-        self._weights = weights
+    def set_weights(self, weights: F64, *, by_flux: bool = False) -> None:
+        """Set the weights of another view, (L,).
+
+        by_flux: shadow rays go by the lamps' flux instead, since it is known which of them arrive.
+        """
+        self._weights, self._by_flux = weights, by_flux
         self._update()
 
     def set_guided(self, is_guided: bool) -> None:
@@ -106,7 +114,12 @@ class NearbyLampSampler:
     def _update(self) -> None:
         # Keep the strongest lamps of the view; the others have importance 0.
         order = np.argsort(-self._weights, kind="stable")[:MAX_NEAR]
-        rows = np.zeros((self._n, 4))  # weight, guided share, 0, 0
+        rows = np.zeros((self._n, 4))  # as _LampRows.strength
+        rows[:, 2] = MAX_NEAR
+        rows[order, 2] = np.arange(len(order))
+        rows[:, 3] = 1
+        if self._by_flux:
+            rows[order, 3] = self._fluxes[order] / np.maximum(self._weights[order], 1e-12)
         rows[order, 0] = self._weights[order]
         rows[:, 1] = self._shares
         strengths = _padded(rows)
@@ -123,22 +136,27 @@ class NearbyLampSampler:
             for k, lamp in enumerate(chosen)
         ]
 
-    def at_vertex(self, p: Any, n: Any, counted: Any, active: Any) -> NearbyLamps:
-        """The lamps from p on a surface of normal n. counted: the one lamp that counts, or -1."""
-        lamps, importances, guided, interiors = [], [], [], []
-        total, guided_total = mi.Float(0), mi.Float(0)
+    def at_vertex(self, p: Any, n: Any, counted: Any, rates: list[Any], active: Any) -> NearbyLamps:
+        """The lamps from p on a surface of normal n.
+
+        counted: the one lamp that counts, or -1. rates: of shadow rays to each that arrive.
+        """
+        lamps, chances, guided, interiors = [], [], [], []
+        closeness, total, guided_total = mi.Float(0), mi.Float(0), mi.Float(0)
         for k in range(MAX_NEAR):
             lamp, counts, rows = self._slot(k, counted, active)
             importance, aimed = _importance(rows, lamp, p, n, counted, active)
             lamps.append(lamp)
             interiors.append(rows.interior)
-            importances.append(counts * importance)
+            importance *= counts
+            closeness += importance
+            chances.append(importance * rates[k] * dr.select(counted >= 0, 1, rows.strength[3]))
             guided.append(counts * aimed)
-            total += importances[-1]
+            total += chances[-1]
             guided_total += guided[-1]
         reference = ReferencePoint(mi.Point3f(p), n, total, guided_total)
         cones = _cones(p, interiors, guided)
-        return NearbyLamps(reference, lamps, importances, guided, cones, self._is_guided)
+        return NearbyLamps(reference, lamps, closeness, chances, guided, cones, self._is_guided)
 
     def importance(self, lamp: Any, p: Any, n: Any, counted: Any, active: Any) -> tuple[Any, Any]:
         """(importance, guided importance) of one lamp as in NearbyLamps; 0 for the weak ones."""
@@ -146,6 +164,11 @@ class NearbyLampSampler:
         strength = dr.gather(mi.Vector4f, self._strengths, lamp, active)
         rows = _LampRows(sphere, strength, None)
         return _importance(rows, lamp, p, n, counted, active)
+
+    def slot(self, lamp: Any, active: Any) -> tuple[Any, Any]:
+        """(place of a lamp among the strongest or MAX_NEAR, what its importance is times for a chance)."""
+        row = dr.gather(mi.Vector4f, self._strengths, lamp, active)
+        return mi.UInt32(row[2]), row[3]
 
     def _slot(self, k: int, counted: Any, active: Any) -> _Slot:
         """A slot; for the lamp that is asked for alone the first one, where the others count nothing."""

@@ -18,6 +18,7 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.transport.kernels.arrival_rates import arrival_rates
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, EmitterWeights
 from pbrs_farm.transport.kernels.outdoor_choice import weights_by_place
@@ -120,24 +121,25 @@ def _shadow_thresholds(brought: NDArray[np.floating], n_lamps: int) -> tuple[flo
     return SHADOW_SHARE * outdoor_mean, SHADOW_SHARE * indoor_mean
 
 
-def guiding_pays(
+def trial_weights(
     scene: DeviceScene,
     emitters: Emitters,
     camera: Camera,
     weights: EmitterWeights,
     fields: LightFields,
     seed: int,
-) -> bool:
-    """Whether guided rays cut the noise of a view by more than they cost; emitters are left guided.
+) -> EmitterWeights:
+    """The weights of a view with what a trial of it says: whether guided rays cut its noise by more
+    than they cost, and how often shadow rays arrive.
 
     Renders the view small both ways, with the view's weights. A view of few samples is guided
     without a trial, which would cost as much as it saves.
     """
     i = camera.intrinsics
     if i.width_px * i.height_px * fields.spp < _MIN_SAMPLES:
-        return True
+        return weights
     width, height = _PILOT_SIZE
-    lanes = Lanes(width, height, 0, _TRIAL_SPP, seed)
+    lanes = Lanes(width, height, 0, _TRIAL_SPP, seed, counts_arrivals=True)
     small = camera.with_size(width, height)
 
     def with_guiding(is_guided: bool) -> Emitters:
@@ -152,7 +154,11 @@ def guiding_pays(
     level = median_filter(light, size=_NEIGHBOURS, mode="nearest").ravel()
     level += _DARK * max(float(level.mean()), 1e-12)
     variances = [float(((_halves_apart(s) / level) ** 2).mean()) for s in (plain, guided)]
-    return variances[0] > _GUIDING_COST * variances[1]
+    is_guided = variances[0] > _GUIDING_COST * variances[1]
+    assert plain.arrivals is not None
+    assert guided.arrivals is not None
+    rates = arrival_rates(plain.arrivals + guided.arrivals)
+    return replace(weights, is_guided=is_guided, arrival_rates=rates)
 
 
 def _luminance(rgb: F32) -> F64:

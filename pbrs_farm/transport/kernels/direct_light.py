@@ -14,7 +14,7 @@ import mitsuba as mi
 from pbrs_farm.transport.guiding.guided_rays import Guiding
 from pbrs_farm.transport.guiding.nearby_lamps import NearbyLamps
 from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, view_independent_pdf
-from pbrs_farm.transport.kernels.device_scene import DeviceScene, offset_ray_origin
+from pbrs_farm.transport.kernels.device_scene import offset_ray_origin
 from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, DirectionSample
 from pbrs_farm.transport.kernels.path_state import (
     NO_EMITTERS,
@@ -61,13 +61,13 @@ def sample_direct_light(
         strategy = strategy._replace(bsdf_share=share)
     first, second = shadow_roulettes(strategy.beta, emitters.shadow_thresholds, sampler, dim)
     return (
-        _direct_light(context.scene, vertex, strategy, outdoor, first),
-        _direct_light(context.scene, vertex, strategy, indoor, second),
+        _direct_light(context, vertex, strategy, outdoor, first),
+        _direct_light(context, vertex, strategy, indoor, second),
     )
 
 
 def _direct_light(
-    scene: DeviceScene,
+    context: PathContext,
     vertex: Vertex,
     strategy: Strategy,
     sample: DirectionSample | None,
@@ -93,7 +93,8 @@ def _direct_light(
     # Weigh by the balance heuristic; the sample's own pdf cancels with the estimator's.
     weight = 1 / (sample.pdf + pdf)
     if roulette is not None:
-        is_cast, chance = roulette.cast_by_chance(value * sample.radiance * weight)
+        rate = context.emitters.arrival.of_kind(si.p, sample.kind, contributes)
+        is_cast, chance = roulette.cast_by_chance(value * sample.radiance * weight, rate)
         contributes, weight = contributes & is_cast, weight / chance
 
     # Aim again from the offset origin: a lamp near by must not shadow itself.
@@ -103,7 +104,10 @@ def _direct_light(
     is_finite = sample.distance < dr.inf
     d = dr.select(is_finite, to / distance, sample.d)
     reach = dr.select(is_finite, distance * (1 - 1e-4), dr.inf)
-    clear = scene.transmittance(begin, d, reach, contributes)
+    clear = context.scene.transmittance(begin, d, reach, contributes)
     incident = dr.select(contributes, sample.radiance * clear * weight, 0)
     light = dr.select(contributes & is_consistent, value * incident, 0)
-    return DirectLightSample(light, sample.d, incident, sample.emitter)
+    arrives = dr.max(clear) > 0
+    return DirectLightSample(
+        light, sample.d, incident, sample.emitter, sample.kind, contributes, arrives
+    )

@@ -22,12 +22,14 @@ from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, TargetSampler, no_targets
 from pbrs_farm.transport.guiding.nearby_lamps import (
+    MAX_NEAR,
     NearbyLamps,
     NearbyLampSampler,
     ReferencePoint,
     sample_discrete,
 )
 from pbrs_farm.transport.kernels.alias_table import alias_rows, sample_alias_table
+from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP, ArrivalRates
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.outdoor_choice import OutdoorChoice, choose_technique
 from pbrs_farm.transport.kernels.packets import colour, vector
@@ -40,8 +42,9 @@ from pbrs_farm.transport.scene_tables.sky import Sky, solid_angles
 SUN, DOME, FIRST_PORTAL = 0, 1, 2  # outdoor techniques; those from FIRST_PORTAL on are portals
 
 # Of the shadow rays to lamps, those that go by where the lamps are; the others go by the weights
-# of the view alone (walls hide lamps).
-NEARBY_SHARE = 0.5
+# of the view alone (walls hide lamps). Where it is known which rays arrive it is more, as far as the
+# nearby lamps have the weight of the view.
+NEARBY_SHARE, MAX_NEARBY_SHARE = 0.5, 0.9
 
 _PORTAL_PACKETS = 3  # corner, first edge, second edge
 
@@ -57,6 +60,7 @@ class EmitterWeights:
     # Luminance of outdoor and indoor light that a shadow ray must be able to bring, or it is cast by
     # chance (shadow_roulette.py); 0 = all are cast.
     shadow_thresholds: tuple[float, float] = (0.0, 0.0)
+    arrival_rates: F64 | None = None  # (voxels, kinds) of arrival_rates.py, None = all rays arrive
 
 
 class DirectionSample(NamedTuple):
@@ -67,6 +71,7 @@ class DirectionSample(NamedTuple):
     radiance: Any  # Color3f from there
     pdf: Any  # per solid angle, of all techniques that could have drawn it
     valid: Any
+    kind: Any  # UInt32, of arrival_rates.py
     emitter: Any = None  # UInt32 number of the lamp, None for the sky
 
 
@@ -81,7 +86,8 @@ class Emitters:
         self, tables: SceneTables, sky: Sky, portals: F64, weights: EmitterWeights
     ) -> None:
         self.nearby = NearbyLampSampler(tables)
-        self.outdoor_choice = OutdoorChoice(VoxelGrid(tables.positions))
+        grid = VoxelGrid(tables.positions)
+        self.outdoor_choice, self.arrival = OutdoorChoice(grid), ArrivalRates(grid)
         self.targets = TargetSampler(no_targets(len(tables.lamps)))
         self._set_lamps(tables, weights.lamps)
         self._set_dome(sky)
@@ -104,7 +110,7 @@ class Emitters:
 
     def set_weights(self, weights: EmitterWeights) -> None:
         """Set other weights; the scene stays."""
-        self._set_lamp_weights(weights.lamps)
+        self._set_lamp_weights(weights.lamps, weights.arrival_rates)
         self._set_outdoor_weights(weights)
         self.nearby.set_guided(weights.is_guided)
         self._set_shadow_thresholds(weights)
@@ -114,20 +120,26 @@ class Emitters:
         self.targets = TargetSampler(targets)
         self.nearby.set_targets(targets)
 
+    def near_lamps(self, p: Any, n: Any, counted: Any, active: Any) -> NearbyLamps:
+        """The strongest lamps from p on a surface of normal n."""
+        rates = self.arrival.of_near_lamps(p, active)
+        rates[0] = dr.select(counted >= 0, 1, rates[0])
+        return self.nearby.at_vertex(p, n, counted, rates, active)
+
     def sample_lamp(
         self, scene: DeviceScene, near: NearbyLamps, u: Any, uv: Any, counted: Any, active: Any
     ) -> DirectionSample:
         """A point on a lamp: of those nearby with chance NEARBY_SHARE, else by weight alone."""
         # Choose a lamp both ways, and take one.
         active = active & self._has_lamps
-        nearby_share = _nearby_share(near.reference)
+        nearby_share = self._nearby_share(near.reference)
         is_near = u < nearby_share
-        rest = dr.select(is_near, u / NEARBY_SHARE, (u - nearby_share) / (1 - nearby_share))
+        rest = dr.select(
+            is_near, u / dr.maximum(nearby_share, 1e-6), (u - nearby_share) / (1 - nearby_share)
+        )
         rest = dr.clip(rest, 0, 1 - 1e-7)
         lamp, v = sample_alias_table(self._lamp_alias, mi.UInt32(0), self._n_lamps, rest, active)
-        near_lamp, near_v = sample_discrete(
-            near.lamps, near.importances, near.reference.total, rest
-        )
+        near_lamp, near_v = sample_discrete(near.lamps, near.chances, near.reference.total, rest)
         lamp, u = dr.select(is_near, near_lamp, lamp), dr.select(is_near, near_v, v)
         lamp = dr.select(counted >= 0, mi.UInt32(counted), lamp)
         # Choose a triangle of it by area, and a point on that.
@@ -143,7 +155,12 @@ class Emitters:
         cos = dr.abs(dr.dot(n, d))
         valid = active & (distance > 1e-5) & (cos > 1e-5)
         radiance, pdf = self._eval_lamp(lamp, near.reference, distance, cos, counted, valid)
-        return DirectionSample(d, distance, radiance, pdf, valid, lamp)
+        kind = self.nearby.slot(lamp, valid)[0] + FIRST_LAMP
+        return DirectionSample(d, distance, radiance, pdf, valid, kind, lamp)
+
+    def _nearby_share(self, reference: ReferencePoint) -> Any:
+        """Chance that a lamp is chosen by where it is; 0 where none is nearby."""
+        return dr.select(reference.total > 0, self._share_nearby, 0)
 
     def eval_lamp(
         self,
@@ -174,8 +191,11 @@ class Emitters:
         importance, _guided = self.nearby.importance(
             lamp, reference.p, reference.n, counted, active
         )
-        nearby = importance / dr.maximum(reference.total, 1e-30)
-        weight = dr.lerp(weight, nearby, _nearby_share(reference))
+        slot, factor = self.nearby.slot(lamp, active)
+        rate = self.arrival.of_kind(reference.p, slot + FIRST_LAMP, active) * factor
+        rate = dr.select(counted >= 0, 1, rate)
+        nearby = importance * rate / dr.maximum(reference.total, 1e-30)
+        weight = dr.lerp(weight, nearby, self._nearby_share(reference))
         weight = dr.select(counted >= 0, 1, weight)
         pdf = weight * dr.square(distance) / dr.maximum(row[3] * cos, 1e-12)
         counts = (counted < 0) | (mi.UInt32(counted) == lamp)
@@ -198,7 +218,7 @@ class Emitters:
         sun, sun_pdf = self.eval_sun(chances, d, counted)
         dome, dome_pdf = self.eval_dome(chances, p, d, counted, active)
         radiance, pdf = dr.select(is_sun, sun, dome), dr.select(is_sun, sun_pdf, dome_pdf)
-        return DirectionSample(d, mi.Float(dr.inf), radiance, pdf, active)
+        return DirectionSample(d, mi.Float(dr.inf), radiance, pdf, active, technique)
 
     def eval_sun(self, chances: list[Any], d: Any, counted: Any) -> tuple[Any, Any]:
         """(radiance of the sun's disc in direction d, pdf of sampling it by the techniques' chances)."""
@@ -298,7 +318,7 @@ class Emitters:
             for a, b in zip(tables.lamp_first[:-1], tables.lamp_first[1:], strict=True)
         ]
         self._triangle_alias = padded(mi.Float, np.concatenate(alias), np.ones((1, 2), np.float32))
-        self._set_lamp_weights(weights)
+        self._set_lamp_weights(weights, None)
 
     def _set_portals(self, portals: F64) -> None:
         rows = np.zeros((MAX_PORTALS, 4 * _PORTAL_PACKETS), np.float32)
@@ -312,9 +332,15 @@ class Emitters:
             for row in rows
         ]
 
-    def _set_lamp_weights(self, weights: F64) -> None:
+    def _set_lamp_weights(self, weights: F64, rates: F64 | None) -> None:
+        self.arrival.set_rates(rates)
+        self.nearby.set_weights(weights, by_flux=rates is not None)
+        share = NEARBY_SHARE
+        if rates is not None:
+            strongest = float(np.sort(weights)[::-1][:MAX_NEAR].sum())
+            share = min(max(round(strongest, 6), NEARBY_SHARE), MAX_NEARBY_SHARE)
+        self._share_nearby = dr.opaque(mi.Float, share)
         padded = weights if len(weights) else np.ones(1)
-        self.nearby.set_weights(weights)
         self._lamp_weights = device_array(mi.Float, padded.astype(np.float32))
         self._lamp_alias = device_array(mi.Float, alias_rows(padded).ravel())
 
@@ -347,11 +373,6 @@ class Emitters:
         self._dome_width = dr.opaque(mi.UInt32, width)
         self._dome_height = dr.opaque(mi.UInt32, height)
         self._dome_height_f = dr.opaque(mi.Float, float(height))
-
-
-def _nearby_share(reference: ReferencePoint) -> Any:
-    """Chance that a lamp is chosen by where it is; 0 where none is nearby."""
-    return dr.select(reference.total > 0, mi.Float(NEARBY_SHARE), 0)
 
 
 def _cone(uv: Any, cos_max: Any) -> Any:

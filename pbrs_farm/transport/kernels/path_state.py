@@ -102,6 +102,9 @@ class DirectLightSample(NamedTuple):
     d: Any  # unit direction to the emitter
     incident: Any  # radiance times visibility and MIS weight, over the pdf
     emitter: Any = None  # number of the lamp, None for the sky
+    kind: Any = None  # of the shadow ray (arrival_rates.py)
+    is_cast: Any = False  # Bool
+    arrives: Any = False  # Bool: nothing stands in its way
 
 
 @dataclass

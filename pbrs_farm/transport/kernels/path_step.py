@@ -145,7 +145,7 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     near, counted = None, context.emitter_filter.indoor
     if counted is not None:
         normal = dr.select(dr.max(si.bsdf.tau) > 0, 0, si.ng)
-        near = context.emitters.nearby.at_vertex(si.p, normal, counted, is_solid)
+        near = context.emitters.near_lamps(si.p, normal, counted, is_solid)
     is_rough = is_solid & ~is_glass & ~is_mirror
     return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near)
 

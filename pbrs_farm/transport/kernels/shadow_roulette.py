@@ -1,7 +1,8 @@
 """Russian roulette of shadow rays: one that can bring little is cast by chance; kernels, no effects.
 
 A shadow ray costs the same whatever it can bring. What it would bring if nothing stood in its way is
-known before it is cast. Below a threshold it is cast with a chance in proportion to that, and what
+known before it is cast, and how often one like it arrives is, too (arrival_rates.py). Where the product
+of both lies below a threshold it is cast with a chance in proportion to that, and what
 it brings is divided by the chance, so that the mean stays (Arvo and Kirk 1990). The chance has a
 least value: without it dark corners of a bright view had spots as bright as the threshold.
 """
@@ -26,14 +27,17 @@ class ShadowRoulette(NamedTuple):
     """Whether a shadow ray is cast at a vertex."""
 
     beta: Any  # Color3f, throughput of the path up to the vertex
-    threshold: Any  # luminance from which on every ray is cast; 0 = every ray is
+    threshold: Any  # expected luminance from which on every ray is cast; 0 = every ray is
     u: Any  # random number
 
-    def cast_by_chance(self, unshadowed: Any) -> tuple[Any, Any]:
-        """(Bool: the ray is cast, chance of that) by what it would bring, before the throughput."""
-        most = luminance(self.beta * unshadowed)
-        chance = dr.maximum(most / self.threshold, LEAST_CHANCE)
-        chance = dr.select(most < self.threshold, chance, mi.Float(1))
+    def cast_by_chance(self, unshadowed: Any, rate: Any) -> tuple[Any, Any]:
+        """(Bool: the ray is cast, chance of that) by what it would bring, before the throughput.
+
+        rate: share of such rays that arrive.
+        """
+        expected = luminance(self.beta * unshadowed) * rate
+        chance = dr.maximum(expected / self.threshold, LEAST_CHANCE)
+        chance = dr.select(expected < self.threshold, chance, mi.Float(1))
         return self.u < chance, chance
 
 

@@ -168,7 +168,7 @@ def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
     rng = mi.PCG32(size=n)
     p, up = mi.Point3f(1.3, 0.5, 2.0), mi.Vector3f(0, 1, 0)
     counted, on = mi.Int32(-1), mi.Bool(True)
-    near = emitters.nearby.at_vertex(p, up, counted, on)
+    near = emitters.near_lamps(p, up, counted, on)
     assert near.reference.total.numpy()[0] > 0
     uv = mi.Point2f(rng.next_float32(), rng.next_float32())
     to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, counted, on)

@@ -31,7 +31,7 @@ def scene_and_camera(room: Callable[[], tuple[House, Camera]]) -> tuple[LightSce
     return LightScene.load(house, {}, RECIPE, SKY), camera.with_size(32, 24)
 
 
-def test_a_ray_is_cast_by_what_it_can_bring_over_the_threshold_and_one_in_ten_at_least() -> None:
+def test_a_ray_is_cast_by_what_it_is_expected_to_bring_and_one_in_ten_at_least() -> None:
     import drjit as dr
     import mitsuba as mi
 
@@ -40,15 +40,16 @@ def test_a_ray_is_cast_by_what_it_can_bring_over_the_threshold_and_one_in_ten_at
     n = 100_000
     u = (dr.arange(mi.Float, n) + 0.5) / n
     throughput = mi.Color3f(0.5)
-    for threshold, brings, expected in (
-        (0.0, 0.001, 1.0),
-        (2.0, 8.0, 1.0),
-        (2.0, 1.0, 0.25),
-        (2.0, 0.004, 0.1),
-        (2.0, float("nan"), 1.0),  # counted, not hidden
+    for threshold, brings, rate, expected in (
+        (0.0, 0.001, 1.0, 1.0),
+        (2.0, 8.0, 1.0, 1.0),
+        (2.0, 1.0, 1.0, 0.25),
+        (2.0, 2.0, 0.5, 0.25),  # half of such rays arrive
+        (2.0, 0.004, 1.0, 0.1),
+        (2.0, float("nan"), 1.0, 1.0),  # counted, not hidden
     ):
         roulette = ShadowRoulette(throughput, mi.Float(threshold), u)
-        is_cast, chance = roulette.cast_by_chance(mi.Color3f(brings))
+        is_cast, chance = roulette.cast_by_chance(mi.Color3f(brings), mi.Float(rate))
         assert np.allclose(chance.numpy(), expected)
         assert is_cast.numpy().mean() == pytest.approx(expected, abs=1e-3)
 

@@ -1,0 +1,89 @@
+"""How many shadow rays arrive, by where they begin and where they go; kernels.
+
+What a shadow ray would bring if nothing stood in its way is known before it is cast, whether something
+stands there is not. So the trial of a view (pilot.py) counts in voxels of the home the shadow rays of
+each kind and those that arrived. A kind is an outdoor technique, one of the strongest lamps of the
+view, or any other lamp.
+Effects: holds buffers on the device.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.transport.guiding.nearby_lamps import MAX_NEAR
+from pbrs_farm.transport.kernels.outdoor_choice import MAX_TECHNIQUES
+from pbrs_farm.transport.kernels.sampler import device_array
+from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
+
+# Kinds of shadow rays: a row's places. The rest of the last packet of four floats is empty.
+FIRST_LAMP: Final = MAX_TECHNIQUES
+OTHER_LAMP: Final = FIRST_LAMP + MAX_NEAR
+N_KINDS: Final = OTHER_LAMP + 4
+# A voxel counts as if it had so many rays more, which arrive as the view's do.
+_PRIOR: Final = 4.0
+_LEAST_RATE: Final = 0.02
+
+
+class ArrivalCounts(NamedTuple):
+    """Of shadow rays that were cast, by voxel and kind."""
+
+    cast: Any  # UInt32, (voxels * N_KINDS,)
+    arrived: Any  # those that met nothing on their way
+
+    def numpy(self) -> NDArray[np.uint32]:
+        """(2, voxels, N_KINDS)."""
+        return np.stack([x.numpy().reshape(-1, N_KINDS) for x in self])
+
+
+class ArrivalRates:
+    """The share of each kind of shadow rays that arrive from every voxel, for one view."""
+
+    def __init__(self, grid: VoxelGrid) -> None:
+        self._grid = grid
+        self.set_rates(None)
+
+    def set_rates(self, rates: F64 | None) -> None:
+        """Set the rates of a view: (voxels, N_KINDS), None = every ray arrives."""
+        rows = np.ones((self._grid.n_voxels, N_KINDS), np.float32)
+        if rates is not None:
+            rows[:] = rates
+        self._rows = device_array(mi.Float, rows.ravel())
+
+    def of_kind(self, p: Any, kind: Any, active: Any) -> Any:
+        """The rate of one kind at p."""
+        return dr.gather(mi.Float, self._rows, self._grid.voxel(p) * N_KINDS + kind, active)
+
+    def of_near_lamps(self, p: Any, active: Any) -> list[Any]:
+        """The rates of the strongest lamps at p, a list entry each."""
+        first = self._grid.voxel(p) * (N_KINDS // 4) + FIRST_LAMP // 4
+        rows = [dr.gather(mi.Vector4f, self._rows, first + k, active) for k in range(MAX_NEAR // 4)]
+        return [row[k] for row in rows for k in range(4)]
+
+    def no_counts(self) -> ArrivalCounts:
+        """Where nothing was counted yet."""
+        n = self._grid.n_voxels * N_KINDS
+        return ArrivalCounts(dr.zeros(mi.UInt32, n), dr.zeros(mi.UInt32, n))
+
+    def count(self, counts: ArrivalCounts, p: Any, kind: Any, is_cast: Any, arrives: Any) -> None:
+        """Count shadow rays from p."""
+        place = self._grid.voxel(p) * N_KINDS + kind
+        # Add in place: a copy for each thread would put the number of voxels into the kernel.
+        one, mode = mi.UInt32(1), dr.ReduceMode.Direct
+        dr.scatter_add(counts.cast, one, place, is_cast, mode=mode)
+        dr.scatter_add(counts.arrived, one, place, is_cast & arrives, mode=mode)
+
+
+def arrival_rates(counts: NDArray[np.uint32]) -> F64:
+    """(voxels, N_KINDS) share of the rays that arrive, never 0. counts: ArrivalCounts.numpy()."""
+    cast, arrived = counts.astype(np.float64)
+    everywhere = (arrived.sum(0) + 0.5) / (cast.sum(0) + 1)
+    rates = (arrived + _PRIOR * everywhere) / (cast + _PRIOR)
+    # Round, so that the last bits of a quotient never change a picture.
+    return np.asarray(np.round(np.maximum(rates, _LEAST_RATE), 6))

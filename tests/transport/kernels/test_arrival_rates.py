@@ -1,0 +1,140 @@
+"""Shadow rays by how often such rays arrive: what is counted, what follows, and that no mean moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import House
+from pbrs_farm.core.lighting import Group
+from pbrs_farm.core.recipe import LightFields, recipe_from_name
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import sunsky
+from pbrs_farm.transport.validation import known_rooms as rooms
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
+
+if choose_variant().startswith("scalar"):
+    pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)
+
+RECIPE = recipe_from_name("fast")
+FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "spp": 64})
+SKY = sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.35)
+
+
+def three_lamps() -> tuple[House, Camera]:
+    """A room with an open side and two bulbs, and a third bulb in a closed box that hides it."""
+    surfaces = rooms.shell((4.0, 2.5, 4.0), 0, front=False)
+    surfaces.append(rooms.box((2.9, 0.0, 2.9), (3.7, 0.8, 3.7), 0))
+    lamps = [
+        rooms.bulb((1.0, 2.0, 1.0), 1, 900.0),
+        rooms.bulb((3.0, 2.0, 1.5), 1, 500.0),
+        rooms.bulb((3.3, 0.4, 3.3), 1, 700.0),
+    ]
+    house = rooms.house(surfaces, [rooms.matte("wall", 0.7), rooms.BULB], lamps=lamps)
+    return house, rooms.camera((2, 1.5, 0.3), (2, 0.5, 3)).with_size(32, 24)
+
+
+@pytest.fixture
+def tried(monkeypatch: pytest.MonkeyPatch) -> tuple[LightScene, Camera]:
+    """The room, where even a small view has a trial."""
+    from pbrs_farm.transport.guiding import pilot
+
+    monkeypatch.setattr(pilot, "_MIN_SAMPLES", 0)
+    house, camera = three_lamps()
+    return LightScene.load(house, {}, RECIPE, SKY), camera
+
+
+def traced(scene: LightScene, camera: Camera, weights: Any, seed: int) -> Any:
+    from pbrs_farm.transport.path_tracer import Lanes, trace
+
+    scene._emitters.set_weights(weights)
+    lanes = Lanes(32, 24, 0, 64, seed, counts_arrivals=True)
+    return trace(scene.device_scene, scene._emitters, camera, lanes, FIELDS)
+
+
+def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_the_views() -> None:
+    from pbrs_farm.transport.kernels.arrival_rates import N_KINDS, arrival_rates
+
+    counts = np.zeros((2, 3, N_KINDS), np.uint32)
+    counts[0, :2, 4] = 1000
+    counts[1, 0, 4] = 900
+    rates = arrival_rates(counts)
+    assert rates[0, 4] == pytest.approx(0.9, abs=0.01)
+    assert 0 < rates[1, 4] < 0.05
+    assert rates[2, 4] == pytest.approx(0.45, abs=0.01)
+    assert ((rates > 0) & (rates <= 1)).all()
+
+
+def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
+    tried: tuple[LightScene, Camera],
+) -> None:
+    from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP
+
+    scene, camera = tried
+    _emitters, weights = scene.emitters(camera, FIELDS, 1)
+    counts = traced(scene, camera, replace(weights, arrival_rates=None), 2).arrivals
+    cast, arrived = counts.sum(1)
+    slot = np.argsort(-weights.lamps, kind="stable")
+    hidden = FIRST_LAMP + int(np.flatnonzero(slot == 2)[0])
+    seen = FIRST_LAMP + int(np.flatnonzero(slot == 0)[0])
+    assert cast[hidden] > 100
+    assert arrived[hidden] < 0.02 * cast[hidden]
+    assert arrived[seen] > 0.4 * cast[seen]  # half of a bulb lies behind its other half
+    # What the room has not: an outdoor technique or a lamp beyond the third.
+    assert not cast[FIRST_LAMP + 3 :].any()
+    assert (arrived <= cast).all()
+
+
+def test_rates_let_more_of_fewer_shadow_rays_arrive(tried: tuple[LightScene, Camera]) -> None:
+    scene, camera = tried
+    _emitters, weights = scene.emitters(camera, FIELDS, 1)
+    assert weights.arrival_rates is not None
+    (cast, arrived), (cast_all, arrived_all) = (
+        traced(scene, camera, w, 2).arrivals.sum((1, 2), dtype=np.int64)
+        for w in (weights, replace(weights, arrival_rates=None))
+    )
+    assert cast < 0.9 * cast_all
+    assert arrived / cast > 1.1 * arrived_all / cast_all
+
+
+@pytest.mark.parametrize("are_random", [False, True])
+def test_rates_leave_the_mean_alone(tried: tuple[LightScene, Camera], are_random: bool) -> None:
+    # Significance: 16 blocks of two groups, |z| < 4.5 each is missed by chance once in 4500 runs.
+    # Random rates are wrong everywhere: chances and pdfs must agree whatever the rates are.
+    scene, camera = tried
+    _emitters, weights = scene.emitters(camera, FIELDS, 1)
+    rates = weights.arrival_rates
+    assert rates is not None
+    if are_random:
+        rates = np.random.default_rng(5).uniform(0.02, 1, rates.shape)
+    found: list[list[list[Any]]] = []
+    for by_place, first_seed in ((rates, 10), (None, 20)):
+        own = replace(weights, arrival_rates=by_place)
+        sums = [traced(scene, camera, own, seed) for seed in range(first_seed, first_seed + 8)]
+        pairs = [[s.outdoor for s in sums], [s.indoor for s in sums]]
+        found.append([[blocks(x.reshape(24, 32, 3)) for x in pictures] for pictures in pairs])
+    for with_rates, without in zip(*found, strict=True):
+        assert np.abs(z_scores(with_rates, without)).max() < 4.5
+
+
+def test_a_tried_view_has_the_same_bits_again(tried: tuple[LightScene, Camera]) -> None:
+    scene, camera = tried
+    fields = FIELDS.model_copy(update={"spp": 8})
+    first, again = (
+        LightScene.load(three_lamps()[0], {}, RECIPE, SKY).render(camera, "-", fields, 3)
+        for _ in range(2)
+    )
+    for group in Group:
+        np.testing.assert_array_equal(first.group(group), again.group(group))
+    assert scene.emitters(camera, fields, 3)[1].arrival_rates is not None
+
+
+def test_metropolis_has_no_rates(tried: tuple[LightScene, Camera]) -> None:
+    scene, camera = tried
+    chains = FIELDS.model_copy(update={"integrator": "metropolis"})
+    assert scene.emitters(camera, chains, 1)[1].arrival_rates is None
