@@ -17,7 +17,7 @@ its standard error, `light.guide_chosen` how many views most trials guide. Seven
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 from unittest.mock import patch
 
@@ -123,16 +123,15 @@ def _trials(
     few = fields.model_copy(update={"spp": 1})
     emitters, weights = scene.emitters(camera, few, 0)  # too few samples to be tried
     # Compile, and measure the lamps' targets, before any clock starts.
-    pilot.guiding_pays(scene.device_scene, emitters, camera, weights, fields, 0)
+    pilot.trial_weights(scene.device_scene, emitters, camera, weights, fields, 0)
     _picture(scene, camera, few, 0, guided=True)
     choices, trial_s, pilot_s = [], [], []
     for seed in range(1, TRIALS + 1):
         began = time.process_time()
         emitters, weights = scene.emitters(camera, few, seed)
         piloted = time.process_time()
-        choices.append(
-            pilot.guiding_pays(scene.device_scene, emitters, camera, weights, fields, seed)
-        )
+        tried = pilot.trial_weights(scene.device_scene, emitters, camera, weights, fields, seed)
+        choices.append(tried.is_guided)
         trial_s.append(time.process_time() - piloted)
         pilot_s.append(piloted - began)
     return choices, float(np.mean(trial_s)), float(np.mean(pilot_s))
@@ -145,7 +144,7 @@ def _picture(
 
     A scene keeps the weights of its last seed: both ways need seeds of their own.
     """
-    with patch.object(pilot, "guiding_pays", lambda *_rest: guided):
+    with patch.object(pilot, "trial_weights", lambda *given: replace(given[3], is_guided=guided)):
         began = time.process_time()
         result = scene.render(camera.with_size(*SIZE), "-", fields, seed)
         spent = time.process_time() - began

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,8 @@ def test_guided_rays_leave_the_mean_alone_and_cut_the_noise(
 def test_an_unguided_view_is_as_one_without_guiding(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, camera = loaded(hard_rooms.open_shade())
     fields = FIELDS.model_copy(update={"spp": 16})
-    monkeypatch.setattr("pbrs_farm.transport.guiding.pilot.guiding_pays", lambda *_: False)
+    plain = "pbrs_farm.transport.guiding.pilot.trial_weights"
+    monkeypatch.setattr(plain, lambda *given: replace(given[3], is_guided=False))
     result = scene.render(camera, "0_0", fields, 1)
     assert result.facts["guided"] is False
     unguided(monkeypatch)
