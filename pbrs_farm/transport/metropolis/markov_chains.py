@@ -337,12 +337,14 @@ def _record(how: Mutations, chain: Any, step: Any, x: _State, suffix: Any, activ
     """Leave what a chain stands at after a round's last step, where active."""
     records = how.records
     row = (step - 1 - how.first) // ROUND_STEPS * records.n_chains + chain
-    dr.scatter(records.pixel, x.pixel, row, active)
-    dr.scatter(records.shared, x.shared, row, active)
-    dr.scatter(records.is_shared, x.shared > 0, row, active)
     k = mi.UInt32(0)
     writing = mi.Bool(active)
+    # All within the loop, which steps that end no round leave out.
     while writing:
+        is_first = writing & (k == 0)
+        dr.scatter(records.pixel, x.pixel, row, is_first)
+        dr.scatter(records.shared, x.shared, row, is_first)
+        dr.scatter(records.is_shared, x.shared > 0, row, is_first)
         dr.scatter(records.rows, suffix.read(k), row * SUFFIX_FLOATS + k, writing)
         k += 1
         writing = writing & (k < SUFFIX_FLOATS)
