@@ -8,7 +8,8 @@ With t the CPU of a trial over the plain view's, choosing over never guiding is
 
     ratio = (p v + 1 - p) (p c + 1 - p + t)
 
-Where no trial guides, both ways are one estimator, the same seed gives the same bits, and all that choosing costs is
+A trial also counts which shadow rays arrive; both ways know that, plain rays without paying for it, so that the
+ratio is guiding's at its dearest. Where no trial guides, both ways are one estimator, the same seed gives the same bits, and all that choosing costs is
 the trial: 1 + t, no quotient of two noises, and only the CPU of a plain picture is measured. Its standard error is
 the jackknife's over the pictures. `light.guide_worst` is the largest ratio of the views, `light.guide_worst_error`
 its standard error, `light.guide_chosen` how many views most trials guide. Seven minutes on two quiet cores.
@@ -30,6 +31,8 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields, recipe_from_name
 from pbrs_farm.transport.guiding import pilot
+from pbrs_farm.transport.kernels.device_scene import DeviceScene
+from pbrs_farm.transport.kernels.emitters import Emitters, EmitterWeights
 from pbrs_farm.transport.light_scene import LightScene
 
 VIEW: Final = (640, 480)  # px, of the view whose CPU is reckoned
@@ -124,7 +127,7 @@ def _trials(
     emitters, weights = scene.emitters(camera, few, 0)  # too few samples to be tried
     # Compile, and measure the lamps' targets, before any clock starts.
     pilot.trial_weights(scene.device_scene, emitters, camera, weights, fields, 0)
-    _picture(scene, camera, few, 0, guided=True)
+    _picture(scene, camera, fields.model_copy(update={"spp": 2}), 0, guided=True)
     choices, trial_s, pilot_s = [], [], []
     for seed in range(1, TRIALS + 1):
         began = time.process_time()
@@ -140,14 +143,30 @@ def _trials(
 def _picture(
     scene: LightScene, camera: Camera, fields: LightFields, seed: int, *, guided: bool
 ) -> tuple[F64, float]:
-    """(luminance at SIZE, CPU seconds with the pilot), guided or plain without a trial.
+    """(luminance at SIZE, CPU seconds with the pilot), guided or plain whatever its trial says.
 
-    A scene keeps the weights of its last seed: both ways need seeds of their own.
+    Its trial is that of VIEW, whose CPU is left out. A scene keeps the weights of its last seed: both
+    ways need seeds of their own.
     """
-    with patch.object(pilot, "trial_weights", lambda *given: replace(given[3], is_guided=guided)):
+    trial, trial_s = pilot.trial_weights, [0.0]
+
+    def told(
+        device_scene: DeviceScene,
+        emitters: Emitters,
+        _small: Camera,
+        weights: EmitterWeights,
+        some: LightFields,
+        trial_seed: int,
+    ) -> EmitterWeights:
+        before = time.process_time()
+        tried = trial(device_scene, emitters, camera, weights, some, trial_seed)
+        trial_s.append(time.process_time() - before)
+        return replace(tried, is_guided=guided)
+
+    with patch.object(pilot, "trial_weights", told):
         began = time.process_time()
         result = scene.render(camera.with_size(*SIZE), "-", fields, seed)
-        spent = time.process_time() - began
+        spent = time.process_time() - began - sum(trial_s)
     return (result.outdoor + result.indoor).astype(np.float64) @ LUMINANCE, spent
 
 
