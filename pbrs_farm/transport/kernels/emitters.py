@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import LUMINANCE
@@ -31,6 +30,7 @@ from pbrs_farm.transport.guiding.nearby_lamps import (
 from pbrs_farm.transport.kernels.alias_table import alias_rows, sample_alias_table
 from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP, ArrivalRates
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
+from pbrs_farm.transport.kernels.lamp_points import LampPointSampler, padded
 from pbrs_farm.transport.kernels.outdoor_choice import OutdoorChoice, choose_technique
 from pbrs_farm.transport.kernels.packets import colour, vector
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
@@ -142,18 +142,13 @@ class Emitters:
         near_lamp, near_v = sample_discrete(near.lamps, near.chances, near.reference.total, rest)
         lamp, u = dr.select(is_near, near_lamp, lamp), dr.select(is_near, near_v, v)
         lamp = dr.select(counted >= 0, mi.UInt32(counted), lamp)
-        # Choose a triangle of it by area, and a point on that.
-        first = dr.gather(mi.UInt32, self._lamp_first, lamp, active)
-        count = dr.gather(mi.UInt32, self._lamp_first, lamp + 1, active) - first
-        triangle, _u = sample_alias_table(self._triangle_alias, first, count, u, active)
-        face = dr.gather(mi.UInt32, self._lamp_faces, first + triangle, active)
-        q, n = scene.sample_face(face, uv, active)
-
-        to = q - near.reference.p
+        p = near.reference.p
+        q, n, is_seen = self._lamp_points.sample(scene, lamp, p, u, uv, active)
+        to = q - p
         distance = dr.norm(to)
         d = to / distance
         cos = dr.abs(dr.dot(n, d))
-        valid = active & (distance > 1e-5) & (cos > 1e-5)
+        valid = active & is_seen & (distance > 1e-5) & (cos > 1e-5)
         radiance, pdf = self._eval_lamp(lamp, near.reference, distance, cos, counted, valid)
         kind = self.nearby.slot(lamp, valid)[0] + FIRST_LAMP
         return DirectionSample(d, distance, radiance, pdf, valid, kind, lamp)
@@ -197,7 +192,8 @@ class Emitters:
         nearby = importance * rate / dr.maximum(reference.total, 1e-30)
         weight = dr.lerp(weight, nearby, self._nearby_share(reference))
         weight = dr.select(counted >= 0, 1, weight)
-        pdf = weight * dr.square(distance) / dr.maximum(row[3] * cos, 1e-12)
+        area = row[3] * self._lamp_points.area_share(lamp, reference.p, active)
+        pdf = weight * dr.square(distance) / dr.maximum(area * cos, 1e-12)
         counts = (counted < 0) | (mi.UInt32(counted) == lamp)
         return dr.select(counts, colour(row), 0), pdf
 
@@ -303,21 +299,11 @@ class Emitters:
         return total, pdf
 
     def _set_lamps(self, tables: SceneTables, weights: F64) -> None:
-        # One lamp more than there are, so that a house without lamps has a row, too.
-        def padded(kind: Any, rows: NDArray[Any], last: NDArray[Any]) -> Any:
-            return device_array(kind, np.concatenate([rows, last]).ravel())
-
         n = len(tables.lamps)
         self._n_lamps = dr.opaque(mi.UInt32, max(n, 1))
         self._has_lamps = dr.opaque(mi.Bool, n > 0)
         self._lamp_rows = padded(mi.Float, tables.lamp_rows.ravel(), np.ones(4, np.float32))
-        self._lamp_first = padded(mi.UInt32, tables.lamp_first, tables.lamp_first[-1:])
-        self._lamp_faces = padded(mi.UInt32, tables.lamp_faces, np.zeros(1, np.uint32))
-        alias = [np.zeros((0, 2), np.float32)] + [
-            alias_rows(np.diff(tables.lamp_areas[a:b], prepend=0.0))
-            for a, b in zip(tables.lamp_first[:-1], tables.lamp_first[1:], strict=True)
-        ]
-        self._triangle_alias = padded(mi.Float, np.concatenate(alias), np.ones((1, 2), np.float32))
+        self._lamp_points = LampPointSampler(tables)
         self._set_lamp_weights(weights, None)
 
     def _set_portals(self, portals: F64) -> None:

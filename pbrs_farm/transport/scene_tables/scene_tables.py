@@ -7,6 +7,7 @@ sky, and none is compiled again.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -18,7 +19,8 @@ from pbrs_farm.core.house import Geometry, House, MaterialKind, geometry_from_ho
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter, area_emitters_of_house
-from pbrs_farm.transport.scene_tables.material_rows import MATERIAL_FLOATS, material_rows
+from pbrs_farm.transport.scene_tables.lamp_symmetry import symmetry_row
+from pbrs_farm.transport.scene_tables.material_rows import MATERIAL_FLOATS, TAU, material_rows
 from pbrs_farm.transport.scene_tables.texture_atlas import texture_atlas
 
 FACE_FLOATS: Final = 28  # columns of a face's row: seven packets of four, gathered together
@@ -47,6 +49,7 @@ class SceneTables:
     lamp_first: NDArray[np.uint32]  # (L + 1,) first of each lamp's triangles in the next two
     lamp_faces: NDArray[np.uint32]  # (T,) face
     lamp_areas: F32  # (T,) running sum of areas over the lamp's area
+    lamp_symmetries: F32  # (L, 4) as symmetry_row; no side where light may pass its faces
     notes: tuple[str, ...]  # what had to be changed or left out
 
 
@@ -78,6 +81,12 @@ def tables_from_house(
         m.kind is MaterialKind.GLASS or m.alpha_cutout or (released and m.opacity < 1)
         for m in house.materials
     ])  # fmt: skip
+    is_open = transparent[material] | rows[material, TAU].any(1)
+    symmetries = np.zeros((len(lamps), 4), np.float32)
+    for k, (a, b) in enumerate(pairwise(first)):
+        emitting = lamp_faces[a:b]
+        if not is_open[emitting].any():
+            symmetries[k] = symmetry_row(triangle_corners(geometry.positions, faces[emitting]))
     return SceneTables(
         positions=geometry.positions,
         faces=faces,
@@ -91,6 +100,7 @@ def tables_from_house(
         lamp_first=first,
         lamp_faces=lamp_faces,
         lamp_areas=lamp_areas,
+        lamp_symmetries=symmetries,
         notes=(*notes, *material_notes),
     )
 

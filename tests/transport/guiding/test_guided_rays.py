@@ -174,10 +174,11 @@ def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
     assert near.reference.total.numpy()[0] > 0
     uv = mi.Point2f(rng.next_float32(), rng.next_float32())
     to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, counted, on)
-    # With the pdfs of all right, the mean of 1 / pdf is the solid angle of all lamps.
+    # With the pdfs of all right, the mean of 1 / pdf is the solid angle of all lamps,
+    # each a disc as wide as its bulb.
     inverse = dr.select(to.valid, dr.rcp(to.pdf), 0).numpy()
     area_over_d2 = sum(
-        2 * float(lamp.area_m2) / 4 / ((1 + k - 1.3) ** 2 + 1.5**2)
+        float(lamp.area_m2) / 4 / ((1 + k - 1.3) ** 2 + 1.5**2)
         for k, lamp in enumerate(scene.tables.lamps)
     )
     assert inverse.mean() == pytest.approx(area_over_d2, rel=0.03)
