@@ -80,6 +80,39 @@ def test_metropolis_on_the_gpu_has_the_light_of_the_cpu(room: str) -> None:
 
 
 @pytest.mark.gpu
+def test_metropolis_on_the_gpu_makes_few_launches_and_compiles_nothing_for_another_size() -> None:
+    import drjit as dr
+
+    house, camera = hard_rooms.covered_cup()
+    scene = LightScene.load(house, {}, RECIPE, dark_sky(), variant="cuda_ad_rgb")
+    changes = {"integrator": "metropolis", "direct_spp": 64, "mutations_per_pixel": 256}
+    fields = FIELDS.model_copy(update=changes)
+    scene.render(camera.with_size(32, 24), "0_0", fields, 1)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        scene.render(camera.with_size(160, 120), "0_0", fields, 1)
+        kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+    assert 0 < len(kernels) <= MAX_LAUNCHES
+    assert all(k["cache_hit"] for k in kernels)
+
+
+@pytest.mark.gpu
+def test_opengl_through_egl_draws_on_the_gpu_what_rays_see() -> None:
+    from pbrs_farm.core.camera import Camera, Intrinsics
+    from pbrs_farm.raster import Rasterizer
+    from pbrs_farm.raycast.caster import Caster
+    from tests.raster.test_rasterizer import items_drawn
+
+    house = builtin_home()
+    stored = house.cameras[0]
+    camera = Camera.look(Intrinsics.from_hfov(320, 240), stored.eye, stored.towards)
+    with Rasterizer(house, {}) as raster:
+        assert "NVIDIA" in raster.name
+    seen = Caster(geometry_from_house(house), variant="scalar_rgb").hit_record(camera).item
+    assert (items_drawn(house, camera) == seen)[seen > 0].mean() > 0.98
+
+
+@pytest.mark.gpu
 def test_labels_of_the_gpu_differ_from_those_of_the_cpu_in_no_more_than_edges() -> None:
     from pbrs_farm.core.camera import Camera, Intrinsics
     from pbrs_farm.raycast.caster import Caster
