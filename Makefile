@@ -66,7 +66,7 @@ bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 11 minutes
 bench-light-tables: setup ## every bench of docs/light_costs.md, one after another, then its tables: 45 quiet minutes
 	@$(BIN)/python -c "import flip_evaluator" 2>/dev/null || $(BIN)/pip install -q -e ".[bench]"
 	@for name in view demo light guided growth denoised presets lux; do $(BIN)/python -m benchmarks $$name; done
-	@$(MAKE) --no-print-directory bench-cycles bench-luxcore
+	-@$(MAKE) --no-print-directory --keep-going bench-cycles bench-luxcore
 	$(BIN)/python -m benchmarks light_tables
 
 bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): 8 minutes
