@@ -221,7 +221,7 @@ def view_lines(f: Figures) -> list[str]:
     return [
         *head("two cores", "wall"),
         row([
-            "a `fast` view of Studio, 640x480, both light groups, 64 samples, denoised, written",
+            "a `fast` view of Studio, 640x480, both light groups, 56 samples, denoised, written",
             f"**{f['view.fast_s']:.1f} s**",
         ]),
         row(["the first one, which loads and compiles", f"{f['view.fast_first_s']:.1f} s"]),
