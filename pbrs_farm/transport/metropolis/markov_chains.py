@@ -163,15 +163,10 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
         step += dr.select(done, mi.UInt32(1), 0)
         fresh = mi.Bool(done)
         active = step < how.last
-
-        # Leave the suffix for reconnection where a round ends.
-        in_round = (step - how.first) % ROUND_STEPS
-        is_end = done & how.reconnects & ((in_round == 0) | ~active)
-        _record(how, lane, step, x, x_suffix, is_end)
+        _record_round(how, lane, step, x, x_suffix, done)
 
     _splat_state(film, lane, x, True)
-    samples = _store(x_samples, STORED_DIMS, lane)
-    suffixes = _store(x_suffix, SUFFIX_FLOATS, lane)
+    samples, suffixes = _store(x_samples, STORED_DIMS, lane), _store(x_suffix, SUFFIX_FLOATS, lane)
     return Chains(samples, x.light, x.target, x.pixel, x.shared, suffixes), sums
 
 
@@ -333,12 +328,16 @@ def _copy(source: Any, target: Any, n: int, active: Any) -> Any:
 
 
 @dr.syntax
-def _record(how: Mutations, chain: Any, step: Any, x: _State, suffix: Any, active: Any) -> None:
-    """Leave what a chain stands at after a round's last step, where active."""
+def _record_round(how: Mutations, chain: Any, step: Any, x: _State, suffix: Any, done: Any) -> None:
+    """Leave what a chain stands at for reconnection, where its last step was a round's last one.
+
+    step: the next one; done: whether a step has just ended.
+    """
     records = how.records
+    is_end = ((step - how.first) % ROUND_STEPS == 0) | (step == how.last)
     row = (step - 1 - how.first) // ROUND_STEPS * records.n_chains + chain
     k = mi.UInt32(0)
-    writing = mi.Bool(active)
+    writing = mi.Bool(done & how.reconnects & is_end)
     # All within the loop, which steps that end no round leave out.
     while writing:
         is_first = writing & (k == 0)
