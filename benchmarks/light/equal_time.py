@@ -50,7 +50,7 @@ from pbrs_farm.transport.develop.denoiser import denoise
 
 SIZE: Final = (48, 36)
 PICTURES: Final = 6
-FAST_SPP, FAST_PICTURES = 64, 2
+FAST_SPP, FAST_PICTURES = 56, 2
 TRIAL_SPP: Final = 128
 _CAMERAS: Final = frozenset(view.key for view in SIX)
 _UNITS: Final = {
@@ -138,7 +138,7 @@ def _luminance(shot: Shot, fields: LightFields, *, seed: int) -> tuple[F64, floa
 def _fast_figures(
     shot: Shot, comparison: Comparison, path_sample_s: float, metropolis_s: float
 ) -> dict[str, float]:
-    """Error and CPU of 64 denoised samples, and how much more CPU Metropolis takes for that error.
+    """Error and CPU of FAST_SPP denoised samples, and how much more CPU Metropolis takes for that error.
 
     CPU is that of as many of path's samples: the denoiser, much of a picture this small, takes 3 % of a view's.
     """

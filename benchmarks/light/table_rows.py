@@ -23,7 +23,7 @@ LUXCORE_SCENES: Final = {
 LUXCORE_ENGINES: Final = ("lux_path", "lux_path_metropolis", "lux_bidir", "lux_bidir_metropolis")
 _LUXCORE_HEADS: Final = ("LuxCore path", "path, Metropolis", "bidirectional", "bidirectional, Metropolis")  # fmt: skip
 DENOISED_WAYS: Final = ("raw", "fast", "together", "demodulated", "prefiltered guides")
-DENOISED_COUNTS: Final = (8, 16, 32, 64, 128)
+DENOISED_COUNTS: Final = (8, 16, 32, 56, 64, 128)
 PRESETS: Final = {"preview": "`preview`", "fast": "`fast`", "paper": "`paper`, reduced", "released": "`released`, reduced"}  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from benchmarks.light.table_rows import (
     TABLES,
 )
 from pbrs_farm.assets.homes_package import example_homes
+from pbrs_farm.core.recipe import recipe_from_name
 from tests.benchmarks.test_equal_time import MEASURED
 
 REPO = Path(__file__).parents[2]
@@ -72,7 +73,8 @@ def all_figures() -> dict[str, dict[str, Any]]:
         "luxcore": luxcore_figures(),
         "cycles": cycles_figures(),
         "growth": growth_figures(),
-        "denoised": denoised.figures_of(errors, 64)[0] | {"light.reference_spp": 1024},
+        "denoised": denoised.figures_of(errors, recipe_from_name("fast").light.spp)[0]
+        | {"light.reference_spp": 1024},
         "guided": guided.figures_of(chosen)[0],
         "view": {"view.fast_s": 9.0, "view.fast_first_s": 12.0, "view.labels_s": 0.1},
         "demo": {"demo.seconds": 11.0, "demo.peak_mb": 900.0, "demo.views": 10},
