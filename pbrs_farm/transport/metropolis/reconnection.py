@@ -99,7 +99,10 @@ def reconnect(
         return
     pixels = mi.UInt32(np.concatenate([g.pixels for g in groups]))
     slots = mi.UInt32(np.concatenate([g.slots for g in groups]))
-    launch = _Launch(scene, film, prefixes.rows, pixels, dr.opaque(mi.UInt32, groups[0].n))
+    # Name the limit in the kernel: Dr.Jit 1.5 tells kernels apart by their code, in which the size of
+    # local memory does not stand, and would take one with less of it.
+    n = dr.minimum(dr.opaque(mi.UInt32, groups[0].n), mi.UInt32(rounds.max_n))
+    launch = _Launch(scene, film, prefixes.rows, pixels, n)
     n_slots = dr.opaque(mi.UInt32, len(groups[0].pixels))
     lane = _lane_of(launch, (slots, n_slots), prefixes, records, rounds, chosen)
     _splat_seen(launch, lane, *_seen(launch, lane, rounds.max_n))
@@ -143,7 +146,7 @@ def _lane_of(
 def _seen(launch: _Launch, lane: _Lane, max_n: int) -> tuple[Any, Any]:
     """(what each pixel of the group sees of the suffix, in local memory; the sum of their targets)."""
     values, total = dr.alloc_local(mi.Float, 3 * max_n), mi.Float(0)
-    k = mi.UInt32(0)
+    k = dr.opaque(mi.UInt32, 0)
     while k < launch.n:
         pixel = dr.gather(mi.UInt32, launch.group_pixels, lane.first_slot + k)
         is_pixel, is_own = pixel != NO_PIXEL, pixel == lane.own_pixel
@@ -165,7 +168,7 @@ def _seen(launch: _Launch, lane: _Lane, max_n: int) -> tuple[Any, Any]:
 def _splat_seen(launch: _Launch, lane: _Lane, values: Any, total: Any) -> None:
     """Weigh what each pixel sees by its target function over the group's sum, and splat it."""
     scale = lane.weight * lane.shared / dr.maximum(total, 1e-37)
-    k = mi.UInt32(0)
+    k = dr.opaque(mi.UInt32, 0)
     while k < launch.n:
         pixel = dr.gather(mi.UInt32, launch.group_pixels, lane.first_slot + k)
         value = mi.Color3f(values.read(3 * k), values.read(3 * k + 1), values.read(3 * k + 2))

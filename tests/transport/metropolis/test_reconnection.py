@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -145,6 +146,23 @@ def test_reconnected_suffixes_leave_the_mean_as_path_has_it(
     z = z_scores(ours, theirs)
     assert np.abs(z).max() < 5
     assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=tolerance)
+
+
+def test_kernels_with_other_local_memory_are_other_kernels() -> None:
+    # The larger one first: were they one kernel, the smaller one would have room to spare.
+    house, camera = rooms.window_room(0.7, lumen=800)
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    few = METROPOLIS.model_copy(update={"direct_spp": 1, "mutations_per_pixel": 1})
+    kernels: dict[int, set[tuple[int, str]]] = {512: set(), 256: set()}
+    for n in (512, 512, 256, 256):
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            fields = few.model_copy(update={"tail_pixels": n})
+            scene.render(camera.with_size(32, 24), "0_0", fields, 7)
+            made = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+        kernels[n] |= {(k["operation_count"], k["hash"]) for k in made}
+    large, small = kernels[512] - kernels[256], kernels[256] - kernels[512]
+    assert {operations for operations, _ in large} & {operations for operations, _ in small}
 
 
 def test_reconnecting_suffixes_cuts_the_error_of_the_same_chains() -> None:
