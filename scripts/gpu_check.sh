@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # From a bare machine with an NVIDIA driver to a table of what it does here: every test marked gpu, then views
 # an hour, under ten minutes. `scripts/gpu_check.sh [WHEELS]`: a folder of wheels for machines without a network,
-# as `scripts/gpu_check.sh --wheels FOLDER` makes one where there is one. Writes out/bench/gpu.json.
+# as `scripts/gpu_check.sh --wheels FOLDER` makes one where there is one: 293 MB, in pieces of 60 MB that can be
+# carried one by one. Writes out/bench/gpu.json.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -9,10 +10,14 @@ VENV=${VENV:-out/gpu-venv}
 PACKAGES=".[gl,transport] pytest hypothesis"
 
 if [ "${1:-}" = --wheels ]; then
-  mkdir -p "$2"
+  wheels=$(mktemp -d)
+  trap 'rm -rf "$wheels"' EXIT
   # shellcheck disable=SC2086
-  python3 -m pip wheel -q --wheel-dir "$2" $PACKAGES setuptools
-  du -sh "$2"
+  "${PYTHON:-python3}" -m pip wheel -q --wheel-dir "$wheels" $PACKAGES setuptools wheel
+  mkdir -p "$2"
+  rm -f "$2"/wheels.tar.*
+  tar -C "$wheels" -c . | split -b 60MB - "$2/wheels.tar."
+  du -ch --apparent-size "$2"/wheels.tar.*
   exit 0
 fi
 
@@ -27,8 +32,12 @@ done
 
 [ -x "$VENV/bin/python" ] || python3 -m venv "$VENV"
 if [ -n "${1:-}" ]; then
+  wheels=$(mktemp -d)
+  trap 'rm -rf "$wheels"' EXIT
+  cat "$1"/wheels.tar.* | tar -C "$wheels" -x
+  "$VENV/bin/pip" install -q --no-index --find-links "$wheels" setuptools wheel
   # shellcheck disable=SC2086
-  "$VENV/bin/pip" install -q --no-index --find-links "$1" $PACKAGES
+  "$VENV/bin/pip" install -q --no-index --no-build-isolation --find-links "$wheels" $PACKAGES
 else
   # shellcheck disable=SC2086
   "$VENV/bin/pip" install -q $PACKAGES
