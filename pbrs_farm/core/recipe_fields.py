@@ -175,7 +175,7 @@ class LightFields(FieldGroup):
     """Light transport (paper section 3.2)."""
 
     integrator: Literal["path", "metropolis"] = "path"
-    spp: int = Field(56, ge=1, le=MAX_SAMPLES, description="samples per pixel of `path`")
+    spp: int = Field(64, ge=1, le=MAX_SAMPLES, description="samples per pixel of `path`")
     direct_spp: int = Field(
         512, ge=0, le=MAX_SAMPLES, description="direct samples beside Metropolis"
     )
