@@ -65,9 +65,10 @@ bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 11 minutes
 
 bench-light-tables: setup ## every bench of docs/light_costs.md, one after another, then its tables: 45 quiet minutes
 	@$(BIN)/python -c "import flip_evaluator" 2>/dev/null || $(BIN)/pip install -q -e ".[bench]"
-	@for name in view demo light guided growth denoised presets lux; do $(BIN)/python -m benchmarks $$name; done
-	-@$(MAKE) --no-print-directory --keep-going bench-cycles bench-luxcore
-	$(BIN)/python -m benchmarks light_tables
+	@failed=; for name in view demo light guided growth denoised presets lux; do $(BIN)/python -m benchmarks $$name || failed="$$failed $$name"; done; \
+	for name in cycles luxcore; do $(MAKE) --no-print-directory bench-$$name || failed="$$failed $$name"; done; \
+	$(BIN)/python -m benchmarks light_tables; \
+	test -z "$$failed" || { echo "bench-light-tables: failed, tables as before:$$failed" >&2; exit 1; }
 
 bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): 8 minutes
 	@test -x out/cycles-venv/bin/python || python3.11 -m venv out/cycles-venv

@@ -9,9 +9,9 @@ With t the CPU of a trial over the plain view's, choosing over never guiding is
     ratio = (p v + 1 - p) (p c + 1 - p + t)
 
 A trial also counts which shadow rays arrive; both ways know that, plain rays without paying for it, so that the
-ratio is guiding's at its dearest. Where no trial guides, both ways are one estimator, the same seed gives the same bits, and all that choosing costs is
-the trial: 1 + t, no quotient of two noises, and only the CPU of a plain picture is measured. Its standard error is
-the jackknife's over the pictures. `light.guide_worst` is the largest ratio of the views, `light.guide_worst_error`
+ratio is guiding's at its dearest. Where no trial guides, both ways are one estimator, the same seed gives the same
+bits, and all that choosing costs is the trial: 1 + t, no quotient of two noises, and only the CPU of a plain picture
+is measured. Its standard error is the jackknife's over the pictures. `light.guide_worst` is the largest ratio of the views, `light.guide_worst_error`
 its standard error, `light.guide_chosen` how many views most trials guide. Seven minutes on two quiet cores.
 """
 

@@ -71,12 +71,12 @@ def reckoned(
 
     chain_rounds: chains times rounds of a launch, None: as on a GPU.
     """
-    from pbrs_farm.transport.metropolis.metropolis_view import GPU_CHAIN_ROUNDS
+    from pbrs_farm.transport.metropolis.metropolis_view import GPU_CHAIN_ROUNDS, rounds_of_a_launch
     from pbrs_farm.transport.sample_passes import samples_per_launch
 
     n_pixels = size[0] * size[1]
     n_rounds, n_chains = rounds_of(paper, n_pixels)
-    per_launch = max((chain_rounds or GPU_CHAIN_ROUNDS) // n_chains, 1)
+    per_launch = rounds_of_a_launch(n_chains, n_pixels, chain_rounds or GPU_CHAIN_ROUNDS)
     n_launches = -(-n_rounds // per_launch)
     more_samples = -(-paper.direct_spp // samples_per_launch(n_pixels)) - 1
     n = counts.without + n_launches * counts.of_chains + more_samples * counts.of_samples

@@ -1,8 +1,9 @@
 """Importances of the lamps near a vertex, for shadow rays and guided rays; kernels, no effects.
 
 A home has a dozen lamps. The pilot's weights (pilot.py) tell which of them matter to a view, not
-where in the view. Here the strongest few are weighted again at every vertex, by distance and by
-whether they stand in front of the surface: inside a shade its own bulb is nearly always taken.
+where in the view. Here the strongest few are weighted again at every vertex: by distance, by
+whether they stand in front of the surface and, in views with a trial, by flux and by how often rays
+to them arrive (arrival_rates.py). Inside a shade its own bulb is nearly always taken.
 """
 
 from __future__ import annotations

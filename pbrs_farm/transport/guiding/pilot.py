@@ -34,7 +34,7 @@ _PILOT_SIZE: Final = (32, 24)  # px
 # A shadow ray that can bring less than this share of a view's light, group by group, is cast by chance.
 SHADOW_SHARE: Final = 0.5
 _MAX_LANES: Final = 1 << 17  # of the pilot: it halves its size where there are very many emitters
-# Of the trial of guided rays: its samples of a pixel (of 16, one trial in six missed the rare bright
+# Of a view's trial, which tries guided rays and counts which shadow rays arrive: its samples of a pixel (of 16, one trial in six missed the rare bright
 # paths of a home), the samples of a view from which it pays, the CPU of a guided sample over a plain
 # one's, and the part of the mean light below which a pixel's noise counts less.
 _TRIAL_SPP: Final = 64

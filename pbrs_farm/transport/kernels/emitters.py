@@ -129,7 +129,7 @@ class Emitters:
     def sample_lamp(
         self, scene: DeviceScene, near: NearbyLamps, u: Any, uv: Any, counted: Any, active: Any
     ) -> DirectionSample:
-        """A point on a lamp: of those nearby with chance NEARBY_SHARE, else by weight alone."""
+        """A point on a lamp: one of those nearby by the chance of _nearby_share, else by weight alone."""
         # Choose a lamp both ways, and take one.
         active = active & self._has_lamps
         nearby_share = self._nearby_share(near.reference)

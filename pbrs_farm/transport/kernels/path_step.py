@@ -1,8 +1,8 @@
 """One step of a path through the scene, shared by `path` and `metropolis`; kernels, no effects.
 
-Next-event estimation: at each vertex one shadow ray goes to the sky and one to a lamp, weighted
-against the scattered ray by the balance heuristic (Veach 1997, section 9.2). An emitter that the
-scattered ray meets counts to its own group.
+At each vertex one shadow ray goes to the sky and one to a lamp (direct_light.py), weighted against
+the scattered ray by the balance heuristic (Veach 1997, section 9.2). An emitter that the scattered
+ray meets counts to its own group.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     wi = frame.to_local(-path.d)
     wi.z = dr.maximum(wi.z, 1e-4)
 
-    # Weigh the lamps; a thin surface is contributes from both sides.
+    # Weigh the lamps; a thin surface is lit from both sides.
     near, counted = None, context.emitter_filter.indoor
     if counted is not None:
         normal = dr.select(dr.max(si.bsdf.tau) > 0, 0, si.ng)

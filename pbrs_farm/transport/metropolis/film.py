@@ -40,7 +40,7 @@ class Chains(NamedTuple):
     target: Any  # target function of the light
     pixel: Any  # UInt32
     shared: Any  # share of the light that is shown to other pixels, 0 = all its own pixel's
-    suffixes: Any  # (SUFFIX_FLOATS * N,), column by column (reconnection.py)
+    suffixes: Any  # (SUFFIX_FLOATS * N,), column by column (suffixes.py)
 
 
 def sample_film(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any, Any]:

@@ -150,6 +150,7 @@ class ChainRun:
         """These sets of prefixes, traced unless the last launch had them all."""
         held = self._prefixes
         if held is None or sets.start < held.sets.start or sets.stop > held.sets.stop:
+            self._prefixes = held = None  # a set of a large picture is a gigabyte: never keep both
             held = trace_prefixes(self._context, self._n_pixels, sets, self._seed)
         self._prefixes = held
         return held

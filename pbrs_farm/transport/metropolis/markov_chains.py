@@ -277,7 +277,7 @@ def _move(
     """Where a chain stands after a step that is accepted with probability a.
 
     Splats what is left behind: the old path with all the weight it has gathered, or the rejected
-    one. The share that is for other pixels, too, waits for the launch's end (reconnection.py).
+    one. The share that is for other pixels, too, waits for the round's end (reconnection.py).
     """
     x.weight += dr.select(done, 1 - a, 0)
     proposed.weight = a

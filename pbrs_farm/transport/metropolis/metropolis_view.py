@@ -22,7 +22,8 @@ from pbrs_farm.transport.sample_passes import SampledView, direct_sums
 from pbrs_farm.transport.time_budget import TimeBudget
 
 _DIRECT_COST: Final = 0.05  # of a direct sample, in mutations of both groups; for the share done
-GPU_CHAIN_ROUNDS: Final = 1 << 20  # 0.7 GB: suffixes of 160 bytes, prefixes of 448
+GPU_CHAIN_ROUNDS: Final = 1 << 20  # suffixes of 160 bytes, 0.2 GB
+_PIXEL_ROUNDS: Final = 1 << 24  # pixels times rounds: groups of 8 bytes, 16 more on the host
 _CHAIN_ROUNDS_PER_THREAD: Final = 1 << 16  # some ten seconds
 _NO_END: Final = 1 << 31  # steps of a chain where time alone decides
 
@@ -81,8 +82,14 @@ def _rounds_per_launch(view: SampledView, runs: Runs) -> int:
     """Rounds of the chains that are one launch; the picture is the same to 1e-5 whatever it is."""
     if view.fields.noise > 0 or view.fields.time_budget_s > 0:
         return 1  # either may end the chains after any round
+    i = view.camera.intrinsics
     n_chains = max((run.n_chains for run in runs.values()), default=1)
-    return max(chain_rounds_per_launch() // n_chains, 1)
+    return rounds_of_a_launch(n_chains, i.width_px * i.height_px, chain_rounds_per_launch())
+
+
+def rounds_of_a_launch(n_chains: int, n_pixels: int, chain_rounds: int) -> int:
+    """Rounds that are one launch: no more than chain_rounds of all chains, and groups of their own."""
+    return max(min(chain_rounds // n_chains, _PIXEL_ROUNDS // n_pixels), 1)
 
 
 def chain_rounds_per_launch() -> int:

@@ -1,4 +1,4 @@
-"""Prefixes of paths, to which suffixes are reconnected: the first rough vertex that a pixel sees; kernels, no effects."""
+"""Prefixes of paths: the first rough vertex that a pixel sees, for suffixes; kernels, no effects."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _rows_of(values: tuple[Any, ...]) -> Any:
     for column, value in enumerate(values):
         local.write(value, mi.UInt32(column))
     # Write them in a loop: each scatter outside of one would trace all paths anew.
-    rows, k = dr.empty(mi.Float, n * dr.width(lane)), mi.UInt32(0)
+    rows, k = dr.empty(mi.Float, n * dr.width(lane)), dr.opaque(mi.UInt32, 0)
     while k < n:
         dr.scatter(rows, local.read(k), lane * n + k)
         k += 1

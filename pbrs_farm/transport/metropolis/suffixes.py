@@ -1,4 +1,4 @@
-"""Suffixes of paths, as reconnection.py shows them to other pixels: how they are recorded; kernels, no effects."""
+"""Suffixes of paths, recorded as reconnection.py shows them to other pixels; kernels, no effects."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Which lamps are convex and symmetric about a point, as bulbs are; pure numpy, no effects.
 
-From outside the sphere around it just one of two opposite points of such a lamp faces a vertex, or neither: shadow rays to
-the other one could never arrive.
+From outside the sphere around it just one of two opposite points of such a lamp faces a vertex,
+or neither: shadow rays to the other one could never arrive.
 """
 
 from __future__ import annotations
@@ -31,14 +31,19 @@ def symmetry_row(corners: F64) -> F32:
         return row
     # Ask whether every corner has its opposite, and no corner lies beyond a face's plane.
     places = np.unique((corners - centre).reshape(-1, 3), axis=0)
-    apart = np.asarray(cKDTree(places).query(-places)[0])
+    if np.asarray(cKDTree(places).query(-places)[0]).max() > _TOLERANCE_M:
+        return row
     normals = unit_normals(corners)
     heights = ((corners[:, 0] - centre) * normals).sum(1)
     side = np.sign(heights[0])
-    above = (side * (places @ normals.T - heights)).max()
-    if apart.max() > _TOLERANCE_M or above > _TOLERANCE_M or (side * heights).min() <= 0:
+    if (side * heights).min() <= 0:
+        return row
+    if (side * (places @ normals.T - heights)).max() > _TOLERANCE_M:
         return row
     # Ask whether the faces are the whole hull, each once.
+    middles = np.unique(np.rint(corners.mean(1) / _TOLERANCE_M), axis=0)
+    if len(middles) < len(corners):
+        return row
     try:
         hull_area = ConvexHull(places).area
     except QhullError:

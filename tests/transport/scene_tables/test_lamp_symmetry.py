@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.house import Material, MaterialKind
-from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.transport.scene_tables.lamp_symmetry import symmetry_row
 from pbrs_farm.transport.scene_tables.scene_tables import tables_from_house
@@ -35,7 +35,9 @@ def test_what_shows_its_inside_or_has_no_opposite_is_not_symmetric() -> None:
     two = np.concatenate([whole, whole + np.array((0.3, 0, 0))])
     twice = np.concatenate([whole, whole])
     one_open = whole[1:]
-    cases = (half, dented, egg, two, twice, one_open, whole[:1])
+    alike = 1 + int(np.abs(face_areas(whole[1:]) - face_areas(whole[:1])).argmin())
+    one_for_another = np.concatenate([whole[1:], whole[alike : alike + 1]])
+    cases = (half, dented, egg, two, twice, one_open, one_for_another, whole[:1])
     assert [float(symmetry_row(corners)[3]) for corners in cases] == [0] * len(cases)
 
 
