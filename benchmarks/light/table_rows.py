@@ -161,11 +161,10 @@ def luxcore_lights_lines(f: Figures) -> list[str]:
 
 def cycles_lines(f: Figures) -> list[str]:
     """Ours and Cycles' errors of 32 samples, and CPU to equal error."""
-    rows = []
-    for k, name in ((1, "first"), (2, "second")):
+    columns = []
+    for k in (1, 2):
         c = below(f, f"light.cycles_{k}_")
-        rows.append(row([
-            name,
+        columns.append([
             f"{c['relmse']:.2g} / {c['relmse_cycles']:.2g}",
             f"{c['median'] ** 0.5:.2g} / {c['median_cycles'] ** 0.5:.2g}",
             f"{c['cpu_s']:.2f} / {c['cpu_s_cycles']:.2f} s",
@@ -174,15 +173,16 @@ def cycles_lines(f: Figures) -> list[str]:
             f"{c['ratio_median']:.1f} times less",
             f"{c['ratio_metropolis']:.0f} times less",
             f"{c['mean_luminance_cycles'] / c['mean_luminance']:.3f}, {c['block_ratio_median']:.3f}",
-        ]))  # fmt: skip
+        ])  # fmt: skip
+    names = (
+        "relMSE, ours / Cycles", "median pixel", "CPU of the samples", "CPU of a picture of one sample",
+        "our CPU to equal relMSE", "to equal median pixel", "of Metropolis, to equal relMSE",
+        "Cycles' light over ours, long pictures: mean, median of 48 blocks",
+    )  # fmt: skip
     return [
-        *head(
-            "camera of 2BedroomApartment", "relMSE, ours / Cycles", "median pixel", "CPU of the samples",
-            "CPU of a picture of one sample", "CPU to equal relMSE", "to equal median",
-            "Metropolis, to equal relMSE", "light of the long pictures, Cycles / ours: mean, median of 48 blocks",
-        ),
-        *rows,
-    ]  # fmt: skip
+        *head("2BedroomApartment", "first camera", "second camera"),
+        *(row([name, *cells]) for name, *cells in zip(names, *columns, strict=True)),
+    ]
 
 
 def compare_lines(f: Figures) -> list[str]:
