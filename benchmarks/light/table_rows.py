@@ -146,10 +146,17 @@ def luxcore_lights_row(name: str, f: Figures) -> str:
 
 
 def luxcore_lines(f: Figures) -> list[str]:
-    """Errors at equal CPU, scene by scene."""
+    """Errors at equal CPU, a column a scene."""
     scenes = LUXCORE_SCENES.items()
     rows = [luxcore_costs_row(name, below(f, f"light.luxcore_{key}_")) for key, name in scenes]
-    return [*luxcore_costs_head(), *rows]
+    return _turned([*luxcore_costs_head(), *rows])
+
+
+def _turned(lines: list[str]) -> list[str]:
+    """A table with its rows for columns: one of many columns does not fit the page."""
+    cells = [[c.strip() for c in line.strip("|").split("|")] for line in (lines[0], *lines[2:])]
+    names, *rows = zip(*cells, strict=True)
+    return [*head(*names), *(row(list(r)) for r in rows)]
 
 
 def luxcore_lights_lines(f: Figures) -> list[str]:
