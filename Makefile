@@ -60,22 +60,22 @@ bench: setup ## measure everything but house, dress, made, light and its tables,
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
 	$(BIN)/python -m benchmarks $(NAME)
 
-bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 11 minutes of CPU (python -m benchmarks light_pictures draws)
+bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 5 quiet minutes (python -m benchmarks light_pictures draws)
 	$(BIN)/python -m benchmarks light
 
-bench-light-tables: setup ## every bench of docs/light_costs.md, one after another, then its tables: 45 quiet minutes
+bench-light-tables: setup ## every bench of docs/light_costs.md, one after another, then its tables: 31 quiet minutes
 	@$(BIN)/python -c "import flip_evaluator" 2>/dev/null || $(BIN)/pip install -q -e ".[bench]"
 	@failed=; for name in view demo light guided growth denoised presets lux; do $(BIN)/python -m benchmarks $$name || failed="$$failed $$name"; done; \
 	for name in cycles luxcore; do $(MAKE) --no-print-directory bench-$$name || failed="$$failed $$name"; done; \
 	$(BIN)/python -m benchmarks light_tables; \
 	test -z "$$failed" || { echo "bench-light-tables: failed, tables as before:$$failed" >&2; exit 1; }
 
-bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): 8 minutes
+bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): 5 quiet minutes
 	@test -x out/cycles-venv/bin/python || python3.11 -m venv out/cycles-venv
 	@out/cycles-venv/bin/python -c "import bpy" 2>/dev/null || out/cycles-venv/bin/pip install -q "bpy==5.0.1"
 	$(BIN)/python -m benchmarks cycles
 
-bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in a Python of its own: 14 minutes when busy
+bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in a Python of its own: 6 quiet minutes
 	@test -x out/luxcore-venv/bin/python || $(BIN)/python -m venv out/luxcore-venv
 	@out/luxcore-venv/bin/pip show -q pyluxcore || out/luxcore-venv/bin/pip install -q "pyluxcore==2.11.2" numpy
 	$(BIN)/python -m benchmarks luxcore

@@ -10,6 +10,10 @@ VENV=${VENV:-out/gpu-venv}
 PACKAGES=".[gl,transport] pytest hypothesis"
 
 if [ "${1:-}" = --wheels ]; then
+  [ -n "${2:-}" ] || {
+    echo "gpu_check: --wheels wants a folder to write to" >&2
+    exit 2
+  }
   wheels=$(mktemp -d)
   trap 'rm -rf "$wheels"' EXIT
   "${PYTHON:-python3}" -c 'import sys; print(*sys.version_info[:2], sep=".")' >"$wheels/python"
@@ -20,6 +24,11 @@ if [ "${1:-}" = --wheels ]; then
   tar -C "$wheels" -c . | split -b 60MB - "$2/wheels.tar."
   du -ch --apparent-size "$2"/wheels.tar.*
   exit 0
+fi
+
+if [ -n "${1:-}" ] && ! ls "$1"/wheels.tar.* >/dev/null 2>&1; then
+  echo "gpu_check: $1 has no wheels.tar.* (scripts/gpu_check.sh --wheels FOLDER makes them)" >&2
+  exit 2
 fi
 
 # The driver first: without it everything below would run on the CPU and say nothing.

@@ -3,7 +3,7 @@
 Eight views (measured_views.py) at SIZE. relMSE is of all light together, against a raw reference whose
 own noise is taken off; FLIP is of the developed pictures against the reference developed as `fast` is.
 References lie in out/bench/references and grow by SPP_A_RUN samples a run, up to MOST_SPP, so that one run
-takes about eight minutes of two quiet cores. `light.fast_error`: mean FLIP of recipe `fast` over the views.
+takes seven and a half minutes on two quiet cores. `light.fast_error`: mean FLIP of recipe `fast` over the views.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ A trial also counts which shadow rays arrive; both ways know that, plain rays wi
 ratio is guiding's at its dearest. Where no trial guides, both ways are one estimator, the same seed gives the same
 bits, and all that choosing costs is the trial: 1 + t, no quotient of two noises, and only the CPU of a plain picture
 is measured. Its standard error is the jackknife's over the pictures. `light.guide_worst` is the largest ratio of the views, `light.guide_worst_error`
-its standard error, `light.guide_chosen` how many views most trials guide. Seven minutes on two quiet cores.
+its standard error, `light.guide_chosen` how many views most trials guide. Four minutes on two quiet cores.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ def path_sums(
     """
     # Size the launches: by memory, by the pace so far, and one pass each when noise decides.
     camera, fields = view.camera, view.fields
-    per_launch = _samples_per_launch(camera)
+    per_launch = samples_per_launch(camera.intrinsics.width_px * camera.intrinsics.height_px)
     budget = TimeBudget(fields.time_budget_s, checkpoint.spent_s)
     is_open = budget.is_limited or fields.noise > 0
     goal = max(fields.spp, fields.max_spp) if is_open else fields.spp
@@ -82,7 +82,8 @@ def direct_sums(
     """
     # Depth counts a path's segments, the camera's among them: 2 is light that met one surface.
     n_samples, max_depth = (view.fields.direct_spp, 2) if view.fields.direct_spp > 0 else (1, 1)
-    per_launch = _samples_per_launch(view.camera)
+    i = view.camera.intrinsics
+    per_launch = samples_per_launch(i.width_px * i.height_px)
     total, spp = _kept_sums(checkpoint, "direct")
     # Launch by launch: sums over samples add up, and a launch must fit into memory.
     while spp < n_samples:
@@ -116,10 +117,6 @@ def _kept_sums(checkpoint: RenderCheckpoint, part: str) -> tuple[SampleSums | No
 def _state_of(total: SampleSums, spp: int) -> Callable[[], Arrays]:
     state: dict[str, Any] = {_SPP: np.int64(spp)}
     return lambda: total.arrays() | state
-
-
-def _samples_per_launch(camera: Camera) -> int:
-    return samples_per_launch(camera.intrinsics.width_px * camera.intrinsics.height_px)
 
 
 def samples_per_launch(n_pixels: int) -> int:

@@ -84,7 +84,7 @@ def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
     seen = FIRST_LAMP + int(np.flatnonzero(slot == 0)[0])
     assert cast[hidden] > 100
     assert arrived[hidden] < 0.02 * cast[hidden]
-    assert arrived[seen] > 0.4 * cast[seen]  # half of a bulb lies behind its other half
+    assert arrived[seen] > 0.95 * cast[seen]  # no ray goes to the half that is turned away
     # What the room has not: an outdoor technique or a lamp beyond the third.
     assert not cast[FIRST_LAMP + 3 :].any()
     assert (arrived <= cast).all()
