@@ -1,6 +1,10 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -50,3 +54,24 @@ def test_one_denoiser_serves_all_pictures_of_a_process(monkeypatch: pytest.Monke
     assert other.shape == (32, 32, 3)
     # After a picture of another size the first one is the same bits again.
     np.testing.assert_array_equal(first, denoise_radiance(noisy, np.full_like(noisy, 0.5), up))
+
+
+def test_the_denoiser_imports_no_torch_and_leaves_it_to_others(tmp_path: Path) -> None:
+    pytest.importorskip("pyoidn")
+    (tmp_path / "torch.py").write_text("import sys\nassert 'pyoidn' in sys.modules, 'too early'\n")
+    script = """
+import sys
+import numpy as np
+from pbrs_farm.transport.develop.denoiser import denoise_radiance
+grey = np.full((16, 16, 3), 0.5, np.float32)
+denoise_radiance(grey, grey, grey)
+assert 'torch' not in sys.modules
+import torch
+assert torch.__file__.startswith(sys.argv[1])
+"""
+    path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
+    command = [sys.executable, "-c", script, str(tmp_path)]
+    found = subprocess.run(
+        command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False
+    )
+    assert found.returncode == 0, found.stderr
