@@ -75,14 +75,22 @@ def rolled_off(rgb: F64) -> F64:
 
     It maps the largest component and keeps the hue; colours far beyond white fade to white.
     """
-    top = np.maximum(np.maximum(rgb[..., :1], rgb[..., 1:2]), rgb[..., 2:3])
-    over = np.maximum(top - _SHOULDER, 0.0)
+    # Leave what lies on the straight part as it is: most of a picture.
+    top = np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
+    is_soft = top > _SHOULDER
+    out = np.array(rgb)
+    out[is_soft] = _shoulder(rgb[is_soft], top[is_soft][:, None])
+    return out
+
+
+def _shoulder(rgb: F64, top: F64) -> F64:
+    """The curve of `photo` above the straight part: of (N, 3) colours, top (N, 1) their largest."""
+    over = top - _SHOULDER
     room = 1 - _SHOULDER
     rise = np.log1p(over / room) / np.log1p((_WHITE - _SHOULDER) / room)
     # Match the slope at the shoulder: a rational start that meets the logarithm's end.
     soft = _SHOULDER + room * np.maximum(rise, over / (over + room) * (1 - 1 / _WHITE))
-    target = np.where(top > _SHOULDER, np.minimum(soft, 1.0), top)
+    target = np.minimum(soft, 1.0)
     # Scale all three components alike; fade to white over five stops, from twice white on.
-    out = rgb * np.divide(target, top, out=np.ones_like(top), where=top > 0)
-    fade = np.clip(np.log2(np.maximum(top, 1e-9) / 2) / 5, 0, 1)
-    return np.asarray(out * (1 - fade) + target * fade)
+    fade = np.clip(np.log2(top / 2) / 5, 0, 1)
+    return np.asarray(rgb * (target / top) * (1 - fade) + target * fade)

@@ -4,7 +4,7 @@ import numpy as np
 
 from pbrs_farm.core.recipe import ToneFields
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoised, wanted_exposures
-from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone
+from pbrs_farm.transport.develop.tone_mapping import exposure_of, rolled_off, tone
 
 
 def grey(level: float) -> np.ndarray:
@@ -33,6 +33,15 @@ def test_tone_rises_with_radiance_and_never_wraps() -> None:
         values = tone(ramp, ToneFields(preset=preset))[0, :, 0].astype(int)
         assert (np.diff(values) >= 0).all()
         assert values[-1] >= 250
+
+
+def test_the_curve_is_straight_below_its_shoulder_and_goes_on_without_a_step() -> None:
+    rng = np.random.default_rng(0)
+    dim = rng.uniform(0, 0.6, (16, 16, 3))
+    np.testing.assert_array_equal(rolled_off(dim), dim)
+    colour = np.array([1.0, 0.5, 0.25])
+    below, above = (rolled_off((level * colour)[None, None]) for level in (0.6, 0.6 + 1e-6))
+    np.testing.assert_allclose(above, below, atol=2e-6)
 
 
 def test_black_stays_black_and_bad_numbers_count_as_black() -> None:
