@@ -143,7 +143,6 @@ def _run_homes(
 
 def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[SourceRef]) -> Run:
     """The run that the options describe; BadInput before anything is stored."""
-    from pbrs_farm.run.chosen_cameras import check_camera_file
     from pbrs_farm.run.local import Run
     from pbrs_farm.run.plan import wanted
     from pbrs_farm.settings import settings_from_environment
@@ -152,7 +151,10 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
     recipe = recipe_of(args)
     want = wanted(args.modes, args.layers, views_wanted(args), pairs=args.pairs)
     check_lens(want.layers, recipe.lens.lens)
-    check_camera_file(recipe.cameras)
+    if recipe.cameras.source in ("file", "trajectory"):
+        from pbrs_farm.run.chosen_cameras import check_camera_file
+
+        check_camera_file(recipe.cameras)
     return Run(
         homes=homes,
         store_url=args.out,

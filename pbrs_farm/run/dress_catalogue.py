@@ -14,7 +14,6 @@ from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Note
-from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
 NO_FURNITURE = "no-furniture"
 """The kind of the note that says that the packages' furniture is not there."""
@@ -24,26 +23,29 @@ GENERATED = "generated"
 """The word of dress.catalogue that leaves the packages out."""
 
 
-def catalogue_of_words(words: str, *, fetch: bool = False) -> Catalogue:
-    """The catalogue that dress.catalogue names: paths with ":" between; fetch as dress_catalogue."""
-    given = [word for word in words.split(":") if word]
-    paths = tuple(Path(word) for word in given if word != GENERATED)
-    if GENERATED in given:
-        return _catalogue(tuple((path, _stamp(path)) for path in paths), None)
-    return dress_catalogue(paths, fetch=fetch)
+def fetch_packages(words: str) -> None:
+    """Download the packages of catalogue_of_words where they are not cached; MachineFailed if apt cannot.
 
-
-def dress_catalogue(given: tuple[Path, ...] = (), *, fetch: bool = False) -> Catalogue:
-    """The packages' catalogue and the user's libraries (--catalogue) after it.
-
-    fetch: download the packages where they are not cached (MachineFailed if apt cannot);
-    otherwise a missing package is a note of the kind NO_FURNITURE, and the rest serves. BadInput
-    for a given path that does not exist or is no catalogue.
+    The user's libraries are read: BadInput for a path that does not exist or is no catalogue.
     """
-    if fetch:
+    given = [word for word in words.split(":") if word]
+    if GENERATED not in given:
         furniture_package.fetch()
         homes_package.fetch()
-    stamps = tuple((path, _stamp(path)) for path in given)
+    if any(word != GENERATED for word in given):
+        catalogue_of_words(words)
+
+
+def catalogue_of_words(words: str) -> Catalogue:
+    """The catalogue that dress.catalogue names, paths with ":" between: the packages', then those.
+
+    A missing package is a note of the kind NO_FURNITURE, and the rest serves. BadInput for a given
+    path that does not exist or is no catalogue.
+    """
+    given = [word for word in words.split(":") if word]
+    stamps = tuple((Path(word), _stamp(Path(word))) for word in given if word != GENERATED)
+    if GENERATED in given:
+        return _catalogue(stamps, None)
     return _catalogue(stamps, furniture_package.PACKAGE in _cached_names())
 
 
@@ -69,6 +71,8 @@ def _stamp(path: Path) -> int:
 
 @lru_cache(maxsize=4)
 def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
+    from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
+
     # None: no package is wanted.
     if has_package is None:
         return catalogue_from((), given=[path for path, _ in given], store=_store())

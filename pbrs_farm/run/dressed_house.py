@@ -13,7 +13,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as MADE_VERSION
 from pbrs_farm.core.recipe import DressFields, Recipe
 from pbrs_farm.read.source import SourceRef
-from pbrs_farm.run.dress_catalogue import catalogue_of_words
+from pbrs_farm.run.dress_catalogue import catalogue_of_words, fetch_packages
 from pbrs_farm.run.processes.verb_process import doing
 
 if TYPE_CHECKING:
@@ -79,12 +79,13 @@ def dressing_digest(source: SourceRef, recipe: Recipe) -> str:
     return keys.digest(VERSION, seed, fields, catalogue_of(recipe.dress).digest, *more)
 
 
-def fetch_catalogue(fields: DressFields) -> Catalogue:
-    """The catalogue that a recipe names, its packages downloaded where they are not cached.
+def fetch_catalogue(fields: DressFields) -> None:
+    """Download the packages of the catalogue that a recipe names where they are not cached.
 
-    Raises MachineFailed, with the command to type, where apt cannot give them.
+    Raises MachineFailed, with the command to type, where apt cannot give them, and BadInput for a
+    library of the user's that is none.
     """
-    return catalogue_of_words(fields.catalogue, fetch=True)
+    fetch_packages(fields.catalogue)
 
 
 def catalogue_of(fields: DressFields) -> Catalogue:

@@ -24,7 +24,6 @@ from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.run.dressed_house import dressing_digest
 from pbrs_farm.run.house_cache import HouseCache
-from pbrs_farm.sample.room_camera import with_names
 from pbrs_farm.store.object_store import Store
 
 
@@ -142,6 +141,8 @@ def camera_file_text(fields: CameraFields) -> str:
         text = read_regular(path, MAX_TEXT_BYTES).decode("utf-8")
         if path.name != "room_camera.txt" or not names.exists():
             return text
+        from pbrs_farm.sample.room_camera import with_names
+
         return with_names(text, read_regular(names, MAX_TEXT_BYTES).decode("utf-8"), str(names))
     except OSError as error:
         raise BadInput(fields.file or "cameras.file", "", fault_of(error)) from None
