@@ -23,11 +23,14 @@ from pbrs_farm.run.attributions import write_attribution
 from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
 from pbrs_farm.run.plan import Wanted
-from pbrs_farm.run.processes.limits import ProcessLimits, memory_share_mb
-from pbrs_farm.run.processes.pool import Pool
+from pbrs_farm.run.processes.limits import ProcessLimits, machine_mb, memory_share_mb
+from pbrs_farm.run.processes.pool import FINISH, RENDER, Pool
 from pbrs_farm.run.processes.render_task import Event, Setting, Task
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store import StoreSettings, store_from_url
+from pbrs_farm.store.object_store import Store
+
+_APART_MB = 6000.0  # memory of a machine on which two processes may share a view's steps
 
 Observer = Callable[[Event], None]
 
@@ -78,33 +81,52 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     store = store_from_url(run.store_url, run.store)
     summary = Summary()
     summary.failures += [(shown(what, MAX_PLACE), text, "") for what, text in run.refused]
-    sources = _resolved(run, summary)
-    if not sources:
-        return summary
-    if any(uses_catalogue(source, run.recipe) for source in sources):
-        fetch_catalogue(run.recipe.dress)
-    claim_root(store, run.recipe, update=run.update)
+    with _pool(run) as pool:
+        # Let the processes load their libraries while the homes are looked for.
+        pool.start()
+        sources = _resolved(run, summary)
+        if not sources:
+            return summary
+        if any(uses_catalogue(source, run.recipe) for source in sources):
+            fetch_catalogue(run.recipe.dress)
+        claim_root(store, run.recipe, update=run.update)
+        _Schedule(run, sources, summary, observe).drive(pool)
+        pool.release()
+        _finish_root(store, summary.houses)
+    return summary
+
+
+def _pool(run: Run) -> Pool:
+    """The run's processes: n_jobs of them, or one for light and one for all else of its views."""
     # Share the cores among the processes, or each would take them all.
     n_jobs = max(1, run.n_jobs)
     n_threads = max(1, (os.cpu_count() or 1) // n_jobs)
     setting = Setting(run.store_url, run.recipe, n_threads, run.debug, run.store)
-    with Pool(n_jobs, setting, _limits(run, n_jobs)) as pool:
-        _Schedule(run, sources, summary, observe).drive(pool)
-    for house_id in summary.houses:
+    lanes = (n_jobs, int(finishes_apart(run)))
+    limits = ProcessLimits(
+        step_s=run.step_timeout_s,
+        silence_s=run.silence_s or run.step_timeout_s,
+        memory_mb=run.memory_mb or memory_share_mb(sum(lanes)),
+    )
+    return Pool(lanes, setting, limits)
+
+
+def finishes_apart(run: Run) -> bool:
+    """Whether a second process finishes a view while the first renders the light of the next.
+
+    One render process leaves cores idle while it labels, draws and develops.
+    """
+    is_room_for_two = (os.cpu_count() or 1) > 1 and machine_mb() > _APART_MB
+    return run.n_jobs <= 1 and is_room_for_two and "light" in plan.view_steps(run.want)
+
+
+def _finish_root(store: Store, houses: Sequence[str]) -> None:
+    for house_id in houses:
         finish_house(store, house_id)
     # The root's manifest covers every house of the folder, those of former runs too.
     below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
     merge_manifests(store, [at.house for at in below if at and at.file == keys.MANIFEST])
     write_attribution(store)
-    return summary
-
-
-def _limits(run: Run, n_jobs: int) -> ProcessLimits:
-    return ProcessLimits(
-        step_s=run.step_timeout_s,
-        silence_s=run.silence_s or run.step_timeout_s,
-        memory_mb=run.memory_mb or memory_share_mb(n_jobs),
-    )
 
 
 def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
@@ -125,7 +147,10 @@ def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
 
 
 class _Schedule:
-    """Which task next: houses in order, each followed by its views."""
+    """Which task next: houses in order, each followed by its views.
+
+    Where views are finished apart, each is two tasks: its light, then what is left of it.
+    """
 
     def __init__(
         self, run: Run, sources: list[SourceRef], summary: Summary, observe: Observer
@@ -134,38 +159,34 @@ class _Schedule:
         self._summary = summary
         self._observe = observe
         self._sources = {s.house_id: s for s in sources}
-        self._waiting = deque(
-            Task(s.house_id, plan.house_steps(run.want, s.house_id), s) for s in sources
-        )
+        houses = (Task(s.house_id, plan.house_steps(run.want, s.house_id), s) for s in sources)
+        self._waiting: dict[int, deque[Task]] = {RENDER: deque(houses), FINISH: deque()}
+        self._is_apart = finishes_apart(run)
+        self._unfinished: dict[
+            tuple[str, str], Task
+        ] = {}  # (house, view) -> what follows its light
         self._cameras: dict[str, dict[str, Any]] = {}  # house -> facts of its cameras step
         self._floor_lux: dict[str, dict[str, Any]] = {}  # house -> room -> lx by group
         self._unlit: set[str] = set()  # houses whose illuminance failed: no light in their views
 
     def drive(self, pool: Pool) -> None:
         """Until nothing waits and nobody works."""
-        while self._waiting or pool.n_busy:
-            for held in pool.idle_houses():
-                task = self._next(held, pool.busy_houses())
-                if task is not None:
-                    pool.give(task)
+        while any(self._waiting.values()) or pool.n_busy:
+            for lane, waiting in self._waiting.items():
+                for held in pool.idle_houses(lane):
+                    if waiting:
+                        pool.give(_next(waiting, held, pool.busy_houses()), lane)
             for event in pool.events():
                 self._take(event)
-
-    def _next(self, held_house: str, busy: set[str]) -> Task | None:
-        """A waiting task: of the house already in memory, else of one nobody works on, else any."""
-        if not self._waiting:
-            return None
-
-        def rank(task: Task) -> int:
-            return 0 if task.house_id == held_house else 1 + (task.house_id in busy)
-
-        task = min(self._waiting, key=rank)
-        self._waiting.remove(task)
-        return task
 
     def _take(self, event: Event) -> None:
         summary = self._summary
         summary.peak_mb = max(summary.peak_mb, event.peak_mb)
+        # Once its light has ended the rest of a view can be done; only then does the view end.
+        light = (event.house_id, event.view_id or "")
+        if event.kind == "end" and light in self._unfinished:
+            self._waiting[FINISH].append(self._unfinished.pop(light))
+            return
         if event.kind in ("done", "kept"):
             self._take_done(event)
         elif event.kind == "failed":
@@ -173,6 +194,8 @@ class _Schedule:
             summary.failures.append((what, event.message, self._command(event)))
             if event.step == "illuminance":
                 self._unlit.add(event.house_id)
+            if event.step == "light" and light in self._unfinished:
+                self._unfinished[light] = _without(self._unfinished[light], "develop")
         elif event.view_id is None and event.kind == "end" and event.house_id in self._cameras:
             self._add_views(event.house_id, self._cameras.pop(event.house_id))
         self._observe(event)
@@ -218,7 +241,10 @@ class _Schedule:
         modes = tuple(m for m in want.modes if not (m.groups and house in self._unlit))
         steps = plan.view_steps(replace(want, modes=modes))
         tasks = [Task(house, steps, source, view, want.layers) for view in views]
-        self._waiting.extendleft(reversed(tasks))
+        if self._is_apart and "light" in steps:
+            self._unfinished |= {(house, t.view_id or ""): _without(t, "light") for t in tasks}
+            tasks = [replace(task, steps=("light",)) for task in tasks]
+        self._waiting[RENDER].extendleft(reversed(tasks))
 
     def _command(self, event: Event) -> str:
         source = self._sources[event.house_id]
@@ -228,3 +254,18 @@ class _Schedule:
         if event.view_id:
             words += ["--view", event.view_id]
         return shlex.join(words)
+
+
+def _next(waiting: deque[Task], held_house: str, busy: set[str]) -> Task:
+    """A waiting task: of the house already in memory, else of one nobody works on, else any."""
+
+    def rank(task: Task) -> int:
+        return 0 if task.house_id == held_house else 1 + (task.house_id in busy)
+
+    task = min(waiting, key=rank)
+    waiting.remove(task)
+    return task
+
+
+def _without(task: Task, step: str) -> Task:
+    return replace(task, steps=tuple(s for s in task.steps if s != step))

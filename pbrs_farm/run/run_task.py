@@ -6,6 +6,8 @@ Effects: the store's, and those of the libraries the steps use; a crash here cos
 from __future__ import annotations
 
 import atexit
+import contextlib
+import importlib
 import os
 import pkgutil
 import resource
@@ -17,6 +19,7 @@ from typing import Any, Literal
 
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+from pbrs_farm.raycast.variant import choose_variant, set_threads
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.processes.message import Handler, Message, Send
@@ -26,6 +29,12 @@ from pbrs_farm.store import store_from_url
 
 # Steps that start Dr.Jit, whose number of threads is fixed from then on.
 _DRJIT_STEPS = ("house", "cameras", "pairs", "truth", "illuminance", "light", "develop")
+
+
+_OF_FINISHING = (
+    "pbrs_farm.run.steps", "pbrs_farm.run.develop_step", "pbrs_farm.truth", "pbrs_farm.raster",
+    "pbrs_farm.formats.house_bundle", "pbrs_farm.run.view_histogram",
+)  # fmt: skip
 
 
 def make_handler(send: Send) -> Handler:
@@ -42,6 +51,20 @@ def make_handler(send: Send) -> Handler:
         return Message("done", body=asdict(end))
 
     return handle
+
+
+def make_finishing_handler(send: Send) -> Handler:
+    """As make_handler, with what labels, OpenGL and the denoiser need loaded before it is ready.
+
+    It has nothing to do while the house is made: the first view waits for no library.
+    """
+    for module in _OF_FINISHING:
+        # What is missing is told by the step that needs it.
+        with contextlib.suppress(ImportError):
+            importlib.import_module(module)
+    with contextlib.suppress(PbrsError):
+        choose_variant()
+    return make_handler(send)
 
 
 def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Task) -> None:
@@ -103,8 +126,6 @@ def _event_of_outcome(work: Work, name: str, outcome: Outcome, seconds: float) -
 def limit_threads(step: str, n_threads: int) -> None:
     """Give Dr.Jit its share of the cores before a step first uses it."""
     if n_threads < (os.cpu_count() or 1) and step in _DRJIT_STEPS:
-        from pbrs_farm.raycast.variant import set_threads
-
         set_threads(n_threads)
 
 

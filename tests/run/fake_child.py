@@ -63,6 +63,9 @@ class FakeChild:
         self.was_killed = True
         self.code = -9 if self.code is None else self.code
 
+    def release(self) -> None:
+        return None
+
     def close(self) -> None:
         self.was_closed = True
         self.code = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run import local
 from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.plan import wanted
+from pbrs_farm.run.processes import pool
 from pbrs_farm.run.processes.render_task import Event, Setting
 
 FAKE = "tests.run.fakes:run_step"
@@ -28,6 +30,8 @@ def fake_steps(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(Setting(*args), runner=FAKE)  # type: ignore[arg-type]
 
     monkeypatch.setattr(local, "Setting", setting)
+    # Fake steps need no library before they begin.
+    monkeypatch.setitem(pool.HANDLERS, pool.FINISH, pool.HANDLERS[pool.RENDER])
 
 
 def named(name: str) -> Recipe:
@@ -217,3 +221,61 @@ def test_two_processes_make_what_one_makes(tmp_path: Path) -> None:
     assert (tmp_path / "one/manifest.jsonl").read_bytes() == (
         tmp_path / "two/manifest.jsonl"
     ).read_bytes()
+
+
+@pytest.fixture
+def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine on which one process renders light while another finishes views."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(local, "machine_mb", lambda: 16_000.0)
+
+
+def makers(out: Path, step: str) -> set[str]:
+    """The processes that made a step of the views, by their markers."""
+    found = out.glob(f"houses/*/done/{step}.*.json")
+    return {json.loads(path.read_text())["worker"] for path in found}
+
+
+@pytest.mark.usefixtures("two_cores")
+def test_one_process_renders_light_while_another_finishes_the_views(tmp_path: Path) -> None:
+    seen: list[Event] = []
+    summary = run_local(Run(["builtin"], str(tmp_path), named("plain")), seen.append)
+    assert summary.n_done == N_STEPS
+    (light,) = makers(tmp_path, "light")
+    (develop,) = makers(tmp_path, "develop")
+    assert light != develop
+    assert makers(tmp_path, "truth") == {develop}
+    # A view ends once, with all its steps.
+    ends = [event.view_id for event in seen if event.kind == "end" and event.view_id]
+    assert sorted(ends) == ["0_0_0", "0_0_1"]
+
+
+@pytest.mark.usefixtures("two_cores")
+def test_a_view_whose_light_crashes_is_finished_without_it(tmp_path: Path) -> None:
+    summary = run(tmp_path, "crash:light.0_0_0")
+    ((what, message, _command),) = summary.failures
+    assert what.endswith("0_0_0/light")
+    assert "SIGSEGV" in message
+    assert summary.n_done == N_STEPS - 2  # its light and what is developed from it
+    assert {"truth.0_0_0", "view.0_0_0", "develop.0_0_1"} < markers(tmp_path)
+    assert "develop.0_0_0" not in markers(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("fields", "cores", "memory_mb", "is_apart"),
+    [
+        ({}, 2, 16_000.0, True),
+        ({"n_jobs": 2}, 4, 16_000.0, False),
+        ({"want": wanted(["opengl_dl"], [])}, 2, 16_000.0, False),
+        ({}, 1, 16_000.0, False),
+        ({}, 2, 4_000.0, False),
+    ],
+)
+def test_views_are_finished_apart_where_one_job_leaves_cores_idle(
+    fields: dict[str, object], cores: int, memory_mb: float, is_apart: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    monkeypatch.setattr(local, "machine_mb", lambda: memory_mb)
+    asked = Run(["builtin"], "somewhere", named("plain"), **fields)  # type: ignore[arg-type]
+    assert local.finishes_apart(asked) is is_apart

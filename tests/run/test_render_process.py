@@ -224,6 +224,19 @@ def test_closing_lets_an_idle_process_end_and_kills_a_busy_one() -> None:
     assert bench.started[1].was_killed
 
 
+def test_a_process_started_before_its_task_serves_it_and_is_killed_where_none_comes() -> None:
+    bench = Bench()
+    bench.next.at(0, "ready")
+    bench.next.at(1, "done")
+    bench.process.start()
+    assert bench.run()[1].cause == ""
+    assert len(bench.started) == 1
+    bench.process.stop()
+    bench.process.start()
+    bench.process.close()
+    assert bench.started[1].was_killed
+
+
 def make_handler(send: Send) -> Handler:
     """A real process for the test below: it does what the request's word says."""
 

@@ -20,12 +20,20 @@ from pbrs_farm.run.processes.message import Message
 from pbrs_farm.run.processes.render_process import CHECK_EVERY_S, Ended, RenderProcess
 from pbrs_farm.run.processes.render_task import Event, Setting, Task, line_from_task
 
-_HANDLER: Final = "pbrs_farm.run.run_task:make_handler"
+RENDER: Final = 0
+"""The lane of processes that do any task."""
+FINISH: Final = 1
+"""The lane of the process that finishes views whose light another one has rendered."""
+HANDLERS: Final = {
+    RENDER: "pbrs_farm.run.run_task:make_handler",
+    FINISH: "pbrs_farm.run.run_task:make_finishing_handler",
+}
 
 
 @dataclass(slots=True)
 class _Worker:
     process: RenderProcess
+    lane: int
     task: Task | None = None
     step: str = ""  # the step being done
     held_house: str = ""  # the house it keeps in memory
@@ -33,10 +41,13 @@ class _Worker:
 
 
 class Pool:
-    """n render processes that run tasks. A process that dies costs the step it was in."""
+    """Render processes that run tasks, so many a lane. A process that dies costs the step it was in.
 
-    def __init__(self, n: int, setting: Setting, limits: ProcessLimits) -> None:
-        self._n = n
+    lanes: how many processes RENDER has, and FINISH.
+    """
+
+    def __init__(self, lanes: tuple[int, int], setting: Setting, limits: ProcessLimits) -> None:
+        self._lanes = lanes
         self._setting = setting
         self._limits = limits
         self._folder = tempfile.TemporaryDirectory(prefix="pbrs-farm-")
@@ -51,37 +62,55 @@ class Pool:
         error: BaseException | None,
         tb: TracebackType | None,
     ) -> None:
+        self.release()  # all end side by side
         for worker in self._workers:
             worker.process.close()
         self._folder.cleanup()
+
+    def release(self) -> None:
+        """Let idle processes end, without waiting for it: no task follows."""
+        for worker in self._workers:
+            worker.process.release()
+
+    def start(self) -> None:
+        """Start the first process of each lane, so that it loads its libraries before it has a task."""
+        for lane, n in enumerate(self._lanes):
+            if n:
+                self._added(lane).process.start()
 
     @property
     def n_busy(self) -> int:
         """Processes with a task."""
         return sum(w.task is not None for w in self._workers)
 
-    def idle_houses(self) -> list[str]:
+    def idle_houses(self, lane: int) -> list[str]:
         """The house each idle process holds in memory ("" for none): a place per idle process."""
-        idle = [w.held_house for w in self._workers if w.task is None]
-        return idle + [""] * (self._n - len(self._workers))
+        idle = [w.held_house for w in self._of(lane) if w.task is None]
+        return idle + [""] * (self._lanes[lane] - len(self._of(lane)))
 
     def busy_houses(self) -> set[str]:
         """Houses being worked on."""
         return {w.task.house_id for w in self._workers if w.task is not None}
 
-    def give(self, task: Task) -> None:
-        """Hand a task to an idle process, one that holds its house if there is one."""
+    def give(self, task: Task, lane: int) -> None:
+        """Hand a task to an idle process of the lane, one that holds its house if there is one."""
         # Loading a house costs more than the views of a room: prefer the process that has it, then
         # a fresh process, then any.
-        idle = [w for w in self._workers if w.task is None]
-        idle.sort(key=lambda w: w.held_house != task.house_id)
-        holds = bool(idle) and idle[0].held_house == task.house_id
-        if not holds and len(self._workers) < self._n:
-            log = Path(self._folder.name) / f"process-{len(self._workers)}.log"
-            start = partial(ChildProcess, _HANDLER, log)
-            idle = [_Worker(RenderProcess(start, self._limits))]
-            self._workers += idle
+        idle = [w for w in self._of(lane) if w.task is None]
+        idle.sort(key=lambda w: (w.held_house != task.house_id, w.held_house != ""))
+        fits = bool(idle) and idle[0].held_house in (task.house_id, "")
+        if not fits and len(self._of(lane)) < self._lanes[lane]:
+            idle = [self._added(lane)]
         self._begin(idle[0], task)
+
+    def _of(self, lane: int) -> list[_Worker]:
+        return [w for w in self._workers if w.lane == lane]
+
+    def _added(self, lane: int) -> _Worker:
+        log = Path(self._folder.name) / f"process-{len(self._workers)}.log"
+        start = partial(ChildProcess, HANDLERS[lane], log)
+        self._workers.append(_Worker(RenderProcess(start, self._limits), lane))
+        return self._workers[-1]
 
     def events(self) -> Iterator[Event]:
         """What happens next, at least once a second; nothing when no process has a task."""

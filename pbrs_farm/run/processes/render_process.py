@@ -75,15 +75,20 @@ class RenderProcess:
         assert self._child is not None
         return self._child.fileno()
 
-    def begin(self, request: bytes, *, task_s: float = math.inf) -> None:
-        """Give it a task of at most task_s seconds; the process is started when there is none."""
-        assert not self._is_busy, "one task at a time"
-        # Start a process unless one lives; the request waits in its pipe until it is ready.
+    def start(self) -> Child:
+        """Start the process, before it has a task too, unless it lives."""
         child = self._child
         if child is None or child.exit_code() is not None:
             self.stop()
             child = self._child = self._start()
             self._is_ready, self._n_tasks = False, 0
+        return child
+
+    def begin(self, request: bytes, *, task_s: float = math.inf) -> None:
+        """Give it a task of at most task_s seconds; the process is started when there is none."""
+        assert not self._is_busy, "one task at a time"
+        # The request waits in the process's pipe until it is ready.
+        child = self.start()
         child.clear_log()
         now = self._clock()
         self._begun_at = self._task_at = self._step_at = self._sign_at = now
@@ -120,10 +125,16 @@ class RenderProcess:
         if self._child is not None:
             self._child.kill()
 
+    def release(self) -> None:
+        """Tell an idle process that nothing more comes, without waiting for its end; then close it."""
+        if self._child is not None and not self._is_busy:
+            self._child.release()
+
     def close(self) -> None:
-        """End an idle process in good order, kill one that has a task."""
-        if self._child is not None and not self._is_busy and self._child.exit_code() is None:
-            self._child.close()
+        """End an idle process in good order, kill one that has a task or never had one."""
+        child = self._child
+        if child is not None and not self._is_busy and self._n_tasks and child.exit_code() is None:
+            child.close()
         else:
             self.stop()
 
