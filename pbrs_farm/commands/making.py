@@ -36,7 +36,8 @@ from pbrs_farm.installation import need, system_command
 if TYPE_CHECKING:
     from pbrs_farm.read.objects.model_folders import ObjectModel
     from pbrs_farm.read.source import SourceRef
-    from pbrs_farm.run.local import Run
+    from pbrs_farm.run.local import Observer, Run
+    from pbrs_farm.run.processes.render_task import Event
 
 
 def add_verbs(verb: Verb) -> None:
@@ -117,10 +118,12 @@ def _run_homes(
     homes: list[str],
     sources: Sequence[SourceRef] = (),
     refused: Sequence[tuple[str, str]] = (),
+    observe: Observer | None = None,
 ) -> int:
     """Run the plan on homes and on sources that are known already; the exit code.
 
-    refused: what was asked for and cannot be read, and why. A wall that repair lost is an error.
+    refused: what was asked for and cannot be read, and why. observe: hears of the run beside the
+    user. A wall that repair lost is an error.
     """
     from pbrs_farm.progress import progress_reporter
     from pbrs_farm.run.local import run_local
@@ -136,7 +139,13 @@ def _run_homes(
     started = time.monotonic()
     n_homes = (len(homes) + len(sources)) * max(1, len(run.dress_seeds))
     with progress_reporter(n_homes, as_json=args.json) as report:
-        summary = run_local(run, report)
+
+        def hear(event: Event) -> None:
+            report(event)
+            if observe is not None:
+                observe(event)
+
+        summary = run_local(run, hear)
     _report(args, summary, time.monotonic() - started)
     return 1 if summary.failures or summary.walls_lost or summary.n_views == 0 else 0
 
@@ -246,8 +255,16 @@ def _demo(args: argparse.Namespace) -> int:
             warn("going on with the built-in home")
             home = "builtin"
     args.dress = _demo_dressing(args)
-    code = _run_homes(args, [home])
-    write_sheets(Path(args.out), 24)
+    from pbrs_farm.gallery.sheet_parts import SheetParts
+
+    with SheetParts(Path(args.out)) as parts:
+
+        def observe(event: Event) -> None:
+            if event.kind == "end" and event.view_id is not None:
+                parts.make(event.house_id, event.view_id)
+
+        code = _run_homes(args, [home], observe=observe)
+        write_sheets(Path(args.out), 24, parts)
     return code
 
 

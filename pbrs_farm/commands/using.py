@@ -13,6 +13,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
 
 if TYPE_CHECKING:
+    from pbrs_farm.gallery.sheet_parts import SheetParts
     from pbrs_farm.run.relight import LampFactor
     from pbrs_farm.transport.validation.claims import LightClaim
 
@@ -81,16 +82,20 @@ def _write_films(folder: Path) -> None:
             echo(str(folder / name))
 
 
-def write_sheets(folder: Path, max_views: int) -> None:
-    """Write sheet.png and index.html into an output folder and say where they are."""
+def write_sheets(folder: Path, max_views: int, parts: SheetParts | None = None) -> None:
+    """Write sheet.png and index.html into an output folder and say where they are.
+
+    parts: what was made of them while the views were.
+    """
     from pbrs_farm.gallery.contact_sheet import contact_sheet
     from pbrs_farm.gallery.gallery_page import gallery_pages
     from pbrs_farm.store.folder import FolderStore
 
     store = FolderStore(folder)
-    store.put("sheet.png", contact_sheet(folder, max_views=max_views))
+    tiles, cards = (parts.tiles(), parts.cards()) if parts else (None, None)
+    store.put("sheet.png", contact_sheet(folder, max_views=max_views, made=tiles))
     names = []
-    for name, html in gallery_pages(folder):
+    for name, html in gallery_pages(folder, cards):
         store.put(name, html.encode())
         names.append(name)
     # Pages of an earlier, larger gallery would show views that are gone.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -18,7 +18,7 @@ from pbrs_farm.gallery.gallery_page import attributions
 from pbrs_farm.gallery.lettering import draw_line
 from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 
-_TILE_PX: Final = 224
+TILE_PX: Final = 224  # longer edge
 _GAP_PX: Final = 6
 _MARGIN_PX: Final = 28
 PAPER: Final = (16, 18, 23)  # background, sRGB
@@ -30,9 +30,12 @@ _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 _Chip = tuple[int, int]  # of the legend: left edge in px, NYU40 id
 
 
-def contact_sheet(folder: Path, *, max_views: int = 12) -> bytes:
+def contact_sheet(
+    folder: Path, *, max_views: int = 12, made: Mapping[Path, Sequence[Tile]] | None = None
+) -> bytes:
     """PNG bytes: a row of nine tiles for each of at most max_views views of an output folder.
 
+    made: view folder -> tiles of at most TILE_PX that are there already.
     The views are spread over houses, then rooms. A tile that is missing says so. Raises BadInput
     if folder is no output folder or holds no view.
     """
@@ -41,13 +44,14 @@ def contact_sheet(folder: Path, *, max_views: int = 12) -> bytes:
     if not everything:
         raise BadInput(folder, "houses/", "holds no view yet", hint="run `pbrs-farm run` first")
     views = spread_views(everything, max_views)
-    rows = [(view, tiles_of(view, _TILE_PX)) for view in views]
+    there = made or {}
+    rows = [(view, there.get(view.folder) or tiles_of(view, TILE_PX)) for view in views]
     heights = [_row_height(tiles) for _view, tiles in rows]
     classes = _classes([tiles for _view, tiles in rows])
     credits = _credits(everything)
 
     # Lay out: header, a row per view, legend, credits.
-    width = 2 * _MARGIN_PX + len(TILES) * _TILE_PX + (len(TILES) - 1) * _GAP_PX
+    width = 2 * _MARGIN_PX + len(TILES) * TILE_PX + (len(TILES) - 1) * _GAP_PX
     legend = _legend_rows(classes, width - 2 * _MARGIN_PX)
     header, foot = 112, 48 + 28 * len(legend) + 22 * len(credits)
     sheet = Image.new("RGB", (width, header + sum(heights) + foot), PAPER)
@@ -63,7 +67,7 @@ def contact_sheet(folder: Path, *, max_views: int = 12) -> bytes:
         y += 22
 
     file = io.BytesIO()
-    sheet.save(file, "PNG", compress_level=6)
+    sheet.save(file, "PNG", compress_level=4)
     return file.getvalue()
 
 
@@ -89,7 +93,7 @@ def _in_turn(lists: Iterable[Sequence[ViewEntry]]) -> list[ViewEntry]:
 
 
 def _row_height(tiles: Sequence[Tile]) -> int:
-    heights = [_TILE_PX * 3 // 4 if t.pixels is None else t.pixels.shape[0] for t in tiles]
+    heights = [TILE_PX * 3 // 4 if t.pixels is None else t.pixels.shape[0] for t in tiles]
     return 34 + max(heights) + 12  # title above, gap below
 
 
@@ -121,7 +125,7 @@ def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown:
     )
     draw.text((_MARGIN_PX + 172, 34), text, _FAINT, _font(16))
     for i, kind in enumerate(TILES):
-        draw.text((_MARGIN_PX + i * (_TILE_PX + _GAP_PX), 80), kind.title, INK, _font(15))
+        draw.text((_MARGIN_PX + i * (TILE_PX + _GAP_PX), 80), kind.title, INK, _font(15))
 
 
 def _draw_row(
@@ -134,7 +138,7 @@ def _draw_row(
     text = f"{view.house.name}, view {view.id}"
     draw_line(draw, (after, y + 11), text, fill=_FAINT, size=14)
     for i, tile in enumerate(tiles):
-        x = _MARGIN_PX + i * (_TILE_PX + _GAP_PX)
+        x = _MARGIN_PX + i * (TILE_PX + _GAP_PX)
         _draw_tile(sheet, draw, (x, y + 34), tile)
 
 
@@ -143,7 +147,7 @@ def _draw_tile(
 ) -> None:
     # Say in an empty frame why a tile is missing.
     if tile.pixels is None:
-        size = (_TILE_PX, _TILE_PX * 3 // 4)
+        size = (TILE_PX, TILE_PX * 3 // 4)
         draw.rectangle([at, (at[0] + size[0] - 1, at[1] + size[1] - 1)], _EMPTY)
         middle = (at[0] + size[0] // 2, at[1] + size[1] // 2)
         draw.text(middle, tile.missing, _FAINT, _font(15), anchor="mm")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
@@ -35,12 +36,38 @@ def page_name(number: int) -> str:
     return "index.html" if number == 1 else f"index-{number}.html"
 
 
-def gallery_pages(folder: Path) -> Iterator[tuple[str, str]]:
-    """(file name, HTML) of each page, made one at a time. Raises BadInput as gallery."""
+@dataclass(frozen=True, slots=True)
+class CardTiles:
+    """What a view's card shows of its tiles: their pixels are dropped, a house may have many views."""
+
+    tiles: tuple[dict[str, Any], ...]  # for the template, pictures as URLs
+    classes: tuple[tuple[int, float], ...]  # (NYU40 id, share), largest first
+    shape: tuple[int, ...] | None  # of the first picture there is
+
+
+def card_tiles(view: ViewEntry) -> CardTiles:
+    """The view's tiles as its card shows them."""
+    tiles = tiles_of(view, THUMBNAIL_PX)
+    rows = tuple(
+        {"kind": t.kind, "note": t.note, "missing": t.missing, "source": _tile_url(t)}
+        for t in tiles
+    )
+    classes = next((tile.classes for tile in tiles if tile.classes), ())
+    shape = next((t.pixels.shape for t in tiles if t.pixels is not None), None)
+    return CardTiles(rows, classes, shape)
+
+
+def gallery_pages(
+    folder: Path, made: Mapping[Path, CardTiles] | None = None
+) -> Iterator[tuple[str, str]]:
+    """(file name, HTML) of each page, made one at a time. Raises BadInput as gallery.
+
+    made: view folder -> card_tiles that are there already.
+    """
     views, reasons = views_of(folder), reasons_of(folder)
     n_pages = max(1, -(-len(views) // PAGE_VIEWS))
     for number in range(1, n_pages + 1):
-        yield page_name(number), _page(folder, views, reasons, number, n_pages)
+        yield page_name(number), _page(folder, views, reasons, (number, n_pages), made or {})
 
 
 def gallery(folder: Path) -> str:
@@ -55,19 +82,19 @@ def _page(
     folder: Path,
     every: Sequence[ViewEntry],
     reasons: Mapping[tuple[str, str], str],
-    number: int,
-    n_pages: int,
+    place: tuple[int, int],
+    made: Mapping[Path, CardTiles],
 ) -> str:
-    """HTML of one page; only its own pictures are read."""
+    """HTML of one page, place = (its number, of how many); only its own pictures are read."""
+    number, n_pages = place
     views = every[(number - 1) * PAGE_VIEWS : number * PAGE_VIEWS]
     cards: list[dict[str, Any]] = []
     aspect = "4 / 3"
     for view in views:
         # Give every tile the shape of the first picture there is.
-        tiles = tiles_of(view, THUMBNAIL_PX)
-        shape = next((t.pixels.shape for t in tiles if t.pixels is not None), None)
-        if not cards and shape is not None:
-            aspect = f"{shape[1]} / {shape[0]}"
+        tiles = made.get(view.folder) or card_tiles(view)
+        if not cards and tiles.shape is not None:
+            aspect = f"{tiles.shape[1]} / {tiles.shape[0]}"
         cards.append(_card(folder, view, tiles, reasons.get((view.house.id, view.id))))
     n_houses = len({view.house.id for view in every})
     return page(
@@ -102,11 +129,10 @@ def _options(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     return sorted(dict(pairs).items(), key=lambda pair: pair[1].lower())
 
 
-def _card(root: Path, view: ViewEntry, tiles: Sequence[Tile], reason: str | None) -> dict[str, Any]:
+def _card(root: Path, view: ViewEntry, tiles: CardTiles, reason: str | None) -> dict[str, Any]:
     """A view for the template. reason: why it is rejected, "" if kept, None if nobody judged it."""
     # Search by home, room, view and the classes that are seen.
-    classes = next((tile.classes for tile in tiles if tile.classes), ())
-    names = " ".join(NYU40_NAMES[i] for i, _share in classes)
+    names = " ".join(NYU40_NAMES[i] for i, _share in tiles.classes)
     words = f"{view.house.id} {view.house.name} {view.room_name} {view.id} {names}"
     return {
         "view": view,
@@ -114,13 +140,10 @@ def _card(root: Path, view: ViewEntry, tiles: Sequence[Tile], reason: str | None
         "reason": reason,
         "verdict": "" if reason is None else "rejected" if reason else "kept",
         "search_text": words.lower(),
-        "tiles": [
-            {"kind": t.kind, "note": t.note, "missing": t.missing, "source": _tile_url(t)}
-            for t in tiles  # pixels are dropped here: a house may have thousands of views
-        ],
+        "tiles": tiles.tiles,
         "classes": [
             {"name": NYU40_NAMES[i], "rgb": NYU40_COLOURS[i].tolist(), "share": share}
-            for i, share in classes
+            for i, share in tiles.classes
         ],
     }
 

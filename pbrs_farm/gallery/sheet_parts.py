@@ -1,0 +1,69 @@
+"""The parts of sheet and gallery, made view by view while other views are rendered.
+
+Effects: a thread, which reads picture files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, TypeAlias
+
+from pbrs_farm.core import keys
+from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
+
+if TYPE_CHECKING:
+    from pbrs_farm.gallery.gallery_page import CardTiles
+    from pbrs_farm.gallery.view_tiles import Tile
+
+_Parts: TypeAlias = "tuple[Sequence[Tile], CardTiles]"
+
+
+class SheetParts:
+    """Tiles and cards of the views of an output folder that are done; use it in a with statement."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._thread = ThreadPoolExecutor(max_workers=1)
+        self._made: dict[Path, Future[_Parts]] = {}
+
+    def __enter__(self) -> SheetParts:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        tb: TracebackType | None,
+    ) -> None:
+        self._thread.shutdown(cancel_futures=True)
+
+    def make(self, house_id: str, view_id: str) -> None:
+        """Begin the parts of a view whose files are all written."""
+        folder = self._folder / keys.view_key(house_id, view_id, "view.json")
+        view = ViewEntry(OutputHouse(house_id, "", ""), view_id, "", "", folder.parent)
+        self._made[view.folder] = self._thread.submit(_parts, view)
+
+    def tiles(self) -> dict[Path, Sequence[Tile]]:
+        """View folder -> the tiles of its row, of all views whose parts could be made."""
+        return {folder: tiles for folder, (tiles, _card) in self._results().items()}
+
+    def cards(self) -> dict[Path, CardTiles]:
+        """View folder -> the tiles of its card, of all views whose parts could be made."""
+        return {folder: card for folder, (_tiles, card) in self._results().items()}
+
+    def _results(self) -> dict[Path, _Parts]:
+        # What could not be made ahead is made with the sheet, which says why.
+        done = {folder: part for folder, part in self._made.items() if part.exception() is None}
+        return {folder: part.result() for folder, part in done.items()}
+
+
+def _parts(view: ViewEntry) -> _Parts:
+    # The thread loads what it needs: whoever starts a run waits for none of it.
+    from pbrs_farm.gallery.contact_sheet import TILE_PX
+    from pbrs_farm.gallery.gallery_page import card_tiles
+    from pbrs_farm.gallery.view_tiles import tiles_of
+
+    return tiles_of(view, TILE_PX), card_tiles(view)
