@@ -235,7 +235,7 @@ def view_lines(f: Figures) -> list[str]:
         row(["all labels of a view", f"{f['view.labels_s']:.2f} s"]),
         row([
             f"`make demo` on a machine that is set up: {f['demo.views']} views",
-            f"{f['demo.seconds']:.1f} s, {f['demo.peak_mb']:.0f} MB",
+            f"{f['demo.seconds']:.1f} s, {f['demo.peak_mb']:.0f} MB a process",
         ]),
     ]  # fmt: skip
 

@@ -6,6 +6,7 @@ pinned file where apt is missing (its sha256 vouches for it), and keeps packages
 
 from __future__ import annotations
 
+import contextlib
 import gzip
 import hashlib
 import io
@@ -108,9 +109,18 @@ def _deb(package: str, tested_version: str, path: Path) -> Deb:
 
 
 @lru_cache(maxsize=16)
-def _sha256(path: Path, _size: int, _mtime_ns: int) -> str:
+def _sha256(path: Path, size: int, mtime_ns: int) -> str:
+    # Keep the hash beside the file, under its size and date: a hundred megabytes take a while.
+    note, held = path.with_name(f"{path.name}.sha256"), [""]
+    with contextlib.suppress(OSError):
+        held = note.read_text("ascii", "replace").split()
+    if len(held) == 3 and held[1:] == [str(size), str(mtime_ns)]:
+        return held[0]
     with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+    with contextlib.suppress(OSError):  # a cache that cannot be written serves all the same
+        write_whole(note, f"{sha256} {size} {mtime_ns}\n".encode())
+    return sha256
 
 
 _HINT: Final = "type `sudo apt-get update`, then try again"

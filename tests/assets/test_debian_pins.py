@@ -90,3 +90,19 @@ def test_a_package_that_apt_gave_here_is_the_pinned_one() -> None:
         if path.exists():
             assert debian._sha256(path, 0, 0) == pin.sha256, name
             assert path.stat().st_size == pin.n_bytes
+
+
+def test_a_package_is_hashed_anew_only_where_it_has_changed(tmp_path: Path) -> None:
+    deb = tmp_path / "some_1.0_all.deb"
+    deb.write_bytes(b"one")
+    digest = hashlib.sha256(b"one").hexdigest()
+    assert debian._sha256(deb, 3, 7) == digest
+    debian._sha256.cache_clear()  # another process
+    deb.write_bytes(b"two")
+    assert debian._sha256(deb, 3, 7) == digest
+    assert debian._sha256(deb, 3, 8) == hashlib.sha256(b"two").hexdigest()
+    # A note that says nothing is written anew.
+    (note,) = tmp_path.glob("*.sha256")
+    note.write_bytes(b"\xff\x00")
+    debian._sha256.cache_clear()
+    assert debian._sha256(deb, 3, 8) == hashlib.sha256(b"two").hexdigest()
