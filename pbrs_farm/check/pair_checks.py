@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats, Rays
@@ -31,6 +29,10 @@ def check_pairs(house: Path, rays: Rays, tally: Tally) -> None:
     file = house / "pairs.parquet"
     if not file.is_file():
         return
+    # Here, since it loads slowly and few homes have the file.
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     try:
         rows = pq.read_table(io.BytesIO(stored_bytes(file))).select(list(COLUMNS)).to_pylist()
         views = {row["id"]: row for row in stored_object(house / "cameras.json")["views"]}

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.walkable import CELL_M, WALK_M
@@ -64,6 +63,8 @@ def spline_through(places: F64) -> F64:
 
     It lies within the hull of every four neighbours: twice continuous and as clear as they are.
     """
+    from scipy.interpolate import BSpline  # here: 0.1 s that only walks need
+
     control = _resampled(places, _CONTROL_M)
     # Repeat the ends, so that the curve begins and ends at them.
     control = np.concatenate([control[:1], control[:1], control, control[-1:], control[-1:]])
