@@ -1,62 +1,70 @@
 #!/usr/bin/env bash
 # From a bare machine with an NVIDIA driver to a table of what it does here: every test marked gpu, then views
-# an hour, under ten minutes. `scripts/gpu_check.sh [WHEELS]`: a folder of wheels for machines without a network,
-# as `scripts/gpu_check.sh --wheels FOLDER` makes one where there is one: 293 MB, in pieces of 60 MB that can be
-# carried one by one; PYTHON names the interpreter, of one version on both. Writes out/bench/gpu.json.
+# an hour, under ten minutes. Writes out/bench/gpu.json.
+#
+#   scripts/gpu_check.sh                            fetches the libraries with pip
+#   scripts/gpu_check.sh FOLDER                     takes them from a folder: no network, no pip, no xz
+#   scripts/gpu_check.sh --wheels FOLDER [VERSION]  makes the folder for a version of Python, where there is a network
+#
+# The folder's wheels-VERSION.tar.xz (55 MB) holds the files of the published wheels, unchanged, less those that
+# nothing here opens (gpu_wheels.py says which). denoiser-VERSION.tar.xz (45 MB) is Open Image Denoise: where it is
+# left behind, views are not denoised, and the table says so. PYTHON names the interpreter; else it is the first of
+# python3 and python3.11 to python3.14 that the folder has an archive for.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 VENV=${VENV:-out/gpu-venv}
-PACKAGES=".[gl,transport] pytest hypothesis"
+PATH=$PATH:/usr/sbin:/sbin
+
+fail() {
+  echo "gpu_check: $2" >&2
+  exit "$1"
+}
 
 if [ "${1:-}" = --wheels ]; then
-  [ -n "${2:-}" ] || {
-    echo "gpu_check: --wheels wants a folder to write to" >&2
-    exit 2
-  }
-  wheels=$(mktemp -d)
-  trap 'rm -rf "$wheels"' EXIT
-  "${PYTHON:-python3}" -c 'import sys; print(*sys.version_info[:2], sep=".")' >"$wheels/python"
-  # shellcheck disable=SC2086
-  "${PYTHON:-python3}" -m pip wheel -q --wheel-dir "$wheels" $PACKAGES setuptools
-  mkdir -p "$2"
-  rm -f "$2"/wheels.tar.*
-  tar -C "$wheels" -c . | split -b 60MB - "$2/wheels.tar."
-  du -ch --apparent-size "$2"/wheels.tar.*
-  exit 0
+  [ -n "${2:-}" ] || fail 2 "--wheels wants a folder to write to"
+  exec "${PYTHON:-python3}" scripts/gpu_wheels.py "${@:2}"
 fi
 
-if [ -n "${1:-}" ] && ! ls "$1"/wheels.tar.* >/dev/null 2>&1; then
-  echo "gpu_check: $1 has no wheels.tar.* (scripts/gpu_check.sh --wheels FOLDER makes them)" >&2
-  exit 2
+# An interpreter that the folder has an archive for; any will do where pip fetches.
+python=
+for candidate in ${PYTHON:-python3 python3.11 python3.12 python3.13 python3.14}; do
+  version=$("$candidate" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue
+  if [ -z "${1:-}" ] || [ -f "$1/wheels-$version.tar.xz" ]; then
+    python=$candidate
+    break
+  fi
+done
+if [ -z "$python" ]; then
+  archives=$(cd "${1:-.}" 2>/dev/null && ls -d wheels-*.tar.xz 2>/dev/null | xargs || true)
+  here=$(${PYTHON:-python3} -V 2>&1 || true)
+  fail 1 "${1:-.} holds ${archives:-nothing}, here is $here; scripts/gpu_check.sh --wheels FOLDER VERSION packs for another version"
 fi
 
 # The driver first: without it everything below would run on the CPU and say nothing.
-nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader || {
-  echo "gpu_check: no NVIDIA driver here (nvidia-smi fails)" >&2
-  exit 1
-}
-for library in libnvoptix.so.1 libEGL_nvidia.so.0; do
-  ldconfig -p | grep -q "$library" || echo "gpu_check: the driver lacks $library: light needs OptiX, OpenGL needs EGL" >&2
+nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader ||
+  fail 1 "no NVIDIA driver here (nvidia-smi fails)"
+for library in libnvoptix.so.1 libEGL.so.1 libEGL_nvidia.so.0; do
+  ldconfig -p | grep -q "$library" || echo "gpu_check: no $library here: light needs OptiX, OpenGL needs EGL" >&2
 done
 
-[ -x "$VENV/bin/python" ] || "${PYTHON:-python3}" -m venv "$VENV"
 if [ -n "${1:-}" ]; then
-  wheels=$(mktemp -d)
-  trap 'rm -rf "$wheels"' EXIT
-  cat "$1"/wheels.tar.* | tar -C "$wheels" -x
-  "$VENV/bin/python" -c 'import sys; sys.exit(sys.argv[1] != "%d.%d" % sys.version_info[:2])' "$(cat "$wheels/python")" || {
-    echo "gpu_check: $1 is for Python $(cat "$wheels/python"), here is $("$VENV/bin/python" -V); PYTHON=... names another" >&2
-    exit 1
-  }
-  # shellcheck disable=SC2086
-  "$VENV/bin/pip" install -q --no-index --find-links "$wheels" $PACKAGES
+  [ -x "$VENV/bin/python" ] || "$python" -m venv --without-pip "$VENV"
+  # Python unpacks them: a bare machine may have no xz.
+  "$VENV/bin/python" -W ignore - "$1"/{wheels,denoiser}-"$version".tar.xz <<'UNPACK'
+import sys, sysconfig, tarfile
+from pathlib import Path
+
+for archive in filter(Path.exists, map(Path, sys.argv[1:])):
+    with tarfile.open(archive) as tar:
+        tar.extractall(sysconfig.get_path("purelib"))
+UNPACK
 else
-  # shellcheck disable=SC2086
-  "$VENV/bin/pip" install -q $PACKAGES
+  [ -x "$VENV/bin/python" ] || "$python" -m venv "$VENV"
+  "$VENV/bin/pip" install -q ".[gl,transport,workers]" pytest hypothesis
 fi
 
 status=0
-timeout 300 "$VENV/bin/python" -m pytest -m gpu tests/transport -rA || status=$?
+timeout 300 "$VENV/bin/python" -m pytest -m gpu tests/transport tests/workers/node -rA || status=$?
 timeout 240 "$VENV/bin/python" -m benchmarks gpu || status=$?
 exit "$status"

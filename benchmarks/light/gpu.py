@@ -7,6 +7,7 @@ with a sixteenth of its samples and mutations, its time taken sixteen times. Lau
 from __future__ import annotations
 
 import time
+from importlib.util import find_spec
 from typing import Any, Final
 
 from benchmarks.figures import write_report
@@ -20,13 +21,14 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sky_for_house
 
 SIZE: Final = (640, 480)
+DENOISER: Final = find_spec("pyoidn") is not None
 PARTS: Final = {"fast": 1, "paper": 16}  # preset -> by what its samples are divided
 
 
 def main() -> None:
     """Measure and write out/bench/gpu.json."""
-    figures: dict[str, Any] = {"gpu.variant": choose_variant()}
-    units = {"gpu.variant": "of Mitsuba"}
+    figures: dict[str, Any] = {"gpu.variant": choose_variant(), "gpu.denoiser": DENOISER}
+    units = {"gpu.variant": "of Mitsuba", "gpu.denoiser": "views of fast are denoised"}
     for preset, parts in PARTS.items():
         seconds, launches = _view(preset, parts)
         figures[f"gpu.{preset}_views_per_hour"] = round(3600 / seconds, 1)
@@ -61,7 +63,7 @@ def _view(preset: str, parts: int) -> tuple[float, int]:
         began = time.perf_counter()
         result = scene.render(camera, "-", fields, 2)
         aovs = LinearAovs(result.outdoor, result.indoor, result.albedo, result.normal)
-        develop(aovs, recipe.tone, denoise=fields.denoise)
+        develop(aovs, recipe.tone, denoise=fields.denoise and DENOISER)
         seconds = time.perf_counter() - began
         kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     return seconds * parts, len(kernels)

@@ -1,0 +1,90 @@
+"""What the GPU check carries to a machine without a network, and what it says when it cannot run there."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+SCRIPTS = Path(__file__).parents[2] / "scripts"
+
+
+@pytest.fixture(scope="module")
+def wheels() -> ModuleType:
+    found = importlib.util.spec_from_file_location("gpu_wheels", SCRIPTS / "gpu_wheels.py")
+    assert found is not None
+    assert found.loader is not None
+    module = importlib.util.module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    ("path", "carried"),
+    [
+        ("mitsuba/cuda_ad_rgb.cpython-312-x86_64-linux-gnu.so", True),
+        ("mitsuba/cuda_ad_mono.cpython-312-x86_64-linux-gnu.so", False),
+        ("mitsuba/plugins/sunsky.so", True),
+        ("mitsuba/plugins/volpath.so", False),
+        ("pyoidn/oidn/lib/libOpenImageDenoise_device_cuda.so.2.5.1", True),
+        ("pyoidn/oidn/lib/libOpenImageDenoise_device_hip.so.2.5.1", False),
+        ("numpy/_core/tests/test_umath.py", False),
+        ("trimesh/base.py", True),
+    ],
+)
+def test_only_files_that_the_check_cannot_use_stay_behind(
+    wheels: ModuleType, path: str, carried: bool
+) -> None:
+    assert wheels.is_carried(path) == carried
+
+
+def test_what_is_packed_comes_out_as_it_was_and_packs_to_the_same_bytes(
+    wheels: ModuleType, tmp_path: Path
+) -> None:
+    site = tmp_path / "site"
+    contents = {
+        "a/b.so": b"\x7fELF" * 99,
+        "a/x.py": b"1\n",
+        "a/tests/x.py": b"2\n",
+        "pyoidn/y": b"3",
+    }
+    for path, content in contents.items():
+        (site / path).parent.mkdir(parents=True, exist_ok=True)
+        (site / path).write_bytes(content)
+    parts = wheels.archives(wheels.carried(site))
+    assert parts == {"wheels": ["a/x.py", "a/b.so"], "denoiser": ["pyoidn/y"]}
+    for name in ("one", "two"):
+        wheels.pack(site, parts["wheels"], tmp_path / f"{name}.tar.xz")
+        os.utime(site / "a/x.py", (1, 1))
+    assert (tmp_path / "one.tar.xz").read_bytes() == (tmp_path / "two.tar.xz").read_bytes()
+    with tarfile.open(tmp_path / "one.tar.xz") as tar:
+        unpacked = {m.name: tar.extractfile(m) for m in tar}
+        assert {k: f.read() for k, f in unpacked.items() if f} == {
+            path: contents[path] for path in parts["wheels"]
+        }
+
+
+def test_every_requirement_is_asked_for_but_those_nothing_imports(wheels: ModuleType) -> None:
+    asked = wheels.requirements()
+    assert any(r.startswith("mitsuba") for r in asked)
+    assert any(r.startswith("celery") for r in asked)
+    assert not any(r.startswith("pyarrow") for r in asked)
+
+
+def test_a_folder_for_another_python_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "wheels-2.7.tar.xz").touch()
+    done = subprocess.run(
+        ["bash", str(SCRIPTS / "gpu_check.sh"), str(tmp_path)],
+        env=os.environ | {"PYTHON": sys.executable}, capture_output=True, text=True,
+    )  # fmt: skip
+    (line,) = done.stderr.splitlines()
+    here = "{}.{}".format(*sys.version_info[:2])
+    assert done.returncode == 1
+    assert "holds wheels-2.7.tar.xz" in line
+    assert f"here is Python {here}" in line
