@@ -3,7 +3,7 @@
 A room of 6x6x3 m with a table of ever finer waves, seen by one camera, 160x120, 16 samples. Then ever more bulbs below
 its ceiling (`lamps`), and ten there with ever more in a hall next door (`lamps_of_a_home`), their light the same in
 sum, bulbs and waves together always of TRIANGLES_OF_LAMPS, so that lamps alone grow. The pilot, whose lanes are one for
-each lamp, is a view's own: it is measured apart, and the ratios are of a whole view of recipe `fast` (640x480, 56
+each lamp, is a view's own: it is measured apart, and the ratios are of a whole view of recipe `fast` (640x480, 32
 samples), reckoned from both. 35 seconds on two quiet cores.
 """
 

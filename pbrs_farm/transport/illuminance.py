@@ -159,8 +159,8 @@ def _radiosity(context: PathContext, p: Any, normal: Any, key: Any, spp: Any) ->
         counted = context.emitter_filter.indoor
         near = context.emitters.near_lamps(p, normal, counted, mi.Bool(True))
         vertex = white_vertex(p, normal, near)
-        sky, lamp = sample_direct_light(context, sampler, vertex, Strategy(), mi.Bool(True))
-        l_out, l_in = sky.light, lamp.light
+        direct = sample_direct_light(context, sampler, vertex, Strategy(), mi.Bool(True))
+        l_out, l_in = direct.outdoor.light, direct.indoor.light
         # Sample the hemisphere by the cosine and follow the path.
         wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(vertex.dim + 1))
         path = surface_path(vertex, mi.Vector3f(vertex.frame.to_world(wo)), wo.z * dr.inv_pi)

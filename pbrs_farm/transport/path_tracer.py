@@ -164,10 +164,13 @@ def trace(
         lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
     counts, arrivals = emitters.outdoor_choice.no_counts(), emitters.arrival.no_counts()
     counts_arrivals = dr.opaque(mi.Bool, lanes.counts_arrivals)
+    # The pilot asks for one technique at a time: sunlit points are none of them.
+    sunlit, seed = emitters.sunlit, lanes.seed + lanes.first_sample
+    sunlit.trace(scene, emitters.sun, seed, active=lanes.n_only == 0)
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(
-        PathContext(scene, emitters, depth_fields, emitter_filter),
+        PathContext(scene, emitters, depth_fields, emitter_filter, sunlit),
         device_camera(camera),
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
@@ -269,7 +272,7 @@ def _count_techniques(
 
 def _count_arrivals(beside: _Beside, context: PathContext, result: StepResult, active: Any) -> None:
     """Count the shadow rays that a step has cast, and those that arrived."""
-    for sample in (result.outdoor_sample, result.indoor_sample):
+    for sample in (result.outdoor_sample, result.indoor_sample, result.sunlit_sample):
         if sample.kind is not None:
             is_cast = active & beside.counts_arrivals & sample.is_cast
             arrival = context.emitters.arrival

@@ -106,7 +106,10 @@ def pilot_weights(
     assert sums.counts is not None
     by_place = weights_by_place(weights.outdoor, sums.counts)
     thresholds = _shadow_thresholds(brought, n_lamps)
-    return replace(weights, outdoor_by_place=by_place, shadow_thresholds=thresholds)
+    vertices = sums.counts[0].astype(np.int64).sum(1)
+    return replace(
+        weights, outdoor_by_place=by_place, shadow_thresholds=thresholds, vertices=vertices
+    )
 
 
 def _shadow_thresholds(brought: NDArray[np.floating], n_lamps: int) -> tuple[float, float]:

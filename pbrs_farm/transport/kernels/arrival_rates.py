@@ -3,7 +3,7 @@
 What a shadow ray would bring if nothing stood in its way is known before it is cast, whether something
 stands there is not. So the trial of a view (pilot.py) counts in voxels of the home the shadow rays of
 each kind and those that arrived. A kind is an outdoor technique, one of the strongest lamps of the
-view, or any other lamp.
+view, any other lamp, or a group of sunlit points (sunlit_points.py).
 Effects: holds buffers on the device.
 """
 
@@ -25,7 +25,9 @@ from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 # Kinds of shadow rays: a row's places. The rest of the last packet of four floats is empty.
 FIRST_LAMP: Final = MAX_TECHNIQUES
 OTHER_LAMP: Final = FIRST_LAMP + MAX_NEAR
-N_KINDS: Final = OTHER_LAMP + 4
+FIRST_SUNLIT: Final = OTHER_LAMP + 4  # rays to sunlit points, group by group
+MAX_SUNLIT: Final = 8  # groups
+N_KINDS: Final = FIRST_SUNLIT + MAX_SUNLIT
 # A voxel counts as if it had so many rays more, which arrive as the view's do.
 _PRIOR: Final = 4.0
 _LEAST_RATE: Final = 0.02
@@ -62,8 +64,15 @@ class ArrivalRates:
 
     def of_near_lamps(self, p: Any, active: Any) -> list[Any]:
         """The rates of the strongest lamps at p, a list entry each."""
-        first = self._grid.voxel(p) * (N_KINDS // 4) + FIRST_LAMP // 4
-        rows = [dr.gather(mi.Vector4f, self._rows, first + k, active) for k in range(MAX_NEAR // 4)]
+        return self._of_kinds(p, FIRST_LAMP, MAX_NEAR, active)
+
+    def of_sunlit(self, p: Any, active: Any) -> list[Any]:
+        """The rates of each group of sunlit points at p, a list entry each."""
+        return self._of_kinds(p, FIRST_SUNLIT, MAX_SUNLIT, active)
+
+    def _of_kinds(self, p: Any, kind: int, n: int, active: Any) -> list[Any]:
+        first = self._grid.voxel(p) * (N_KINDS // 4) + kind // 4
+        rows = [dr.gather(mi.Vector4f, self._rows, first + k, active) for k in range(n // 4)]
         return [row[k] for row in rows for k in range(4)]
 
     def no_counts(self) -> ArrivalCounts:

@@ -67,6 +67,17 @@ def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
     return value, pdf
 
 
+def diffuse_reflection(bsdf: Bsdf, cos_o: Any) -> Any:
+    """f |cos wo| of diffuse reflection alone, less diffuse_response() to wi; both are above."""
+    coated = 28 / 23 * (1 - bsdf.f0) * _ashikhmin(cos_o)
+    return bsdf.kd * dr.select(bsdf.alpha > 0, coated, 1.0) * (cos_o * dr.inv_pi)
+
+
+def diffuse_response(has_coat: Any, cos_i: Any) -> Any:
+    """What diffuse reflection towards wi is less under a coat."""
+    return dr.select(has_coat, _ashikhmin(cos_i), 1.0)
+
+
 def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any) -> Any:
     """A direction wo drawn with the pdf of evaluate_bsdf()."""
     p_diffuse, p_coat = _lobe_probabilities(bsdf, wi)

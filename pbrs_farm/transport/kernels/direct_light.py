@@ -1,7 +1,7 @@
 """Light that comes straight from an emitter to a vertex, by shadow rays; kernels, no effects.
 
-Next-event estimation: one shadow ray goes to the sky and one to a lamp, weighted against the
-scattered ray by the balance heuristic (Veach 1997, section 9.2).
+Next-event estimation: one shadow ray goes to the sky, one to a lamp and in `path` one to a sunlit point
+(sunlit_points.py), weighted against the scattered ray by the balance heuristic (Veach 1997, section 9.2).
 """
 
 from __future__ import annotations
@@ -15,18 +15,21 @@ from pbrs_farm.transport.guiding.guided_rays import Guiding
 from pbrs_farm.transport.guiding.nearby_lamps import NearbyLamps
 from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, view_independent_pdf
 from pbrs_farm.transport.kernels.device_scene import offset_ray_origin
-from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, DirectionSample
+from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, SUN, DirectionSample
 from pbrs_farm.transport.kernels.path_state import (
     NO_EMITTERS,
     DirectLightSample,
     PathContext,
+    PathState,
     Vertex,
 )
 from pbrs_farm.transport.kernels.sampler import Sampler
-from pbrs_farm.transport.kernels.shadow_roulette import ShadowRoulette, shadow_roulettes
+from pbrs_farm.transport.kernels.shadow_roulette import FREE_DIM, ShadowRoulette, shadow_roulette
+from pbrs_farm.transport.kernels.sunlit_points import SunlitSample
 
 # Random dimensions of a vertex, one or two numbers each; path_step.py has the others.
 _LAMP, _LAMP_UV, _OUT, _OUT_UV = 4, 5, 7, 8
+_SUNLIT = 3  # after those of roulette (shadow_roulette.py)
 
 
 class Strategy(NamedTuple):
@@ -39,30 +42,56 @@ class Strategy(NamedTuple):
     beta: Any = None  # throughput up to the vertex, for shadow rays' roulette; None = all are cast
 
 
+class DirectLight(NamedTuple):
+    """What the shadow rays of a vertex bring."""
+
+    outdoor: DirectLightSample  # straight from the sky
+    indoor: DirectLightSample
+    sunlit: DirectLightSample  # by way of a sunlit point
+
+
 def sample_direct_light(
-    context: PathContext, sampler: Sampler, vertex: Vertex, strategy: Strategy, active: Any
-) -> tuple[DirectLightSample, DirectLightSample]:
-    """(outdoor, indoor) light scattered back along the path, a shadow ray each or none."""
+    context: PathContext,
+    sampler: Sampler,
+    vertex: Vertex,
+    strategy: Strategy,
+    active: Any,
+    path: PathState | None = None,
+) -> DirectLight:
+    """The light scattered back along the path by a shadow ray each to sky, lamps and sunlit points.
+
+    path: the one that has come to the vertex, needed where sunlit points are sampled.
+    """
     emitters, emitter_filter, dim = context.emitters, context.emitter_filter, vertex.dim
-    outdoor = indoor = None
+    p, outdoor, indoor, sunlit = vertex.si.p, None, None, None
     if emitter_filter.outdoor is not None:
         u, uv = sampler.get_1d(dim + _OUT), sampler.get_2d(dim + _OUT_UV)
         is_asked = active & (emitter_filter.outdoor > NO_EMITTERS)
-        outdoor = emitters.sample_outdoor(vertex.si.p, u, uv, emitter_filter.outdoor, is_asked)
+        outdoor = emitters.sample_outdoor(p, u, uv, emitter_filter.outdoor, is_asked)
     if emitter_filter.indoor is not None and vertex.near is not None:
         u, uv = sampler.get_1d(dim + _LAMP), sampler.get_2d(dim + _LAMP_UV)
         is_asked = active & (emitter_filter.indoor > NO_EMITTERS)
         indoor = emitters.sample_lamp(
             context.scene, vertex.near, u, uv, emitter_filter.indoor, is_asked
         )
+    if context.sunlit is not None:
+        goes_on = active & (vertex.depth + 1 < context.fields.max_depth)
+        sunlit = context.sunlit.sample(p, sampler.get_1d(dim + (FREE_DIM + _SUNLIT)), goes_on)
+
     # A portal asked for alone has no light of scattered rays to be weighted against.
+    of_sky = strategy
     if emitter_filter.outdoor is not None:
         share = dr.select(emitter_filter.outdoor >= FIRST_PORTAL, 0, strategy.bsdf_share)
-        strategy = strategy._replace(bsdf_share=share)
-    first, second = shadow_roulettes(strategy.beta, emitters.shadow_thresholds, sampler, dim)
-    return (
-        _direct_light(context, vertex, strategy, outdoor, first),
-        _direct_light(context, vertex, strategy, indoor, second),
+        of_sky = strategy._replace(bsdf_share=share)
+    by_sky, by_lamps = emitters.shadow_thresholds
+    roulettes = [
+        shadow_roulette(strategy.beta, threshold, sampler, dim, k)
+        for k, threshold in enumerate((by_sky, by_lamps, by_sky))
+    ]
+    return DirectLight(
+        _direct_light(context, vertex, of_sky, outdoor, roulettes[0], path),
+        _direct_light(context, vertex, of_sky, indoor, roulettes[1]),
+        _direct_light(context, vertex, strategy, sunlit, roulettes[2]),
     )
 
 
@@ -70,10 +99,14 @@ def _direct_light(
     context: PathContext,
     vertex: Vertex,
     strategy: Strategy,
-    sample: DirectionSample | None,
+    sample: DirectionSample | SunlitSample | None,
     roulette: ShadowRoulette | None,
+    path: PathState | None = None,
 ) -> DirectLightSample:
-    """What one shadow ray brings; nothing where its roulette casts none."""
+    """What one shadow ray brings; nothing where its roulette casts none.
+
+    path: the one that has come to the vertex, if a part of the sun is left to sunlit points.
+    """
     if sample is None:
         return DirectLightSample(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
     si, is_independent = vertex.si, strategy.is_view_independent
@@ -92,10 +125,15 @@ def _direct_light(
     contributes = contributes & sample.valid & (sample.pdf > 0)
     # Weigh by the balance heuristic; the sample's own pdf cancels with the estimator's.
     weight = 1 / (sample.pdf + pdf)
+    taken = _taken_by_sunlit(context, vertex, path, sample, wo, contributes)
     if roulette is not None:
         rate = context.emitters.arrival.of_kind(si.p, sample.kind, contributes)
-        is_cast, chance = roulette.cast_by_chance(value * sample.radiance * weight, rate)
+        left = value * sample.radiance * weight
+        if taken is not None:
+            left = dr.maximum(left - taken, 0)
+        is_cast, chance = roulette.cast_by_chance(left, rate)
         contributes, weight = contributes & is_cast, weight / chance
+        taken = None if taken is None else taken / chance
 
     # Aim again from the offset origin: a lamp near by must not shadow itself.
     begin = offset_ray_origin(si.p, dr.select(side > 0, si.ng, -si.ng))
@@ -107,7 +145,27 @@ def _direct_light(
     clear = context.scene.transmittance(begin, d, reach, contributes)
     incident = dr.select(contributes, sample.radiance * clear * weight, 0)
     light = dr.select(contributes & is_consistent, value * incident, 0)
+    if taken is not None:
+        light -= dr.select(contributes & is_consistent, taken * clear, 0)
     arrives = dr.max(clear) > 0
     return DirectLightSample(
         light, sample.d, incident, sample.emitter, sample.kind, contributes, arrives
     )
+
+
+def _taken_by_sunlit(
+    context: PathContext,
+    vertex: Vertex,
+    path: PathState | None,
+    sample: DirectionSample | SunlitSample,
+    wo: Any,
+    active: Any,
+) -> Any:
+    """Color3f of the light of a sample that sunlit points bring instead; None where there are none."""
+    if context.sunlit is None or path is None:
+        return None
+    by_sun = active & (sample.kind == SUN)
+    taken = context.sunlit.share_of_sun(
+        (path.reference.p, path.bsdf_pdf), vertex.si, vertex.wi, wo, sample.d, by_sun
+    )
+    return dr.select(by_sun, taken * sample.radiance / sample.pdf, 0)

@@ -16,7 +16,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.arrays import F32, F64, I64
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, TargetSampler, no_targets
@@ -34,6 +34,8 @@ from pbrs_farm.transport.kernels.lamp_points import LampPointSampler, padded
 from pbrs_farm.transport.kernels.outdoor_choice import OutdoorChoice, choose_technique
 from pbrs_farm.transport.kernels.packets import colour, vector
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
+from pbrs_farm.transport.kernels.sun_disc import SunDisc
+from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
 from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
@@ -61,6 +63,7 @@ class EmitterWeights:
     # chance (shadow_roulette.py); 0 = all are cast.
     shadow_thresholds: tuple[float, float] = (0.0, 0.0)
     arrival_rates: F64 | None = None  # (voxels, kinds) of arrival_rates.py, None = all rays arrive
+    vertices: I64 | None = None  # (voxels,) of the pilot's paths, None = no sunlit points
 
 
 class DirectionSample(NamedTuple):
@@ -88,13 +91,13 @@ class Emitters:
         self.nearby = NearbyLampSampler(tables)
         grid = VoxelGrid(tables.positions)
         self.outdoor_choice, self.arrival = OutdoorChoice(grid), ArrivalRates(grid)
+        self.sun, self.sunlit = SunDisc(sky), SunlitPoints(grid, self.arrival)
         self.targets = TargetSampler(no_targets(len(tables.lamps)))
         self._set_lamps(tables, weights.lamps)
         self._set_dome(sky)
         self._set_portals(portals)
         self._set_outdoor_weights(weights)
         self._set_shadow_thresholds(weights)
-        self._set_sun(sky)
         shines = bool(sky.dome.max() > 0 or sky.sun_irradiance.max() > 0)
         self.has_sky = dr.opaque(mi.Bool, shines)
         self._has_group = {Group.OUTDOOR: shines, Group.INDOOR: len(tables.lamps) > 0}
@@ -113,6 +116,7 @@ class Emitters:
         self._set_lamp_weights(weights.lamps, weights.arrival_rates)
         self._set_outdoor_weights(weights)
         self.nearby.set_guided(weights.is_guided)
+        self.sunlit.set_view(weights.vertices)
         self._set_shadow_thresholds(weights)
 
     def set_targets(self, targets: GuidingTargets) -> None:
@@ -206,7 +210,7 @@ class Emitters:
         is_sun = technique == SUN
         # Draw a direction by every technique, and take one.
         texel, _u = sample_alias_table(self._dome_alias, mi.UInt32(0), self._n_texels, u, active)
-        to_sun = self._sun_frame.to_world(_cone(uv, self._sun_cos))
+        to_sun = self.sun.sample(uv)
         to_dome = self._texel_direction(texel, uv)
         to_portal = self._portal_direction(p, technique, uv, active)
         d = dr.select(is_sun, to_sun, dr.select(technique == DOME, to_dome, to_portal))
@@ -218,10 +222,9 @@ class Emitters:
 
     def eval_sun(self, chances: list[Any], d: Any, counted: Any) -> tuple[Any, Any]:
         """(radiance of the sun's disc in direction d, pdf of sampling it by the techniques' chances)."""
-        inside = dr.dot(d, self._sun_frame.n) >= self._sun_cos - 1e-7
         weight = dr.select(counted >= 0, 1, chances[SUN])
         counts = (counted < 0) | (counted == SUN)
-        return dr.select(inside & counts, self._sun_rgb, 0), weight * self._sun_pdf
+        return dr.select(counts, self.sun.radiance(d), 0), weight * self.sun.pdf
 
     def eval_dome(
         self, chances: list[Any], p: Any, d: Any, counted: Any, active: Any
@@ -338,15 +341,6 @@ class Emitters:
         outdoor, indoor = weights.shadow_thresholds
         self.shadow_thresholds = dr.opaque(mi.Float, outdoor), dr.opaque(mi.Float, indoor)
 
-    def _set_sun(self, sky: Sky) -> None:
-        self._sun_frame = mi.Frame3f(opaque3(mi.Vector3f, sky.sun_direction))
-        cos_max = math.cos(sky.sun_half_angle_rad)
-        # The disc's radiance gives its irradiance: integral of the cosine over the cone.
-        projected = math.pi * math.sin(sky.sun_half_angle_rad) ** 2
-        self._sun_cos = dr.opaque(mi.Float, cos_max)
-        self._sun_pdf = dr.opaque(mi.Float, 1 / (2 * math.pi * (1 - cos_max)))
-        self._sun_rgb = opaque3(mi.Color3f, sky.sun_irradiance / projected)
-
     def _set_dome(self, sky: Sky) -> None:
         height, width = sky.dome.shape[:2]
         probability = dome_probabilities(sky.dome)
@@ -359,11 +353,6 @@ class Emitters:
         self._dome_width = dr.opaque(mi.UInt32, width)
         self._dome_height = dr.opaque(mi.UInt32, height)
         self._dome_height_f = dr.opaque(mi.Float, float(height))
-
-
-def _cone(uv: Any, cos_max: Any) -> Any:
-    warp: Any = mi.warp.square_to_uniform_cone
-    return warp(uv, cos_max)
 
 
 def dome_probabilities(dome: F32) -> F64:

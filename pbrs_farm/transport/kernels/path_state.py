@@ -20,6 +20,7 @@ from pbrs_farm.transport.kernels.device_scene import (
 )
 from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, Sampler
+from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 ALL_EMITTERS, NO_EMITTERS = -1, -2
@@ -50,6 +51,7 @@ class PathContext(NamedTuple):
     emitters: Emitters
     fields: DeviceFields
     emitter_filter: EmitterFilter
+    sunlit: SunlitPoints | None = None  # where shadow rays go to sunlit points, too
 
 
 @dataclass
@@ -135,6 +137,7 @@ class StepResult(NamedTuple):
     pass_probability: Any  # of going straight through what was met, 1 if that is no glass
     outdoor_sample: DirectLightSample
     indoor_sample: DirectLightSample
+    sunlit_sample: DirectLightSample
     is_view_independent: Any  # Bool: weighted by view_independent_pdf (bsdf.py)
 
 

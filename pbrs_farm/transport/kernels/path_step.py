@@ -101,15 +101,15 @@ def advance(
     # Send shadow rays, and go on.
     goes_on = vertex.is_rough & (vertex.depth < context.fields.max_depth)
     strategy = _strategy(context, path, vertex, goes_on, may_reconnect)
-    outdoor, indoor = sample_direct_light(context, sampler, vertex, strategy, goes_on)
+    direct = sample_direct_light(context, sampler, vertex, strategy, goes_on, path)
     step = _Step(context, sampler, path, vertex, strategy, lobe)
     scattered = _scatter(step, goes_on)
     following, pdfs, alive = _follow(step, scattered)
     result = StepResult(
         emitted_outdoor=emitted_outdoor,
         emitted_indoor=emitted_indoor,
-        direct_outdoor=path.beta * outdoor.light,
-        direct_indoor=path.beta * indoor.light,
+        direct_outdoor=path.beta * (direct.outdoor.light + direct.sunlit.light),
+        direct_indoor=path.beta * direct.indoor.light,
         is_rough=vertex.is_rough,
         missed=missed,
         albedo=dr.minimum(bsdf.kd + bsdf.f0 + bsdf.tau, 1),
@@ -118,8 +118,9 @@ def advance(
         pdfs=pdfs,
         guided_weight=weight,
         pass_probability=dr.select(vertex.is_glass, 1 - lobe.probability, 1),
-        outdoor_sample=outdoor,
-        indoor_sample=indoor,
+        outdoor_sample=direct.outdoor,
+        indoor_sample=direct.indoor,
+        sunlit_sample=direct.sunlit,
         is_view_independent=strategy.is_view_independent,
     )
     return following, result, alive

@@ -22,7 +22,7 @@ from pbrs_farm.transport.kernels.sampler import Sampler
 LEAST_CHANCE: Final = 0.1
 # Random dimensions beyond all of the vertices' own: Metropolis, which has no such roulette, keeps its
 # stored numbers.
-_FIRST_DIM: Final = 1 << 16
+FREE_DIM: Final = 1 << 16
 
 
 class ShadowRoulette(NamedTuple):
@@ -43,14 +43,13 @@ class ShadowRoulette(NamedTuple):
         return self.u < chance, chance
 
 
-def shadow_roulettes(
-    beta: Any, thresholds: tuple[Any, Any], sampler: Sampler, dim: Any
-) -> tuple[ShadowRoulette | None, ShadowRoulette | None]:
-    """The roulettes of a vertex's outdoor and indoor shadow ray; none without a throughput.
+def shadow_roulette(
+    beta: Any, threshold: Any, sampler: Sampler, dim: Any, number: int
+) -> ShadowRoulette | None:
+    """The roulette of one of a vertex's shadow rays; none without a throughput.
 
-    dim: the first random dimension of the vertex.
+    dim: the first random dimension of the vertex. number: of the shadow ray, each its own.
     """
     if beta is None:
-        return None, None
-    outdoor, indoor = (sampler.get_1d(dim + (_FIRST_DIM + k)) for k in range(2))
-    return ShadowRoulette(beta, thresholds[0], outdoor), ShadowRoulette(beta, thresholds[1], indoor)
+        return None
+    return ShadowRoulette(beta, threshold, sampler.get_1d(dim + (FREE_DIM + number)))

@@ -25,7 +25,8 @@ class VoxelGrid:
     def __init__(self, positions: F32) -> None:
         """positions: (N, 3) of all that there is."""
         low, shape, edge = voxel_grid(positions)
-        self.n_voxels = int(np.prod(shape))
+        self.n_voxels, self.edge_m = int(np.prod(shape)), edge
+        self._host_low, self._host_shape = low, shape
         self._low, self._scale = opaque3(mi.Vector3f, low), dr.opaque(mi.Float, 1 / edge)
         self._shape = [dr.opaque(mi.UInt32, int(n)) for n in shape]
 
@@ -34,6 +35,11 @@ class VoxelGrid:
         at = dr.maximum((mi.Vector3f(p) - self._low) * self._scale, 0)
         x, y, z = (dr.minimum(mi.UInt32(at[k]), self._shape[k] - 1) for k in range(3))
         return (x * self._shape[1] + y) * self._shape[2] + z
+
+    def centres(self) -> F64:
+        """(voxels, 3) their middles."""
+        at = np.indices(tuple(int(n) for n in self._host_shape)).reshape(3, -1).T
+        return np.asarray(self._host_low + (at + 0.5) * self.edge_m)
 
 
 def voxel_grid(positions: F32) -> tuple[F64, NDArray[np.int64], float]:

@@ -73,7 +73,7 @@ def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_the_views() -> N
 def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
     tried: tuple[LightScene, Camera],
 ) -> None:
-    from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP
+    from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP, FIRST_SUNLIT
 
     scene, camera = tried
     _emitters, weights = scene.emitters(camera, FIELDS, 1)
@@ -86,7 +86,7 @@ def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
     assert arrived[hidden] < 0.02 * cast[hidden]
     assert arrived[seen] > 0.95 * cast[seen]  # no ray goes to the half that is turned away
     # What the room has not: an outdoor technique or a lamp beyond the third.
-    assert not cast[FIRST_LAMP + 3 :].any()
+    assert not cast[FIRST_LAMP + 3 : FIRST_SUNLIT].any()
     assert (arrived <= cast).all()
 
 

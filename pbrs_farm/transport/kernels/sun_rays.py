@@ -1,0 +1,139 @@
+"""Rays from the sun to the surfaces that they meet; kernels, no effects."""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from pbrs_farm.core.arrays import F32
+from pbrs_farm.transport.kernels.bsdf import diffuse_reflection, luminance
+from pbrs_farm.transport.kernels.device_scene import (
+    DeviceScene,
+    SurfaceInteraction,
+    offset_ray_origin,
+)
+from pbrs_farm.transport.kernels.packets import rgb, xyz
+from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
+from pbrs_farm.transport.kernels.sun_disc import SunDisc
+from pbrs_farm.transport.kernels.sun_plane import REACH_M, SunPlane
+from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
+from pbrs_farm.transport.scene_tables.material_rows import GLASS, SURFACE
+
+_MAX_SHEETS: Final = 16  # of glass before a point
+_SCATTERED: Final = 8  # rays from a place, to see what its light is worth
+
+# Floats of a point: place, cosine to the sun; face normal, pdf of the ray per m2 of the plane; shading
+# normal, 1 under a coat; radiance that it reflects, less diffuse_response() (bsdf.py).
+POINT_FLOATS: Final = 16
+COS_SUN, PLANE_PDF, COATED = 3, 7, 11
+RADIANCE: Final = slice(12, 15)
+
+
+class SunRays(NamedTuple):
+    """Where rays from the sun end."""
+
+    si: SurfaceInteraction
+    d: Any  # unit direction to the sun
+    cos_sun: Any  # to the face's normal
+    light: Any  # Color3f, radiance reflected diffusely, less diffuse_response()
+    lit: Any  # Bool: the sun shines on a surface that scatters and lets nothing through
+
+
+def sun_rays(scene: DeviceScene, sun: SunDisc, plane: SunPlane, cell: Any, sampler: Any) -> SunRays:
+    """A ray through a point of each cell; takes dimensions 0 to 3."""
+    through = plane.point(cell, sampler.get_2d(mi.UInt32(0)))
+    d = sun.sample(sampler.get_2d(mi.UInt32(2)))
+    # Find the first surface that no light goes straight through.
+    begin = _behind_glass(scene, through + REACH_M * d, -d)
+    si = scene.intersect(begin, -d, mi.Bool(True))
+    cos_sun, cos_n = dr.dot(si.ng, d), dr.dot(si.n_interpolated, d)
+    is_rough = si.valid & ~si.is_cutout & (si.bsdf.kind == SURFACE)
+    may = is_rough & (dr.max(si.bsdf.tau) <= 0) & (cos_sun > 0) & (cos_n > 0)
+    clear = scene.transmittance(offset_ray_origin(si.p, si.ng), d, mi.Float(dr.inf), may)
+    light = diffuse_reflection(si.bsdf, cos_n) * sun.irradiance * clear
+    return SunRays(si, d, cos_sun, light, may & (dr.max(light) > 0))
+
+
+def lit_points(
+    scene: DeviceScene, sun: SunDisc, plane: SunPlane, cells: Any, pdfs: Any, seed: int
+) -> tuple[F32, Any]:
+    """(points that rays light (N, POINT_FLOATS), number of each one's ray (N,)).
+
+    cells: (R,) that the rays go through. pdfs: (cells,) of a ray per m2 of the plane.
+    """
+    key = stream_key(dr.opaque(mi.UInt32, 0), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+    sampler = SobolSampler(key, dr.arange(mi.UInt32, len(cells)))
+    rays = sun_rays(scene, sun, plane, device_array(mi.UInt32, cells), sampler)
+    at, inside = plane.cell(rays.si.p, rays.d)
+    lit = rays.lit & inside
+    pdf = dr.gather(mi.Float, pdfs, at, lit)
+    si, has_coat = rays.si, dr.select(rays.si.bsdf.alpha > 0, mi.Float(1), 0)
+    # Write each point's row, and keep those that are lit.
+    normals = *xyz(si.ng), pdf, *xyz(si.n_interpolated), has_coat
+    columns = [*xyz(si.p), rays.cos_sun, *normals, *rgb(rays.light)]
+    lit &= pdf > 0
+    dr.eval(lit, *columns)
+    keep = np.flatnonzero(lit.numpy())
+    rows = np.zeros((len(keep), POINT_FLOATS), np.float32)
+    for k, column in enumerate(columns):
+        rows[:, k] = column.numpy()[keep]
+    return rows, keep
+
+
+def reached_by_cells(
+    scene: DeviceScene, sun: SunDisc, plane: SunPlane, grid: VoxelGrid, wanted: Any, seed: int
+) -> tuple[F32, F32]:
+    """(places (C, 3) that a ray through each cell lights, use (C,) of that light).
+
+    wanted: (voxels,) how much light in each of them matters. A point's use is what it reflects, times
+    that of the voxels where it falls.
+    """
+    key = stream_key(dr.opaque(mi.UInt32, 1), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+    cell = dr.arange(mi.UInt32, plane.n_cells)
+    sampler = SobolSampler(key, cell)
+    rays = sun_rays(scene, sun, plane, cell, sampler)
+    use = _use_of(scene, grid, wanted, rays.si, sampler, mi.Bool(rays.lit))
+    use *= dr.select(rays.lit, luminance(rays.light) / rays.cos_sun, 0)
+    dr.eval(use, rays.si.p)
+    places = np.stack([x.numpy() for x in xyz(rays.si.p)], 1)
+    return places, use.numpy()
+
+
+@dr.syntax
+def _use_of(
+    scene: DeviceScene,
+    grid: VoxelGrid,
+    wanted: Any,
+    si: SurfaceInteraction,
+    sampler: Any,
+    active: Any,
+) -> Any:
+    """Mean of wanted over the voxels where rays that scatter from si end."""
+    begin, frame = offset_ray_origin(si.p, si.ng), mi.Frame3f(si.ng)
+    total, n = mi.Float(0), mi.UInt32(0)
+    while active:
+        wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(4 + 2 * n))
+        d = mi.Vector3f(frame.to_world(wo))
+        o = _behind_glass(scene, begin, d)
+        hit = scene.intersect(o, d, active)
+        total += dr.select(hit.valid, dr.gather(mi.Float, wanted, grid.voxel(hit.p), hit.valid), 0)
+        n += 1
+        active = active & (n < _SCATTERED)
+    return total / _SCATTERED
+
+
+@dr.syntax
+def _behind_glass(scene: DeviceScene, o: Any, d: Any) -> Any:
+    """Where a ray starts that passes all glass and cut-outs before its first other surface."""
+    here, n = mi.Point3f(o), mi.UInt32(0)
+    goes_on = dr.full(mi.Bool, True, dr.width(o))
+    while goes_on:
+        si = scene.intersect(here, d, goes_on)
+        passes = goes_on & si.valid & (si.is_cutout | (si.bsdf.kind == GLASS))
+        here = dr.select(passes, offset_ray_origin(si.p, -si.ng), here)
+        n += 1
+        goes_on = passes & (n < _MAX_SHEETS)
+    return here

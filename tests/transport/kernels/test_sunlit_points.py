@@ -1,0 +1,171 @@
+"""Sunlit points: the light they bring is the light that paths find by chance, with less noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import House, Material, MaterialKind
+from pbrs_farm.core.lighting import Group
+from pbrs_farm.core.recipe import LightFields, recipe_from_name
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_result import LightResult
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import sunsky
+from pbrs_farm.transport.validation import known_rooms as rooms
+from pbrs_farm.transport.validation.statistics import blocks, z_scores
+
+if choose_variant().startswith("scalar"):
+    pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)
+
+RECIPE = recipe_from_name("fast")
+FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "spp": 64})
+
+
+def sunny(house: House, *, azimuth_rad: float = 0.35) -> LightScene:
+    """The scene of a house whose sun stands before its window, 29 degrees high."""
+    sky = sunsky(RECIPE, elevation_rad=0.5, azimuth_rad=azimuth_rad)
+    return LightScene.load(house, {}, RECIPE, sky)
+
+
+def bare_room() -> tuple[House, Camera]:
+    """The window room: a patch of sun on floor and table, a sill outside."""
+    house, camera = rooms.window_room(0.7)
+    return house, camera.with_size(32, 24)
+
+
+def hard_room() -> tuple[House, Camera]:
+    """The same with a coat on all walls, a smooth ball and a pane of glass in the patch, a mirror
+    beside it, and a shade that light passes."""
+    house, camera = bare_room()
+    coated = replace(house.materials[0], specular=(0.5, 0.5, 0.5), roughness=0.6)
+    glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
+    mirror = Material("mirror", kind=MaterialKind.MIRROR, specular=(1.0, 1.0, 1.0))
+    shade = Material("shade", kind=MaterialKind.SHADE, diffuse=(0.9, 0.9, 0.9))
+    n = len(house.materials)
+    things = (
+        rooms.sphere((1.6, 0.25, 1.6), 0.25, n, n=24),
+        rooms.quad([(2.4, 0, 1.2), (2.4, 1, 1.2), (2.4, 1, 2.4), (2.4, 0, 2.4)], n + 1),
+        rooms.quad([(1.0, 0, 1.4), (1.0, 0.8, 1.4), (1.3, 0.8, 2.4), (1.3, 0, 2.4)], n + 2),
+        rooms.quad([(1.9, 0.9, 0.3), (2.6, 0.9, 0.3), (2.6, 1.4, 0.5), (1.9, 1.4, 0.5)], n + 3),
+    )
+    materials = (coated, *house.materials[1:], rooms.matte("ball", 0.8), glass, mirror, shade)
+    (walls,) = house.items
+    items = (replace(walls, surfaces=(*walls.surfaces, *things)),)
+    return replace(house, items=items, materials=materials), camera
+
+
+def renders(scene: LightScene, camera: Camera, seeds: range) -> list[LightResult]:
+    return [scene.render(camera, "-", FIELDS, seed) for seed in seeds]
+
+
+@pytest.fixture
+def without_points(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """What to undo, so that views have sunlit points again."""
+    from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
+
+    real = SunlitPoints.set_view
+    monkeypatch.setattr(SunlitPoints, "set_view", lambda self, _vertices: real(self, None))
+    return monkeypatch
+
+
+@pytest.mark.parametrize(("room", "most"), [(bare_room, 0.4), (hard_room, 0.8)])
+def test_sunlit_points_leave_the_mean_alone_and_cut_the_noise(
+    room: Callable[[], tuple[House, Camera]], most: float, without_points: pytest.MonkeyPatch
+) -> None:
+    # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
+    house, camera = room()
+    scene = sunny(house)
+    by_chance = renders(scene, camera, range(20, 28))
+    without_points.undo()
+    by_points = renders(scene, camera, range(10, 18))
+    again = scene.render(camera, "-", FIELDS, 10)
+    np.testing.assert_array_equal(again.outdoor, by_points[0].outdoor)
+    sums = [[blocks(r.group(Group.OUTDOOR)) for r in runs] for runs in (by_points, by_chance)]
+    assert np.abs(z_scores(*sums)).max() < 4.5
+    noises = [np.mean([r.noise["outdoor"] ** 2 for r in runs]) for runs in (by_points, by_chance)]
+    assert noises[0] < most * noises[1]
+
+
+def test_a_room_without_sun_has_no_points() -> None:
+    house, camera = bare_room()
+    for azimuth_rad, some in ((0.35, True), (np.pi, False)):
+        scene = sunny(house, azimuth_rad=azimuth_rad)
+        emitters, _weights = scene.emitters(camera, FIELDS, 1)
+        emitters.sunlit.trace(scene.device_scene, emitters.sun, 1, active=True)
+        p, n = np.float32([2, 1.2, 1]), 64
+        sample = points_seen(emitters, p, n)
+        assert sample.any() == some
+
+
+def points_seen(emitters: object, p: np.ndarray, n: int) -> np.ndarray:
+    """(n,) whether a point is found from p."""
+    import drjit as dr
+    import mitsuba as mi
+
+    u = (dr.arange(mi.Float, n) + 0.5) / n
+    at = mi.Point3f(*(mi.Float(float(x)) + 0 * u for x in p))
+    return emitters.sunlit.sample(at, u, mi.Bool(True)).valid.numpy()  # type: ignore[attr-defined]
+
+
+def test_points_lie_where_the_sun_shines_in_the_order_of_their_groups() -> None:
+    from pbrs_farm.transport.kernels.sun_rays import COS_SUN, PLANE_PDF, RADIANCE
+    from pbrs_farm.transport.kernels.sunlit_cells import traced_points, used_cells
+
+    house, camera = bare_room()
+    scene = sunny(house)
+    emitters, weights = scene.emitters(camera, FIELDS, 1)
+    grid, device = emitters.outdoor_choice._grid, scene.device_scene
+    used = used_cells(device, emitters.sun, grid, weights.vertices)
+    assert used.shares.sum() == pytest.approx(1)
+    tables = traced_points(device, emitters.sun, used, 3)
+    rows = tables.rows
+    assert len(rows) > 1000
+    assert tables.first[-1] == len(rows)
+    assert (rows[:, COS_SUN] > 0).all()
+    assert (rows[:, PLANE_PDF] > 0).all()
+    assert (rows[:, RADIANCE] > 0).all()
+    # Each begins a ray that leaves through the window, or stands before it.
+    towards = np.asarray(scene.sky.sun_direction)
+    inside = rows[:, 2] > 1e-3
+    assert inside.mean() > 0.3
+    y = rows[inside, :3] - rows[inside, 2:3] / towards[2] * towards
+    assert (y[:, 0] > 1.25).all()
+    assert (y[:, 0] < 2.75).all()
+    assert (y[:, 1] > 0.85).all()
+    assert (y[:, 1] < 2.15).all()
+    # A group's pdf sums to 1 over what its points stand for: rays over their pdf are the lit area.
+    lit_m2 = sum(
+        (1 / rows[a:b, PLANE_PDF]).mean() for a, b in zip(tables.first, tables.first[1:]) if b > a
+    )
+    assert 0 < lit_m2 < used.plane.edge_m**2 * (used.groups >= 0).sum() * 1.01
+
+
+def test_a_cell_is_found_again_along_the_sun() -> None:
+    import drjit as dr
+    import mitsuba as mi
+
+    from pbrs_farm.transport.kernels.sun_plane import SunPlane
+
+    direction = np.array([0.48, 0.6, -0.64])
+    plane = SunPlane(direction, np.array([(0.0, 0, 0), (3, 2, 4)]))
+    cell = dr.arange(mi.UInt32, plane.n_cells)
+    d = mi.Vector3f(*direction.tolist())
+    p = plane.point(cell, mi.Point2f(0.3, 0.8)) - 1.5 * d
+    found, inside = plane.cell(p, d)
+    assert inside.numpy().all()
+    np.testing.assert_array_equal(found.numpy(), cell.numpy())
+    _found, inside = plane.cell(mi.Point3f(40.0, 0, 0), d)
+    assert not inside.numpy().any()
+
+
+def test_a_vast_plane_has_no_more_cells_than_fit() -> None:
+    from pbrs_farm.transport.kernels.sun_plane import SunPlane
+
+    plane = SunPlane(np.array([0.0, 1.0, 0.0]), np.array([(0.0, 0, 0), (90, 3, 70)]))
+    assert plane.n_cells <= 1 << 15
+    assert plane.edge_m**2 * plane.n_cells >= 90 * 70
