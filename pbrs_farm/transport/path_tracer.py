@@ -165,8 +165,9 @@ def trace(
     counts, arrivals = emitters.outdoor_choice.no_counts(), emitters.arrival.no_counts()
     counts_arrivals = dr.opaque(mi.Bool, lanes.counts_arrivals)
     # The pilot asks for one technique at a time: sunlit points are none of them.
-    sunlit, seed = emitters.sunlit, lanes.seed + lanes.first_sample
-    sunlit.trace(scene, emitters.sun, seed, active=lanes.n_only == 0)
+    sunlit, n_samples = emitters.sunlit, lanes.n_lanes * lanes.n_samples
+    seed = lanes.seed + lanes.first_sample
+    sunlit.trace(scene, emitters.sun, n_samples if lanes.n_only == 0 else 0, seed)
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(

@@ -32,7 +32,8 @@ from pbrs_farm.transport.kernels.sun_rays import (
 )
 from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
-_N_RAYS: Final = 1 << 16
+_MIN_RAYS, _MAX_RAYS = 1 << 13, 1 << 16  # of a launch
+_SAMPLES_A_RAY: Final = 16
 _CELL_SEED: Final = 0x5CE11  # parts the rays that value the cells from those of points
 _SMOOTH: Final = 3  # cells, edge of the window over which a cell's worth is averaged
 _ROUNDS: Final = 8  # of grouping
@@ -91,14 +92,20 @@ def used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices: I64)
     return UsedCells(plane, groups, shares / shares.sum())
 
 
-def traced_points(scene: DeviceScene, sun: SunDisc, used: UsedCells, seed: int) -> SunlitTables:
-    """The points that rays through the cells light, other ones for each seed."""
+def traced_points(
+    scene: DeviceScene, sun: SunDisc, used: UsedCells, n_samples: int, seed: int
+) -> SunlitTables:
+    """The points that rays through the cells light, other ones for each seed.
+
+    n_samples: of the launch that they are for: there are more points for more samples, up to a number.
+    """
     if used.groups.max() < 0:
         return no_points()
     # Send each cell its share of the rays, in order, so that neighbours are neighbours.
     order = np.argsort(used.groups, kind="stable")
     ends = np.cumsum(used.shares[order])
-    strata = (np.arange(_N_RAYS) + 0.5) / _N_RAYS * ends[-1]
+    n_rays = min(max(n_samples // _SAMPLES_A_RAY, _MIN_RAYS), _MAX_RAYS)
+    strata = (np.arange(n_rays) + 0.5) / n_rays * ends[-1]
     cells = order[np.minimum(np.searchsorted(ends, strata), len(order) - 1)]
     # A group's points are drawn among themselves: their pdf is that of its own rays.
     is_used, area = used.groups >= 0, used.plane.edge_m**2

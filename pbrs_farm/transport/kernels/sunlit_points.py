@@ -77,7 +77,7 @@ class SunlitPoints:
         self._grid, self._arrival = grid, arrival
         self._vertices: I64 | None = None
         self._used: UsedCells | None = None
-        self._traced: tuple[I64 | None, int] = None, 0  # what the points were traced for
+        self._traced: tuple[I64 | None, int, int] = None, 0, 0  # what the points were traced for
         self._set_points(no_points())
 
     def set_view(self, vertices: I64 | None) -> None:
@@ -85,17 +85,17 @@ class SunlitPoints:
         if vertices is not self._vertices:
             self._vertices, self._used = vertices, None
 
-    def trace(self, scene: DeviceScene, sun: SunDisc, seed: int, *, active: bool) -> None:
-        """Trace rays from the sun, other ones for each seed; no points where not active."""
-        vertices = self._vertices if active and sun.shines else None
-        before, self._traced = self._traced, (vertices, seed)
+    def trace(self, scene: DeviceScene, sun: SunDisc, n_samples: int, seed: int) -> None:
+        """Trace rays from the sun for a launch of n_samples, other ones for each seed; 0 = no points."""
+        vertices = self._vertices if n_samples > 0 and sun.shines else None
+        before, self._traced = self._traced, (vertices, n_samples, seed)
         if vertices is None or not vertices.any():
             if before[0] is not None:
                 self._set_points(no_points())
-        elif vertices is not before[0] or seed != before[1]:
+        elif vertices is not before[0] or (n_samples, seed) != before[1:]:
             if self._used is None:
                 self._used = used_cells(scene, sun, self._grid, vertices)
-            self._set_points(traced_points(scene, sun, self._used, seed))
+            self._set_points(traced_points(scene, sun, self._used, n_samples, seed))
 
     def chances(self, p: Any, active: Any) -> list[Any]:
         """The chance of each group at p, a list entry each; all 0 where there are none."""

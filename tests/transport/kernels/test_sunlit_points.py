@@ -96,7 +96,7 @@ def test_a_room_without_sun_has_no_points() -> None:
     for azimuth_rad, some in ((0.35, True), (np.pi, False)):
         scene = sunny(house, azimuth_rad=azimuth_rad)
         emitters, _weights = scene.emitters(camera, FIELDS, 1)
-        emitters.sunlit.trace(scene.device_scene, emitters.sun, 1, active=True)
+        emitters.sunlit.trace(scene.device_scene, emitters.sun, 1000, 1)
         p, n = np.float32([2, 1.2, 1]), 64
         sample = points_seen(emitters, p, n)
         assert sample.any() == some
@@ -122,7 +122,7 @@ def test_points_lie_where_the_sun_shines_in_the_order_of_their_groups() -> None:
     grid, device = emitters.outdoor_choice._grid, scene.device_scene
     used = used_cells(device, emitters.sun, grid, weights.vertices)
     assert used.shares.sum() == pytest.approx(1)
-    tables = traced_points(device, emitters.sun, used, 3)
+    tables = traced_points(device, emitters.sun, used, 1 << 20, 3)
     rows = tables.rows
     assert len(rows) > 1000
     assert tables.first[-1] == len(rows)
