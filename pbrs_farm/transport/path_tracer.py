@@ -166,7 +166,7 @@ def trace(
     counts_arrivals = dr.opaque(mi.Bool, lanes.counts_arrivals)
     # The pilot asks for one technique at a time: sunlit points are none of them.
     sunlit, n_samples = emitters.sunlit, lanes.n_lanes * lanes.n_samples
-    seed = lanes.seed + lanes.first_sample
+    seed = (lanes.seed + 0x9E3779B9 * lanes.first_sample) & 0xFFFFFFFF
     sunlit.trace(scene, emitters.sun, n_samples if lanes.n_only == 0 else 0, seed)
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)

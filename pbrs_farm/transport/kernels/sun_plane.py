@@ -33,7 +33,7 @@ class SunPlane:
         at = (places - middle) @ np.stack([a, b], 1)
         low, size = at.min(0), np.ptp(at, axis=0)
         edge = _EDGE_M
-        while np.prod(shape := np.floor(size / edge).astype(np.int64) + 1) > _MAX_CELLS:
+        while np.prod(shape := np.floor(size / edge) + 1) > _MAX_CELLS:
             edge *= 1.1
         self.edge_m, self.shape = edge, (int(shape[0]), int(shape[1]))
         self._a, self._b = opaque3(mi.Vector3f, a), opaque3(mi.Vector3f, b)

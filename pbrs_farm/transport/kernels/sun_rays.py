@@ -23,6 +23,7 @@ from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 from pbrs_farm.transport.scene_tables.material_rows import GLASS, SURFACE
 
 _MAX_SHEETS: Final = 16  # of glass before a point
+_POINTS, _CELLS = 0xFFFFFFFF, 0xFFFFFFFE  # random streams that no pixel has
 _SCATTERED: Final = 8  # rays from a place, to see what its light is worth
 
 # Floats of a point: place, cosine to the sun; face normal, pdf of the ray per m2 of the plane; shading
@@ -64,11 +65,13 @@ def lit_points(
 
     cells: (R,) that the rays go through. pdfs: (cells,) of a ray per m2 of the plane.
     """
-    key = stream_key(dr.opaque(mi.UInt32, 0), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+    key = stream_key(dr.opaque(mi.UInt32, _POINTS), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     sampler = SobolSampler(key, dr.arange(mi.UInt32, len(cells)))
-    rays = sun_rays(scene, sun, plane, device_array(mi.UInt32, cells), sampler)
+    cell = device_array(mi.UInt32, cells)
+    rays = sun_rays(scene, sun, plane, cell, sampler)
+    # Keep the cell that the other technique finds: at an edge rounding may say the next one.
     at, inside = plane.cell(rays.si.p, rays.d)
-    lit = rays.lit & inside
+    lit = rays.lit & inside & (at == cell)
     pdf = dr.gather(mi.Float, pdfs, at, lit)
     si, has_coat = rays.si, dr.select(rays.si.bsdf.alpha > 0, mi.Float(1), 0)
     # Write each point's row, and keep those that are lit.
@@ -91,7 +94,7 @@ def reached_by_cells(
     wanted: (voxels,) how much light in each of them matters. A point's use is what it reflects, times
     that of the voxels where it falls.
     """
-    key = stream_key(dr.opaque(mi.UInt32, 1), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+    key = stream_key(dr.opaque(mi.UInt32, _CELLS), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     cell = dr.arange(mi.UInt32, plane.n_cells)
     sampler = SobolSampler(key, cell)
     rays = sun_rays(scene, sun, plane, cell, sampler)

@@ -34,6 +34,7 @@ from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
 _MIN_RAYS, _MAX_RAYS = 1 << 13, 1 << 16  # of a launch
 _SAMPLES_A_RAY: Final = 16
+_LEAST_LIT: Final = 32  # points of a group, or it has none
 _CELL_SEED: Final = 0x5CE11  # parts the rays that value the cells from those of points
 _SMOOTH: Final = 3  # cells, edge of the window over which a cell's worth is averaged
 _ROUNDS: Final = 8  # of grouping
@@ -107,19 +108,23 @@ def traced_points(
     n_rays = min(max(n_samples // _SAMPLES_A_RAY, _MIN_RAYS), _MAX_RAYS)
     strata = (np.arange(n_rays) + 0.5) / n_rays * ends[-1]
     cells = order[np.minimum(np.searchsorted(ends, strata), len(order) - 1)]
-    # A group's points are drawn among themselves: their pdf is that of its own rays.
-    is_used, area = used.groups >= 0, used.plane.edge_m**2
-    of_group = np.bincount(used.groups[is_used], used.shares[is_used], MAX_SUNLIT)
+    # A group's points are drawn among themselves, as often as rays were sent through each cell; a
+    # cell too small for a ray is left to the paths.
+    area, groups = used.plane.edge_m**2, used.groups[cells]
+    sent = np.bincount(groups, minlength=MAX_SUNLIT)
+    rays = np.bincount(cells, minlength=used.plane.n_cells)
+    is_used = rays > 0
     pdfs = np.zeros(used.plane.n_cells)
-    pdfs[is_used] = used.shares[is_used] / of_group[used.groups[is_used]] / area
+    pdfs[is_used] = rays[is_used] / sent[used.groups[is_used]] / area
     on_device = device_array(mi.Float, pdfs.astype(np.float32))
     rows, numbers = lit_points(scene, sun, used.plane, cells, on_device, seed)
 
-    # Of a group's rays only some light a point; each of those is drawn more often for it.
-    groups = used.groups[cells]
-    sent = np.bincount(groups, minlength=MAX_SUNLIT)
+    # Of a group's rays only some light a point; each of those is drawn more often for it. Of too
+    # few the share is not known.
     lit = np.bincount(groups[numbers], minlength=MAX_SUNLIT)
-    scale = np.where(lit > 0, sent / np.maximum(lit, 1), 0)
+    scale = np.where(lit >= _LEAST_LIT, sent / np.maximum(lit, 1), 0)
+    kept = scale[groups[numbers]] > 0
+    rows, numbers = rows[kept], numbers[kept]
     rows[:, PLANE_PDF] *= scale[groups[numbers]]
     table = np.zeros((used.plane.n_cells, 2), np.float32)
     table[is_used, 0] = pdfs[is_used] * scale[used.groups[is_used]]

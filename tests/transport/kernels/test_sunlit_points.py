@@ -18,6 +18,7 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sunsky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from tests.transport import hard_rooms
 
 if choose_variant().startswith("scalar"):
     pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)
@@ -63,25 +64,29 @@ def renders(scene: LightScene, camera: Camera, seeds: range) -> list[LightResult
     return [scene.render(camera, "-", FIELDS, seed) for seed in seeds]
 
 
-@pytest.fixture
-def without_points(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
-    """What to undo, so that views have sunlit points again."""
+def hide_points(patch: pytest.MonkeyPatch) -> None:
+    """Let views have no sunlit points."""
     from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
 
     real = SunlitPoints.set_view
-    monkeypatch.setattr(SunlitPoints, "set_view", lambda self, _vertices: real(self, None))
-    return monkeypatch
+    patch.setattr(SunlitPoints, "set_view", lambda self, _vertices: real(self, None))
+
+
+def renders_by_chance(scene: LightScene, camera: Camera, fields: LightFields) -> list[LightResult]:
+    """Eight pictures without sunlit points."""
+    with pytest.MonkeyPatch.context() as patch:
+        hide_points(patch)
+        return [scene.render(camera, "-", fields, seed) for seed in range(20, 28)]
 
 
 @pytest.mark.parametrize(("room", "most"), [(bare_room, 0.4), (hard_room, 0.8)])
 def test_sunlit_points_leave_the_mean_alone_and_cut_the_noise(
-    room: Callable[[], tuple[House, Camera]], most: float, without_points: pytest.MonkeyPatch
+    room: Callable[[], tuple[House, Camera]], most: float
 ) -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
     house, camera = room()
     scene = sunny(house)
-    by_chance = renders(scene, camera, range(20, 28))
-    without_points.undo()
+    by_chance = renders_by_chance(scene, camera, FIELDS)
     by_points = renders(scene, camera, range(10, 18))
     again = scene.render(camera, "-", FIELDS, 10)
     np.testing.assert_array_equal(again.outdoor, by_points[0].outdoor)
@@ -138,11 +143,74 @@ def test_points_lie_where_the_sun_shines_in_the_order_of_their_groups() -> None:
     assert (y[:, 0] < 2.75).all()
     assert (y[:, 1] > 0.85).all()
     assert (y[:, 1] < 2.15).all()
-    # A group's pdf sums to 1 over what its points stand for: rays over their pdf are the lit area.
-    lit_m2 = sum(
-        (1 / rows[a:b, PLANE_PDF]).mean() for a, b in zip(tables.first, tables.first[1:]) if b > a
+
+
+def test_every_cell_that_points_are_said_to_come_from_has_sent_its_rays() -> None:
+    # A terrace of 24 x 14 m has more cells than a small launch has rays.
+    house, camera = bare_room()
+    (walls,) = house.items
+    terrace = rooms.quad([(-10, 0, -14.1), (-10, 0, -0.1), (14, 0, -0.1), (14, 0, -14.1)], 0)
+    house = replace(house, items=(replace(walls, surfaces=(*walls.surfaces, terrace)),))
+    scene = sunny(house)
+    emitters, weights = scene.emitters(camera, FIELDS, 1)
+    from pbrs_farm.transport.kernels.sun_rays import PLANE_PDF
+    from pbrs_farm.transport.kernels.sunlit_cells import traced_points, used_cells
+
+    device, grid = scene.device_scene, emitters.outdoor_choice._grid
+    used = used_cells(device, emitters.sun, grid, weights.vertices)
+    for n_samples in (1, 1 << 22):
+        tables = traced_points(device, emitters.sun, used, n_samples, 3)
+        # What a group's points stand for is the part of its cells that is lit, each cell once.
+        for group, (first, last) in enumerate(zip(tables.first, tables.first[1:], strict=False)):
+            cells = (tables.cells[:, 0] > 0) & (tables.cells[:, 1] == group)
+            area = cells.sum() * used.plane.edge_m**2
+            stands_for = (1 / tables.rows[first:last, PLANE_PDF]).sum() / max(last - first, 1)
+            assert stands_for <= area * 1.001
+            if n_samples > 1 and area > 0.5:
+                assert stands_for > 0.3 * area
+
+
+def test_light_of_lamps_and_a_trial_beside_sunlit_points_leave_the_mean_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Significance: 16 blocks of two groups, |z| < 4.7 each is missed by chance once in 12,000 runs.
+    from pbrs_farm.transport.guiding import pilot
+
+    house, camera = hard_rooms.open_shade()
+    camera, scene = camera.with_size(32, 24), sunny(house)
+    by_chance = renders_by_chance(scene, camera, FIELDS)
+    monkeypatch.setattr(pilot, "_MIN_SAMPLES", 0)  # small pictures are tried, too
+    by_points = renders(scene, camera, range(10, 18))
+    assert any(r.facts["guided"] for r in by_points)
+    for group in Group:
+        sums = [[blocks(r.group(group)) for r in runs] for runs in (by_points, by_chance)]
+        assert np.abs(z_scores(*sums)).max() < 4.7
+
+
+def test_points_count_from_the_length_of_path_on_that_they_stand_for() -> None:
+    # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
+    house, camera = bare_room()
+    scene = sunny(house)
+    short, longer = (FIELDS.model_copy(update={"max_depth": n}) for n in (2, 3))
+    by_chance = renders_by_chance(scene, camera, longer)
+    by_points = [scene.render(camera, "-", longer, seed) for seed in range(10, 18)]
+    sums = [[blocks(r.outdoor) for r in runs] for runs in (by_points, by_chance)]
+    assert np.abs(z_scores(*sums)).max() < 4.5
+    # A path of one vertex has no second one for the sun to shine on.
+    by_chance = renders_by_chance(scene, camera, short)
+    np.testing.assert_array_equal(
+        scene.render(camera, "-", short, 20).outdoor, by_chance[0].outdoor
     )
-    assert 0 < lit_m2 < used.plane.edge_m**2 * (used.groups >= 0).sum() * 1.01
+
+
+def test_another_view_in_between_changes_no_bit() -> None:
+    house, camera = bare_room()
+    scene = sunny(house)
+    first = scene.render(camera, "-", FIELDS, 1)
+    other = rooms.camera((2.0, 1.2, 0.5), (1.0, 0.5, 3.5)).with_size(32, 24)
+    scene.render(other, "-", FIELDS, 2)
+    scene.floor_lux(house)
+    np.testing.assert_array_equal(scene.render(camera, "-", FIELDS, 1).outdoor, first.outdoor)
 
 
 def test_a_cell_is_found_again_along_the_sun() -> None:
