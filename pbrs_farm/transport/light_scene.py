@@ -279,6 +279,8 @@ class LightScene:
             weights = pilot_weights(
                 self.device_scene, emitters, camera, *n, fields, seed ^ _PILOT_SEED
             )
+            emitters.set_weights(weights)
+            emitters.sunlit.choose_cells(self.device_scene, emitters.sun)
             # Guide the rays where that pays; Metropolis always guides its own.
             if self.n_lamps > 0 and fields.integrator == "path":
                 trial_seed = seed ^ _TRIAL_SEED

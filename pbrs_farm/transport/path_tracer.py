@@ -155,6 +155,11 @@ def trace(
     max_depth: int | None = None,
 ) -> SampleSums:
     """Trace n_samples paths for every lane; max_depth replaces the recipe's."""
+    # The pilot asks for one technique at a time: sunlit points are none of them. Trace them before
+    # anything of the kernel is there, or it is another kernel where there are some.
+    sunlit, n_samples = emitters.sunlit, lanes.n_lanes * lanes.n_samples
+    seed = (lanes.seed + 0x9E3779B9 * lanes.first_sample) & 0xFFFFFFFF
+    sunlit.trace(scene, emitters.sun, n_samples if lanes.n_only == 0 else 0, seed)
     # A lane is a pixel, or a pixel and an emitter filter.
     lane = dr.arange(mi.UInt32, lanes.n_lanes)
     pixel, emitter_filter = _pixels_and_emitters(lane, lanes)
@@ -164,10 +169,6 @@ def trace(
         lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
     counts, arrivals = emitters.outdoor_choice.no_counts(), emitters.arrival.no_counts()
     counts_arrivals = dr.opaque(mi.Bool, lanes.counts_arrivals)
-    # The pilot asks for one technique at a time: sunlit points are none of them.
-    sunlit, n_samples = emitters.sunlit, lanes.n_lanes * lanes.n_samples
-    seed = (lanes.seed + 0x9E3779B9 * lanes.first_sample) & 0xFFFFFFFF
-    sunlit.trace(scene, emitters.sun, n_samples if lanes.n_only == 0 else 0, seed)
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(

@@ -85,6 +85,12 @@ class SunlitPoints:
         if vertices is not self._vertices:
             self._vertices, self._used = vertices, None
 
+    def choose_cells(self, scene: DeviceScene, sun: SunDisc) -> None:
+        """Find once for a view which cells of the sun's plane its points come from."""
+        vertices = self._vertices
+        if self._used is None and sun.shines and vertices is not None and vertices.any():
+            self._used = used_cells(scene, sun, self._grid, vertices)
+
     def trace(self, scene: DeviceScene, sun: SunDisc, n_samples: int, seed: int) -> None:
         """Trace rays from the sun for a launch of n_samples, other ones for each seed; 0 = no points."""
         vertices = self._vertices if n_samples > 0 and sun.shines else None
@@ -93,8 +99,8 @@ class SunlitPoints:
             if before[0] is not None:
                 self._set_points(no_points())
         elif vertices is not before[0] or (n_samples, seed) != before[1:]:
-            if self._used is None:
-                self._used = used_cells(scene, sun, self._grid, vertices)
+            self.choose_cells(scene, sun)
+            assert self._used is not None
             self._set_points(traced_points(scene, sun, self._used, n_samples, seed))
 
     def chances(self, p: Any, active: Any) -> list[Any]:

@@ -213,6 +213,23 @@ def test_another_view_in_between_changes_no_bit() -> None:
     np.testing.assert_array_equal(scene.render(camera, "-", FIELDS, 1).outdoor, first.outdoor)
 
 
+def test_paths_have_one_kernel_with_sunlit_points_and_without() -> None:
+    import drjit as dr
+
+    house, camera = rooms.window_room(0.7, lumen=800.0)
+    camera, few = camera.with_size(16, 12), FIELDS.model_copy(update={"spp": 1})
+    found = set()
+    for azimuth_rad in (0.35, np.pi):
+        scene = sunny(house, azimuth_rad=azimuth_rad)
+        scene.render(camera, "-", few, 1)
+        dr.kernel_history_clear()
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            scene.render(camera, "-", few, 2)
+            kernels = dr.kernel_history([dr.KernelType.JIT])
+        found |= {k["hash"] for k in kernels if k["operation_count"] > 4000}
+    assert len(found) == 1
+
+
 def test_a_cell_is_found_again_along_the_sun() -> None:
     import drjit as dr
     import mitsuba as mi
