@@ -6,6 +6,7 @@ import argparse
 import json
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -257,7 +258,7 @@ def _demo(args: argparse.Namespace) -> int:
     args.dress = _demo_dressing(args)
     from pbrs_farm.gallery.sheet_parts import SheetParts
 
-    with SheetParts(Path(args.out)) as parts:
+    with closing(SheetParts(Path(args.out))) as parts:
 
         def observe(event: Event) -> None:
             if event.kind == "end" and event.view_id is not None:

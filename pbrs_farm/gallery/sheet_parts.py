@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, TypeAlias
 
 from pbrs_farm.core import keys
@@ -22,22 +21,15 @@ _Parts: TypeAlias = "tuple[Sequence[Tile], CardTiles]"
 
 
 class SheetParts:
-    """Tiles and cards of the views of an output folder that are done; use it in a with statement."""
+    """Tiles and cards of the views of an output folder that are done; to be closed."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._made: dict[Path, Future[_Parts]] = {}
 
-    def __enter__(self) -> SheetParts:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        tb: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Begin no more parts, and wait for the one being made."""
         self._thread.shutdown(cancel_futures=True)
 
     def make(self, house_id: str, view_id: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,7 @@ def sheets(root: Path) -> tuple[bytes, bytes]:
 def test_sheets_of_parts_made_ahead_are_the_same(root: Path) -> None:
     write_sheets(root, 24)
     at_once = sheets(root)
-    with SheetParts(root) as parts:
+    with closing(SheetParts(root)) as parts:
         parts.make("a", "0_0_2")
         parts.make("a", "0_1_0")
         write_sheets(root, 24, parts)
@@ -33,7 +34,7 @@ def test_sheets_of_parts_made_ahead_are_the_same(root: Path) -> None:
 
 
 def test_parts_made_ahead_are_not_made_again(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with SheetParts(root) as parts:
+    with closing(SheetParts(root)) as parts:
         for view in ("0_0_1", "0_0_2", "0_1_0"):
             parts.make("a", view)
         assert len(parts.tiles()) == len(parts.cards()) == 3
@@ -42,7 +43,7 @@ def test_parts_made_ahead_are_not_made_again(root: Path, monkeypatch: pytest.Mon
 
 
 def test_a_view_that_is_not_there_is_left_to_the_sheet(root: Path) -> None:
-    with SheetParts(root) as parts:
+    with closing(SheetParts(root)) as parts:
         parts.make("a", "9_9_9")
         parts.make("a", "0_0_1")
         write_sheets(root, 24, parts)

@@ -37,7 +37,8 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
 )
 
 _RAY_OFFSET = 2e-5  # of a point's largest coordinate plus 1 m
-_MAX_TRANSPARENT = 16  # surfaces that a shadow ray passes
+MAX_TRANSPARENT = 16  # surfaces that a shadow ray passes
+LEAST_COS = 0.02  # of a shading normal to where it is seen from; one that turns away more is bent
 _FACE_PACKETS = FACE_FLOATS // 4
 _MATERIAL_PACKETS = MATERIAL_FLOATS // 4
 _MAP_PACKET = FIRST_MAP_TEXEL // 4  # the last one, of the maps
@@ -141,9 +142,9 @@ class DeviceScene:
                 way = dr.select(aims, to / dr.maximum(reach, 1e-12), way)
             n += 1
             brightest: Any = dr.max(left)
-            go_on = met & (brightest > 0) & (reach > 0) & (n < _MAX_TRANSPARENT)
+            go_on = met & (brightest > 0) & (reach > 0) & (n < MAX_TRANSPARENT)
         # Treat what is behind more sheets than anyone hangs in a row as opaque.
-        return dr.select(n >= _MAX_TRANSPARENT, 0, left)
+        return dr.select(n >= MAX_TRANSPARENT, 0, left)
 
     def sample_face(self, face: Any, u: Any, active: Any) -> tuple[Any, Any]:
         """(point, unit normal) uniform over a face."""
@@ -239,7 +240,7 @@ class DeviceScene:
 def bend_normal(n: Any, d: Any) -> Any:
     """A shading normal turned so that a ray of direction d comes from its front."""
     towards = -dr.dot(n, d)
-    return dr.select(towards < 0.02, dr.normalize(n - (0.02 - towards) * d), n)
+    return dr.select(towards < LEAST_COS, dr.normalize(n - (LEAST_COS - towards) * d), n)
 
 
 def offset_ray_origin(p: Any, n: Any) -> Any:

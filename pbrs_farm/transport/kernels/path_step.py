@@ -1,6 +1,6 @@
 """One step of a path through the scene, shared by `path` and `metropolis`; kernels, no effects.
 
-At each vertex shadow rays go to the sky, to a lamp and to what the sun shines on (direct_light.py), weighted against
+At each vertex shadow rays go to the sky, to a lamp and in `path` to what the sun shines on (direct_light.py), weighted against
 the scattered ray by the balance heuristic (Veach 1997, section 9.2). An emitter that the scattered
 ray meets counts to its own group.
 """

@@ -11,6 +11,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.transport.kernels.bsdf import diffuse_reflection, luminance
 from pbrs_farm.transport.kernels.device_scene import (
+    MAX_TRANSPARENT,
     DeviceScene,
     SurfaceInteraction,
     offset_ray_origin,
@@ -22,7 +23,6 @@ from pbrs_farm.transport.kernels.sun_plane import REACH_M, SunPlane
 from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 from pbrs_farm.transport.scene_tables.material_rows import GLASS, SURFACE
 
-_MAX_SHEETS: Final = 16  # of glass before a point
 _POINTS, _CELLS = 0xFFFFFFFF, 0xFFFFFFFE  # random streams that no pixel has
 _SCATTERED: Final = 8  # rays from a place, to see what its light is worth
 
@@ -89,24 +89,24 @@ def lit_points(
 def reached_by_cells(
     scene: DeviceScene, sun: SunDisc, plane: SunPlane, grid: VoxelGrid, wanted: Any, seed: int
 ) -> tuple[F32, F32]:
-    """(places (C, 3) that a ray through each cell lights, use (C,) of that light).
+    """(places (C, 3) that a ray through each cell lights, worth (C,) of that light).
 
-    wanted: (voxels,) how much light in each of them matters. A point's use is what it reflects, times
-    that of the voxels where it falls.
+    wanted: (voxels,) how much light in each of them matters. A point's worth is what it reflects,
+    times that of the voxels where it falls.
     """
     key = stream_key(dr.opaque(mi.UInt32, _CELLS), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     cell = dr.arange(mi.UInt32, plane.n_cells)
     sampler = SobolSampler(key, cell)
     rays = sun_rays(scene, sun, plane, cell, sampler)
-    use = _use_of(scene, grid, wanted, rays.si, sampler, mi.Bool(rays.lit))
-    use *= dr.select(rays.lit, luminance(rays.light) / rays.cos_sun, 0)
-    dr.eval(use, rays.si.p)
+    worth = _worth_of(scene, grid, wanted, rays.si, sampler, mi.Bool(rays.lit))
+    worth *= dr.select(rays.lit, luminance(rays.light) / rays.cos_sun, 0)
+    dr.eval(worth, rays.si.p)
     places = np.stack([x.numpy() for x in xyz(rays.si.p)], 1)
-    return places, use.numpy()
+    return places, worth.numpy()
 
 
 @dr.syntax
-def _use_of(
+def _worth_of(
     scene: DeviceScene,
     grid: VoxelGrid,
     wanted: Any,
@@ -138,5 +138,5 @@ def _behind_glass(scene: DeviceScene, o: Any, d: Any) -> Any:
         passes = goes_on & si.valid & (si.is_cutout | (si.bsdf.kind == GLASS))
         here = dr.select(passes, offset_ray_origin(si.p, -si.ng), here)
         n += 1
-        goes_on = passes & (n < _MAX_SHEETS)
+        goes_on = passes & (n < MAX_TRANSPARENT)
     return here

@@ -14,7 +14,7 @@ Effects: holds buffers on the device.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -24,7 +24,7 @@ from pbrs_farm.core.arrays import I64
 from pbrs_farm.transport.guiding.nearby_lamps import sample_discrete
 from pbrs_farm.transport.kernels.arrival_rates import FIRST_SUNLIT, MAX_SUNLIT, ArrivalRates
 from pbrs_farm.transport.kernels.bsdf import diffuse_reflection, diffuse_response
-from pbrs_farm.transport.kernels.device_scene import DeviceScene, SurfaceInteraction
+from pbrs_farm.transport.kernels.device_scene import LEAST_COS, DeviceScene, SurfaceInteraction
 from pbrs_farm.transport.kernels.packets import colour, gather_packets, point, vector
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
 from pbrs_farm.transport.kernels.sun_disc import SunDisc
@@ -37,8 +37,6 @@ from pbrs_farm.transport.kernels.sunlit_cells import (
     used_cells,
 )
 from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
-
-_LEAST_COS: Final = 0.02  # of a shading normal that is not bent (device_scene.py)
 
 
 class SunlitSample(NamedTuple):
@@ -182,5 +180,5 @@ def _pdf(y: _Point, w: Any, distance: Any) -> Any:
     """Pdf of y per solid angle at a vertex in direction w from it, by its group; 0 = not drawn so."""
     cos = dr.dot(y.ng, w)
     # Leave out where the shading normal would be bent, by what it is seen from.
-    drawn = (cos > 1e-4) & (dr.dot(y.n, w) > _LEAST_COS) & (y.cos_sun > 0)
+    drawn = (cos > 1e-4) & (dr.dot(y.n, w) > LEAST_COS) & (y.cos_sun > 0)
     return dr.select(drawn, y.plane_pdf * y.cos_sun * dr.square(distance) / cos, 0)
