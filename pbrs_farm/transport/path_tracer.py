@@ -76,7 +76,8 @@ def sums_from_arrays(arrays: Mapping[str, Any]) -> SampleSums:
 class Lanes:
     """Which pixels to trace and how often.
 
-    With n_only_* a lane is a pixel's light of one emitter: lane = pixel * n_only + emitter.
+    With n_only_* a lane is a pixel's light of one emitter: lane = pixel * n_only + emitter. A trial has
+    all pixels twice, with the same random numbers: plain, then as the emitters' weights guide.
     """
 
     width: int  # of the picture
@@ -87,7 +88,7 @@ class Lanes:
     n_only_lamps: int = 0  # 0, or the lamps that the pilot asks for one by one
     n_only_outdoor: int = 0  # the same, outdoor techniques
     n_lamps: int = 0  # 0, or the number of all lamps, to sum the light of each by itself
-    counts_arrivals: bool = False  # count the shadow rays that arrive
+    is_trial: bool = False  # count the shadow rays that arrive, too
 
     @property
     def n_only(self) -> int:
@@ -97,6 +98,11 @@ class Lanes:
     @property
     def n_lanes(self) -> int:
         """Lanes of a launch."""
+        return self.n_streams * (2 if self.is_trial else 1)
+
+    @property
+    def n_streams(self) -> int:
+        """Streams of random numbers."""
         return self.width * self.height * max(self.n_only, 1)
 
 
@@ -160,24 +166,26 @@ def trace(
     sunlit, n_samples = emitters.sunlit, lanes.n_lanes * lanes.n_samples
     seed = (lanes.seed + 0x9E3779B9 * lanes.first_sample) & 0xFFFFFFFF
     sunlit.trace(scene, emitters.sun, n_samples if lanes.n_only == 0 else 0, seed)
-    # A lane is a pixel, or a pixel and an emitter filter.
+    # A lane is a pixel, or a pixel and an emitter filter; of a trial, the first half stay plain.
     lane = dr.arange(mi.UInt32, lanes.n_lanes)
-    pixel, emitter_filter = _pixels_and_emitters(lane, lanes)
+    stream = lane % dr.opaque(mi.UInt32, lanes.n_streams)
+    may_guide = lane >= dr.opaque(mi.UInt32, lanes.n_streams if lanes.is_trial else 0)
+    pixel, emitter_filter = _pixels_and_emitters(stream, lanes)
     lamp_sums = None
     if lanes.n_lamps > 0:
         sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
         lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
     counts, arrivals = emitters.outdoor_choice.no_counts(), emitters.arrival.no_counts()
-    counts_arrivals = dr.opaque(mi.Bool, lanes.counts_arrivals)
+    counts_arrivals = dr.opaque(mi.Bool, lanes.is_trial)
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(
-        PathContext(scene, emitters, depth_fields, emitter_filter, sunlit),
+        PathContext(scene, emitters, depth_fields, emitter_filter, sunlit, may_guide),
         device_camera(camera),
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
-        stream_key(lane, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF)),
+        stream_key(stream, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF)),
         _Beside(lamp_sums, counts, arrivals, counts_arrivals),
     )
     dr.eval(total, counts, arrivals)
@@ -192,14 +200,14 @@ def trace(
         lamps = lamp_sums.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
     n_bad = int(np.sum(total.n_bad.numpy(), dtype=np.int64))
     of_pilot = counts.numpy() if lanes.n_only_outdoor > 0 else None
-    of_trial = arrivals.numpy() if lanes.counts_arrivals else None
+    of_trial = arrivals.numpy() if lanes.is_trial else None
     return SampleSums(**rows, n_bad=n_bad, lamps=lamps, counts=of_pilot, arrivals=of_trial)
 
 
-def _pixels_and_emitters(lane: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:
-    """(pixel, emitters that count) of each lane: all of them, or for the pilot a single one."""
+def _pixels_and_emitters(stream: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:
+    """(pixel, emitters that count) of each stream: all of them, or for the pilot a single one."""
     per_pixel = dr.opaque(mi.UInt32, max(lanes.n_only, 1))
-    pixel, number = lane // per_pixel, mi.Int32(lane % per_pixel)
+    pixel, number = stream // per_pixel, mi.Int32(stream % per_pixel)
     n_lamps = dr.opaque(mi.Int32, lanes.n_only_lamps)
     is_single, is_lamp = dr.opaque(mi.Bool, lanes.n_only > 0), number < n_lamps
     indoor = dr.select(is_lamp, number, NO_EMITTERS)

@@ -135,33 +135,24 @@ def trial_weights(
     """The weights of a view with what a trial of it says: whether guided rays cut its noise by more
     than they cost, and how often shadow rays arrive.
 
-    Renders the view small both ways, with the view's weights. A view of few samples is guided
-    without a trial, which would cost as much as it saves.
+    Renders the view small both ways, with the weights that emitters carry: the view's, guided. A view
+    of few samples is guided without a trial, which would cost as much as it saves.
     """
     i = camera.intrinsics
     if i.width_px * i.height_px * fields.spp < _MIN_SAMPLES:
         return weights
     width, height = _PILOT_SIZE
-    lanes = Lanes(width, height, 0, _TRIAL_SPP, seed, counts_arrivals=True)
-    small = camera.with_size(width, height)
-
-    def with_guiding(is_guided: bool) -> Emitters:
-        emitters.set_weights(replace(weights, is_guided=is_guided))
-        return emitters
-
-    plain, guided = (
-        trace(scene, with_guiding(is_guided), small, lanes, fields) for is_guided in (False, True)
-    )
+    lanes = Lanes(width, height, 0, _TRIAL_SPP, seed, is_trial=True)
+    sums = trace(scene, emitters, camera.with_size(width, height), lanes, fields)
     # Judge noise against what is around a pixel: a firefly must not be its own measure.
-    light = _luminance(guided.outdoor + guided.indoor).reshape(height, width)
-    level = median_filter(light, size=_NEIGHBOURS, mode="nearest").ravel()
+    _plain, guided = _luminance(sums.outdoor + sums.indoor).reshape(2, height, width)
+    level = median_filter(guided, size=_NEIGHBOURS, mode="nearest")
     level += _DARK * max(float(level.mean()), 1e-12)
-    variances = [float(((_halves_apart(s) / level) ** 2).mean()) for s in (plain, guided)]
-    is_guided = variances[0] > _GUIDING_COST * variances[1]
-    assert plain.arrivals is not None
-    assert guided.arrivals is not None
-    rates = arrival_rates(plain.arrivals + guided.arrivals)
-    return replace(weights, is_guided=is_guided, arrival_rates=rates)
+    apart = _halves_apart(sums).reshape(2, height, width) / level
+    plain_variance, guided_variance = (apart**2).mean((1, 2))
+    is_guided = bool(plain_variance > _GUIDING_COST * guided_variance)
+    assert sums.arrivals is not None
+    return replace(weights, is_guided=is_guided, arrival_rates=arrival_rates(sums.arrivals))
 
 
 def _luminance(rgb: F32) -> F64:

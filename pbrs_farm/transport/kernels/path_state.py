@@ -52,6 +52,7 @@ class PathContext(NamedTuple):
     fields: DeviceFields
     emitter_filter: EmitterFilter
     sunlit: SunlitPoints | None = None  # where shadow rays go to sunlit points, too
+    may_guide: Any = None  # Bool: lanes whose rays are guided where the view's are; None = all
 
 
 @dataclass

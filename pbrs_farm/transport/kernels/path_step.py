@@ -147,6 +147,8 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     if counted is not None:
         normal = dr.select(dr.max(si.bsdf.tau) > 0, 0, si.ng)
         near = context.emitters.near_lamps(si.p, normal, counted, is_solid)
+        if context.may_guide is not None:
+            near = near._replace(is_guided=near.is_guided & context.may_guide)
     is_rough = is_solid & ~is_glass & ~is_mirror
     return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near)
 

@@ -89,6 +89,23 @@ def test_rays_are_guided_where_a_shade_hides_the_bulb_and_not_where_nothing_does
         assert weights.is_guided is pays
 
 
+def test_a_trial_is_the_plain_and_the_guided_view_in_one_launch() -> None:
+    from pbrs_farm.transport.path_tracer import Lanes, trace
+
+    scene, camera = loaded(hard_rooms.open_shade())
+    emitters, weights = scene.emitters(camera, FIELDS, 1)
+
+    def lit(*, is_guided: bool, is_trial: bool = False) -> Any:
+        emitters.set_weights(replace(weights, is_guided=is_guided))
+        lanes = Lanes(32, 24, 0, 16, 3, is_trial=is_trial)
+        return trace(scene.device_scene, emitters, camera, lanes, FIELDS).indoor
+
+    plain, guided = np.split(lit(is_guided=True, is_trial=True), 2)
+    np.testing.assert_array_equal(plain, lit(is_guided=False))
+    np.testing.assert_array_equal(guided, lit(is_guided=True))
+    assert (plain != guided).any()
+
+
 def test_a_small_view_is_guided_without_a_trial() -> None:
     scene, camera = loaded(rooms.window_room(lumen=800))
     _emitters, weights = scene.emitters(camera, FIELDS, 0)
