@@ -14,6 +14,7 @@ import resource
 import sys
 import time
 import traceback
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Literal
 
@@ -31,9 +32,13 @@ from pbrs_farm.store import store_from_url
 _DRJIT_STEPS = ("house", "cameras", "pairs", "truth", "illuminance", "light", "develop")
 
 
-_OF_FINISHING = (
-    "pbrs_farm.run.steps", "pbrs_farm.run.develop_step", "pbrs_farm.truth", "pbrs_farm.raster",
-    "pbrs_farm.formats.house_bundle", "pbrs_farm.run.view_histogram",
+_OF_LIGHT = (
+    "pbrs_farm.run.steps", "pbrs_farm.formats.house_bundle", "pbrs_farm.transport.light_scene",
+    "pbrs_farm.transport.illuminance", "pbrs_farm.run.pilot_views", "pbrs_farm.run.blurred_camera",
+)  # fmt: skip
+_OF_HOUSES = (
+    "pbrs_farm.run.steps", "pbrs_farm.read.sweethome3d", "pbrs_farm.dress.dressing",
+    "pbrs_farm.repair", "pbrs_farm.formats.house_bundle", "pbrs_farm.run.chosen_cameras",
 )  # fmt: skip
 
 
@@ -53,18 +58,28 @@ def make_handler(send: Send) -> Handler:
     return handle
 
 
-def make_finishing_handler(send: Send) -> Handler:
-    """As make_handler, with what labels, OpenGL and the denoiser need loaded before it is ready.
+def make_light_handler(send: Send) -> Handler:
+    """As make_handler, with what light needs loaded before it is ready.
 
-    It has nothing to do while the house is made: the first view waits for no library.
+    It has nothing to do while the house is made: its first task waits for no library.
     """
-    for module in _OF_FINISHING:
+    _load(_OF_LIGHT)
+    return make_handler(send)
+
+
+def make_finishing_handler(send: Send) -> Handler:
+    """As make_handler, with what a house needs loaded before it is ready: homes are looked for yet."""
+    _load(_OF_HOUSES)
+    return make_handler(send)
+
+
+def _load(modules: Sequence[str]) -> None:
+    for module in modules:
         # What is missing is told by the step that needs it.
         with contextlib.suppress(ImportError):
             importlib.import_module(module)
     with contextlib.suppress(PbrsError):
         choose_variant()
-    return make_handler(send)
 
 
 def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Task) -> None:

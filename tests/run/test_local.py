@@ -31,7 +31,8 @@ def fake_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(local, "Setting", setting)
     # Fake steps need no library before they begin.
-    monkeypatch.setitem(pool.HANDLERS, pool.FINISH, pool.HANDLERS[pool.RENDER])
+    for role in pool.HANDLERS:
+        monkeypatch.setitem(pool.HANDLERS, role, pool.HANDLERS[pool.ALONE])
 
 
 def named(name: str) -> Recipe:
@@ -231,8 +232,8 @@ def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def makers(out: Path, step: str) -> set[str]:
-    """The processes that made a step of the views, by their markers."""
-    found = out.glob(f"houses/*/done/{step}.*.json")
+    """The processes that made a step of the houses or of the views, by their markers."""
+    found = [*out.glob(f"houses/*/done/{step}.*.json"), *out.glob(f"houses/*/done/{step}.json")]
     return {json.loads(path.read_text())["worker"] for path in found}
 
 
@@ -244,10 +245,38 @@ def test_one_process_renders_light_while_another_finishes_the_views(tmp_path: Pa
     (light,) = makers(tmp_path, "light")
     (develop,) = makers(tmp_path, "develop")
     assert light != develop
-    assert makers(tmp_path, "truth") == {develop}
-    # A view ends once, with all its steps.
-    ends = [event.view_id for event in seen if event.kind == "end" and event.view_id]
-    assert sorted(ends) == ["0_0_0", "0_0_1"]
+    assert makers(tmp_path, "truth") == makers(tmp_path, "cameras") == {develop}
+    assert makers(tmp_path, "illuminance") == {light}
+    # The house and each view end once, with all their steps.
+    ends = [event.view_id or "" for event in seen if event.kind == "end"]
+    assert sorted(ends) == ["", "0_0_0", "0_0_1"]
+
+
+@pytest.mark.usefixtures("two_cores")
+def test_several_houses_follow_one_another_through_both_processes(tmp_path: Path) -> None:
+    seen: list[Event] = []
+    homes = ["builtin", "made:1", "made:2", "made:3"]
+    summary = run_local(Run(homes, str(tmp_path), named("plain")), seen.append)
+    assert (summary.n_done, summary.n_views, summary.failures) == (4 * N_STEPS, 8, [])
+    # A house's views are all known before the next house is begun.
+    kinds = [e.kind if e.kind == "planned" else e.step for e in seen if e.view_id is None]
+    told = [k for k in kinds if k in ("house", "planned")]
+    assert told == ["house", "house", "planned"] * 4  # begun, done, its views known
+
+
+@pytest.mark.usefixtures("two_cores")
+@pytest.mark.parametrize("wrong", ["refuse", "crash"])
+def test_a_house_that_fails_costs_itself_alone(tmp_path: Path, wrong: str) -> None:
+    summary = run_local(Run(["builtin"], str(tmp_path), named(f"{wrong}:house")))
+    assert [what.split("/")[1] for what, _message, _command in summary.failures] == ["house"]
+    assert markers(tmp_path) == set()
+
+
+@pytest.mark.usefixtures("two_cores")
+def test_a_crash_of_cameras_costs_no_illuminance(tmp_path: Path) -> None:
+    summary = run(tmp_path, "crash:cameras")
+    assert [what.split("/")[1] for what, _message, _command in summary.failures] == ["cameras"]
+    assert markers(tmp_path) == {"house", "illuminance"}
 
 
 @pytest.mark.usefixtures("two_cores")

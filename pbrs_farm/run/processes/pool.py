@@ -21,13 +21,16 @@ from pbrs_farm.run.processes.render_process import CHECK_EVERY_S, Ended, RenderP
 from pbrs_farm.run.processes.render_task import Event, Setting, Task, line_from_task
 
 RENDER: Final = 0
-"""The lane of processes that do any task."""
+"""The lane of processes that do any task, or render light where another does all else."""
 FINISH: Final = 1
-"""The lane of the process that finishes views whose light another one has rendered."""
+"""The lane of the process that makes houses and finishes views whose light another one renders."""
+ALONE, LIGHT, REST = "alone", "light", "rest"
 HANDLERS: Final = {
-    RENDER: "pbrs_farm.run.run_task:make_handler",
-    FINISH: "pbrs_farm.run.run_task:make_finishing_handler",
+    ALONE: "pbrs_farm.run.run_task:make_handler",
+    LIGHT: "pbrs_farm.run.run_task:make_light_handler",
+    REST: "pbrs_farm.run.run_task:make_finishing_handler",
 }
+"""What makes the handler of a process that does every step, light, or all else."""
 
 
 @dataclass(slots=True)
@@ -43,7 +46,7 @@ class _Worker:
 class Pool:
     """Render processes that run tasks, so many a lane. A process that dies costs the step it was in.
 
-    lanes: how many processes RENDER has, and FINISH.
+    lanes: how many processes RENDER has, and FINISH: with any there, RENDER renders light.
     """
 
     def __init__(self, lanes: tuple[int, int], setting: Setting, limits: ProcessLimits) -> None:
@@ -108,7 +111,9 @@ class Pool:
 
     def _added(self, lane: int) -> _Worker:
         log = Path(self._folder.name) / f"process-{len(self._workers)}.log"
-        start = partial(ChildProcess, HANDLERS[lane], log)
+        is_apart = self._lanes[FINISH] > 0
+        role = REST if lane == FINISH else LIGHT if is_apart else ALONE
+        start = partial(ChildProcess, HANDLERS[role], log)
         self._workers.append(_Worker(RenderProcess(start, self._limits), lane))
         return self._workers[-1]
 
