@@ -91,7 +91,7 @@ def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
     add_light(p)
     add_output(p)
     add = p.add_argument
-    text = "processes (default 1, and a second one that finishes views; each view uses all cores)"
+    text = "processes (default 1, and a second one for all but light; each view uses all cores)"
     add("--jobs", type=int, default=1, metavar="N", help=text)
     text = "seconds a step may take (default 3600)"
     add("--step-timeout", type=float, default=3600.0, metavar="S", help=text)
@@ -156,11 +156,13 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
     from pbrs_farm.run.local import Run
     from pbrs_farm.run.plan import wanted
     from pbrs_farm.settings import settings_from_environment
-    from pbrs_farm.truth.optional_layers import check_lens
 
     recipe = recipe_of(args)
     want = wanted(args.modes, args.layers, views_wanted(args), pairs=args.pairs)
-    check_lens(want.layers, recipe.lens.lens)
+    if want.layers:
+        from pbrs_farm.truth.optional_layers import check_lens
+
+        check_lens(want.layers, recipe.lens.lens)
     if recipe.cameras.source in ("file", "trajectory"):
         from pbrs_farm.run.chosen_cameras import check_camera_file
 

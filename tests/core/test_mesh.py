@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pbrs_farm.core.mesh import (
     area_vectors,
     boxes_meeting,
+    clipped_to_box,
     closed_edge_share,
     cross_products,
     distances_to_triangles,
@@ -71,6 +72,43 @@ def test_boxes_that_touch_meet_and_one_apart_along_an_axis_does_not() -> None:
 def test_unique_points_are_numpys_unique_rows(n: int) -> None:
     points = np.random.default_rng(3).integers(0, 4, (n, 3)).astype(np.float64)
     np.testing.assert_array_equal(unique_points(points), np.unique(points, axis=0))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_areas_are_trimeshs_to_the_bit(seed: int) -> None:
+    corners = np.random.default_rng(seed).normal(size=(100, 3, 3)) * 10.0 ** (seed % 7 - 4)
+    theirs = trimesh.triangles.area(crosses=area_vectors(corners))
+    np.testing.assert_array_equal(face_areas(corners), theirs)
+
+
+def cut_by_trimesh(corners: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    for axis in range(3):
+        for normal, place in ((np.eye(3)[axis], low), (-np.eye(3)[axis], high)):
+            faces = np.arange(3 * len(corners)).reshape(-1, 3)
+            points, faces, _ = trimesh.intersections.slice_faces_plane(
+                corners.reshape(-1, 3), faces, normal, place
+            )
+            corners = points[faces].reshape(-1, 3, 3)
+    return corners
+
+
+@pytest.mark.parametrize("is_on_a_grid", [False, True])
+@pytest.mark.parametrize("seed", range(30))
+def test_what_is_cut_by_a_box_is_trimeshs_to_the_bit(seed: int, is_on_a_grid: bool) -> None:
+    # On a grid many corners, edges and whole faces lie in the box's sides.
+    random = np.random.default_rng(seed)
+    corners, size = random.normal(size=(60, 3, 3)), random.uniform(0.2, 2.0, 3)
+    if is_on_a_grid:
+        corners, size = np.rint(2 * corners) / 2, np.ceil(2 * size) / 2
+    cut = clipped_to_box(corners, -size, size)
+    np.testing.assert_array_equal(cut, cut_by_trimesh(corners, -size, size))
+
+
+def test_a_triangle_over_a_corner_of_the_box_keeps_what_is_inside() -> None:
+    cut = clipped_to_box(TRIANGLE[None], np.array([-1.0, -1, -1]), np.array([1.0, 1, 1]))
+    assert face_areas(cut).sum() == pytest.approx(1)
+    outside = np.array([3.0, 3, 3])
+    assert len(clipped_to_box(TRIANGLE[None], outside, outside + 1)) == 0
 
 
 def box(extents: tuple[float, float, float]) -> np.ndarray:
