@@ -286,10 +286,17 @@ def growth_lines(f: Figures) -> list[str]:
         c = below(f, f"light.{kind}_{n}_")
         rows.append(row([
             name, f"{c['us']:.2f} us", f"{c['pilot_s']:.2f} s", f"{c['times']:.2f}",
-            f"{c['load_s']:.1f} s",
+            f"{c['small_times']:.2f}", f"{c['load_s']:.1f} s",
         ]))  # fmt: skip
     return [
-        *head("", "CPU of a sample", "of a pilot", "of a `fast` view, over the first", "load"),
+        *head(
+            "",
+            "CPU of a sample of `fast`",
+            "of its pilot and trial",
+            "of a view, over the first",
+            "reckoned from small pictures",
+            "load",
+        ),
         *rows,
         "",
         f"{f['light.growth_peak_mb'] / 1000:.1f} GB at most.",

@@ -56,7 +56,7 @@ def cycles_figures() -> dict[str, float]:
 def growth_figures() -> dict[str, float]:
     cases = {"triangles": (100_000, 1_000_000, 4_000_000)}
     cases |= {"lamps": (10, 100, 500), "lamps_of_a_home": (10, 100, 500)}
-    ends = ("us", "pilot_s", "load_s", "times")
+    ends = ("us", "pilot_s", "load_s", "times", "small_times")
     found = {f"light.{k}_{n}_{e}": 1.0 for k, some in cases.items() for n in some for e in ends}
     return found | {"light.growth_peak_mb": 1300}
 
