@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from pbrs_farm.core.house import Enclosure, House, Item, ItemKind, Opening
@@ -21,7 +21,16 @@ from tests.repair.shells import (
     structure_of,
     unpaired_edges,
 )
-from tests.repair.wall_rooms import covers, house, planar_walls, room, turned, wall, walls_around
+from tests.repair.wall_rooms import (
+    covers,
+    house,
+    mitred_walls,
+    planar_walls,
+    room,
+    turned,
+    wall,
+    walls_around,
+)
 
 RECT = (0.0, 0.0, 4.0, 3.0)
 MIDDLE = (2.0, 1.3, 1.5)
@@ -172,7 +181,27 @@ def test_uv_of_a_source_is_carried_to_the_new_solid() -> None:
     assert face.uvs == pytest.approx(want, abs=1e-4)
 
 
+def test_no_light_passes_a_mitre_above_walls_that_end_below_the_ceiling() -> None:
+    r = room("0_0", RECT)
+    after, report = _repaired(house([*mitred_walls(RECT, top=2.47), *covers(r)], [r]))
+    assert _sky(report) == 0
+    # From the room's corner along the diagonal, at heights between the walls and the ceiling.
+    y = np.linspace(2.472, 2.498, 14)
+    origins = np.stack([np.full(14, 1e-3), y, np.full(14, 1e-3)], 1).astype(np.float32)
+    outward = np.tile(np.array([-0.5, 0, -0.5], np.float32) * np.sqrt(2), (14, 1))
+    distance, _ = EmbreeOccluder(structure_of(after)).first_hit(origins, outward.astype(np.float32))
+    assert distance.max() < 0.02
+
+
 @settings(max_examples=12, deadline=None)
+@example(angle=0.0, gaps=(0.0,) * 4, slack=0.03125, thickness=0.03125, lifts=(0.0, 0.03125))
+@example(
+    angle=0.2735617020880154,
+    gaps=(0.015922034331182396, 0.0005, 0.0, 0.0),
+    slack=0.039,
+    thickness=0.04,
+    lifts=(0.03824808627819242, 0.03125),
+)
 @given(
     angle=st.floats(0.0, 3.14),
     gaps=st.tuples(*[st.floats(0.0, 0.04)] * 4),

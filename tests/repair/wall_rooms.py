@@ -91,6 +91,19 @@ def walls_around(rect: Rect, prefix: str = "w", **more: float) -> list[Item]:
     return found  # fmt: skip
 
 
+def mitred_walls(rect: Rect, *, thickness: float = 0.2, top: float = HEIGHT_M) -> list[Item]:
+    """Four walls around the rectangle that meet in their corners' diagonals and share nothing."""
+    x0, z0, x1, z1 = rect
+    inner = _outline(rect)
+    outer = _outline((x0 - thickness, z0 - thickness, x1 + thickness, z1 + thickness))
+    found = []
+    for k in range(4):
+        ends, tops = [(k + 1) % 4, k], np.full(2, top)
+        surfaces = wall_prism(inner[ends], outer[ends], 0.0, tops, tops, (WALL,) * 3)
+        found.append(Item(f"m{k}", f"m{k}", ItemKind.WALL, "0", surfaces, nyu40=1))
+    return found
+
+
 def planar_walls(rect: Rect, *, top: float = HEIGHT_M) -> list[Item]:
     """Four walls without thickness on the rectangle's edges, fronts into the room."""
     outline = _outline(rect)

@@ -7,6 +7,8 @@ of a joint shows, where they do not it fills the gap.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 import shapely
@@ -15,7 +17,8 @@ from manifold3d import Manifold
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
-from pbrs_farm.repair.structure.prisms import level_plane, polygons_of, solid_prisms
+from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
+from pbrs_farm.repair.structure.room_volumes import MARGIN_M
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
 
@@ -77,11 +80,14 @@ def _touches(area: shapely.Polygon, wall: Wall) -> bool:
 
 
 def _bridge(a: Wall, b: Wall, rooms: plan.Shape) -> plan.Shape:
-    # Span the ends of both walls by their convex hull, outside the rooms.
-    ends = [
-        plan.common(x.footprint, plan.grown(y.footprint, 1.5 * GAP_M)) for x, y in ((a, b), (b, a))
-    ]
-    return plan.without(shapely.convex_hull(plan.union(ends)), plan.grown(rooms, _RECESS_M))
+    # Span the ends of both walls, outside the rooms.
+    return plan.without(_hull_of_ends(a.footprint, b.footprint), plan.grown(rooms, _RECESS_M))
+
+
+def _hull_of_ends(a: plan.Shape, b: plan.Shape) -> plan.Shape:
+    # Take the convex hull of what lies near the other one.
+    ends = [plan.common(x, plan.grown(y, 1.5 * GAP_M)) for x, y in ((a, b), (b, a))]
+    return shapely.convex_hull(plan.union(ends))
 
 
 def _outer_corner(a: Wall, b: Wall, rooms: plan.Shape) -> tuple[plan.Shape, plan.Shape]:
@@ -119,7 +125,7 @@ def joints_with_surface(
     """
     depth_m = 0.5 * thickness_m
     away = 1.0 if surface.is_ceiling else -1.0  # out of the room
-    found = []
+    feet: list[_Foot] = []
     for wall in plan.near_to(footprint, walls, lambda w: w.footprint, 0.0):
         area = plan.common(plan.grown(wall.footprint, -_RECESS_M), footprint)
         if not surface.is_ceiling:
@@ -129,13 +135,52 @@ def joints_with_surface(
             # Compare the end of the wall with the plane of the floor or ceiling.
             end = wall.top if surface.is_ceiling else level_plane(wall.bottom_y)
             gap = away * (surface.plane.at(corners) - end.at(corners))
-            if gap.max() > GAP_M or gap.max() < -depth_m:
-                continue
-            # Reach from inside the wall to the middle of the slab.
-            near, far = end.raised(-away * _OVERLAP_M), surface.plane.raised(away * depth_m)
-            low, high = (near, far) if surface.is_ceiling else (far, near)
-            if (high.at(corners) - low.at(corners)).min() < _RECESS_M:
-                continue
-            tags = (wall.tag("joint"),) * 3
-            found += [(wall, s) for s in solid_prisms([polygon], low, high, tags, table)]
+            if -depth_m <= gap.max() <= GAP_M:
+                start = end.raised(-away * _OVERLAP_M)
+                feet.append(_Foot(wall, polygon, start, float(gap.max())))
+    # Reach from inside the wall to the middle of the slab.
+    far = surface.plane.raised(away * depth_m)
+    found = []
+    for foot in [*feet, *_between(feet, is_ceiling=surface.is_ceiling)]:
+        low, high = (foot.start, far) if surface.is_ceiling else (far, foot.start)
+        corners = shapely.get_coordinates(foot.area)
+        if (high.at(corners) - low.at(corners)).min() < _RECESS_M:
+            continue
+        tags = (foot.wall.tag("joint"),) * 3
+        found += [(foot.wall, s) for s in solid_prisms([foot.area], low, high, tags, table)]
     return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Foot:
+    """Where a wall stands on a floor or under a ceiling, drawn back behind its faces."""
+
+    wall: Wall
+    area: shapely.Polygon
+    start: Plane  # inside the wall
+    gap_m: float  # largest distance of its end from the floor or ceiling, negative inside that
+
+
+def _between(feet: Sequence[_Foot], *, is_ceiling: bool) -> list[_Foot]:
+    # Fill the corners of walls that end visibly short: drawn back, their feet are apart.
+    found = []
+    for a, b in combinations(feet, 2):
+        if a.wall is b.wall or max(a.gap_m, b.gap_m) <= _GAP_SEEN_M:
+            continue
+        if a.area.distance(b.area) > GAP_M:
+            continue
+        shorter = max(a, b, key=lambda foot: foot.gap_m)
+        # Fill a corner of which the walls share little over their whole height.
+        if _is_loose(a.wall, b.wall):
+            y = shorter.wall.bottom_y - GAP_M if is_ceiling else shorter.wall.high_y + GAP_M
+            shorter = replace(shorter, start=level_plane(y))
+        areas = polygons_of(_hull_of_ends(a.area, b.area))
+        found += [replace(shorter, area=area) for area in areas]
+    return found
+
+
+def _is_loose(a: Wall, b: Wall) -> bool:
+    # Rooms cut MARGIN_M off what fills a corner: ask whether the walls share a wider part of it.
+    thin = [plan.grown(w.footprint, -0.5 * MARGIN_M) for w in (a, b)]
+    both = plan.grown(plan.union([a.footprint, b.footprint]), -0.5 * MARGIN_M)
+    return not any(all(p.intersects(t) for t in thin) for p in polygons_of(both))

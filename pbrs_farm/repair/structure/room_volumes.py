@@ -17,7 +17,9 @@ from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.slabs import SAME_HEIGHT_M
 
-_MARGIN_M = 0.005  # volumes reach this far into what bounds them
+MARGIN_M = 0.005
+"""Volumes of rooms reach this far into what bounds them."""
+
 _TOUCH_M = 0.002  # solids that overlap less are left uncut
 
 
@@ -77,7 +79,7 @@ def _margin(rooms: Sequence[Room]) -> float:
         for upper in rooms
         if upper.floor_y > lower.ceiling_y
     ]
-    return min([_MARGIN_M, *(gap / 3 for gap in gaps)])
+    return min([MARGIN_M, *(gap / 3 for gap in gaps)])
 
 
 def _volume(area: shapely.Polygon, low: Plane, high: Plane, items: frozenset[int]) -> RoomVolume:
