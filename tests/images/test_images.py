@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -145,6 +146,30 @@ def test_wrong_shapes_and_types_are_refused() -> None:
         images.exr_from_layers(
             {"a": np.zeros((4, 4), np.float32), "b": np.zeros((4, 5), np.float32)}
         )
+
+
+def test_where_there_are_no_files_in_memory_the_bytes_are_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rgb = np.random.default_rng(1).integers(0, 256, (9, 7, 3), np.uint8)
+    planes = {"Z": rgb[..., 0].astype(np.float32)}
+    encoders = (
+        lambda: images.png_from_array(rgb),
+        lambda: images.jpeg_from_array(rgb, 90),
+        lambda: images.exr_from_layers(planes),
+    )
+    in_memory = [encode() for encode in encoders]
+    monkeypatch.delattr("os.memfd_create")
+    assert [encode() for encode in encoders] == in_memory
+
+
+def test_a_picture_is_written_in_memory_and_touches_no_disk(
+    tmp_path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    assert images.png_from_array(np.zeros((4, 4), np.uint8)).startswith(b"\x89PNG")
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 
 def test_no_temporary_file_stays(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
