@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 NAME ?=
 HOME_NAME ?= Studio
 
-.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm docs format clean
+.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm docs format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -55,6 +55,10 @@ endef
 test-study: setup ## the study's tests that need torch; installs its CPU build (192 MB) the first time
 	@$(study-packages)
 	$(BIN)/pytest -m "study and not slow and not gpu"
+
+test-cuda: export PBRS_SETUP_ALSO := gcc
+test-cuda: setup ## the tests marked gpu without a GPU: what one would run is translated for the CPU, all but OpenGL
+	$(BIN)/python -m tests.cuda_on_cpu $(BIN)/pytest -m gpu -k "not opengl"
 
 bench: setup ## measure everything but house, dress, made, light and its tables, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))

@@ -1,0 +1,63 @@
+"""Build the libraries and become a command that finds them; see the package."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+HERE: Final = Path(__file__).resolve().parent
+OUT: Final = HERE.parents[1] / "out" / "cuda-on-cpu"
+_CC: Final = ("gcc", "-O1", "-fopenmp", "-shared", "-fPIC", "-w")
+
+
+def main(command: list[str]) -> None:
+    """Run a command in place of this process."""
+    if not command:
+        sys.exit("usage: python -m tests.cuda_on_cpu COMMAND [ARGUMENT...]")
+    build()
+    os.environ |= {
+        "DRJIT_LIBCUDA_PATH": str(OUT / "libcuda_on_cpu.so"),
+        "DRJIT_LIBOPTIX_PATH": str(OUT / "liboptix_on_cpu.so"),
+        "CUDA_ON_CPU": str(OUT),
+        "CUDA_ON_CPU_TRANSLATE": f"{sys.executable} {HERE / 'ptx_to_c.py'}",
+        "CUDA_ON_CPU_INCLUDE": str(HERE),
+    }
+    os.execvp(command[0], command)
+
+
+def build() -> None:
+    """Both libraries, anew where their source has changed; kernels translated before go with them."""
+    import embreex
+
+    embree = next((Path(embreex.__file__).parents[1] / "embreex.libs").glob("libembree4*.so*"))
+    driver, optix = OUT / "libcuda_on_cpu.so", OUT / "liboptix_on_cpu.so"
+    newest = max(path.stat().st_mtime for path in HERE.iterdir() if path.is_file())
+    if optix.is_file() and optix.stat().st_mtime > newest:
+        return
+    OUT.mkdir(parents=True, exist_ok=True)
+    for old in OUT.glob("*.so"):
+        old.unlink()
+    stubs = OUT / "other_calls.c"
+    stubs.write_text(_other_calls())
+    subprocess.run([*_CC, "-o", driver, HERE / "driver.c", stubs, "-ldl"], check=True)
+    links = [str(driver), str(embree), f"-Wl,-rpath,{embree.parent}"]
+    subprocess.run([*_CC, "-o", optix, HERE / "optix.c", *links], check=True)
+
+
+def _other_calls() -> str:
+    """C of the driver's functions that Dr.Jit asks for and driver.c lacks: they do nothing."""
+    import re
+
+    import drjit
+
+    library = (Path(drjit.__file__).parent / "libdrjit-core.so").read_bytes()
+    asked = {name.decode() for name in re.findall(rb"\0(cu[A-Z]\w+)(?=\0)", library)}
+    ours = set(re.findall(r"^int (cu\w+)\(", (HERE / "driver.c").read_text(), re.MULTILINE))
+    return "".join(f"int {name}(void) {{ return 0; }}\n" for name in sorted(asked - ours))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
