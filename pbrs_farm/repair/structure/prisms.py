@@ -18,6 +18,11 @@ UvMap = Callable[[F64], F64]
 """Texture coordinates (N, 2) of positions (N, 3)."""
 
 _ON_PLANE_M = 1e-3  # points of a plane lie no farther from it
+_CRUMBS_M = (
+    1e-5,
+    1e-4,
+    1e-3,
+)  # half the width of what parts rings; the next where one is too small
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +96,7 @@ def prism(
     uv: of bottom and top; metres in plan when None. Sides have metres along and up.
     """
     # Triangulate the outline with its holes, corners shared by bottom, top and sides.
-    polygon = shapely.orient_polygons(polygon)
+    polygon = shapely.orient_polygons(_with_rings_apart(polygon))
     rings = [np.asarray(r.coords)[:-1] for r in (polygon.exterior, *polygon.interiors)]
     plan = np.concatenate(rings)
     triangles = np.asarray(manifold3d.triangulate(rings), np.int64).reshape(-1, 3)
@@ -103,6 +108,21 @@ def prism(
         _patch(top_tag, highs, triangles[:, [0, 2, 1]], highs[:, [0, 2]] if uv is None else uv(highs)),
         _sides(side_tag, rings, lows, highs),
     ]  # fmt: skip
+
+
+def _with_rings_apart(polygon: shapely.Polygon) -> shapely.Polygon:
+    # Lay crumbs where rings touch: four sides would share an edge there, and manifold3d leans them.
+    for crumb_m in _CRUMBS_M:
+        rings = (polygon.exterior, *polygon.interiors)
+        points = np.concatenate([np.asarray(r.coords)[:-1] for r in rings])
+        places, counts = np.unique(points, axis=0, return_counts=True)
+        if counts.max() == 1:
+            break
+        low, high = places[counts > 1] - crumb_m, places[counts > 1] + crumb_m
+        crumbs = [shapely.box(*corners) for corners in np.concatenate([low, high], 1).tolist()]
+        crumbed = plan.union([polygon, *crumbs])
+        polygon = max(polygons_of(crumbed, min_area_m2=0.0), key=lambda p: p.area)
+    return polygon
 
 
 def solid_prisms(

@@ -1,0 +1,39 @@
+"""Prisms over plan polygons: the solid is the polygon times its height, sides upright."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
+from pbrs_farm.repair.structure.booleans import Tag, TagTable, patches_from_solid
+from pbrs_farm.repair.structure.prisms import level_plane, solid_prisms
+
+RECTANGLE = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)]
+DENTED = [(0.0, 0.0), (2.0, 1.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)]
+TAG = Tag(0, "side", 0)
+
+
+@pytest.mark.parametrize(
+    ("outline", "hole"),
+    [
+        (RECTANGLE, [(0.0, 0.0), (1.0, 0.5), (0.5, 1.0)]),
+        (RECTANGLE, [(0.0, 0.0), (0.05, 0.02), (0.02, 0.05)]),
+        (DENTED, [(2.0, 1.0), (2.2, 1.5), (1.8, 1.5)]),
+        (DENTED, [(2.0, 1.0), (2.002, 1.005), (1.998, 1.005)]),
+        # A sharp wedge between the rings: a small crumb would leave them touching.
+        (RECTANGLE, [(0.0, 0.0), (3.0, 0.06), (3.0, 1.0)]),
+    ],
+)
+def test_a_prism_whose_hole_touches_its_outline_keeps_volume_and_upright_sides(
+    outline: list[tuple[float, float]], hole: list[tuple[float, float]]
+) -> None:
+    polygon, table = shapely.Polygon(outline, [hole]), TagTable()
+    assert polygon.is_valid
+    (solid,) = solid_prisms([polygon], level_plane(0.0), level_plane(0.1), (TAG,) * 3, table)
+    assert solid.volume() == pytest.approx(0.1 * polygon.area, rel=1e-5)
+    (patch,) = patches_from_solid(solid, table)
+    corners = triangle_corners(patch.positions, patch.faces)
+    up = np.abs(unit_normals(corners)[:, 1])
+    assert face_areas(corners)[(up > 1e-3) & (up < 0.999)].sum() < 1e-9
