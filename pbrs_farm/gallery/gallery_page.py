@@ -24,6 +24,7 @@ from pbrs_farm.formats.output_folder import ViewEntry, reasons_of, views_of
 from pbrs_farm.gallery.templates import page
 from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 
+TEMPLATE: Final = ("pbrs_farm.gallery", "gallery.html")  # package and file of the pages
 THUMBNAIL_PX: Final = 320  # longer edge
 MAX_TILE_BYTES: Final = 11_000  # of a thumbnail
 MAX_PAGE_BYTES: Final = 5_000_000
@@ -45,9 +46,8 @@ class CardTiles:
     shape: tuple[int, ...] | None  # of the first picture there is
 
 
-def card_tiles(view: ViewEntry) -> CardTiles:
-    """The view's tiles as its card shows them."""
-    tiles = tiles_of(view, THUMBNAIL_PX)
+def card_tiles(tiles: Sequence[Tile]) -> CardTiles:
+    """Tiles of at most THUMBNAIL_PX as a view's card shows them."""
     rows = tuple(
         {"kind": t.kind, "note": t.note, "missing": t.missing, "source": _tile_url(t)}
         for t in tiles
@@ -92,14 +92,13 @@ def _page(
     aspect = "4 / 3"
     for view in views:
         # Give every tile the shape of the first picture there is.
-        tiles = made.get(view.folder) or card_tiles(view)
+        tiles = made.get(view.folder) or card_tiles(tiles_of(view, THUMBNAIL_PX))
         if not cards and tiles.shape is not None:
             aspect = f"{tiles.shape[1]} / {tiles.shape[0]}"
         cards.append(_card(folder, view, tiles, reasons.get((view.house.id, view.id))))
     n_houses = len({view.house.id for view in every})
     return page(
-        "pbrs_farm.gallery",
-        "gallery.html",
+        *TEMPLATE,
         title=f"{len(every)} views of {n_houses} house{'s'[: n_houses != 1]}",
         number=number,
         pages=[(k, page_name(k)) for k in _near_pages(number, n_pages)],

@@ -55,7 +55,10 @@ class SheetParts:
 def _parts(view: ViewEntry) -> _Parts:
     # The thread loads what it needs: whoever starts a run waits for none of it.
     from pbrs_farm.gallery.contact_sheet import TILE_PX
-    from pbrs_farm.gallery.gallery_page import card_tiles
-    from pbrs_farm.gallery.view_tiles import tiles_of
+    from pbrs_farm.gallery.gallery_page import TEMPLATE, THUMBNAIL_PX, card_tiles
+    from pbrs_farm.gallery.templates import compiled
+    from pbrs_farm.gallery.view_tiles import tiles_of_sizes
 
-    return tiles_of(view, TILE_PX), card_tiles(view)
+    compiled(*TEMPLATE)
+    tiles, small = tiles_of_sizes(view, TILE_PX, THUMBNAIL_PX)
+    return tiles, card_tiles(small)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from pbrs_farm.core.shown_text import printable
 
@@ -14,6 +15,12 @@ def page(package: str, template: str, **values: Any) -> str:
 
     Raises jinja2.UndefinedError for a name the template uses and values lacks.
     """
+    return compiled(package, template).render(values)
+
+
+@functools.cache
+def compiled(package: str, template: str) -> Template:
+    """The template file of a package, ready to be filled; each is compiled once a process."""
     environment = Environment(
         loader=PackageLoader(package, ""),
         autoescape=True,
@@ -22,7 +29,7 @@ def page(package: str, template: str, **values: Any) -> str:
         lstrip_blocks=True,
         finalize=_finalized,
     )
-    return environment.get_template(template).render(values)
+    return environment.get_template(template)
 
 
 def _finalized(value: Any) -> Any:

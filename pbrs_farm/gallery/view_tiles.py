@@ -65,26 +65,47 @@ class Tile:
     classes: tuple[tuple[int, float], ...] = ()  # of semantic: (NYU40 id, share), largest first
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Layer:
+    # A layer as it is shown, at its full size.
+    kind: TileKind
+    pixels: Srgb8Image | None = None
+    missing: str = ""
+    note: str = ""
+    classes: tuple[tuple[int, float], ...] = ()
+
+    def tile(self, max_edge_px: int) -> Tile:
+        # Labels keep their values: the nearest pixel, but photographs and smooth layers are averaged.
+        nearest, pixels = self.kind.layer in ("semantic", "instance"), self.pixels
+        if pixels is not None:
+            pixels = images.thumbnail(pixels, max_edge_px=max_edge_px, nearest=nearest)
+        return Tile(self.kind, pixels, self.missing, self.note, self.classes)
+
+
 def tiles_of(view: ViewEntry, max_edge_px: int = 320) -> tuple[Tile, ...]:
     """The view's tiles in the order of TILES; one that is absent or damaged says so in its place."""
-    return tuple(_tile(view, kind, max_edge_px) for kind in TILES)
+    (tiles,) = tiles_of_sizes(view, max_edge_px)
+    return tiles
 
 
-def _tile(view: ViewEntry, kind: TileKind, max_edge_px: int) -> Tile:
+def tiles_of_sizes(view: ViewEntry, *max_edges_px: int) -> list[tuple[Tile, ...]]:
+    """As tiles_of for each of several sizes; every layer is read once."""
+    layers = [_layer(view, kind) for kind in TILES]
+    return [tuple(layer.tile(edge_px) for layer in layers) for edge_px in max_edges_px]
+
+
+def _layer(view: ViewEntry, kind: TileKind) -> _Layer:
     path = view.file(kind.file)
     if path is None:
-        return Tile(kind, None, missing="not rendered")
+        return _Layer(kind, missing="not rendered")
     try:
         stored = images.array_from_png(read_regular(path), str(path))
         if kind.is_photo:
-            return Tile(kind, images.thumbnail(_photo(stored), max_edge_px=max_edge_px))
+            return _Layer(kind, _photo(stored))
         pixels = _COLOURS[kind.layer](stored)
     except (BadInput, OSError, ValueError, IndexError):
-        return Tile(kind, None, missing="cannot be read")
-    # Labels keep their values: the nearest pixel, but smooth layers are averaged.
-    nearest = kind.layer in ("semantic", "instance")
-    small = images.thumbnail(pixels, max_edge_px=max_edge_px, nearest=nearest)
-    return Tile(kind, small, note=_note(kind, stored), classes=_classes(kind, stored))
+        return _Layer(kind, missing="cannot be read")
+    return _Layer(kind, pixels, note=_note(kind, stored), classes=_classes(kind, stored))
 
 
 def _photo(stored: NDArray[Any]) -> Srgb8Image:
