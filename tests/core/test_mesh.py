@@ -13,6 +13,7 @@ from pbrs_farm.core.mesh import (
     closed_edge_share,
     cross_products,
     distances_to_triangles,
+    dots,
     edges_are_paired,
     face_areas,
     faces_with_area,
@@ -203,3 +204,11 @@ def test_cross_products_are_numpys_to_the_bit(dtype: type) -> None:
     assert found.dtype == dtype
     assert found.tobytes() == np.cross(a, b).tobytes()
     assert np.array_equal(cross_products(a[0], b), np.cross(a[0], b))
+
+
+def test_dots_and_unit_normals_are_numpys_to_the_bit() -> None:
+    rng = np.random.default_rng(5)
+    a, b = rng.normal(0, 3, (2, 4000, 3, 3))
+    assert dots(a, b).tobytes() == (a * b).sum(-1).tobytes()
+    n = np.cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 0])
+    assert unit_normals(a).tobytes() == (n / np.linalg.norm(n, axis=1)[:, None]).tobytes()

@@ -6,6 +6,7 @@ sky, and none is compiled again.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64, I32, I64, Bools
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Geometry, House, MaterialKind, geometry_from_house
-from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
+from pbrs_farm.core.mesh import dots, faces_with_area, lengths, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.transport.scene_tables.lamp_emission import AreaEmitter, area_emitters_of_house
 from pbrs_farm.transport.scene_tables.lamp_symmetry import symmetry_row
@@ -30,7 +31,7 @@ NORMALS = slice(16, 19), slice(20, 23), slice(24, 27)  # of the corners
 FRONT_PDF, BACK_PDF, TARGET_EMITTER = 19, 23, 27  # filled by guiding; column 15 is free
 NO_LAMP: Final = 0xFFFF  # upper half of a face's tag that does not emit
 
-_FACES_AT_ONCE: Final = 1 << 14  # in the making of rows, against memory
+_FACES_AT_ONCE: Final = 1 << 13  # in the making of rows, against memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,16 +108,25 @@ def tables_from_house(
 
 def _solid_faces(geometry: Geometry) -> Bools:
     """(F,) bool: finite corners and an area that defines the face's plane."""
-    return faces_with_area(triangle_corners(geometry.positions, geometry.faces), 0.5e-10)
+    keep = np.empty(len(geometry.faces), np.bool_)
+    for part in _parts(len(keep)):
+        corners = triangle_corners(geometry.positions, geometry.faces[part])
+        keep[part] = faces_with_area(corners, 0.5e-10)
+    return keep
 
 
 def _face_rows(geometry: Geometry, faces: I32) -> F32:
-    """(F, FACE_FLOATS) what a ray needs to know of each face, by parts that stay in the cache."""
+    """(F, FACE_FLOATS) what a ray needs to know of each face."""
     rows = np.zeros((len(faces), FACE_FLOATS), np.float32)
-    for start in range(0, len(faces), _FACES_AT_ONCE):
-        part = slice(start, start + _FACES_AT_ONCE)
+    for part in _parts(len(faces)):
         _fill_rows(rows[part], geometry, faces[part])
     return rows
+
+
+def _parts(n_faces: int) -> Iterator[slice]:
+    """Slices of n_faces that stay in the cache."""
+    for start in range(0, n_faces, _FACES_AT_ONCE):
+        yield slice(start, start + _FACES_AT_ONCE)
 
 
 def _fill_rows(rows: F32, geometry: Geometry, faces: I32) -> None:
@@ -126,18 +136,22 @@ def _fill_rows(rows: F32, geometry: Geometry, faces: I32) -> None:
 
     # Take the face's own normal where a vertex has none or one that is not of unit length.
     normals = geometry.normals[faces].astype(np.float64)
+    of_face = np.broadcast_to(flat[:, None], normals.shape)
     with np.errstate(invalid="ignore", divide="ignore"):
-        length = np.linalg.norm(normals, axis=2, keepdims=True)
-        normals = np.where((length > 0.5) & (length < 2), normals / length, flat[:, None])
+        length = lengths(normals)
+        normals /= length[..., None]
+        is_bad = ~((length > 0.5) & (length < 2))
+    normals[is_bad] = of_face[is_bad]
     # Turn all three to the front; replace one that leans to the back by the face's own.
-    side = np.sign((normals.sum(1) * flat).sum(1))
-    normals = np.where((side < 0)[:, None, None], -normals, normals)
-    lean = (normals * flat[:, None]).sum(2, keepdims=True)
-    normals = np.where((lean > 0.05) & (side != 0)[:, None, None], normals, flat[:, None])
+    side = np.sign(dots(normals[:, 0] + normals[:, 1] + normals[:, 2], flat))
+    normals[side < 0] *= -1
+    leans_back = ~((dots(normals, flat[:, None]) > 0.05) & (side != 0)[:, None])
+    normals[leans_back] = of_face[leans_back]
 
     # Shift repeating textures by whole turns to start near 0: float32 keeps the fraction.
     uvs = np.nan_to_num(geometry.uvs[faces].astype(np.float64), posinf=0, neginf=0)
-    uvs -= np.floor(uvs.min(1, keepdims=True))
+    least = np.minimum(np.minimum(uvs[:, 0], uvs[:, 1]), uvs[:, 2])
+    uvs -= np.floor(least)[:, None]
     duv = uvs[:, 1:] - uvs[:, :1]
 
     rows[:, ORIGIN], rows[:, EDGE1], rows[:, EDGE2] = corners[:, 0], e1, e2
