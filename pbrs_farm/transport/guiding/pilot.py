@@ -34,10 +34,11 @@ _PILOT_SIZE: Final = (32, 24)  # px
 # A shadow ray that can bring less than this share of a view's light, group by group, is cast by chance.
 SHADOW_SHARE: Final = 0.5
 _MAX_LANES: Final = 1 << 17  # of the pilot: it halves its size where there are very many emitters
-# Of a view's trial, which tries guided rays and counts which shadow rays arrive: its samples of a pixel (of 16, one trial in six missed the rare bright
-# paths of a home), the samples of a view from which it pays, the CPU of a guided sample over a plain
-# one's, and the part of the mean light below which a pixel's noise counts less.
-_TRIAL_SPP: Final = 64
+# Of a view's trial, which tries guided rays and counts which shadow rays arrive: its size in px and
+# its samples of a pixel, the samples of a view from which it pays, the CPU of a guided sample over a
+# plain one's, and the part of the mean light below which a pixel's noise counts less.
+_TRIAL_SIZE: Final = (64, 48)
+_TRIAL_SPP: Final = 8
 _MIN_SAMPLES: Final = 1 << 22
 _GUIDING_COST: Final = 1.1
 _DARK: Final = 0.1
@@ -141,27 +142,34 @@ def trial_weights(
     i = camera.intrinsics
     if i.width_px * i.height_px * fields.spp < _MIN_SAMPLES:
         return weights
-    width, height = _PILOT_SIZE
+    width, height = _TRIAL_SIZE
     lanes = Lanes(width, height, 0, _TRIAL_SPP, seed, is_trial=True)
     sums = trace(scene, emitters, camera.with_size(width, height), lanes, fields)
+    assert sums.arrivals is not None
+    rates = arrival_rates(sums.arrivals, emitters.arrival.grid)
+    return replace(weights, is_guided=_pays(sums, (2, height, width)), arrival_rates=rates)
+
+
+def _pays(sums: SampleSums, shape: tuple[int, int, int]) -> bool:
+    """Whether guided rays cut the noise of a trial by more than they cost. shape: plain and guided."""
     # Judge noise against what is around a pixel: a firefly must not be its own measure.
-    _plain, guided = _luminance(sums.outdoor + sums.indoor).reshape(2, height, width)
+    _plain, guided = _luminance(sums.outdoor + sums.indoor).reshape(shape)
     level = median_filter(guided, size=_NEIGHBOURS, mode="nearest")
     level += _DARK * max(float(level.mean()), 1e-12)
-    apart = _halves_apart(sums).reshape(2, height, width) / level
-    plain_variance, guided_variance = (apart**2).mean((1, 2))
-    is_guided = bool(plain_variance > _GUIDING_COST * guided_variance)
-    assert sums.arrivals is not None
-    return replace(weights, is_guided=is_guided, arrival_rates=arrival_rates(sums.arrivals))
+    # Daylight is as noisy both ways, since the rays are guided into lamps: what differs in it by
+    # chance must not choose.
+    halves = (sums.outdoor, sums.outdoor_even), (sums.indoor, sums.indoor_even)
+    outdoor, indoor = ((_apart(*h).reshape(shape) / level) ** 2 for h in halves)
+    daylight, (plain_lamps, guided_lamps) = outdoor.mean(), indoor.mean((1, 2))
+    return bool(daylight + plain_lamps > _GUIDING_COST * (daylight + guided_lamps))
 
 
 def _luminance(rgb: F32) -> F64:
     return np.asarray(rgb.astype(np.float64) @ LUMINANCE)
 
 
-def _halves_apart(sums: SampleSums) -> F64:
-    """Difference of the half buffers of all light, pixel by pixel."""
-    whole, even = sums.outdoor + sums.indoor, sums.outdoor_even + sums.indoor_even
+def _apart(whole: F32, even: F32) -> F64:
+    """Difference of the half buffers of a group, lane by lane."""
     return 2 * _luminance(even) - _luminance(whole)
 
 

@@ -28,7 +28,8 @@ OTHER_LAMP: Final = FIRST_LAMP + MAX_NEAR
 FIRST_SUNLIT: Final = OTHER_LAMP + 4  # rays to sunlit points, group by group
 MAX_SUNLIT: Final = 8  # groups
 N_KINDS: Final = FIRST_SUNLIT + MAX_SUNLIT
-# A voxel counts as if it had so many rays more, which arrive as the view's do.
+# A voxel counts as if it had so many rays more, which arrive as those around it do, and these so many
+# more, which arrive as the view's do.
 _PRIOR: Final = 4.0
 _LEAST_RATE: Final = 0.02
 
@@ -48,19 +49,19 @@ class ArrivalRates:
     """The share of each kind of shadow rays that arrive from every voxel, for one view."""
 
     def __init__(self, grid: VoxelGrid) -> None:
-        self._grid = grid
+        self.grid = grid
         self.set_rates(None)
 
     def set_rates(self, rates: F64 | None) -> None:
         """Set the rates of a view: (voxels, N_KINDS), None = every ray arrives."""
-        rows = np.ones((self._grid.n_voxels, N_KINDS), np.float32)
+        rows = np.ones((self.grid.n_voxels, N_KINDS), np.float32)
         if rates is not None:
             rows[:] = rates
         self._rows = device_array(mi.Float, rows.ravel())
 
     def of_kind(self, p: Any, kind: Any, active: Any) -> Any:
         """The rate of one kind at p."""
-        return dr.gather(mi.Float, self._rows, self._grid.voxel(p) * N_KINDS + kind, active)
+        return dr.gather(mi.Float, self._rows, self.grid.voxel(p) * N_KINDS + kind, active)
 
     def of_near_lamps(self, p: Any, active: Any) -> list[Any]:
         """The rates of the strongest lamps at p, a list entry each."""
@@ -71,28 +72,35 @@ class ArrivalRates:
         return self._of_kinds(p, FIRST_SUNLIT, MAX_SUNLIT, active)
 
     def _of_kinds(self, p: Any, kind: int, n: int, active: Any) -> list[Any]:
-        first = self._grid.voxel(p) * (N_KINDS // 4) + kind // 4
+        first = self.grid.voxel(p) * (N_KINDS // 4) + kind // 4
         rows = [dr.gather(mi.Vector4f, self._rows, first + k, active) for k in range(n // 4)]
         return [row[k] for row in rows for k in range(4)]
 
     def no_counts(self) -> ArrivalCounts:
         """Where nothing was counted yet."""
-        n = self._grid.n_voxels * N_KINDS
+        n = self.grid.n_voxels * N_KINDS
         return ArrivalCounts(dr.zeros(mi.UInt32, n), dr.zeros(mi.UInt32, n))
 
     def count(self, counts: ArrivalCounts, p: Any, kind: Any, is_cast: Any, arrives: Any) -> None:
         """Count shadow rays from p."""
-        place = self._grid.voxel(p) * N_KINDS + kind
+        place = self.grid.voxel(p) * N_KINDS + kind
         # Add in place: a copy for each thread would put the number of voxels into the kernel.
         one, mode = mi.UInt32(1), dr.ReduceMode.Direct
         dr.scatter_add(counts.cast, one, place, is_cast, mode=mode)
         dr.scatter_add(counts.arrived, one, place, is_cast & arrives, mode=mode)
 
 
-def arrival_rates(counts: NDArray[np.uint32]) -> F64:
+def arrival_rates(counts: NDArray[np.uint32], grid: VoxelGrid) -> F64:
     """(voxels, N_KINDS) share of the rays that arrive, never 0. counts: ArrivalCounts.numpy()."""
-    cast, arrived = counts.astype(np.float64)
+    # Of a kind that no ray was of nothing is known.
+    rates = np.full(counts.shape[1:], 0.5)
+    kinds = np.flatnonzero(counts[0].any(0))
+    own = counts[..., kinds]
+    near_cast, near_arrived = (grid.with_neighbours(rows) for rows in own)
+    cast, arrived = own.astype(np.float64)
     everywhere = (arrived.sum(0) + 0.5) / (cast.sum(0) + 1)
-    rates = (arrived + _PRIOR * everywhere) / (cast + _PRIOR)
+    near = (near_arrived + _PRIOR * everywhere) / (near_cast + _PRIOR)
+    here = (arrived + _PRIOR * near) / (cast + _PRIOR)
     # Round, so that the last bits of a quotient never change a picture.
-    return np.asarray(np.round(np.maximum(rates, _LEAST_RATE), 6))
+    rates[:, kinds] = np.round(np.maximum(here, _LEAST_RATE), 6)
+    return rates

@@ -41,6 +41,18 @@ class VoxelGrid:
         at = np.indices(tuple(int(n) for n in self._host_shape)).reshape(3, -1).T
         return np.asarray(self._host_low + (at + 0.5) * self.edge_m)
 
+    def with_neighbours(self, rows: NDArray[np.uint32]) -> NDArray[np.uint32]:
+        """(voxels, K) sums of rows over each voxel and the 26 around it, as far as there are any."""
+        sums = rows.reshape(*self._host_shape, -1)
+        for axis in range(3):
+            # Add the voxels before and behind, axis by axis.
+            alone, total = np.moveaxis(sums, axis, 0), sums.copy()
+            along = np.moveaxis(total, axis, 0)
+            along[:-1] += alone[1:]
+            along[1:] += alone[:-1]
+            sums = total
+        return sums.reshape(rows.shape)
+
 
 def voxel_grid(positions: F32) -> tuple[F64, NDArray[np.int64], float]:
     """(lowest corner, number of voxels along each axis, edge in m) of a grid around positions."""

@@ -1,7 +1,8 @@
-"""The pilot of very many lamps: what it leaves to those it found, and how small it gets."""
+"""The pilot of very many lamps: what it leaves to those it found, and how small it gets; what a trial chooses."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from pbrs_farm.raycast.variant import choose_variant
@@ -32,3 +33,28 @@ def test_the_pilot_of_very_many_emitters_is_smaller(n_emitters: int) -> None:
     width, height = pilot_size(n_emitters)
     assert width * height * n_emitters <= 1 << 17
     assert width * 3 == height * 4
+
+
+@pytest.mark.parametrize(("bright", "pays"), [("outdoor", False), ("indoor", True)])
+def test_a_firefly_that_guided_rays_lack_chooses_them_unless_it_is_daylight(
+    bright: str, pays: bool
+) -> None:
+    from pbrs_farm.transport.guiding.pilot import _pays
+    from pbrs_farm.transport.path_tracer import SampleSums
+
+    height, width = 8, 12
+    n = 2 * height * width
+    odd, even = np.random.default_rng(1).uniform(0.9, 1.1, (2, n, 3)).astype(np.float32)
+
+    def chosen(firefly: str) -> bool:
+        plus = {name: np.zeros((n, 3), np.float32) for name in ("outdoor", "indoor")}
+        if firefly:
+            plus[firefly][7] = 50
+        light = {name: odd + even + x for name, x in plus.items()}
+        halves = {f"{name}_even": even + x for name, x in plus.items()}
+        return _pays(
+            SampleSums(**light, **halves, albedo=odd, normal=odd, n_bad=0), (2, height, width)
+        )
+
+    assert not chosen("")
+    assert chosen(bright) is pays

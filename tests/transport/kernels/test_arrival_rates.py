@@ -62,17 +62,39 @@ def plain_half(lanes: Any) -> Any:
     return lanes[: 32 * 24].reshape(24, 32, 3)
 
 
-def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_the_views() -> None:
+def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_that_around_it_or_the_views() -> (
+    None
+):
     from pbrs_farm.transport.kernels.arrival_rates import N_KINDS, arrival_rates
+    from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
-    counts = np.zeros((2, 3, N_KINDS), np.uint32)
+    grid = VoxelGrid(np.array([[0.1, 0.1, 0.1], [2.4, 0.1, 0.1]], np.float32))
+    assert grid.n_voxels == 5
+    counts = np.zeros((2, 5, N_KINDS), np.uint32)
     counts[0, :2, 4] = 1000
     counts[1, 0, 4] = 900
-    rates = arrival_rates(counts)
+    rates = arrival_rates(counts, grid)
     assert rates[0, 4] == pytest.approx(0.9, abs=0.01)
     assert 0 < rates[1, 4] < 0.05
-    assert rates[2, 4] == pytest.approx(0.45, abs=0.01)
+    assert rates[2, 4] == pytest.approx(0.02, abs=0.01)
+    assert rates[3:, 4] == pytest.approx(0.45, abs=0.01)
     assert ((rates > 0) & (rates <= 1)).all()
+
+
+def test_a_voxel_counts_with_the_26_around_it() -> None:
+    from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
+
+    grid = VoxelGrid(np.array([[0, 0, 0], [1.9, 1.4, 2.4]], np.float32))
+    ones = np.ones((grid.n_voxels, 1), np.uint32)
+    counted = grid.with_neighbours(ones).reshape(4, 3, 5)
+    assert counted[0, 0, 0] == counted[3, 2, 4] == 8
+    assert counted[0, 1, 2] == 18
+    assert counted[1, 1, 1] == 27
+    one = np.zeros((4, 3, 5, 1), np.uint32)
+    one[3, 1, 2] = 7
+    near = grid.with_neighbours(one.reshape(-1, 1)).reshape(4, 3, 5)
+    assert (near[2:, :, 1:4] == 7).all()
+    assert near.sum() == 7 * 18
 
 
 def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
