@@ -199,6 +199,9 @@ def test_no_light_passes_a_mitre_above_walls_that_end_below_the_ceiling() -> Non
     angle=1.375, gaps=(0.0, 0.0, 0.015625, 0.0), slack=0.03125, thickness=0.03125, lifts=(0.0, 0.0)
 )
 @example(
+    angle=0.785398, gaps=(0.01, 0.0, 0.01, 0.015625), slack=0.0, thickness=0.1, lifts=(0.001, 0.01)
+)
+@example(
     angle=0.2735617020880154,
     gaps=(0.015922034331182396, 0.0005, 0.0, 0.0),
     slack=0.039,

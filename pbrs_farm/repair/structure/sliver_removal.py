@@ -17,6 +17,7 @@ from pbrs_farm.core.mesh import face_areas
 
 MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver: float32 holds no smaller one
 _MERGE_M = 4e-6  # a few steps of float32 ten metres from the origin
+_THIN_M = 1e-8  # height of a face that is nearly a sliver
 _MAX_ROUNDS = 8  # splitting may leave new slivers
 
 
@@ -34,8 +35,9 @@ def without_slivers(vertices: F64, faces: I64, labels: I64) -> tuple[F64, I64, I
     _, place = np.unique(vertices[:, :3], axis=0, return_inverse=True)
     # Dissolve until no sliver is left.
     mesh = _Mesh(vertices, np.ravel(place), faces, labels)
-    for _ in range(_MAX_ROUNDS):
-        if not mesh.dissolve():
+    for k in range(2 * _MAX_ROUNDS):
+        # Take near slivers too where slivers in one line with them keep splitting each other.
+        if not mesh.dissolve(with_thin=k >= _MAX_ROUNDS):
             break
     return mesh.result()
 
@@ -62,10 +64,10 @@ class _Mesh:
         for f in range(len(self._faces)):
             self._enter(f)
 
-    def dissolve(self) -> int:
-        """Dissolve every sliver once; how many there were."""
+    def dissolve(self, *, with_thin: bool) -> int:
+        """Dissolve every sliver once, with faces nearly as thin, longest first; how many slivers."""
         slivers = self._slivers()
-        for f in slivers:
+        for f in self._thin() if with_thin and slivers else slivers:
             if self._alive[f]:
                 self._dissolve_one(f)
         return len(slivers)
@@ -80,6 +82,13 @@ class _Mesh:
         vertices = np.array(self._vertices)[:, :3]
         area = face_areas(vertices[np.array(self._faces, np.int64)])
         return np.flatnonzero((area <= MIN_AREA_M2) & np.array(self._alive)).tolist()
+
+    def _thin(self) -> list[int]:
+        corners = np.array(self._vertices)[:, :3][np.array(self._faces, np.int64)]
+        longest = np.linalg.norm(corners - np.roll(corners, -1, 1), axis=2).max(1)
+        is_thin = face_areas(corners) <= np.maximum(MIN_AREA_M2, 0.5 * _THIN_M * longest)
+        found = np.flatnonzero(is_thin & np.array(self._alive)).tolist()
+        return sorted(found, key=lambda f: -longest[f])
 
     def _dissolve_one(self, f: int) -> None:
         places = [self._place[v] for v in self._faces[f]]
