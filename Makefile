@@ -58,7 +58,7 @@ test-study: setup ## the study's tests that need torch; installs its CPU build (
 
 test-cuda: export PBRS_SETUP_ALSO := gcc
 test-cuda: setup ## the tests marked gpu without a GPU: what one would run is translated for the CPU, all but OpenGL
-	$(BIN)/python -m tests.cuda_on_cpu $(BIN)/pytest -m gpu -k "not opengl"
+	$(BIN)/python -m tests.cuda_on_cpu $(BIN)/pytest -m gpu -k "not opengl" tests/transport tests/workers
 
 bench: setup ## measure everything but house, dress, made, light and its tables, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
