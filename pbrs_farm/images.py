@@ -1,7 +1,8 @@
 """Pixels <-> PNG, EXR and JPEG bytes: the only user of OpenImageIO.
 
 Effects: a temporary file per call, because the binding reads and writes files only; it is gone
-when the call returns, and in memory where it is written (on a disk a small PNG took 5 ms). EXR channels are found by name, never by position (OpenEXR sorts them), and
+when the call returns. What is written goes to memory (on a disk a small PNG took 5 ms), what is
+read comes from a disk. EXR channels are found by name, never by position (OpenEXR sorts them), and
 carry a fixed DateTime, so that equal images give equal bytes.
 """
 
@@ -230,14 +231,24 @@ def _temporary(suffix: str, data: bytes | None = None) -> Iterator[Path]:
         path.unlink(missing_ok=True)
 
 
+def _memory_file() -> int | None:
+    """A file in memory, None where the system has none or a sandbox forbids it."""
+    if not (hasattr(os, "memfd_create") and _OPEN_FILES.is_dir()):
+        return None
+    try:
+        return os.memfd_create("pbrs-image")
+    except OSError:
+        return None
+
+
 @contextmanager
 def _scratch(suffix: str) -> Iterator[Path]:
     """An empty file in memory, where the system has such: one on a disk would be written out."""
-    if not (hasattr(os, "memfd_create") and _OPEN_FILES.is_dir()):
+    handle = _memory_file()
+    if handle is None:
         with _temporary(suffix) as path:
             yield path
         return
-    handle = os.memfd_create("pbrs-image")
     try:
         yield _OPEN_FILES / str(handle)
     finally:
@@ -255,7 +266,8 @@ def _encoded(array: NDArray[Any], spec: Any, suffix: str) -> bytes:
         closed = output.close()
         if not (written and closed):
             text = f"OpenImageIO cannot write {suffix}: {output.geterror()}"
-            hint = f"is there room for {path}?"
+            is_in_memory = path.parent == _OPEN_FILES
+            hint = "is there memory left?" if is_in_memory else f"is there room for {path}?"
             raise MachineFailed(text, hint=hint)
         return path.read_bytes()
 

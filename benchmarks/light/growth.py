@@ -46,9 +46,7 @@ class Cost(NamedTuple):
     view_s: float  # of a `fast` view
     sample_us: float  # of one of its samples, in microseconds
     pilot_s: float  # of its pilot and its trial
-    small_view_s: (
-        float  # what a `fast` view would cost with the samples and the pilot of a small one
-    )
+    small_view_s: float  # of a `fast` view, reckoned from a small one
     load_s: float
 
 

@@ -91,7 +91,7 @@ def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
     add_light(p)
     add_output(p)
     add = p.add_argument
-    text = "processes (default 1, and a second one for all but light; each view uses all cores)"
+    text = "processes (default 1, and a second one for most of all but light; each view uses all cores)"
     add("--jobs", type=int, default=1, metavar="N", help=text)
     text = "seconds a step may take (default 3600)"
     add("--step-timeout", type=float, default=3600.0, metavar="S", help=text)

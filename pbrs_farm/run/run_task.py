@@ -68,7 +68,7 @@ def make_light_handler(send: Send) -> Handler:
 
 
 def make_finishing_handler(send: Send) -> Handler:
-    """As make_handler, with what a house needs loaded before it is ready: homes are looked for yet."""
+    """As make_handler, with what a house needs loaded before it is ready, while homes are still looked for."""
     _load(_OF_HOUSES)
     return make_handler(send)
 

@@ -8,5 +8,5 @@ the last bits of approximate instructions are not the GPU's.
     make test-cuda                                   the tests marked gpu
     python -m tests.cuda_on_cpu COMMAND [ARGUMENT...]   any command
 
-Needs gcc. A thread is a warp of its own: what only goes wrong between threads is not found.
+Needs gcc on x86-64 Linux. A thread is a warp of its own: what only goes wrong between threads is not found.
 """

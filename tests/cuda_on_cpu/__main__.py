@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +23,7 @@ def main(command: list[str]) -> None:
         "DRJIT_LIBCUDA_PATH": str(OUT / "libcuda_on_cpu.so"),
         "DRJIT_LIBOPTIX_PATH": str(OUT / "liboptix_on_cpu.so"),
         "CUDA_ON_CPU": str(OUT),
-        "CUDA_ON_CPU_TRANSLATE": f"{sys.executable} {HERE / 'ptx_to_c.py'}",
+        "CUDA_ON_CPU_TRANSLATE": shlex.join([sys.executable, str(HERE / "ptx_to_c.py")]),
         "CUDA_ON_CPU_INCLUDE": str(HERE),
     }
     os.execvp(command[0], command)
@@ -34,7 +35,8 @@ def build() -> None:
 
     embree = next((Path(embreex.__file__).parents[1] / "embreex.libs").glob("libembree4*.so*"))
     driver, optix = OUT / "libcuda_on_cpu.so", OUT / "liboptix_on_cpu.so"
-    newest = max(path.stat().st_mtime for path in HERE.iterdir() if path.is_file())
+    sources = [*filter(Path.is_file, HERE.iterdir()), embree, _drjit()]
+    newest = max(path.stat().st_mtime for path in sources)
     if optix.is_file() and optix.stat().st_mtime > newest:
         return
     OUT.mkdir(parents=True, exist_ok=True)
@@ -47,13 +49,18 @@ def build() -> None:
     subprocess.run([*_CC, "-o", optix, HERE / "optix.c", *links], check=True)
 
 
+def _drjit() -> Path:
+    """Dr.Jit's library."""
+    import drjit
+
+    return Path(drjit.__file__).parent / "libdrjit-core.so"
+
+
 def _other_calls() -> str:
     """C of the driver's functions that Dr.Jit asks for and driver.c lacks: they do nothing."""
     import re
 
-    import drjit
-
-    library = (Path(drjit.__file__).parent / "libdrjit-core.so").read_bytes()
+    library = _drjit().read_bytes()
     asked = {name.decode() for name in re.findall(rb"\0(cu[A-Z]\w+)(?=\0)", library)}
     ours = set(re.findall(r"^int (cu\w+)\(", (HERE / "driver.c").read_text(), re.MULTILINE))
     return "".join(f"int {name}(void) {{ return 0; }}\n" for name in sorted(asked - ours))

@@ -98,8 +98,8 @@ void *compiled(const char *ptx, size_t n, const char *begins, char *name) {
   FILE *file = fopen(command, "w");
   fwrite(ptx, 1, n, file), fclose(file);
   snprintf(command, sizeof command,
-           "%s %s.ptx %s.c && gcc -w -O1 -mfma -I%s -shared -fPIC -o %s.so %s.c "
-           "%s/libcuda_on_cpu.so %s/liboptix_on_cpu.so -lm && mv %s.so %s && rm %s.ptx %s.c",
+           "%s '%s.ptx' '%s.c' && gcc -w -O1 -mfma -I'%s' -shared -fPIC -o '%s.so' '%s.c' "
+           "'%s/libcuda_on_cpu.so' '%s/liboptix_on_cpu.so' -lm && mv '%s.so' '%s' && rm '%s.ptx' '%s.c'",
            getenv("CUDA_ON_CPU_TRANSLATE"), part, part, getenv("CUDA_ON_CPU_INCLUDE"), part, part,
            out, out, part, path, part, part);
   if (system(command) || !(library = dlopen(path, RTLD_NOW)))

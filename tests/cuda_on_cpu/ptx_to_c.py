@@ -166,6 +166,8 @@ class _Kernel:
 
     def _translated(self, op: list[str], to: list[str]) -> str:
         name, kind = op[0], op[-1]
+        if _is_unknown(op):
+            raise KeyError(name)
         if name == "bra":
             return f"goto {to[0]};"
         if name == "ret":
@@ -250,7 +252,9 @@ class _Kernel:
     def _atomic(self, op: list[str], to: list[str]) -> str:
         kind, places = op[-1], to if op[0] == "red" else to[1:]
         at, value = f"({C_TYPES[kind]} *) {self._address(places[0])}", self._value(places[1], kind)
-        action = next(part for part in op[1:] if part in ("add", "or", "and", "exch"))
+        action = next((part for part in op[1:] if part in ("add", "or", "and", "exch")), "")
+        if not action:
+            raise KeyError(op[0])
         if kind == "f32":
             before = {"add": f"add_f32({at}, {value})"}[action]
         else:
@@ -323,6 +327,18 @@ class _Kernel:
                 results[0], f"hit.attributes[{self._value(given[0], 'u32')}]", "u32"
             )
         return self._assign(results[0], *HIT[query])
+
+
+def _is_unknown(op: list[str]) -> bool:
+    """Whether an instruction is a form of a known one that would be translated wrongly."""
+    name, types = op[0], {"ld", "ldu", "st", "mov", "selp", "setp", *BINARY}
+    return (
+        "sat" in op
+        or ("f64" in op and name not in types)
+        or (name in ("popc", "clz", "brev", "bfind") and op[-1].endswith("64"))
+        or (name == "bfind" and "shiftamt" not in op)
+        or (name == "setp" and bool(set(op[2:-1]) - {"ftz"}))
+    )
 
 
 def _variable(register: str) -> str:

@@ -24,9 +24,10 @@ def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
 
 
 def _make(name: str, work: Work) -> StepOutput:
-    word, _, where = work.recipe.name.partition(":")
+    word, _, place = work.recipe.name.partition(":")
+    where, _, home = place.partition("@")  # of any house, or of one whose id begins so
     at = f"{name}.{work.view_id}" if STEPS[name].per_view else name
-    if at == where:
+    if at == where and work.house_id.startswith(home):
         if word == "crash":
             os.kill(os.getpid(), signal.SIGSEGV)
         if word == "hang":

@@ -267,9 +267,14 @@ def test_several_houses_follow_one_another_through_both_processes(tmp_path: Path
 @pytest.mark.usefixtures("two_cores")
 @pytest.mark.parametrize("wrong", ["refuse", "crash"])
 def test_a_house_that_fails_costs_itself_alone(tmp_path: Path, wrong: str) -> None:
-    summary = run_local(Run(["builtin"], str(tmp_path), named(f"{wrong}:house")))
-    assert [what.split("/")[1] for what, _message, _command in summary.failures] == ["house"]
-    assert markers(tmp_path) == set()
+    homes = ["builtin", "made:1"]
+    summary = run_local(Run(homes, str(tmp_path), named(f"{wrong}:house@builtin")))
+    ((what, _message, _command),) = summary.failures
+    assert what.startswith("builtin")
+    assert what.endswith("/house")
+    # The other one is whole.
+    assert (summary.n_done, summary.n_views) == (N_STEPS, 2)
+    assert not list(tmp_path.glob("houses/builtin*/done/*"))
 
 
 @pytest.mark.usefixtures("two_cores")

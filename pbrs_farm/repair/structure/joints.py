@@ -120,7 +120,9 @@ def joints_with_surface(
 ) -> list[tuple[Wall, Manifold]]:
     """Wall parts that reach half a slab into the floor below or the ceiling above, hidden in it.
 
-    Made where a wall ends within GAP_M of the surface's plane, so that a gap there is filled too.
+    Made where a wall ends within GAP_M of the surface's plane, so that a gap there is filled too, and
+    in the corner of two walls of which one ends visibly short: over its whole height where they
+    hardly touch.
     doors: plan area of openings down to the floor, where a wall has no foot.
     """
     depth_m = 0.5 * thickness_m

@@ -18,11 +18,8 @@ UvMap = Callable[[F64], F64]
 """Texture coordinates (N, 2) of positions (N, 3)."""
 
 _ON_PLANE_M = 1e-3  # points of a plane lie no farther from it
-_CRUMBS_M = (
-    1e-5,
-    1e-4,
-    1e-3,
-)  # half the width of what parts rings; the next where one is too small
+# Half the width of what parts rings; the next where one is too small.
+_CRUMBS_M = (1e-5, 1e-4, 1e-3)
 
 
 @dataclass(frozen=True, slots=True)

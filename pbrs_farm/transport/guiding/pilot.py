@@ -156,7 +156,7 @@ def _pays(sums: SampleSums, shape: tuple[int, int, int]) -> bool:
     _plain, guided = _luminance(sums.outdoor + sums.indoor).reshape(shape)
     level = median_filter(guided, size=_NEIGHBOURS, mode="nearest")
     level += _DARK * max(float(level.mean()), 1e-12)
-    # Daylight is as noisy both ways, since the rays are guided into lamps: what differs in it by
+    # Daylight is nearly as noisy both ways, since rays are guided into lamps: what differs in it by
     # chance must not choose.
     halves = (sums.outdoor, sums.outdoor_even), (sums.indoor, sums.indoor_even)
     outdoor, indoor = ((_apart(*h).reshape(shape) / level) ** 2 for h in halves)
