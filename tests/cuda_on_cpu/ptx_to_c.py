@@ -334,10 +334,19 @@ def _is_unknown(op: list[str]) -> bool:
     name, types = op[0], {"ld", "ldu", "st", "mov", "selp", "setp", *BINARY}
     return (
         "sat" in op
-        or ("f64" in op and name not in types)
+        or ("f64" in op and name not in types and not _is_another_float(op))
         or (name in ("popc", "clz", "brev", "bfind") and op[-1].endswith("64"))
         or (name == "bfind" and "shiftamt" not in op)
         or (name == "setp" and bool(set(op[2:-1]) - {"ftz"}))
+    )
+
+
+def _is_another_float(op: list[str]) -> bool:
+    """Whether a number of one precision becomes the same of another."""
+    return (
+        op[0] == "cvt"
+        and all(kind.startswith("f") for kind in op[-2:])
+        and not set(op) & set(ROUNDED)
     )
 
 

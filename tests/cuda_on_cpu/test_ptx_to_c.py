@@ -73,6 +73,7 @@ def test_a_ray_carries_origin_direction_and_distances() -> None:
         "add.sat.f32 %f1, %f2, %f3;",
         "fma.rn.f64 %d1, %d2, %d3, %d4;",
         "cvt.rzi.u32.f64 %r1, %d2;",
+        "cvt.rni.f64.f64 %d1, %d2;",
         "setp.eq.and.u32 %p1, %r2, %r3, %p4;",
         "popc.b64 %r1, %rd2;",
         "bfind.u32 %r1, %r2;",
