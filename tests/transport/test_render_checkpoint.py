@@ -14,7 +14,7 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.render_checkpoint import Arrays
-from pbrs_farm.transport.scene_tables.sky import uniform_sky
+from pbrs_farm.transport.scene_tables.sky import sunsky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from tests.transport.test_path_tracer import FIELDS, RECIPE
 
@@ -60,24 +60,26 @@ class Memory:
             raise Killed
 
 
-@lru_cache(maxsize=1)
-def scene_and_camera() -> tuple[LightScene, Camera]:
+@lru_cache(maxsize=2)
+def scene_and_camera(*, is_sunny: bool) -> tuple[LightScene, Camera]:
     house, camera = rooms.window_room(lumen=800)
-    scene = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
+    # A sun before the window, so that each launch has sunlit points of its own.
+    sun = sunsky(RECIPE, elevation_rad=0.5, azimuth_rad=0.35)
+    scene = LightScene.load(house, {}, RECIPE, sun if is_sunny else uniform_sky((1, 1, 1)))
     return scene, camera.with_size(32, 24)
 
 
-def rendered(fields: LightFields, checkpoint: Memory) -> LightResult:
-    scene, camera = scene_and_camera()
+def rendered(fields: LightFields, checkpoint: Memory, *, is_sunny: bool = False) -> LightResult:
+    scene, camera = scene_and_camera(is_sunny=is_sunny)
     return scene.render(camera, "0_0", fields, 7, checkpoint)
 
 
-def gone_on(fields: LightFields, n: int) -> LightResult:
+def gone_on(fields: LightFields, n: int, *, is_sunny: bool = False) -> LightResult:
     """The picture of a render that was killed after it had kept n states."""
     killed = Memory(n)
     with pytest.raises(Killed):
-        rendered(fields, killed)
-    return rendered(fields, Memory(loaded=killed.states))
+        rendered(fields, killed, is_sunny=is_sunny)
+    return rendered(fields, Memory(loaded=killed.states), is_sunny=is_sunny)
 
 
 @pytest.fixture
@@ -92,9 +94,11 @@ def _short_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     "changes",
     [{"spp": 14}, {"spp": 4, "noise": 0.12, "max_spp": 256}, {"spp": 8, "groups": "lamps"}],
 )
-def test_path_goes_on_to_the_same_bits(changes: dict[str, object]) -> None:
+@pytest.mark.parametrize("is_sunny", [False, True])
+def test_path_goes_on_to_the_same_bits(changes: dict[str, object], is_sunny: bool) -> None:
     fields = FIELDS.model_copy(update=changes)
-    whole, again = rendered(fields, Memory()), gone_on(fields, 1)
+    whole = rendered(fields, Memory(), is_sunny=is_sunny)
+    again = gone_on(fields, 1, is_sunny=is_sunny)
     assert again.spp == whole.spp > 4
     assert again.noise == whole.noise
     for name in ("outdoor", "indoor", "albedo", "normal"):

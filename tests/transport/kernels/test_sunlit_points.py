@@ -11,6 +11,7 @@ import pytest
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.lighting import Group
+from pbrs_farm.core.picture_fields.lens_fields import LensFields
 from pbrs_farm.core.recipe import LightFields, recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_result import LightResult
@@ -60,6 +61,13 @@ def hard_room() -> tuple[House, Camera]:
     return replace(house, items=items, materials=materials), camera
 
 
+def seen_all_round() -> tuple[House, Camera]:
+    """The window room through the lens of a panorama."""
+    house, camera = bare_room()
+    intrinsics = LensFields(model="equirect").intrinsics(camera.intrinsics)
+    return house, Camera(intrinsics, camera.world_from_camera).with_size(32, 16)
+
+
 def renders(scene: LightScene, camera: Camera, seeds: range) -> list[LightResult]:
     return [scene.render(camera, "-", FIELDS, seed) for seed in seeds]
 
@@ -79,7 +87,9 @@ def renders_by_chance(scene: LightScene, camera: Camera, fields: LightFields) ->
         return [scene.render(camera, "-", fields, seed) for seed in range(20, 28)]
 
 
-@pytest.mark.parametrize(("room", "most"), [(bare_room, 0.4), (hard_room, 0.8)])
+@pytest.mark.parametrize(
+    ("room", "most"), [(bare_room, 0.4), (hard_room, 0.8), (seen_all_round, 0.6)]
+)
 def test_sunlit_points_leave_the_mean_alone_and_cut_the_noise(
     room: Callable[[], tuple[House, Camera]], most: float
 ) -> None:
