@@ -36,7 +36,7 @@ _OF_LIGHT = (
     "pbrs_farm.run.steps", "pbrs_farm.formats.house_bundle", "pbrs_farm.transport.light_scene",
     "pbrs_farm.transport.illuminance", "pbrs_farm.run.pilot_views", "pbrs_farm.run.blurred_camera",
 )  # fmt: skip
-_OF_HOUSES = (
+_OF_FINISHING = (
     "pbrs_farm.run.steps", "pbrs_farm.read.sweethome3d", "pbrs_farm.dress.dressing",
     "pbrs_farm.repair", "pbrs_farm.formats.house_bundle", "pbrs_farm.run.chosen_cameras",
 )  # fmt: skip
@@ -69,7 +69,7 @@ def make_light_handler(send: Send) -> Handler:
 
 def make_finishing_handler(send: Send) -> Handler:
     """As make_handler, with what a house needs loaded before it is ready, while homes are still looked for."""
-    _load(_OF_HOUSES)
+    _load(_OF_FINISHING)
     return make_handler(send)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -58,8 +59,6 @@ def _drjit() -> Path:
 
 def _other_calls() -> str:
     """C of the driver's functions that Dr.Jit asks for and driver.c lacks: they do nothing."""
-    import re
-
     library = _drjit().read_bytes()
     asked = {name.decode() for name in re.findall(rb"\0(cu[A-Z]\w+)(?=\0)", library)}
     ours = set(re.findall(r"^int (cu\w+)\(", (HERE / "driver.c").read_text(), re.MULTILINE))

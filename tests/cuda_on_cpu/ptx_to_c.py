@@ -31,6 +31,7 @@ SPECIAL: Final = {
 BINARY: Final = {
     "add": "+", "sub": "-", "mul": "*", "div": "/", "rem": "%", "and": "&", "or": "|", "xor": "^",
 }  # fmt: skip
+OF_DOUBLES: Final = {"ld", "ldu", "st", "mov", "selp", "setp", *BINARY}  # translated for f64, too
 UNARY: Final = {
     "neg": "-({0})", "not": "~({0})", "abs": "fabsf({0})", "sqrt": "sqrtf({0})",
     "rsqrt": "1.0f / sqrtf({0})", "rcp": "1.0f / ({0})", "sin": "sinf({0})", "cos": "cosf({0})",
@@ -67,6 +68,14 @@ def c_of_ptx(text: str) -> str:
             end += 1
         parts.append(_Kernel(match[1]).translated(text[match.end() : end - 1]))
     return "\n".join(parts)
+
+
+def _groups(pattern: str, text: str) -> tuple[str, ...]:
+    """The groups of a pattern that the whole text must match."""
+    match = re.fullmatch(pattern, text)
+    if match is None:
+        raise UnknownPtxError(text)
+    return match.groups()
 
 
 def _operands(text: str) -> list[str]:
@@ -136,20 +145,18 @@ class _Kernel:
         if text.startswith("label "):
             self._lines.append(f"{text[6:]}: ;")
         elif text.startswith(".reg"):
-            kind, names = re.fullmatch(r"\.reg\s*\.(\w+)\s+(.*)", text).groups()  # type: ignore[union-attr]
+            kind, names = _groups(r"\.reg\s*\.(\w+)\s+(.*)", text)
             for name in _operands(names):
                 if "<" not in name:
                     self._types.setdefault(name, kind)
                     continue
                 # %r<9> and the like are made when they are met.
-                stem, n = re.fullmatch(r"(%\w+)\s*<(\d+)>", name).groups()  # type: ignore[union-attr]
+                stem, n = _groups(r"(%\w+)\s*<(\d+)>", name)
                 if stem[1:] not in PREFIXES and stem != "%h":
                     self._types.update({f"{stem}{k}": kind for k in range(int(n))})
         elif text.startswith(".local"):
-            found = re.fullmatch(r"\.local \.align \d+ \.(\w+) (\w+)\[(\d+)\]", text)
-            if found is None:
-                raise UnknownPtxError(text)
-            self._arrays[found[2]] = f"{C_TYPES[found[1]]} {found[2]}[{found[3]}];"
+            kind, name, n = _groups(r"\.local \.align \d+ \.(\w+) (\w+)\[(\d+)\]", text)
+            self._arrays[name] = f"{C_TYPES[kind]} {name}[{n}];"
         else:
             self._instruction(text)
 
@@ -195,10 +202,8 @@ class _Kernel:
 
     def _type(self, register: str) -> str:
         if register not in self._types:
-            prefix = re.fullmatch(r"%([a-z]+)\d+", register)
-            if prefix is None:
-                raise UnknownPtxError(register)
-            self._types[register] = PREFIXES[prefix[1]]
+            (prefix,) = _groups(r"%([a-z]+)\d+", register)
+            self._types[register] = PREFIXES[prefix]
         return self._types[register]
 
     def _value(self, operand: str, kind: str) -> str:
@@ -331,10 +336,10 @@ class _Kernel:
 
 def _is_unknown(op: list[str]) -> bool:
     """Whether an instruction is a form of a known one that would be translated wrongly."""
-    name, types = op[0], {"ld", "ldu", "st", "mov", "selp", "setp", *BINARY}
+    name = op[0]
     return (
         "sat" in op
-        or ("f64" in op and name not in types and not _is_another_float(op))
+        or ("f64" in op and name not in OF_DOUBLES and not _is_another_float(op))
         or (name in ("popc", "clz", "brev", "bfind") and op[-1].endswith("64"))
         or (name == "bfind" and "shiftamt" not in op)
         or (name == "setp" and bool(set(op[2:-1]) - {"ftz"}))

@@ -24,11 +24,11 @@ RENDER: Final = 0
 """The lane of processes that do any task, or render light where another does all else."""
 FINISH: Final = 1
 """The lane of the process that makes houses and finishes views whose light another one renders."""
-ALONE, LIGHT, REST = "alone", "light", "rest"
+ALONE, LIGHT, FINISHING = "alone", "light", "finishing"
 HANDLERS: Final = {
     ALONE: "pbrs_farm.run.run_task:make_handler",
     LIGHT: "pbrs_farm.run.run_task:make_light_handler",
-    REST: "pbrs_farm.run.run_task:make_finishing_handler",
+    FINISHING: "pbrs_farm.run.run_task:make_finishing_handler",
 }
 """What makes the handler of a process that does every step, light, or all else."""
 
@@ -112,7 +112,7 @@ class Pool:
     def _added(self, lane: int) -> _Worker:
         log = Path(self._folder.name) / f"process-{len(self._workers)}.log"
         is_apart = self._lanes[FINISH] > 0
-        role = REST if lane == FINISH else LIGHT if is_apart else ALONE
+        role = FINISHING if lane == FINISH else LIGHT if is_apart else ALONE
         start = partial(ChildProcess, HANDLERS[role], log)
         self._workers.append(_Worker(RenderProcess(start, self._limits), lane))
         return self._workers[-1]
