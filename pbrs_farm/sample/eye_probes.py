@@ -70,20 +70,29 @@ def not_above_floor(house: House, eyes: F64, counter: ItemCounter) -> Bools:
 def enclosed(house: House, eyes: F64, counter: ItemCounter) -> Bools:
     """(N,) bool: one item all around the eye (N, 3): a wardrobe's inside, a solid wall's.
 
-    Counts the pixels of the six faces of a cube around the eye.
+    Counts the pixels of the six faces of a cube around the eyes that some item's box holds.
     """
-    cube = Intrinsics.from_hfov(_CUBE_PX, _CUBE_PX, math.pi / 2)
-    cameras = [Camera(cube, pose) for pose in _cube_poses(eyes)]
     bounds, most = _enclosing(house)
     inside = np.zeros(len(eyes), np.bool_)
+    held = np.flatnonzero(_held_by(bounds, eyes))
+    cube = Intrinsics.from_hfov(_CUBE_PX, _CUBE_PX, math.pi / 2)
+    cameras = [Camera(cube, pose) for pose in _cube_poses(eyes[held])]
     for part, rows in counted(counter, cameras, len(house.items), group=6):
         # Add up the six faces, and compare with what encloses each item's kind.
         share = rows[:, 1:].reshape(-1, 6, len(house.items)).sum(1) / (6 * _CUBE_PX**2)
-        which = slice(part.start // 6, part.stop // 6)
+        which = held[part.start // 6 : part.stop // 6]
         eye = eyes[which, None, :]
         holds = ((eye >= bounds[:, 0]) & (eye <= bounds[:, 1])).all(2)
         inside[which] = (holds & (share > most)).any(1)
     return inside
+
+
+def _held_by(bounds: F64, eyes: F64) -> Bools:
+    """(N,) bool: the box of some item (I, 2, 3) holds the eye (N, 3)."""
+    held = np.zeros(len(eyes), np.bool_)
+    for low, high in bounds:
+        held |= ((eyes >= low) & (eyes <= high)).all(1)
+    return held
 
 
 def _cube_poses(eyes: F64) -> F64:

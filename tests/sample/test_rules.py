@@ -1,16 +1,20 @@
 """The paper's rules (section 3.1), held by every winner and recomputed from the geometry."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import House, ItemKind
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.eye_probes import enclosed
 from pbrs_farm.sample.rejection import Verdict
 from tests.builders import builtin_home
 from tests.sample.sampled_rooms import (
@@ -72,6 +76,21 @@ def test_no_candidate_inside_a_wardrobe_is_kept() -> None:
     refused = {Verdict(v) for v in np.unique(trace.verdict[inside])}
     assert refused <= {Verdict.ENCLOSED, Verdict.NEAR_OBSTACLE}
     assert Verdict.ENCLOSED in refused
+
+
+def test_only_eyes_that_a_box_holds_are_looked_around_from() -> None:
+    house = furnished()
+    count, wardrobe = counter_of(house), house.items[-1].bounds.mean(0)
+    seen: list[int] = []
+
+    def watched(cameras: Sequence[Camera]) -> NDArray[np.uint32]:
+        seen.append(len(cameras))
+        return count(cameras)
+
+    free = np.array([[1.0, 1.5, 1.0], [1.5, 1.5, 1.0]])
+    eyes = np.concatenate([free[:1], wardrobe[None], free[1:]])
+    assert enclosed(house, eyes, watched).tolist() == [False, True, False]
+    assert seen == [6]  # the faces of one cube
 
 
 def test_no_candidate_inside_a_thick_wall_that_the_room_overlaps_is_kept() -> None:
