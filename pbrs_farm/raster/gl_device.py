@@ -27,10 +27,15 @@ def n_samples(context: Any, wanted: int) -> int:
 def open_context() -> Any:
     """A headless OpenGL 3.3 context; raises MachineFailed when there is none.
 
-    Through EGL, which needs no display; else through what moderngl finds (X11, CGL, WGL).
+    Through EGL, which needs no display; else through what moderngl finds (X11, CGL, WGL). Where its
+    libraries have other names glcontext looks for them, with a process for each: 0.1 s of a large one.
     """
     faults = []
-    ways: dict[str, Any] = {"EGL": {"backend": "egl"}, "the system's own": {}}
+    ways: dict[str, Any] = {
+        "EGL by its usual name": {"backend": "egl", "libgl": "libGL.so.1", "libegl": "libEGL.so.1"},
+        "EGL": {"backend": "egl"},
+        "the system's own": {},
+    }
     for name, settings in ways.items():
         try:
             context = moderngl.create_context(require=330, standalone=True, **settings)

@@ -24,7 +24,23 @@ def test_where_egl_fails_the_systems_own_way_is_taken(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(moderngl, "create_context", create)
     assert open_context() is found
-    assert asked == ["egl", "default"]
+    assert asked == ["egl", "egl", "default"]
+
+
+def test_egl_by_its_usual_name_needs_no_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[dict[str, Any]] = []
+    found = SimpleNamespace(enable=lambda _flag: None)
+
+    def create(**settings: Any) -> Any:
+        asked.append(settings)
+        if len(asked) == 1:
+            raise Exception("libEGL.so.1 not loaded")
+        return found
+
+    monkeypatch.setattr(moderngl, "create_context", create)
+    assert open_context() is found
+    assert (asked[0]["libgl"], asked[0]["libegl"]) == ("libGL.so.1", "libEGL.so.1")
+    assert "libegl" not in asked[1]
 
 
 def test_without_any_the_reason_of_each_and_the_remedy_are_told(
