@@ -18,6 +18,7 @@ from pbrs_farm.core.mesh import (
     face_areas,
     faces_with_area,
     lengths,
+    numbered_points,
     points_bounds,
     signed_volume,
     triangle_corners,
@@ -73,6 +74,16 @@ def test_boxes_that_touch_meet_and_one_apart_along_an_axis_does_not() -> None:
 def test_unique_points_are_numpys_unique_rows(n: int) -> None:
     points = np.random.default_rng(3).integers(0, 4, (n, 3)).astype(np.float64)
     np.testing.assert_array_equal(unique_points(points), np.unique(points, axis=0))
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 200])
+def test_points_are_numbered_as_numpys_unique_rows_are(n: int) -> None:
+    points = np.random.default_rng(4).integers(-1, 3, (n, 3)).astype(np.float64)
+    points *= np.where(np.arange(n) % 2, 1.0, -1.0)[:, None]  # zeros of both signs are one place
+    _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    found = numbered_points(points)
+    np.testing.assert_array_equal(found[0], first)
+    np.testing.assert_array_equal(found[1], np.ravel(number))
 
 
 @pytest.mark.parametrize("seed", range(20))

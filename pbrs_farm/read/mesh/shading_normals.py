@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, I32, I64
-from pbrs_farm.core.mesh import unit_normals
+from pbrs_farm.core.mesh import numbered_points, unit_normals
 
 
 def crease_normals(points: F64, faces: I64, crease_rad: float) -> tuple[F64, I64]:
@@ -33,7 +33,7 @@ def crease_normals(points: F64, faces: I64, crease_rad: float) -> tuple[F64, I64
 
 def _normal_of_corner(points: F64, faces: I64, unit: F64, min_cos: float) -> tuple[int, I32]:
     # How many normals there are, and which each of the 3 F corners has.
-    _, welded = np.unique(points[faces.ravel()], axis=0, return_inverse=True)
+    _, welded = numbered_points(points[faces.ravel()])
     first, second = _smooth_links(welded.reshape(-1, 3), unit, min_cos)
     # Corners that smooth edges join, directly or through others, share one normal.
     shape = (faces.size, faces.size)

@@ -14,7 +14,7 @@ import shapely
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, Surface, geometry_from_house
-from pbrs_farm.core.mesh import triangle_corners, unit_normals
+from pbrs_farm.core.mesh import dots, lengths, triangle_corners, unit_normals
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.occluder import Occluder
 from pbrs_farm.repair.measure.room_edges import RoomInterior
@@ -185,12 +185,13 @@ def _measured(
             for a, b in zip(p[gone][: _MAX_LEAKS - len(leaks)], d[gone], strict=False)
         ]
         # Go on from the front of faces; absorb rays that see a back, inside a solid.
-        front = ~gone
-        front[front] = (d[front] * normals[face[front]]).sum(1) < 0
+        met = np.flatnonzero(~gone)
+        n, towards = normals.take(face[met], 0), d.take(met, 0)
+        is_front = dots(towards, n) < 0
         if flight == 0:
-            n_blind = int((~gone & ~front).sum())
-        reached = p[front] + d[front] * distance[front, None].astype(np.float64)
-        n = normals[face[front]]
+            n_blind = len(met) - int(is_front.sum())
+        front, n = met[is_front], n[is_front]
+        reached = p[front] + towards[is_front] * distance[front, None].astype(np.float64)
         # Bounce diffusely: a point on a unit sphere that touches the face.
         d = _unit(_unit(rng.normal(size=n.shape)) + n)
         p = reached + 1e-4 * n
@@ -204,7 +205,7 @@ def _measured(
 
 
 def _unit(v: F64) -> F64:
-    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12))
+    return np.asarray(v / np.maximum(lengths(v), 1e-12)[:, None])
 
 
 def _triple(v: F64) -> tuple[float, float, float]:

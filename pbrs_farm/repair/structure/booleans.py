@@ -19,7 +19,7 @@ from manifold3d import Manifold
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, I64
-from pbrs_farm.core.mesh import edges_are_paired, signed_volume
+from pbrs_farm.core.mesh import edges_are_paired, numbered_points, signed_volume
 from pbrs_farm.repair.structure.sliver_removal import without_slivers
 
 WELD_M = 1e-5  # corners nearer than this become one where exact ones do not close
@@ -122,8 +122,8 @@ def _welded(patches: Sequence[Patch], weld_m: float) -> _Welded:
     # Join the vertex lists; declare equal positions of different patches to be one vertex.
     positions = np.concatenate([p.positions for p in patches])
     keys = np.round(positions / weld_m) if weld_m else positions + 0.0  # + 0.0 makes -0 and 0 equal
-    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    canonical = first[np.ravel(inverse)]  # each vertex -> the first at its place
+    first, number = numbered_points(keys)
+    canonical = first[number]  # each vertex -> the first at its place
     if weld_m:
         positions = positions[canonical]
     faces = faces_of_patches(patches)

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import face_areas, signed_volume, unit_normals
+from pbrs_farm.core.mesh import face_areas, numbered_points, signed_volume, unit_normals
 from pbrs_farm.repair.structure.booleans import (
     WELD_M,
     Patch,
@@ -80,9 +80,7 @@ def components(patches: Sequence[Patch]) -> list[I64]:
     """For each patch the shell (F,) of each face; shells are faces joined at their corners."""
     positions = np.concatenate([p.positions for p in patches])
     # Number the places of corners through all patches.
-    keys = np.round(positions / WELD_M)
-    _, inverse = np.unique(keys, axis=0, return_inverse=True)
-    node = np.ravel(inverse)
+    _, node = numbered_points(np.round(positions / WELD_M))
     faces = node[faces_of_patches(patches)]
     # Connect the corners of each face, then label connected places.
     rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from pbrs_farm.core.arrays import F64, I64
-from pbrs_farm.core.mesh import face_areas
+from pbrs_farm.core.mesh import face_areas, numbered_points
 
 MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver: float32 holds no smaller one
 _MERGE_M = 4e-6  # a few steps of float32 ten metres from the origin
@@ -32,9 +32,9 @@ def without_slivers(vertices: F64, faces: I64, labels: I64) -> tuple[F64, I64, I
     # Round positions to float32, one for each cluster of close points.
     vertices = vertices.copy()
     vertices[:, :3] = vertices[_representatives(vertices[:, :3]), :3].astype(np.float32)
-    _, place = np.unique(vertices[:, :3], axis=0, return_inverse=True)
+    _, place = numbered_points(vertices[:, :3])
     # Dissolve until no sliver is left.
-    mesh = _Mesh(vertices, np.ravel(place), faces, labels)
+    mesh = _Mesh(vertices, place, faces, labels)
     for k in range(2 * _MAX_ROUNDS):
         # Take near slivers too where slivers in one line with them keep splitting each other.
         if not mesh.dissolve(with_thin=k >= _MAX_ROUNDS):
