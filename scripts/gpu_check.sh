@@ -6,9 +6,10 @@
 #   scripts/gpu_check.sh FOLDER                     takes them from a folder: no network, no pip, no xz
 #   scripts/gpu_check.sh --wheels FOLDER [VERSION]  makes the folder for a version of Python, where there is a network
 #
-# The folder's wheels-VERSION.tar.xz (55 MB) holds the files of the published wheels, unchanged, less those that
-# nothing here opens (gpu_wheels.py says which). denoiser-VERSION.tar.xz (45 MB) is Open Image Denoise: where it is
-# left behind, views are not denoised, and the table says so. PYTHON names the interpreter; else it is the first of
+# The folder's wheels-VERSION.tar.xz (58.5 MB) holds the libraries of the published wheels as cut copies, for this check
+# only: gpu_wheels.txt says which files are left out because nothing here opens them, gpu_wheels.py what is blanked in
+# the others (debug data, and the networks of Open Image Denoise that pbrs_farm does not ask for), CUT.txt in the
+# archive in which. Take libraries for anything else from the wheels. PYTHON names the interpreter; else it is the first of
 # python3 and python3.11 to python3.14 that the folder has an archive for.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -51,13 +52,11 @@ done
 if [ -n "${1:-}" ]; then
   [ -x "$VENV/bin/python" ] || "$python" -m venv --without-pip "$VENV"
   # Python unpacks them: a bare machine may have no xz.
-  "$VENV/bin/python" -W ignore - "$1"/{wheels,denoiser}-"$version".tar.xz <<'UNPACK'
+  "$VENV/bin/python" -W ignore - "$1/wheels-$version.tar.xz" <<'UNPACK'
 import sys, sysconfig, tarfile
-from pathlib import Path
 
-for archive in filter(Path.exists, map(Path, sys.argv[1:])):
-    with tarfile.open(archive) as tar:
-        tar.extractall(sysconfig.get_path("purelib"))
+with tarfile.open(sys.argv[1]) as tar:
+    tar.extractall(sysconfig.get_path("purelib"))
 UNPACK
 else
   [ -x "$VENV/bin/python" ] || "$python" -m venv "$VENV"

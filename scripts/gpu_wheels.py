@@ -1,11 +1,13 @@
 """Packs the libraries of scripts/gpu_check.sh for a machine without a network.
 
-Effects: fetches wheels with pip, writes FOLDER/wheels-VERSION.tar.xz and FOLDER/denoiser-VERSION.tar.xz.
+Effects: fetches wheels with pip, denoises a picture twice, writes FOLDER/wheels-VERSION.tar.xz.
 
-The archives hold files of the published wheels, unchanged, unpacked side by side, less those that
-gpu_wheels.txt leaves out because the check opens none of them. All are compressed as one stream,
-with the filter for x86 code. The denoiser stands apart: the networks in its library are 44 MB that
-no compressor makes smaller.
+The archive holds the files of the published wheels, unpacked side by side, less those that
+gpu_wheels.txt leaves out because the check opens none of them. Libraries are cut copies, for this
+check only: what the loader does not map is blanked (debug data, symbol tables), and so are those
+networks of Open Image Denoise that pbrs_farm does not ask for, 42 of its 51 MB. That library is cut
+only if a picture comes out the same bits before and after; else it is packed whole.
+CUT.txt, packed with them, names every library that was changed.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
+from library_cuts import without_debug, without_networks
+
 HERE: Final = Path(__file__).resolve().parent
 EXTRAS: Final = ("gl", "transport", "workers")
 TEST_PACKAGES: Final = ("pytest", "hypothesis")
@@ -28,12 +32,28 @@ TEST_PACKAGES: Final = ("pytest", "hypothesis")
 _FOR_OLDER_PYTHON: Final = ("async-timeout",)
 # Dependencies that nothing in the check imports: tables, the board's pages, a coordinator's figures.
 NOT_CARRIED: Final = ("pyarrow", "jinja2", "prometheus-client")
+DENOISER: Final = "pyoidn/oidn/lib"
+# What color, albedo and normal, hdr and cleanAux, of high quality are denoised by.
+NETWORK: Final = "rt_hdr_calb_cnrm_large"
+NOTICE_OF_DEBUG: Final = """\
+Cut copies, for scripts/gpu_check.sh of pbrs_farm only: in the libraries named here, everything that
+the loader does not map (debug data, symbol tables) was overwritten with zeros. Take the libraries
+themselves from the published wheels, whose versions the folders *.dist-info name.
+
+"""
+NOTICE_OF_NETWORKS: Final = f"""\
+A cut copy, for scripts/gpu_check.sh of pbrs_farm only: in libOpenImageDenoise_core all networks but
+{NETWORK} were overwritten with zeros; a filter that asks for another one fails.
+Take Open Image Denoise itself from https://www.openimagedenoise.org. It is distributed under the
+licence below.
+
+"""
 # pip takes each by its exact name.
 _ABIS: Final = "_2_28 _2_27 _2_24 _2_17 2014 _2_12 2010 _2_5 1"
 
 
 def main() -> None:
-    """Fetch, leave out, pack; say how large the archives are."""
+    """Fetch, leave out, cut, pack; say how large the archive is."""
     parser = argparse.ArgumentParser(description="pack the libraries of the GPU check")
     parser.add_argument("folder", type=Path)
     parser.add_argument("python", nargs="?", default="{}.{}".format(*sys.version_info[:2]))
@@ -42,11 +62,14 @@ def main() -> None:
     with TemporaryDirectory() as scratch:
         site = Path(scratch)
         fetch(site, args.python)
-        for name, files in archives(carried(site)).items():
-            archive = args.folder / f"{name}-{args.python}.tar.xz"
-            pack(site, files, archive)
-            n_bytes = archive.stat().st_size
-            sys.stdout.write(f"{archive}: {n_bytes / 1e6:.1f} MB, {len(files)} files\n")
+        cut_networks(site / DENOISER)
+        cut_debug(site, carried(site))
+        files = carried(site)
+        archive = args.folder / f"wheels-{args.python}.tar.xz"
+        pack(site, files, archive)
+        n_bytes = archive.stat().st_size
+        size = f"{n_bytes / 1e6:.1f} MB ({n_bytes / 2**20:.1f} MiB)"
+        sys.stdout.write(f"{archive}: {size}, {len(files)} files\n")
 
 
 def requirements() -> list[str]:
@@ -89,18 +112,56 @@ def carried(site: Path) -> list[str]:
     return [path for path in by_kind if is_carried(path)]
 
 
-def archives(files: list[str]) -> dict[str, list[str]]:
-    """Name of an archive -> its files."""
-    denoiser = [path for path in files if path.startswith("pyoidn")]
-    return {"wheels": [p for p in files if not p.startswith("pyoidn")], "denoiser": denoiser}
+def cut_networks(denoiser: Path) -> None:
+    """Blank the networks of Open Image Denoise that pbrs_farm never asks for; CUT.txt says so.
+
+    denoiser: the folder of its libraries. They stay whole, and a line says why, when the networks
+    are not found, or a picture does not come out the same bits.
+    """
+    core = next(denoiser.glob("libOpenImageDenoise_core.so.*"))
+    whole = core.read_bytes()
+    try:
+        before = picture(denoiser)
+        core.write_bytes(without_networks(whole, NETWORK))
+        if picture(denoiser) != before:
+            raise ValueError("a picture comes out otherwise")
+    except ValueError as error:
+        core.write_bytes(whole)
+        sys.stderr.write(f"gpu_wheels: {core.name} is packed with all its networks: {error}\n")
+        return
+    licence = (HERE.parent / "LICENSE").read_text(encoding="utf-8")
+    (denoiser / "CUT.txt").write_text(NOTICE_OF_NETWORKS + licence, "utf-8")
+
+
+def cut_debug(site: Path, files: list[str]) -> None:
+    """Blank what the loader does not map of the libraries among the files; CUT.txt names them."""
+    changed = []
+    for path in (p for p in files if ".so" in p):
+        whole = (site / path).read_bytes()
+        cut = without_debug(whole)
+        if cut != whole:
+            (site / path).write_bytes(cut)
+            changed.append(f"{path}\n")
+    (site / "CUT.txt").write_text(NOTICE_OF_DEBUG + "".join(changed), "utf-8")
+
+
+def picture(denoiser: Path) -> str:
+    """Hash of a picture denoised by the libraries of that folder, or why there is none.
+
+    Another process loads them, so that each call sees what the folder holds now.
+    """
+    library = denoiser / "libOpenImageDenoise.so"
+    command = [sys.executable, str(HERE / "denoise_once.py"), str(library)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if done.returncode:
+        raise ValueError(done.stderr.strip().rpartition("\n")[2])
+    return done.stdout
 
 
 def pack(site: Path, files: list[str], archive: Path) -> None:
     """Write one compressed stream; without owners and clocks, so that equal wheels give equal bytes."""
-    # Weights of half precision come in pairs of bytes; code and text do not.
-    pairs = {"lc": 0, "lp": 1, "pb": 1} if archive.name.startswith("denoiser") else {}
     preset = {"preset": 9 | lzma.PRESET_EXTREME, "dict_size": 1 << 27}
-    filters = [{"id": lzma.FILTER_X86}, {"id": lzma.FILTER_LZMA2, **preset, **pairs}]
+    filters = [{"id": lzma.FILTER_X86}, {"id": lzma.FILTER_LZMA2, **preset}]
     with (
         lzma.open(archive, "wb", filters=filters) as stream,
         tarfile.open(fileobj=stream, mode="w") as tar,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import os
 import subprocess
 import sys
@@ -15,14 +15,10 @@ import pytest
 SCRIPTS = Path(__file__).parents[2] / "scripts"
 
 
-@pytest.fixture(scope="module")
-def wheels() -> ModuleType:
-    found = importlib.util.spec_from_file_location("gpu_wheels", SCRIPTS / "gpu_wheels.py")
-    assert found is not None
-    assert found.loader is not None
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
+@pytest.fixture
+def wheels(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(SCRIPTS)
+    return importlib.import_module("gpu_wheels")
 
 
 @pytest.mark.parametrize(
@@ -32,8 +28,12 @@ def wheels() -> ModuleType:
         ("mitsuba/cuda_ad_mono.cpython-312-x86_64-linux-gnu.so", False),
         ("mitsuba/plugins/sunsky.so", True),
         ("mitsuba/plugins/volpath.so", False),
-        ("pyoidn/oidn/lib/libOpenImageDenoise_device_cuda.so.2.5.1", True),
+        ("pyoidn/oidn/lib/libOpenImageDenoise_core.so.2.5.1", True),
+        ("pyoidn/oidn/lib/libOpenImageDenoise_device_cpu.so.2.5.1", True),
+        ("pyoidn/oidn/lib/libOpenImageDenoise_device_cuda.so.2.5.1", False),
         ("pyoidn/oidn/lib/libOpenImageDenoise_device_hip.so.2.5.1", False),
+        ("pyoidn/oidn/lib/libtbb.so.12", True),
+        ("pyoidn/oidn/lib/CUT.txt", True),
         ("numpy/_core/tests/test_umath.py", False),
         ("trimesh/base.py", True),
     ],
@@ -57,16 +57,16 @@ def test_what_is_packed_comes_out_as_it_was_and_packs_to_the_same_bytes(
     for path, content in contents.items():
         (site / path).parent.mkdir(parents=True, exist_ok=True)
         (site / path).write_bytes(content)
-    parts = wheels.archives(wheels.carried(site))
-    assert parts == {"wheels": ["a/x.py", "a/b.so"], "denoiser": ["pyoidn/y"]}
+    carried = wheels.carried(site)
+    assert carried == ["a/x.py", "pyoidn/y", "a/b.so"]
     for name in ("one", "two"):
-        wheels.pack(site, parts["wheels"], tmp_path / f"{name}.tar.xz")
+        wheels.pack(site, carried, tmp_path / f"{name}.tar.xz")
         os.utime(site / "a/x.py", (1, 1))
     assert (tmp_path / "one.tar.xz").read_bytes() == (tmp_path / "two.tar.xz").read_bytes()
     with tarfile.open(tmp_path / "one.tar.xz") as tar:
         unpacked = {m.name: tar.extractfile(m) for m in tar}
         assert {k: f.read() for k, f in unpacked.items() if f} == {
-            path: contents[path] for path in parts["wheels"]
+            path: contents[path] for path in carried
         }
 
 
