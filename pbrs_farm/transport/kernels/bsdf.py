@@ -88,6 +88,15 @@ def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any) -> Any:
     return dr.select(use_coat, 2 * dr.dot(wi, h) * h - wi, wo)
 
 
+def coat_reflection(f0: Any, alpha: Any, wi: Any, wo: Any) -> Any:
+    """f |cos wo| of the coat alone, 0 without one; local directions, both above."""
+    h = dr.normalize(wi + wo)
+    g = 1 + _lambda(wi, alpha) + _lambda(wo, alpha)
+    fresnel = _schlick(f0, dr.maximum(dr.dot(wi, h), 0))
+    reflected = fresnel * (_ggx_d(h, alpha) / (4 * wi.z * g))
+    return dr.select((alpha > 0) & (wi.z > 0) & (wo.z > 0), reflected, 0)
+
+
 def is_reconnectable(bsdf: Bsdf) -> Any:
     """Whether the surface is rough enough that a path through it may be seen from elsewhere."""
     return (bsdf.alpha <= 0) | (bsdf.alpha >= _MIN_RECONNECT_ALPHA)

@@ -125,7 +125,7 @@ def _direct_light(
     contributes = contributes & sample.valid & (sample.pdf > 0)
     # Weigh by the balance heuristic; the sample's own pdf cancels with the estimator's.
     weight = 1 / (sample.pdf + pdf)
-    taken = _taken_by_sunlit(context, vertex, path, sample, wo, contributes)
+    taken = _taken_by_sunlit(context, vertex, path, sample, value, contributes)
     if roulette is not None:
         rate = context.emitters.arrival.of_kind(si.p, sample.kind, contributes)
         left = value * sample.radiance * weight
@@ -158,14 +158,13 @@ def _taken_by_sunlit(
     vertex: Vertex,
     path: PathState | None,
     sample: DirectionSample | SunlitSample,
-    wo: Any,
+    value: Any,
     active: Any,
 ) -> Any:
     """Color3f of the light of a sample that sunlit points bring instead; None where there are none."""
     if context.sunlit is None or path is None:
         return None
     by_sun = active & (sample.kind == SUN)
-    taken = context.sunlit.share_of_sun(
-        (path.reference.p, path.bsdf_pdf), vertex.si, vertex.wi, wo, sample.d, by_sun
-    )
-    return dr.select(by_sun, taken * sample.radiance / sample.pdf, 0)
+    ray = path.reference.p, path.bsdf_pdf
+    share = context.sunlit.share_of_sun(ray, vertex.si, sample.d, by_sun)
+    return dr.select(by_sun, value * sample.radiance * (share / sample.pdf), 0)

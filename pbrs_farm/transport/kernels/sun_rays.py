@@ -27,10 +27,12 @@ _POINTS, _CELLS = 0xFFFFFFFF, 0xFFFFFFFE  # random streams that no pixel has
 _SCATTERED: Final = 8  # rays from a place, to see what its light is worth
 
 # Floats of a point: place, cosine to the sun; face normal, pdf of the ray per m2 of the plane; shading
-# normal, 1 under a coat; radiance that it reflects, less diffuse_response() (bsdf.py).
-POINT_FLOATS: Final = 16
-COS_SUN, PLANE_PDF, COATED = 3, 7, 11
-RADIANCE: Final = slice(12, 15)
+# normal, roughness of its coat or 0; radiance that it reflects diffusely, less diffuse_response()
+# (bsdf.py), direction to the sun, and the sun's irradiance, each with a channel of the coat's f0.
+POINT_FLOATS: Final = 24
+COS_SUN, PLANE_PDF, ALPHA = 3, 7, 11
+RADIANCE, IRRADIANCE = slice(12, 15), slice(20, 23)
+F0: Final = [15, 19, 23]
 
 
 class SunRays(NamedTuple):
@@ -40,6 +42,7 @@ class SunRays(NamedTuple):
     d: Any  # unit direction to the sun
     cos_sun: Any  # to the face's normal
     light: Any  # Color3f, radiance reflected diffusely, less diffuse_response()
+    irradiance: Any  # Color3f, of a surface that faces the sun
     lit: Any  # Bool: the sun shines on a surface that scatters and lets nothing through
 
 
@@ -54,8 +57,9 @@ def sun_rays(scene: DeviceScene, sun: SunDisc, plane: SunPlane, cell: Any, sampl
     is_rough = si.valid & ~si.is_cutout & (si.bsdf.kind == SURFACE)
     may = is_rough & (dr.max(si.bsdf.tau) <= 0) & (cos_sun > 0) & (cos_n > 0)
     clear = scene.transmittance(offset_ray_origin(si.p, si.ng), d, mi.Float(dr.inf), may)
-    light = diffuse_reflection(si.bsdf, cos_n) * sun.irradiance * clear
-    return SunRays(si, d, cos_sun, light, may & (dr.max(light) > 0))
+    irradiance = sun.irradiance * clear
+    light = diffuse_reflection(si.bsdf, cos_n) * irradiance
+    return SunRays(si, d, cos_sun, light, irradiance, may & (dr.max(irradiance) > 0))
 
 
 def lit_points(
@@ -73,10 +77,11 @@ def lit_points(
     at, inside = plane.cell(rays.si.p, rays.d)
     lit = rays.lit & inside & (at == cell)
     pdf = dr.gather(mi.Float, pdfs, at, lit)
-    si, has_coat = rays.si, dr.select(rays.si.bsdf.alpha > 0, mi.Float(1), 0)
+    si, f0 = rays.si, rgb(rays.si.bsdf.f0)
     # Write each point's row, and keep those that are lit.
-    normals = *xyz(si.ng), pdf, *xyz(si.n_interpolated), has_coat
-    columns = [*xyz(si.p), rays.cos_sun, *normals, *rgb(rays.light)]
+    normals = *xyz(si.ng), pdf, *xyz(si.n_interpolated), si.bsdf.alpha
+    light = *rgb(rays.light), f0[0], *xyz(rays.d), f0[1], *rgb(rays.irradiance), f0[2]
+    columns = [*xyz(si.p), rays.cos_sun, *normals, *light]
     lit &= pdf > 0
     dr.eval(lit, *columns)
     keep = np.flatnonzero(lit.numpy())
@@ -99,7 +104,9 @@ def reached_by_cells(
     sampler = SobolSampler(key, cell)
     rays = sun_rays(scene, sun, plane, cell, sampler)
     worth = _worth_of(scene, grid, wanted, rays.si, sampler, mi.Bool(rays.lit))
-    worth *= dr.select(rays.lit, luminance(rays.light) / rays.cos_sun, 0)
+    by_coat = rays.irradiance * rays.si.bsdf.f0 * (rays.cos_sun * dr.inv_pi)
+    reflected = luminance(rays.light + dr.select(rays.si.bsdf.alpha > 0, by_coat, 0))
+    worth *= dr.select(rays.lit, reflected / rays.cos_sun, 0)
     dr.eval(worth, rays.si.p)
     places = np.stack([x.numpy() for x in xyz(rays.si.p)], 1)
     return places, worth.numpy()

@@ -23,7 +23,10 @@ from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.kernels.sun_disc import SunDisc
 from pbrs_farm.transport.kernels.sun_plane import SunPlane
 from pbrs_farm.transport.kernels.sun_rays import (
+    ALPHA,
     COS_SUN,
+    F0,
+    IRRADIANCE,
     PLANE_PDF,
     POINT_FLOATS,
     RADIANCE,
@@ -137,7 +140,8 @@ def _tables(plane: SunPlane, rows: F32, groups: I64, cells: F32) -> SunlitTables
     first = np.concatenate([[0], np.cumsum(counts)])
     # Flux of a point: what it reflects, over how often it is drawn.
     often = np.maximum(rows[:, PLANE_PDF] * rows[:, COS_SUN], 1e-12).astype(np.float64)
-    light = rows[:, RADIANCE].astype(np.float64) @ LUMINANCE / often
+    by_coat = rows[:, IRRADIANCE] * rows[:, F0] * (rows[:, [ALPHA]] > 0) / np.pi
+    light = (rows[:, RADIANCE] + by_coat).astype(np.float64) @ LUMINANCE / often
     fluxes = np.bincount(groups, light, MAX_SUNLIT) / np.maximum(counts, 1)
     spheres = np.zeros((MAX_SUNLIT, 4))
     for k in np.flatnonzero(counts):

@@ -4,8 +4,8 @@ Most noise of a sunny room is sunlight that a small patch reflects, of the floor
 before the window: a path finds the patch by chance. So rays from the sun are traced first, and each
 vertex x sends a shadow ray to one of the points y that they meet (virtual point lights, Keller 1997).
 A pair (x, y) is drawn in this way, or by the surface at x and then a shadow ray from y to the sun: the
-balance heuristic weighs both, so that no distance is left out or held up. It holds for what y reflects
-diffusely; what its coat reflects, and what thin surfaces let through, is left to the surface at x.
+balance heuristic weighs both, so that no distance is left out or held up. It holds for what y reflects,
+its coat too; what mirrors reflect, and what thin surfaces let through, is left to the surface at x.
 
 A vertex chooses one of a few groups of points (sunlit_cells.py) by what it reflects, how far it is,
 and how often rays to it arrive (arrival_rates.py).
@@ -23,12 +23,12 @@ import numpy as np
 from pbrs_farm.core.arrays import I64
 from pbrs_farm.transport.guiding.nearby_lamps import sample_discrete
 from pbrs_farm.transport.kernels.arrival_rates import FIRST_SUNLIT, MAX_SUNLIT, ArrivalRates
-from pbrs_farm.transport.kernels.bsdf import diffuse_reflection, diffuse_response
+from pbrs_farm.transport.kernels.bsdf import coat_reflection, diffuse_response
 from pbrs_farm.transport.kernels.device_scene import LEAST_COS, DeviceScene, SurfaceInteraction
 from pbrs_farm.transport.kernels.packets import colour, gather_packets, point, vector
 from pbrs_farm.transport.kernels.sampler import device_array, opaque3
 from pbrs_farm.transport.kernels.sun_disc import SunDisc
-from pbrs_farm.transport.kernels.sun_rays import COATED, COS_SUN, PLANE_PDF, POINT_FLOATS
+from pbrs_farm.transport.kernels.sun_rays import ALPHA, COS_SUN, PLANE_PDF, POINT_FLOATS
 from pbrs_farm.transport.kernels.sunlit_cells import (
     SunlitTables,
     UsedCells,
@@ -44,7 +44,7 @@ class SunlitSample(NamedTuple):
 
     d: Any  # unit Vector3f
     distance: Any
-    radiance: Any  # Color3f, of diffuse reflection
+    radiance: Any  # Color3f that it reflects
     pdf: Any  # per solid angle
     valid: Any
     kind: Any  # UInt32, of arrival_rates.py
@@ -130,19 +130,22 @@ class SunlitPoints:
         distance = dr.norm(to)
         d = to / distance
         y = _Point(vector(rows[1]), vector(rows[2]), rows[0][COS_SUN], rows[1][PLANE_PDF % 4])
-        has_coat = rows[COATED // 4][3] > 0
-        radiance = colour(rows[3]) * diffuse_response(has_coat, dr.maximum(-dr.dot(y.n, d), 0))
+        alpha, f0 = rows[ALPHA // 4][3], mi.Color3f(rows[3][3], rows[4][3], rows[5][3])
+        radiance = colour(rows[3]) * diffuse_response(alpha > 0, dr.maximum(-dr.dot(y.n, d), 0))
+        frame = mi.Frame3f(y.n)
+        wi, wo = frame.to_local(-d), frame.to_local(vector(rows[4]))
+        radiance += coat_reflection(f0, alpha, wi, wo) * colour(rows[5])
         pdf = chance * _pdf(y, -d, distance)
         valid = active & (pdf > 0) & (distance > 1e-4)
         return SunlitSample(d, distance, radiance, pdf, valid, number + FIRST_SUNLIT)
 
     def share_of_sun(
-        self, ray: tuple[Any, Any], si: SurfaceInteraction, wi: Any, wo: Any, d: Any, active: Any
+        self, ray: tuple[Any, Any], si: SurfaceInteraction, d: Any, active: Any
     ) -> Any:
-        """What sample() takes over of f |cos| of the sun at si: Color3f.
+        """What share sample() takes over of what si reflects of the sun.
 
         ray: that has met si: where it was drawn, and the pdf per solid angle of the surface there, 0 =
-        a mirror or the camera. d: unit direction to the sun; wi, wo: local ones, back and to the sun.
+        a mirror or the camera. d: unit direction to the sun.
         """
         p, p_bsdf = ray
         at, inside = self._plane.cell(si.p, d)
@@ -155,9 +158,7 @@ class SunlitPoints:
         to = p - si.p
         distance = dr.norm(to)
         pdf = chance * _pdf(y, to / distance, distance)
-        share = dr.select(active & (pdf > 0), pdf / (pdf + p_bsdf), 0)
-        diffuse = diffuse_reflection(si.bsdf, dr.maximum(wo.z, 0))
-        return diffuse * diffuse_response(si.bsdf.alpha > 0, wi.z) * share
+        return dr.select(active & (pdf > 0), pdf / (pdf + p_bsdf), 0)
 
     def _set_points(self, tables: SunlitTables) -> None:
         # One point more, so that a view without any has a row, too.

@@ -61,6 +61,17 @@ def hard_room() -> tuple[House, Camera]:
     return replace(house, items=items, materials=materials), camera
 
 
+def shiny_room() -> tuple[House, Camera]:
+    """The window room with a plate of brushed metal in the patch, which throws the sun at the walls."""
+    house, camera = bare_room()
+    coat = replace(rooms.matte("plate", 0.0), specular=(0.9, 0.8, 0.7), roughness=0.6)
+    (walls,) = house.items
+    plate = [(0.8, 0.02, 0.3), (0.8, 0.02, 2.4), (3.2, 0.02, 2.4), (3.2, 0.02, 0.3)]
+    surfaces = (*walls.surfaces, rooms.quad(plate, len(house.materials)))
+    items = (replace(walls, surfaces=surfaces),)
+    return replace(house, items=items, materials=(*house.materials, coat)), camera
+
+
 def seen_all_round() -> tuple[House, Camera]:
     """The window room through the lens of a panorama."""
     house, camera = bare_room()
@@ -88,7 +99,8 @@ def renders_by_chance(scene: LightScene, camera: Camera, fields: LightFields) ->
 
 
 @pytest.mark.parametrize(
-    ("room", "most"), [(bare_room, 0.4), (hard_room, 0.8), (seen_all_round, 0.6)]
+    ("room", "most"),
+    [(bare_room, 0.4), (hard_room, 0.8), (shiny_room, 0.44), (seen_all_round, 0.6)],
 )
 def test_sunlit_points_leave_the_mean_alone_and_cut_the_noise(
     room: Callable[[], tuple[House, Camera]], most: float
