@@ -105,7 +105,7 @@ def pilot_weights(
     if fields.integrator != "path":
         return weights
     assert sums.counts is not None
-    by_place = weights_by_place(weights.outdoor, sums.counts)
+    by_place = weights_by_place(weights.outdoor, sums.counts, emitters.arrival.grid)
     thresholds = _shadow_thresholds(brought, n_lamps)
     vertices = sums.counts[0].astype(np.int64).sum(1)
     return replace(

@@ -23,8 +23,8 @@ from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
 
 MAX_TECHNIQUES: Final = 8  # floats of a row: two packets
-# A voxel counts as if it had so many vertices more, seen as the view's are; and so much of its weights
-# is the view's, for what no vertex has found.
+# A voxel counts as if it had so many vertices more, lit as those around it are, and these so many more,
+# lit as the view's are; and so much of its weights is the view's, for what no vertex has found.
 _PRIOR: Final = 4.0
 _VIEW_SHARE: Final = 0.2
 
@@ -85,14 +85,17 @@ def choose_technique(chances: list[Any], u: Any) -> tuple[Any, Any]:
     return sample_discrete(numbers, chances, mi.Float(1), dr.minimum(u, 1 - 1e-6))
 
 
-def weights_by_place(weights: F64, counts: NDArray[np.uint32]) -> F64:
+def weights_by_place(weights: F64, counts: NDArray[np.uint32], grid: VoxelGrid) -> F64:
     """(voxels, techniques) weights, each of the view's times how much more often it lights a voxel.
 
     weights: (techniques,) of the view. counts: TechniqueCounts.numpy().
     """
-    vertices, lit = counts[..., : len(weights)].astype(np.float64)
+    own = counts[..., : len(weights)]
+    near_vertices, near_lit = (grid.with_neighbours(rows) for rows in own)
+    vertices, lit = own.astype(np.float64)
     everywhere = (lit.sum(0) + 0.5) / (vertices.sum(0) + 1)
-    here = (lit + _PRIOR * everywhere) / (vertices + _PRIOR)
+    near = (near_lit + _PRIOR * everywhere) / (near_vertices + _PRIOR)
+    here = (lit + _PRIOR * near) / (vertices + _PRIOR)
     # Keep a part of the view's own weights: what is seen from a voxel is known by few vertices.
     rows = weights * here / everywhere
     rows /= rows.sum(1, keepdims=True)

@@ -61,17 +61,23 @@ def test_a_corner_that_is_nowhere_has_no_voxel() -> None:
 
 def test_a_voxel_has_more_of_what_lights_it_and_something_of_everything() -> None:
     from pbrs_farm.transport.kernels.outdoor_choice import MAX_TECHNIQUES, weights_by_place
+    from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
+    grid = VoxelGrid(np.array([[0, 0, 0], [3.2, 0.2, 0.2]], np.float32))
+    assert grid.n_voxels == 7
     weights = np.array([0.2, 0.3, 0.5])
-    counts = np.zeros((2, 3, MAX_TECHNIQUES), np.uint32)
-    counts[0, :2, :3] = 100  # vertices in two of three voxels
-    counts[1, 0, 1], counts[1, 1, 2] = 80, 40
-    rows = weights_by_place(weights, counts)
+    counts = np.zeros((2, 7, MAX_TECHNIQUES), np.uint32)
+    counts[0, [0, 3], :3] = 100  # vertices in two of seven voxels
+    counts[1, 0, 1], counts[1, 3, 2] = 80, 40
+    rows = weights_by_place(weights, counts, grid)
     assert np.allclose(rows.sum(1), 1)
     assert rows[0, 1] > 0.7
-    assert rows[1, 2] > 0.7
-    # Where no vertex was, the view's own weights hold; nowhere is a technique forgotten.
-    assert np.allclose(rows[2], weights, atol=1e-5)
+    assert rows[3, 2] > 0.7
+    # Where no vertex was, those around tell; where none is around, the view's own weights hold.
+    assert rows[1, 1] > 0.6
+    assert rows[2, 2] > 0.6
+    assert np.allclose(rows[5:], weights, atol=1e-5)
+    # Nowhere is a technique forgotten.
     assert (rows >= 0.19 * weights).all()
 
 
@@ -87,7 +93,7 @@ def test_weights_by_place_leave_the_mean_alone_and_cut_the_noise(
     by_place = [scene.render(camera, "-", FIELDS, seed) for seed in range(10, 18)]
     again = scene.render(camera, "-", FIELDS, 10)
     np.testing.assert_array_equal(again.outdoor, by_place[0].outdoor)
-    monkeypatch.setattr(pilot, "weights_by_place", lambda _weights, _counts: None)
+    monkeypatch.setattr(pilot, "weights_by_place", lambda _weights, _counts, _grid: None)
     everywhere = [scene.render(camera, "-", FIELDS, seed) for seed in range(20, 28)]
     sums = [[blocks(r.group(Group.OUTDOOR)) for r in runs] for runs in (by_place, everywhere)]
     assert np.abs(z_scores(*sums)).max() < 4.5
