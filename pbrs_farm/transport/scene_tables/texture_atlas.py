@@ -92,20 +92,25 @@ def _packed_colours(picture: Picture) -> NDArray[np.uint32]:
     if picture.ndim == 2:
         picture = picture[..., None]
     rgb = picture[..., :3] if picture.shape[-1] >= 3 else np.repeat(picture[..., :1], 3, -1)
-    alpha = picture[..., 3] if picture.shape[-1] == 4 else np.full(picture.shape[:2], 255, np.uint8)
+    alpha = picture[..., 3] if picture.shape[-1] == 4 else None
     # Encode by the square root of linear light; cut alpha at one half.
     linear = linear_from_srgb(np.arange(256) / 255)
     if _step(picture) > 1:
         small = _shrunk(rgb, linear.astype(np.float32))
         bits = np.round(np.sqrt(small) * 1023).astype(np.uint32)
-        alpha = _shrunk(alpha[..., None], np.arange(256, dtype=np.float32))[..., 0].astype(np.uint8)
+        packed = bits[..., 0] | bits[..., 1] << np.uint32(10) | bits[..., 2] << np.uint32(20)
+        if alpha is not None:
+            plain = np.arange(256, dtype=np.float32)
+            alpha = _shrunk(alpha[..., None], plain)[..., 0].astype(np.uint8)
     else:
-        bits = np.round(np.sqrt(linear) * 1023).astype(np.uint32)[rgb]
-    opaque = np.where(alpha >= 128, np.uint32(3), np.uint32(0)) << np.uint32(30)
-    packed: NDArray[np.uint32] = (
-        bits[..., 0] | bits[..., 1] << np.uint32(10) | bits[..., 2] << np.uint32(20) | opaque
-    )
-    return packed
+        # Look each channel up where its bits belong.
+        of_byte = np.round(np.sqrt(linear) * 1023).astype(np.uint32)
+        packed = of_byte.take(rgb[..., 0])
+        for k in (1, 2):
+            packed |= (of_byte << np.uint32(10 * k)).take(rgb[..., k])
+    opaque = np.uint32(3 << 30)
+    packed |= opaque if alpha is None else np.where(alpha >= 128, opaque, np.uint32(0))
+    return np.asarray(packed, np.uint32)
 
 
 def _packed_maps(
