@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I64
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
-from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
+from pbrs_farm.core.mesh import face_areas, triangle_bounds, triangle_corners, unit_normals
 from pbrs_farm.transport.guiding.guiding_targets import BACK_SIDE, GuidingTargets, no_targets
 from pbrs_farm.transport.illuminance import radiosity
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
@@ -104,14 +104,18 @@ def _candidates(tables: SceneTables) -> tuple[I64, I64]:
     scatters = tables.material_rows[tag & 0xFFFF, KIND] == SURFACE
     faces = np.flatnonzero(scatters & ((tag >> 16) == NO_LAMP))
     corners = tables.positions[tables.faces[faces]]
-    low, high = corners.min(1), corners.max(1)
+    bounds = triangle_bounds(corners.astype(np.float64))
+    low, high = (np.ascontiguousarray(b.T) for b in bounds)
     nearest = np.full(len(faces), np.inf)
     lamps = np.zeros(len(faces), np.int64)
     for k, sphere in enumerate(bounding_spheres(tables)):
         # Measure from the bulb to corners and centre, of the faces in its bounding box alone.
         centre, radius = sphere[:3], sphere[3]
         reach = INTERIOR_REACH_M + radius
-        in_box = (low >= centre - reach).all(1) & (high <= centre + reach).all(1)
+        in_box = np.ones(len(faces), np.bool_)
+        for axis in range(3):
+            in_box &= low[axis] >= centre[axis] - reach
+            in_box &= high[axis] <= centre[axis] + reach
         within = np.flatnonzero(in_box)
         places = np.concatenate([corners[within], corners[within].mean(1, keepdims=True)], 1)
         from_bulb = np.linalg.norm(places - centre, axis=2)
