@@ -275,9 +275,9 @@ def _count_techniques(
 ) -> None:
     """Count the vertices of a lane that asks for one outdoor technique, and those it lights."""
     technique = context.emitter_filter.outdoor
-    is_lit = luminance(result.direct_outdoor) > 0
+    brought = luminance(result.direct_outdoor)
     choice = context.emitters.outdoor_choice
-    choice.count(counts, result.si.p, technique, active & result.is_rough, is_lit)
+    choice.count(counts, result.si.p, technique, active & result.is_rough, brought)
 
 
 def _count_arrivals(beside: _Beside, context: PathContext, result: StepResult, active: Any) -> None:

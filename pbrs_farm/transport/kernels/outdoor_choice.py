@@ -2,7 +2,7 @@
 
 The weights of a view hold for all of it. But a window of the next room is worth no shadow ray, and of
 the sun only few vertices see anything. So the pilot, which asks for one technique at a time, counts
-in voxels of the home its paths' vertices and those which a technique brought light to, and each
+in voxels of the home its paths' vertices and what light a technique brought to them, and each
 voxel gets weights of its own (a map of visibility as of Guo et al. 2020, to techniques, not to voxels).
 Effects: holds buffers on the device.
 """
@@ -27,6 +27,8 @@ MAX_TECHNIQUES: Final = 8  # floats of a row: two packets
 # lit as the view's are; and so much of its weights is the view's, for what no vertex has found.
 _PRIOR: Final = 4.0
 _VIEW_SHARE: Final = 0.2
+_STEPS: Final = 64.0
+_MOST: Final = 1000.0  # luminance that counts
 
 assert MAX_PORTALS + 2 <= MAX_TECHNIQUES
 
@@ -35,7 +37,7 @@ class TechniqueCounts(NamedTuple):
     """Of vertices at which one technique was asked for alone, by voxel and technique."""
 
     vertices: Any  # UInt32, (voxels * MAX_TECHNIQUES,)
-    lit: Any  # those that it brought light to
+    brought: Any  # the root of the luminance that it brought each of them, in 1 / _STEPS, summed
 
     def numpy(self) -> NDArray[np.uint32]:
         """(2, voxels, MAX_TECHNIQUES)."""
@@ -67,16 +69,20 @@ class OutdoorChoice:
         return TechniqueCounts(dr.zeros(mi.UInt32, n), dr.zeros(mi.UInt32, n))
 
     def count(
-        self, counts: TechniqueCounts, p: Any, technique: Any, active: Any, is_lit: Any
+        self, counts: TechniqueCounts, p: Any, technique: Any, active: Any, brought: Any
     ) -> None:
-        """Count vertices at p; technique: the one that is asked for alone, or less than 0."""
+        """Count vertices at p and the luminance brought to them; technique: the one that is asked for
+        alone, or less than 0."""
         counted = active & (technique >= 0)
         place = self._grid.voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
         # Add in place: a copy for each thread would put the number of voxels into the kernel, and
         # every home would compile one of its own.
         one, mode = mi.UInt32(1), dr.ReduceMode.Direct
         dr.scatter_add(counts.vertices, one, place, counted, mode=mode)
-        dr.scatter_add(counts.lit, one, place, counted & is_lit, mode=mode)
+        # The root, so that a few bright vertices do not say all; whole numbers, so that their order
+        # changes no sum.
+        root = mi.UInt32(_STEPS * dr.sqrt(dr.clip(brought, 0, _MOST)) + 0.5)
+        dr.scatter_add(counts.brought, root, place, counted & (brought > 0), mode=mode)
 
 
 def choose_technique(chances: list[Any], u: Any) -> tuple[Any, Any]:
@@ -86,16 +92,16 @@ def choose_technique(chances: list[Any], u: Any) -> tuple[Any, Any]:
 
 
 def weights_by_place(weights: F64, counts: NDArray[np.uint32], grid: VoxelGrid) -> F64:
-    """(voxels, techniques) weights, each of the view's times how much more often it lights a voxel.
+    """(voxels, techniques) weights, each of the view's times how much more light it brings to a voxel.
 
     weights: (techniques,) of the view. counts: TechniqueCounts.numpy().
     """
     own = counts[..., : len(weights)]
-    near_vertices, near_lit = (grid.with_neighbours(rows) for rows in own)
-    vertices, lit = own.astype(np.float64)
-    everywhere = (lit.sum(0) + 0.5) / (vertices.sum(0) + 1)
-    near = (near_lit + _PRIOR * everywhere) / (near_vertices + _PRIOR)
-    here = (lit + _PRIOR * near) / (vertices + _PRIOR)
+    near_vertices, near_brought = (grid.with_neighbours(rows) for rows in own)
+    vertices, brought = own.astype(np.float64)
+    everywhere = (brought.sum(0) + 0.5 * _STEPS) / (vertices.sum(0) + 1)
+    near = (near_brought + _PRIOR * everywhere) / (near_vertices + _PRIOR)
+    here = (brought + _PRIOR * near) / (vertices + _PRIOR)
     # Keep a part of the view's own weights: what is seen from a voxel is known by few vertices.
     rows = weights * here / everywhere
     rows /= rows.sum(1, keepdims=True)
