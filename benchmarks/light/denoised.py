@@ -31,7 +31,7 @@ F32 = NDArray[np.float32]
 
 SIZE: Final = (240, 180)
 VIEW: Final = (640, 480)  # px, of the view that the small one stands for
-COUNTS: Final = (8, 16, 32, 48, 64, 128)  # samples per pixel
+COUNTS: Final = (8, 16, 28, 32, 64, 128)  # samples per pixel
 SPP_A_RUN: Final = 1024
 MOST_SPP: Final = 8192
 SEED, REFERENCE_SEED = 1, 998

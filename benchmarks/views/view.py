@@ -1,4 +1,4 @@
-"""One 640x480 view of the Studio home: both light groups at 32 samples, denoised; its labels."""
+"""One 640x480 view of the Studio home: both light groups at 28 samples, denoised; its labels."""
 
 from __future__ import annotations
 

@@ -187,7 +187,7 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "fast": {
         "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0},
         "cameras": _PHOTO,
-        "light": {"spp": 32},
+        "light": {"spp": 28},
         "selection": {"min_room_lx": 1.0},
     },
     "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},
