@@ -63,7 +63,10 @@ def main() -> None:
         site = Path(scratch)
         fetch(site, args.python)
         cut_networks(site / DENOISER)
+        shown = picture(site / DENOISER)
         cut_debug(site, carried(site))
+        if picture(site / DENOISER) != shown:
+            parser.exit(1, "gpu_wheels: without debug data the denoiser's picture is another one\n")
         files = carried(site)
         archive = args.folder / f"wheels-{args.python}.tar.xz"
         pack(site, files, archive)
@@ -152,9 +155,10 @@ def picture(denoiser: Path) -> str:
     """
     library = denoiser / "libOpenImageDenoise.so"
     command = [sys.executable, str(HERE / "denoise_once.py"), str(library)]
-    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
     if done.returncode:
-        raise ValueError(done.stderr.strip().rpartition("\n")[2])
+        said = done.stderr.strip().rpartition("\n")[2]
+        raise ValueError(said or f"its process ended with {done.returncode}")
     return done.stdout
 
 

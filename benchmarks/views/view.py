@@ -45,7 +45,7 @@ def main() -> None:
         "view.labels_first_s": round(rows[0][1], 3),
     }
     units = {
-        "view.fast_s": "s, 640x480, 32 spp, both groups, denoised, written",
+        "view.fast_s": "s, 640x480, 28 spp, both groups, denoised, written",
         "view.fast_first_s": "s, the same, loading and compiling included",
         "view.labels_s": "s, all ground truth of the view, written",
         "view.labels_first_s": "s, the same, loading included",

@@ -273,7 +273,7 @@ def _trace(
 def _count_techniques(
     counts: TechniqueCounts, context: PathContext, result: StepResult, active: Any
 ) -> None:
-    """Count the vertices of a lane that asks for one outdoor technique, and those it lights."""
+    """Count the vertices of a lane that asks for one outdoor technique, and what that brings."""
     technique = context.emitter_filter.outdoor
     brought = luminance(result.direct_outdoor)
     choice = context.emitters.outdoor_choice

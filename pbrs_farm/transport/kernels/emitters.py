@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64, I64
-from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.transport.guiding.guiding_targets import GuidingTargets, TargetSampler, no_targets
 from pbrs_farm.transport.guiding.nearby_lamps import (
@@ -90,7 +90,9 @@ class Emitters:
     ) -> None:
         self.nearby = NearbyLampSampler(tables)
         grid = VoxelGrid(tables.positions)
-        self.outdoor_choice, self.arrival = OutdoorChoice(grid), ArrivalRates(grid)
+        level = (sky.sky_lx + sky.sun_lx) / LM_PER_W / math.pi
+        self.outdoor_choice = OutdoorChoice(grid, level if level > 0 else 1.0)
+        self.arrival = ArrivalRates(grid)
         self.sun, self.sunlit = SunDisc(sky), SunlitPoints(grid, self.arrival)
         self.targets = TargetSampler(no_targets(len(tables.lamps)))
         self._set_lamps(tables, weights.lamps)

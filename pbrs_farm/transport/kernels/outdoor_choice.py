@@ -2,7 +2,7 @@
 
 The weights of a view hold for all of it. But a window of the next room is worth no shadow ray, and of
 the sun only few vertices see anything. So the pilot, which asks for one technique at a time, counts
-in voxels of the home its paths' vertices and what light a technique brought to them, and each
+in voxels of the home its paths' vertices and what light a technique brought the paths there, and each
 voxel gets weights of its own (a map of visibility as of Guo et al. 2020, to techniques, not to voxels).
 Effects: holds buffers on the device.
 """
@@ -27,8 +27,8 @@ MAX_TECHNIQUES: Final = 8  # floats of a row: two packets
 # lit as the view's are; and so much of its weights is the view's, for what no vertex has found.
 _PRIOR: Final = 4.0
 _VIEW_SHARE: Final = 0.2
-_STEPS: Final = 64.0
-_MOST: Final = 1000.0  # luminance that counts
+_STEPS: Final = 1024.0
+_MOST: Final = 100.0  # times a white ground's luminance: what is brighter counts as that
 
 assert MAX_PORTALS + 2 <= MAX_TECHNIQUES
 
@@ -37,7 +37,9 @@ class TechniqueCounts(NamedTuple):
     """Of vertices at which one technique was asked for alone, by voxel and technique."""
 
     vertices: Any  # UInt32, (voxels * MAX_TECHNIQUES,)
-    brought: Any  # the root of the luminance that it brought each of them, in 1 / _STEPS, summed
+    brought: (
+        Any  # the root of the luminance that it brought the path at each, in 1 / _STEPS, summed
+    )
 
     def numpy(self) -> NDArray[np.uint32]:
         """(2, voxels, MAX_TECHNIQUES)."""
@@ -47,8 +49,9 @@ class TechniqueCounts(NamedTuple):
 class OutdoorChoice:
     """The weights of all outdoor techniques in every voxel of a home, for one view."""
 
-    def __init__(self, grid: VoxelGrid) -> None:
-        self._grid = grid
+    def __init__(self, grid: VoxelGrid, level: float) -> None:
+        """level: luminance of white ground under the open sky, > 0, that what is counted goes by."""
+        self._grid, self._scale = grid, dr.opaque(mi.Float, 1 / level)
         self.set_weights(np.ones(1))
 
     def set_weights(self, weights: F64) -> None:
@@ -71,8 +74,10 @@ class OutdoorChoice:
     def count(
         self, counts: TechniqueCounts, p: Any, technique: Any, active: Any, brought: Any
     ) -> None:
-        """Count vertices at p and the luminance brought to them; technique: the one that is asked for
-        alone, or less than 0."""
+        """Count vertices at p, and the luminance brought to the path there.
+
+        technique: the one that is asked for alone, or less than 0.
+        """
         counted = active & (technique >= 0)
         place = self._grid.voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
         # Add in place: a copy for each thread would put the number of voxels into the kernel, and
@@ -81,7 +86,7 @@ class OutdoorChoice:
         dr.scatter_add(counts.vertices, one, place, counted, mode=mode)
         # The root, so that a few bright vertices do not say all; whole numbers, so that their order
         # changes no sum.
-        root = mi.UInt32(_STEPS * dr.sqrt(dr.clip(brought, 0, _MOST)) + 0.5)
+        root = mi.UInt32(_STEPS * dr.sqrt(dr.clip(brought * self._scale, 0, _MOST)) + 0.5)
         dr.scatter_add(counts.brought, root, place, counted & (brought > 0), mode=mode)
 
 
@@ -96,7 +101,7 @@ def weights_by_place(weights: F64, counts: NDArray[np.uint32], grid: VoxelGrid) 
 
     weights: (techniques,) of the view. counts: TechniqueCounts.numpy().
     """
-    own = counts[..., : len(weights)]
+    own = counts[..., : len(weights)].astype(np.uint64)
     near_vertices, near_brought = (grid.with_neighbours(rows) for rows in own)
     vertices, brought = own.astype(np.float64)
     everywhere = (brought.sum(0) + 0.5 * _STEPS) / (vertices.sum(0) + 1)

@@ -140,7 +140,8 @@ def _tables(plane: SunPlane, rows: F32, groups: I64, cells: F32) -> SunlitTables
     first = np.concatenate([[0], np.cumsum(counts)])
     # Flux of a point: what it reflects, over how often it is drawn.
     often = np.maximum(rows[:, PLANE_PDF] * rows[:, COS_SUN], 1e-12).astype(np.float64)
-    by_coat = rows[:, IRRADIANCE] * rows[:, F0] * (rows[:, [ALPHA]] > 0) / np.pi
+    by_coat = rows[:, IRRADIANCE] * rows[:, F0] * rows[:, [COS_SUN]] / np.pi
+    by_coat *= rows[:, [ALPHA]] > 0
     light = (rows[:, RADIANCE] + by_coat).astype(np.float64) @ LUMINANCE / often
     fluxes = np.bincount(groups, light, MAX_SUNLIT) / np.maximum(counts, 1)
     spheres = np.zeros((MAX_SUNLIT, 4))

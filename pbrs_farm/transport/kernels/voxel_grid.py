@@ -41,7 +41,7 @@ class VoxelGrid:
         at = np.indices(tuple(int(n) for n in self._host_shape)).reshape(3, -1).T
         return np.asarray(self._host_low + (at + 0.5) * self.edge_m)
 
-    def with_neighbours(self, rows: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    def with_neighbours(self, rows: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
         """(voxels, K) sums of rows over each voxel and the 26 around it, as far as there are any."""
         sums = rows.reshape(*self._host_shape, -1)
         for axis in range(3):

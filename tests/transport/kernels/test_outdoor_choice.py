@@ -68,7 +68,7 @@ def test_a_voxel_has_more_of_what_lights_it_and_something_of_everything() -> Non
     weights = np.array([0.2, 0.3, 0.5])
     counts = np.zeros((2, 7, MAX_TECHNIQUES), np.uint32)
     counts[0, [0, 3], :3] = 100  # vertices in two of seven voxels
-    counts[1, 0, 1], counts[1, 3, 2] = 64 * 80, 64 * 40
+    counts[1, 0, 1], counts[1, 3, 2] = 1024 * 80, 1024 * 40
     rows = weights_by_place(weights, counts, grid)
     assert np.allclose(rows.sum(1), 1)
     assert rows[0, 1] > 0.7
