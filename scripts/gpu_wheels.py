@@ -48,6 +48,7 @@ Take Open Image Denoise itself from https://www.openimagedenoise.org. It is dist
 licence below.
 
 """
+_PATIENCE_S: Final = 300  # for a picture of 64x48
 # pip takes each by its exact name.
 _ABIS: Final = "_2_28 _2_27 _2_24 _2_17 2014 _2_12 2010 _2_5 1"
 
@@ -62,11 +63,10 @@ def main() -> None:
     with TemporaryDirectory() as scratch:
         site = Path(scratch)
         fetch(site, args.python)
-        cut_networks(site / DENOISER)
-        shown = picture(site / DENOISER)
+        shown = cut_networks(site / DENOISER)
         cut_debug(site, carried(site))
-        if picture(site / DENOISER) != shown:
-            parser.exit(1, "gpu_wheels: without debug data the denoiser's picture is another one\n")
+        if shown and shown != picture_or_fault(site / DENOISER):
+            parser.exit(1, "gpu_wheels: without debug data the denoiser makes another picture\n")
         files = carried(site)
         archive = args.folder / f"wheels-{args.python}.tar.xz"
         pack(site, files, archive)
@@ -115,14 +115,15 @@ def carried(site: Path) -> list[str]:
     return [path for path in by_kind if is_carried(path)]
 
 
-def cut_networks(denoiser: Path) -> None:
+def cut_networks(denoiser: Path) -> str:
     """Blank the networks of Open Image Denoise that pbrs_farm never asks for; CUT.txt says so.
 
-    denoiser: the folder of its libraries. They stay whole, and a line says why, when the networks
-    are not found, or a picture does not come out the same bits.
+    denoiser: the folder of its libraries. Returns the hash of a picture that they make, "" where this
+    machine cannot tell. They stay whole, and a line says why, then and when the networks are not found, or
+    a picture does not come out the same bits.
     """
     core = next(denoiser.glob("libOpenImageDenoise_core.so.*"))
-    whole = core.read_bytes()
+    whole, before = core.read_bytes(), ""
     try:
         before = picture(denoiser)
         core.write_bytes(without_networks(whole, NETWORK))
@@ -131,9 +132,10 @@ def cut_networks(denoiser: Path) -> None:
     except ValueError as error:
         core.write_bytes(whole)
         sys.stderr.write(f"gpu_wheels: {core.name} is packed with all its networks: {error}\n")
-        return
+        return before
     licence = (HERE.parent / "LICENSE").read_text(encoding="utf-8")
     (denoiser / "CUT.txt").write_text(NOTICE_OF_NETWORKS + licence, "utf-8")
+    return before
 
 
 def cut_debug(site: Path, files: list[str]) -> None:
@@ -149,17 +151,30 @@ def cut_debug(site: Path, files: list[str]) -> None:
 
 
 def picture(denoiser: Path) -> str:
-    """Hash of a picture denoised by the libraries of that folder, or why there is none.
+    """Hash of a picture denoised by the libraries of that folder; ValueError says why there is none.
 
     Another process loads them, so that each call sees what the folder holds now.
     """
     library = denoiser / "libOpenImageDenoise.so"
     command = [sys.executable, str(HERE / "denoise_once.py"), str(library)]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
+    try:
+        done = subprocess.run(
+            command, check=False, capture_output=True, text=True, timeout=_PATIENCE_S
+        )
+    except subprocess.TimeoutExpired as late:
+        raise ValueError(f"no picture within {_PATIENCE_S} s") from late
     if done.returncode:
         said = done.stderr.strip().rpartition("\n")[2]
         raise ValueError(said or f"its process ended with {done.returncode}")
     return done.stdout
+
+
+def picture_or_fault(denoiser: Path) -> str:
+    """As picture(), or why there is none."""
+    try:
+        return picture(denoiser)
+    except ValueError as error:
+        return str(error)
 
 
 def pack(site: Path, files: list[str], archive: Path) -> None:

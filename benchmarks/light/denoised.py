@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from benchmarks.figures import FOLDER, write_report
 from benchmarks.light.measured_views import EIGHT, MeasuredView, loaded
 from benchmarks.light.picture_error import flip, relmse
+from benchmarks.light.table_rows import DENOISED_COUNTS as COUNTS
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
@@ -31,7 +32,6 @@ F32 = NDArray[np.float32]
 
 SIZE: Final = (240, 180)
 VIEW: Final = (640, 480)  # px, of the view that the small one stands for
-COUNTS: Final = (8, 16, 28, 32, 64, 128)  # samples per pixel
 SPP_A_RUN: Final = 1024
 MOST_SPP: Final = 8192
 SEED, REFERENCE_SEED = 1, 998

@@ -6,7 +6,7 @@ the same CPU time, in turn, PICTURES of each, all of other seeds. Error is the v
 one kind (picture_variance.py): that both have the same mean is tested elsewhere, and no reference is needed.
 Ratios are Metropolis over path, below 1 favours Metropolis: `relmse_ratio` of relMSE x CPU, `median_ratio` of
 the median pixel's error x sqrt(CPU); `..._spread` is a ratio's standard error as a share of it.
-`fast_times_cheaper`: CPU time of Metropolis over that of recipe `fast` (28 samples and the denoiser) for the
+`fast_times_cheaper`: CPU time of Metropolis over that of recipe `fast` (its samples and the denoiser) for the
 error `fast` reaches, its bias with it, against the mean of all pictures.
 
 `light.homes_ratio`: the median of relmse_ratio over six cameras of homes. LIGHT_SCENES="door shade" measures

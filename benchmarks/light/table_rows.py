@@ -13,6 +13,7 @@ from typing import Any, Final
 from benchmarks.light.growth import LAMPS, TRIANGLES
 from benchmarks.light.measured_views import EIGHT, MeasuredView
 from benchmarks.light.shots import ROOMS, SIX
+from pbrs_farm.core.recipe import recipe_from_name
 
 Figures = Mapping[str, Any]
 
@@ -23,7 +24,7 @@ LUXCORE_SCENES: Final = {
 LUXCORE_ENGINES: Final = ("lux_path", "lux_path_metropolis", "lux_bidir", "lux_bidir_metropolis")
 _LUXCORE_HEADS: Final = ("LuxCore path", "path, Metropolis", "bidirectional", "bidirectional, Metropolis")  # fmt: skip
 DENOISED_WAYS: Final = ("raw", "fast", "together", "demodulated", "prefiltered guides")
-DENOISED_COUNTS: Final = (8, 16, 28, 32, 64, 128)
+DENOISED_COUNTS: Final = (8, 16, 28, 32, 64, 128)  # samples per pixel, those of `fast` among them
 PRESETS: Final = {"preview": "`preview`", "fast": "`fast`", "paper": "`paper`, reduced", "released": "`released`, reduced"}  # fmt: skip
 
 
@@ -225,10 +226,11 @@ def compare_lines(f: Figures) -> list[str]:
 
 def view_lines(f: Figures) -> list[str]:
     """A view of `fast`, its labels, and the demo."""
+    samples = recipe_from_name("fast").light.spp
     return [
         *head("two cores", "wall"),
         row([
-            "a `fast` view of Studio, 640x480, both light groups, 28 samples, denoised, written",
+            f"a `fast` view of Studio, 640x480, both light groups, {samples} samples, denoised, written",
             f"**{f['view.fast_s']:.1f} s**",
         ]),
         row(["the first one, which loads and compiles", f"{f['view.fast_first_s']:.1f} s"]),

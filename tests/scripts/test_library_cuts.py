@@ -132,6 +132,42 @@ def test_a_library_that_denoises_otherwise_when_cut_is_packed_whole(
     assert core.read_bytes() == library
 
 
+@pytest.mark.parametrize(("shown", "is_packed"), [("", True), ("as before", False)])
+def test_nothing_is_packed_once_the_denoiser_makes_no_picture_any_more(
+    wheels: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    shown: str,
+    is_packed: bool,
+) -> None:
+    # Where there was no picture to begin with, the library is packed whole and nothing is to be compared.
+    def fetch(site: Path, _python: str) -> None:
+        (site / "a.py").write_text("1\n")
+
+    monkeypatch.setattr(wheels, "fetch", fetch)
+    monkeypatch.setattr(wheels, "cut_networks", lambda _folder: shown)
+    monkeypatch.setattr(sys, "argv", ["gpu_wheels", str(tmp_path), "3.12"])
+    if is_packed:
+        wheels.main()
+    else:
+        with pytest.raises(SystemExit, match="1"):
+            wheels.main()
+        assert capsys.readouterr().err.splitlines() == [
+            "gpu_wheels: without debug data the denoiser makes another picture"
+        ]
+    assert (tmp_path / "wheels-3.12.tar.xz").exists() == is_packed
+
+
+def test_a_denoiser_that_does_not_load_is_told_in_one_line(
+    wheels: ModuleType, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match=r"^OSError: .*libOpenImageDenoise\.so") as fault:
+        wheels.picture(tmp_path)
+    assert "\n" not in str(fault.value)
+    assert wheels.picture_or_fault(tmp_path) == str(fault.value)
+
+
 def test_the_cut_denoiser_makes_the_same_bits_and_refuses_what_was_cut(
     wheels: ModuleType, tmp_path: Path
 ) -> None:

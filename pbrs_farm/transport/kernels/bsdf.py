@@ -52,18 +52,15 @@ def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
     value = dr.select(above, diffuse, bsdf.tau) * (cos_o * dr.inv_pi)
 
     # Reflection by the coat.
-    h = dr.normalize(wi + wo)
-    d = _ggx_d(h, bsdf.alpha)
-    lambda_i, lambda_o = _lambda(wi, bsdf.alpha), _lambda(wo, bsdf.alpha)
-    fresnel = _schlick(bsdf.f0, dr.maximum(dr.dot(wi, h), 0))
     use_coat = has_coat & above
-    value += dr.select(use_coat, fresnel * (d / (4 * wi.z * (1 + lambda_i + lambda_o))), 0)
+    value += dr.select(use_coat, coat_reflection(bsdf.f0, bsdf.alpha, wi, wo), 0)
 
     # The pdf of all three lobes.
     p_diffuse, p_coat = _lobe_probabilities(bsdf, wi)
     p_transmitted = 1 - p_diffuse - p_coat
     pdf = dr.select(above, p_diffuse, p_transmitted) * (cos_o * dr.inv_pi)
-    pdf += dr.select(use_coat, p_coat * d / (4 * wi.z * (1 + lambda_i)), 0)
+    d = _ggx_d(dr.normalize(wi + wo), bsdf.alpha)
+    pdf += dr.select(use_coat, p_coat * d / (4 * wi.z * (1 + _lambda(wi, bsdf.alpha))), 0)
     return value, pdf
 
 
@@ -89,12 +86,11 @@ def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any) -> Any:
 
 
 def coat_reflection(f0: Any, alpha: Any, wi: Any, wo: Any) -> Any:
-    """f |cos wo| of the coat alone, 0 without one; local directions, both above."""
+    """f |cos wo| of the coat alone; local directions, both above, alpha > 0."""
     h = dr.normalize(wi + wo)
-    g = 1 + _lambda(wi, alpha) + _lambda(wo, alpha)
     fresnel = _schlick(f0, dr.maximum(dr.dot(wi, h), 0))
-    reflected = fresnel * (_ggx_d(h, alpha) / (4 * wi.z * g))
-    return dr.select((alpha > 0) & (wi.z > 0) & (wo.z > 0), reflected, 0)
+    shadowed = 1 + _lambda(wi, alpha) + _lambda(wo, alpha)
+    return fresnel * (_ggx_d(h, alpha) / (4 * wi.z * shadowed))
 
 
 def is_reconnectable(bsdf: Bsdf) -> Any:

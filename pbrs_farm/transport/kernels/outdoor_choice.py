@@ -27,8 +27,10 @@ MAX_TECHNIQUES: Final = 8  # floats of a row: two packets
 # lit as the view's are; and so much of its weights is the view's, for what no vertex has found.
 _PRIOR: Final = 4.0
 _VIEW_SHARE: Final = 0.2
+# What a technique brings counts by its luminance over that of white ground: whole steps of the root, up
+# to that of _MOST.
 _STEPS: Final = 1024.0
-_MOST: Final = 100.0  # times a white ground's luminance: what is brighter counts as that
+_MOST: Final = 100.0
 
 assert MAX_PORTALS + 2 <= MAX_TECHNIQUES
 
@@ -37,9 +39,7 @@ class TechniqueCounts(NamedTuple):
     """Of vertices at which one technique was asked for alone, by voxel and technique."""
 
     vertices: Any  # UInt32, (voxels * MAX_TECHNIQUES,)
-    brought: (
-        Any  # the root of the luminance that it brought the path at each, in 1 / _STEPS, summed
-    )
+    brought: Any  # sums of the root of the luminance that it brought the path, in 1 / _STEPS
 
     def numpy(self) -> NDArray[np.uint32]:
         """(2, voxels, MAX_TECHNIQUES)."""

@@ -81,6 +81,19 @@ def test_a_voxel_has_more_of_what_lights_it_and_something_of_everything() -> Non
     assert (rows >= 0.19 * weights).all()
 
 
+def test_a_dim_sky_is_chosen_as_a_bright_one() -> None:
+    # A hundred-thousandth of the light, and none of it is rounded away.
+    house, camera = rooms.window_room(0.7)
+    rows = []
+    for scale in (1.0, 1e-5):
+        sky = sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.35)
+        dim = replace(sky, dome=sky.dome * scale, sun_irradiance=sky.sun_irradiance * scale)
+        _emitters, weights = LightScene.load(house, {}, RECIPE, dim).emitters(camera, FIELDS, 1)
+        rows.append(weights.outdoor_by_place)
+    assert np.ptp(rows[0], axis=0).max() > 0.1
+    np.testing.assert_allclose(rows[1], rows[0], atol=0.01)
+
+
 def test_weights_by_place_leave_the_mean_alone_and_cut_the_noise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
