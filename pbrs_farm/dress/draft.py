@@ -1,4 +1,7 @@
-"""A house while it is dressed: what was added, changed and refused; state: the draft itself."""
+"""A house while it is dressed: what was added, changed and refused; state: the draft itself.
+
+Effects: a thread paints materials (draft_materials.py).
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, House, Item, LightPart, Material, Note, Surface, Texture
+from pbrs_farm.dress.draft_materials import DraftMaterials
 
 ADDED_TAG = "dressed:"  # before the id of the piece that an item was made from
 CHANGED_TAG = "changed:"  # before the part of the dressing that changed an item of the source
@@ -25,14 +29,17 @@ class Draft:
         self.source = house
         self.seed = seed
         self.items: list[Item] = list(house.items)
-        self.materials: list[Material] = list(house.materials)
-        self.textures: dict[str, Texture] = dict(house.textures)
+        self.materials = DraftMaterials(house.materials, house.textures)
         self.notes: list[Note] = []
         self.done: Counter[str] = Counter()  # what was added or changed, by part and group
         self.refused: Counter[str] = Counter()  # `<part>: <reason>` of what was not
         self.used: dict[str, Piece] = {}  # pieces of the catalogue in the house, by id
         self.kept: dict[str, object] = {}  # what parts compute from the items and use again
-        self._number = {m: i for i, m in reversed(list(enumerate(self.materials)))}
+
+    @property
+    def textures(self) -> dict[str, Texture]:
+        """All textures by id; waits for those that are not painted yet."""
+        return self.materials.textures()
 
     def rng(self, *words: str | int) -> np.random.Generator:
         """A random stream of its own for each (house, seed, words): parts do not disturb another."""
@@ -40,11 +47,7 @@ class Draft:
 
     def material(self, material: Material, textures: Iterable[Texture] = ()) -> int:
         """The number of a material, the same for equal ones; textures: those that it names."""
-        self.textures.update((t.id, t) for t in textures)
-        if material not in self._number:
-            self._number[material] = len(self.materials)
-            self.materials.append(material)
-        return self._number[material]
+        return self.materials.add(material, textures)
 
     def placed(
         self, piece: Piece, shape: Shape, at: F64, turn_rad: float, *,

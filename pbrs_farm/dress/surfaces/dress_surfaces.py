@@ -131,7 +131,9 @@ def _paint_walls(draft: Draft, scheme: JoineryScheme, finishes: list[_RoomFinish
         foot=plain_material(draft, replace(scheme.plaster, name=REVEAL)),
         flat=plain_material(draft, scheme.plaster),
     )
-    render = PatternMaterial(plain_material(draft, scheme.render), (1.0, 1.0), scheme.render.paint)
+    render = PatternMaterial(
+        plain_material(draft, scheme.render), (1.0, 1.0), lambda: scheme.render.paint
+    )
     is_painted = any(f.walls is not None for f in finishes)
     for index, wall in walls.items():
         looks = {

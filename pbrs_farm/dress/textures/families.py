@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.draft_materials import Painted
 from pbrs_farm.dress.style import WOODS, Rgb, Wood
 from pbrs_farm.dress.textures.laid_tiles import (
     Glaze,
@@ -43,10 +46,19 @@ from pbrs_farm.dress.textures.planks import (
     plank_maps,
     rows_of_planks,
 )
-from pbrs_farm.dress.textures.wallpaper import wallpaper_maps
+from pbrs_farm.dress.textures.wallpaper import WIDTH_M, wallpaper_maps
 
 _FINE, _COARSE = (1024, 1024), (512, 512)  # pixels of one repeat
 _FLOOR_M = (2.0, 2.0)
+_SIZE_M: Final = {
+    "strip": _FLOOR_M, "planks": (2.4, 2.4), "laminate": (2.6, 1.92), "herringbone": _FLOOR_M,
+    "chevron": _FLOOR_M, "marble": (2.4, 2.4), "terracotta": _FLOOR_M, "brick": _FLOOR_M,
+    "painted brick": _FLOOR_M, "paint": (1.0, 1.0), "plaster": _FLOOR_M,
+    "smooth plaster": _FLOOR_M, "concrete": _FLOOR_M, "carpet": (1.0, 1.0),
+    "loop carpet": (0.64, 0.64), "wallpaper": (WIDTH_M, WIDTH_M), "grain": (1.0, 1.0),
+    "weave": (0.25, 0.25), "twill": (0.25, 0.25), "leather": (0.3, 0.3),
+}  # fmt: skip
+"""Width and height of one repeat by family; tiles have that of their laying."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +80,12 @@ class PatternMaterial:
 
     number: int  # in Draft.materials
     size_m: tuple[float, float]  # of one repeat: uv = metres / size
-    mean_rgb: Rgb  # mean linear colour
+    mean: Callable[[], Rgb]  # gives the mean linear colour once it is painted
+
+    @property
+    def mean_rgb(self) -> Rgb:
+        """The mean linear colour; waits for a material that is still painted."""
+        return self.mean()
 
 
 _Painter = Callable[[np.random.Generator, Pattern], SurfaceMaps]
@@ -79,20 +96,33 @@ def maps_of(pattern: Pattern) -> SurfaceMaps:
     return FAMILIES[pattern.family](np.random.default_rng(pattern.seed), pattern)
 
 
+def size_of(pattern: Pattern) -> tuple[float, float]:
+    """Width and height of one repeat of the pattern, metres; KeyError for an unknown family."""
+    if pattern.family == "tiles":
+        return _TILES[_laid(pattern)[0]][0]
+    return _SIZE_M[pattern.family]
+
+
 def pattern_material(draft: Draft, pattern: Pattern) -> PatternMaterial:
-    """The pattern as a material of the draft's house, made once a draft."""
+    """The pattern as a material of the draft's house, made once a draft, beside what follows."""
     key = f"pattern {pattern!r}"
     kept = draft.kept.get(key)
     if isinstance(kept, PatternMaterial):
         return kept
     if pattern.photograph:
-        made = PatternMaterial(*photograph_material(draft, pattern.photograph, pattern.family))
+        number, size, mean = photograph_material(draft, pattern.photograph, pattern.family)
+        made = PatternMaterial(number, size, lambda: mean)
     else:
-        maps = maps_of(pattern)
-        material, textures = material_from_maps(maps, f"{pattern.family}-{pattern.seed:08x}")
-        made = PatternMaterial(draft.material(material, textures), maps.size_m, maps.mean_rgb)
+        number, painting = draft.materials.paint(partial(_painted, pattern))
+        made = PatternMaterial(number, size_of(pattern), lambda: painting.painted().mean_rgb)
     draft.kept[key] = made
     return made
+
+
+def _painted(pattern: Pattern) -> Painted:
+    maps = maps_of(pattern)
+    material, textures = material_from_maps(maps, f"{pattern.family}-{pattern.seed:08x}")
+    return Painted(material, textures, maps.mean_rgb)
 
 
 def photographed(draft: Draft, catalogue: Catalogue, pattern: Pattern) -> Pattern:
@@ -120,38 +150,34 @@ def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Te
 
 
 def _strip(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = rows_of_planks(rng, _FINE, _FLOOR_M, 28, 4)
-    return _planks(rng, p, layout, _FLOOR_M, PlankLook(variation=0.05))
+    layout = rows_of_planks(rng, _FINE, size_of(p), 28, 4)
+    return _planks(rng, p, layout, PlankLook(variation=0.05))
 
 
 def _boards(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     # Long boards: a wide repeat, a joint or two in each row.
-    size = (2.4, 2.4)
-    layout = rows_of_planks(rng, _FINE, size, int(rng.choice([12, 14, 17])), 1)
+    layout = rows_of_planks(rng, _FINE, size_of(p), int(rng.choice([12, 14, 17])), 1)
     look = PlankLook(bevel_m=0.003, variation=0.04, roughness=0.42)
-    return _planks(rng, p, layout, size, look)
+    return _planks(rng, p, layout, look)
 
 
 def _laminate(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    size = (2.6, 1.92)
-    layout = rows_of_planks(rng, (768, 1024), size, 10, 2)
-    return _planks(rng, p, layout, size, PlankLook(0.0006, 0.0, 0.03, 0.34, 0.5))
+    layout = rows_of_planks(rng, (768, 1024), size_of(p), 10, 2)
+    return _planks(rng, p, layout, PlankLook(0.0006, 0.0, 0.03, 0.34, 0.5))
 
 
 def _herringbone(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = herringbone(_FINE, _FLOOR_M, int(rng.choice([5, 6, 7])), 2)
-    return _planks(rng, p, layout, _FLOOR_M, PlankLook(variation=0.05))
+    layout = herringbone(_FINE, size_of(p), int(rng.choice([5, 6, 7])), 2)
+    return _planks(rng, p, layout, PlankLook(variation=0.05))
 
 
 def _chevron(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = chevron(_FINE, _FLOOR_M, 4, int(rng.choice([14, 16])))
-    return _planks(rng, p, layout, _FLOOR_M, PlankLook(variation=0.045))
+    layout = chevron(_FINE, size_of(p), 4, int(rng.choice([14, 16])))
+    return _planks(rng, p, layout, PlankLook(variation=0.045))
 
 
-def _planks(
-    rng: np.random.Generator, p: Pattern, layout: Layout, size: tuple[float, float], look: PlankLook
-) -> SurfaceMaps:
-    return plank_maps(rng, p.wood, layout, size, look, p.darkness)
+def _planks(rng: np.random.Generator, p: Pattern, layout: Layout, look: PlankLook) -> SurfaceMaps:
+    return plank_maps(rng, p.wood, layout, size_of(p), look, p.darkness)
 
 
 # Rows and columns in one repeat of that size, shift of every other row, joint, bevel; pixels.
@@ -171,8 +197,8 @@ _TILES: dict[str, tuple[tuple[float, float], Laying, float, tuple[int, int]]] = 
 
 def _tiles(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     """Variant: `<laying>[-checker|-mixed|-stone]`; the last tint is the grout where there are more."""
-    laid, _, kind = p.variant.partition("-")
-    size, laying, bevel, shape = _TILES[laid or "30"]
+    laid, kind = _laid(p)
+    size, laying, bevel, shape = _TILES[laid]
     grout = p.tints[-1] if len(p.tints) > 1 else (0.72, 0.71, 0.68)
     colours = p.tints[:-1] if len(p.tints) > 1 else p.tints
     if kind == "stone":
@@ -184,8 +210,14 @@ def _tiles(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     return tile_maps(rng, shape, size, laying, glaze)
 
 
+def _laid(p: Pattern) -> tuple[str, str]:
+    """How tiles are laid, a key of _TILES, and their kind."""
+    laid, _, kind = p.variant.partition("-")
+    return laid or "30", kind
+
+
 def _marble(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    size, laying = (2.4, 2.4), Laying(4, 4, 0.0, 0.002)
+    size, laying = size_of(p), Laying(4, 4, 0.0, 0.002)
     sheet = marble(rng, _FINE, p.tints[0], p.tints[-1])
     body = cut_from(rng, sheet, tile_grid(_FINE, size, laying))
     grout = p.tints[0]
@@ -194,7 +226,7 @@ def _marble(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
 
 def _terracotta(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     n = int(rng.choice([7, 8, 10]))
-    return terracotta_maps(rng, _FINE, _FLOOR_M, Laying(n, n, 0.0, 0.007), p.tints[0])
+    return terracotta_maps(rng, _FINE, size_of(p), Laying(n, n, 0.0, 0.007), p.tints[0])
 
 
 def _wallpaper(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
@@ -204,7 +236,7 @@ def _wallpaper(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
 
 def _cloth(rng: np.random.Generator, p: Pattern, *, twill: bool) -> SurfaceMaps:
     second = p.tints[1] if len(p.tints) > 1 else None
-    return weave_maps(rng, _COARSE, (0.25, 0.25), p.tints[0], second=second, twill=twill)
+    return weave_maps(rng, _COARSE, size_of(p), p.tints[0], second=second, twill=twill)
 
 
 FAMILIES: dict[str, _Painter] = {
@@ -216,18 +248,18 @@ FAMILIES: dict[str, _Painter] = {
     "tiles": _tiles,
     "marble": _marble,
     "terracotta": _terracotta,
-    "brick": lambda r, p: brick_maps(r, _FINE, _FLOOR_M, p.tints[0], painted=False),
-    "painted brick": lambda r, p: brick_maps(r, _FINE, _FLOOR_M, p.tints[0], painted=True),
-    "paint": lambda r, p: paint_maps(r, _COARSE, (1.0, 1.0), p.tints[0]),
-    "plaster": lambda r, p: plaster_maps(r, _FINE, _FLOOR_M, p.tints[0]),
-    "smooth plaster": lambda r, p: plaster_maps(r, _COARSE, _FLOOR_M, p.tints[0], depth=0.35),
-    "concrete": lambda r, p: concrete_maps(r, _FINE, _FLOOR_M, p.tints[0]),
-    "carpet": lambda r, p: carpet_maps(r, _COARSE, (1.0, 1.0), p.tints[0], loops=False),
-    "loop carpet": lambda r, p: carpet_maps(r, _COARSE, (0.64, 0.64), p.tints[0], loops=True),
+    "brick": lambda r, p: brick_maps(r, _FINE, size_of(p), p.tints[0], painted=False),
+    "painted brick": lambda r, p: brick_maps(r, _FINE, size_of(p), p.tints[0], painted=True),
+    "paint": lambda r, p: paint_maps(r, _COARSE, size_of(p), p.tints[0]),
+    "plaster": lambda r, p: plaster_maps(r, _FINE, size_of(p), p.tints[0]),
+    "smooth plaster": lambda r, p: plaster_maps(r, _COARSE, size_of(p), p.tints[0], depth=0.35),
+    "concrete": lambda r, p: concrete_maps(r, _FINE, size_of(p), p.tints[0]),
+    "carpet": lambda r, p: carpet_maps(r, _COARSE, size_of(p), p.tints[0], loops=False),
+    "loop carpet": lambda r, p: carpet_maps(r, _COARSE, size_of(p), p.tints[0], loops=True),
     "wallpaper": _wallpaper,
     "grain": lambda r, p: grain_maps(r, p.wood),
     "weave": lambda r, p: _cloth(r, p, twill=False),
     "twill": lambda r, p: _cloth(r, p, twill=True),
-    "leather": lambda r, p: leather_maps(r, _COARSE, (0.3, 0.3), p.tints[0]),
+    "leather": lambda r, p: leather_maps(r, _COARSE, size_of(p), p.tints[0]),
 }
 """Painters by family; docs/dress.md shows them all."""

@@ -5,7 +5,7 @@ import pytest
 
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import WOODS
-from pbrs_farm.dress.textures.families import FAMILIES, Pattern, maps_of, pattern_material
+from pbrs_farm.dress.textures.families import FAMILIES, Pattern, maps_of, pattern_material, size_of
 from pbrs_farm.dress.textures.maps import normals_from_height
 from pbrs_farm.dress.textures.noise import blurred, noise
 from pbrs_farm.dress.textures.wallpaper import PATTERNS
@@ -31,6 +31,11 @@ def test_a_step_over_an_edge_is_no_larger_than_steps_inside(pattern: Pattern) ->
         )
         # Joints are steps too: compare with the largest of all lines, noise with the median.
         assert steps[-1] <= max(steps[:-1].max() * 1.05, np.median(steps) * 1.5)
+
+
+@pytest.mark.parametrize("pattern", ALL, ids=lambda p: f"{p.family} {p.variant}")
+def test_the_size_of_a_pattern_is_known_before_it_is_painted(pattern: Pattern) -> None:
+    assert size_of(pattern) == maps_of(pattern).size_m
 
 
 @pytest.mark.parametrize("family", FAMILIES)

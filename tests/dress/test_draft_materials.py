@@ -1,0 +1,96 @@
+"""A draft's materials: painted beside what follows, once each, in the order they were asked for."""
+
+from threading import Event
+
+import pytest
+
+from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.dress.draft_materials import DraftMaterials, Painted
+
+PLAIN = Material("plain")
+
+
+def _texture(name: str) -> Texture:
+    return Texture(name, f"{name}.jpg", "image/jpeg", b"")
+
+
+def _painted(name: str) -> Painted:
+    return Painted(Material(name, texture_id=name), (_texture(name),), (0.5, 0.5, 0.5))
+
+
+def test_who_needs_a_material_paints_it_while_the_thread_is_at_another() -> None:
+    materials, begun, go_on = DraftMaterials([PLAIN], {}), Event(), Event()
+
+    def held() -> Painted:
+        begun.set()
+        go_on.wait(60)
+        return _painted("held")
+
+    slow, _ = materials.paint(held)
+    fast, painting = materials.paint(lambda: _painted("fast"))
+    assert begun.wait(60)  # the thread paints, and does not end before it is let
+    assert materials[fast].name == "fast"
+    assert painting.painted().mean_rgb == (0.5, 0.5, 0.5)
+    go_on.set()
+    assert materials[slow].name == "held"
+    assert materials[0] == PLAIN
+
+
+def test_a_thread_paints_what_nobody_has_asked_for_yet() -> None:
+    materials, done = DraftMaterials([], {}), Event()
+
+    def paint() -> Painted:
+        done.set()
+        return _painted("a")
+
+    materials.paint(paint)
+    assert done.wait(60)
+
+
+def test_a_material_is_painted_once_however_often_it_is_read() -> None:
+    materials, calls = DraftMaterials([], {}), list[int]()
+
+    def paint() -> Painted:
+        calls.append(1)
+        return _painted("a")
+
+    number, painting = materials.paint(paint)
+    assert {materials[number].name, painting.painted().material.name} == {"a"}
+    assert list(materials.textures()) == ["a"]
+    assert len(calls) == 1
+
+
+def test_textures_stand_in_the_order_of_asking_not_of_painting() -> None:
+    materials, go_on = DraftMaterials([], {"old": _texture("old")}), Event()
+
+    def held() -> Painted:
+        go_on.wait(60)
+        return _painted("held")
+
+    materials.paint(held)
+    second, _ = materials.paint(lambda: _painted("second"))
+    materials.add(Material("named", texture_id="named"), [_texture("named")])
+    assert materials[second].texture_id == "second"
+    go_on.set()
+    assert list(materials.textures()) == ["old", "held", "second", "named"]
+
+
+def test_the_error_of_a_painter_reaches_who_reads_the_material() -> None:
+    materials = DraftMaterials([PLAIN], {})
+
+    def fail() -> Painted:
+        raise KeyError("no such family")
+
+    number, _ = materials.paint(fail)
+    assert materials[0] == PLAIN
+    with pytest.raises(KeyError, match="no such family"):
+        _ = materials[number]
+
+
+def test_equal_materials_have_one_number() -> None:
+    materials = DraftMaterials([PLAIN], {})
+    number, _ = materials.paint(lambda: _painted("a"))
+    assert materials.add(PLAIN, ()) == 0
+    assert materials.add(Material("new"), ()) == materials.add(Material("new"), ()) == 2
+    assert (number, len(materials)) == (1, 3)
+    assert [m.name for m in materials[:2]] == ["plain", "a"]
