@@ -46,7 +46,7 @@ STEPS: Final = {
         Step("illuminance", 5, ("sky", "emission", "materials"), ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
         Step(
-            "light", 19, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
+            "light", 20, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
             needs=("illuminance",),
         ),
         Step("develop", 6, ("tone", "light", "sensor"), ("light",), needs=("light",)),

@@ -1,0 +1,71 @@
+"""Rays of the path tracer find the first surface, through which of Embree's tests ever."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbrs_farm.raycast.tracer import scene_from_mesh
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.scene_tables import SceneTables
+from pbrs_farm.transport.scene_tables.sky import dark_sky
+from tests.transport import hard_rooms
+from tests.transport.recorded_blocks import RECIPE
+
+N_RAYS = 20_000
+
+pytestmark = pytest.mark.skipif(
+    choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
+)
+
+
+@pytest.fixture
+def tables() -> SceneTables:
+    house, _camera = hard_rooms.covered_cup()
+    return LightScene.load(house, {}, RECIPE, dark_sky()).tables
+
+
+def faces_met(scene: Any, tables: SceneTables) -> NDArray[np.int64]:
+    """(N_RAYS,) faces that rays from the middle of the room meet, -1 = none."""
+    import drjit as dr
+    import mitsuba as mi
+
+    directions = np.random.default_rng(3).standard_normal((3, N_RAYS)).astype(np.float32)
+    directions /= np.linalg.norm(directions, axis=0)
+    eye = (tables.positions.min(axis=0) + tables.positions.max(axis=0)) / 2
+    o = dr.repeat(mi.Point3f(*map(float, eye)), N_RAYS)
+    si = scene.intersect(o, mi.Vector3f(directions), mi.Bool(True))
+    return np.where(si.valid.numpy(), si.face.numpy().astype(np.int64), -1)
+
+
+def test_the_faster_test_finds_the_same_faces(
+    tables: SceneTables, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pbrs_farm.transport.kernels import device_scene
+
+    fast = device_scene.DeviceScene(tables)
+    monkeypatch.setattr(device_scene, "MAX_FAST_FACES", len(tables.faces) - 1)
+    plain = device_scene.DeviceScene(tables)
+    found = faces_met(fast, tables)
+    assert (fast._fast is None, plain._fast is None) == (False, True)
+    assert (found >= 0).mean() > 0.9
+    assert (found == faces_met(plain, tables)).mean() > 0.9999
+
+
+def test_a_ray_that_slips_out_through_the_faster_test_is_traced_again(tables: SceneTables) -> None:
+    # A tree without the faces that most rays meet stands for one with gaps along its edges.
+    import mitsuba as mi
+
+    from pbrs_farm.transport.kernels.device_scene import DeviceScene
+
+    scene = DeviceScene(tables)
+    before = faces_met(scene, tables)
+    last = np.bincount(before[before >= 0]).argmax()
+    scene._fast = scene_from_mesh(mi, tables.positions, tables.faces[:last], watertight=False)
+    after = faces_met(scene, tables)
+    assert ((before == last) & (after == last)).any()
+    assert ((after >= 0) == (before >= 0)).all()
