@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import math
 import os
 import signal
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -272,3 +274,33 @@ def test_real_processes_live_and_die_as_the_fake_ones(tmp_path: Path) -> None:
         assert run("fine") == ("", "fine")
     finally:
         process.close()
+
+
+class _Kept:
+    """What a library holds until the interpreter is taken apart."""
+
+    def __del__(self) -> None:
+        os.write(2, b"taken apart\n")
+
+
+_KEPT: list[_Kept] = []
+
+
+def make_leaving_handler(_send: Send) -> Handler:
+    """A handler that has something left to do when its process ends."""
+    atexit.register(sys.stdout.write, "left in order\n")
+    _KEPT.append(_Kept())
+    return lambda line: Message("done", line.decode())
+
+
+def test_a_process_that_ends_does_what_is_left_and_is_not_taken_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)
+    target = "tests.run.test_render_process:make_leaving_handler"
+    process = RenderProcess(partial(ChildProcess, target, tmp_path / "log"), ProcessLimits())
+    process.begin(b"fine")
+    while not isinstance(process.poll(0.2), Ended):
+        pass
+    process.close()
+    assert process.log_tail() == "left in order\n"

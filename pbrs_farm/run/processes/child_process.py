@@ -24,7 +24,7 @@ PATH_FROM_PARENT: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1
 """Code of a child that sees the modules its parent sees, wherever it was started."""
 
 _BOOT: Final = PATH_FROM_PARENT + (
-    "from pbrs_farm.run.processes.task_loop import main; sys.exit(main(sys.argv[2]))"
+    "from pbrs_farm.run.processes.task_loop import end, main; end(main(sys.argv[2]))"
 )
 
 

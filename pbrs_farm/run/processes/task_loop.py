@@ -7,12 +7,13 @@ messages leave on what was stdout; whatever libraries print goes to stderr, whic
 
 from __future__ import annotations
 
+import atexit
 import os
 import pkgutil
 import signal
 import sys
 import traceback
-from typing import BinaryIO
+from typing import BinaryIO, NoReturn
 
 from pbrs_farm.run.processes.child_process import die_with_parent
 from pbrs_farm.run.processes.message import Message
@@ -42,6 +43,18 @@ def main(target: str) -> int:
     return 0
 
 
+def end(code: int) -> NoReturn:
+    """End this process as soon as what was left for its end is done (atexit).
+
+    Whoever started it waits for it. Taking the interpreter apart, with all that Mitsuba and Dr.Jit
+    put into it, is 0.12 s of CPU and frees nothing that the kernel does not.
+    """
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
 def _own_pipes() -> tuple[BinaryIO, BinaryIO]:
     """Keep stdin and stdout for ourselves; everybody else reads nothing and prints to stderr."""
     requests = os.fdopen(os.dup(0), "rb")
@@ -50,7 +63,3 @@ def _own_pipes() -> tuple[BinaryIO, BinaryIO]:
     os.dup2(nothing, 0)
     os.dup2(2, 1)
     return requests, replies
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
