@@ -34,7 +34,9 @@ _DRJIT_STEPS = ("house", "cameras", "pairs", "truth", "illuminance", "light", "d
 
 _OF_LIGHT = (
     "pbrs_farm.run.steps", "pbrs_farm.formats.house_bundle", "pbrs_farm.transport.light_scene",
-    "pbrs_farm.transport.illuminance", "pbrs_farm.run.pilot_views", "pbrs_farm.run.blurred_camera",
+    "pbrs_farm.transport.illuminance", "pbrs_farm.transport.guiding.lampshade_exitance",
+    "pbrs_farm.transport.guiding.pilot", "pbrs_farm.transport.sample_passes",
+    "pbrs_farm.run.panoramas", "pbrs_farm.run.pilot_views", "pbrs_farm.run.blurred_camera",
 )  # fmt: skip
 _OF_FINISHING = (
     "pbrs_farm.run.steps", "pbrs_farm.read.sweethome3d", "pbrs_farm.dress.dressing",
