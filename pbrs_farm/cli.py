@@ -82,6 +82,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         offer = did_you_mean(verb, [v for verbs in MODULES.values() for v in verbs])
         warn(f"no verb {verb!r}{f', {offer}' if offer else ''} (pbrs-farm --help lists them)")
         return 2
+    if verb == "demo":
+        _start_early(words)
     parser = build_parser(module)
     args, unknown = parser.parse_known_args(words)
     if unknown:
@@ -91,6 +93,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 2
     return _handled(args)
+
+
+def _start_early(words: Sequence[str]) -> None:
+    """Start the demo's process that makes the house, before the modules of the verb are loaded."""
+    from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, start_early
+    from pbrs_farm.run.processes.limits import is_room_for_two
+
+    options = {word.partition("=")[0] for word in words}
+    # Other numbers of processes have other processes.
+    if is_room_for_two() and not options & {"-h", "--help", "--jobs"}:
+        start_early(FINISHING_HANDLER)
 
 
 def _handled(args: argparse.Namespace) -> int:

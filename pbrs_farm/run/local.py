@@ -21,15 +21,13 @@ from pbrs_farm.run.attributions import write_attribution
 from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
 from pbrs_farm.run.plan import Wanted
-from pbrs_farm.run.processes.limits import ProcessLimits, machine_mb, memory_share_mb
+from pbrs_farm.run.processes.limits import ProcessLimits, is_room_for_two, memory_share_mb
 from pbrs_farm.run.processes.pool import Pool
 from pbrs_farm.run.processes.render_task import Event, Setting
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.run.schedule import Schedule
 from pbrs_farm.store import StoreSettings, store_from_url
 from pbrs_farm.store.object_store import Store
-
-_APART_MB = 6000.0  # memory of a machine on which two processes may share a view's steps
 
 Observer = Callable[[Event], None]
 
@@ -115,8 +113,7 @@ def finishes_apart(run: Run) -> bool:
 
     One render process leaves cores idle while it reads, labels, draws and develops.
     """
-    is_room_for_two = (os.cpu_count() or 1) > 1 and machine_mb() > _APART_MB
-    return run.n_jobs <= 1 and is_room_for_two and "light" in plan.view_steps(run.want)
+    return run.n_jobs <= 1 and is_room_for_two() and "light" in plan.view_steps(run.want)
 
 
 def _finish_root(store: Store, houses: Sequence[str]) -> None:

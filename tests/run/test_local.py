@@ -17,7 +17,7 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run import local
 from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.plan import wanted
-from pbrs_farm.run.processes import pool
+from pbrs_farm.run.processes import limits, pool
 from pbrs_farm.run.processes.render_task import Event, Setting
 
 FAKE = "tests.run.fakes:run_step"
@@ -228,7 +228,7 @@ def test_two_processes_make_what_one_makes(tmp_path: Path) -> None:
 def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine on which one process renders light while another finishes views."""
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
-    monkeypatch.setattr(local, "machine_mb", lambda: 16_000.0)
+    monkeypatch.setattr(limits, "machine_mb", lambda: 16_000.0)
 
 
 def makers(out: Path, step: str) -> set[str]:
@@ -310,6 +310,6 @@ def test_views_are_finished_apart_where_one_job_leaves_cores_idle(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
-    monkeypatch.setattr(local, "machine_mb", lambda: memory_mb)
+    monkeypatch.setattr(limits, "machine_mb", lambda: memory_mb)
     asked = Run(["builtin"], "somewhere", named("plain"), **fields)  # type: ignore[arg-type]
     assert local.finishes_apart(asked) is is_apart

@@ -133,6 +133,10 @@ class ChildProcess:
         except OSError:
             return ""
 
+    def move_log(self, log: Path) -> None:
+        """Keep its log at another place of the same file system."""
+        self._log = self._log.replace(log)
+
     def clear_log(self) -> None:
         """Empty its log: the next task's begins."""
         os.truncate(self._log, 0)

@@ -16,6 +16,7 @@ _CGROUP_LIMITS: Final = (
 # cgroup v1 writes "no limit" as a number near 2^63.
 _NO_LIMIT: Final = 1 << 50
 _SHARE_OF_MACHINE: Final = 0.9
+_APART_MB: Final = 6000.0  # memory of a machine on which two processes may share a view's steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,11 @@ def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
         if text.isdigit() and int(text) < _NO_LIMIT:
             total = min(total, int(text))
     return total / 2**20
+
+
+def is_room_for_two() -> bool:
+    """Whether this machine has the cores and the memory for two processes that share a view's steps."""
+    return (os.cpu_count() or 1) > 1 and machine_mb() > _APART_MB
 
 
 def memory_share_mb(n_processes: int) -> float:

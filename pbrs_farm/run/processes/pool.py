@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-from pbrs_farm.run.processes.child_process import ChildProcess
+from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, child_of
 from pbrs_farm.run.processes.limits import ProcessLimits
 from pbrs_farm.run.processes.message import Message
 from pbrs_farm.run.processes.render_process import CHECK_EVERY_S, Ended, RenderProcess
@@ -28,7 +28,7 @@ ALONE, LIGHT, FINISHING = "alone", "light", "finishing"
 HANDLERS: Final = {
     ALONE: "pbrs_farm.run.run_task:make_handler",
     LIGHT: "pbrs_farm.run.run_task:make_light_handler",
-    FINISHING: "pbrs_farm.run.run_task:make_finishing_handler",
+    FINISHING: FINISHING_HANDLER,
 }
 """What makes the handler of a process that does every step, light, or all else."""
 
@@ -113,7 +113,7 @@ class Pool:
         log = Path(self._folder.name) / f"process-{len(self._workers)}.log"
         is_apart = self._lanes[FINISH] > 0
         role = FINISHING if lane == FINISH else LIGHT if is_apart else ALONE
-        start = partial(ChildProcess, HANDLERS[role], log)
+        start = partial(child_of, HANDLERS[role], log)
         self._workers.append(_Worker(RenderProcess(start, self._limits), lane))
         return self._workers[-1]
 

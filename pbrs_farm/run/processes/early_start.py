@@ -1,0 +1,39 @@
+"""Render processes that start before the run is known: they load their libraries meanwhile.
+
+Effects: starts processes. Those that no run takes end with this one, as all render processes do.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm.run.processes.child_process import ChildProcess
+
+FINISHING_HANDLER: Final = "pbrs_farm.run.run_task:make_finishing_handler"
+"""What makes the handler of the process that makes houses and finishes views."""
+
+# Target -> a process that nobody has taken, and the folder of its log.
+_STARTED: Final[dict[str, tuple[ChildProcess, tempfile.TemporaryDirectory[str]]]] = {}
+
+
+def start_early(target: str) -> None:
+    """Start a process of `target` (see task_loop.main) for the next child_of to take."""
+    folder = tempfile.TemporaryDirectory(prefix="pbrs-farm-")
+    _STARTED[target] = (ChildProcess(target, Path(folder.name) / "early.log"), folder)
+
+
+def child_of(target: str, log: Path) -> ChildProcess:
+    """The process that was started early for a target, if it lives; else one that starts now.
+
+    log: its file from now on, on the file system of temporary files.
+    """
+    if target not in _STARTED:
+        return ChildProcess(target, log)
+    child, folder = _STARTED.pop(target)
+    is_alive = child.exit_code() is None
+    if is_alive:
+        child.move_log(log)
+    folder.cleanup()
+    return child if is_alive else ChildProcess(target, log)
