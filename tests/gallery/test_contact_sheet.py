@@ -18,7 +18,7 @@ from pbrs_farm.core.classes import NYU40_COLOURS
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.gallery import contact_sheet as sheet
-from pbrs_farm.gallery import gallery_page, lettering
+from pbrs_farm.gallery import gallery_page, lettering, view_tiles
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
 from pbrs_farm.gallery.view_tiles import TILES, Tile
@@ -185,6 +185,17 @@ def test_nyu40_colours_are_distinct() -> None:
     apart = np.abs(table[:, None] - table[None]).sum(2) + 999 * np.eye(41, dtype=int)
     assert table.shape == (41, 3)
     assert apart.min() >= 48
+
+
+def test_a_black_picture_says_that_no_light_came(root: Path) -> None:
+    folder = root / "houses/a/views/0_0_1"
+    black = images.png_from_array(np.zeros((60, 80, 3), np.uint8))
+    for mode in ("mlt_ol", "mlt_il_ol"):
+        (folder / f"{mode}.png").write_bytes(black)
+    one, other = (view_tiles.tiles_of(view) for view in views_of(root)[:2])
+    notes = [{t.kind.layer: t.note for t in tiles if t.kind.is_photo} for tiles in (one, other)]
+    dark = {"mlt_ol": "no daylight", "mlt_il_ol": "no light"}
+    assert notes == [dict.fromkeys(notes[1], "") | dark, dict.fromkeys(notes[1], "")]
 
 
 def test_first_200_instances_have_200_colours() -> None:
