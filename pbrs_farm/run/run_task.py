@@ -23,6 +23,7 @@ from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.raycast.variant import choose_variant, set_threads
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.processes.limits import give_back_memory
 from pbrs_farm.run.processes.message import Handler, Message, Send
 from pbrs_farm.run.processes.render_task import Event, Setting, Task, task_from_line
 from pbrs_farm.run.step_cache import Outcome, Work
@@ -118,6 +119,8 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
         traceback.print_exc()
         sys.stderr.flush()
     else:
+        if name == "house":
+            give_back_memory()  # of painting and repair, before scenes are built
         seconds = time.perf_counter() - started
         send(Message("event", body=asdict(_event_of_outcome(work, name, outcome, seconds))))
         return True

@@ -1,0 +1,30 @@
+"""What a render process does with a task, in this process."""
+
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.read.source import resolve
+from pbrs_farm.run import run_task
+from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.processes.message import Message
+from pbrs_farm.run.processes.render_task import Setting, Task
+
+
+def test_memory_is_given_back_once_a_house_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(run_task, "give_back_memory", lambda: said.append("given back"))
+    setting = Setting(
+        str(tmp_path), recipe_from_name("preview", {}), 1, runner="tests.run.fakes:run_step"
+    )
+    source = resolve("builtin")
+
+    def hear(message: Message) -> None:
+        said.append(f"{message.kind} {message.body.get('step', message.text)}")
+
+    task = Task(source.house_id, ("house", "cameras"), source)
+    run_task.run_task(hear, setting, HouseCache(), task)
+    assert said == ["step house", "given back", "event house", "step cameras", "event cameras"]
