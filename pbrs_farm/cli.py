@@ -11,6 +11,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Final
@@ -82,8 +83,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         offer = did_you_mean(verb, [v for verbs in MODULES.values() for v in verbs])
         warn(f"no verb {verb!r}{f', {offer}' if offer else ''} (pbrs-farm --help lists them)")
         return 2
-    if verb == "demo":
-        _start_early(words)
+    try:
+        if verb == "demo":
+            _start_early(words)
+        return _parsed(words, verb, module)
+    except KeyboardInterrupt:
+        warn("interrupted; the same command goes on where it stopped")
+        return 130  # 128 + SIGINT, as shells have it
+    finally:
+        if verb == "demo":
+            _end_untaken()
+
+
+def _parsed(words: Sequence[str], verb: str, module: str | None) -> int:
+    """Read the options of a verb and run it."""
     parser = build_parser(module)
     args, unknown = parser.parse_known_args(words)
     if unknown:
@@ -103,7 +116,16 @@ def _start_early(words: Sequence[str]) -> None:
     options = {word.partition("=")[0] for word in words}
     # Other numbers of processes have other processes.
     if is_room_for_two() and not options & {"-h", "--help", "--jobs"}:
-        start_early(FINISHING_HANDLER)
+        # What cannot start now cannot later either, and is told then.
+        with suppress(OSError):
+            start_early(FINISHING_HANDLER)
+
+
+def _end_untaken() -> None:
+    """End what _start_early started and no run has taken: its words were wrong, or ask for others."""
+    from pbrs_farm.run.processes.early_start import end_untaken
+
+    end_untaken()
 
 
 def _handled(args: argparse.Namespace) -> int:
@@ -121,9 +143,6 @@ def _handled(args: argparse.Namespace) -> int:
             raise
         warn(f"this needs {error.name}: {install_command(EXTRA_OF[error.name])}")
         return 1
-    except KeyboardInterrupt:
-        warn("interrupted; the same command goes on where it stopped")
-        return 130  # 128 + SIGINT, as shells have it
     except BrokenPipeError:
         # The reader of the pipe is gone: keep Python from complaining as it exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

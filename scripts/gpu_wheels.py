@@ -65,8 +65,9 @@ def main() -> None:
         fetch(site, args.python)
         shown = cut_networks(site / DENOISER)
         cut_debug(site, carried(site))
-        if shown and shown != picture_or_fault(site / DENOISER):
-            parser.exit(1, "gpu_wheels: without debug data the denoiser makes another picture\n")
+        if shown and shown != (now := picture_or_fault(site / DENOISER)):
+            said = f"the denoiser makes another picture or none: {now}"
+            parser.exit(1, f"gpu_wheels: without debug data {said}\n")
         files = carried(site)
         archive = args.folder / f"wheels-{args.python}.tar.xz"
         pack(site, files, archive)

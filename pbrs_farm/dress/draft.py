@@ -36,6 +36,10 @@ class Draft:
         self.used: dict[str, Piece] = {}  # pieces of the catalogue in the house, by id
         self.kept: dict[str, object] = {}  # what parts compute from the items and use again
 
+    def close(self) -> None:
+        """End the thread that paints: the draft is a house now, or was given up."""
+        self.materials.close()
+
     @property
     def textures(self) -> dict[str, Texture]:
         """All textures by id; waits for those that are not painted yet."""

@@ -1,6 +1,6 @@
 """The materials and textures of a draft, some of them painted beside what follows.
 
-Effects: a thread paints; each draft has its own, which ends with it.
+Effects: a thread paints; each draft has its own, until close().
 """
 
 from __future__ import annotations
@@ -58,10 +58,18 @@ class DraftMaterials(Sequence[Material]):
         if isinstance(number, slice):
             return [self[k] for k in range(*number.indices(len(self)))]
         made = self._all[number]
-        return made.painted().material if isinstance(made, Painting) else made
+        if not isinstance(made, Painting):
+            return made
+        # From now on an equal one that is added has this number.
+        material = made.painted().material
+        self._number.setdefault(material, number % len(self._all))
+        return material
 
     def add(self, material: Material, textures: Iterable[Texture]) -> int:
-        """The number of a material, the same for equal ones; textures: those that it names."""
+        """The number of a material; textures: those that it names.
+
+        The same for equal ones, painted ones that were read included.
+        """
         self._textures += ((t.id, t) for t in textures)
         if material not in self._number:
             self._number[material] = len(self._all)
@@ -75,6 +83,11 @@ class DraftMaterials(Sequence[Material]):
         self._textures.append(painting)
         self._all.append(painting)
         return len(self._all) - 1, painting
+
+    def close(self) -> None:
+        """End the thread after what it paints now; nothing is painted beside any more."""
+        if "_thread" in self.__dict__:
+            self._thread.shutdown(wait=False, cancel_futures=True)
 
     def textures(self) -> dict[str, Texture]:
         """All textures by id, in the order in which they came; waits for what is not painted yet."""

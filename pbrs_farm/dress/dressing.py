@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from typing import Final
 
@@ -58,7 +59,11 @@ def dress(
     house: as read, not repaired. Equal arguments give equal bits. Raises BadRecipe for an unknown
     style.
     """
-    draft = Draft(house, seed)
+    with closing(Draft(house, seed)) as draft:
+        return _dressed(draft, catalogue, fields)
+
+
+def _dressed(draft: Draft, catalogue: Catalogue, fields: DressFields) -> tuple[House, DressReport]:
     style = style_for(draft.rng("style"), fields.style)
     pieces = {p.id: p for p in catalogue.pieces}
     gates: tuple[Gate, ...] = ()
@@ -72,7 +77,9 @@ def dress(
     dressed = draft.house()
     credits = _credits(dressed, catalogue)
     dressed = replace(
-        dressed, id=keys.dressed_id(house.id, seed), source=_credited(house.source, credits)
+        dressed,
+        id=keys.dressed_id(draft.source.id, draft.seed),
+        source=_credited(draft.source.source, credits),
     )
     return dressed, _report(dressed, draft, style, gates, credits)
 

@@ -101,7 +101,9 @@ def _layer(view: ViewEntry, kind: TileKind) -> _Layer:
     try:
         stored = images.array_from_png(read_regular(path), str(path))
         if kind.is_photo:
-            return _Layer(kind, _photo(stored), note=_note(kind, stored))
+            photo = _photo(stored)
+            dark = "no daylight" if kind.layer == "mlt_ol" else "no light"
+            return _Layer(kind, photo, note="" if photo.any() else dark)
         pixels = _COLOURS[kind.layer](stored)
     except (BadInput, OSError, ValueError, IndexError):
         return _Layer(kind, missing="cannot be read")
@@ -120,8 +122,6 @@ def _note(kind: TileKind, stored: NDArray[Any]) -> str:
         return f"{near:.1f} to {far:.1f} m"
     if kind.layer == "instance":
         return f"{len(np.unique(stored[stored > 0]))} instances"
-    if kind.is_photo and not stored.any():
-        return "no daylight" if kind.layer == "mlt_ol" else "no light"
     return ""
 
 

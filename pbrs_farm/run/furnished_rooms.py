@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -62,9 +63,14 @@ def with_rooms_furnished(house: House, catalogue: Catalogue, seed: int, style: s
 
     Raises BadInput for a style that there is none of.
     """
-    draft = Draft(house, seed)
+    with closing(Draft(house, seed)) as draft:
+        return _furnished(draft, catalogue, style)
+
+
+def _furnished(draft: Draft, catalogue: Catalogue, style: str) -> House:
+    house = draft.source
     space = floor_space(draft)
-    rng = np.random.default_rng(keys.seed(house.id, "furnish", seed))
+    rng = np.random.default_rng(keys.seed(house.id, "furnish", draft.seed))
     for level in house.levels:
         storey = _storey(house, space, level.id, draft)
         if storey.empty:

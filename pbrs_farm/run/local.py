@@ -21,6 +21,7 @@ from pbrs_farm.run.attributions import write_attribution
 from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
 from pbrs_farm.run.plan import Wanted
+from pbrs_farm.run.processes.early_start import end_untaken
 from pbrs_farm.run.processes.limits import ProcessLimits, is_room_for_two, memory_share_mb
 from pbrs_farm.run.processes.pool import Pool
 from pbrs_farm.run.processes.render_task import Event, Setting
@@ -81,6 +82,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     with _pool(run) as pool:
         # Let the processes load their libraries while the homes are looked for.
         pool.start()
+        end_untaken()
         sources = _resolved(run, summary)
         if not sources:
             return summary

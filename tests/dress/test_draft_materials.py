@@ -94,3 +94,31 @@ def test_equal_materials_have_one_number() -> None:
     assert materials.add(Material("new"), ()) == materials.add(Material("new"), ()) == 2
     assert (number, len(materials)) == (1, 3)
     assert [m.name for m in materials[:2]] == ["plain", "a"]
+
+
+def test_a_painted_material_that_was_read_keeps_its_number_when_it_is_added() -> None:
+    materials = DraftMaterials([PLAIN], {})
+    number, _ = materials.paint(lambda: _painted("a"))
+    assert materials.add(materials[number], ()) == number
+    assert len(materials) == 2
+
+
+def test_a_draft_that_is_given_up_paints_no_more() -> None:
+    materials, begun, go_on, painted = DraftMaterials([], {}), Event(), Event(), list[str]()
+
+    def held() -> Painted:
+        begun.set()
+        go_on.wait(60)
+        return _painted("held")
+
+    def later() -> Painted:
+        painted.append("later")
+        return _painted("later")
+
+    materials.paint(held)
+    materials.paint(later)
+    assert begun.wait(60)
+    materials.close()
+    go_on.set()
+    materials._thread.shutdown(wait=True)
+    assert not painted

@@ -1,13 +1,13 @@
 """Render processes that start before the run is known."""
 
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from pbrs_farm import cli
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.run import local
+from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.processes import early_start, limits
 from pbrs_farm.run.processes.child_process import ChildProcess
 from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, child_of, start_early
@@ -52,20 +52,65 @@ def test_a_process_that_died_is_not_taken(tmp_path: Path) -> None:
         child.kill()
 
 
-def test_a_process_that_nobody_takes_ends_with_the_command() -> None:
-    code = f"""
-from pbrs_farm.run.processes import early_start
-early_start.start_early({TARGET!r})
-child, folder = early_start._STARTED[{TARGET!r}]
-print(child._process.pid, folder.name)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    pid, folder = done.stdout.split()
-    end = time.monotonic() + 60
-    while Path(f"/proc/{pid}").exists() and time.monotonic() < end:
-        time.sleep(0.05)
-    assert not Path(f"/proc/{pid}").exists()
-    assert not Path(folder).exists()
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Path]]:
+    """Process id and folder of each process that the command starts early, of TARGET."""
+    places: list[tuple[int, Path]] = []
+
+    def start(_target: str) -> None:
+        start_early(TARGET)
+        child, folder = early_start._STARTED[TARGET]
+        places.append((child._process.pid, Path(folder.name)))
+
+    monkeypatch.setattr(early_start, "start_early", start)
+    monkeypatch.setattr(limits, "is_room_for_two", lambda: True)
+    return places
+
+
+def _are_gone(places: list[tuple[int, Path]]) -> bool:
+    return not any(Path(f"/proc/{pid}").exists() or folder.exists() for pid, folder in places)
+
+
+def test_a_process_that_nobody_takes_ends_with_the_command(started: list[tuple[int, Path]]) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(["demo", "--no-such-option"])
+    assert len(started) == 1
+    assert _are_gone(started)
+
+
+def test_a_process_that_the_run_has_no_use_for_ends_when_its_own_start(
+    started: list[tuple[int, Path]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    early_start.start_early(TARGET)
+    monkeypatch.setattr(local, "_resolved", lambda *_arguments: [])
+    run_local(Run((), str(tmp_path / "out"), Recipe()))
+    assert len(started) == 1
+    assert _are_gone(started)
+
+
+def test_a_command_goes_on_where_no_process_can_start_early(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(_target: str) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(early_start, "start_early", full)
+    monkeypatch.setattr(limits, "is_room_for_two", lambda: True)
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(["demo", "--no-such-option"])
+    assert "--no-such-option" in capsys.readouterr().err
+
+
+def test_an_interrupt_before_the_options_are_read_is_told_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(_module: str | None) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "build_parser", interrupted)
+    monkeypatch.setattr(limits, "is_room_for_two", lambda: False)
+    assert cli.main(["demo"]) == 130
+    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 @pytest.mark.parametrize(

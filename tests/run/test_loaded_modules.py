@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-# Makes a house in a process that is ready for light, then prints what light loads beside.
-_CODE = """
+# What is done in a process of its own: a house and its cameras; then, in one that is ready for light,
+# light, and it prints what that loads beside.
+_BEGIN = """
 import sys
 from pathlib import Path
 from pbrs_farm.read.source import resolve
@@ -18,21 +19,27 @@ from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import store_from_url
 from tests.run.test_pipeline import small
 
-make_light_handler(print)
 source = resolve("builtin")
 work = Work(store_from_url(sys.argv[1]), small(), source.house_id, HouseCache(), source)
-for step in ("house", "cameras"):
-    views = run_step(step, work).marker.facts.get("views")
+"""
+_HOUSE = """
+run_step("house", work)
+print(run_step("cameras", work).marker.facts["views"][0][0])
+"""
+_LIGHT = """
+make_light_handler(print)
 before = set(sys.modules)
 run_step("illuminance", work)
-run_step("light", Work(work.store, work.recipe, work.house_id, work.house_cache, view_id=views[0][0]))
+run_step("light", Work(work.store, work.recipe, work.house_id, work.house_cache, view_id=sys.argv[2]))
 print(*sorted(m for m in set(sys.modules) - before if m.startswith("pbrs_farm")))
 """
 
 
 def test_light_waits_for_no_module_of_ours(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba")
-    done = subprocess.run(
-        [sys.executable, "-c", _CODE, str(tmp_path)], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split() == []
+
+    def said(code: str, *words: str) -> str:
+        command = [sys.executable, "-c", _BEGIN + code, str(tmp_path), *words]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+    assert said(_LIGHT, said(_HOUSE)) == ""

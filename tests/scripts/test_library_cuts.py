@@ -141,7 +141,8 @@ def test_nothing_is_packed_once_the_denoiser_makes_no_picture_any_more(
     shown: str,
     is_packed: bool,
 ) -> None:
-    # Where there was no picture to begin with, the library is packed whole and nothing is to be compared.
+    # Where there was no picture to begin with, all networks are packed and nothing is to be compared.
+    # Here there is none: the folder holds no library.
     def fetch(site: Path, _python: str) -> None:
         (site / "a.py").write_text("1\n")
 
@@ -153,9 +154,9 @@ def test_nothing_is_packed_once_the_denoiser_makes_no_picture_any_more(
     else:
         with pytest.raises(SystemExit, match="1"):
             wheels.main()
-        assert capsys.readouterr().err.splitlines() == [
-            "gpu_wheels: without debug data the denoiser makes another picture"
-        ]
+        (line,) = capsys.readouterr().err.splitlines()
+        said = "without debug data the denoiser makes another picture or none: OSError: "
+        assert line.startswith(f"gpu_wheels: {said}")
     assert (tmp_path / "wheels-3.12.tar.xz").exists() == is_packed
 
 

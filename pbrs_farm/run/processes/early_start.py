@@ -1,6 +1,7 @@
 """Render processes that start before the run is known: they load their libraries meanwhile.
 
-Effects: starts processes. Those that no run takes end with this one, as all render processes do.
+Effects: starts processes. Whoever started one ends it with end_untaken() where no run takes it; it
+ends with this one at the latest, as all render processes do.
 """
 
 from __future__ import annotations
@@ -22,6 +23,14 @@ def start_early(target: str) -> None:
     """Start a process of `target` (see task_loop.main) for the next child_of to take."""
     folder = tempfile.TemporaryDirectory(prefix="pbrs-farm-")
     _STARTED[target] = (ChildProcess(target, Path(folder.name) / "early.log"), folder)
+
+
+def end_untaken() -> None:
+    """End the processes that nobody has taken; they are gone afterwards."""
+    while _STARTED:
+        child, folder = _STARTED.popitem()[1]
+        child.kill()
+        folder.cleanup()
 
 
 def child_of(target: str, log: Path) -> ChildProcess:

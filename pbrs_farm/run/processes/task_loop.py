@@ -8,6 +8,7 @@ messages leave on what was stdout; whatever libraries print goes to stderr, whic
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import pkgutil
 import signal
@@ -50,8 +51,9 @@ def end(code: int) -> NoReturn:
     put into it, is 0.12 s of CPU and frees nothing that the kernel does not.
     """
     atexit._run_exitfuncs()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError):
+            stream.flush()
     os._exit(code)
 
 
