@@ -39,7 +39,9 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
 _RAY_OFFSET = 2e-5  # of a point's largest coordinate plus 1 m
 MAX_TRANSPARENT = 16  # surfaces that a shadow ray passes
 LEAST_COS = 0.02  # of a shading normal to where it is seen from; one that turns away more is bent
-MAX_FAST_FACES = 1_000_000  # with more, the second tree costs more than it saves
+# With more faces or lamps the second tree costs more than it saves.
+MAX_FAST_FACES = 1_000_000
+MAX_FAST_LAMPS = 200
 _FACE_PACKETS = FACE_FLOATS // 4
 _MATERIAL_PACKETS = MATERIAL_FLOATS // 4
 _MAP_PACKET = FIRST_MAP_TEXEL // 4  # the last one, of the maps
@@ -72,7 +74,8 @@ class DeviceScene:
         self._all = scene_from_mesh(mi, tables.positions, tables.faces)
         # Embree builds a tree for its faster test three times as long, and needs it beside the other.
         self._fast: Any = None
-        if not one_scene and len(tables.faces) <= MAX_FAST_FACES:
+        is_small = len(tables.faces) <= MAX_FAST_FACES and len(tables.lamps) <= MAX_FAST_LAMPS
+        if is_small and not one_scene:
             self._fast = scene_from_mesh(mi, tables.positions, tables.faces, watertight=False)
         transparent = tables.transparent
         self.has_transparent = bool(transparent.any())

@@ -42,13 +42,14 @@ def faces_met(scene: Any, tables: SceneTables) -> NDArray[np.int64]:
     return np.where(si.valid.numpy(), si.face.numpy().astype(np.int64), -1)
 
 
+@pytest.mark.parametrize(("limit", "counted"), [("FACES", "faces"), ("LAMPS", "lamps")])
 def test_the_faster_test_finds_the_same_faces(
-    tables: SceneTables, monkeypatch: pytest.MonkeyPatch
+    tables: SceneTables, monkeypatch: pytest.MonkeyPatch, limit: str, counted: str
 ) -> None:
     from pbrs_farm.transport.kernels import device_scene
 
     fast = device_scene.DeviceScene(tables)
-    monkeypatch.setattr(device_scene, "MAX_FAST_FACES", len(tables.faces) - 1)
+    monkeypatch.setattr(device_scene, f"MAX_FAST_{limit}", len(getattr(tables, counted)) - 1)
     plain = device_scene.DeviceScene(tables)
     found = faces_met(fast, tables)
     assert (fast._fast is None, plain._fast is None) == (False, True)
