@@ -80,7 +80,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     summary = Summary()
     summary.failures += [(shown(what, MAX_PLACE), text, "") for what, text in run.refused]
     with _pool(run) as pool:
-        # Let the processes load their libraries while the homes are looked for.
+        # Let the processes load their libraries while the homes are looked for, and no others beside.
         pool.start()
         end_untaken()
         sources = _resolved(run, summary)
