@@ -1,20 +1,18 @@
-"""The state of the code itself: size, comments, folders, functions, import cycles, coverage.
+"""The state of the code itself: size, imports, crumbs, names, import cycles, coverage.
 
 Effects: runs the test suite under coverage (about six minutes) and writes out/bench/house.json.
-`python -m benchmarks.house --quick` leaves the tests out and writes nothing.
+`python -m benchmarks.house --quick` leaves the tests out, writes nothing and lists what it counted.
 """
 
 from __future__ import annotations
 
 import ast
-import io
 import json
 import os
 import subprocess
 import sys
-import tokenize
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +22,6 @@ from benchmarks.figures import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
 MARKERS = "not slow and not gpu and not chaos and not infra and not web and not sweethome3d"
-PRAGMAS = ("noqa", "type:", "fmt:", "pragma:")
-# Parts that came after a number of lines was wished for.
-LATER_PARTS = tuple(
-    Path("pbrs_farm") / part for part in ("dress", "read/catalogue", "generate", "board", "study")
-)
 LINE_KINDS = (
     "lines_of_statements",
     "lines_of_imports",
@@ -43,15 +36,17 @@ UNITS = {
     "house.lines_of_docstrings": "of these",
     "house.lines_of_comments": "of these, comments alone",
     "house.lines_blank": "of these",
-    "house.lines_of_later_parts": "of these, in dress, read/catalogue, generate, board and study",
-    "house.comments_per_100": "lines with a comment, pragmas apart, per 100 lines",
-    "house.max_folder_files": "files of the fullest folder, one level, __init__ apart",
-    "house.function_p90": "lines, 90th percentile of all functions, docstrings included",
-    "house.function_max": "lines of the longest function",
-    "house.file_max": "lines of the longest file",
+    "house.files": "files of .py of pbrs_farm and workers",
+    "house.imports_per_100": "lines of imports per 100 lines",
+    "house.single_importer": "modules whose one importer stands in their own folder",
+    "house.twice_named": "names that two or more classes have",
+    "house.untyped": "functions with a parameter or result that has no annotation",
     "house.import_cycles": "groups of modules that import one another, type checking apart",
     "house.coverage": "% of statements run by the tests, subprocesses counted",
 }
+
+# Module -> the modules that it imports.
+Imports = Mapping[str, set[str]]
 
 
 def main() -> None:
@@ -64,21 +59,18 @@ def main() -> None:
 def static_figures() -> dict[str, Any]:
     """What the source says by itself."""
     texts = {path: path.read_text(encoding="utf-8") for path in sources()}
-    n_lines = sum(len(text.splitlines()) for text in texts.values())
-    n_comments = sum(commented_lines(text) for text in texts.values())
-    lengths = [n for text in texts.values() for n in function_lengths(text)]
+    trees = [ast.parse(text) for text in texts.values()]
     kinds = sum((line_kinds(text) for text in texts.values()), Counter[str]())
-    later = [t for path, t in texts.items() if any(d in path.parents for d in LATER_PARTS)]
+    imports = imports_of_modules()
     return {
-        "house.lines": n_lines,
+        "house.lines": kinds.total(),
         **{f"house.{name}": kinds[name] for name in LINE_KINDS},
-        "house.lines_of_later_parts": sum(len(t.splitlines()) for t in later),
-        "house.comments_per_100": round(100 * n_comments / n_lines, 2),
-        "house.max_folder_files": max(folder_files().values()),
-        "house.function_p90": int(np.percentile(lengths, 90)),
-        "house.function_max": max(lengths),
-        "house.file_max": max(len(text.splitlines()) for text in texts.values()),
-        "house.import_cycles": import_cycles(),
+        "house.files": len(texts),
+        "house.imports_per_100": round(100 * kinds["lines_of_imports"] / kinds.total(), 2),
+        "house.single_importer": len(single_importers(imports)),
+        "house.twice_named": len(twice_named(trees)),
+        "house.untyped": sum(untyped_functions(tree) for tree in trees),
+        "house.import_cycles": import_cycles(imports),
     }
 
 
@@ -86,13 +78,6 @@ def sources() -> Iterator[Path]:
     """Every Python file of the packages."""
     for package in PACKAGES:
         yield from sorted(Path(package).rglob("*.py"))
-
-
-def commented_lines(text: str) -> int:
-    """Lines that carry a comment which says something to a reader."""
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    comments = (t for t in tokens if t.type == tokenize.COMMENT)
-    return len({t.start[0] for t in comments if not t.string.lstrip("# ").startswith(PRAGMAS)})
 
 
 def line_kinds(text: str) -> Counter[str]:
@@ -119,34 +104,55 @@ def _lines(node: ast.stmt) -> range:
     return range(node.lineno, (node.end_lineno or node.lineno) + 1)
 
 
-def function_lengths(text: str) -> Iterator[int]:
-    """Lines of each function and method, from `def` to its last line."""
-    for node in ast.walk(ast.parse(text)):
+def imports_of_modules() -> Imports:
+    """The packages' modules, each with those it imports; imports for type checking apart."""
+    import grimp
+
+    graph = grimp.build_graph(*PACKAGES, exclude_type_checking_imports=True, cache_dir=None)
+    return {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+
+
+def single_importers(imports: Imports) -> list[str]:
+    """Modules that one other imports, which stands in the same folder."""
+    importers = defaultdict(set)
+    for importer, modules in imports.items():
+        for module in modules:
+            importers[module].add(importer)
+    return sorted(
+        module
+        for module, found in importers.items()
+        if len(found) == 1 and next(iter(found)).rpartition(".")[0] == module.rpartition(".")[0]
+    )
+
+
+def twice_named(trees: list[ast.Module]) -> list[str]:
+    """Names of classes that two or more modules define."""
+    names = Counter(
+        node.name for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)
+    )
+    return sorted(name for name, n in names.items() if n > 1)
+
+
+def untyped_functions(tree: ast.Module) -> int:
+    """Functions with a parameter or a result without annotation; self, cls and lambdas apart."""
+    found = 0
+    for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            yield (node.end_lineno or node.lineno) - node.lineno + 1
-
-
-def folder_files() -> Counter[Path]:
-    """Files per folder of the packages, caches and __init__.py apart."""
-    found: Counter[Path] = Counter()
-    for package in PACKAGES:
-        for path in Path(package).rglob("*"):
-            if path.is_file() and "__pycache__" not in path.parts and path.name != "__init__.py":
-                found[path.parent] += 1
+            given = node.args
+            named = [*given.posonlyargs, *given.args, *given.kwonlyargs]
+            named += [a for a in (given.vararg, given.kwarg) if a is not None]
+            bare = [a for a in named if a.annotation is None and a.arg not in ("self", "cls")]
+            found += bool(bare) or node.returns is None
     return found
 
 
-def import_cycles() -> int:
+def import_cycles(imports: Imports) -> int:
     """Strongly connected groups of more than one module."""
-    import grimp
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    graph = grimp.build_graph(*PACKAGES, exclude_type_checking_imports=True, cache_dir=None)
-    number = {name: k for k, name in enumerate(sorted(graph.modules))}
-    pairs = [
-        (number[a], number[b]) for a in number for b in graph.find_modules_directly_imported_by(a)
-    ]
+    number = {name: k for k, name in enumerate(sorted(imports))}
+    pairs = [(number[a], number[b]) for a, modules in imports.items() for b in modules]
     rows, columns = np.array(pairs).T
     matrix = coo_array((np.ones(len(pairs)), (rows, columns)), shape=(len(number),) * 2)
     _, label = connected_components(matrix, directed=True, connection="strong")
@@ -191,5 +197,8 @@ if __name__ == "__main__":
     if "--quick" in sys.argv:
         for name, value in static_figures().items():
             print(f"{name:<26}{value}")
+        print("single importers:", *single_importers(imports_of_modules()), sep="\n  ")
+        classes = twice_named([ast.parse(p.read_text(encoding="utf-8")) for p in sources()])
+        print("twice named:", *classes, sep="\n  ")
     else:
         main()

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from benchmarks.house import commented_lines, function_lengths, line_kinds
+import ast
 
-
-def test_comments_count_by_line_and_pragmas_do_not() -> None:
-    text = 'x = 1  # metres\n# Sum the rest.\n# noqa\ny = 2  # type: ignore\nz = "# no"\n'
-    assert commented_lines(text) == 2
-
-
-def test_a_function_is_as_long_as_its_lines() -> None:
-    text = "def a():\n    return 1\n\nclass B:\n    def c(self):\n\n        return 2\n"
-    assert sorted(function_lengths(text)) == [2, 3]
+from benchmarks.house import (
+    import_cycles,
+    line_kinds,
+    single_importers,
+    twice_named,
+    untyped_functions,
+)
 
 
 def test_every_line_counts_once_by_what_it_is() -> None:
@@ -26,3 +24,23 @@ def test_every_line_counts_once_by_what_it_is() -> None:
         "lines_of_statements": 1,
     }
     assert sum(kinds.values()) == len(text.splitlines())
+
+
+def test_a_module_with_one_importer_counts_where_both_share_a_folder() -> None:
+    imports = {"p.a": {"p.b", "p.c", "q.d"}, "p.b": {"p.c"}, "p.c": set(), "q.d": set()}
+    assert single_importers(imports) == ["p.b"]
+
+
+def test_modules_that_import_one_another_are_one_cycle() -> None:
+    assert import_cycles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == 1
+    assert import_cycles({"a": {"b"}, "b": {"c"}, "c": set()}) == 0
+
+
+def test_classes_of_one_name_in_two_modules_count_once() -> None:
+    one, other = ast.parse("class Plan: ...\nclass Wall: ..."), ast.parse("class Plan: ...")
+    assert twice_named([one, other]) == ["Plan"]
+
+
+def test_a_function_without_an_annotation_counts() -> None:
+    text = "class A:\n    def f(self, x: int) -> int: ...\n    def g(self, x) -> int: ...\ndef h(): ..."
+    assert untyped_functions(ast.parse(text)) == 2
