@@ -20,7 +20,7 @@ import pbrs_farm
 from pbrs_farm.commands.arguments import Handler, warn
 from pbrs_farm.commands.command_line import Parser, unknown_words, verb_first
 from pbrs_farm.core.errors import PbrsError
-from pbrs_farm.core.near_names import did_you_mean
+from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.installation import EXTRA_OF, install_command
 
 # Module of pbrs_farm.commands -> the verbs it adds.

@@ -13,7 +13,7 @@ from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.read.common.companion_files import SourceFiles
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, home_id, resolve, variants
 from pbrs_farm.run.dress_catalogue import GENERATED, has_furniture
 from pbrs_farm.run.processes.verb_process import doing
@@ -80,7 +80,7 @@ def is_left_in_place(ref: SourceRef) -> bool:
 
 def placed_reference(path: Path) -> tuple[str, bytes]:
     """Key and bytes of the reference file a job is to be selected against; BadInput if none."""
-    from pbrs_farm.curate.reference_build import read_reference
+    from pbrs_farm.curate.photographs import read_reference
     from pbrs_farm.selection.reference_set import bytes_from_reference
 
     reference = read_reference(path)

@@ -28,7 +28,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.plan import wanted
-from pbrs_farm.truth.albedo import albedo_png
+from pbrs_farm.truth.surface_layers import albedo_png
 
 HOME: Final = "Studio"
 N_PAIRS: Final = int(os.environ.get("PAIRS", "20"))

@@ -30,8 +30,8 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.source import read_house, resolve
 from pbrs_farm.repair import repair
 from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.eye_probes import counted
-from pbrs_farm.sample.rejection import Verdict
 from pbrs_farm.sample.view_score import object_columns, paper_score
 
 HOME = "2BedroomApartmentWithBowWindow"

@@ -12,7 +12,7 @@ from typing import Final
 
 from pbrs_farm.assets.debian import Deb, cached_deb, fetched_deb, write_whole
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.near_names import hint_of_choice
+from pbrs_farm.core.shown_text import hint_of_choice
 
 PACKAGE: Final = "sweethome3d"
 TESTED_VERSION: Final = "7.0.2+dfsg-3"

@@ -9,7 +9,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from pbrs_farm.core.near_names import did_you_mean
+from pbrs_farm.core.shown_text import did_you_mean
 
 # What a user wants -> the verbs for it, in the order of the help.
 GROUPS: Final = {

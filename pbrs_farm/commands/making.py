@@ -30,8 +30,8 @@ from pbrs_farm.commands.arguments import (
 )
 from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.errors import BadInput, MachineFailed
-from pbrs_farm.core.near_names import hint_of_choice
 from pbrs_farm.core.recipe import recipe_from_json
+from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.installation import need, system_command
 
 if TYPE_CHECKING:
@@ -318,7 +318,7 @@ def _step(args: argparse.Namespace) -> int:
 
 
 def _objects(args: argparse.Namespace) -> int:
-    from pbrs_farm.read.common.companion_files import SourceFiles
+    from pbrs_farm.read.common.source_files import SourceFiles
     from pbrs_farm.read.objects.model_folders import pick_models
     from pbrs_farm.read.source import object_source
 

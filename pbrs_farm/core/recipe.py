@@ -15,26 +15,26 @@ from pydantic import Field, ValidationError, model_validator
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.errors import BadRecipe
-from pbrs_farm.core.near_names import hint_of_choice, near_names, question
-from pbrs_farm.core.picture_fields.blur_fields import BlurFields
-from pbrs_farm.core.picture_fields.lens_fields import LensFields
-from pbrs_farm.core.picture_fields.sensor_fields import SensorFields
 from pbrs_farm.core.recipe_fields import (
+    BlurFields,
     CameraFields,
     DressFields,
     EmissionFields,
     FieldGroup,
     HistogramFields,
     ImageFields,
+    LensFields,
     LightFields,
     MaterialFields,
     RasterFields,
     ReadFields,
     RepairFields,
     SelectionFields,
+    SensorFields,
     SkyFields,
     ToneFields,
 )
+from pbrs_farm.core.shown_text import hint_of_choice, near_names, question
 
 __all__ = [
     "RECIPE_NAMES",

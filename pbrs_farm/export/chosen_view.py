@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER, LAYERS, Layer
-from pbrs_farm.core.lenses.lens import PINHOLE, lens_from_table
+from pbrs_farm.core.lenses import PINHOLE, lens_from_table
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes

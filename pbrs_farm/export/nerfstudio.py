@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.lenses.lens import COEFFICIENTS
+from pbrs_farm.core.lenses import COEFFICIENTS
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
 from pbrs_farm.export.sequences import required_picture
 

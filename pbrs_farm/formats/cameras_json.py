@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.lenses.lens import PINHOLE, lens_from_table
+from pbrs_farm.core.lenses import PINHOLE, lens_from_table
 from pbrs_farm.formats.serialise import json_bytes
 
 

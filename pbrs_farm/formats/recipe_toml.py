@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core.errors import BadRecipe
-from pbrs_farm.core.near_names import hint_of_choice
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, changed_recipe
-from pbrs_farm.core.shown_text import shown
+from pbrs_farm.core.shown_text import hint_of_choice, shown
 from pbrs_farm.regular_files import fault_of, read_regular
 
 ENDING: Final = ".toml"

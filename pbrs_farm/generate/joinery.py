@@ -10,8 +10,8 @@ from typing import Final
 
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind
-from pbrs_farm.core.primitives import Triple, boxes_surface
 from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
+from pbrs_farm.geometry.solids import Triple, boxes_surface
 
 _FRAME_M: Final = 0.06  # breadth of a frame's posts
 _LEAF_M: Final = 0.04  # thickness of a door's leaf

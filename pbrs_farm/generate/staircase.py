@@ -16,9 +16,9 @@ from shapely.geometry import Polygon
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material
-from pbrs_farm.core.primitives import Triple, box_quads, boxes_surface, quads_surface
 from pbrs_farm.generate.floor_plan import Plan, Point, Rect, RoomType
 from pbrs_farm.generate.plan_walls import largest_rectangle
+from pbrs_farm.geometry.solids import Triple, box_quads, boxes_surface, quads_surface
 
 HIGHEST_RISER_M: Final = 0.185
 RAIL_M: Final = 0.95  # above the upper floor

@@ -19,9 +19,8 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import is_made, made_homes
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.record import Record
-from pbrs_farm.read.common.companion_files import SourceFiles
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.regular_files import fault_of, read_given, real_path, text_given
 
 if TYPE_CHECKING:
@@ -190,7 +189,7 @@ def _companions(kind: SourceKind, path: Path, data: bytes, files: SourceFiles) -
         names = [*side_files(path), *files_of_gltf(data, path.name)]
         return files.digest(RootFolder(path.parent), names)
     from pbrs_farm.assets import homes_package
-    from pbrs_farm.read.sweethome3d.home_file.container import needs_program
+    from pbrs_farm.read.sweethome3d.home_file.home_xml import needs_program
 
     return _package_digest(homes_package.cached()) if needs_program(data, path.name) else ""
 
@@ -322,7 +321,7 @@ def check_unchanged(source: SourceRef) -> None:
 
 
 def _suncg(folder: Path, files: SourceFiles) -> SourceRef:
-    from pbrs_farm.read.suncg.suncg_companions import suncg_companions
+    from pbrs_farm.read.suncg.suncg_house import suncg_companions
 
     if not (folder / "house.json").exists():
         raise BadHouse(

@@ -12,8 +12,7 @@ from pbrs_farm.core.recipe import CameraFields, LensFields
 from pbrs_farm.run.step_cache import camera_file_text
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from pbrs_farm.sample.camera_report import CameraReport
-from pbrs_farm.sample.house_sampler import Sampling, sample_cameras
-from pbrs_farm.sample.stereo_views import with_right_views
+from pbrs_farm.sample.house_sampler import Sampling, sample_cameras, with_right_views
 from pbrs_farm.sample.stored_cameras import views_from_cameras
 from pbrs_farm.sample.walks.trajectory_file import poses_from_tum, trajectory_views
 from pbrs_farm.sample.walks.walk_sampler import sample_walk

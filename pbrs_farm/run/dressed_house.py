@@ -60,7 +60,7 @@ def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, Dre
     if not seed:
         return house, None
     from pbrs_farm.dress.dressing import dress
-    from pbrs_farm.repair.cleaning import without_persons_and_plants
+    from pbrs_farm.repair.repair_house import without_persons_and_plants
 
     doing(source.location, "dress")
     # Nothing makes way for people and plants that repair will take out.

@@ -14,7 +14,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
-from pbrs_farm.read.common.companion_files import SourceFiles
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan
 from pbrs_farm.run.attributions import write_attribution

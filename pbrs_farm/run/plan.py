@@ -16,8 +16,8 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.core.lighting import ALL_MODES, Mode
-from pbrs_farm.core.near_names import hint_of_choice
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.shown_text import hint_of_choice
 
 
 @dataclass(frozen=True, slots=True)

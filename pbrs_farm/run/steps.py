@@ -45,9 +45,9 @@ from pbrs_farm.run.view_histogram import view_histogram
 if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
     from pbrs_farm.repair import RepairReport
-    from pbrs_farm.selection.view_record import ViewPlace
+    from pbrs_farm.selection.quality import ViewPlace
     from pbrs_farm.transport.light_result import LightResult
-    from pbrs_farm.truth.partners import Relation
+    from pbrs_farm.truth.optical_flow import Relation
 
 
 def _cached_house(work: Work) -> CachedHouse:
@@ -213,7 +213,7 @@ def _partners(
     needed = {LAYER[name].partner for name in work.layers} - {""}
     if not needed:
         return {}
-    from pbrs_farm.truth.partners import partner_table, partners_of
+    from pbrs_farm.truth.optical_flow import partner_table, partners_of
 
     found = partners_of(view, cached.views(work.inputs["cameras"]))
     kept = {relation: other for relation, other in found.items() if relation in needed}

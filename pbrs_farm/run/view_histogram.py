@@ -15,7 +15,7 @@ from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.selection import scene_quality, view_record
-from pbrs_farm.selection.view_record import ViewPlace
+from pbrs_farm.selection.quality import ViewPlace
 from pbrs_farm.store.object_store import Store
 
 _MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})

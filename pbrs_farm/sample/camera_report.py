@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from enum import IntEnum
 
 from pbrs_farm.core.record import Record
 
@@ -62,3 +63,29 @@ def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
         for sector in room.sectors:
             total.update(sector.refused)
     return dict(total)
+
+
+# What became of a candidate viewpoint.
+
+
+class Verdict(IntEnum):
+    """The first rule that rejected a candidate, in the order the rules are tried, or its success."""
+
+    OUTSIDE_ROOM = 0  # not inside the room's polygon
+    NEAR_OBSTACLE = 1  # closer to a triangle than the clearance
+    NOT_ABOVE_FLOOR = 2  # a wall or a ceiling is below: inside a wall, or above a sloped ceiling
+    ENCLOSED = 3  # inside a piece of furniture or a wall
+    FILLED_BY_ONE = 4  # one object or wall covers more of the picture than it may
+    FEW_OBJECTS = 5  # too few objects cover enough of the picture
+    WEAK = 6  # preset photo: scores less than the least score
+    TWIN = 7  # preset photo: shows what a better view of the home shows
+    LOWER_SCORE = 8  # kept every rule; another one of its sector was taken
+    WINNER = 9
+
+    @property
+    def label(self) -> str:
+        """The name in reports: "near_obstacle"."""
+        return self.name.lower()
+
+
+REJECTIONS = tuple(v for v in Verdict if v < Verdict.LOWER_SCORE)

@@ -5,18 +5,20 @@ The pictures the rule needs come from a counter, an argument: pixels of each ite
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
-from pbrs_farm.core.camera import View
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera, View
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import CameraReport, RoomReport, total_rejected
+from pbrs_farm.sample.candidates import RoomCandidates
 from pbrs_farm.sample.eye_probes import ItemCounter
 from pbrs_farm.sample.photo_sampler import PhotoSampler, room_report
-from pbrs_farm.sample.room_candidates import RoomCandidates
 from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
 from pbrs_farm.sample.stored_cameras import stored_views
-from pbrs_farm.sample.view_overlap import DepthOf
+from pbrs_farm.sample.view_score import DepthOf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,3 +131,24 @@ def _report(
         rooms=rooms,
         notes=notes,
     )
+
+
+# Stereo pairs: for each view one more, moved to the right along its own x axis.
+
+
+def with_right_views(views: Iterable[View], baseline_m: float) -> tuple[View, ...]:
+    """The views, each followed by the right one of its pair; as they are when baseline_m is 0.
+
+    Both have the same intrinsics and axes, so that rows of the two pictures correspond.
+    """
+    if baseline_m <= 0:
+        return tuple(views)
+    pairs = ((view, _right(view, baseline_m)) for view in views)
+    return tuple(view for pair in pairs for view in pair)
+
+
+def _right(view: View, baseline_m: float) -> View:
+    pose = view.camera.world_from_camera.copy()
+    pose[:3, 3] += baseline_m * pose[:3, 0]
+    camera = Camera(view.camera.intrinsics, pose)
+    return replace(view, id=keys.right_id(view.id), camera=camera, left_id=view.id)

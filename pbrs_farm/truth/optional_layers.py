@@ -16,22 +16,17 @@ from pbrs_farm.core.classes import NYU13_FROM_NYU40
 from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Geometry, House, MaterialKind
 from pbrs_farm.core.layers import LAYER
-from pbrs_farm.core.lenses.lens import Lens
-from pbrs_farm.truth.albedo import albedo_png
+from pbrs_farm.core.lenses import Lens
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
-from pbrs_farm.truth.depth_sensor import sensor_depth
-from pbrs_farm.truth.depth_stereo import stereo_depth
-from pbrs_farm.truth.depth_time_of_flight import tof_depth
-from pbrs_farm.truth.hha import hha_png
+from pbrs_farm.truth.depth_sensor import sensor_depth, stereo_depth, tof_depth
 from pbrs_farm.truth.optical_flow import (
     Correspondence,
+    Relation,
     correspondence,
     disparity_png,
     flow_exr,
     flow_kitti,
 )
-from pbrs_farm.truth.partners import Relation
-from pbrs_farm.truth.shading_normal import shading_normals
 from pbrs_farm.truth.standard_layers import (
     depth_mm,
     encoded_normal,
@@ -39,6 +34,7 @@ from pbrs_farm.truth.standard_layers import (
     normal_png,
     semantic_png,
 )
+from pbrs_farm.truth.surface_layers import albedo_png, hha_png, shading_normals
 
 HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the same camera's hits
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from pbrs_farm.core.errors import BadRecipe
-from pbrs_farm.core.near_names import did_you_mean, hint_of_choice, near_names
 from pbrs_farm.core.recipe import Recipe, field_paths, recipe_from_name
+from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice, near_names
 
 HOMES = ("Studio", "2BedroomApartment", "4BedroomHouse", "builtin")
 

@@ -15,9 +15,14 @@ from pbrs_farm import images
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import SelectionFields
-from pbrs_farm.curate import charts, selection_summary
 from pbrs_farm.curate import selection_run as selecting
-from pbrs_farm.curate.selection_report import bin_colours, selection_report
+from pbrs_farm.curate.selection_report import (
+    bin_colours,
+    distribution,
+    joint,
+    selection_report,
+    yields,
+)
 from pbrs_farm.store import MemoryStore
 from tests.selection.histogram_sets import record, reference
 
@@ -85,7 +90,7 @@ def test_a_home_a_room_or_a_photograph_called_script_is_escaped() -> None:
 
 
 def test_words_in_a_chart_are_escaped() -> None:
-    chart = charts.yields([("<b> & co", "both", [1.0, 0.0])], 0.5, (0.7, 0.7))
+    chart = yields([("<b> & co", "both", [1.0, 0.0])], 0.5, (0.7, 0.7))
     assert "&lt;b&gt; &amp; co" in chart
     assert "<b>" not in chart
 
@@ -109,7 +114,7 @@ def test_no_run_is_an_error(store: MemoryStore) -> None:
 
 def test_bars_of_a_distribution_add_up_to_the_views() -> None:
     scores = np.array([0.1, 0.1, 0.9, 1.0])
-    svg = ET.fromstring(charts.distribution(scores, scores > 0.5, 0.5, "score"))
+    svg = ET.fromstring(distribution(scores, scores > 0.5, 0.5, "score"))
     heights = {"kept": 0.0, "rejected": 0.0}
     for box in svg.iter("rect"):
         heights[box.get("class", "")] += float(box.get("height", "0"))
@@ -128,14 +133,14 @@ def test_what_was_refused_is_not_drawn_in_the_colour_of_what_was_kept() -> None:
         [0.9, 0.9, 0.9, 0.2]
     )  # three in one cell above both limits, one refused there
     kept = np.array([True, True, False, False])
-    drawn = str(charts.joint(scores, scores, kept, (0.7, 0.7)))
+    drawn = str(joint(scores, scores, kept, (0.7, 0.7)))
     assert drawn.count('class="kept"') == 1
     assert drawn.count('class="rejected"') == 2
-    none = str(charts.joint(scores, scores, np.zeros(4, bool), (0.7, 0.7)))
+    none = str(joint(scores, scores, np.zeros(4, bool), (0.7, 0.7)))
     assert 'class="kept"' not in none
 
 
 def test_room_types_are_types_whatever_rooms_are_called() -> None:
     names = ["Bedroom 2", "Chambre", "Kitchen", "Room 7", None]
-    table = selection_summary._with_types(pa.table({"room_type": pa.array(names, pa.string())}))
+    table = selecting._with_types(pa.table({"room_type": pa.array(names, pa.string())}))
     assert table["room_type"].to_pylist() == ["bedroom", "bedroom", "kitchen", "", ""]

@@ -6,7 +6,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Material, Room, Source, Surface
-from pbrs_farm.core.primitives import box, box_quads, quads_surface
+from pbrs_farm.geometry.solids import box, box_quads, quads_surface
 
 WIDTH, DEPTH, HEIGHT = 4.0, 3.0, 2.5  # of the room, metres
 

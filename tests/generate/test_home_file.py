@@ -22,12 +22,12 @@ from pbrs_farm.core.house import (
     geometry_from_house,
 )
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.generate.drawing import drawn_plan
 from pbrs_farm.generate.floor_plan import Plan
 from pbrs_farm.generate.furniture import PlacedPiece, Storey
 from pbrs_farm.generate.home_file import home_file
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair

@@ -13,8 +13,7 @@ from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.formats.glb import GlbWriter
-from pbrs_farm.read.common.companion_files import SourceFiles
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.read.source import SourceRef, object_source, read_house, resolve
 from pbrs_farm.run.house_cache import HouseCache

@@ -12,9 +12,8 @@ from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields, Recipe
-from pbrs_farm.read.common.material_library import MaterialLibrary
+from pbrs_farm.read.common.material_library import MaterialLibrary, texture_from_bytes
 from pbrs_farm.read.common.notes import HARMLESS, Notes
-from pbrs_farm.read.common.textures import texture_from_bytes
 from pbrs_farm.read.source import SourceRef, read_house, resolve
 from pbrs_farm.run.steps import repaired_house
 from tests.example_homes import example_homes

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pbrs_farm.core.house import Item, ItemKind, Surface
-from pbrs_farm.core.primitives import box
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.closed_shells import closed_shells, shells_from_item
 

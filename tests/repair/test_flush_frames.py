@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.house import House, Item, ItemKind, Opening
-from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import repair, summary_of_report
-from pbrs_farm.repair.structure.flush_frames import MOVED_M, with_frames_apart
+from pbrs_farm.repair.structure.cut_openings import MOVED_M, with_frames_apart
 from tests.repair.wall_rooms import WALL, covers, house, room, walls_around
 
 RECT = (0.0, 0.0, 4.0, 3.0)

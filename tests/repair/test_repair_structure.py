@@ -10,8 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from pbrs_farm.core.house import Enclosure, House, Item, ItemKind, Opening
-from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import RepairReport, repair
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.shells import (

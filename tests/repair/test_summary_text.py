@@ -9,8 +9,8 @@ import pytest
 import shapely
 
 from pbrs_farm.core.house import House, Item, ItemKind
-from pbrs_farm.core.primitives import box
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import RepairReport, repair, section_svg, summary_of_report
 from pbrs_farm.repair.measure import furniture_audit as furniture_audit_module
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit

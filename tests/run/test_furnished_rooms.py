@@ -13,9 +13,9 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Shape
 from pbrs_farm.core.house import House, Material, Surface
 from pbrs_farm.core.made_home import MadeHome
-from pbrs_farm.core.primitives import box_quads, quads_surface
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.generate.made import made
+from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.read.source import resolve
 from pbrs_farm.read.sweethome3d import read_home
 from pbrs_farm.run.dressed_house import dressing_digest, uses_catalogue

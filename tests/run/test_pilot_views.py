@@ -8,7 +8,7 @@ from pbrs_farm.core.recipe import RepairFields, recipe_from_name
 from pbrs_farm.repair import repair
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
 from pbrs_farm.run.pilot_views import pilot_of_view, pilot_view
-from pbrs_farm.sample.stereo_views import with_right_views
+from pbrs_farm.sample.house_sampler import with_right_views
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene
 from tests.builders import builtin_home

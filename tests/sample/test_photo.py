@@ -13,6 +13,7 @@ from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.photo_sampler import PhotoSampler
 from pbrs_farm.sample.photo_score import (
@@ -22,8 +23,7 @@ from pbrs_farm.sample.photo_score import (
     photo_score,
     photo_shares,
 )
-from pbrs_farm.sample.rejection import Verdict
-from pbrs_farm.sample.view_overlap import DEPTH_SIZE, overlap, shared_part
+from pbrs_farm.sample.view_score import DEPTH_SIZE, overlap, shared_part
 from tests.sample.sampled_rooms import box, furnished, room_house, shell
 
 FIELDS: CameraFields = recipe_from_name("fast").cameras.model_copy(

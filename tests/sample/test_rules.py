@@ -14,8 +14,8 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import House, ItemKind
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.eye_probes import enclosed
-from pbrs_farm.sample.rejection import Verdict
 from tests.builders import builtin_home
 from tests.sample.sampled_rooms import (
     QUICK,

@@ -9,7 +9,7 @@ import pytest
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import Geometry
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.sample.stereo_views import with_right_views
+from pbrs_farm.sample.house_sampler import with_right_views
 from pbrs_farm.truth.common_surface import pair_rows
 from pbrs_farm.truth.optical_flow import (
     HIDDEN,
@@ -18,8 +18,8 @@ from pbrs_farm.truth.optical_flow import (
     correspondence,
     disparity_png,
     flow_kitti,
+    partners_of,
 )
-from pbrs_farm.truth.partners import partners_of
 
 WIDTH, HEIGHT, F = 64, 48, 40.0
 INTRINSICS = Intrinsics(WIDTH, HEIGHT, F, F, WIDTH / 2, HEIGHT / 2)

@@ -11,8 +11,7 @@ from pbrs_farm.core.house import House, Material, MaterialKind, geometry_from_ho
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.truth.depth_stereo import stereo_depth
-from pbrs_farm.truth.depth_time_of_flight import tof_depth
+from pbrs_farm.truth.depth_sensor import stereo_depth, tof_depth
 from tests.truth.hits import camera, hit, house, square
 
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import pbrs_farm
 from pbrs_farm.core.errors import BadInput, MachineFailed, ObjectMissing
-from pbrs_farm.core.near_names import did_you_mean
+from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.store import Store, store_from_url
 from workers.client.explain import explain
 from workers.client.rerun_command import rerun_command

@@ -42,7 +42,7 @@ def candidates(store: Store, house_id: str) -> dict[str, Any]:
     from pbrs_farm.run.house_cache import CachedHouse
     from pbrs_farm.run.steps import camera_seed
     from pbrs_farm.sample import sample_cameras
-    from pbrs_farm.sample.rejection import Verdict
+    from pbrs_farm.sample.camera_report import Verdict
 
     recipe = recipe_from_json(store.get(keys.RECIPE), keys.RECIPE)
     if keys.is_object(house_id) or recipe.cameras.source == "file":

@@ -14,8 +14,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import edges_are_paired, points_bounds, signed_volume
-from pbrs_farm.core.surface_points import item_triangles
 from pbrs_farm.dress.draft import ADDED_TAG, Draft
+from pbrs_farm.geometry.surface_points import item_triangles
 
 Faces = NDArray[np.int64]
 

@@ -15,11 +15,11 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import BLINDS, CURTAIN, FLOOR_MAT
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
-from pbrs_farm.core.surface_points import surface_points
 from pbrs_farm.dress.gates.bodies import Body, Shell, boxes_of
 from pbrs_farm.dress.gates.crossing import crossing_m
 from pbrs_farm.dress.gates.inside import depths_inside
 from pbrs_farm.dress.gates.solids import Solids, thickness
+from pbrs_farm.geometry.surface_points import surface_points
 
 MOST_M: Final = 0.01
 _SPACING_M: Final = 0.015  # of points on open meshes

@@ -16,9 +16,9 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds, unique_points
-from pbrs_farm.core.surface_points import item_triangles
 from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.gates.plumb import Plumb
+from pbrs_farm.geometry.surface_points import item_triangles
 
 MOST_M: Final = 0.002
 _ROUNDING_M: Final = 1e-5  # of single precision

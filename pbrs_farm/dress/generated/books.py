@@ -11,9 +11,9 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
-from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.generated.assembly import Made, Part, made, transformed
 from pbrs_farm.dress.generated.covers import N_CELLS, N_COVERS, Box4, Covers
+from pbrs_farm.geometry.solids import box
 
 _BOARD_M = 0.0025
 _GAP_M = 0.0004  # between neighbours, so that no faces coincide

@@ -7,7 +7,6 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import BAG, BOX, CLOTHES, PICTURE
 from pbrs_farm.core.house import Surface
-from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.generated.assembly import (
     Made,
     Part,
@@ -21,6 +20,7 @@ from pbrs_farm.dress.generated.assembly import (
 from pbrs_farm.dress.generated.tableware import china
 from pbrs_farm.dress.generated.turned import slab, turned, vessel
 from pbrs_farm.dress.style import Rgb, Style, mix, shade
+from pbrs_farm.geometry.solids import box
 
 
 def storage_box(rng: np.random.Generator, style: Style) -> Made:

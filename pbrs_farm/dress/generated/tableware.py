@@ -7,7 +7,6 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Material, Surface
-from pbrs_farm.core.primitives import sphere
 from pbrs_farm.dress.generated.assembly import (
     Made,
     Part,
@@ -20,6 +19,7 @@ from pbrs_farm.dress.generated.assembly import (
 )
 from pbrs_farm.dress.generated.turned import smooth, turned, vessel
 from pbrs_farm.dress.style import Rgb, Style, shade
+from pbrs_farm.geometry.solids import sphere
 
 _FRUIT = ((0.72, 0.12, 0.1), (0.85, 0.45, 0.08), (0.88, 0.75, 0.15), (0.45, 0.62, 0.15))
 

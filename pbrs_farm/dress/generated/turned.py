@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.house import Surface
-from pbrs_farm.core.primitives import box
+from pbrs_farm.geometry.solids import box
 
 _SHARP_RAD = np.radians(50)  # a profile that turns by more has an edge there
 

@@ -8,7 +8,6 @@ import shapely
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import TABLE
-from pbrs_farm.core.surface_points import lowest_above
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.lamps.generated_lamps import (
     ceiling_dome,
@@ -20,6 +19,7 @@ from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import next_id
+from pbrs_farm.geometry.surface_points import lowest_above
 
 PART = "lamps"
 _HEAD_M = 1.95  # below a lamp over free floor

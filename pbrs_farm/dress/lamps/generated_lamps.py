@@ -10,8 +10,8 @@ from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.house import ItemKind, LightPart, Material, MaterialKind, Surface
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.core.primitives import lathe, sphere
 from pbrs_farm.dress.style import Style
+from pbrs_farm.geometry.solids import lathe, sphere
 
 _WARM = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
 _O = np.zeros(3)

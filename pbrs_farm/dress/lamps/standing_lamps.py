@@ -9,12 +9,12 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import NIGHT_STAND, SOFA
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.core.surface_points import item_triangles, lowest_above
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.lamps.generated_lamps import floor_lamp, table_lamp, with_flux
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import next_id
+from pbrs_farm.geometry.surface_points import item_triangles, lowest_above
 
 PART = "lamps"
 _BY_SOFA, _BY_BED = 0.75, 0.75  # how often

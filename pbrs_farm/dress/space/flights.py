@@ -12,9 +12,9 @@ from shapely.geometry.base import BaseGeometry
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import ItemKind, Room
 from pbrs_farm.core.mesh import unit_normals
-from pbrs_farm.core.surface_points import item_triangles
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.footprints import plan_area
+from pbrs_farm.geometry.surface_points import item_triangles
 
 _STEP_M: Final = 0.45  # from a floor to the treads that one reaches from it
 _BEFORE_M: Final = 0.85  # that is kept before them

@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import clipped_to_box, triangle_bounds
-from pbrs_farm.core.surface_points import item_triangles, surface_points
+from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 _GRID_M = 1e-4  # plan coordinates are rounded to this
 _THIN_M = 0.004  # half the width given to what stands upright

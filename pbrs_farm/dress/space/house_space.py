@@ -13,7 +13,6 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import FLOOR_MAT
 from pbrs_farm.core.house import Item, ItemKind, Room
 from pbrs_farm.core.mesh import area_vectors, points_bounds, triangle_bounds
-from pbrs_farm.core.surface_points import item_triangles, lowest_above, surface_points
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.footprints import areal, plan_area
 from pbrs_farm.dress.space.passages import Passage, passages_of
@@ -27,6 +26,7 @@ from pbrs_farm.dress.space.room_faces import (
 )
 from pbrs_farm.dress.space.room_kinds import RoomKind, room_kind
 from pbrs_farm.dress.space.wall_faces import Hidden, WallFace, hidden_cells, wall_planes
+from pbrs_farm.geometry.surface_points import item_triangles, lowest_above, surface_points
 
 _ABOVE_FLOOR_M = 0.5  # structure lower than this above a floor is no ceiling
 _CHEST_M = 1.2  # above the floor, where walls are cut for their plan

@@ -13,7 +13,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import area_vectors, edges_are_paired
-from pbrs_farm.core.surface_points import item_triangles
+from pbrs_farm.geometry.surface_points import item_triangles
 
 CELL_M = 0.025
 FAR_M = 1.2  # free space is measured up to here

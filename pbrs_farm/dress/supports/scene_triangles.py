@@ -9,7 +9,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
-from pbrs_farm.core.surface_points import item_triangles
+from pbrs_farm.geometry.surface_points import item_triangles
 
 
 class SceneTriangles:

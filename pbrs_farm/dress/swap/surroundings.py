@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import triangle_bounds
-from pbrs_farm.core.surface_points import item_triangles, surface_points
+from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 CUBE_M: Final = 0.02
 _BITS: Final = 21  # of a cube's number along each axis

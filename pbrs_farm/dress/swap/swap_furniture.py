@@ -16,7 +16,6 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Surface
-from pbrs_farm.core.surface_points import item_triangles
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD
@@ -34,6 +33,7 @@ from pbrs_farm.dress.swap.old_places import (
 )
 from pbrs_farm.dress.swap.standing_things import drop_onto, things_on
 from pbrs_farm.dress.swap.surroundings import Surroundings
+from pbrs_farm.geometry.surface_points import item_triangles
 
 PART: Final = "swap"
 FREE_CUBES: Final = 6  # of 2 cm, shared with neighbours beyond what the old one shared: a touch

@@ -11,7 +11,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
-from pbrs_farm.core.primitives import lathe
+from pbrs_farm.geometry.solids import lathe
 
 _THICK_M = 0.003
 _COLUMNS_PER_FOLD = 10

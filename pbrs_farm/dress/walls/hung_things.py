@@ -15,9 +15,9 @@ from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE, SHELVES
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
-from pbrs_farm.core.primitives import box, lathe, quads_surface
 from pbrs_farm.dress.generated.assembly import GENERATED, Made, metal, plain
 from pbrs_farm.dress.style import Rgb, Style, shade
+from pbrs_farm.geometry.solids import box, lathe, quads_surface
 from pbrs_farm.images import jpeg_from_array
 
 Parts = Sequence[tuple[Surface, Material]]

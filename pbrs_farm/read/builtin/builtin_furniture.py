@@ -14,7 +14,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Surface
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.core.primitives import box_quads, lathe, quads_surface, sphere
+from pbrs_farm.geometry.solids import box_quads, lathe, quads_surface, sphere
 
 Triple = tuple[float, float, float]
 

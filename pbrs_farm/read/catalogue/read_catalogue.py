@@ -22,14 +22,13 @@ from pbrs_farm.read.catalogue.library_files import (
     LibraryNotes,
     furniture_library,
 )
-from pbrs_farm.read.catalogue.library_shapes import library_shape
+from pbrs_farm.read.catalogue.library_shapes import ShapeStore, library_shape
 from pbrs_farm.read.catalogue.model_folder import model_folder
-from pbrs_farm.read.catalogue.picture_folder import picture_folder
 from pbrs_farm.read.catalogue.piece_groups import GroupRule, Verdict, group_rule, verdicts
-from pbrs_farm.read.catalogue.shape_store import ShapeStore
 from pbrs_farm.read.catalogue.surface_pictures import (
     JAR_TEXTURES,
     TEXTURES,
+    picture_folder,
     pictures_of_models,
     texture_library,
 )

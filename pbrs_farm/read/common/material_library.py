@@ -2,12 +2,74 @@
 
 from __future__ import annotations
 
+import io
+import warnings
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
+from PIL import Image, UnidentifiedImageError
+
+from pbrs_farm.core import keys
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.textures import texture_from_bytes
+
+# Encoded pictures of a source -> Texture, tried before they are believed.
+
+
+MAX_EDGE_PX: Final = 16384
+MAX_TEXTURE_PIXELS: Final = 64_000_000
+_KEPT: Final = {"PNG": "image/png", "JPEG": "image/jpeg", "MPO": "image/jpeg"}
+_TRIED: Final = ("PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP")
+_HOLE_BELOW: Final = 128
+
+
+def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
+    """(the texture, whether its alpha has holes). PNG and JPEG keep their bytes; GIF, BMP, TIFF
+    and WebP become PNG.
+
+    Raises ValueError with the reason for a picture that cannot be decoded or is too large.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of odd metadata in a picture that decodes
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            picture = Image.open(io.BytesIO(data), formats=_TRIED)
+            return _texture(picture, data, name)
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning):
+        raise ValueError("the picture is too large") from None
+    except UnidentifiedImageError:
+        raise ValueError("is no picture of a known kind") from None
+    except (OSError, SyntaxError, EOFError, IndexError, KeyError, TypeError):
+        raise ValueError("the picture cannot be decoded: damaged or cut short") from None
+
+
+def _texture(picture: Image.Image, data: bytes, name: str) -> tuple[Texture, bool]:
+    width, height = picture.size
+    if max(width, height) > MAX_EDGE_PX or width * height > MAX_TEXTURE_PIXELS:
+        raise ValueError(f"the picture is too large: {width} x {height}")
+    # Decode in full, a JPEG at an eighth: a header alone proves nothing.
+    media_type = _KEPT.get(picture.format or "")
+    if media_type == "image/jpeg":
+        picture.draft("RGB", (max(width // 8, 1), max(height // 8, 1)))  # quick: eighth size
+    picture.load()
+    has_holes = _has_holes(picture)
+    # Store other kinds as PNG, with alpha where it cuts holes.
+    if media_type is None:
+        buffer = io.BytesIO()
+        picture.convert("RGBA" if has_holes else "RGB").save(buffer, "PNG")
+        data, media_type = buffer.getvalue(), "image/png"
+    return Texture(keys.sha256(data)[:16], name, media_type, data), has_holes
+
+
+def _has_holes(picture: Image.Image) -> bool:
+    if picture.mode not in ("RGBA", "LA", "PA") and "transparency" not in picture.info:
+        return False
+    lowest, _ = picture.convert("RGBA").getchannel("A").getextrema()
+    return isinstance(lowest, (int, float)) and lowest < _HOLE_BELOW
+
+
+# The materials and textures of a house while it is read, each once.
+
 
 PANE_OPACITY: Final = 0.2  # of panes and glass whose source says opaque
 

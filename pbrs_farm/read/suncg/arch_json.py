@@ -19,14 +19,13 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Opening, Surface
-from pbrs_farm.core.primitives import box_quads, quads_surface
 from pbrs_farm.formats.serialise import json_from_bytes
+from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.read.common.placed_mesh import placed
-from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
-from pbrs_farm.read.mesh.mtl import ObjMaterial
-from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.mesh.obj import Mesh, ObjMaterial
+from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal
 from pbrs_farm.read.suncg.house_json import JsonReader, Node, Override, world_from_house_of
-from pbrs_farm.read.suncg.model_materials import ModelMaterials
+from pbrs_farm.read.suncg.models import ModelMaterials
 from pbrs_farm.read.suncg.wall_holes import CUTTER_REACH_M, LEAST_HOLE_M, box_between
 
 # Thickness where an element tells none.

@@ -17,15 +17,22 @@ from pbrs_farm.core.classes import MIRROR, NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import oriented_box, placed
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.mesh.mtl import ObjMaterial
+from pbrs_farm.read.common.source_files import RootFolder
+from pbrs_farm.read.mesh.obj import ObjMaterial
 from pbrs_farm.read.suncg.arch_json import Arch, arch_items
 from pbrs_farm.read.suncg.house_json import Node
 from pbrs_farm.read.suncg.metadata import LampMaterials, ModelClass, Tables
-from pbrs_farm.read.suncg.mirror_glass import as_mirror, mirror_slot
-from pbrs_farm.read.suncg.model_files import DamagedModel, ModelCache, ParsedModel
-from pbrs_farm.read.suncg.model_lights import placed_light, separate_bulbs, with_emitting_bulbs
-from pbrs_farm.read.suncg.model_materials import ModelMaterials
+from pbrs_farm.read.suncg.models import (
+    DamagedModel,
+    ModelCache,
+    ModelMaterials,
+    ParsedModel,
+    as_mirror,
+    mirror_slot,
+    placed_light,
+    separate_bulbs,
+    with_emitting_bulbs,
+)
 
 _T = TypeVar("_T")
 

@@ -9,27 +9,34 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.room_bounds import check_rooms
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,
+    check_rooms,
     enclosed_polygon,
     floor_height,
     floor_polygon,
 )
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.suncg.arch_json import Arch, arch_from_json, arch_openings
-from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
-from pbrs_farm.read.suncg.metadata import read_tables
-from pbrs_farm.read.suncg.model_files import ModelCache
-from pbrs_farm.read.suncg.model_materials import ModelMaterials
+from pbrs_farm.read.suncg.house_json import NAME, HouseRecord, Node, house_record
+from pbrs_farm.read.suncg.metadata import (
+    CLASS_TABLES,
+    LAMP_TABLE,
+    LIGHT_TABLE,
+    VARIANT_TABLE,
+    read_tables,
+    table_places,
+)
+from pbrs_farm.read.suncg.models import ModelCache, ModelMaterials
 from pbrs_farm.read.suncg.node_items import (
     ReaderContext,
     box_item,
@@ -37,8 +44,63 @@ from pbrs_farm.read.suncg.node_items import (
     object_item,
     room_items,
 )
-from pbrs_farm.read.suncg.suncg_companions import MAX_HOUSE_BYTES, arch_file
 from pbrs_farm.read.suncg.wall_holes import openings
+
+# Which files below a SUNCG root a house is made of. Effect: reads its JSON and MTL files.
+
+
+MAX_HOUSE_BYTES: Final = 64_000_000
+
+
+def arch_file(house_id: str) -> str:
+    """Name of v2's structure of a house."""
+    return f"wall/{house_id}/{house_id}.arch.json"
+
+
+def suncg_companions(folder: RootFolder, house_id: str, files: SourceFiles) -> Iterator[str]:
+    """Names of all files beside house.json that reading the house may open; some may not exist."""
+    for table in (*CLASS_TABLES, VARIANT_TABLE, LAMP_TABLE, LIGHT_TABLE):
+        yield from table_places(table)
+    yield arch_file(house_id)
+    # Collect what the house's own JSON files name.
+    documents = (f"house/{house_id}/house.json", arch_file(house_id))
+    named = [pair for name in documents for pair in _named(_document(folder, name))]
+    models = {value for key, value in named if key == "modelId"}
+    folders = [f"room/{house_id}", *(f"object/{model}" for model in sorted(models))]
+    # A model's folder holds its meshes in every state; a material library names its pictures.
+    for place in folders:
+        for name in folder.names(place, (".obj", ".mtl")):
+            yield name
+            if name.endswith(".mtl"):
+                yield from files.pictures(folder, name)
+    for texture in {value for key, value in named if key == "texture"}:
+        yield from (f"texture/{texture}{suffix}" for suffix in (".png", ".jpg"))
+
+
+def _document(folder: RootFolder, name: str) -> Any:
+    try:
+        return json_from_bytes(folder.read(name, max_bytes=MAX_HOUSE_BYTES) or b"{}", name)
+    except BadHouse:
+        return {}  # the reader will say what is wrong with it
+
+
+def _named(document: Any) -> Iterator[tuple[str, str]]:
+    """(key, value) of every model and texture named anywhere in a JSON document."""
+    waiting = [document]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, list):
+            waiting += value
+        elif isinstance(value, dict):
+            waiting += value.values()
+            for key in ("modelId", "texture"):
+                name = value.get(key)
+                if isinstance(name, str) and NAME.fullmatch(name):
+                    yield key, name
+
+
+# A SUNCG house (v1, or v2 by its arch.json) -> House.
+
 
 _HOUSE_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_\-]{0,63}")
 _ROOM_ID: Final = re.compile(r"\d{1,6}_\d{1,6}")

@@ -15,7 +15,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors, face_areas
-from pbrs_farm.core.primitives import box
+from pbrs_farm.geometry.solids import box
 
 CUTTER_REACH_M: Final = 0.02  # that a cutter stands out of either side of a wall without a hole
 _OVERLAP_M: Final = 0.002  # of a plug and the wall around it

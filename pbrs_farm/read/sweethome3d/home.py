@@ -2,33 +2,122 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePath
+from typing import Final, TypeVar
 from xml.etree.ElementTree import Element
 
+import numpy as np
 import shapely
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Source
+from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Source, StoredCamera
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.core.shown_text import shown
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.resources import Resources
-from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
+from pbrs_farm.read.common.room_floors import HINT, check_outlines
+from pbrs_farm.read.common.source_files import Resources
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
-from pbrs_farm.read.sweethome3d.home_cameras import stored_cameras
-from pbrs_farm.read.sweethome3d.home_file.container import open_container
-from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, Plan, PlanLevel, level_of
+from pbrs_farm.read.sweethome3d.home_file.home_xml import (
+    Paint,
+    Plan,
+    PlanLevel,
+    PlanPiece,
+    PlanRoom,
+    PlanWall,
+    level_of,
+    open_container,
+)
 from pbrs_farm.read.sweethome3d.home_file.parse_home import parse_plan
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
-from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom, plane_items, read_rooms, room_nouns
+from pbrs_farm.read.sweethome3d.home_rooms import (
+    CeilingHeights,
+    ReadRoom,
+    plane_items,
+    read_rooms,
+    room_nouns,
+    staircase_cuts,
+)
 from pbrs_farm.read.sweethome3d.open_doors import PlacedPiece, opened_doors
-from pbrs_farm.read.sweethome3d.outlines import Outline, outlines_of
 from pbrs_farm.read.sweethome3d.piece_items import piece_item, piece_opening
 from pbrs_farm.read.sweethome3d.piece_models import PieceModels
-from pbrs_farm.read.sweethome3d.plan_bounds import check_plan_bounds
-from pbrs_farm.read.sweethome3d.stairs import staircase_cuts
-from pbrs_farm.read.sweethome3d.wall_solids import wall_items
+from pbrs_farm.read.sweethome3d.wall_solids import Outline, outlines_of, wall_items
+
+# Stored viewpoints -> cameras in the world.
+
+
+def stored_cameras(plan: Plan) -> tuple[StoredCamera, ...]:
+    """The author's viewpoints: direction (-sin yaw cos pitch, -sin pitch, cos yaw cos pitch)."""
+    cameras = []
+    for c in plan.cameras:
+        x, y, z = c.at
+        # Yaw turns from +y of the plan, which is +z of the world; pitch is positive downwards.
+        level, down = math.cos(c.pitch), math.sin(c.pitch)
+        towards = np.array([-math.sin(c.yaw) * level, -down, math.cos(c.yaw) * level])
+        cameras.append(StoredCamera(c.name, np.array([x, z, y]), towards, c.hfov))
+    return tuple(cameras)
+
+
+# What a plan may hold, so that its repair ends within seconds.
+# A home has some dozen rooms and walls; what is far beyond it, or drawn over itself a hundred
+# times, is refused by a line before any of it is built.
+
+
+MAX_WALLS: Final = 3_000
+MAX_PIECES: Final = 10_000
+MAX_CROSSINGS: Final = 500
+"""Pairs of walls of a level whose centre lines cross; a home has a dozen."""
+
+_Drawn = TypeVar("_Drawn", PlanRoom, PlanWall, PlanPiece)
+
+
+def check_plan_bounds(plan: Plan, file: str) -> None:
+    """Raise BadHouse, naming the file, for a plan of too many parts, or drawn over itself.
+
+    Levels that are left out count for nothing.
+    """
+    walls = _by_level(plan, plan.walls)
+    pieces = [p for found in _by_level(plan, plan.pieces).values() for p in found]
+    n_walls = sum(map(len, walls.values()))
+    if n_walls > MAX_WALLS:
+        raise BadHouse(file, "", f"{n_walls} walls, at most {MAX_WALLS} are read", hint=HINT)
+    if len(pieces) > MAX_PIECES:
+        text = f"{len(pieces)} pieces, at most {MAX_PIECES} are read{_commonest(pieces)}"
+        raise BadHouse(file, "", text, hint=HINT)
+    n_crossings = sum(_crossings(found) for found in walls.values())
+    if n_crossings > MAX_CROSSINGS:
+        text = f"walls cross {n_crossings} times, at most {MAX_CROSSINGS} crossings are built"
+        raise BadHouse(file, "walls", text, hint=HINT)
+    rooms = _by_level(plan, plan.rooms)
+    check_outlines({level: [r.points for r in found] for level, found in rooms.items()}, file)
+
+
+def _by_level(plan: Plan, drawn: Sequence[_Drawn]) -> dict[str, list[_Drawn]]:
+    """What is drawn on each level that is shown."""
+    found: dict[str, list[_Drawn]] = {}
+    for one in drawn:
+        found.setdefault(one.level, []).append(one)
+    return {level: ones for level, ones in found.items() if level_of(plan, level).is_visible}
+
+
+def _commonest(pieces: Sequence[PlanPiece]) -> str:
+    # What a program copied by the thousand bears one name.
+    name, n = max(Counter(p.name for p in pieces).items(), key=lambda row: row[1])
+    return f"; {n} of them are called {shown(name)!r}" if 2 * n > len(pieces) else ""
+
+
+def _crossings(walls: Sequence[PlanWall]) -> int:
+    lines = [shapely.LineString([w.start, w.end]) for w in walls]
+    pairs = shapely.STRtree(lines).query(lines, predicate="crosses")
+    return int((pairs[0] < pairs[1]).sum())
+
+
+# A Sweet Home 3D home -> House.
+
 
 _NO_ROOMS = "draw rooms (Plan > Create rooms) and save the home again"
 _HIDDEN_ROOMS = "every room is on a level saved as hidden: --set read.hidden_levels=true"

@@ -2,19 +2,217 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
+from scipy.spatial import ConvexHull, QhullError
 
-from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.arrays import F64, I32, I64, Points2
 from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
-from pbrs_farm.read.mesh.horizontal_polygons import counter_clockwise, horizontal
-from pbrs_farm.read.sweethome3d.ceilings import CeilingHeights
-from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, Plan, PlanLevel, PlanRoom, level_of
+from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal, triangulated
+from pbrs_farm.read.sweethome3d.door_cutouts import polygons_from_path
+from pbrs_farm.read.sweethome3d.home_file.home_xml import (
+    Paint,
+    Plan,
+    PlanLevel,
+    PlanPiece,
+    PlanRoom,
+    level_of,
+)
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
-from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
+from pbrs_farm.read.sweethome3d.placement import PieceFrame, frame_of
+from pbrs_farm.read.sweethome3d.wall_solids import Outline, picture_uvs, top_heights
+
+# A polygon with a height at each corner -> the triangles of the ceiling over it.
+
+
+FIT_M = 0.02  # how far a roof may lie above a given height
+ROOF_SLIVER_M2 = 1e-6  # pieces of less area are left out
+
+
+class Roof(NamedTuple):
+    """Plan points (N, 2), their heights (N,), triangles (F, 3) counter-clockwise in plan."""
+
+    points: Points2
+    heights: F64
+    faces: I32
+
+
+def roof_over(rings: Sequence[Points2], heights: F64) -> Roof:
+    """The ceiling over an outline and its holes; heights: of all their points in order.
+
+    A roof that bends only downwards (gable, hip, shed) is spanned over the corners and ridge ends
+    like a cloth, to within FIT_M of every given height; any other is cut by its plan alone.
+    """
+    points = np.concatenate([np.asarray(r, np.float64) for r in rings])
+    cloth = _cloth(points, heights)
+    if cloth is not None:
+        spanned = _spanned(rings, points, heights, cloth)
+        if spanned is not None:
+            return spanned
+    return Roof(points, heights, triangulated(rings)[1])
+
+
+def _cloth(points: Points2, heights: F64) -> I64 | None:
+    # Triangles of the upper side of the convex hull of the points in space.
+    # Add a point far below: the faces without it are the upper side.
+    n = len(points)
+    below = [*points.mean(0), heights.min() - 10.0 * float(np.ptp(points) + np.ptp(heights))]
+    try:
+        hull = ConvexHull(np.vstack([np.column_stack([points, heights]), below]))
+    except (QhullError, ValueError):
+        return None
+    faces = hull.simplices[(hull.simplices < n).all(1)].astype(np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    faces = np.where(turn[:, None] < 0, faces[:, [0, 2, 1]], faces)[
+        np.abs(turn) > 2 * ROOF_SLIVER_M2
+    ]
+    return faces[np.lexsort(faces.T[::-1])] if len(faces) else None
+
+
+def _spanned(rings: Sequence[Points2], points: Points2, heights: F64, cloth: I64) -> Roof | None:
+    # The cloth cut along the outline; None if a given height lies too far under it.
+    outline = shapely.Polygon(rings[0], list(rings[1:]))
+    all_points, all_heights, all_faces, n = [], [], [], 0
+    worst = 0.0
+    for face in cloth:
+        corners = points[face]
+        # Fit the plane height = a x + b z + c through the triangle's corners.
+        plane = np.linalg.solve(np.column_stack([corners, np.ones(3)]), heights[face])
+        triangle = shapely.Polygon(corners)
+        # Measure how far it lies above the heights given there.
+        on_it = shapely.intersects_xy(triangle.buffer(1e-9), points)
+        over = points[on_it] @ plane[:2] + plane[2] - heights[on_it]
+        worst = max(worst, float(over.max(initial=0.0)))
+        # Keep the part of it inside the outline.
+        for part in shapely.get_parts(shapely.intersection(triangle, outline)):
+            if part.geom_type != "Polygon" or part.area < ROOF_SLIVER_M2:
+                continue
+            inner = [shapely.get_coordinates(r)[:-1] for r in (part.exterior, *part.interiors)]
+            plan, faces = triangulated(inner)
+            all_points.append(plan)
+            all_heights.append(plan @ plane[:2] + plane[2])
+            all_faces.append(faces + n)
+            n += len(plan)
+    if worst > FIT_M or not all_points:
+        return None
+    return Roof(
+        np.concatenate(all_points),
+        np.concatenate(all_heights),
+        np.concatenate(all_faces).astype(np.int32),
+    )
+
+
+# How high a room's ceiling is: its level's height, or the tops of the walls around.
+
+
+KINK_M = 0.01  # smaller bends of a ceiling are left out
+TIE_M = 1e-3  # walls are equally near within this
+CORNER_REACH_M = 0.10  # A wall's corner this near to a room's edge can bend the ceiling there
+
+
+class CeilingHeights:
+    """Ceiling heights above the level, in metres; on the top level they follow the walls."""
+
+    def __init__(self, plan: Plan, outlines: dict[str, Outline]) -> None:
+        self._top = max((x.index for x in plan.levels), default=0)
+        self._wall_height = plan.wall_height
+        by_level: dict[str, list[tuple[F64, F64]]] = {}
+        # Collect the top edges of all walls of a level: plan segments and heights at their ends.
+        for wall in plan.walls:
+            if wall.id not in outlines:
+                continue
+            outline, around = outlines[wall.id], outlines[wall.id].polygon
+            along = np.concatenate([outline.along, outline.along[::-1]])
+            tops = top_heights(wall, around, along)
+            a, b = np.arange(len(around)), np.roll(np.arange(len(around)), -1)
+            segments = np.concatenate([around[a], around[b]], 1)
+            edges = (segments, np.stack([tops[a], tops[b]], 1))
+            by_level.setdefault(level_of(plan, wall.level).id, []).append(edges)
+        self._edges = {
+            level_id: (np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts]))
+            for level_id, parts in by_level.items()
+        }
+
+    def heights(self, level: PlanLevel, points: Points2, is_flat: bool) -> F64:
+        """(N,) heights over plan points (N, 2)."""
+        edges = self._edges.get(level.id)
+        # Below the top level the ceiling is flat, at the level's height.
+        if level.index != self._top or edges is None:
+            height = level.height if level.id else self._wall_height
+            return np.full(len(points), height)
+        found = np.array([_nearest(p, *edges) for p in points])
+        return np.full(len(points), found.max()) if is_flat else found
+
+    def surface(
+        self, level: PlanLevel, parts: Sequence[Sequence[Points2]], material: int, *, is_flat: bool
+    ) -> Surface:
+        """The ceiling over polygons (each an outline and its holes), facing down."""
+        bent = [[self._with_kinks(level, ring, is_flat) for ring in rings] for rings in parts]
+        heights = [self.heights(level, np.concatenate(rings), is_flat) for rings in bent]
+        every = np.concatenate(heights)
+        # A level ceiling needs no roof.
+        if np.ptp(every) < 1e-4:
+            return horizontal("ceiling", parts, level.elevation + every[0], material, up=False)
+        # Span a roof over each polygon, and number its corners after those before it.
+        positions, faces, n = [], [], 0
+        for rings, tops in zip(bent, heights, strict=True):
+            plan, y, triangles = roof_over(rings, tops)
+            positions.append(np.stack([plan[:, 0], level.elevation + y, plan[:, 1]], -1))
+            faces.append(triangles + n)
+            n += len(plan)
+        world = np.concatenate(positions).astype(np.float32)
+        numbers = np.concatenate(faces).astype(np.int32)
+        return Surface("ceiling", world, numbers, material, world[:, [0, 2]])
+
+    def _with_kinks(self, level: PlanLevel, ring: Points2, is_flat: bool) -> Points2:
+        # The ring with the points where the walls' tops beside one of its edges bend.
+        edges = self._edges.get(level.id)
+        if level.index != self._top or edges is None or is_flat:
+            return ring
+        corners = np.unique(edges[0][:, :2], axis=0)
+        points: list[F64] = []
+        for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+            points.append(a)
+            d = b - a
+            length = float(np.linalg.norm(d))
+            # Take the walls' corners that lie along this edge of the room.
+            t = (corners - a) @ d / max(length**2, 1e-18)
+            gap = np.linalg.norm(a + t[:, None] * d - corners, axis=1)
+            inside = (gap < CORNER_REACH_M) & (t * length > KINK_M) & ((1 - t) * length > KINK_M)
+            # Keep a corner where the ceiling leaves the straight line between the edge's ends.
+            ends = self.heights(level, np.stack([a, b]), False)
+            last = 0.0
+            for where in np.sort(t[inside]):
+                if (where - last) * length < KINK_M:
+                    continue
+                spot = a + where * d
+                straight = ends[0] + where * (ends[1] - ends[0])
+                if abs(self.heights(level, spot[None], False)[0] - straight) > KINK_M:
+                    points.append(spot)
+                    last = float(where)
+        return np.array(points)
+
+
+def _nearest(point: Points2, segments: F64, tops: F64) -> float:
+    # Height of the top of the wall edge nearest to a plan point, at the nearest spot; the lowest
+    # of those equally near, so that no wall ends below the ceiling.
+    a, d = segments[:, :2], segments[:, 2:] - segments[:, :2]
+    t = ((point - a) * d).sum(1) / np.maximum((d * d).sum(1), 1e-18)
+    # The nearest spot on each edge, and the height of the wall there.
+    t = np.clip(t, 0, 1)
+    gap = np.linalg.norm(a + t[:, None] * d - point, axis=1)
+    heights = tops[:, 0] + t * (tops[:, 1] - tops[:, 0])
+    return float(heights[gap <= gap.min() + TIE_M].min())
+
+
+# Rooms -> Room nouns, floors and ceilings.
+
 
 MIN_AREA_M2 = 0.01  # smaller rooms are left out
 SLIVER_M2 = 1e-4  # smaller pieces come of rounding
@@ -189,3 +387,69 @@ def _rings(polygon: shapely.Polygon) -> list[Points2]:
 
 def _ring(ring: shapely.LinearRing) -> Points2:
     return np.asarray(shapely.get_coordinates(ring)[:-1], np.float64)
+
+
+# Staircases -> what they cut out of floors and ceilings.
+
+
+TOLERANCE_M = 0.01  # of heights that meet
+
+Cuts = dict[str, shapely.Geometry]
+
+
+def staircase_cuts(
+    plan: Plan, materials: HomeMaterials, house_level: dict[str, str]
+) -> tuple[Cuts, Cuts]:
+    """By level id, what staircases take of its floors and of its ceilings (plan polygons).
+
+    A floor is cut by a staircase that starts below it and reaches it, the ceiling under such a
+    floor likewise. A ceiling with no visible level above stays whole, so that no sky looks in.
+    """
+    floors: dict[str, list[shapely.Geometry]] = {}
+    ceilings: dict[str, list[shapely.Geometry]] = {}
+    visible = [level for level in plan.levels if level.is_visible]
+    for piece in plan.pieces:
+        if not piece.staircase_cut_out or piece.staircase_cut_out.lower() == "false":
+            continue
+        own = level_of(plan, piece.level)
+        if not own.is_visible:
+            continue
+        # Cut the floors that it leads up to, and the ceilings it passes.
+        hole = _hole(piece, frame_of(piece, own), materials)
+        if hole is None:
+            continue
+        foot = own.elevation + piece.elevation
+        top = foot + piece.size[2]
+        for level in visible:
+            reach = level.elevation - level.reach_down - TOLERANCE_M
+            if foot < level.elevation - TOLERANCE_M and top >= reach:
+                floors.setdefault(house_level[level.id], []).append(hole)
+        for level in visible:
+            ceiling = level.elevation + level.height
+            has_above = any(x.elevation >= ceiling - TOLERANCE_M for x in visible)
+            if foot < ceiling and top >= ceiling - TOLERANCE_M and has_above:
+                ceilings.setdefault(house_level[level.id], []).append(hole)
+    return _joined(floors), _joined(ceilings)
+
+
+def _joined(cuts: dict[str, list[shapely.Geometry]]) -> Cuts:
+    return {level: shapely.union_all(holes) for level, holes in cuts.items()}
+
+
+def _hole(piece: PlanPiece, frame: PieceFrame, materials: HomeMaterials) -> shapely.Geometry | None:
+    # The cut-out shape is drawn in the unit square, x to the right, y to the front.
+    try:
+        outlines = polygons_from_path(piece.staircase_cut_out)
+    except ValueError as error:
+        materials.notes.add(
+            "bad-cut-out", piece.place, f"staircaseCutOutShape: {error}; nothing is cut"
+        )
+        return None
+    shapes = []
+    for outline in outlines:
+        x = (outline[:, 0] - 0.5) * 2 * frame.half[0] * frame.mirror
+        z = (outline[:, 1] - 0.5) * 2 * frame.half[2]
+        world = frame.world(np.stack([x, np.zeros(len(x)), z], -1))
+        polygon = shapely.Polygon(world[:, [0, 2]])
+        shapes.append(polygon if polygon.is_valid else shapely.make_valid(polygon))
+    return shapely.union_all(shapes) if shapes else None

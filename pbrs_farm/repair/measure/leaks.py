@@ -8,20 +8,38 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import shapely
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F32, F64, I32
 from pbrs_farm.core.house import House, Item, ItemKind, Surface, geometry_from_house
 from pbrs_farm.core.mesh import dots, lengths, triangle_corners, unit_normals
-from pbrs_farm.repair.measure.enclosure import Space
-from pbrs_farm.repair.measure.occluder import Occluder
-from pbrs_farm.repair.measure.room_edges import RoomInterior
+from pbrs_farm.repair.measure.enclosure import RoomInterior, Space
 from pbrs_farm.repair.repair_report import Leak, LeakReport, SpaceLeaks
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.plan_geometry import Shape
 from pbrs_farm.repair.structure.prisms import Plane, lifted, polygons_of
+
+# What repair asks of a ray caster; the caster itself comes as an argument. No effects.
+
+
+class Occluder(Protocol):
+    """First hits of rays with the triangles of one house (faces as in geometry_from_house)."""
+
+    def first_hit(
+        self, origins: F32, directions: F32, max_distance: float = ...
+    ) -> tuple[F32, I32]:
+        """Distance (N,) in metres, inf = a miss, and face index (N,), -1 = a miss.
+
+        origins, directions: (N, 3) float32, directions unit.
+        """
+        ...
+
+
+# The leak meter.
+
 
 WITHIN_M = 0.005  # how near to an edge rays start
 _MAX_LEAKS = 50  # of a space, kept with their rays

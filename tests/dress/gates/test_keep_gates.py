@@ -9,10 +9,10 @@ import pytest
 
 from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.house import House, Item, ItemKind, Material
-from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates import keep_gates
 from pbrs_farm.dress.report import Gate
+from pbrs_farm.geometry.solids import box
 from tests.builders import builtin_home
 from tests.dress.furniture import house, solid
 

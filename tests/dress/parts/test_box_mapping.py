@@ -9,8 +9,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
-from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.parts.box_mapping import box_mapped
+from pbrs_farm.geometry.solids import box
 
 
 def _board(half: list[float], axes: F64 | None = None) -> Surface:

@@ -9,7 +9,6 @@ import pytest
 import shapely
 
 from pbrs_farm.core.house import House, Item, ItemKind, Room
-from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import (
     HouseSpace,
@@ -20,6 +19,7 @@ from pbrs_farm.dress.space import (
     house_space,
     item_footprint,
 )
+from pbrs_farm.geometry.solids import box
 from tests.builders import builtin_home
 
 

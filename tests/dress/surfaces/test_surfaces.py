@@ -9,7 +9,6 @@ import shapely
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.core.mesh import edges_are_paired, face_areas, triangle_corners
-from pbrs_farm.core.primitives import wall_prism
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
@@ -17,6 +16,7 @@ from pbrs_farm.dress.surfaces import surfaces
 from pbrs_farm.dress.surfaces.cut_meshes import cut_triangles
 from pbrs_farm.dress.surfaces.floor_materials import room_frame
 from pbrs_farm.dress.surfaces.wall_sides import RoomFinder, sided_wall
+from pbrs_farm.geometry.solids import wall_prism
 from pbrs_farm.repair import repair
 from tests.builders import builtin_home
 

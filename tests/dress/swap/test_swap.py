@@ -11,11 +11,11 @@ from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Material
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.draft import ADDED_TAG, Draft
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.swap import swap
 from pbrs_farm.dress.swap.old_places import OldPlace, before_boards
+from pbrs_farm.geometry.solids import box
 from tests.dress.furniture import house, solid
 
 Size = tuple[float, float, float]  # width, depth, height

@@ -12,7 +12,6 @@ import shapely
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corners
-from pbrs_farm.core.primitives import box
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import Passage, house_space
 from pbrs_farm.dress.style import style_for
@@ -22,6 +21,7 @@ from pbrs_farm.dress.textiles.curtains import WindowSide, is_flat
 from pbrs_farm.dress.textiles.rug_patterns import FAMILIES, inks_of, rug_pixels
 from pbrs_farm.dress.textiles.rugs import rug
 from pbrs_farm.dress.textiles.towels import towel_rail
+from pbrs_farm.geometry.solids import box
 from tests.builders import builtin_home
 
 STYLE = style_for(np.random.default_rng(1))

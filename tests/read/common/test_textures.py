@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from pbrs_farm.read.common.textures import texture_from_bytes
+from pbrs_farm.read.common.material_library import texture_from_bytes
 from tests.read.small_houses import png
 
 KINDS = ["PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP"]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.house import Enclosure, House, Item, ItemKind
-from pbrs_farm.core.primitives import quads_surface
 from pbrs_farm.core.recipe import ReadFields, RepairFields
+from pbrs_farm.geometry.solids import quads_surface
 from pbrs_farm.read.gltf.scene import read_gltf
 from pbrs_farm.repair import RepairReport, repair
 from pbrs_farm.repair.structure.booleans import TagTable

@@ -1,1 +1,0 @@
-"""The recipe's fields of a real camera: lens, blur, sensor; presets with the source of each number."""

@@ -1,0 +1,1 @@
+"""Solids and points of meshes, between the nouns and the stages; no effects."""

@@ -1,0 +1,152 @@
+"""The albedo layer: diffuse reflectance at each pixel's centre; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, F64, I32, I64, HitRecord, UnitVectors
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
+from pbrs_farm.core.house import Geometry, House
+from pbrs_farm.core.mesh import triangle_corners, unit_normals
+from pbrs_farm.core.normal_maps import normals_from_picture, perturbed_normals, tangents
+
+# Pictures looked up between the four nearest texels, repeating.
+
+
+def bilinear(pixels: NDArray[np.uint8], uv: F32, value_of_byte: F32 | None = None) -> F32:
+    """(N, C) values of pixels (H, W, C) at uv (N, 2), v up and row 0 at the top.
+
+    value_of_byte: (256,) what the bytes stand for; None = themselves.
+    """
+    # Place texel centres at half integers; v points up, rows count down.
+    height, width = pixels.shape[:2]
+    finite = np.where(np.isfinite(uv), uv, 0).astype(np.float64)
+    x = finite[:, 0] * width - 0.5
+    y = (1 - finite[:, 1]) * height - 0.5
+    # Find the four texels around each point and how far it lies between them.
+    x0, y0 = np.floor(x), np.floor(y)
+    fx, fy = (x - x0).astype(np.float32)[:, None], (y - y0).astype(np.float32)[:, None]
+    left, right = (x0 % width).astype(np.int64), ((x0 + 1) % width).astype(np.int64)
+    top, bottom = (y0 % height).astype(np.int64), ((y0 + 1) % height).astype(np.int64)
+
+    def at(rows: I64, columns: I64) -> F32:
+        found = pixels[rows, columns]
+        return found.astype(np.float32) if value_of_byte is None else value_of_byte[found]
+
+    # Blend along rows first.
+    upper = at(top, left) * (1 - fx) + at(top, right) * fx
+    lower = at(bottom, left) * (1 - fx) + at(bottom, right) * fx
+    return np.asarray(upper * (1 - fy) + lower * fy, np.float32)
+
+
+# The albedo layer.
+
+
+_LINEAR_OF_BYTE = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
+_STEPS = 4096  # entries of the encoding table: fine enough that every byte is rounded as by formula
+_BYTE_OF_LINEAR = np.rint(srgb_from_linear(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
+
+
+def albedo_png(
+    hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
+) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 sRGB: diffuse colour times texture, multiplied in linear light; 0 = nothing.
+
+    textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 = top (v = 1), repeated; looked up between the
+    four nearest texels, not filtered over the pixel. A missing texture counts as white.
+    """
+    # Shade material by material: each texture is looked up once, for all its pixels.
+    linear = np.zeros((*hit.face.shape, 3), np.float32)
+    if len(geometry.faces):
+        material = np.where(hit.valid, geometry.face_material[hit.face], -1)
+        for number in np.unique(material[material >= 0]):
+            shaded = house.materials[int(number)]
+            mask = material == number
+            colour = linear_from_srgb(np.array(shaded.diffuse)).astype(np.float32)
+            pixels = textures.get(shaded.texture_id) if shaded.texture_id else None
+            linear[mask] = colour
+            if pixels is not None:
+                linear[mask] *= bilinear(pixels[..., :3], hit.points.uv[mask], _LINEAR_OF_BYTE)
+    # Encode by table: 8-bit sRGB.
+    steps = np.rint(np.clip(linear, 0, 1) * _STEPS).astype(np.int32)
+    return np.asarray(_BYTE_OF_LINEAR[steps])
+
+
+# The shading normals that light follows: interpolated, and bent by normal maps.
+
+
+def shading_normals(
+    hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
+) -> UnitVectors:
+    """(H, W, 3) unit shading normals with normal maps, turned as the hit's own; (0, 0, 0) = nothing.
+
+    textures: as in LabelInputs; looked up between the four nearest texels, not filtered over the
+    pixel. The geometric normals of every other layer stay what they are.
+    """
+    normals = hit.points.shading_normal_world.copy()
+    if not len(geometry.faces):
+        return normals
+    # Bend material by material: each map is looked up once, for all its pixels.
+    material = np.where(hit.valid, geometry.face_material[hit.face], -1)
+    for number in np.unique(material[material >= 0]):
+        shaded = house.materials[int(number)]
+        pixels = textures.get(shaded.normal_texture_id or "") if shaded.shows_maps else None
+        if pixels is None or pixels.ndim != 3:
+            continue
+        mask = material == number
+        values = bilinear(pixels[..., :3], hit.points.uv[mask])
+        mapped = normals_from_picture(values, shaded.normal_scale).astype(np.float64)
+        faces, seen = hit.face[mask], normals[mask].astype(np.float64)
+        normals[mask] = _bent(geometry, faces, seen, mapped).astype(np.float32)
+    return normals
+
+
+def _bent(geometry: Geometry, faces: I32, seen: F64, mapped: F64) -> F64:
+    """(N, 3) normals seen at faces, bent by the map's; both turned to the camera."""
+    corners = triangle_corners(geometry.positions, geometry.faces[faces])
+    dp_du, side, is_defined = tangents(
+        corners, geometry.uvs[geometry.faces[faces]].astype(np.float64)
+    )
+    # A map belongs to the front: turn the normals there and back.
+    turn = np.where((seen * unit_normals(corners)).sum(1) < 0, -1.0, 1.0)[:, None]
+    bent = turn * perturbed_normals(turn * seen, dp_du, side, mapped)
+    return np.where(is_defined[:, None], bent, seen)
+
+
+# The hha layer: horizontal disparity, height above ground, angle with gravity.
+# Source: Gupta, Girshick, Arbelaez, Malik 2014, with the constants of their published encoder,
+# and the paper's depth baseline. Gravity and normals are exact here, where theirs are estimated.
+
+
+_DISPARITY_CM = 31000.0  # disparity = this / depth in cm
+_NEAREST_CM = 100.0  # nearer depths count as this: the disparity fits into a byte
+_ANGLE_OFFSET = 128 - 90  # a wall, at 90 degrees, is 128
+_FLOOR_IN_VIEW_CM = -90.0  # the lowest point below this, from the eye, is taken for the floor
+_ASSUMED_FLOOR_CM = -130.0  # the floor's height from the eye when none is in view
+
+
+def hha_png(hit: HitRecord, camera: Camera) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8: H, H, A; (0, 0, 0) = nothing.
+
+    R: 31000 / depth_z in cm, depth held to at least 100 cm. G: height in cm above the lowest point
+    in view, or above 130 cm below the camera when no point lies more than 90 cm below it. B: degrees
+    between gravity and the normal that points away from the camera, plus 38: floors are 38, walls
+    128, ceilings 218. Each is rounded and held to 0..255.
+    """
+    out = np.zeros((*hit.face.shape, 3), np.float32)
+    if not hit.valid.any():
+        return out.astype(np.uint8)
+    # Estimate the floor's height from the lowest point in view.
+    above_eye_cm = (hit.points.position_world[..., 1] - np.float32(camera.eye[1])) * np.float32(100)
+    lowest_cm = float(above_eye_cm[hit.valid].min())
+    floor_cm = lowest_cm if lowest_cm <= _FLOOR_IN_VIEW_CM else _ASSUMED_FLOOR_CM
+    # Encode the three channels.
+    out[..., 0] = _DISPARITY_CM / np.maximum(hit.depth_z * np.float32(100), _NEAREST_CM)
+    out[..., 1] = above_eye_cm - floor_cm
+    up = np.clip(hit.geo_normal_world[..., 1], -1, 1)
+    out[..., 2] = np.degrees(np.arccos(up)) + _ANGLE_OFFSET
+    return np.where(hit.valid[..., None], np.clip(np.rint(out), 0, 255), 0).astype(np.uint8)
