@@ -87,7 +87,7 @@ def floor_polygons(
 
 
 def _grown(areas: Any, by_m: float) -> Any:
-    with np.errstate(invalid="ignore"):  # GEOS sets a flag that means nothing
+    with np.errstate(invalid="ignore", divide="ignore"):  # GEOS sets flags that mean nothing
         return shapely.buffer(areas, by_m, join_style="mitre")
 
 
