@@ -25,10 +25,27 @@ def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
     return world_from_camera @ OPENCV_FROM_OPENGL
 
 
+def rotation_x(angle_rad: float) -> F64:
+    """(3, 3) right-handed rotation about +x."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]], np.float64)
+
+
 def rotation_y(angle_rad: float) -> F64:
     """(3, 3) right-handed rotation about +y."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], np.float64)
+
+
+def rotation_z(angle_rad: float) -> F64:
+    """(3, 3) right-handed rotation about +z."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float64)
+
+
+# Quarter turns that are exact: what stands upright lies with its top along +x, or along +z.
+LYING_ALONG_X: F64 = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+LYING_ALONG_Z: F64 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 def transform_points(a_from_b: F64, points_b: NDArray[np.floating]) -> F64:

@@ -13,7 +13,7 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.generated.assembly import Made
-from pbrs_farm.dress.generated.soft import bed_pillow, cushion, folded_blanket
+from pbrs_farm.dress.generated.things import THINGS
 from pbrs_farm.dress.generated.turned import smooth
 from pbrs_farm.dress.supports.exact_heights import heights_under
 from pbrs_farm.dress.supports.find_supports import plan_turn
@@ -58,18 +58,18 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
     if not _has_pillows(bed) and rng.random() < 0.95 * placing.share:
         # Both pillows of a bed are alike.
         own = int(rng.integers(1 << 30))
-        made = bed_pillow(np.random.default_rng(own), placing.style)
+        made = THINGS.make("bed_pillow", np.random.default_rng(own), placing.style)
         apart = max(0.46, (made[0].size[0] + 0.02) / bed.width)
         fits = bed.width > 1.15 and apart * bed.width + made[0].size[0] < bed.width + 0.06
         for at in (0.5 - apart / 2, 0.5 + apart / 2) if fits else (0.5,):
             n += lay_down(placing, scene, index, made, *_place(bed, at, 0.06, made), bed.level)
     if rng.random() < 0.45 * placing.share:
-        made = cushion(rng, placing.style)
+        made = THINGS.make("cushion", rng, placing.style)
         at = float(rng.uniform(0.4, 0.6))
         n += lay_down(placing, scene, index, made, *_place(bed, at, 0.75, made), bed.level)
     if rng.random() < 0.65 * placing.share:
         # A folded blanket across the foot.
-        made = folded_blanket(rng, placing.style)
+        made = THINGS.make("folded_blanket", rng, placing.style)
         at = float(rng.uniform(0.35, 0.65))
         from_head = bed.length - made[0].size[1] - float(rng.uniform(0.08, 0.25))
         n += lay_down(placing, scene, index, made, *_place(bed, at, from_head, made), bed.level)

@@ -13,7 +13,7 @@ from pbrs_farm.core.house import ItemKind
 from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.generated.books import magazines, open_book, stack_of_books
 from pbrs_farm.dress.generated.covers import Covers
-from pbrs_farm.dress.generated.things import GENERATORS
+from pbrs_farm.dress.generated.things import THINGS
 from pbrs_farm.dress.style import Style
 
 _MOST_FACES: Final = 1500  # of a small thing from a catalogue, and of most kinds
@@ -35,15 +35,8 @@ class Kind:
     most_faces: int = _MOST_FACES
 
 
-_MADE_ONLY = (
-    "bag", "binders", "brush_cup", "carton", "cartons", "folded_blanket", "folded_clothes", "jar",
-    "kitchen_roll", "laundry_basket", "mills", "notebook", "papers", "pen_pot", "plant_pot", "pouf", "shelf_basket",
-    "soap_bar", "soap_dispenser", "sponge", "spray_bottle", "storage_box", "suitcase", "table_frame",
-    "tissue_box", "toilet_rolls", "toiletries",
-)  # fmt: skip
-
+# Of the generated things, those that a catalogue has, too, or that may face anywhere.
 _KINDS: Final[dict[str, Kind]] = {
-    **{name: Kind(made=name) for name in _MADE_ONLY},
     "armchair": Kind(("armchair",), most_m=1.1, place=Place.FLOOR, most_faces=12_000),
     "ball": Kind(("ball",), most_m=0.3, is_round=True),
     "bath_small": Kind(("bath_small",), "toiletries", 0.3),
@@ -103,7 +96,7 @@ class Stock:
         if kind == "magazines":
             return magazines(rng, self.covers, int(rng.integers(1, 6)))
         # Draw for all alike, so that what the catalogue holds moves no later draw.
-        found = _KINDS[kind]
+        found = _kind(kind)
         is_made, number = rng.random() < _GENERATED_SHARE, int(rng.integers(1 << 30))
         designs = [] if found.made and is_made else self._owned(kind)
         # Of one detailed model there are few in a home.
@@ -113,12 +106,12 @@ class Stock:
             self._faces[piece.id] += _n_faces(shape)
             return piece, shape
         own = np.random.default_rng(number)
-        return GENERATORS[found.made](own, style) if found.made else None
+        return THINGS.make(found.made, own, style) if found.made else None
 
     def _owned(self, kind: str) -> list[Made]:
         """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
         if kind not in self._designs:
-            found = _KINDS[kind]
+            found = _kind(kind)
             fitting = [
                 p
                 for p in self._catalogue.of(*found.groups)
@@ -145,7 +138,11 @@ def is_round(kind: str) -> bool:
 
 def is_known(kind: str) -> bool:
     """Whether there is such a kind."""
-    return kind in _KINDS or kind in ("book", "magazines")
+    return kind in (*_KINDS, *THINGS.names, "book", "magazines")
+
+
+def _kind(name: str) -> Kind:
+    return _KINDS.get(name) or Kind(made=name)
 
 
 def _n_faces(shape: Shape) -> int:

@@ -11,7 +11,7 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.dress.clutter.beds import TOUCH_M, put_as_it_is
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.generated.assembly import Made
-from pbrs_farm.dress.generated.soft import cushion
+from pbrs_farm.dress.generated.things import THINGS
 from pbrs_farm.dress.generated.turned import smooth
 from pbrs_farm.dress.supports.exact_heights import heights_under
 from pbrs_farm.dress.supports.find_supports import plan_turn
@@ -52,7 +52,7 @@ def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -
     for k in range(2 * n_wanted):
         if n == n_wanted:
             break
-        made = cushion(rng, placing.style)
+        made = THINGS.make("cushion", rng, placing.style)
         half = made[0].size[0] / 2 / _CELL_M
         low, high = columns[0] + half + _SIDE_M / _CELL_M, columns[-1] - half - _SIDE_M / _CELL_M
         if high <= low:

@@ -45,6 +45,19 @@ def made(
     return piece, Shape(moved, tuple(materials), {t.id: t for t in textures})
 
 
+def hung(
+    family: str, group: str, nyu40: int, parts: Sequence[Part], textures: Sequence[Texture] = (),
+    place: Place = Place.WALL,
+) -> Made:  # fmt: skip
+    """A generated piece that hangs, and its shape: unlike what stands, it keeps its own origin."""
+    materials = tuple(dict.fromkeys(m for _s, m in parts))
+    surfaces = tuple(replace(s, material=materials.index(m)) for s, m in parts)
+    shape = Shape(surfaces, materials, {t.id: t for t in textures})
+    w, h, d = (float(x) for x in np.diff(shape.bounds, axis=0)[0])
+    name = family.replace("_", " ").capitalize()
+    return Piece(f"{GENERATED}{family}", name, group, place, nyu40, (w, d, h)), shape
+
+
 def transformed(surface: Surface, matrix: F64, offset: Sequence[float] = (0, 0, 0)) -> Surface:
     """The surface turned by a rotation (3, 3) and then moved, metres."""
     positions = surface.positions.astype(np.float64) @ matrix.T + np.asarray(offset, np.float64)

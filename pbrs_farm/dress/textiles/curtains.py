@@ -13,13 +13,12 @@ from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import BLINDS, CURTAIN
 from pbrs_farm.core.house import Item, ItemKind, Material, Surface
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.assembly import metal, plain
+from pbrs_farm.dress.generated.assembly import hung, metal, plain
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
 from pbrs_farm.dress.style import Style, mix, shade
 from pbrs_farm.dress.textiles.cloth import Folds, bar, panel
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.walls.hanging import GAP_M, next_id
-from pbrs_farm.dress.walls.hung_things import hung
 from pbrs_farm.geometry.solids import box, sphere
 
 PART = "textiles"

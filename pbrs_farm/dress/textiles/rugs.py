@@ -13,13 +13,13 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import BATHTUB, BED, FLOOR_MAT, SINK, SOFA, TABLE
 from pbrs_farm.core.house import Item, Material
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.assembly import Made, plain
+from pbrs_farm.dress.generated.assembly import Made, hung, plain
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textiles.rug_patterns import rug_pixels
 from pbrs_farm.dress.walls.hanging import next_id
-from pbrs_farm.dress.walls.hung_things import hung, jpeg_texture, slab
+from pbrs_farm.dress.walls.hung_things import jpeg_texture, slab
 
 PART = "textiles"
 RUG_TAG = "rug"

@@ -8,14 +8,13 @@ from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import SINK, TOWEL
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.assembly import Made, metal
+from pbrs_farm.dress.generated.assembly import Made, hung, metal
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style, mix
 from pbrs_farm.dress.textiles.cloth import bar, towel_over_bar
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.walls.hanging import Hanging
-from pbrs_farm.dress.walls.hung_things import hung
 from pbrs_farm.geometry.solids import box
 
 PART = "textiles"

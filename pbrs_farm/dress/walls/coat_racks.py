@@ -8,12 +8,19 @@ import numpy as np
 
 from pbrs_farm.core.classes import CLOTHES
 from pbrs_farm.core.house import Surface
-from pbrs_farm.dress.generated.assembly import Made, Part, any_colour, metal, plain, transformed
+from pbrs_farm.dress.generated.assembly import (
+    Made,
+    Part,
+    any_colour,
+    hung,
+    metal,
+    plain,
+    transformed,
+)
 from pbrs_farm.dress.generated.turned import slab, smooth
 from pbrs_farm.dress.space.room_kinds import RoomKind, is_cooked_in
 from pbrs_farm.dress.style import Rgb, Style, mix
 from pbrs_farm.dress.walls.hanging import Hanging
-from pbrs_farm.dress.walls.hung_things import hung
 
 _HOOKS_M: Final = 1.68  # of the board's lower edge above the floor
 _BEFORE_M: Final = 0.55

@@ -6,39 +6,22 @@ Shapes have their back at z = 0 and grow to +z, the middle of the lower edge at 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, Srgb8Image
-from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE, SHELVES
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
-from pbrs_farm.dress.generated.assembly import GENERATED, Made, metal, plain
+from pbrs_farm.dress.generated.assembly import Made, hung, metal, plain
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.geometry.solids import box, lathe, quads_surface
 from pbrs_farm.images import jpeg_from_array
-
-Parts = Sequence[tuple[Surface, Material]]
 
 _UNIT = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
 _JPEG_QUALITY = 88
 # Turns what stands upright so that its top looks along +z.
 _LYING = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-
-
-def hung(
-    family: str, group: str, nyu40: int, parts: Parts, textures: Sequence[Texture] = (),
-    place: Place = Place.WALL,
-) -> Made:  # fmt: skip
-    """A generated piece that hangs, and its shape: unlike what stands, it keeps its own origin."""
-    materials = tuple(dict.fromkeys(m for _s, m in parts))
-    surfaces = tuple(replace(s, material=materials.index(m)) for s, m in parts)
-    shape = Shape(surfaces, materials, {t.id: t for t in textures})
-    w, h, d = (float(x) for x in np.diff(shape.bounds, axis=0)[0])
-    name = family.replace("_", " ").capitalize()
-    return Piece(f"{GENERATED}{family}", name, group, place, nyu40, (w, d, h)), shape
 
 
 def jpeg_texture(name: str, pixels: Srgb8Image) -> Texture:

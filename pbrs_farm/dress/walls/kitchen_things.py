@@ -11,10 +11,9 @@ import numpy as np
 
 from pbrs_farm.core.classes import CABINET, OTHERPROP, SHELVES
 from pbrs_farm.core.house import Material
-from pbrs_farm.dress.generated.assembly import Made, Part, any_colour, plain, transformed
+from pbrs_farm.dress.generated.assembly import Made, Part, any_colour, hung, plain, transformed
 from pbrs_farm.dress.generated.turned import slab, turned
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.walls.hung_things import hung
 
 _BOARD_M = 0.018
 _DEPTH_M = 0.32

@@ -7,13 +7,13 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.classes import DESK, TABLE, WHITEBOARD
-from pbrs_farm.dress.generated.assembly import Made, Part, any_colour, plain
+from pbrs_farm.dress.generated.assembly import Made, Part, any_colour, hung, plain
 from pbrs_farm.dress.generated.turned import slab
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
-from pbrs_farm.dress.walls.hung_things import frame_material, hung, ring
+from pbrs_farm.dress.walls.hung_things import frame_material, ring
 
 _BOARDS: Final = {
     RoomKind.OFFICE: 0.75, RoomKind.BEDROOM: 0.35, RoomKind.KITCHEN: 0.4, RoomKind.HALL: 0.2,

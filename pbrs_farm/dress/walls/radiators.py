@@ -7,7 +7,7 @@ from typing import Final
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.assembly import Made, Part, plain
+from pbrs_farm.dress.generated.assembly import Made, Part, hung, plain
 from pbrs_farm.dress.generated.turned import slab
 from pbrs_farm.dress.joinery.coating import coat_material
 from pbrs_farm.dress.joinery.scheme import joinery_scheme
@@ -15,7 +15,6 @@ from pbrs_farm.dress.name_words import RADIATORS, words_of_item
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import Hanging
-from pbrs_farm.dress.walls.hung_things import hung
 
 _HEATED: Final = 0.75  # of homes without any, that are heated so
 _LOW_M, _SPACE_M = 0.12, 0.1  # above the floor; below the sill

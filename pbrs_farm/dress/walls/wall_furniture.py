@@ -8,14 +8,14 @@ import numpy as np
 
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import Material, Surface
-from pbrs_farm.dress.generated.assembly import Made, Part, metal, plain, transformed
+from pbrs_farm.dress.generated.assembly import Made, Part, hung, metal, plain, transformed
 from pbrs_farm.dress.generated.turned import turned
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textiles.rug_patterns import rug_pixels
 from pbrs_farm.dress.walls.fittings import hang_anywhere
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging
-from pbrs_farm.dress.walls.hung_things import hung, jpeg_texture, slab, wall_shelf
+from pbrs_farm.dress.walls.hung_things import jpeg_texture, slab, wall_shelf
 from pbrs_farm.dress.walls.kitchen_things import Fronts, open_box, wall_cupboard
 
 # How many things with shelves a room's walls get, from and to.
