@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from shapely.geometry import LineString, Point, Polygon
 
-from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, RoomType
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.floor_plan import OpeningKind, PlacedPiece, Plan, PlanOpening, RoomType
 
 CELL_M, WAY_M, SWING_M = 0.025, 0.6, 0.8
 MEDIANS = {

@@ -19,7 +19,7 @@ _DIGEST_AND_VARIANT: Final = re.compile(r"(-[0-9a-f]{8})?(-d[0-9]+)?")
 
 
 @dataclass(frozen=True, slots=True)
-class Shares:
+class SplitShares:
     """How large each split is: shares of 1, together 1."""
 
     train: float = 0.8
@@ -33,7 +33,7 @@ class Shares:
             raise BadInput("split", "", text, hint="80/10/10")
 
 
-def shares_from_text(text: str) -> Shares:
+def shares_from_text(text: str) -> SplitShares:
     """80/10/10 as Shares; raises BadInput."""
     try:
         train, val, test = (float(part) for part in text.split("/"))
@@ -42,7 +42,7 @@ def shares_from_text(text: str) -> Shares:
     total = train + val + test
     if not 0 < total < float("inf"):
         raise BadInput("--split", text, "expected shares above 0", hint="80/10/10")
-    return Shares(train / total, val / total, test / total)
+    return SplitShares(train / total, val / total, test / total)
 
 
 def home_of(house: str) -> str:
@@ -51,9 +51,9 @@ def home_of(house: str) -> str:
     return match["home"] if match else house
 
 
-def split_of_house(house: str, shares: Shares | None = None) -> str:
+def split_of_house(house: str, shares: SplitShares | None = None) -> str:
     """ "train", "val" or "test" of a house's id."""
-    shares = shares or Shares()
+    shares = shares or SplitShares()
     # Take a number of 0..1 from the home's name.
     digest = hashlib.sha256(home_of(house).encode()).digest()
     at = int.from_bytes(digest[:8], "big") / 2**64

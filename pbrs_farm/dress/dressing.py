@@ -16,13 +16,13 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Piece
 from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.recipe import DressFields
+from pbrs_farm.dress.built_in import joinery
 from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.draft import CHANGED_TAG, Draft
-from pbrs_farm.dress.furnishing import furniture
+from pbrs_farm.dress.finishes import parts
+from pbrs_farm.dress.furniture import furniture
 from pbrs_farm.dress.gates import group_of, keep_gates, part_of, piece_id
-from pbrs_farm.dress.joinery import joinery
 from pbrs_farm.dress.lamps import lamps
-from pbrs_farm.dress.parts import parts
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surfaces import surfaces

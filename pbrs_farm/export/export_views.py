@@ -13,7 +13,7 @@ from typing import Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import SPLITS, Shares, split_of_house
+from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.coco import write_coco
 from pbrs_farm.export.colmap import write_colmap
@@ -50,7 +50,7 @@ def export(
     *,
     selection: str | None = None,
     choice: Choice | None = None,
-    shares: Shares | None = None,
+    shares: SplitShares | None = None,
 ) -> tuple[int, int]:
     """Write the finished views of folder to out in a form of FORMS: (views, files written).
 
@@ -83,7 +83,7 @@ def export(
     return len(views), n_files
 
 
-def _by_split(views: list[ViewEntry], shares: Shares | None) -> dict[str, list[ViewEntry]]:
+def _by_split(views: list[ViewEntry], shares: SplitShares | None) -> dict[str, list[ViewEntry]]:
     """Split -> its views, in the order train, val, test; all under "" without shares."""
     if shares is None:
         return {"": views}

@@ -10,6 +10,7 @@ from typing import Final
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 from pbrs_farm.generate.floor_plan import (
     OpeningKind,
+    PlacedPiece,
     Plan,
     PlanOpening,
     PlanRoom,
@@ -17,8 +18,8 @@ from pbrs_farm.generate.floor_plan import (
     Point,
     Rect,
     RoomType,
+    Storey,
 )
-from pbrs_farm.generate.furniture import PlacedPiece, Storey
 from pbrs_farm.generate.staircase import Stair
 
 _MARGIN_M: Final = 0.6

@@ -11,6 +11,7 @@ import math
 import zipfile
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 from xml.etree import ElementTree as ET
 
@@ -19,18 +20,44 @@ import numpy as np
 from pbrs_farm.core.catalogue import Catalogue, Picture, Place, Shape
 from pbrs_farm.generate.floor_plan import (
     OpeningKind,
+    PlacedPiece,
     Plan,
     PlanOpening,
     PlanRoom,
     PlanWall,
     RoomType,
+    Storey,
 )
-from pbrs_farm.generate.furniture import PlacedPiece, Storey
-from pbrs_farm.generate.home_paints import Paints, drawn_paints
-from pbrs_farm.generate.joinery import joinery
-from pbrs_farm.generate.model_file import model_files
+from pbrs_farm.generate.model_file import joinery, model_files
 from pbrs_farm.generate.staircase import Stair, staircase
 from pbrs_farm.images import png_from_array
+
+# The paints of a made home.
+
+
+@dataclass(frozen=True, slots=True)
+class Paints:
+    """The colours of a home, "RRGGBB"."""
+
+    walls: tuple[str, ...]  # of rooms to live in, one drawn for each
+    wet_walls: str
+    floor: str
+    wet_floor: str
+    ceiling: str
+    joinery: tuple[float, float, float]  # sRGB
+
+
+def drawn_paints(rng: np.random.Generator) -> Paints:
+    """Soft walls, light ceilings, doors and windows of one paint."""
+    walls = ("F4F1EA", "EFEBE0", "E8ECEA", "F3E9DC", "E6E3DA", "DDE4E6", "F6F3EE", "EDE6DD")
+    chosen = [walls[i] for i in rng.permutation(len(walls))[:3]]
+    white, oak, grey = (0.93, 0.92, 0.90), (0.66, 0.50, 0.33), (0.45, 0.46, 0.47)
+    wood = (white, white, oak, grey)[int(rng.integers(4))]
+    return Paints(tuple(chosen), "EEF1F1", "B08A62", "C9C6BF", "FAFAF8", wood)
+
+
+# A furnished plan as a Sweet Home 3D file.
+
 
 AUTHOR: Final = "pbrs_farm"
 VERSION: Final = "7000"

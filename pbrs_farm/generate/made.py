@@ -13,9 +13,8 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.made_home import VERSION, MadeHome
 from pbrs_farm.generate.drawn_home import drawn_home
-from pbrs_farm.generate.floor_plan import Plan, PlanRoom, Point
+from pbrs_farm.generate.floor_plan import Plan, PlanRoom, Point, Storey
 from pbrs_farm.generate.furnish.furnished import furnished
-from pbrs_farm.generate.furniture import Storey
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.programme import Programme, Wishes
 from pbrs_farm.generate.staircase import Stair

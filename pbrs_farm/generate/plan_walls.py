@@ -14,7 +14,7 @@ from shapely.ops import unary_union
 
 from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, Point, Rect, RoomType
 from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.slicing_rules import STEP_M
+from pbrs_farm.generate.slicing import STEP_M
 
 OUTSIDE: Final = -1
 OUTER_M, WET_M, INNER_M, PARAPET_M = 0.26, 0.16, 0.075, 0.10  # thickness, as people draw them
@@ -23,7 +23,7 @@ BALCONY_DEPTH_M: Final = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class WallRun:
     """A straight stretch between the same two neighbours, on a line of the grid; in steps."""
 
     is_vertical: bool
@@ -49,7 +49,7 @@ class Run:
         return (here, there) if self.is_vertical else (there, here)
 
 
-def runs_of(layout: Layout) -> list[Run]:
+def runs_of(layout: Layout) -> list[WallRun]:
     """Every stretch between two different neighbours, outside included; in a fixed order."""
     # Paint the owners on the grid, with a rim of outside.
     owner = np.full((layout.depth + 2, layout.width + 2), OUTSIDE, np.int32)
@@ -65,25 +65,25 @@ def runs_of(layout: Layout) -> list[Run]:
 
 def _runs_on_line(
     before: NDArray[np.int32], after: NDArray[np.int32], line: int, is_vertical: bool
-) -> list[Run]:
+) -> list[WallRun]:
     # The rim shifts cells by one: cell k lies between the coordinates k - 1 and k.
     found, start = [], 0
     for (a, b), group in groupby(zip(before.tolist(), after.tolist(), strict=True)):
         stop = start + len(list(group))
         if a != b:
-            found.append(Run(is_vertical, line, start - 1, stop - 1, a, b))
+            found.append(WallRun(is_vertical, line, start - 1, stop - 1, a, b))
         start = stop
     return found
 
 
-def thickness(run: Run, types: list[RoomType]) -> float:
+def thickness(run: WallRun, types: list[RoomType]) -> float:
     """Of the wall on a run, metres."""
     if OUTSIDE in run.rooms:
         return OUTER_M
     return WET_M if any(types[r].is_wet for r in run.rooms) else INNER_M
 
 
-def walls_of(layout: Layout, runs: list[Run]) -> tuple[PlanWall, ...]:
+def walls_of(layout: Layout, runs: list[WallRun]) -> tuple[PlanWall, ...]:
     """The walls: runs of one line and thickness joined; none between rooms that are open."""
     types = [wish.type for wish in layout.programme.rooms]
     is_open = open_pairs(layout)
@@ -91,7 +91,7 @@ def walls_of(layout: Layout, runs: list[Run]) -> tuple[PlanWall, ...]:
     standing.sort(key=lambda item: (item[0].is_vertical, item[0].line, item[1], item[0].low))
     # Join what continues in a line.
     walls: list[PlanWall] = []
-    last: Run | None = None
+    last: WallRun | None = None
     for run, thick in standing:
         start, end = run.point(run.low), run.point(run.high)
         continues = last is not None and (last.is_vertical, last.line, last.high) == (
@@ -175,7 +175,7 @@ def largest_rectangle(polygon: Polygon) -> Rect:
     return best
 
 
-def balcony(run: Run, low: float, high: float) -> tuple[PlanRoom, tuple[PlanWall, ...]]:
+def balcony(run: WallRun, low: float, high: float) -> tuple[PlanRoom, tuple[PlanWall, ...]]:
     """A balcony before the outer run, between two coordinates of its axis in metres."""
     outwards = -1.0 if run.before == OUTSIDE else 1.0
     face = run.line * STEP_M + outwards * OUTER_M / 2

@@ -26,6 +26,7 @@ from pbrs_farm.dress.space.passages import Passage
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.generate.floor_plan import (
     OpeningKind,
+    PlacedPiece,
     Plan,
     PlanOpening,
     PlanRoom,
@@ -34,7 +35,6 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
 )
 from pbrs_farm.generate.furnish.furnished import furnished
-from pbrs_farm.generate.furniture import PlacedPiece
 from pbrs_farm.generate.made import turned_by, upright_angle
 from pbrs_farm.generate.plan_walls import corners
 

@@ -1,7 +1,7 @@
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import Shares, home_of, shares_from_text, split_of_house
+from pbrs_farm.core.house_split import SplitShares, home_of, shares_from_text, split_of_house
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_splits_are_as_large_as_asked() -> None:
 
 
 def test_a_larger_share_moves_homes_one_way_only() -> None:
-    small, large = Shares(0.5, 0.25, 0.25), Shares(0.7, 0.15, 0.15)
+    small, large = SplitShares(0.5, 0.25, 0.25), SplitShares(0.7, 0.15, 0.15)
     for k in range(500):
         if split_of_house(f"made-{k}", small) == "train":
             assert split_of_house(f"made-{k}", large) == "train"

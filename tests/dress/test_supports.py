@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.house import Item
-from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, Support, supports_of_item
-from pbrs_farm.dress.supports.plan_grid import cells_over, covered, covered_by_each
+from pbrs_farm.dress.supports import (
+    PlanGrid,
+    SceneTriangles,
+    Support,
+    cells_over,
+    covered,
+    covered_by_each,
+    supports_of_item,
+)
 from tests.dress.furniture import boards, bookcase, room, solid, thin_table
 
 

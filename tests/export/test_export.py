@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import Shares, split_of_house
+from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.export_views import export
 from pbrs_farm.export.run_lengths import compressed_runs, run_lengths
@@ -189,7 +189,7 @@ def test_only_chosen_layers_and_modes_are_exported_and_radiance_when_named(root,
 
 def test_a_split_is_a_folder_of_its_own_for_each_form(root, tmp_path):
     house = view_folder(root).parent.parent.name
-    shares = Shares(1, 0, 0)
+    shares = SplitShares(1, 0, 0)
     assert split_of_house(house, shares) == "train"
     export(root, tmp_path / "coco", "coco", shares=shares)
     assert (tmp_path / "coco/train/annotations.json").exists()

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from pbrs_farm.core.catalogue import Piece, Place
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.floor_plan import PlacedPiece
 
 _SOFA = Piece("x#sofa", "Sofa", "sofa", Place.FLOOR, 6, (2.0, 1.0, 0.8))
 

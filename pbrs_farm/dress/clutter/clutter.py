@@ -2,30 +2,401 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.classes import BED, CHAIR, SOFA
 from pbrs_farm.core.house import Item, ItemKind
-from pbrs_farm.dress.clutter.beds import dress_bed
-from pbrs_farm.dress.clutter.floors import fill_floor
-from pbrs_farm.dress.clutter.kinds import Stock
-from pbrs_farm.dress.clutter.placing import Placing
-from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of
-from pbrs_farm.dress.clutter.seats import dress_seat
-from pbrs_farm.dress.clutter.shelves import fill_shelf, plan_shelves
-from pbrs_farm.dress.clutter.tops import fill_top, set_table
-from pbrs_farm.dress.clutter.worktop import Worktop
+from pbrs_farm.core.walkable import CELL_M
+from pbrs_farm.dress.clutter.cushions import dress_bed, dress_seat
+from pbrs_farm.dress.clutter.placing import LIFT_M, Placing, Stock, TopSpot, Worktop, is_round
+from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of, shares, usual_area
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.covers import book_covers
+from pbrs_farm.dress.space.floor_bitmaps import (
+    FloorBitmap,
+    doors_are_joined,
+    flights_of,
+    floor_bitmap,
+    with_body,
+)
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
+from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style, room_style
-from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, supports_of_item, surroundings
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.books import book_covers, leaning_book, run_of_books, stack_of_books
+
+# What stands on tables, desks, counters, chests: by the table of shares, greatest first.
+
+
+_MOST_OF_A_KIND = 3
+_ANOTHER = 0.35  # chance of one more of the kind
+_FULL = 0.45  # no more is put where less than this share of the surface is free
+_MOST_FACTOR = 1.6
+_CHAIR_M = 0.6  # from a chair's middle to the table it belongs to
+
+# Kinds that are drawn to the front: hands reach for them.
+_IN_FRONT = ("laptop", "papers", "notebook", "remote", "phone", "plates", "cutlery", "glass", "cup")
+
+
+def fill_top(placing: Placing, top: Worktop, receptacle: str) -> int:
+    """Put things on the worktop as the table says; how many were put there."""
+    rng = placing.rng
+    factor = min(top.support.area / usual_area(receptacle), _MOST_FACTOR)
+    wanted: list[str] = []
+    for row in shares().get(receptacle, ()):
+        chance = np.clip((row.share + placing.bias * row.share**0.5) * factor, 0, 0.98)
+        n = 0
+        while n < _MOST_OF_A_KIND and rng.random() < chance * placing.share:
+            n, chance = n + 1, _ANOTHER * chance
+        wanted += [row.kind] * n
+    return put_all(placing, top, wanted)
+
+
+def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64]) -> int:
+    """Lay a place before each chair (plan points (2,)): a plate, a glass to its right; how many."""
+    plate = placing.stock.take(placing.rng, "one_plate", placing.style)
+    glass = placing.stock.take(placing.rng, "glass", placing.style)
+    if plate is None or glass is None:
+        return 0
+    rows, columns = np.nonzero(top.support.mask)
+    cells = top.grid.plan_of(columns + 0.5, rows + 0.5)
+    middle, n = cells.mean(0), 0
+    for chair in chairs:
+        # Go in from the table's edge that is nearest to the chair.
+        edge = cells[int(np.argmin(((cells - chair) ** 2).sum(1)))]
+        inward = middle - edge
+        if np.linalg.norm(chair - edge) > _CHAIR_M or np.linalg.norm(inward) < 0.2:
+            continue
+        inward = inward / np.linalg.norm(inward)
+        right = np.array([-inward[1], inward[0]])
+        at = edge + inward * (plate[0].size[0] / 2 + 0.03)
+        n += placing.drop_near(top, plate, at)
+        n += placing.drop_near(top, glass, at + inward * 0.1 + right * 0.17)
+    return n
+
+
+def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
+    """Put a thing of each of the kinds on the worktop, the largest first."""
+    things: list[tuple[str, Made]] = []
+    for kind in kinds:
+        made = placing.stock.take(placing.rng, kind, placing.style)
+        if made is None:
+            placing.refuse(f"no {kind} in the catalogue")
+        else:
+            things.append((kind, made))
+    things.sort(key=lambda thing: -thing[1][0].size[0] * thing[1][0].size[1])
+    n = 0
+    for kind, made in things:
+        if top.free_share() < _FULL and n:
+            placing.refuse("surface full")
+            continue
+        pull = -3.0 if kind in _IN_FRONT else 5.0 + 12.0 * made[0].size[2]
+        n += placing.drop(top, made, faces_anywhere=is_round(kind), depth_pull=pull)
+    return n
+
+
+# Things on the floor: bins, bags, shoes, baskets, boxes near walls, never in anybody's way.
+
+
+_WALK_M = 0.65  # the width of a way, with something to spare
+_REACH_M = 0.35  # a thing's middle is no farther from a wall or furniture
+_KEPT_M = 0.04  # between things
+_DOOR_M = 1.0  # kept free before doors
+_HEAD_M = 1.9
+_RUG_M = 0.03  # what is lower may lie anywhere, but carries nothing
+
+# What stands on floors: kind, chance in a room.
+_USUAL: dict[RoomKind, tuple[tuple[str, float], ...]] = {
+    RoomKind.HALL: (("stool", 0.4), ("shoes", 0.8), ("shoes", 0.6), ("bag", 0.35), ("suitcase", 0.2), ("basket", 0.15)),
+    RoomKind.LIVING: (("armchair", 0.85), ("armchair", 0.4), ("basket", 0.5), ("pouf", 0.55), ("toy", 0.35), ("bag", 0.25), ("storage_box", 0.25)),
+    RoomKind.BEDROOM: (("armchair", 0.4), ("stool", 0.4), ("laundry_basket", 0.4), ("suitcase", 0.25), ("pouf", 0.25), ("basket", 0.4), ("shoes", 0.45), ("toy", 0.3), ("bag", 0.3), ("storage_box", 0.3), ("bin", 0.2)),
+    RoomKind.KITCHEN: (("stool", 0.5), ("bin", 0.75), ("bag", 0.25), ("bottle", 0.25), ("carton", 0.12)),
+    RoomKind.DINING: (("basket", 0.25), ("toy", 0.2), ("bag", 0.2)),
+    RoomKind.BATHROOM: (("stool", 0.45), ("laundry_basket", 0.5), ("basket", 0.4), ("bin", 0.5), ("shoes", 0.15)),
+    RoomKind.OFFICE: (("armchair", 0.4), ("stool", 0.4), ("bin", 0.8), ("carton", 0.4), ("bag", 0.4), ("storage_box", 0.4)),
+    RoomKind.STORE: (("cartons", 0.8), ("carton", 0.8), ("storage_box", 0.6), ("basket", 0.3), ("bag", 0.3), ("shoes", 0.4)),
+    RoomKind.OTHER: (("armchair", 0.5), ("stool", 0.3), ("carton", 0.3), ("basket", 0.4), ("bag", 0.2)),
+    RoomKind.OUTDOOR: (("plant_pot", 0.5), ("plant_pot", 0.3)),
+}  # fmt: skip
+
+
+@dataclass(slots=True)
+class _Floor:
+    # Cells of a room's floor while things are put there.
+    room: RoomSpace
+    bitmap: FloorBitmap
+    grid: PlanGrid  # of the same cells
+    free: Bools  # nothing stands there, no door needs it
+    walkable: Bools  # nothing stands there
+    has_ways: bool  # one way joins the room's doors
+
+
+def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> int:
+    """Put things on the floor of a room; how many."""
+    rng = placing.rng
+    # Draw what the room usually has before its floor is looked at, which costs more.
+    wanted = [
+        kind for kind, chance in _USUAL.get(room.kind, ()) if rng.random() < chance * placing.share
+    ]
+    floor = _floor(scene, space, room) if wanted else None
+    flights = flights_of(placing.draft, room.room, room.area)
+    if floor is not None and not flights.before.is_empty:
+        plan = floor.grid.centres()
+        floor.free &= ~shapely.contains_xy(flights.before, plan[..., 0], plan[..., 1])
+    if floor is None or not floor.free.any():
+        return 0
+    n = 0
+    for kind in wanted:
+        made = placing.stock.take(rng, kind, placing.style)
+        if made is not None:
+            n += _put(placing, floor, made)
+    return n
+
+
+def _floor(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> _Floor | None:
+    if room.area.is_empty or room.room.polygon.shape[0] < 3:
+        return None
+    y = room.room.floor_y
+    bitmap = floor_bitmap(space, room)
+    grid = PlanGrid(np.asarray(bitmap.origin), 0.0, CELL_M, bitmap.inside.shape)
+    plan = grid.centres()
+    around = surroundings(scene, -1, grid, y)
+    hits, inside = around.hits, bitmap.inside & ~around.solid
+    # Rugs carry nothing, but one walks over them.
+    stands = (hits.low < y + _HEAD_M) & (hits.high > y + 0.002)
+    blocks = stands & (hits.high > y + _RUG_M)
+    low, body = np.zeros(grid.shape, np.bool_), np.zeros(grid.shape, np.bool_)
+    low[hits.row[stands], hits.column[stands]] = True
+    body[hits.row[blocks], hits.column[blocks]] = True
+    walkable = inside & ~body
+    # Keep a metre before doors and windows that reach the floor.
+    kept = np.zeros(grid.shape, np.bool_)
+    for passage in (*room.doors, *(w for w in room.windows if w.bottom_y < y + 0.4)):
+        side = passage.side_of(room.room.id)
+        if side is None:
+            continue
+        zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(CELL_M)
+        kept |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
+    joined = doors_are_joined(bitmap, room)
+    return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, joined)
+
+
+def _put(placing: Placing, floor: _Floor, made: Made) -> bool:
+    low, high = made[1].bounds
+    reach = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
+    # Its middle keeps from everything by its own radius, but not much more.
+    distance = ndimage.distance_transform_edt(np.pad(floor.free, 1))[1:-1, 1:-1] * CELL_M
+    to_wall = ndimage.distance_transform_edt(np.pad(floor.walkable, 1))[1:-1, 1:-1] * CELL_M
+    least = reach + _KEPT_M + CELL_M
+    rows, columns = np.nonzero((distance >= least) & (to_wall <= least + _REACH_M))
+    for k in placing.rng.permutation(len(rows))[:12]:
+        disc = _disc(floor.grid.shape, int(rows[k]), int(columns[k]), reach + CELL_M)
+        # One way still joins all doors, where one did.
+        if floor.has_ways and not doors_are_joined(
+            with_body(floor.bitmap, disc, _WALK_M), floor.room
+        ):
+            continue
+        x, z = floor.grid.plan_of(columns[k] + 0.5, rows[k] + 0.5)
+        turn = _facing(to_wall, int(rows[k]), int(columns[k]))
+        placing.put(
+            made, np.array([x, placing.room.floor_y + LIFT_M, z]),
+            turn + float(placing.rng.normal(0, 0.2)),
+        )  # fmt: skip
+        floor.free &= ~disc
+        floor.walkable &= ~disc
+        floor.bitmap.occupied[disc] = True
+        return True
+    placing.refuse("no place on the floor")
+    return False
+
+
+def _disc(shape: tuple[int, int], row: int, column: int, radius_m: float) -> Bools:
+    i, j = np.ogrid[: shape[0], : shape[1]]
+    return np.asarray((i - row) ** 2 + (j - column) ** 2 <= (radius_m / CELL_M) ** 2)
+
+
+def _facing(to_wall: F64, row: int, column: int) -> float:
+    # Away from what is nearest: up the slope of the distance.
+    i, j = slice(max(row - 2, 0), row + 3), slice(max(column - 2, 0), column + 3)
+    part = to_wall[i, j]
+    if min(part.shape) < 2:
+        return 0.0
+    down, right = np.gradient(part)
+    return float(np.arctan2(right.mean(), down.mean()))
+
+
+# Fills shelves from left to right: runs of books with their spines out, piles, boxes, ornaments.
+
+
+_LEAST_BOOK_M = 0.14  # free height that upright books need
+_HEADROOM_M = 0.015
+_TOUCH_M = 0.0003  # between a run and the book that leans on it
+
+_Kinds = tuple[tuple[str, float], ...]
+
+# What else stands on shelves, and how often.
+_DECOR: _Kinds = (
+    ("vase", 0.2), ("ornament", 0.2), ("table_frame", 0.2), ("candle", 0.12), ("storage_box", 0.25),
+    ("shelf_basket", 0.25), ("clock", 0.08), ("bowl", 0.08), ("magazines", 0.08), ("toy", 0.04),
+    ("plant_pot", 0.06),
+)  # fmt: skip
+_KITCHEN: _Kinds = (
+    ("plates", 0.25), ("bowl", 0.2), ("cup", 0.25), ("glass", 0.2), ("jar", 0.3), ("bottle", 0.15),
+    ("kitchen_tool", 0.1), ("pot", 0.1), ("shelf_basket", 0.08),
+)  # fmt: skip
+_CHILD: _Kinds = (
+    ("toy", 0.35),
+    ("storage_box", 0.25),
+    ("ball", 0.1),
+    ("shelf_basket", 0.2),
+    ("table_frame", 0.1),
+)
+_OFFICE: _Kinds = (
+    ("binders", 0.5),
+    ("storage_box", 0.2),
+    ("papers", 0.2),
+    ("table_frame", 0.1),
+    ("ornament", 0.1),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ShelfPlan:
+    """How a whole bookcase is filled."""
+
+    books: float  # share of its length
+    fullness: float
+    others: _Kinds
+    inset_m: float  # of the spines behind the front edge
+
+
+def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
+    """How the shelves of one bookcase are filled, by the room it stands in."""
+    rng = placing.rng
+    others, books = _DECOR, float(rng.uniform(0.08, 0.26))
+    if kind is RoomKind.KITCHEN or (kind is RoomKind.DINING and rng.random() < 0.4):
+        others, books = _KITCHEN, 0.15
+    elif kind is RoomKind.OFFICE:
+        others, books = _OFFICE, float(rng.uniform(0.15, 0.35))
+    elif kind is RoomKind.BEDROOM and rng.random() < 0.35:
+        others, books = _CHILD, float(rng.uniform(0.08, 0.25))
+    fullness = float(np.clip(rng.uniform(0.55, 1.0) + placing.bias, 0.2, 1.0))
+    return ShelfPlan(
+        books, fullness * min(placing.share, 1.0), others, float(rng.uniform(0.01, 0.04))
+    )
+
+
+def fill_shelf(placing: Placing, top: Worktop, plan: ShelfPlan) -> int:
+    """Fill one shelf from left to right; how many things were put there."""
+    rng = placing.rng
+    n, column = 0, top.columns[0]
+    free = top.free_height()
+    while column < top.columns[1] - 4:
+        if rng.random() > plan.fullness:
+            # Leave a gap.
+            column += int(rng.uniform(0.08, 0.22) / top.grid.cell_m)
+            continue
+        if free > _LEAST_BOOK_M and rng.random() < plan.books:
+            after = _put_books(placing, top, column, plan, free)
+        else:
+            after = _put_other(placing, top, column, plan, free)
+        n += after is not None
+        column = after if after is not None else column + 6
+    return n
+
+
+def _put_books(
+    placing: Placing, top: Worktop, column: int, plan: ShelfPlan, free: float
+) -> int | None:
+    rng, stock = placing.rng, placing.stock
+    tall = free - _HEADROOM_M - 0.01
+    depth = min(top.depth - 0.01, 0.24)
+    if depth < 0.1 or tall < 0.11:
+        return None
+    # Now and then they lie; a pile may carry nothing.
+    if rng.random() < 0.12:
+        return _leftmost(placing, top, column, [_lying(rng, placing, depth, tall)], plan.inset_m)
+    most = min(float(rng.uniform(0.14, 0.6)), (top.columns[1] - column) * top.grid.cell_m - 0.012)
+    leans = rng.random() < 0.3 and most > 0.3
+    for length in (most, 0.6 * most, 0.35 * most):
+        if length < 0.03:
+            return None
+        made, last = run_of_books(rng, stock.covers, length - 0.09 * leans, tall, depth)
+        row = [made]
+        if leans and last > 0.14:
+            row.append(leaning_book(rng, stock.covers, last * 0.97, depth))
+        after = _leftmost(placing, top, column, row, plan.inset_m)
+        if after is not None:
+            return after
+    return None
+
+
+def _lying(rng: np.random.Generator, placing: Placing, depth: float, tall: float) -> Made:
+    # A pile as high as the shelf lets it, its spines out.
+    n = int(rng.integers(2, 6))
+    while True:
+        made = stack_of_books(rng, placing.stock.covers, n, most=min(depth / 0.72, 0.32))
+        if made[0].size[2] < tall or n == 1:
+            return made
+        n -= 1
+
+
+def _put_other(
+    placing: Placing, top: Worktop, column: int, plan: ShelfPlan, free: float
+) -> int | None:
+    rng = placing.rng
+    share = np.array([p for _, p in plan.others])
+    kind = plan.others[int(rng.choice(len(share), p=share / share.sum()))][0]
+    made = placing.stock.take(rng, kind, placing.style)
+    if made is None or made[0].size[2] > free - _HEADROOM_M or made[0].size[1] > top.depth:
+        return None
+    return _leftmost(placing, top, column + 1, [made], plan.inset_m + float(rng.uniform(0, 0.04)))
+
+
+def _leftmost(
+    placing: Placing, top: Worktop, column: int, row: list[Made], inset_m: float
+) -> int | None:
+    """Put things that touch side by side as far left as they fit; the next free column, or None.
+
+    Their fronts stand in one line, inset_m behind the shelf's edge where there is room.
+    """
+    sizes = np.array([made[1].bounds[1] - made[1].bounds[0] for made in row])
+    width = float(sizes[:, 0].sum() + _TOUCH_M * (len(row) - 1))
+    needed = (width, float(sizes[:, 1].max()), float(sizes[:, 2].max()))
+    rows, columns, n = top.spots(needed, margin_m=0.0)
+    usable = columns >= column
+    if not usable.any():
+        return None
+    first = int(columns[usable].min())
+    choices = rows[usable & (columns == first)]
+    target = top.rows[1] - n[0] - inset_m / top.grid.cell_m
+    spot = TopSpot(int(choices[np.argmin(np.abs(choices - target))]), first, *n)
+    top.take(spot)
+    _put_row(placing, top, spot, row, sizes)
+    return spot.column + spot.n_columns
+
+
+def _put_row(placing: Placing, top: Worktop, spot: TopSpot, row: list[Made], sizes: F64) -> None:
+    # Line the things up from the spot's left, their fronts on its front.
+    cell, turn = top.grid.cell_m, top.grid.turn_rad
+    front = (spot.row + spot.n_rows) * cell - 0.5 * cell
+    x = spot.column * cell + 0.5 * cell
+    for made, size in zip(row, sizes, strict=True):
+        place = top.grid.plan_of((x + size[0] / 2) / cell, (front - size[2] / 2) / cell)
+        placing.put(made, np.array([place[0], top.height, place[1]]), turn)
+        x += float(size[0]) + _TOUCH_M
+
+
+# The part `clutter` of the dressing.
+
 
 _LEAST_SHELF_DEPTH_M = 0.12
 _DOOR_MARGIN_M = 0.02  # around where doors swing

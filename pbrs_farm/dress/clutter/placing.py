@@ -2,18 +2,279 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, I32, Bools
+from pbrs_farm.core.catalogue import Catalogue, Place, Shape
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.house import Room
-from pbrs_farm.dress.clutter.kinds import Stock
-from pbrs_farm.dress.clutter.worktop import Spot, Worktop, turned_size
+from pbrs_farm.core.house import ItemKind, Room
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.style import Style
+from pbrs_farm.dress.supports import Support
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.books import Covers, magazines, open_book, stack_of_books
+from pbrs_farm.dress.things.things import THINGS
+
+# A support while things are put on it: where a thing of a size fits; state: what is taken.
+
+
+MARGIN_M = 0.02  # between things
+_HEADROOM_M = 0.01  # above a thing
+LIFT_M = 0.0001  # above the support, so that no faces coincide
+
+
+@dataclass(frozen=True, slots=True)
+class TopSpot:
+    """A place for a thing: cells of a worktop."""
+
+    row: int
+    column: int
+    n_rows: int
+    n_columns: int
+
+
+class Worktop:
+    """A support and what is still free on it. Rows run from the back to the front."""
+
+    def __init__(self, support: Support) -> None:
+        self.support = support
+        self.grid = support.grid
+        self.clear = support.clear.copy()
+        rows, columns = np.nonzero(support.mask)
+        self.rows = int(rows.min()), int(rows.max()) + 1
+        self.columns = int(columns.min()), int(columns.max()) + 1
+
+    @property
+    def width(self) -> float:
+        """Metres from its left to its right end."""
+        return (self.columns[1] - self.columns[0]) * self.grid.cell_m
+
+    @property
+    def depth(self) -> float:
+        """Metres from its back to its front."""
+        return (self.rows[1] - self.rows[0]) * self.grid.cell_m
+
+    @property
+    def height(self) -> float:
+        """World y that things stand at."""
+        return self.support.height + LIFT_M
+
+    def free_height(self) -> float:
+        """The median free height of what is left, metres; 0 where nothing is."""
+        left = self.clear[self.support.mask & (self.clear > 0)]
+        return float(np.median(left)) if len(left) else 0.0
+
+    def free_share(self) -> float:
+        """The share of the support that nothing was put on."""
+        mask = self.support.mask
+        return float((mask & (self.clear > 0)).sum() / max(mask.sum(), 1))
+
+    def spots(
+        self, size: tuple[float, float, float], *, margin_m: float = MARGIN_M, inset_m: float = 0.0
+    ) -> tuple[I32, I32, tuple[int, int]]:
+        """Rows and columns of the first cells of all places for a (width, height, depth), metres.
+
+        And the rows and columns such a place has. margin_m: to what stands there; inset_m: to the
+        support's edge.
+        """
+        cell = self.grid.cell_m
+        n = (int(np.ceil(size[2] / cell)) + 1, int(np.ceil(size[0] / cell)) + 1)
+        margin, inset = round(margin_m / cell), round(inset_m / cell)
+        # The thing must lie on the support, and nothing lower than it stand near.
+        off = _counts(~self.support.mask, n, inset)
+        hit = _counts(self.clear < size[1] + _HEADROOM_M, n, margin)
+        rows, columns = np.nonzero((off == 0) & (hit == 0))
+        return rows.astype(np.int32), columns.astype(np.int32), n
+
+    def take(self, spot: TopSpot) -> None:
+        """Nothing else can stand there."""
+        ahead = slice(spot.row, spot.row + spot.n_rows)
+        self.clear[ahead, spot.column : spot.column + spot.n_columns] = 0.0
+
+    def keep_free(self, zone: BaseGeometry) -> None:
+        """Nothing can stand over a plan area."""
+        plan = self.grid.centres()
+        corners = plan[[0, 0, -1, -1], [0, -1, 0, -1]]
+        if not zone.is_empty and shapely.box(*corners.min(0), *corners.max(0)).intersects(zone):
+            self.clear[shapely.contains_xy(zone, plan[..., 0], plan[..., 1])] = 0.0
+
+    def middle(self, spot: TopSpot) -> F64:
+        """(3,) world place of the spot's middle, on the support."""
+        x, z = self.grid.plan_of(spot.column + spot.n_columns / 2, spot.row + spot.n_rows / 2)
+        return np.array([x, self.height, z])
+
+
+def turned_size(size: F64, turn_rad: float) -> tuple[float, float, float]:
+    """Width, height and depth of the box around a turned box (3,) of width, height, depth."""
+    c, s = abs(np.cos(turn_rad)), abs(np.sin(turn_rad))
+    return (
+        float(size[0] * c + size[2] * s), float(size[1]), float(size[0] * s + size[2] * c),
+    )  # fmt: skip
+
+
+def _counts(bad: Bools, n: tuple[int, int], grown: int) -> I32:
+    # How many bad cells are in each window of n cells, grown by so many on each side.
+    tall, wide = n[0] + 2 * grown, n[1] + 2 * grown
+    total = np.zeros((bad.shape[0] + 2 * grown + 1, bad.shape[1] + 2 * grown + 1), np.int32)
+    total[1:, 1:] = np.pad(bad, grown).astype(np.int32).cumsum(0).cumsum(1)
+    if tall >= total.shape[0] or wide >= total.shape[1]:
+        return np.ones((0, 0), np.int32)
+    return np.asarray(
+        total[tall:, wide:] - total[:-tall, wide:] - total[tall:, :-wide] + total[:-tall, :-wide]
+    )
+
+
+# Kinds of small things and where they come from: the catalogue's groups, or generated.
+
+
+_MOST_FACES: Final = 1500  # of a small thing from a catalogue, and of most kinds
+_MOST_OF_MODEL: Final = 12_000  # faces of all things of one model in a home
+_GENERATED_SHARE: Final = 0.5  # where there are both
+_DESIGNS: Final = 1  # of a kind in one home
+_MOST_TRIES: Final = 2  # models that are loaded to find them
+
+
+@dataclass(frozen=True, slots=True)
+class ThingKind:
+    """Where a kind's pieces come from."""
+
+    groups: tuple[str, ...] = ()  # of the catalogue
+    made: str = ""  # generator's name
+    most_m: float = 0.6  # the longest side
+    is_round: bool = False  # it may face anywhere
+    place: Place = Place.SURFACE  # of the catalogue's pieces
+    most_faces: int = _MOST_FACES
+
+
+# Of the generated things, those that a catalogue has, too, or that may face anywhere.
+_KINDS: Final[dict[str, ThingKind]] = {
+    "armchair": ThingKind(("armchair",), most_m=1.1, place=Place.FLOOR, most_faces=12_000),
+    "ball": ThingKind(("ball",), most_m=0.3, is_round=True),
+    "bath_small": ThingKind(("bath_small",), "toiletries", 0.3),
+    "bin": ThingKind(("bin",), "bin", 0.6, True),
+    "basket": ThingKind(("basket",), "basket", 0.6, True),
+    "bottle": ThingKind(("bottle",), "bottle", 0.4, True),
+    "bowl": ThingKind(("bowl",), "bowl", 0.4, True),
+    "box": ThingKind(("box",), "storage_box", 0.45),
+    "candle": ThingKind(("candle",), "candle", 0.4, True),
+    "clock": ThingKind(("clock",), "clock", 0.3),
+    "coffee_machine": ThingKind(("coffee_machine",), most_m=0.5),
+    "cup": ThingKind(("cup",), "cup", 0.2, True),
+    "cutlery": ThingKind(("cutlery",), most_m=0.35),
+    "electronics": ThingKind(("electronics", "speaker"), most_m=0.5),
+    "folded_towels": ThingKind(("towel",), "folded_towels", 0.5),
+    "food": ThingKind(("food",), "fruit", 0.4, True),
+    "fruit": ThingKind(("fruit",), "fruit", 0.4, True),
+    "glass": ThingKind(("glass",), "glass", 0.3, True),
+    "jewel": ThingKind(("jewel",), most_m=0.2),
+    "kettle": ThingKind(("kettle",), "kettle", 0.35, True),
+    "kitchen_tool": ThingKind(("kitchen_tool", "kitchen_appliance"), "jar", 0.5),
+    "laptop": ThingKind(("laptop",), "laptop", 0.45),
+    "microwave": ThingKind(("microwave",), most_m=0.6),
+    "monitor": ThingKind(("monitor",), most_m=0.7),
+    "ornament": ThingKind(("ornament",), "ornament", 0.5, True),
+    "one_plate": ThingKind(made="one_plate", is_round=True),
+    "pan": ThingKind(("pot_pan",), "pan", 0.5),
+    "phone": ThingKind(("phone",), "phone", 0.3),
+    "plates": ThingKind(("plate",), "plates", 0.4, True),
+    "pot": ThingKind(("pot_pan",), "pot", 0.45),
+    "remote": ThingKind(("remote",), "remote", 0.3, True),
+    "shoes": ThingKind(("shoes",), "shoes", 0.4),
+    "stool": ThingKind(("stool",), "stool", 0.8, place=Place.FLOOR, most_faces=6_000),
+    "table_lamp": ThingKind(("table_lamp",), most_m=0.65),
+    "toaster": ThingKind(("toaster",), most_m=0.45),
+    "toy": ThingKind(("toy",), most_m=0.45, is_round=True),
+    "vase": ThingKind(("vase",), "vase", 0.5, True),
+}
+
+
+class Stock:
+    """What a home's small things are taken from: one model of each kind, as people own sets."""
+
+    def __init__(self, catalogue: Catalogue, covers: Covers, seed: int) -> None:
+        self.covers = covers
+        self._catalogue = catalogue
+        self._seed = seed
+        self._designs: dict[str, list[Made]] = {}
+        self._faces: Counter[str] = Counter()  # of the things taken so far, by piece
+
+    def take(self, rng: np.random.Generator, kind: str, style: Style) -> Made | None:
+        """A thing of that kind; None where there is none that can be used."""
+        if kind == "book":
+            # One or a pile; now and then one lies open.
+            n = int(rng.choice([0, 1, 1, 2, 3, 4, 5]))
+            return stack_of_books(rng, self.covers, n) if n else open_book(rng, self.covers)
+        if kind == "magazines":
+            return magazines(rng, self.covers, int(rng.integers(1, 6)))
+        # Draw for all alike, so that what the catalogue holds moves no later draw.
+        found = _kind(kind)
+        is_made, number = rng.random() < _GENERATED_SHARE, int(rng.integers(1 << 30))
+        designs = [] if found.made and is_made else self._owned(kind)
+        # Of one detailed model there are few in a home.
+        designs = [d for d in designs if self._faces[d[0].id] + _n_faces(d[1]) <= _MOST_OF_MODEL]
+        if designs:
+            piece, shape = designs[number % len(designs)]
+            self._faces[piece.id] += _n_faces(shape)
+            return piece, shape
+        own = np.random.default_rng(number)
+        return THINGS.make(found.made, own, style) if found.made else None
+
+    def _owned(self, kind: str) -> list[Made]:
+        """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
+        if kind not in self._designs:
+            found = _kind(kind)
+            fitting = [
+                p
+                for p in self._catalogue.of(*found.groups)
+                if p.place is found.place
+                and max(p.size) <= found.most_m
+                and p.kind in (ItemKind.OBJECT, ItemKind.LAMP)
+            ]
+            order = np.random.default_rng([self._seed, *kind.encode()]).permutation(len(fitting))
+            owned: list[Made] = []
+            for k in order[:_MOST_TRIES]:
+                if len(owned) == _DESIGNS:
+                    break
+                shape = self._catalogue.shape(fitting[k])
+                if shape is not None and _is_usable(shape, found):
+                    owned.append((fitting[k], shape))
+            self._designs[kind] = owned
+        return self._designs[kind]
+
+
+def is_round(kind: str) -> bool:
+    """Whether things of that kind may face anywhere."""
+    return kind in _KINDS and _KINDS[kind].is_round
+
+
+def is_known(kind: str) -> bool:
+    """Whether there is such a kind."""
+    return kind in (*_KINDS, *THINGS.names, "book", "magazines")
+
+
+def _kind(name: str) -> ThingKind:
+    return _KINDS.get(name) or ThingKind(made=name)
+
+
+def _n_faces(shape: Shape) -> int:
+    return sum(len(s.faces) for s in shape.surfaces)
+
+
+def _is_usable(shape: Shape, kind: ThingKind) -> bool:
+    if not 0 < _n_faces(shape) <= kind.most_faces:
+        return False
+    low, high = shape.bounds
+    return bool(np.isfinite([low, high]).all() and (high - low).max() <= kind.most_m + 0.05)
+
+
+# Puts things on worktops.
+
 
 PART = "clutter"
 _NEAR_M = 0.06
@@ -68,7 +329,7 @@ class Placing:
         # Prefer the back or the front, and leave the rest to chance.
         weight = np.exp(-depth_pull * rows * top.grid.cell_m)
         k = int(self.rng.choice(len(rows), p=weight / weight.sum()))
-        spot = Spot(int(rows[k]), int(columns[k]), *n)
+        spot = TopSpot(int(rows[k]), int(columns[k]), *n)
         top.take(spot)
         self.put(made, top.middle(spot), top.grid.turn_rad + float(turn_rad))
         return True
@@ -85,7 +346,7 @@ class Placing:
         k = int(np.argmin(away))
         if away[k] > _NEAR_M:
             return False
-        spot = Spot(int(rows[k]), int(columns[k]), *n)
+        spot = TopSpot(int(rows[k]), int(columns[k]), *n)
         top.take(spot)
         self.put(made, top.middle(spot), top.grid.turn_rad)
         return True

@@ -26,8 +26,7 @@ from pbrs_farm.core.classes import (
     TOILET,
 )
 from pbrs_farm.core.house import Item, ItemKind
-from pbrs_farm.dress.name_words import words_of_item
-from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.space.room_kinds import RoomKind, words_of_item
 from pbrs_farm.dress.supports import Support
 
 _HOLDS_NOTHING = (

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from functools import lru_cache
+from typing import Final
 
 from pbrs_farm.core.classes import (
     BATHTUB,
@@ -19,7 +22,34 @@ from pbrs_farm.core.classes import (
     TOILET,
 )
 from pbrs_farm.core.house import Item, Room
-from pbrs_farm.dress.name_words import folded, words_of, words_of_item
+
+# The words of which names of rooms and things are made.
+
+
+RADIATORS: Final = frozenset({"radiator", "heater", "heizkorper", "heizkoerper", "radiateur"})
+
+
+def folded(text: str) -> str:
+    """Lower case, without accents."""
+    # What that takes apart besides (Hangul) is composed again.
+    taken_apart = unicodedata.normalize("NFKD", text.casefold())
+    plain = "".join(c for c in taken_apart if not unicodedata.combining(c))
+    return unicodedata.normalize("NFC", plain)
+
+
+def words_of(name: str) -> frozenset[str]:
+    """Folded words of letters alone; camelCase adds its parts, a plural adds its singular."""
+    parted = re.sub(r"(?<=[^\W\d_])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])", " ", name)
+    words = re.findall(r"[^\W\d_]+", folded(f"{name} {parted}"))
+    return frozenset(words) | {word.removesuffix("s") for word in words}
+
+
+def words_of_item(item: Item) -> frozenset[str]:
+    """Words of what an item is called and of its class in the source: "Woven basket" has no oven."""
+    return words_of(f"{item.name} {item.source_class}")
+
+
+# What a room is used for, by its types, its name and what stands in it.
 
 
 class RoomKind(StrEnum):

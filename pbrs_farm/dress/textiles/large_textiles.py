@@ -4,15 +4,103 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.catalogue import Catalogue, Place
+from pbrs_farm.core.classes import SINK, TOWEL
+from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.space import RoomSpace, house_space
+from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.space.room_kinds import RoomKind
-from pbrs_farm.dress.style import Style, room_style
-from pbrs_farm.dress.textiles.curtains import hang_blind, hang_curtains, room_cloth, window_side
-from pbrs_farm.dress.textiles.drawn_rugs import cover_drawn_rugs
-from pbrs_farm.dress.textiles.rugs import lay_rugs
-from pbrs_farm.dress.textiles.towels import hang_towels
+from pbrs_farm.dress.style import Style, mix, room_style
+from pbrs_farm.dress.textiles.curtains import (
+    bar,
+    hang_blind,
+    hang_curtains,
+    room_cloth,
+    towel_over_bar,
+    window_side,
+)
+from pbrs_farm.dress.textiles.rugs import cover_drawn_rugs, lay_rugs
+from pbrs_farm.dress.textures.families import Pattern, pattern_material
+from pbrs_farm.dress.things.assembly import Made, hung, metal
+from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.geometry.solids import box
+
+# Hangs towels near washbasins: on a rail of the catalogue, or on one made here.
+
+
+PART = "textiles"
+_RAIL_M = 1.25  # above the floor
+_FAR_M = 2.5  # from the basin
+
+
+def hang_towels(
+    draft: Draft, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator,
+    share: float,
+) -> None:  # fmt: skip
+    """A towel or two in a bathroom that has none, on the free wall nearest to the basin."""
+    space = house_space(draft)
+    room = space.room(room_id)
+    has = any(draft.items[n].nyu40 == TOWEL for n in room.items)
+    if room.kind is not RoomKind.BATHROOM or has or rng.random() >= 0.85 * share:
+        return
+    hanging = Hanging(draft, room, PART)
+    for _ in range(int(rng.integers(1, 3))):
+        piece, shape = _drawn(catalogue, rng) or towel_rail(draft, style, rng)
+        (x0, _y0, _z0), (x1, y1, z1) = shape.bounds
+        width, height, depth = float(x1 - x0), float(y1), float(z1)
+        low = room.room.floor_y + _RAIL_M - height
+        spot = _nearest(hanging, space, room, draft, width, (low, low + height), depth)
+        if spot is None:
+            draft.refused[f"{PART}: no free wall for a towel"] += 1
+            return
+        hanging.hang(piece, shape, spot[0], spot[1] + width / 2, low)
+
+
+def _drawn(catalogue: Catalogue, rng: np.random.Generator) -> Made | None:
+    pieces = [p for p in catalogue.of("towel") if p.place is Place.WALL and p.size[0] < 0.7]
+    if not pieces or rng.random() < 0.5:
+        return None
+    piece = pieces[int(rng.integers(len(pieces)))]
+    shape = catalogue.shape(piece)
+    return (piece, shape) if shape is not None else None
+
+
+def towel_rail(draft: Draft, style: Style, rng: np.random.Generator) -> Made:
+    """A rail with a towel over it."""
+    width = float(rng.uniform(0.4, 0.6))
+    towel, drop, z = width * float(rng.uniform(0.6, 0.85)), float(rng.uniform(0.45, 0.7)), 0.07
+    tint = mix(style.textiles[int(rng.integers(len(style.textiles)))], (0.93, 0.92, 0.9), float(rng.choice([0.0, 0.4, 0.85])))  # fmt: skip
+    r, g, b = (round(c, 2) for c in tint)
+    pattern = pattern_material(draft, Pattern("loop carpet", int(rng.integers(3)), ((r, g, b),)))
+    steel = metal(style)
+    parts: list[tuple[Surface, Material]] = [
+        (towel_over_bar(towel, drop, z, rng), draft.materials[pattern.number]),
+        (bar("rail", -width / 2, width / 2, drop, z, 0.009), steel),
+    ]
+    for sign in (-1, 1):
+        arm = np.array([sign * (width / 2 - 0.01), drop, z / 2])
+        parts.append((box("arm", arm, np.array([0.008, 0.008, z / 2]), 0), steel))
+    return hung("towel_rail", "towel", TOWEL, parts)
+
+
+def _nearest(
+    hanging: Hanging, space: HouseSpace, room: RoomSpace, draft: Draft, width: float,
+    heights: tuple[float, float], depth: float,
+) -> tuple[int, float] | None:  # fmt: skip
+    """(face, s) of the free place nearest to a basin of the room, within reach; None = none."""
+    basins = [space.bounds[n].mean(0) for n in room.items if draft.items[n].nyu40 == SINK]
+    best: tuple[float, int, float] | None = None
+    for k, face in enumerate(hanging.faces):
+        for s in face.starts(width + 0.06, heights[0], heights[1] + 0.05, depth + 0.15):
+            at = face.point(float(s) + width / 2, heights[1])
+            away = min((float(np.linalg.norm((at - b)[[0, 2]])) for b in basins), default=0.0)
+            if away < _FAR_M and (best is None or away < best[0]):
+                best = (away, k, float(s) + 0.03)
+    return None if best is None else (best[1], best[2])
+
+
+# The part `textiles_large` of dressing.
+
 
 # How likely a window gets curtains, and how likely a blind where it got none.
 _CURTAINS = {

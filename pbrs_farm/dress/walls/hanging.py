@@ -14,7 +14,7 @@ from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import RoomSpace, WallFace
-from pbrs_farm.dress.space.flights import flights_of
+from pbrs_farm.dress.space.floor_bitmaps import flights_of
 from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M
 
 GAP_M = 0.0008  # between a wall's face and the back of what hangs on it

@@ -5,20 +5,38 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import PRINTS, Catalogue, Picture
-from pbrs_farm.core.classes import BED, CABINET, CHAIR, DESK, DRESSER, OTHERFURNITURE, SOFA, TABLE
+from pbrs_farm.core.classes import (
+    BED,
+    CABINET,
+    CHAIR,
+    DESK,
+    DRESSER,
+    OTHERFURNITURE,
+    SOFA,
+    TABLE,
+    WHITEBOARD,
+)
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.assembly import Made
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Rgb, Style, room_style
+from pbrs_farm.dress.things.assembly import Made, Part, any_colour, hung, plain, slab
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
-from pbrs_farm.dress.walls.hung_things import canvas, frame_material, framed, jpeg_texture, poster
+from pbrs_farm.dress.walls.hung_things import (
+    canvas,
+    frame_material,
+    framed,
+    jpeg_texture,
+    poster,
+    ring,
+)
 from pbrs_farm.dress.walls.prints import print_pixels
 from pbrs_farm.images import decode_photo
 
@@ -43,7 +61,7 @@ _LOWEST_M, _TALLEST_BENEATH_M = 0.35, 1.25
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class PictureGroup:
     """Pictures that hang together: (left, bottom, width, height) of each, metres from the lower left."""
 
     frames: tuple[tuple[float, float, float, float], ...]
@@ -58,7 +76,7 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True)
-class Spot:
+class PictureSpot:
     """A place for a group: middle s on a face, above what (world y of its top; None = eye height)."""
 
     score: float
@@ -152,7 +170,7 @@ def hang_pictures(
         hanging.draft.refused["walls: no free wall for pictures"] += wanted
 
 
-def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> list[Spot]:
+def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> list[PictureSpot]:
     """Places for pictures, best first: over furniture, then the middles of free stretches."""
     room, found = hanging.room, []
     for number in room.items:
@@ -165,7 +183,7 @@ def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> lis
             if s1 - s0 > 0.5:
                 width = (s1 - s0) * float(rng.uniform(0.55, 0.8))
                 score = liked + 0.3 * (s1 - s0) + float(rng.uniform(0, 0.6))
-                found.append(Spot(score, k, (s0 + s1) / 2, width, float(high[1])))
+                found.append(PictureSpot(score, k, (s0 + s1) / 2, width, float(high[1])))
     y0, y1 = hanging.floor_y + 1.3, hanging.floor_y + 1.8
     for k, face in enumerate(hanging.faces):
         starts = face.starts(0.3, y0, y1, IN_FRONT_M)
@@ -176,7 +194,7 @@ def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> lis
             for j in range(n):
                 s = first + length * (j + 0.5) / n
                 score = 0.25 * min(length / n, 2.5) + float(rng.uniform(0, 0.7))
-                found.append(Spot(score, k, s, min(length / n - 0.2, 1.5), None))
+                found.append(PictureSpot(score, k, s, min(length / n - 0.2, 1.5), None))
     return sorted(found, key=lambda spot: -spot.score)
 
 
@@ -189,8 +207,8 @@ def _stretches(starts: F64) -> list[tuple[float, float]]:
 
 
 def _group_for(
-    rng: np.random.Generator, spot: Spot, hanging: Hanging, left: int
-) -> tuple[Group, float, float] | None:
+    rng: np.random.Generator, spot: PictureSpot, hanging: Hanging, left: int
+) -> tuple[PictureGroup, float, float] | None:
     """A group that fits at the spot, with its left edge and its bottom; smaller ones are tried."""
     face, floor = hanging.faces[spot.face], hanging.floor_y
     for attempt in range(5):
@@ -211,7 +229,7 @@ def _group_for(
     return None
 
 
-def _drawn(rng: np.random.Generator, width: float, left: int) -> Group:
+def _drawn(rng: np.random.Generator, width: float, left: int) -> PictureGroup:
     """A group about so wide of at most `left` pictures; sides of 20 to 110 cm."""
     gap = float(rng.uniform(0.05, 0.08))
     kind = rng.random()
@@ -219,23 +237,23 @@ def _drawn(rng: np.random.Generator, width: float, left: int) -> Group:
         w = min((width - gap) / 2, 0.5)
         h = w * float(rng.choice([1.0, 1.3]))
         cells = [(x, y, w, h) for y in (0.0, h + gap) for x in (0.0, w + gap)]
-        return Group(tuple(cells))
+        return PictureGroup(tuple(cells))
     if width > 0.8 and left >= 3 and kind < 0.38:
         w = min((width - 2 * gap) / 3, 0.5)
         h = w * float(rng.choice([1.0, 1.25, 1.41]))
-        return Group(tuple((k * (w + gap), 0.0, w, h) for k in range(3)))
+        return PictureGroup(tuple((k * (w + gap), 0.0, w, h) for k in range(3)))
     if width > 0.55 and left >= 2 and kind < 0.6:
         w = min((width - gap) / 2, 0.6)
         h = w * float(rng.choice([1.0, 1.3, 1.41]))
-        return Group(tuple((k * (w + gap), 0.0, w, min(h, 0.95)) for k in range(2)))
+        return PictureGroup(tuple((k * (w + gap), 0.0, w, min(h, 0.95)) for k in range(2)))
     w = min(max(width, 0.22), 1.05)
     shapes = [0.7, 0.75, 1.0] if w > 0.7 else [1.0, 1.3, 1.41]
     h = float(np.clip(w * float(rng.choice(shapes)), 0.2, 1.0))
-    return Group(((0.0, 0.0, w, h),))
+    return PictureGroup(((0.0, 0.0, w, h),))
 
 
 def _hang_group(
-    rng: np.random.Generator, hanging: Hanging, spot: Spot, group: tuple[Group, float, float],
+    rng: np.random.Generator, hanging: Hanging, spot: PictureSpot, group: tuple[PictureGroup, float, float],
     gallery: Gallery, style: Style, frame: Material,
 ) -> None:  # fmt: skip
     pictures, left, bottom = group
@@ -265,3 +283,78 @@ def _picture(
     if kind == "poster":
         return poster(width, height, shown.texture)
     return framed(rng, style, width, height, shown.texture, frame)
+
+
+# Boards of cork with what a household pins to them but on the draft.
+
+
+_BOARDS: Final = {
+    RoomKind.OFFICE: 0.75, RoomKind.BEDROOM: 0.35, RoomKind.KITCHEN: 0.4, RoomKind.HALL: 0.2,
+}  # fmt: skip
+_LOW_M: Final = 1.2
+
+
+def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
+    """A pin board over the room's desk, else on any free wall of a kitchen, hall or study."""
+    kind = hanging.room.kind
+    rng = hanging.draft.rng("pin board", hanging.room.room.id)
+    if rng.random() >= _BOARDS.get(kind, 0.0) * share:
+        return
+    width, height = float(rng.uniform(0.55, 0.95)), float(rng.uniform(0.42, 0.65))
+    made = pin_board(rng, style, width, height)
+    low = hanging.floor_y + _LOW_M
+    places = _over_desks(hanging, space)
+    if kind is not RoomKind.BEDROOM:
+        places += [
+            (k, float(s) + width / 2 + 0.05)
+            for k, face in enumerate(hanging.faces)
+            for s in face.starts(width + 0.1, low - 0.05, low + height + 0.05, IN_FRONT_M)[::8]
+        ]
+    for k, s in places:
+        if hanging.faces[k].free_m(s - width / 2, s + width / 2, low, low + height) >= IN_FRONT_M:
+            hanging.hang(*made, k, s, low)
+            return
+    hanging.draft.refused["walls: no free wall for a pin board"] += 1
+
+
+def _over_desks(hanging: Hanging, space: HouseSpace) -> list[tuple[int, float]]:
+    """(face, s) of the wall behind the middle of each desk, or table in a room with a bed."""
+    found = []
+    for number in hanging.room.items:
+        item, (low, high) = hanging.draft.items[number], space.bounds[number]
+        if item.nyu40 in (DESK, TABLE) and 0.6 < high[1] - hanging.floor_y < 0.95:
+            found += [(k, (s0 + s1) / 2) for k, s0, s1 in faces_behind(hanging.room, low, high)[:1]]
+    return found
+
+
+def pin_board(rng: np.random.Generator, style: Style, width: float, height: float) -> Made:
+    """Cork in a frame, with papers, cards and photographs pinned to it."""
+    low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
+    parts: list[Part] = [
+        (ring("frame", low, high, 0.022, 0.018), frame_material(rng, style)),
+        (
+            slab((low[0] + 0.022, 0.022, 0.001), (high[0] - 0.022, height - 0.022, 0.01)),
+            plain("cork", (0.66, 0.5, 0.34), 0.9),
+        ),
+    ]
+    # Pin sheets to cells of a grid, so that they lie beside one another.
+    columns, rows = max(2, int(width / 0.19)), max(2, int(height / 0.2))
+    for i in range(columns * rows):
+        if rng.random() < 0.3:
+            continue
+        w, h = (float(v) for v in rng.uniform((0.07, 0.08), (0.15, 0.16)))
+        x = low[0] + 0.03 + (i % columns + 0.5) * (width - 0.06) / columns
+        y = 0.03 + (i // columns + 0.5) * (height - 0.06) / rows
+        white = rng.random() < 0.5
+        sheet = plain("sheet", (0.92, 0.91, 0.88) if white else any_colour(rng, style), 0.8)
+        card = slab((x - w / 2, y - h / 2, 0.01), (x + w / 2, y + h / 2, 0.0108))
+        parts.append((card, sheet))
+        if white:
+            lines = plain("print", (0.45, 0.45, 0.47), 0.8)
+            for k in range(int(rng.integers(2, 5))):
+                top = y + h / 2 - 0.018 - 0.018 * k
+                line = slab((x - 0.38 * w, top - 0.003, 0.0108), (x + 0.35 * w, top, 0.0111))
+                parts.append((line, lines))
+        pin = slab((x - 0.005, y + h / 2 - 0.012, 0.0108), (x + 0.005, y + h / 2 - 0.002, 0.016))
+        parts.append((pin, plain("pin", any_colour(rng, style), 0.3)))
+    return hung("pin_board", "pin_board", WHITEBOARD, parts)

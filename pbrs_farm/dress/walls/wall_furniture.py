@@ -8,15 +8,20 @@ import numpy as np
 
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import Material, Surface
-from pbrs_farm.dress.generated.assembly import Made, Part, hung, metal, plain, transformed
-from pbrs_farm.dress.generated.turned import turned
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.textiles.rug_patterns import rug_pixels
+from pbrs_farm.dress.textiles.rugs import rug_pixels
+from pbrs_farm.dress.things.assembly import Made, Part, hung, metal, plain, transformed, turned
 from pbrs_farm.dress.walls.fittings import hang_anywhere
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging
-from pbrs_farm.dress.walls.hung_things import jpeg_texture, slab, wall_shelf
-from pbrs_farm.dress.walls.kitchen_things import Fronts, open_box, wall_cupboard
+from pbrs_farm.dress.walls.hung_things import (
+    Fronts,
+    faced_slab,
+    jpeg_texture,
+    open_box,
+    wall_cupboard,
+    wall_shelf,
+)
 
 # How many things with shelves a room's walls get, from and to.
 _SHELVES: Final = {
@@ -106,14 +111,14 @@ def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: flo
     r, g, b = (float(c) / 255 for c in pixels.reshape(-1, 3).mean(0))
     yarn = plain("yarn", (r, g, b), 1.0)
     low, high = np.array([-width / 2, fringe]), np.array([width / 2, height])
-    face, back = slab("cloth", low, high, (0.002, 0.008))
+    face, back = faced_slab("cloth", low, high, (0.002, 0.008))
     parts: list[Part] = [(face, shown), (back, yarn)]
     for x in np.arange(-width / 2 + 0.01, width / 2 - 0.01, 0.02):
         ends = (
             np.array([float(x), float(rng.uniform(0.0, 0.015))]),
             np.array([float(x) + 0.012, fringe]),
         )
-        parts += [(part, yarn) for part in slab("fringe", *ends, (0.003, 0.007))]
+        parts += [(part, yarn) for part in faced_slab("fringe", *ends, (0.003, 0.007))]
     along = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     long = width + 0.1
     stick = turned([(0.0, 0.0), (rod, 0.0), (rod, long), (0.0, long)], n=12)

@@ -9,10 +9,8 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.generate.floor_plan import Plan, Rect, RoomType
-from pbrs_farm.generate.furnish.room_space import RoomSpace, room_space
-from pbrs_farm.generate.furnish.walking import WalkMap
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Rect, RoomType
+from pbrs_farm.generate.furnish.room_space import FurnishSpace, WalkMap, room_space
 
 _SEATS: Final = ("sofa", "corner_sofa", "armchair", "chair")
 MUST_HAVES: Final[dict[RoomType, tuple[tuple[str, ...], ...]]] = {
@@ -79,7 +77,7 @@ def missing(type_: RoomType, here: list[PlacedPiece], catalogue: Catalogue) -> l
     ]
 
 
-def _blocked(space: RoomSpace, here: list[PlacedPiece]) -> list[str]:
+def _blocked(space: FurnishSpace, here: list[PlacedPiece]) -> list[str]:
     """Furniture before doors, above window sills, or outside the room."""
     found = []
     for piece in here:

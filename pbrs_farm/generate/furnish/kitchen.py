@@ -15,11 +15,122 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.generate.floor_plan import Rect
-from pbrs_farm.generate.furnish.kitchen_shapes import DEPTH_M, MODULE_M, Arm, run_shapes
+from pbrs_farm.generate.furnish.pieces import Shelf
 from pbrs_farm.generate.furnish.places import allowed, frames_array
-from pbrs_farm.generate.furnish.room_space import RoomSpace
-from pbrs_farm.generate.furnish.shelf import Shelf
-from pbrs_farm.generate.furnish.template import Slot, Standing, Template
+from pbrs_farm.generate.furnish.room_space import FurnishSpace, RoomWall
+from pbrs_farm.generate.furnish.template import PieceSlot, Standing, Template
+
+# Where a kitchen run can stand: along one wall, or along two that meet in a corner.
+
+
+DEPTH_M: Final = 0.62
+MODULE_M: Final = 0.60
+_LONGEST_ARM_M: Final = 3.9
+_LEAST_M: Final = 1.75  # fridge, sink and cooker
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """A stretch of a wall that units stand along, from `low` to `high`."""
+
+    wall: RoomWall
+    low: float
+    high: float
+    turns: int  # of its pieces against those of the main arm
+    corner: float  # u of the main arm's corner that it starts from
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return self.high - self.low
+
+
+def run_shapes(space: FurnishSpace) -> Iterator[tuple[Arm, ...]]:
+    """One arm, two that meet in a corner, or three; the first is the main one."""
+    free = [_free(space, wall) for wall in space.walls]
+    for k, wall in enumerate(space.walls):
+        for low, high in free[k]:
+            for a, b in _cuts(low, high, wall):
+                yield (Arm(wall, a, b, 0, 0.0),)
+        right = _next(space, k)
+        if right is None:
+            continue
+        for low, high in free[k]:
+            if high < wall.length - 0.01 or high - low < 1.2:
+                continue
+            for s_low, s_high in free[right]:
+                if s_low > 0.01 or s_high < DEPTH_M + 0.9:
+                    continue
+                for a in _starts(low, high):
+                    for b in _starts(-s_high, -(DEPTH_M + 0.02)):
+                        main = Arm(wall, a, wall.length, 0, 0.0)
+                        side = Arm(space.walls[right], DEPTH_M + 0.02, -b, 1, wall.length)
+                        yield main, side
+
+
+def _next(space: FurnishSpace, k: int) -> int | None:
+    """The wall that meets wall k at its right end."""
+    wall = space.walls[k]
+    if not wall.is_right_corner:
+        return None
+    end = wall.frame.point(wall.length, 0.0)
+    for n, other in enumerate(space.walls):
+        if abs(other.frame.x - end[0]) + abs(other.frame.z - end[1]) < 0.02:
+            return n
+    return None
+
+
+def _starts(low: float, high: float) -> list[float]:
+    # Whole stretches first, then shorter ones that keep their far end in the corner.
+    cuts = [low] if high - low <= _LONGEST_ARM_M else []
+    cuts += [high - n * MODULE_M for n in (2, 3, 4, 5, 6) if low < high - n * MODULE_M - 0.01]
+    return cuts
+
+
+def _cuts(low: float, high: float, wall: RoomWall) -> list[tuple[float, float]]:
+    if high - low < _LEAST_M:
+        return []
+    found = [(low, high)] if high - low <= _LONGEST_ARM_M + 0.5 else []
+    for n in (4, 5, 6, 7):
+        length = n * MODULE_M
+        if length < high - low - 0.01:
+            found += [(low, low + length), (high - length, high)]
+    return found
+
+
+def _free(space: FurnishSpace, wall: RoomWall) -> list[tuple[float, float]]:
+    """Stretches of a wall before which a unit can stand."""
+    # What doors' swings and low windows take of the strip that units stand on.
+    taken = []
+    strip = wall.frame.rect((0.0, 0.0, wall.length, DEPTH_M + 0.02))
+    low_windows = [w.zone for w in space.windows if w.sill < 0.8]
+    for rect in [*(tuple(r) for r in space.doors.tolist()), *low_windows]:
+        along = _along(rect, strip, wall)
+        if along is not None:
+            taken.append(along)
+    # Sweep along the wall; a unit needs 0.6 m.
+    found, start = [], 0.0
+    for low, high in sorted(taken):
+        if low - start > 0.6:
+            found.append((start, low))
+        start = max(start, high)
+    if wall.length - start > 0.6:
+        found.append((start, wall.length))
+    return found
+
+
+def _along(rect: Rect, strip: Rect, wall: RoomWall) -> tuple[float, float] | None:
+    if min(rect[2], strip[2]) - max(rect[0], strip[0]) < 0.01:
+        return None
+    if min(rect[3], strip[3]) - max(rect[1], strip[1]) < 0.01:
+        return None
+    f = wall.frame
+    at = [(x - f.x) * f.dx + (z - f.z) * f.dz for x, z in (rect[:2], rect[2:])]
+    return max(min(at), 0.0), min(max(at), wall.length)
+
+
+# Kitchen runs.
+
 
 UPPER_M: Final = 1.45  # lower edge of wall cabinets
 _FRONT_M: Final = 0.8  # free before the run
@@ -84,7 +195,7 @@ def units_of(shelf: Shelf) -> Units | None:
 
 
 def kitchen_places(
-    units: Units, space: RoomSpace, rng: np.random.Generator, *, wanted: float
+    units: Units, space: FurnishSpace, rng: np.random.Generator, *, wanted: float
 ) -> list[Standing]:
     """Every run that the room allows, with its score; wanted: metres of modules it should have."""
     found: list[Standing] = []
@@ -103,7 +214,7 @@ def kitchen_places(
 
 
 def _best_run(
-    arms: tuple[Arm, ...], units: Units, space: RoomSpace
+    arms: tuple[Arm, ...], units: Units, space: FurnishSpace
 ) -> tuple[Template, float] | None:
     """The best order of units along the arms."""
     best: tuple[float, list[_Module]] | None = None
@@ -181,7 +292,7 @@ def _arm_rows(
         yield row
 
 
-def _run_score(modules: list[_Module], arms: tuple[Arm, ...], space: RoomSpace) -> float | None:
+def _run_score(modules: list[_Module], arms: tuple[Arm, ...], space: FurnishSpace) -> float | None:
     """How well one can cook there; None where a hood would hang before a window."""
     kinds = [m.kind for m in modules]
     sink, cooker, fridge = (kinds.index(k) for k in ("sink", "cooker", "fridge"))
@@ -202,7 +313,7 @@ def _run_score(modules: list[_Module], arms: tuple[Arm, ...], space: RoomSpace) 
     return score
 
 
-def _below_window(module: _Module, arms: tuple[Arm, ...], space: RoomSpace) -> float:
+def _below_window(module: _Module, arms: tuple[Arm, ...], space: FurnishSpace) -> float:
     """Metres of a module that stand below windows."""
     wall = arms[module.arm].wall
     return sum(
@@ -213,9 +324,9 @@ def _below_window(module: _Module, arms: tuple[Arm, ...], space: RoomSpace) -> f
 
 
 def _template(
-    modules: list[_Module], arms: tuple[Arm, ...], units: Units, space: RoomSpace
+    modules: list[_Module], arms: tuple[Arm, ...], units: Units, space: FurnishSpace
 ) -> Template:
-    slots: list[Slot] = []
+    slots: list[PieceSlot] = []
     n_base = 0
     dishes = units.dishwasher if len(modules) >= 6 else None
     kinds = [m.kind for m in modules]
@@ -236,7 +347,7 @@ def _template(
             if dishes is not None and abs(i - sink) == 1 and fits:
                 piece, dishes = dishes, None
         depth = DEPTH_M if module.kind != "fridge" else max(piece.size[1], 0.5)
-        slots.append(_placed(Slot(piece, 0, 0, module.width, depth, height), module, arms))
+        slots.append(_placed(PieceSlot(piece, 0, 0, module.width, depth, height), module, arms))
         slots += [_placed(s, module, arms) for s in _above(module, units, arms, space, n_base + i)]
     clear, fronts = _rects(modules, arms)
     name = f"kitchen of {len(arms)} arms, {len(modules)} modules"
@@ -244,8 +355,8 @@ def _template(
 
 
 def _above(
-    module: _Module, units: Units, arms: tuple[Arm, ...], space: RoomSpace, number: int
-) -> list[Slot]:
+    module: _Module, units: Units, arms: tuple[Arm, ...], space: FurnishSpace, number: int
+) -> list[PieceSlot]:
     """The hood or the wall cabinet over a module."""
     # A run never puts its cooker below a window.
     beside = _below_window(module, arms, space) <= (0.02 if module.kind == "cooker" else 0.0)
@@ -256,15 +367,15 @@ def _above(
             return []
         w, d, h = units.hood.size
         h = min(h, space.height - 1.5 - 0.02)
-        return [Slot(units.hood, 0, 0, min(w, module.width), d, h, 1.5)]
+        return [PieceSlot(units.hood, 0, 0, min(w, module.width), d, h, 1.5)]
     if not units.uppers or module.width < 0.3:
         return []
     upper = units.uppers[number % len(units.uppers)] if module.kind == "base" else units.uppers[0]
     _, d, h = upper.size
-    return [Slot(upper, 0, 0, module.width, min(d, 0.36), min(h, 0.72), UPPER_M)]
+    return [PieceSlot(upper, 0, 0, module.width, min(d, 0.36), min(h, 0.72), UPPER_M)]
 
 
-def _placed(slot: Slot, module: _Module, arms: tuple[Arm, ...]) -> Slot:
+def _placed(slot: PieceSlot, module: _Module, arms: tuple[Arm, ...]) -> PieceSlot:
     """A unit with its back at its arm's wall, in the frame of the main arm's wall."""
     gap = _GAP if slot.elevation < UPPER_M else _HUNG_GAP
     along, across = (module.low + module.high) / 2, gap + slot.depth / 2

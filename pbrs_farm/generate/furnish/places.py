@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.generate.floor_plan import Point, Rect
-from pbrs_farm.generate.furnish.room_space import RoomSpace, Wall
-from pbrs_farm.generate.furnish.template import Frame, Group, Liking, Stand, Standing, Template
+from pbrs_farm.generate.furnish.room_space import FurnishSpace, RoomWall
+from pbrs_farm.generate.furnish.template import (
+    Liking,
+    PieceGroup,
+    Stand,
+    Standing,
+    Template,
+    WallFrame,
+)
 
 Ints = NDArray[np.int64]
 
@@ -47,7 +54,7 @@ class Places:
         """The template of place k where it would stand."""
         x, z, dx, dz = self.frames[k].tolist()
         template = self.templates[int(self.template_of[k])]
-        return Standing(template, Frame(x, z, dx, dz), float(self.scores[k]))
+        return Standing(template, WallFrame(x, z, dx, dz), float(self.scores[k]))
 
     def free_of(self, alive: Bools, standing: Standing) -> Bools:
         """Which of the places stay possible when something stands."""
@@ -91,7 +98,7 @@ def overlap(rects: F64, others: F64) -> Bools:
     return np.asarray(hit.any(2))
 
 
-def places_of(group: Group, space: RoomSpace, rng: np.random.Generator) -> Places:
+def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) -> Places:
     """Every place of every template of a group that walls, doors and windows allow."""
     versions = [v for template in group.templates for v in _versions(template)]
     frames, scores, template_of = [], [], []
@@ -131,13 +138,13 @@ def _places(templates: list[Template], template_of: Ints, frames: F64, scores: F
     return Places(templates, template_of, frames, bodies, clear, scores)
 
 
-def frames_array(frames: Sequence[Frame]) -> F64:
+def frames_array(frames: Sequence[WallFrame]) -> F64:
     """(N, 4) frames as arrays have them."""
     rows = [(f.x, f.z, f.dx, f.dz) for f in frames]
     return np.array(rows, np.float64).reshape(-1, 4)
 
 
-def allowed(template: Template, frames: F64, space: RoomSpace) -> Bools:
+def allowed(template: Template, frames: F64, space: FurnishSpace) -> Bools:
     """(N,) which frames keep a template inside the room, off doors and below window sills."""
     bodies = _moved(np.array([s.rect for s in template.bodies]), frames)
     bad = overlap(bodies, np.concatenate([space.outside, space.doors])).any(1)
@@ -160,7 +167,7 @@ def _versions(template: Template) -> list[Template]:
     return [template] if same and set(template.clear) == set(turned.clear) else [template, turned]
 
 
-def _frames(template: Template, space: RoomSpace) -> tuple[F64, Ints]:
+def _frames(template: Template, space: FurnishSpace) -> tuple[F64, Ints]:
     """(N, 4) where a template could stand, and the wall of each, -1 for none."""
     if template.stand is Stand.FREE:
         frames = _free_frames(space)
@@ -179,7 +186,7 @@ def _frames(template: Template, space: RoomSpace) -> tuple[F64, Ints]:
     return np.concatenate(found), np.concatenate(walls)
 
 
-def _along(template: Template, wall: Wall, low: float, high: float) -> F64:
+def _along(template: Template, wall: RoomWall, low: float, high: float) -> F64:
     """Where along a wall a template's origin can be, metres."""
     at: list[float] = []
     if high < low - 1e-9:
@@ -197,7 +204,7 @@ def _along(template: Template, wall: Wall, low: float, high: float) -> F64:
     return np.array(at)
 
 
-def _free_frames(space: RoomSpace) -> F64:
+def _free_frames(space: FurnishSpace) -> F64:
     """A grid over the room, at each of its points along x and along z."""
     x0, z0, x1, z1 = space.bounds
     xs = x0 + np.arange(1, int((x1 - x0) / _FREE_STEP_M)) * _FREE_STEP_M
@@ -220,7 +227,7 @@ def _array(rects: Sequence[Rect]) -> F64:
     return np.array(rects, np.float64).reshape(-1, 4)
 
 
-def _scores(template: Template, frames: F64, walls: Ints, space: RoomSpace) -> F64:
+def _scores(template: Template, frames: F64, walls: Ints, space: FurnishSpace) -> F64:
     """(N,) how good each place is, by what the template likes."""
     like, scores = template.liking, np.full(len(frames), template.rank)
     u0, v0, u1, v1 = template.extent
@@ -249,7 +256,7 @@ def _nearest(points: F64, others: Sequence[Point]) -> F64:
 
 
 def _wall_scores(
-    like: Liking, span: tuple[float, float], frames: F64, walls: Ints, space: RoomSpace
+    like: Liking, span: tuple[float, float], frames: F64, walls: Ints, space: FurnishSpace
 ) -> F64:
     """(N,) for ends at corners, against gaps that nobody can use and what stands below windows."""
     start = frames_array([w.frame for w in space.walls])[walls]
@@ -271,7 +278,7 @@ def _wall_scores(
     return scores
 
 
-def _back_scores(template: Template, frames: F64, space: RoomSpace) -> F64:
+def _back_scores(template: Template, frames: F64, space: FurnishSpace) -> F64:
     """(N,) of a seat whose back is its far end: 1 at a wall, .6 with a way behind it, else -1."""
     u0, _, u1, v1 = template.extent
     scores = np.full(len(frames), 0.6)

@@ -10,13 +10,15 @@ from typing import Final
 
 import numpy as np
 import shapely
+from scipy import ndimage
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.walkable import CELL_M, WALK_M
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, Point, Rect, RoomType
-from pbrs_farm.generate.furnish.template import Frame
+from pbrs_farm.generate.furnish.template import WallFrame
 
 BEFORE_DOOR_M: Final = 0.8
 BEFORE_FRENCH_M: Final = 0.6
@@ -28,10 +30,10 @@ _EPSILON: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class RoomWall:
     """A straight stretch of wall from its left end, seen from the room."""
 
-    frame: Frame
+    frame: WallFrame
     length: float
     is_left_corner: bool  # whether another wall meets it there, inside the room
     is_right_corner: bool
@@ -50,13 +52,13 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RoomSpace:
+class FurnishSpace:
     """One room of a plan, or a part of it."""
 
     number: int
     polygon: Polygon
     walk_polygon: BaseGeometry  # with the rooms that no wall parts from it
-    walls: tuple[Wall, ...]
+    walls: tuple[RoomWall, ...]
     outside: F64  # (N, 4) rectangles around the polygon
     doors: F64  # (D, 4) rectangles before doors, on either side, swings included
     ways: tuple[Rect, ...]  # what a way must join: before each door and open side
@@ -75,7 +77,7 @@ class RoomSpace:
         return float(self.polygon.area)
 
 
-def room_space(plan: Plan, number: int) -> RoomSpace:
+def room_space(plan: Plan, number: int) -> FurnishSpace:
     """The space of a room of the plan."""
     room = plan.rooms[number]
     polygon = Polygon(room.polygon)
@@ -108,14 +110,14 @@ def room_space(plan: Plan, number: int) -> RoomSpace:
         for way, free in _open_sides(room.polygon, open_to, width):
             ways.append(way)
             doors.append(free)
-    return RoomSpace(
+    return FurnishSpace(
         number, polygon, unary_union([polygon, *(n.buffer(_EPSILON) for n in floors)]),
         walls, outside_of(polygon), np.array(doors).reshape(-1, 4), tuple(ways), tuple(windows),
         plan.height,
     )  # fmt: skip
 
 
-def with_bodies(space: RoomSpace, bodies: Sequence[Rect]) -> RoomSpace:
+def with_bodies(space: FurnishSpace, bodies: Sequence[Rect]) -> FurnishSpace:
     """The space of a room where something stands already: nothing more fits there."""
     if not bodies:
         return space
@@ -154,7 +156,7 @@ def _open_neighbours(plan: Plan, number: int) -> list[tuple[int, Polygon]]:
     return found
 
 
-def _walls(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> tuple[Wall, ...]:
+def _walls(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> tuple[RoomWall, ...]:
     """The sides of a room, cut where it is open."""
     near = unary_union([p.buffer(2 * _EPSILON) for p in open_to])
     n, found = len(corners), []
@@ -164,14 +166,14 @@ def _walls(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> tuple[Wall
         if length < 0.3 or min(abs(b[0] - a[0]), abs(b[1] - a[1])) > 0.02:
             continue
         dx, dz = round((b[0] - a[0]) / length), round((b[1] - a[1]) / length)
-        frame = Frame(a[0], a[1], dx, dz)
+        frame = WallFrame(a[0], a[1], dx, dz)
         # An inner corner turns left, since the outline is anticlockwise.
         left = _turn(before, a, b) > 0
         right = _turn(a, b, after) > 0
         for low, high in _solid(frame, length, near):
-            start = Frame(*frame.point(low, 0.0), dx, dz)
+            start = WallFrame(*frame.point(low, 0.0), dx, dz)
             found.append(
-                Wall(start, high - low, left and low < 0.01, right and high > length - 0.01)
+                RoomWall(start, high - low, left and low < 0.01, right and high > length - 0.01)
             )
     return tuple(found)
 
@@ -180,7 +182,7 @@ def _turn(a: Point, b: Point, c: Point) -> float:
     return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 
 
-def _solid(frame: Frame, length: float, near: BaseGeometry) -> list[tuple[float, float]]:
+def _solid(frame: WallFrame, length: float, near: BaseGeometry) -> list[tuple[float, float]]:
     """Stretches of a side that are not open, by samples every 2.5 cm."""
     if near.is_empty:
         return [(0.0, length)]
@@ -217,7 +219,7 @@ def _open_sides(
         length = math.dist(a, b)
         if length < 0.3:
             continue
-        frame = Frame(a[0], a[1], (b[0] - a[0]) / length, (b[1] - a[1]) / length)
+        frame = WallFrame(a[0], a[1], (b[0] - a[0]) / length, (b[1] - a[1]) / length)
         walls = _solid(frame, length, near)
         if walls == [(0.0, length)]:
             continue
@@ -236,7 +238,7 @@ def _open_sides(
     return found
 
 
-def _seen_from(plan: Plan, opening: PlanOpening, polygon: Polygon) -> Frame | None:
+def _seen_from(plan: Plan, opening: PlanOpening, polygon: Polygon) -> WallFrame | None:
     """The frame in the middle of an opening on the wall's face, v into the room."""
     wall = plan.walls[opening.wall]
     x, z = wall.at(opening.along)
@@ -247,11 +249,13 @@ def _seen_from(plan: Plan, opening: PlanOpening, polygon: Polygon) -> Frame | No
         inner = box(*_around((x + nx * (half + 0.05), z + nz * (half + 0.05))))
         if polygon.intersects(inner):
             # v is the normal: u = (nz, -nx).
-            return Frame(x + nx * half, z + nz * half, nz, -nx)
+            return WallFrame(x + nx * half, z + nz * half, nz, -nx)
     return None
 
 
-def _window(opening: PlanOpening, frame: Frame, walls: tuple[Wall, ...], depth: float) -> Window:
+def _window(
+    opening: PlanOpening, frame: WallFrame, walls: tuple[RoomWall, ...], depth: float
+) -> Window:
     half = opening.width / 2
     number, low, high = -1, 0.0, 0.0
     for k, wall in enumerate(walls):
@@ -265,3 +269,86 @@ def _window(opening: PlanOpening, frame: Frame, walls: tuple[Wall, ...], depth: 
             break
     zone = frame.rect((-half, 0.0, half, depth))
     return Window(zone, opening.sill, (frame.x, frame.z), number, low, high)
+
+
+# Where one can walk in a room, on a bitmap of 5 cm, no random numbers.
+
+
+_RADIUS: Final = WALK_M / 2 / CELL_M  # cells
+# From a cell's middle to walls and bodies, exactly: whole cells would let ways of 0.5 m pass.
+_REACH_M: Final = WALK_M / 2 - 0.005
+
+
+class WalkMap:
+    """Where the middle of a man can be in a room; furniture is marked on copies."""
+
+    def __init__(self, space: FurnishSpace, standing: Iterable[Rect] = ()) -> None:
+        x0, z0, x1, z1 = space.walk_polygon.bounds
+        self._origin = x0 - 2 * CELL_M, z0 - 2 * CELL_M
+        shape = math.ceil((z1 - z0) / CELL_M) + 4, math.ceil((x1 - x0) / CELL_M) + 4
+        xx, zz = np.meshgrid(
+            self._origin[0] + (np.arange(shape[1]) + 0.5) * CELL_M,
+            self._origin[1] + (np.arange(shape[0]) + 0.5) * CELL_M,
+        )
+        self._inside: Bools = np.asarray(shapely.contains_xy(space.polygon, xx, zz))
+        clear = space.walk_polygon.buffer(-_REACH_M, join_style="mitre")
+        self._xs, self._zs = xx[0], zz[:, 0]
+        self.free = self.with_bodies(np.asarray(shapely.contains_xy(clear, xx, zz)), standing)
+        # A way that an empty room does not have is not asked for.
+        self._start = space.ways[0] if space.ways else None
+        region = self._region(self.free, self._start)
+        self.joined_ways = [w for w in space.ways if region is not None and self._meets(region, w)]
+
+    def with_bodies(self, free: Bools, rects: Iterable[Rect]) -> Bools:
+        """The middles that are left where something stands on rectangles."""
+        left = free.copy()
+        for x0, z0, x1, z1 in rects:
+            # Look at the cells of the rectangle around what is near; round its corners off.
+            columns, rows = (
+                slice(*np.searchsorted(at, (low - _REACH_M, high + _REACH_M)).tolist())
+                for at, low, high in ((self._xs, x0, x1), (self._zs, z0, z1))
+            )
+            x, z = self._xs[columns], self._zs[rows]
+            dx, dz = (
+                np.maximum(np.maximum(a - v, v - b), 0) for v, a, b in ((x, x0, x1), (z, z0, z1))
+            )
+            left[rows, columns] &= dx[None] ** 2 + dz[:, None] ** 2 >= _REACH_M**2
+        return left
+
+    def reached(self, free: Bools, fronts: Iterable[Rect]) -> Bools | None:
+        """(H, W) middles of a man who came in by the doors; None where a door or front is cut off."""
+        region = self._region(free, self._start)
+        if region is None:
+            return None
+        if all(self._meets(region, r) for r in (*self.joined_ways, *fronts)):
+            return region
+        return None
+
+    def share(self, region: Bools) -> float:
+        """Share of the room's floor that ways 0.6 m wide cover."""
+        if not region.any():
+            return 0.0
+        near = ndimage.distance_transform_edt(~region) <= _RADIUS
+        return float((near & self._inside).sum() / max(self._inside.sum(), 1))
+
+    def _cells(self, rect: Rect) -> tuple[slice, slice]:
+        # A cell counts if its middle lies within.
+        def span(low: float, high: float, origin: float) -> slice:
+            a = math.ceil((low - origin) / CELL_M - 0.5 - 1e-6)
+            b = math.floor((high - origin) / CELL_M - 0.5 + 1e-6) + 1
+            return slice(max(a, 0), max(b, 0))
+
+        return span(rect[1], rect[3], self._origin[1]), span(rect[0], rect[2], self._origin[0])
+
+    def _region(self, free: Bools, start: Rect | None) -> Bools | None:
+        """The way that begins at a rectangle; the largest where there is none."""
+        ways, _ = ndimage.label(free)
+        area = ways[self._cells(start)] if start else ways
+        counts = np.bincount(area.ravel(), minlength=1)
+        counts[0] = 0
+        if not counts.any():
+            return None
+        return np.asarray(ways == int(counts.argmax()))
+
+    def _meets(self, region: Bools, rect: Rect) -> bool:
+        return bool(region[self._cells(rect)].any())

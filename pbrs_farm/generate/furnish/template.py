@@ -13,8 +13,7 @@ from functools import cached_property
 from typing import Final
 
 from pbrs_farm.core.catalogue import Piece
-from pbrs_farm.generate.floor_plan import Point, Rect
-from pbrs_farm.generate.furniture import PlacedPiece
+from pbrs_farm.generate.floor_plan import PlacedPiece, Point, Rect
 
 _WORKTOP_M: Final = 0.9
 
@@ -28,7 +27,7 @@ class Stand(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class WallFrame:
     """A place in the plan: the template's origin and the direction of its u."""
 
     x: float
@@ -52,7 +51,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class PieceSlot:
     """A piece in a template."""
 
     piece: Piece
@@ -80,11 +79,11 @@ class Slot:
         """Up to where it hides a window behind it: a sink's tap does not."""
         return min(self.top, _WORKTOP_M) if self.piece.group == "sink" else self.top
 
-    def mirrored(self) -> Slot:
+    def mirrored(self) -> PieceSlot:
         """On the other side of the template's middle."""
         return replace(self, u=-self.u, turns=-self.turns)
 
-    def placed(self, frame: Frame, room: int) -> PlacedPiece:
+    def placed(self, frame: WallFrame, room: int) -> PlacedPiece:
         """The piece where the template stands."""
         x, z = frame.point(self.u, self.v)
         angle = (frame.angle_rad + self.turns * math.pi / 2) % (2 * math.pi)
@@ -111,7 +110,7 @@ class Template:
     """Pieces that stand together, and what they need free; all of it moves as one."""
 
     name: str
-    slots: tuple[Slot, ...]
+    slots: tuple[PieceSlot, ...]
     clear: tuple[Rect, ...] = ()  # in the room, without furniture of others
     fronts: tuple[Rect, ...] = ()  # a way must reach each
     stand: Stand = Stand.WALL
@@ -121,7 +120,7 @@ class Template:
     stands_off_floor: bool = False  # what hangs, though nobody can walk below it
 
     @cached_property
-    def bodies(self) -> tuple[Slot, ...]:
+    def bodies(self) -> tuple[PieceSlot, ...]:
         """The slots that nobody can walk through."""
         return tuple(s for s in self.slots if s.elevation < 0.4 or self.stands_off_floor)
 
@@ -147,7 +146,7 @@ class Template:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class PieceGroup:
     """What a room wants: one of several templates."""
 
     name: str
@@ -160,7 +159,7 @@ class Standing:
     """A template where it stands."""
 
     template: Template
-    frame: Frame
+    frame: WallFrame
     score: float
 
     @property

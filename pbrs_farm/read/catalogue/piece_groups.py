@@ -72,7 +72,7 @@ class GroupRule:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class PieceVerdict:
     """A piece that was looked at: its group ("" = left out), how it must be turned, and why."""
 
     group: str
@@ -115,10 +115,10 @@ def group_rules() -> tuple[GroupRule, ...]:
 
 
 @cache
-def verdicts() -> Mapping[str, Verdict]:
+def verdicts() -> Mapping[str, PieceVerdict]:
     """Piece id (`<library>#<id>`) -> what was seen of it: the rows of exceptions.csv."""
     return {
-        r["id"]: Verdict(r["group"], float(r["turn_deg"] or 0), r["reason"])
+        r["id"]: PieceVerdict(r["group"], float(r["turn_deg"] or 0), r["reason"])
         for r in _rows("exceptions.csv")
     }
 

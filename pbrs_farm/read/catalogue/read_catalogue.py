@@ -24,7 +24,7 @@ from pbrs_farm.read.catalogue.library_files import (
 )
 from pbrs_farm.read.catalogue.library_shapes import ShapeStore, library_shape
 from pbrs_farm.read.catalogue.model_folder import model_folder
-from pbrs_farm.read.catalogue.piece_groups import GroupRule, Verdict, group_rule, verdicts
+from pbrs_farm.read.catalogue.piece_groups import GroupRule, PieceVerdict, group_rule, verdicts
 from pbrs_farm.read.catalogue.surface_pictures import (
     JAR_TEXTURES,
     TEXTURES,
@@ -36,7 +36,7 @@ from pbrs_farm.read.catalogue.surface_pictures import (
 VERSION: Final = 2
 """Of the rules, the tables and the reading of models: part of the digest, and of what stored shapes
 are known by. Raised when a piece or its shape changes."""
-_AS_WRITTEN: Final = Verdict("", 0.0, "")
+_AS_WRITTEN: Final = PieceVerdict("", 0.0, "")
 
 Loader = Callable[[], Shape | None]
 
@@ -146,7 +146,7 @@ def _rule(entry: Entry, group: str) -> GroupRule | None:
 
 
 def _piece(
-    library: Library, entry: Entry, rule: GroupRule, seen: Verdict, notes: LibraryNotes
+    library: Library, entry: Entry, rule: GroupRule, seen: PieceVerdict, notes: LibraryNotes
 ) -> tuple[Piece, Loader]:
     # Turn the size with a piece that is turned a quarter.
     width, depth, height = entry.piece.size

@@ -16,7 +16,7 @@ from svgelements import Arc, Close, CubicBezier, Line, Move, Path, QuadraticBezi
 from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Opening, Surface
 from pbrs_farm.read.mesh.triangulate import counter_clockwise
-from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, PlanPiece, PlanWall
+from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, HomeWall, PlanPiece
 from pbrs_farm.read.sweethome3d.home_file.parse_home import FULL_CUT_OUT
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.placement import PieceFrame
@@ -121,7 +121,7 @@ PARALLEL_SINE = math.sin(math.radians(20.0))  # of a wall's angle with the piece
 class StandingWall:
     """A wall's plan polygon with the heights between which it stands."""
 
-    wall: PlanWall
+    wall: HomeWall
     polygon: shapely.Geometry  # plan, m
     low: float  # world y of its foot
     high: float  # world y of its top
@@ -214,7 +214,7 @@ def _depth_span(
     return min(s[0] for s in spans) - MARGIN_M, max(s[1] for s in spans) + MARGIN_M
 
 
-def _is_along(wall: PlanWall, frame: PieceFrame) -> bool:
+def _is_along(wall: HomeWall, frame: PieceFrame) -> bool:
     if abs(wall.arc) > 1e-3:
         return True
     direction = np.array(wall.end) - np.array(wall.start)

@@ -23,12 +23,12 @@ from pbrs_farm.read.common.room_floors import HINT, check_outlines
 from pbrs_farm.read.common.source_files import Resources
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
+    HomePlan,
+    HomeRoom,
+    HomeWall,
     Paint,
-    Plan,
     PlanLevel,
     PlanPiece,
-    PlanRoom,
-    PlanWall,
     level_of,
     open_container,
 )
@@ -42,7 +42,7 @@ from pbrs_farm.read.sweethome3d.home_rooms import (
     room_nouns,
     staircase_cuts,
 )
-from pbrs_farm.read.sweethome3d.open_doors import PlacedPiece, opened_doors
+from pbrs_farm.read.sweethome3d.open_doors import StandingPiece, opened_doors
 from pbrs_farm.read.sweethome3d.piece_items import piece_item, piece_opening
 from pbrs_farm.read.sweethome3d.piece_models import PieceModels
 from pbrs_farm.read.sweethome3d.wall_solids import Outline, outlines_of, wall_items
@@ -50,7 +50,7 @@ from pbrs_farm.read.sweethome3d.wall_solids import Outline, outlines_of, wall_it
 # Stored viewpoints -> cameras in the world.
 
 
-def stored_cameras(plan: Plan) -> tuple[StoredCamera, ...]:
+def stored_cameras(plan: HomePlan) -> tuple[StoredCamera, ...]:
     """The author's viewpoints: direction (-sin yaw cos pitch, -sin pitch, cos yaw cos pitch)."""
     cameras = []
     for c in plan.cameras:
@@ -72,10 +72,10 @@ MAX_PIECES: Final = 10_000
 MAX_CROSSINGS: Final = 500
 """Pairs of walls of a level whose centre lines cross; a home has a dozen."""
 
-_Drawn = TypeVar("_Drawn", PlanRoom, PlanWall, PlanPiece)
+_Drawn = TypeVar("_Drawn", HomeRoom, HomeWall, PlanPiece)
 
 
-def check_plan_bounds(plan: Plan, file: str) -> None:
+def check_plan_bounds(plan: HomePlan, file: str) -> None:
     """Raise BadHouse, naming the file, for a plan of too many parts, or drawn over itself.
 
     Levels that are left out count for nothing.
@@ -96,7 +96,7 @@ def check_plan_bounds(plan: Plan, file: str) -> None:
     check_outlines({level: [r.points for r in found] for level, found in rooms.items()}, file)
 
 
-def _by_level(plan: Plan, drawn: Sequence[_Drawn]) -> dict[str, list[_Drawn]]:
+def _by_level(plan: HomePlan, drawn: Sequence[_Drawn]) -> dict[str, list[_Drawn]]:
     """What is drawn on each level that is shown."""
     found: dict[str, list[_Drawn]] = {}
     for one in drawn:
@@ -110,7 +110,7 @@ def _commonest(pieces: Sequence[PlanPiece]) -> str:
     return f"; {n} of them are called {shown(name)!r}" if 2 * n > len(pieces) else ""
 
 
-def _crossings(walls: Sequence[PlanWall]) -> int:
+def _crossings(walls: Sequence[HomeWall]) -> int:
     lines = [shapely.LineString([w.start, w.end]) for w in walls]
     pairs = shapely.STRtree(lines).query(lines, predicate="crosses")
     return int((pairs[0] < pairs[1]).sum())
@@ -177,7 +177,7 @@ def read_home(
     )
 
 
-def _plan(root: Element, file: str, fields: ReadFields, notes: Notes) -> Plan:
+def _plan(root: Element, file: str, fields: ReadFields, notes: Notes) -> HomePlan:
     """The plan: levels that are hidden go, what is absurd is refused."""
     plan = _shown(parse_plan(root, file, fields.max_extent_m), fields, notes)
     check_plan_bounds(plan, file)
@@ -191,7 +191,7 @@ def _numbered(items: tuple[Item, ...], file: str) -> tuple[Item, ...]:
     return items
 
 
-def _shown(plan: Plan, fields: ReadFields, notes: Notes) -> Plan:
+def _shown(plan: HomePlan, fields: ReadFields, notes: Notes) -> HomePlan:
     """The plan with hidden levels made visible: all if the recipe says so, else those between.
 
     A level between shown ones was hidden to draw, or to look below it: the rooms under it would
@@ -214,7 +214,7 @@ def _shown(plan: Plan, fields: ReadFields, notes: Notes) -> Plan:
     return replace(plan, levels=tuple(levels))
 
 
-def _why_no_rooms(plan: Plan) -> str:
+def _why_no_rooms(plan: HomePlan) -> str:
     is_hidden = any(not level_of(plan, room.level).is_visible for room in plan.rooms)
     return _HIDDEN_ROOMS if is_hidden else _NO_ROOMS
 
@@ -223,7 +223,7 @@ def _place_of(level: PlanLevel) -> str:
     return f"level {level.id} '{level.name}'"
 
 
-def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:
+def _levels(plan: HomePlan, house_level: dict[str, str]) -> tuple[Level, ...]:
     if not plan.levels:
         return (Level("0", "", 0.0, plan.wall_height),)
     return tuple(
@@ -233,7 +233,7 @@ def _levels(plan: Plan, house_level: dict[str, str]) -> tuple[Level, ...]:
     )
 
 
-def _house_levels(plan: Plan, notes: Notes) -> dict[str, str]:
+def _house_levels(plan: HomePlan, notes: Notes) -> dict[str, str]:
     """The home's level id -> the House's; hidden levels are noted and left out."""
     for level in plan.levels:
         if not level.is_visible:
@@ -244,7 +244,7 @@ def _house_levels(plan: Plan, notes: Notes) -> dict[str, str]:
 
 
 def _furniture(
-    plan: Plan,
+    plan: HomePlan,
     materials: HomeMaterials,
     outlines: dict[str, Outline],
     rooms: list[ReadRoom],
@@ -256,7 +256,7 @@ def _furniture(
     models = PieceModels(materials, file, fields.max_model_triangles)
     walls = _standing_walls(plan, outlines)
     cutter_material = materials.painted(Paint(), "cut", "")
-    found: list[PlacedPiece] = []
+    found: list[StandingPiece] = []
     openings: list[Opening] = []
     n_faces = n_pieces = 0
     for number, piece in enumerate(plan.pieces):
@@ -276,7 +276,7 @@ def _furniture(
                 file, piece.place, f"more than {fields.max_triangles} triangles in the house",
                 hint="raise read.max_triangles",
             )  # fmt: skip
-        found.append(PlacedPiece(piece, level, item, frame))
+        found.append(StandingPiece(piece, level, item, frame))
         opening = piece_opening(piece, item, frame, walls, materials, cutter_material)
         if opening is not None:
             openings.append(opening)
@@ -292,7 +292,7 @@ def _furniture(
     return [placed.item for placed in found], tuple(openings)
 
 
-def _standing_walls(plan: Plan, outlines: dict[str, Outline]) -> list[StandingWall]:
+def _standing_walls(plan: HomePlan, outlines: dict[str, Outline]) -> list[StandingWall]:
     walls = []
     for wall in plan.walls:
         level = level_of(plan, wall.level)
@@ -306,7 +306,7 @@ def _standing_walls(plan: Plan, outlines: dict[str, Outline]) -> list[StandingWa
     return walls
 
 
-def _source(plan: Plan, file: str, sha: str, package: str) -> Source:
+def _source(plan: HomePlan, file: str, sha: str, package: str) -> Source:
     author = plan.properties.get("Author", "")
     licence = plan.properties.get("License", "")
     owner = f"{author} {plan.properties.get('Copyright', '')}".lower()

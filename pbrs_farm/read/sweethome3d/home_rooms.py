@@ -16,11 +16,11 @@ from pbrs_farm.core.house import Item, ItemKind, Room, Surface
 from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal, triangulated
 from pbrs_farm.read.sweethome3d.door_cutouts import polygons_from_path
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
+    HomePlan,
+    HomeRoom,
     Paint,
-    Plan,
     PlanLevel,
     PlanPiece,
-    PlanRoom,
     level_of,
 )
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
@@ -119,7 +119,7 @@ CORNER_REACH_M = 0.10  # A wall's corner this near to a room's edge can bend the
 class CeilingHeights:
     """Ceiling heights above the level, in metres; on the top level they follow the walls."""
 
-    def __init__(self, plan: Plan, outlines: dict[str, Outline]) -> None:
+    def __init__(self, plan: HomePlan, outlines: dict[str, Outline]) -> None:
         self._top = max((x.index for x in plan.levels), default=0)
         self._wall_height = plan.wall_height
         by_level: dict[str, list[tuple[F64, F64]]] = {}
@@ -224,13 +224,15 @@ class ReadRoom:
     """A room of a visible level with its outline as a simple polygon."""
 
     id: str
-    plan: PlanRoom
+    plan: HomeRoom
     level: PlanLevel
     level_id: str
     outline: shapely.Polygon
 
 
-def read_rooms(plan: Plan, materials: HomeMaterials, house_level: dict[str, str]) -> list[ReadRoom]:
+def read_rooms(
+    plan: HomePlan, materials: HomeMaterials, house_level: dict[str, str]
+) -> list[ReadRoom]:
     """The rooms of visible levels, numbered within their level in the file's order."""
     rooms: list[ReadRoom] = []
     counts: dict[str, int] = {}
@@ -248,7 +250,7 @@ def read_rooms(plan: Plan, materials: HomeMaterials, house_level: dict[str, str]
     return rooms
 
 
-def _simple(room: PlanRoom, materials: HomeMaterials) -> shapely.Polygon | None:
+def _simple(room: HomeRoom, materials: HomeMaterials) -> shapely.Polygon | None:
     if len(room.points) < 3:
         materials.notes.add("degenerate-room", room.place, "fewer than three points: left out")
         return None
@@ -266,7 +268,7 @@ def _simple(room: PlanRoom, materials: HomeMaterials) -> shapely.Polygon | None:
     return polygon
 
 
-def _coarse(room: PlanRoom, materials: HomeMaterials) -> Points2:
+def _coarse(room: HomeRoom, materials: HomeMaterials) -> Points2:
     """The room's points; of more than MAX_CORNERS those that say most, with a note."""
     points = np.asarray(room.points, np.float64)
     if len(points) <= MAX_CORNERS:
@@ -398,7 +400,7 @@ Cuts = dict[str, shapely.Geometry]
 
 
 def staircase_cuts(
-    plan: Plan, materials: HomeMaterials, house_level: dict[str, str]
+    plan: HomePlan, materials: HomeMaterials, house_level: dict[str, str]
 ) -> tuple[Cuts, Cuts]:
     """By level id, what staircases take of its floors and of its ceilings (plan polygons).
 

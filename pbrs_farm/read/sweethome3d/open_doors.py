@@ -159,7 +159,7 @@ def around_everything(item: Item, frame: PieceFrame) -> Item:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlacedPiece:
+class StandingPiece:
     """A piece of the plan and the item it became."""
 
     piece: PlanPiece
@@ -169,7 +169,7 @@ class PlacedPiece:
 
 
 def opened_doors(
-    placed: Sequence[PlacedPiece],
+    placed: Sequence[StandingPiece],
     models: PieceModels,
     materials: HomeMaterials,
     rooms: list[ReadRoom],
@@ -212,7 +212,7 @@ def opened_doors(
 
 
 def _opened(
-    door: PlacedPiece, models: PieceModels, materials: HomeMaterials, rooms: list[ReadRoom]
+    door: StandingPiece, models: PieceModels, materials: HomeMaterials, rooms: list[ReadRoom]
 ) -> Item:
     """The item of a door whose leaves are moved or left out; without surfaces where nothing is left."""
     piece, item = door.piece, door.item

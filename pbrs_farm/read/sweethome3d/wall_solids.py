@@ -14,11 +14,11 @@ from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.geometry.solids import wall_prism
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     Baseboard,
+    HomePlan,
+    HomeWall,
     Paint,
-    Plan,
     PlanLevel,
     PlanPicture,
-    PlanWall,
     level_of,
 )
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
@@ -46,7 +46,7 @@ class Outline:
         return np.concatenate([self.left, self.right[::-1]])
 
 
-def outlines_of(walls: tuple[PlanWall, ...]) -> dict[str, Outline]:
+def outlines_of(walls: tuple[HomeWall, ...]) -> dict[str, Outline]:
     """Mitred outline of each wall by id; walls without length or thickness have none."""
     bare = {w.id: _unjoined(w) for w in walls if _has_size(w)}
     order = {w.id: k for k, w in enumerate(walls)}
@@ -72,11 +72,11 @@ def _is_sound(mitred: Outline, bare: Outline) -> bool:
     return bool(a.is_valid and (a.exterior.is_ccw == b.exterior.is_ccw or not b.is_valid))
 
 
-def _has_size(wall: PlanWall) -> bool:
+def _has_size(wall: HomeWall) -> bool:
     return math.dist(wall.start, wall.end) > MIN_LENGTH_M and wall.thickness > MIN_LENGTH_M
 
 
-def _unjoined(wall: PlanWall) -> Outline:
+def _unjoined(wall: HomeWall) -> Outline:
     start, end = np.array(wall.start), np.array(wall.end)
     half = wall.thickness / 2
     if abs(wall.arc) > 1e-3 and abs(wall.arc) < 2 * math.pi - 1e-3:
@@ -88,7 +88,7 @@ def _unjoined(wall: PlanWall) -> Outline:
     return Outline(line + offset, line - offset, np.array([0.0, 1.0]))
 
 
-def _arc(wall: PlanWall, start: Points2, end: Points2, half: float) -> Outline:
+def _arc(wall: HomeWall, start: Points2, end: Points2, half: float) -> Outline:
     # Find the circle's centre from the chord and the angle it spans.
     chord = end - start
     centre = (start + end) / 2 + np.array([-chord[1], chord[0]]) / (2 * math.tan(wall.arc / 2))
@@ -107,8 +107,8 @@ def _arc(wall: PlanWall, start: Points2, end: Points2, half: float) -> Outline:
 
 
 def _join(
-    wall: PlanWall,
-    other: PlanWall,
+    wall: HomeWall,
+    other: HomeWall,
     at_start: bool,
     sides: tuple[Points2, Points2],
     bare: dict[str, Outline],
@@ -137,7 +137,7 @@ def _join(
             target[here] = crossing
 
 
-def _joins_at_start(wall: PlanWall, other: PlanWall, at_start: bool) -> bool | None:
+def _joins_at_start(wall: HomeWall, other: HomeWall, at_start: bool) -> bool | None:
     # Which end of the other wall meets this one; by its own links, else by the nearer end.
     back_start, back_end = other.at_start == wall.id, other.at_end == wall.id
     if back_start != back_end:
@@ -166,7 +166,10 @@ SUNK_M = 0.002  # How deep a baseboard's back stands in its wall, so that the tw
 
 
 def wall_items(
-    plan: Plan, outlines: dict[str, Outline], materials: HomeMaterials, house_level: dict[str, str]
+    plan: HomePlan,
+    outlines: dict[str, Outline],
+    materials: HomeMaterials,
+    house_level: dict[str, str],
 ) -> list[Item]:
     """An item for each wall of a visible level, each followed by its baseboards."""
     items: list[Item] = []
@@ -193,7 +196,7 @@ def wall_items(
     return items
 
 
-def top_heights(wall: PlanWall, points: F64, along: F64) -> F64:
+def top_heights(wall: HomeWall, points: F64, along: F64) -> F64:
     """(N,) heights above the level of the wall's top over plan points.
 
     The top of a straight wall is a plane through its two end heights; of an arc, it follows along.
@@ -208,7 +211,7 @@ def top_heights(wall: PlanWall, points: F64, along: F64) -> F64:
 
 
 def _wall_item(
-    wall: PlanWall, outline: Outline, level: PlanLevel, materials: HomeMaterials, level_id: str
+    wall: HomeWall, outline: Outline, level: PlanLevel, materials: HomeMaterials, level_id: str
 ) -> Item:
     place = f"wall {wall.id}"
     sides = (
@@ -242,7 +245,7 @@ def _wall_item(
 
 
 def _baseboard_item(
-    wall: PlanWall,
+    wall: HomeWall,
     board: Baseboard,
     outlines: tuple[Outline, Outline],
     level: PlanLevel,
@@ -276,7 +279,7 @@ def _baseboard_item(
     )
 
 
-def _with_baseboards(wall: PlanWall) -> PlanWall:
+def _with_baseboards(wall: HomeWall) -> HomeWall:
     # The wall thickened by its baseboards, whose mitred outline is the boards' front.
     most = max((b.thickness for b in wall.baseboards), default=0.0)
     return replace(wall, thickness=wall.thickness + 2 * most)

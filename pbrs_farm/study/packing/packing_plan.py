@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import SPLITS, Shares, split_of_house
+from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.study.reading.dataset_json import WHOLE
 from pbrs_farm.study.reading.view_sample import LAYERS, MODES, Request, Size
 from pbrs_farm.study.reading.views import ViewRef
@@ -27,7 +27,7 @@ class Packing:
     size: Size | None = None
     layers: tuple[str, ...] = LAYERS
     modes: tuple[str, ...] = MODES
-    shares: Shares | None = None
+    shares: SplitShares | None = None
     views_per_shard: int = 200
     colour: str = "png"
     quality: int = 95  # of JPEG

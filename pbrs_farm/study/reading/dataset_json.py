@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import Shares
+from pbrs_farm.core.house_split import SplitShares
 from pbrs_farm.study.reading.view_sample import LAYERS, MODES, Size
 
 DATASET_JSON: Final = "dataset.json"
@@ -35,7 +35,7 @@ class Dataset:
     modes: tuple[str, ...]
     layers: tuple[str, ...]
     shards: tuple[Shard, ...]
-    shares: Shares | None  # None: not split
+    shares: SplitShares | None  # None: not split
     classes: tuple[str, ...] = ()  # names of ids 0..40
 
 
@@ -63,7 +63,7 @@ def dataset_from_json(data: bytes, place: str) -> Dataset:
         size = None if row["size"] is None else (int(row["size"][0]), int(row["size"][1]))
         shards = tuple(Shard(**shard) for shard in row["shards"])
         modes, layers = tuple(row["modes"]), tuple(row["layers"])
-        shares = None if row["split"] is None else Shares(**row["split"])
+        shares = None if row["split"] is None else SplitShares(**row["split"])
         if not set(modes) <= set(MODES) or not set(layers) <= set(LAYERS) or not shards:
             raise ValueError
         return Dataset(size, modes, layers, shards, shares, tuple(row["classes"]))

@@ -10,7 +10,7 @@ from typing import Any, Final
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import Shares, split_of_house
+from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.regular_files import fault_of, open_regular
 from pbrs_farm.store import Store
 from pbrs_farm.store.folder import FolderStore
@@ -168,7 +168,7 @@ class ShardSet:
         """The shard that holds a view."""
         return self._at[ref][0]
 
-    def split_of(self, ref: ViewRef, shares: Shares | None) -> str:
+    def split_of(self, ref: ViewRef, shares: SplitShares | None) -> str:
         packed = self._at[ref][0].split
         return split_of_house(ref.house, shares) if shares or packed == WHOLE else packed
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, ObjectMissing
-from pbrs_farm.core.house_split import Shares, split_of_house
+from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.layers import LAYERS as ALL_LAYERS
 from pbrs_farm.formats.layer_file import layer_from_bytes
@@ -127,7 +127,7 @@ class StoredRoot:
             lines += self._get(keys.ATTRIBUTION).decode("utf-8", "replace").splitlines()
         return tuple(dict.fromkeys(line for line in lines if line))
 
-    def split_of(self, ref: ViewRef, shares: Shares | None) -> str:
+    def split_of(self, ref: ViewRef, shares: SplitShares | None) -> str:
         return split_of_house(ref.house, shares)
 
     def _get(self, key: str) -> bytes:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import SPLITS, Shares
+from pbrs_farm.core.house_split import SPLITS, SplitShares
 from pbrs_farm.study.reading.stored_layers import ViewFacts
 from pbrs_farm.study.reading.view_sample import Request, Sample
 
@@ -73,7 +73,7 @@ class ViewSource(Protocol):
         """The views that a selection keeps; BadInput where there is no such run."""
         ...
 
-    def split_of(self, ref: ViewRef, shares: Shares | None) -> str:
+    def split_of(self, ref: ViewRef, shares: SplitShares | None) -> str:
         """The split the view's house falls into; shares None: as packed, else 80/10/10."""
         ...
 
@@ -174,7 +174,7 @@ class Views(Sequence[View]):
         self,
         *,
         split: str | None = None,
-        shares: Shares | None = None,
+        shares: SplitShares | None = None,
         houses: Collection[str] | None = None,
         objects: bool | None = None,
         selection: str | None = None,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from torch.utils.data import Dataset
 
-from pbrs_farm.core.house_split import Shares
+from pbrs_farm.core.house_split import SplitShares
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.reading.view_sample import Request, Sample
 from pbrs_farm.study.reading.views import Views
@@ -33,7 +33,7 @@ class StoredViews(Dataset):  # type: ignore[misc]
         request: Request | None = None,
         *,
         split: str | None = None,
-        shares: Shares | None = None,
+        shares: SplitShares | None = None,
         transform: Transform | None = None,
         seed: int = 0,
     ) -> None:

@@ -10,12 +10,10 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import clutter
-from pbrs_farm.dress.clutter.beds import lying_place
-from pbrs_farm.dress.clutter.seats import find_seat
+from pbrs_farm.dress.clutter.cushions import find_seat, lying_place
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.supports import SceneTriangles
-from pbrs_farm.dress.supports.exact_heights import heights_under
+from pbrs_farm.dress.supports import SceneTriangles, heights_under
 from tests.dress.furniture import boards, house, room, solid
 
 _PILLOW = 18

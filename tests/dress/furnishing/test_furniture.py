@@ -10,15 +10,12 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.furnishing import furniture
-from pbrs_farm.dress.furnishing.room_wants import KINDS
-from pbrs_farm.dress.generated.assembly import Made, plain
-from pbrs_farm.dress.generated.carcass import Boards
-from pbrs_farm.dress.generated.case_goods import bookcase, cube_shelf
-from pbrs_farm.dress.generated.tables import desk_chair
+from pbrs_farm.dress.furniture import KINDS, furniture
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from pbrs_farm.dress.things.assembly import Made, plain
+from pbrs_farm.dress.things.case_goods import Boards, bookcase, cube_shelf, desk_chair
 from tests.builders import builtin_home
 
 STYLE = style_for(np.random.default_rng(1))

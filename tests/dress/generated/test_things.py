@@ -8,11 +8,11 @@ import pytest
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.mesh import closed_edge_share, signed_volume, triangle_corners
-from pbrs_farm.dress.generated import books
-from pbrs_farm.dress.generated.assembly import Made
-from pbrs_farm.dress.generated.covers import N_CELLS, book_covers
-from pbrs_farm.dress.generated.things import THINGS
 from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.things import books
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.books import N_CELLS, book_covers
+from pbrs_farm.dress.things.things import THINGS
 
 _STYLE = style_for(np.random.default_rng(1), "nordic")
 _COVERS = book_covers(np.random.default_rng(2), _STYLE)

@@ -16,11 +16,9 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import Passage, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.textiles import textiles_large
-from pbrs_farm.dress.textiles.cloth import Folds, bar, panel, towel_over_bar
-from pbrs_farm.dress.textiles.curtains import WindowSide, is_flat
-from pbrs_farm.dress.textiles.rug_patterns import FAMILIES, inks_of, rug_pixels
-from pbrs_farm.dress.textiles.rugs import rug
-from pbrs_farm.dress.textiles.towels import towel_rail
+from pbrs_farm.dress.textiles.curtains import Folds, WindowSide, bar, is_flat, panel, towel_over_bar
+from pbrs_farm.dress.textiles.large_textiles import towel_rail
+from pbrs_farm.dress.textiles.rugs import FAMILIES, inks_of, rug, rug_pixels
 from pbrs_farm.geometry.solids import box
 from tests.builders import builtin_home
 

@@ -10,17 +10,16 @@ import pytest
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import Item, ItemKind, Material
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
+from pbrs_farm.dress.built_in import coat_material, joinery_scheme
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.generated.assembly import Made
-from pbrs_farm.dress.joinery.coating import coat_material
-from pbrs_farm.dress.joinery.scheme import joinery_scheme
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.walls import walls
-from pbrs_farm.dress.walls.coat_racks import coat_rack
+from pbrs_farm.dress.walls.fittings import hang_radiators, radiator, wants_radiators
+from pbrs_farm.dress.walls.hang_walls import coat_rack
 from pbrs_farm.dress.walls.hanging import Hanging
-from pbrs_farm.dress.walls.pin_boards import pin_board
-from pbrs_farm.dress.walls.radiators import hang_radiators, radiator, wants_radiators
+from pbrs_farm.dress.walls.pictures import pin_board
 from tests.builders import builtin_home
 
 

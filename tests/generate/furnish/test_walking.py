@@ -13,13 +13,12 @@ from pbrs_farm.generate.floor_plan import (
     Rect,
     RoomType,
 )
-from pbrs_farm.generate.furnish.room_space import RoomSpace, room_space
-from pbrs_farm.generate.furnish.walking import WalkMap
+from pbrs_farm.generate.furnish.room_space import FurnishSpace, WalkMap, room_space
 
 W, D = 5.0, 3.0
 
 
-def room() -> RoomSpace:
+def room() -> FurnishSpace:
     """A room with a door at either end of its length."""
     corners = ((0.0, 0.0), (W, 0.0), (W, D), (0.0, D))
     walls = tuple(

@@ -12,7 +12,7 @@ import pytest
 import pbrs_farm
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import Shares, split_of_house
+from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.images import decode_photo
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
@@ -35,7 +35,7 @@ def test_equal_views_give_equal_bytes(root, tmp_path):
         pack(
             pbrs_farm.open(root),
             tmp_path / name,
-            Packing((8, 6), modes=MODES, shares=Shares(), views_per_shard=5),
+            Packing((8, 6), modes=MODES, shares=SplitShares(), views_per_shard=5),
         )
     names = sorted(p.name for p in (tmp_path / "a").iterdir())
     assert names == sorted(p.name for p in (tmp_path / "b").iterdir())
@@ -45,7 +45,7 @@ def test_equal_views_give_equal_bytes(root, tmp_path):
 
 
 def test_shards_are_split_by_house_and_mixed(root, tmp_path):
-    shares = Shares(0.5, 0.25, 0.25)
+    shares = SplitShares(0.5, 0.25, 0.25)
     packing = Packing(modes=MODES, shares=shares, views_per_shard=4)
     packed = pack(pbrs_farm.open(root), tmp_path / "x", packing)
     assert sum(packed.n_views.values()) == 24
@@ -58,7 +58,7 @@ def test_shards_are_split_by_house_and_mixed(root, tmp_path):
     houses = {v.house for v in _facts(tmp_path / "x" / first["file"])}
     assert len(houses) > 1
     with pytest.raises(BadInput, match="no view in split"):
-        pbrs_farm.open(tmp_path / "x").only(split="train", shares=Shares(0, 1, 0))
+        pbrs_farm.open(tmp_path / "x").only(split="train", shares=SplitShares(0, 1, 0))
 
 
 def _facts(shard: Path):
@@ -83,7 +83,7 @@ def test_other_programs_read_the_parts(root, tmp_path):
 
 
 def test_dataset_json_and_card_say_what_is_there(root, tmp_path):
-    pack(pbrs_farm.open(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=Shares()))
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=SplitShares()))
     said = json.loads((tmp_path / "x/dataset.json").read_text())
     assert said["classes"][1] == "wall"
     assert len(said["class_colours_srgb"]) == 41
@@ -109,7 +109,10 @@ def test_colour_may_be_packed_as_jpeg(root, tmp_path, monkeypatch):
 
 def test_parquet_has_image_columns_and_every_bit_of_labels(root, tmp_path):
     packed = pack(
-        pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES, shares=Shares()), form="parquet"
+        pbrs_farm.open(root),
+        tmp_path / "x",
+        Packing(modes=MODES, shares=SplitShares()),
+        form="parquet",
     )
     files = sorted((tmp_path / "x/data").iterdir())
     assert packed.n_files == len(files) + 1
@@ -175,7 +178,7 @@ def test_the_verb_packs_and_says_what_it_left_out(tmp_path, capsys):
 
 
 def test_shards_are_read_where_there_is_numpy_alone(root, tmp_path):
-    pack(pbrs_farm.open(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=Shares()))
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=SplitShares()))
     code = f"""
 import sys
 for name in ("pydantic", "OpenImageIO", "torch", "scipy", "pyarrow", "PIL", "obstore", "mitsuba"):

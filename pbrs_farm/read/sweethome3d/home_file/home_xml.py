@@ -76,7 +76,7 @@ class Baseboard:
 
 
 @dataclass(frozen=True, slots=True)
-class PlanWall:
+class HomeWall:
     """A wall's centre line and paint."""
 
     id: str
@@ -96,7 +96,7 @@ class PlanWall:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlanRoom:
+class HomeRoom:
     """A room's outline and paint."""
 
     place: str  # what messages call it
@@ -173,7 +173,7 @@ class PlanCamera:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class HomePlan:
     """Everything of a home the pipeline uses."""
 
     name: str
@@ -181,13 +181,13 @@ class Plan:
     wall_height: float
     properties: dict[str, str]
     levels: tuple[PlanLevel, ...]
-    walls: tuple[PlanWall, ...]
-    rooms: tuple[PlanRoom, ...]
+    walls: tuple[HomeWall, ...]
+    rooms: tuple[HomeRoom, ...]
     pieces: tuple[PlanPiece, ...]
     cameras: tuple[PlanCamera, ...]
 
 
-def level_of(plan: Plan, level_id: str) -> PlanLevel:
+def level_of(plan: HomePlan, level_id: str) -> PlanLevel:
     """The level of that id; the home's only storey for an unknown or empty one."""
     for level in plan.levels:
         if level.id == level_id:

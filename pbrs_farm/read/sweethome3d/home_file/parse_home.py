@@ -12,15 +12,15 @@ from pbrs_farm.core.frames import M_FROM_CM
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     Baseboard,
     DoorFrame,
+    HomePlan,
+    HomeRoom,
+    HomeWall,
     Paint,
-    Plan,
     PlanCamera,
     PlanLevel,
     PlanLight,
     PlanPicture,
     PlanPiece,
-    PlanRoom,
-    PlanWall,
     as_points,
 )
 
@@ -307,7 +307,7 @@ _PIECES = frozenset({"pieceOfFurniture", "doorOrWindow", "light", "shelfUnit"})
 FALLBACK_HEIGHT_M = 2.5  # of walls and levels that tell none
 
 
-def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
+def parse_plan(root: Element, file: str, max_extent_m: float) -> HomePlan:
     """Read every element the pipeline uses; BadHouse names the element that is wrong."""
     home = Attributes(file, "home", root, max_extent_m)
     # Bound the work before any element is read.
@@ -343,7 +343,7 @@ def parse_plan(root: Element, file: str, max_extent_m: float) -> Plan:
             e for e in root if e.get("attribute") == "storedCamera" and "amera" in e.tag
         )
     )
-    return Plan(
+    return HomePlan(
         name=root.get("name", ""),
         version=root.get("version", ""),
         wall_height=wall_height,
@@ -394,9 +394,9 @@ def _levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
     return tuple(levels)
 
 
-def _wall(a: Attributes, number: int, wall_height: float) -> PlanWall:
+def _wall(a: Attributes, number: int, wall_height: float) -> HomeWall:
     boards = [b for e in a.element.findall("baseboard") if (b := baseboard_of(a, e)) is not None]
-    return PlanWall(
+    return HomeWall(
         id=a.text("id", f"#{number}"),
         level=a.text("level"),
         start=(a.metres("xStart"), a.metres("yStart")),
@@ -414,12 +414,12 @@ def _wall(a: Attributes, number: int, wall_height: float) -> PlanWall:
     )
 
 
-def _room(a: Attributes) -> PlanRoom:
+def _room(a: Attributes) -> HomeRoom:
     points = [
         Attributes(a.file, f"{a.place} point #{k}", e, a.max_extent_m)
         for k, e in enumerate(a.element.findall("point"))
     ]
-    return PlanRoom(
+    return HomeRoom(
         place=a.place,
         level=a.text("level"),
         name=a.text("name"),

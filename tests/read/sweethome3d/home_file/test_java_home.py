@@ -18,7 +18,7 @@ import pytest
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.sweethome3d.home import read_home
-from pbrs_farm.read.sweethome3d.home_file.home_xml import Plan, PlanRoom, open_container
+from pbrs_farm.read.sweethome3d.home_file.home_xml import HomePlan, HomeRoom, open_container
 from pbrs_farm.read.sweethome3d.home_file.java_home import JavaStreamError, java_objects
 from pbrs_farm.read.sweethome3d.home_file.parse_home import parse_plan
 from tests.read.sweethome3d.home_file.record_java_home import JAVA_HOME_XML, RECORD
@@ -38,7 +38,7 @@ def old_home(stream: bytes) -> bytes:
     return data.getvalue()
 
 
-def plan_of(data: bytes) -> Plan:
+def plan_of(data: bytes) -> HomePlan:
     return parse_plan(open_container(data, "home.sh3d", None).root, "home.sh3d", 1000)
 
 
@@ -52,7 +52,7 @@ def test_the_serialised_home_says_what_its_xml_says() -> None:
     assert {p.model.rpartition("/")[2] for p in java.pieces} == {"chair.obj"}
     (a,), (b,) = java.rooms, xml.rooms
     np.testing.assert_array_equal(a.points, b.points)
-    values = [{n: getattr(r, n) for n in PlanRoom.__slots__ if n != "points"} for r in (a, b)]
+    values = [{n: getattr(r, n) for n in HomeRoom.__slots__ if n != "points"} for r in (a, b)]
     assert values[0] == values[1]
 
 

@@ -1,0 +1,463 @@
+"""The part `furniture` of dressing: what people add along free walls, room by room; no effects.
+
+A thing stands with its back at a wall where nothing is before it, closes no way, blocks no door,
+and leaves most of the floor and a good part of the wall free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.catalogue import Catalogue, Place
+from pbrs_farm.core.classes import BED, BOOKSHELF, CABINET, DESK, DRESSER, NIGHT_STAND, SHELVES
+from pbrs_farm.core.house import Material
+from pbrs_farm.core.walkable import CELL_M, FloorGrid
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.finishes import box_mapped, grain_pattern
+from pbrs_farm.dress.space import FloorBitmap, HouseSpace, RoomSpace, WallFace, house_space
+from pbrs_farm.dress.space.floor_bitmaps import (
+    doors_are_joined,
+    flights_of,
+    floor_bitmap,
+    with_body,
+)
+from pbrs_farm.dress.space.room_kinds import RoomKind
+from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
+from pbrs_farm.dress.style import Rgb, Style, mix, rgb, room_style
+from pbrs_farm.dress.textures.families import pattern_material, photographed
+from pbrs_farm.dress.things import case_goods
+from pbrs_farm.dress.things.assembly import Made, metal, plain
+from pbrs_farm.dress.things.case_goods import Boards, Size, desk_chair
+from pbrs_farm.dress.walls.hanging import Hanging, next_id
+
+# What added furniture is made of: wood of the home, white or painted boards but on the draft.
+
+
+_WHITE: Rgb = (0.9, 0.9, 0.88)
+_PAINTS = tuple(rgb(code) for code in ("3d4a52", "5f6b5c", "2f3338", "8a8d8a", "7b8f98", "b9b09f"))
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Boards, and of materials that show a picture how large one repeat of it is."""
+
+    boards: Boards
+    size_m: Mapping[Material, tuple[float, float]]
+
+
+def look_of(draft: Draft, catalogue: Catalogue, style: Style, rng: np.random.Generator) -> Look:
+    """What the added furniture of a room is made of."""
+    pattern = photographed(draft, catalogue, grain_pattern(draft, style.wood))
+    grain = pattern_material(draft, pattern)
+    wood = draft.materials[grain.number]
+    kind, tone = rng.random(), float(rng.uniform(0.3, 0.45))
+    white = plain("board white", _WHITE, tone)
+    colour = _PAINTS[int(rng.integers(len(_PAINTS)))]
+    painted = plain("board painted", mix(colour, style.palette[4], 0.25), tone)
+    # Half of it is of wood; white and painted carcasses may have tops or fronts of wood.
+    if kind < 0.5:
+        body, front, top = wood, wood, wood
+    elif kind < 0.62:
+        body, front, top = wood, white, wood
+    elif kind < 0.75:
+        body, front, top = white, white, wood
+    elif kind < 0.88:
+        body, front, top = white, white, white
+    else:
+        body, front, top = painted, painted, wood
+    cloth = style.textiles[int(rng.integers(len(style.textiles)))]
+    return Look(Boards(body, front, top, metal(style), cloth), {wood: grain.size_m})
+
+
+def grained(made: Made, look: Look) -> Made:
+    """The piece with the grain of its wood along each board."""
+    piece, shape = made
+    surfaces = []
+    for surface in shape.surfaces:
+        size_m = look.size_m.get(shape.materials[surface.material])
+        surfaces.append(box_mapped(surface, np.eye(3), size_m) if size_m else surface)
+    return piece, replace(shape, surfaces=tuple(surfaces))
+
+
+# A room's floor and walls while furniture is put there; state: what was put.
+
+
+OUT_M = 0.015  # from a wall to a back: skirting boards are between
+LOWER_M = 0.1  # above the floor, where a free wall begins
+
+_MOST_COVERED = 0.58  # of a floor
+_WALL_SHARE = 0.75  # of the free wall that may be stood at
+_WAYS_KEPT = 0.6  # of the floor that one could walk on
+_DOOR_MARGIN_M = 0.05
+_FRENCH_M = 0.4  # a window whose sill is lower is walked through
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorSpot:
+    """A place at a wall."""
+
+    face: WallFace
+    s: float  # of the thing's middle, along the face
+    depth: float  # of the thing, metres
+    body: BaseGeometry  # the plan area it takes
+    front: BaseGeometry  # and the floor before it
+
+
+def spot_at(face: WallFace, s: float, width: float, depth: float, before_m: float) -> FloorSpot:
+    """The place of a thing (width, depth) at s on a face, with before_m of free floor."""
+
+    def area(z0: float, z1: float) -> BaseGeometry:
+        ends = [(s - width / 2, z0), (s + width / 2, z0), (s + width / 2, z1), (s - width / 2, z1)]
+        return shapely.Polygon([face.point(x, 0.0, z)[[0, 2]] for x, z in ends])
+
+    end = OUT_M + depth
+    return FloorSpot(face, s, depth, area(OUT_M, end), area(end, end + before_m))
+
+
+@dataclass(slots=True)
+class RoomFloor:
+    """What is left of a room's floor and walls."""
+
+    space: HouseSpace
+    room: RoomSpace
+    faces: Sequence[WallFace]
+    bitmap: FloorBitmap
+    free: BaseGeometry  # its floor without walls
+    kept: BaseGeometry  # doors' swings, and where one stands before doors and windows
+    has_ways: bool  # one way joins its doors
+    walkable: int  # cells of its largest way, before anything was put
+    wall_m: float  # of wall that may still be stood at
+    bodies: list[BaseGeometry] = field(default_factory=list)  # of what was put
+    fronts: list[BaseGeometry] = field(default_factory=list)  # the floor before it
+
+    @classmethod
+    def of(cls, draft: Draft, space: HouseSpace, room: RoomSpace) -> RoomFloor | None:
+        """The room as it is; None where it has no floor or no walls."""
+        bitmap = floor_bitmap(space, room)
+        if not bitmap.inside.any() or not room.faces:
+            return None
+        zones = []
+        for passage in (*room.doors, *room.windows):
+            side = passage.side_of(room.room.id)
+            is_walked = not passage.is_window or passage.bottom_y < room.room.floor_y + _FRENCH_M
+            if side is not None and is_walked:
+                zones.append(passage.before(side))
+                zones += [] if passage.is_window else [passage.swing(side)]
+        flights = flights_of(draft, room.room, room.area)
+        zones += [flights.under, flights.before]
+        # Count the wall before which one could stand something.
+        faces = Hanging(draft, room, "furniture").faces
+        low, high = room.room.floor_y + LOWER_M, room.room.floor_y + 0.9
+        free_m = sum(len(face.starts(WALL_CELL_M, low, high, 0.5)) for face in faces) * WALL_CELL_M
+        return cls(
+            space, room, faces, bitmap, shapely.difference(room.area, room.walls),
+            shapely.union_all(zones).buffer(_DOOR_MARGIN_M), doors_are_joined(bitmap, room),
+            _largest_way(bitmap), _WALL_SHARE * free_m,
+        )  # fmt: skip
+
+    def allows(self, body: BaseGeometry, front: BaseGeometry) -> bool:
+        """Whether a thing may stand there, with the floor before it free."""
+        is_there = shapely.contains(self.free, body) and not shapely.intersects(self.kept, body)
+        if not is_there or any(shapely.intersects(body, area) for area in self.fronts):
+            return False
+        if any(
+            shapely.intersects(area, body) or shapely.intersects(area, front)
+            for area in self.bodies
+        ):
+            return False
+        return self._keeps_ways(self._cells(body))
+
+    def take(self, body: BaseGeometry, front: BaseGeometry) -> None:
+        """A thing stands there now."""
+        self.bodies.append(body)
+        self.fronts.append(front)
+        self.bitmap = with_body(self.bitmap, self._cells(body))
+
+    def is_too_full(self, area_m2: float) -> bool:
+        """Whether furniture would cover more of the floor than people let it with so much more."""
+        inside, covered = self.bitmap.inside, self.bitmap.occupied & self.bitmap.inside
+        covered_m2 = float(covered.sum()) * CELL_M**2 + area_m2
+        return covered_m2 > _MOST_COVERED * float(inside.sum()) * CELL_M**2
+
+    def _keeps_ways(self, cells: Bools) -> bool:
+        after = with_body(self.bitmap, cells)
+        if _largest_way(after) < _WAYS_KEPT * self.walkable:
+            return False
+        return not self.has_ways or doors_are_joined(after, self.room)
+
+    def _cells(self, area: BaseGeometry) -> Bools:
+        x, z = FloorGrid(self.bitmap.origin, self.bitmap.inside.shape).middles
+        return np.asarray(shapely.contains_xy(area.buffer(CELL_M / 2), x, z))
+
+
+def _largest_way(bitmap: FloorBitmap) -> int:
+    return int(np.bincount(bitmap.ways.reshape(-1))[1:].max(initial=0))
+
+
+# What furniture rooms usually have beside the largest pieces, and of which sizes.
+
+
+Maker = Callable[[np.random.Generator, Boards, Size], Made]
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class WantedKind:
+    """One kind of furniture that stands at a wall."""
+
+    make: Maker
+    width: Range
+    height: Range
+    depth: Range
+    before_m: float = 0.55  # free floor in front of it
+    alike: tuple[int, ...] = ()  # NYU40 ids: a room that has one wants less of it
+    groups: tuple[str, ...] = ()  # of the catalogue
+    beside: int | None = None  # it stands beside a thing of that class
+
+
+def _nightstand(rng: np.random.Generator, boards: Boards, size: Size) -> Made:
+    return case_goods.chest(rng, boards, size, nyu40=NIGHT_STAND)
+
+
+def _cubes(rng: np.random.Generator, boards: Boards, size: Size) -> Made:
+    columns = max(1, int(size[0] / 0.36))
+    rows = min(max(1, int(size[1] / 0.36)), 5 if columns > 1 else 4)
+    return case_goods.cube_shelf(boards, columns, rows)
+
+
+KINDS: Final[Mapping[str, WantedKind]] = MappingProxyType({
+    "bookcase": WantedKind(case_goods.bookcase, (0.4, 1.7), (1.7, 2.15), (0.24, 0.31), 0.25, (BOOKSHELF,), ("bookcase",)),
+    "low bookcase": WantedKind(case_goods.bookcase, (0.45, 1.4), (0.8, 1.15), (0.24, 0.31), 0.25, (BOOKSHELF, SHELVES)),
+    "cubes": WantedKind(_cubes, (0.45, 1.5), (0.75, 1.9), (0.38, 0.38), 0.3, (SHELVES,)),
+    "rack": WantedKind(case_goods.rack, (0.4, 1.1), (1.5, 1.95), (0.27, 0.38), 0.25, (SHELVES,), ("shelves",)),
+    "chest": WantedKind(case_goods.chest, (0.5, 1.3), (0.74, 1.05), (0.38, 0.47), 0.35, (DRESSER,), ("dresser",)),
+    "sideboard": WantedKind(case_goods.sideboard, (0.9, 1.8), (0.7, 0.88), (0.36, 0.44), 0.4, (CABINET, DRESSER)),
+    "wardrobe": WantedKind(case_goods.wardrobe, (0.8, 1.9), (1.9, 2.2), (0.5, 0.6), 0.45, (CABINET,), ("wardrobe",)),
+    "tall cabinet": WantedKind(case_goods.tall_cabinet, (0.3, 0.45), (1.6, 1.95), (0.26, 0.34), 0.3, (CABINET,)),
+    "shoe cabinet": WantedKind(case_goods.shoe_cabinet, (0.5, 1.0), (0.8, 1.15), (0.18, 0.26), 0.4),
+    "console": WantedKind(case_goods.console, (0.6, 1.2), (0.74, 0.82), (0.26, 0.36), 0.35),
+    "bench": WantedKind(case_goods.bench, (0.7, 1.3), (0.44, 0.48), (0.32, 0.4), 0.35),
+    "desk": WantedKind(case_goods.desk, (0.8, 1.4), (0.73, 0.75), (0.5, 0.64), 0.5, (DESK,)),
+    "nightstand": WantedKind(_nightstand, (0.36, 0.5), (0.45, 0.6), (0.34, 0.42), 0.15, (NIGHT_STAND,), ("nightstand",), BED),
+})  # fmt: skip
+
+# Kind of furniture and how likely a room of that use has it, the most wanted first.
+WANTED: Final[Mapping[RoomKind, tuple[tuple[str, float], ...]]] = MappingProxyType({
+    RoomKind.LIVING: (("bookcase", 0.95), ("sideboard", 0.65), ("cubes", 0.45), ("bookcase", 0.6), ("console", 0.3), ("rack", 0.35), ("desk", 0.25), ("low bookcase", 0.4), ("tall cabinet", 0.3)),
+    RoomKind.BEDROOM: (("nightstand", 0.9), ("nightstand", 0.7), ("wardrobe", 0.6), ("desk", 0.55), ("chest", 0.7), ("bookcase", 0.5), ("low bookcase", 0.35), ("rack", 0.3), ("tall cabinet", 0.3), ("bench", 0.2)),
+    RoomKind.DINING: (("sideboard", 0.85), ("bookcase", 0.5), ("console", 0.3), ("cubes", 0.3)),
+    RoomKind.KITCHEN: (("rack", 0.6), ("sideboard", 0.35), ("tall cabinet", 0.4), ("bench", 0.2)),
+    RoomKind.HALL: (("shoe cabinet", 0.75), ("wardrobe", 0.35), ("console", 0.4), ("bookcase", 0.4), ("bench", 0.35), ("chest", 0.25)),
+    RoomKind.OFFICE: (("bookcase", 0.95), ("bookcase", 0.75), ("cubes", 0.5), ("chest", 0.4), ("rack", 0.4), ("bookcase", 0.4)),
+    RoomKind.BATHROOM: (("tall cabinet", 0.75), ("rack", 0.4)),
+    RoomKind.STORE: (("rack", 0.9), ("rack", 0.8), ("wardrobe", 0.3), ("rack", 0.5)),
+    RoomKind.OTHER: (("bookcase", 0.7), ("chest", 0.5), ("sideboard", 0.4), ("desk", 0.3), ("cubes", 0.3)),
+})  # fmt: skip
+
+
+# The part `furniture` of dressing.
+
+
+PART = "furniture"
+
+_LEAST_M2 = 3.0  # of a room
+_SIDE_M = 0.03  # to what stands beside it
+_LIFT_M = 0.0001  # above the floor, so that no faces coincide
+_FREE_BEFORE_M = 1.19  # of a wall, at most: no more is measured
+_TRIES = 8  # places of one thing
+_MOST_FACES = 12_000  # of a model of the catalogue
+_FROM_CATALOGUE = 0.35  # of what both have
+_ALIKE, _BESIDE_ALIKE = 0.7, 0.8  # how much less a room wants of what it has
+_BESIDE_M = 0.15  # from a bed to its nightstand
+_END_LIKED = 0.5  # an end of a free stretch, where all its other places together count 1
+_FILLED = ("full", "filled")  # in names of models that hold things of their own
+_LOOKS = 3  # of a home's added furniture
+
+
+def furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Add furniture to the rooms of the draft. share: 0..1 of what a room would get."""
+    space = house_space(draft)
+    for room in space.rooms:
+        wanted = WANTED.get(room.kind, ())
+        if not wanted or not room.room.has_floor or room.area.area < _LEAST_M2:
+            continue
+        rng = draft.rng(PART, room.room.id)
+        names = _drawn(draft, room, wanted, rng, share)
+        floor = RoomFloor.of(draft, space, room) if names else None
+        if floor is None:
+            continue
+        own = room_style(style, draft.rng("style", room.room.id))
+        look = look_of(draft, catalogue, own, draft.rng(PART, "look", int(rng.integers(_LOOKS))))
+        for name in names:
+            _stand(draft, catalogue, floor, name, look, rng)
+
+
+def _drawn(
+    draft: Draft, room: RoomSpace, wanted: Sequence[tuple[str, float]], rng: np.random.Generator,
+    share: float,
+) -> list[str]:  # fmt: skip
+    has = {draft.items[n].nyu40 for n in room.items}
+    found = []
+    for name, chance in wanted:
+        kind = KINDS[name]
+        # The other side of a bed may still want its nightstand.
+        less = _BESIDE_ALIKE if kind.beside is not None else _ALIKE
+        chance *= less if has & set(kind.alike) else 1.0
+        if rng.random() < chance * share:
+            found.append(name)
+    return found
+
+
+def _stand(
+    draft: Draft, catalogue: Catalogue, floor: RoomFloor, name: str, look: Look,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Put a thing of that kind where it fits; narrower ones are tried."""
+    kind = KINDS[name]
+    width, height, depth = (
+        float(rng.uniform(*side)) for side in (kind.width, kind.height, kind.depth)
+    )
+    own, from_catalogue = int(rng.integers(1 << 30)), rng.random() < _FROM_CATALOGUE
+    widths = {max(width * factor, kind.width[0]) for factor in (1.0, 0.75, 0.55, 0.0)}
+    for w in sorted(widths, reverse=True):
+        if w > floor.wall_m:
+            continue
+        made = _from_catalogue(catalogue, kind, w, own) if from_catalogue else None
+        made = made or _generated(kind, look, (w, height, depth), own)
+        spot = _spot(draft, floor, kind, made, rng)
+        if spot is None:
+            continue
+        _put(draft, floor, made, spot)
+        if name == "desk":
+            _chair_before(draft, floor, spot, look, rng)
+        return
+    draft.refused[f"{PART}: no free wall for a {name}"] += 1
+
+
+def _generated(kind: WantedKind, look: Look, size: Size, own: int) -> Made:
+    return grained(kind.make(np.random.default_rng(own), look.boards, size), look)
+
+
+def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: int) -> Made | None:
+    """A model of about that width; None where there is none."""
+    fit = [
+        p
+        for p in catalogue.of(*kind.groups)
+        if p.place is Place.FLOOR
+        and 0.7 * width < p.size[0] <= width * 1.1
+        and p.size[1] < kind.depth[1] + 0.15
+        and 0.6 * kind.height[0] < p.size[2] < kind.height[1] + 0.1
+        and not any(word in p.name.lower() for word in _FILLED)
+    ]
+    if not fit:
+        return None
+    piece = fit[own % len(fit)]
+    shape = catalogue.shape(piece)
+    if shape is None or sum(len(s.faces) for s in shape.surfaces) > _MOST_FACES:
+        return None
+    return piece, shape
+
+
+def _spot(
+    draft: Draft, floor: RoomFloor, kind: WantedKind, made: Made, rng: np.random.Generator
+) -> FloorSpot | None:
+    """A place for the thing, drawn from those that are free; None where there is none."""
+    low, high = made[1].bounds
+    w, h, d = (float(v) for v in high - low)
+    if floor.is_too_full(w * d):
+        return None
+    y = floor.room.room.floor_y
+    depth = min(OUT_M + d + kind.before_m, _FREE_BEFORE_M)
+    places: list[tuple[int, float, float]] = []
+    for k, face in enumerate(floor.faces):
+        starts = face.starts(w + 2 * _SIDE_M, y + LOWER_M, y + h + 0.05, depth)
+        places += [(k, s + _SIDE_M + w / 2, liked) for s, liked in _liked(starts)]
+    weights = np.array([liked for _, _, liked in places])
+    if kind.beside is not None:
+        weights *= [_is_beside(draft, floor, kind.beside, k, s, w) for k, s, _ in places]
+    if not weights.any():
+        return None
+    n = min(_TRIES, int(np.count_nonzero(weights)))
+    for j in rng.choice(len(places), n, replace=False, p=weights / weights.sum()):
+        k, s, _ = places[int(j)]
+        spot = spot_at(floor.faces[k], s, w, d, kind.before_m)
+        if floor.allows(spot.body, spot.front):
+            return spot
+    return None
+
+
+def _liked(starts: F64) -> list[tuple[float, float]]:
+    """(s, how much it is liked) of each start: furniture fills walls from their ends."""
+    if not len(starts):
+        return []
+    breaks = np.flatnonzero(np.diff(starts) > 0.03)
+    ends = {0, len(starts) - 1, *breaks.tolist(), *(breaks + 1).tolist()}
+    rest = 1.0 / len(starts)
+    return [(float(s), _END_LIKED if k in ends else rest) for k, s in enumerate(starts)]
+
+
+def _is_beside(
+    draft: Draft, floor: RoomFloor, nyu40: int, face_number: int, s: float, width: float
+) -> bool:
+    """Whether a place at a wall is right beside a thing of the class that stands at that wall."""
+    face = floor.faces[face_number]
+    for number in floor.room.items:
+        if draft.items[number].nyu40 != nyu40:
+            continue
+        low, high = floor.space.bounds[number]
+        corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
+        out, along = face.out_of(corners), face.s_of(corners)
+        gap = max(float(along.min()) - (s + width / 2), s - width / 2 - float(along.max()))
+        if -0.1 < out.min() < 0.4 and abs(gap) < _BESIDE_M:
+            return True
+    return False
+
+
+def _put(draft: Draft, floor: RoomFloor, made: Made, spot: FloorSpot) -> None:
+    _piece, shape = made
+    low, high = shape.bounds
+    # Its back comes to the wall, the middle of its width to the spot.
+    y = floor.room.room.floor_y + _LIFT_M - float(low[1])
+    at = spot.face.point(spot.s, y, OUT_M - float(low[2]))
+    at = at - spot.face.along * float(low[0] + high[0]) / 2
+    _add(draft, floor, made, at, spot.face.turn_rad)
+    floor.take(spot.body, spot.front)
+    floor.wall_m -= float(high[0] - low[0])
+
+
+def _chair_before(
+    draft: Draft, floor: RoomFloor, spot: FloorSpot, look: Look, rng: np.random.Generator
+) -> None:
+    """A chair before a desk, turned to it; none where it would be in the way."""
+    made = grained(desk_chair(rng, look.boards), look)
+    high = made[1].bounds[1]
+    out = OUT_M + spot.depth + float(high[2]) + float(rng.uniform(0.05, 0.12))
+    y = floor.room.room.floor_y
+    at = spot.face.point(spot.s + float(rng.normal(0, 0.06)), y + _LIFT_M, out)
+    body = shapely.Point(at[0], at[2]).buffer(float(high[2]) + 0.04)
+    x0, z0, x1, z1 = body.bounds
+    # It stands where the desk's own front is: ask as if the desk had none.
+    own = floor.fronts.pop()
+    is_free = floor.allows(body, shapely.Polygon()) and floor.space.is_free(
+        np.array([x0, y + 0.03, z0]), np.array([x1, y + 1.0, z1])
+    )
+    floor.fronts.append(own)
+    if is_free:
+        _add(draft, floor, made, at, spot.face.turn_rad + np.pi + float(rng.normal(0, 0.25)))
+        floor.take(body, shapely.Polygon())
+
+
+def _add(draft: Draft, floor: RoomFloor, made: Made, at: F64, turn_rad: float) -> None:
+    room = floor.room.room
+    item = draft.placed(
+        *made, at, turn_rad, item_id=next_id(draft, PART), room_id=room.id, level_id=room.level_id
+    )
+    draft.add(item, PART, made[0])

@@ -1,0 +1,124 @@
+"""Pieces of a catalogue by group and size, as one home chooses them; no effects.
+
+A home has one order of preference: it asks twice for a chair and gets the same one.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Catalogue, Piece
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.generate.furnish.template import PieceSlot
+
+STYLES: Final = {
+    "mixed": "",
+    "nordic": "simple clear white wooden wood oak beige mid century junior",
+    "modern": "modern glass metal black led flat office design table4 bed3",
+    "classic": "winchester antique iron oak cushion tablecloth grand chandelier captains armchair3",
+    "vintage": "mid century thonet iron leather burlap osaka wood",
+}
+"""Style -> words of pieces that such a home likes."""
+
+_LIKED: Final = 0.6  # of the whole order that a word moves a piece forward
+
+_UNFIT: Final = frozenset(
+    [
+        "eTeks#loftBed140x190",
+        "eTeks#cornerBunkBed90x190",
+        "Scopia#mezzanine-bed",  # a house's own frame round them
+        "Scopia#day_bed_frame",  # without a mattress
+        "Scopia#futon",
+        "BlendSwap-CC-0#babyRockingBed",
+        "BlendSwap-CC-0#technicalTable1",  # a drawing board
+        "Scopia#chest-freezer",
+        "BlendSwap-CC-BY#bunkBed",  # its model cannot be read
+    ]
+)
+"""Pieces that templates cannot use, each looked at."""
+
+
+def style_of(name: str, rng: np.random.Generator) -> str:
+    """The style of that name; one by seed for none. Raises BadInput for an unknown one."""
+    if name and name not in STYLES:
+        raise BadInput("--style", name, "no such style", hint=f"one of {', '.join(STYLES)}")
+    drawn = sorted(STYLES)[int(rng.integers(len(STYLES)))]
+    return name or drawn
+
+
+class Shelf:
+    """A catalogue in the order of one home's preference."""
+
+    def __init__(self, catalogue: Catalogue, rng: np.random.Generator, style: str = "") -> None:
+        self.catalogue = catalogue
+        liked = set(STYLES.get(style, "").split())
+        self._order: dict[str, float] = {}
+        for piece, key in zip(
+            catalogue.pieces, rng.random(len(catalogue.pieces)).tolist(), strict=True
+        ):
+            words = set(re.findall(r"[a-z0-9]+", f"{piece.id} {piece.name}".lower()))
+            self._order[piece.id] = key - _LIKED * bool(words & liked)
+        self._tops: dict[str, float] = {}
+
+    def of(
+        self, *groups: str, width: tuple[float, float] = (0.0, 9.0),
+        depth: tuple[float, float] = (0.0, 9.0), height: tuple[float, float] = (0.0, 9.0),
+        without: str = "",
+    ) -> list[Piece]:  # fmt: skip
+        """Pieces of those groups and sizes, the preferred one first; without: words they lack."""
+        ranges = width, depth, height
+        aside = set(without.split())
+        found = [
+            p
+            for p in self.catalogue.of(*groups)
+            if p.id not in _UNFIT
+            and all(low <= x <= high for (low, high), x in zip(ranges, p.size, strict=True))
+            and not aside & set(re.findall(r"[a-z0-9]+", f"{p.id} {p.name}".lower()))
+        ]
+        return sorted(found, key=lambda p: (self._order[p.id], p.id))
+
+    def top(self, piece: Piece) -> float:
+        """Height above its base at which something can stand in a piece's middle, metres."""
+        if piece.id not in self._tops:
+            self._tops[piece.id] = self._top(piece)
+        return self._tops[piece.id]
+
+    def _top(self, piece: Piece) -> float:
+        shape = self.catalogue.shape(piece)
+        if shape is None:
+            return piece.size[2]
+        corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in shape.surfaces])
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        size = np.linalg.norm(normals, axis=1)
+        level = normals[:, 1] > 0.95 * np.maximum(size, 1e-12)
+        # Take the highest level that covers a fifth of the piece's ground.
+        heights, areas = corners[level].mean(1)[:, 1], size[level] / 2
+        order = np.argsort(-heights)
+        wanted = 0.2 * piece.size[0] * piece.size[1]
+        for k in order:
+            here = np.abs(heights - heights[k]) < 0.005
+            if areas[here].sum() >= wanted:
+                return float(heights[k])
+        return piece.size[2]
+
+
+def slot(
+    piece: Piece, u: float, v: float, *, turns: int = 0, elevation: float = 0.0,
+    size: tuple[float, float, float] | None = None,
+) -> PieceSlot:  # fmt: skip
+    """A piece with the middle of its ground at (u, v); size: another than its own."""
+    w, d, h = size or piece.size
+    return PieceSlot(piece, u, v, w, d, h, elevation, turns)
+
+
+def backed(
+    piece: Piece, u: float = 0.0, *, gap: float = 0.02, elevation: float = 0.0,
+    size: tuple[float, float, float] | None = None,
+) -> PieceSlot:  # fmt: skip
+    """A piece with its back at the wall."""
+    depth = (size or piece.size)[1]
+    return slot(piece, u, gap + depth / 2, elevation=elevation, size=size)
