@@ -52,8 +52,7 @@ def of_house(seed: int) -> dict[str, Any]:
     from benchmarks.dress.contacts import blocked_doors, penetrations, things_of
     from pbrs_farm.generate.made import made
     from pbrs_farm.read.source import resolve
-    from pbrs_farm.run.dress_catalogue import catalogue_of_words
-    from pbrs_farm.run.house_of_source import house_of_source
+    from pbrs_farm.run.dress_catalogue import catalogue_of_words, house_of_source
     from pbrs_farm.run.steps import repaired_house
 
     recipe = recipe_from_name("fast")

@@ -6,7 +6,7 @@ and waves together always of TRIANGLES_OF_LAMPS, so that lamps alone grow.
 
 `times` is of whole views of the recipe `fast`, as a user gets them. Until 850a6d3 it was reckoned from samples of a
 small picture (160x120, 16 samples), which are not those of `fast`: below 4 million samples there is no trial
-(guiding/pilot.py), so that rays are guided where nothing is hidden and no shadow ray is left out that seldom arrives.
+(transport/pilot.py), so that rays are guided where nothing is hidden and no shadow ray is left out that seldom arrives.
 That number, the larger one, goes on as `small_times`. Two to three minutes on two quiet cores.
 """
 

@@ -1,6 +1,6 @@
 """Guiding where it pays: relMSE x CPU of a `fast` view as its trial chooses over never guiding, eight views.
 
-A `fast` view of VIEW is tried before it is rendered (transport/guiding/pilot.py), and the trial is a chance of its
+A `fast` view of VIEW is tried before it is rendered (pbrs_farm/transport/pilot.py), and the trial is a chance of its
 own: TRIALS of them say how often it chooses guided rays, p, and what it costs. RUNS pictures of SIZE, guided and
 plain in turn, say what guided rays do: v, relMSE over that of plain rays, relMSE being the variance between pictures
 of one way (picture_variance.py), and c, the CPU of a view over the plain one's, reckoned from samples and pilot.
@@ -30,7 +30,7 @@ from benchmarks.light.picture_variance import F64, Run, compared, relative_sprea
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields, recipe_from_name
-from pbrs_farm.transport.guiding import pilot
+from pbrs_farm.transport import pilot
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters, EmitterWeights
 from pbrs_farm.transport.light_scene import LightScene

@@ -17,7 +17,7 @@ from benchmarks.figures import write_report
 from benchmarks.study.rendered import FOLDER
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.view_sample import Request
+from pbrs_farm.study.reading.view_sample import SampleRequest
 from pbrs_farm.study.reading.views import Views
 
 N_READ, N_ROUNDS = 40, 5
@@ -62,7 +62,7 @@ def _rendered(root: Path) -> Path:
 
 
 def _rate(views: Views) -> float:
-    request, best_s = Request(LAYERS, MODE), float("inf")
+    request, best_s = SampleRequest(LAYERS, MODE), float("inf")
     views[0].sample(request)
     for _round in range(N_ROUNDS):
         started = time.process_time()

@@ -29,11 +29,10 @@ from benchmarks.study.loading import UNITS as LOADING_UNITS
 from benchmarks.study.loading import loading_figures
 from benchmarks.study.rendered import FOLDER, HELD_OUT, rendered
 from pbrs_farm.study.metrics.confusion import Confusion
-from pbrs_farm.study.metrics.edge_matching import n_matched
-from pbrs_farm.study.metrics.edge_scores import edge_counts
+from pbrs_farm.study.metrics.edge_scores import edge_counts, n_matched
 
 if TYPE_CHECKING:
-    from pbrs_farm.study.training.view_sources import Source
+    from pbrs_farm.study.training.view_sources import ViewSource
 
 UNITS = LOADING_UNITS | {
     "study.normals_heldout": "degrees, mean on held-out homes: bare, photo cameras, mlt_il_ol, plan tiny",
@@ -116,10 +115,10 @@ def _trained(
     return train(job, views.some(4) if by_heart else views, held_out)
 
 
-def _source() -> Source:
-    from pbrs_farm.study.training.view_sources import Source
+def _source() -> ViewSource:
+    from pbrs_farm.study.training.view_sources import ViewSource
 
-    return Source((str(_root()),), hold_out=frozenset(HELD_OUT))
+    return ViewSource((str(_root()),), hold_out=frozenset(HELD_OUT))
 
 
 def _by_heart(folder: Path) -> Figures:
@@ -146,7 +145,7 @@ def _classes(folder: Path) -> Figures:
 def _edges(folder: Path) -> Figures:
     from pbrs_farm.study.networks.initial_weights import has_hed, start_from
     from pbrs_farm.study.networks.network_choice import network_of
-    from pbrs_farm.study.tasks.task_choice import task_of
+    from pbrs_farm.study.tasks.tasks import task_of
     from pbrs_farm.study.training.prediction import judged
     from pbrs_farm.study.training.view_sources import held_out_views
     from pbrs_farm.study.training_plan import plan_of

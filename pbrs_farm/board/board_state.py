@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 from jinja2 import Environment
 
-from pbrs_farm.board.farm.audit import Audit
-from pbrs_farm.board.farm.live_farm import LiveFarm
 from pbrs_farm.board.index.queries import Queries
 from pbrs_farm.board.index.refresh import Refresher
 from pbrs_farm.board.index.view_index import ViewIndex
+from pbrs_farm.board.live_farm import Audit, LiveFarm
 from pbrs_farm.board.options import BoardOptions
 from pbrs_farm.board.pages.rendering import environment
-from pbrs_farm.board.pictures.picture_cache import PictureCache
+from pbrs_farm.board.pictures import PictureCache
 from pbrs_farm.board.root_reader import RootReader
-from pbrs_farm.board.security.sessions import Sessions
+from pbrs_farm.board.sessions import Sessions
 from pbrs_farm.board.static_files import Asset, assets
 from pbrs_farm.core import keys
 from pbrs_farm.store.object_store import Store

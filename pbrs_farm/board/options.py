@@ -13,7 +13,7 @@ DEFAULT_PORT: Final = 8080
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class BoardLimits:
     """What one client may ask of the board."""
 
     requests_per_s: float = 100.0  # on average, of one address
@@ -38,7 +38,7 @@ class BoardOptions:
     allowed_hosts: tuple[str, ...] = ()  # names a browser may call the board by
     price_per_slot_hour: float = 0.0  # of the farm; 0 = no cost is shown
     currency: str = "EUR"
-    limits: Limits = field(default_factory=Limits)
+    limits: BoardLimits = field(default_factory=BoardLimits)
 
     @property
     def is_private(self) -> bool:

@@ -112,7 +112,7 @@ def _dress(args: argparse.Namespace) -> int:
 
 def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dict[str, bytes]:
     """The pictures of the home as it was and as it is, by file name."""
-    from pbrs_farm.gallery.before_after import before_after_png
+    from pbrs_farm.gallery.contact_sheet import before_after_png
     from pbrs_farm.read.source import resolve
     from pbrs_farm.run.processes.verb_process import doing
     from pbrs_farm.run.steps import repaired_house
@@ -139,7 +139,7 @@ def _repair(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.read.source import resolve
     from pbrs_farm.repair import section_svg, summary_of_report
-    from pbrs_farm.run.house_of_source import house_of_source
+    from pbrs_farm.run.dress_catalogue import house_of_source
     from pbrs_farm.run.steps import repaired_house
     from pbrs_farm.store.folder import FolderStore
 

@@ -14,7 +14,7 @@ from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.store.secret import Secret
 
 if TYPE_CHECKING:
-    from pbrs_farm.board.farm.live_farm import LiveFarm
+    from pbrs_farm.board.live_farm import LiveFarm
     from pbrs_farm.board.options import BoardOptions
 
 
@@ -46,8 +46,8 @@ def _board(args: argparse.Namespace) -> int:
         raise MachineFailed(f"board needs {' and '.join(missing)}", hint=hint)
     from pbrs_farm.board.board_state import new_board
     from pbrs_farm.board.options import BoardOptions
-    from pbrs_farm.board.security.sessions import new_token
     from pbrs_farm.board.serve import bound_socket, default_cache, server_of
+    from pbrs_farm.board.sessions import new_token
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 
@@ -83,7 +83,7 @@ def _farm(store_url: str) -> LiveFarm | None:
         return None
     if find_spec("redis") is None:
         raise MachineFailed("PBRS_REDIS_URL needs redis", hint="pip install 'pbrs-farm[workers]'")
-    from pbrs_farm.board.farm.live_farm import LiveFarm
+    from pbrs_farm.board.live_farm import LiveFarm
     from workers.client.farm_client import Farm
     from workers.config import config_from_environment
 

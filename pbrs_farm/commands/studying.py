@@ -20,8 +20,8 @@ from pbrs_farm.commands.arguments import (
 from pbrs_farm.core.errors import MachineFailed
 
 if TYPE_CHECKING:
-    from pbrs_farm.study.training.view_sources import Source
-    from pbrs_farm.study.training_plan import Plan
+    from pbrs_farm.study.training.view_sources import ViewSource
+    from pbrs_farm.study.training_plan import TrainingPlan
 
 TASKS = ("normals", "segmentation", "boundaries")
 _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth; repeatable"
@@ -85,7 +85,7 @@ def _add_plan(p: argparse.ArgumentParser) -> None:
     p.add_argument("--views", type=int, default=0, metavar="N", help="train on at most N views")
 
 
-def _plan(args: argparse.Namespace, task: str) -> Plan:
+def _plan(args: argparse.Namespace, task: str) -> TrainingPlan:
     from pbrs_farm.study.training_plan import plan_of
 
     at_least("--views", args.views, 0)
@@ -97,10 +97,10 @@ def _hold_out(args: argparse.Namespace) -> frozenset[str] | None:
     return None if words is None else frozenset(words) - {"none"}
 
 
-def _source(args: argparse.Namespace) -> Source:
-    from pbrs_farm.study.training.view_sources import Source
+def _source(args: argparse.Namespace) -> ViewSource:
+    from pbrs_farm.study.training.view_sources import ViewSource
 
-    return Source(tuple(args.root), tuple(args.modes), _hold_out(args), most=args.views)
+    return ViewSource(tuple(args.root), tuple(args.modes), _hold_out(args), most=args.views)
 
 
 def _need_torch() -> None:
@@ -112,7 +112,7 @@ def _train(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.training.prediction import device_of
     from pbrs_farm.study.training.training_job import Job, train
-    from pbrs_farm.study.training.view_arrays import ViewArrays
+    from pbrs_farm.study.training.training_views import ViewArrays
     from pbrs_farm.study.training.view_sources import held_out_views, left_out, training_views
 
     plan, source = _plan(args, args.task), _source(args)
@@ -193,16 +193,16 @@ def _ablation(args: argparse.Namespace) -> int:
     from pbrs_farm.study.judging.evaluation import check_exact
     from pbrs_farm.study.judging.judged_places import homes_that_train, judged_place
     from pbrs_farm.study.training.run_folder import made_folder
-    from pbrs_farm.study.training.view_sources import Source
+    from pbrs_farm.study.training.view_sources import ViewSource
 
     at_least("--seeds", args.seeds, 1)
     check_exact(args.task, exact=args.exact)
-    plan, common = _plan(args, args.task), Source((), (), _hold_out(args), most=args.views)
+    plan, common = _plan(args, args.task), ViewSource((), (), _hold_out(args), most=args.views)
     made_folder(args.out)
     # A set of training views a row; all rows share plan, seeds and held-out homes.
     sets = training_sets(args.root, args.modes, common)
     if args.objects:
-        objects = Source((args.objects,), ("mlt_il_ol",), frozenset(), True, args.views)
+        objects = ViewSource((args.objects,), ("mlt_il_ol",), frozenset(), True, args.views)
         sets = (*sets, TrainingSet("objects", objects))
     # No row may be judged on homes that any of the rows trains on.
     trained_on = homes_that_train([each.source for each in sets])

@@ -163,7 +163,7 @@ def _claim_row(claim: LightClaim) -> str:
 
 
 def _relight(args: argparse.Namespace) -> int:
-    from pbrs_farm.run.fetched_view import folder_of_view
+    from pbrs_farm.run.relight import folder_of_view
     from pbrs_farm.settings import settings_from_environment
 
     store = settings_from_environment().store

@@ -34,9 +34,8 @@ from pbrs_farm.curate.selection_run import (
     verdict_table,
     yield_curve,
 )
-from pbrs_farm.gallery.gallery_page import data_url, small_jpeg
+from pbrs_farm.gallery.gallery_page import data_url, page, small_jpeg
 from pbrs_farm.gallery.label_colours import depth_colours
-from pbrs_farm.gallery.templates import page
 from pbrs_farm.regular_files import read_regular
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.reference_set import Reference

@@ -10,10 +10,104 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from pbrs_farm.core.classes import NYU40_NAMES
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
 from pbrs_farm.export.chosen_view import Choice, ChosenView, camera_facts
-from pbrs_farm.export.coco_panoptic import write_panoptic
-from pbrs_farm.export.run_lengths import compressed_runs
+from pbrs_farm.images import png_from_array
+
+# COCO panoptic: panoptic.json and a picture of segment ids a view. Effects: reads views, writes
+# files.
+
+
+def write_panoptic(
+    views: list[ChosenView],
+    images: list[dict[str, Any]],
+    categories: list[dict[str, Any]],
+    out: Path,
+) -> int:
+    """panoptic.json and panoptic/<house>/<view>.png; the number of files.
+
+    images, categories: those of the instances, view by view. A segment is an instance with a class,
+    its id the instance's, in a pixel R + 256 G + 65536 B; what has no class is 0.
+    """
+    annotations = []
+    for view, image in zip(views, images, strict=True):
+        name = f"{view.house.id}/{view.id}.png"
+        rows = [row for row in view.facts["instances"] if row["nyu40"]]
+        file = out / "panoptic" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(png_from_array(_segment_ids(view.array("instance"), rows)))
+        segments = [_segment(row) for row in rows]
+        annotations.append({"image_id": image["id"], "file_name": name, "segments_info": segments})
+    # Furniture and the like are things; walls, floors, doors and other structure are stuff.
+    document = {
+        "images": images,
+        "annotations": annotations,
+        "categories": [
+            c
+            | {
+                "isthing": int(c["supercategory"] == "object"),
+                "color": NYU40_COLOURS[c["id"]].tolist(),
+            }
+            for c in categories
+        ],
+    }
+    (out / "panoptic.json").write_text(json.dumps(document, separators=(",", ":")) + "\n")
+    return 1 + len(views)
+
+
+def _segment(row: dict[str, Any]) -> dict[str, Any]:
+    x0, y0, x1, y1 = row["box2d"]
+    box = [x0, y0, x1 - x0, y1 - y0]
+    fields = {"category_id": row["nyu40"], "area": row["pixels"], "bbox": box, "iscrowd": 0}
+    return {"id": row["id"], **fields}
+
+
+def _segment_ids(instance: NDArray[Any], rows: list[dict[str, Any]]) -> NDArray[np.uint8]:
+    known = np.isin(instance, [row["id"] for row in rows])
+    ids = np.where(known, instance, 0).astype(np.uint32)
+    return np.stack([ids & 255, ids >> 8 & 255, ids >> 16 & 255], axis=-1).astype(np.uint8)
+
+
+# COCO's run lengths of masks, plain and compressed.
+
+
+def run_lengths(mask: NDArray[np.bool_]) -> dict[str, list[int]]:
+    """COCO's uncompressed run lengths of mask (H, W): column by column, zeros first."""
+    # Cut where the value changes; a mask that starts with ones has a first run of 0.
+    flat = mask.T.reshape(-1)
+    changes = np.nonzero(np.diff(flat, prepend=False))[0]
+    counts = np.diff(np.concatenate([[0], changes, [flat.size]]))
+    return {"size": [int(n) for n in mask.shape], "counts": [int(n) for n in counts]}
+
+
+def compressed_runs(mask: NDArray[np.bool_]) -> dict[str, list[int] | str]:
+    """COCO's compressed run lengths: counts as text, as pycocotools and every reader take them."""
+    runs = run_lengths(mask)
+    counts, text = runs["counts"], []
+    for k, count in enumerate(counts):
+        # From the fourth on, a count is its difference from the last but one.
+        text.append(_digits(count - counts[k - 2] if k > 2 else count))
+    return {"size": runs["size"], "counts": "".join(text)}
+
+
+def _digits(value: int) -> str:
+    """A signed number in digits of 5 bits, lowest first, as characters from "0" on."""
+    text = []
+    while True:
+        digit = value & 0x1F
+        value >>= 5
+        # The number ends where the rest is its sign alone.
+        is_last = value == (-1 if digit & 0x10 else 0)
+        text.append(chr(48 + digit + (0 if is_last else 0x20)))
+        if is_last:
+            return "".join(text)
+
+
+# COCO instances.
+
 
 # Classes of the supercategory "structure"; all others are objects.
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")

@@ -6,27 +6,255 @@ a module here; docs/formats.md describes them.
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Callable, Mapping
+import math
+import tarfile
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.classes import CEILING, FLOOR, NYU40_NAMES, WALL
+from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import PICTURES, Choice, ChosenView, new_folder, require_lens
 from pbrs_farm.export.coco import write_coco
-from pbrs_farm.export.colmap import write_colmap
-from pbrs_farm.export.hdf5 import write_hdf5
-from pbrs_farm.export.kitti import write_kitti
-from pbrs_farm.export.nerfstudio import write_nerfstudio
-from pbrs_farm.export.new_folder import new_folder
-from pbrs_farm.export.released_layout import write_released
-from pbrs_farm.export.tum import write_tum
-from pbrs_farm.export.webdataset import write_webdataset
-from pbrs_farm.export.yolo import write_data_yaml, write_yolo
+from pbrs_farm.export.sequences import write_colmap, write_kitti, write_nerfstudio, write_tum
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.regular_files import fault_of, read_regular
+
+# WebDataset: tar shards of samples, equal bytes for equal views.
+# Effects: reads views, writes files.
+
+
+def write_webdataset(views: list[ChosenView], out: Path, choice: Choice) -> int:
+    """shard-<6 digits>.tar of choice.views_per_shard views each; the number of files.
+
+    A sample's key is <house>__<view>; its parts are json (view.json) and every layer that is
+    exported, by name: "mlt_il_ol.png", "depth.png". No clock, no owner.
+    """
+    n_shards = 0
+    for start in range(0, len(views), choice.views_per_shard):
+        shard = out / f"shard-{n_shards:06d}.tar"
+        with tarfile.open(shard, "w", format=tarfile.USTAR_FORMAT) as tar:
+            for view in views[start : start + choice.views_per_shard]:
+                _add_sample(tar, view)
+        n_shards += 1
+    return n_shards
+
+
+def _add_sample(tar: tarfile.TarFile, view: ChosenView) -> None:
+    # A dot would end the key.
+    key = f"{view.house.id}__{view.id}".replace(".", "_")
+    parts = {"json": view.facts_json}
+    for layer in view.layers:
+        parts[f"{layer.name}{Path(layer.file).suffix}"] = view.data(layer.name)
+    for part, data in parts.items():
+        # TarInfo's own defaults: time 0, no owner.
+        member = tarfile.TarInfo(f"{key}.{part}")
+        member.size = len(data)
+        tar.addfile(member, io.BytesIO(data))
+
+
+# HDF5 in BlenderProc's form: one file per view, its keys and conventions.
+# Effects: reads views, writes files.
+
+
+def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """<n>.hdf5 per view, n counted from 0, and index.jsonl; the number of files.
+
+    colors (H, W, 3) uint8 (the first of PICTURES there is; every mode also by its name), depth
+    (H, W) float32 planar metres (0 = nothing), normals (H, W, 3) float32 (n + 1) / 2 with OpenGL
+    camera axes, category_id_segmaps uint8, instance_segmaps uint16, and as JSON text
+    instance_attribute_maps and campose (the OpenGL pose, and cam_K as BlenderProc means it: the centre
+    of the first pixel is (0, 0), so that cx is (W - 1) / 2; where no pin-hole, also lens and depth as
+    view.json has them). Raises MachineFailed without h5py.
+    """
+    h5py = _h5py()
+    index = []
+    for number, view in enumerate(views):
+        with h5py.File(out / f"{number}.hdf5", "w") as file:
+            for name, value in _datasets(view).items():
+                if isinstance(value, str):  # JSON: a scalar, which HDF5 cannot compress
+                    file.create_dataset(name, data=np.bytes_(value.encode()))
+                else:
+                    file.create_dataset(name, data=value, compression="gzip")
+        row = {"file": f"{number}.hdf5", "house": view.house.id, "view": view.id}
+        index.append(json.dumps(row))
+    # Say which view each file holds.
+    (out / "index.jsonl").write_text("\n".join(index) + "\n")
+    return len(views) + 1
+
+
+def _h5py() -> Any:
+    try:
+        import h5py
+    except ImportError:
+        hint = "pip install 'pbrs-farm[selection]'"
+        raise MachineFailed("writing HDF5 needs h5py", hint=hint) from None
+    return h5py
+
+
+def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
+    data: dict[str, NDArray[Any] | str] = {}
+    # The last written is the first of PICTURES.
+    for mode in reversed(PICTURES):
+        if view.has(mode):
+            data[str(mode)] = data["colors"] = view.array(mode)
+    # Labels keep their numbers; depth is in metres, nothing is 0.
+    if view.has("depth"):
+        data["depth"] = view.array("depth").astype(np.float32) / np.float32(1000)
+    if view.has("normal"):
+        data["normals"] = _blenderproc_normals(view.array("normal"), view.array("valid") > 0)
+    for layer, name in (("semantic", "category_id_segmaps"), ("instance", "instance_segmaps")):
+        if view.has(layer):
+            data[name] = view.array(layer)
+    rows = view.facts["instances"]
+    maps = [{"idx": r["id"], "name": r["name"], "category_id": r["nyu40"]} for r in rows]
+    data["instance_attribute_maps"] = json.dumps(maps)
+    pose = view.facts["world_from_camera_opengl"]
+    lens = {name: view.facts[name] for name in ("lens", "depth") if name in view.facts}
+    data["campose"] = json.dumps(
+        {"cam_K": blenderproc_k(view.facts["K"]), "cam2world_matrix": pose} | lens
+    )
+    return data
+
+
+def blenderproc_k(k: list[list[float]]) -> list[list[float]]:
+    """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel."""
+    (fx, skew, cx), (_zero, fy, cy), last = k
+    return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
+
+
+def _blenderproc_normals(png: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray[np.float32]:
+    # Published axes are x right, y forward, z up; OpenGL's are x right, y up, z backward.
+    published = png * np.float32(2 / 65535) - np.float32(1)
+    opengl = np.stack([published[..., 0], published[..., 2], -published[..., 1]], axis=-1)
+    # Bring -1..1 to 0..1, and what is nothing to 0.
+    return np.where(valid[..., None], (opengl + 1) / 2, 0).astype(np.float32)
+
+
+# YOLO detection: pictures, a text file of boxes for each, data.yaml. Effects: reads views, writes
+# files.
+
+
+# What surrounds the whole picture is no object: it has no boxes.
+_NO_BOX: Final = (0, WALL, FLOOR, CEILING)
+
+
+def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """images/<house>__<view>.png and labels/<house>__<view>.txt; the number of files.
+
+    A line is a box: class (NYU40 id - 1), centre x, y, width, height, as shares of the picture.
+    Views without a picture are left out.
+    """
+    n_files = 0
+    for folder in ("images", "labels"):
+        (out / folder).mkdir()
+    for view in views:
+        if view.picture is None:
+            continue
+        name = f"{view.house.id}__{view.id}"
+        (out / "images" / f"{name}.png").write_bytes(view.data(view.picture))
+        (out / "labels" / f"{name}.txt").write_text("".join(_lines(view)))
+        n_files += 2
+    return n_files
+
+
+def _lines(view: ChosenView) -> Iterable[str]:
+    width, height = view.facts["width_px"], view.facts["height_px"]
+    for row in view.facts["instances"]:
+        if row["nyu40"] in _NO_BOX:
+            continue
+        x0, y0, x1, y1 = row["box2d"]
+        box = ((x0 + x1) / 2 / width, (y0 + y1) / 2 / height, (x1 - x0) / width, (y1 - y0) / height)
+        yield f"{row['nyu40'] - 1} " + " ".join(f"{share:.6f}" for share in box) + "\n"
+
+
+def write_data_yaml(out: Path, splits: tuple[str, ...]) -> int:
+    """data.yaml of an export with these splits, or none; the number of files, 1."""
+    folders = [(name, f"{name}/images") for name in splits]
+    # Ultralytics wants train and val: without a split both are all views.
+    folders = folders or [("train", "images"), ("val", "images")]
+    lines = ["path: .", *(f"{name}: {folder}" for name, folder in folders), "names:"]
+    lines += [f"  {k}: {name}" for k, name in enumerate(NYU40_NAMES[1:])]
+    (out / "data.yaml").write_text("\n".join(lines) + "\n")
+    return 1
+
+
+# The layout of the published PBRS data (docs/spec/suncg.md section 5): <kind>_v2/<house>/<6
+# digits>_<kind>.png.
+# Effects: reads views, writes files. Every label is stored in that form already, so files are
+# copied.
+
+
+# Layer -> where the published data has it.
+FILES: Final = {
+    "mlt_il_ol": "mlt_v2/{house}/{id}_mlt.png",
+    "opengl_il": "opengl_ver2/{house}/{id}_color.png",
+    "depth": "depth_v2/{house}/{id}_depth.png",
+    "normal": "normal_v2/{house}/{id}_norm_camera.png",
+    "valid": "normal_v2/{house}/{id}_valid.png",
+    "semantic": "category_v2/{house}/{id}_category40.png",
+    "boundary": "boundary_v2/{house}/{id}_instance_boundary.png",
+}
+
+
+def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """Every view's files, camera_v2/<house>/room_camera*.txt and data_goodlist_v2.txt; the number.
+
+    id is the view's number in its house, 0-based: its line in room_camera.txt.
+    """
+    houses: dict[str, list[ChosenView]] = defaultdict(list)
+    for view in views:
+        houses[view.house.id].append(view)
+    n_files, good = 0, []  # files written, lines of the list of good views
+    for house, own in houses.items():
+        for number, view in enumerate(own):
+            place = {"house": house, "id": f"{number:06d}"}
+            for layer, published in FILES.items():
+                if view.has(layer):
+                    _write(out / published.format(**place), view.data(layer))
+                    n_files += 1
+            good.append("{house}/{id}\n".format(**place))
+        n_files += _write_cameras(out / "camera_v2" / house, own)
+    (out / "data_goodlist_v2.txt").write_text("".join(good))
+    return n_files + 1
+
+
+def _write_cameras(folder: Path, views: list[ChosenView]) -> int:
+    # A line of both camera files for each view, in the order of the views' numbers.
+    folder.mkdir(parents=True)
+    (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views))
+    names = "".join(f"Room#{v.entry.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
+    (folder / "room_camera_name.txt").write_text(names)
+    return 2
+
+
+def _write(target: Path, data: bytes) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(data)
+
+
+def camera_line(view: ChosenView) -> str:
+    """`vx vy vz  tx ty tz  ux uy uz  xf yf  value`: eye, towards, up, half angles in rad, score."""
+    require_lens(view, "released")
+    pose = np.array(view.facts["world_from_camera_opengl"], np.float64)
+    width, height = view.facts["width_px"], view.facts["height_px"]
+    k = np.array(view.facts["K"], np.float64)
+    # Half the fields of view, horizontal and vertical.
+    half = (math.atan(width / 2 / k[0, 0]), math.atan(height / 2 / k[1, 1]))
+    groups = (pose[:3, 3], -pose[:3, 2], pose[:3, 1], half, (view.facts.get("score") or 0.0,))
+    return "  ".join(" ".join(f"{x:g}" for x in group) for group in groups) + "\n"
+
+
+# `pbrs-farm export`.
+
 
 Writer = Callable[[list[ChosenView], Path, Choice], int]  # -> files written to the new folder
 

@@ -8,17 +8,20 @@ from __future__ import annotations
 import gc
 from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.assets.skies import fetch_skies
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import View
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.house import Geometry, House, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import views_from_json
+from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.store.object_store import Store
 
 if TYPE_CHECKING:
@@ -83,7 +86,6 @@ class CachedHouse:
     @cached_property
     def sky(self) -> Sky:
         """The sky over this house; BadRecipe when the recipe's panoramas cannot be had."""
-        from pbrs_farm.run.panoramas import panorama_for_house
         from pbrs_farm.transport.scene_tables.sky import sky_for_house
 
         # Choose the panorama by the house's id, so that all its views have one sky.
@@ -154,3 +156,38 @@ class HouseCache:
         if self._held is not None:
             self._held[1].close()
             self._held = None
+
+
+# The panorama of a house: a file of the recipe's folder, by the house's id. Effects: reads files.
+
+
+SUFFIXES = (".exr", ".hdr")
+
+
+def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.floating]] | None:
+    """(name, (H, W, 3) linear radiance) of a house's sky; None when the recipe wants no panorama.
+
+    Without a folder in the recipe those of Debian's blender-data are taken (skies.py).
+
+    Raises BadRecipe when the folder is missing or holds no outdoor panorama.
+    """
+    if recipe.sky.kind != "panorama":
+        return None
+    from pbrs_farm.images import decode_radiance
+    from pbrs_farm.transport.scene_tables.sky import choose_panorama
+
+    folder = Path(recipe.sky.panoramas) if recipe.sky.panoramas else fetch_skies()
+    if not folder.is_dir():
+        hint = "`pbrs-farm skies` fetches four; or --set sky.kind=sunsky"
+        raise BadRecipe(f"sky.panoramas: {folder} is no folder of panoramas", hint=hint)
+    # Choose by name and house, not by the folder's order: each machine takes the same.
+    files = {p.name: p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES}
+    name = choose_panorama(list(files), house_id, recipe.seed)
+    return name, decode_radiance(_bytes(files[name]), name)
+
+
+def _bytes(file: Path) -> bytes:
+    try:
+        return read_regular(file)
+    except OSError as error:
+        raise BadRecipe(f"sky.panoramas: {file} {fault_of(error)}") from None

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import Any, Final
 
 import numpy as np
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.formats.layer_file import layer_bytes
@@ -20,6 +24,7 @@ from pbrs_farm.formats.radiance_exr import RadianceExr, radiance_from_exr
 from pbrs_farm.formats.view_json import lamps_from_view_json
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.run.output_root import attribution
+from pbrs_farm.store import StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
 from pbrs_farm.transport.develop.mode_pictures import Factor, LinearAovs, denoised, develop
@@ -129,3 +134,40 @@ def _is_named(row: Mapping[str, Any], word: str) -> bool:
     item, name = str(row["item"]), str(row["name"])
     is_it = word in (str(row["number"]), item, name) or item.startswith(f"{word}/")
     return is_it or ("*" in word and (fnmatchcase(item, word) or fnmatchcase(name, word)))
+
+
+# A view of any store as a folder, for as long as it is used. Effects: network, temporary files.
+
+
+_VIEW: Final = re.compile(
+    r"(?P<root>[^:]+://.+)/(?:houses|objects)/(?P<house>[^/]+)/views/(?P<view>[^/]+)/?"
+)
+
+
+@contextmanager
+def folder_of_view(word: str, settings: StoreSettings, *, needs_light: bool) -> Iterator[Path]:
+    """The folder of a view: the one that word names, or a copy of what relighting reads of a URL's.
+
+    needs_light: radiance.exr too. Raises BadInput where a URL names no view, or its store lacks one.
+    """
+    if "://" not in word:
+        yield Path(word)
+        return
+    match = _VIEW.fullmatch(word)
+    if match is None:
+        raise BadInput(word, "", "names no view", hint="URL/houses/HOUSE/views/VIEW")
+    house, view = match["house"], match["view"]
+    store = store_from_url(match["root"], settings)
+    wanted = [keys.RECIPE, keys.view_key(house, view, "view.json")]
+    if needs_light:
+        wanted.append(keys.view_key(house, view, RADIANCE_EXR))
+    with TemporaryDirectory(prefix="pbrs-view-") as folder:
+        copy = FolderStore(Path(folder))
+        for key in (*wanted, keys.house_key(house, "house.json")):
+            try:
+                copy.put(key, store.get(key))
+            except ObjectMissing:
+                # Only the line of credit stands in house.json.
+                if key in wanted:
+                    raise BadInput(word, key, "not in this store") from None
+        yield Path(folder) / keys.view_key(house, view)

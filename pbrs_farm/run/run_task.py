@@ -23,9 +23,9 @@ from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.raycast.variant import choose_variant, set_threads
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.processes.child_process import Handler, Message, Send
 from pbrs_farm.run.processes.limits import give_back_memory
-from pbrs_farm.run.processes.message import Handler, Message, Send
-from pbrs_farm.run.processes.render_task import Event, Setting, Task, task_from_line
+from pbrs_farm.run.processes.render_task import Event, RenderTask, Setting, task_from_line
 from pbrs_farm.run.step_cache import Outcome, Work
 from pbrs_farm.store import store_from_url
 
@@ -35,9 +35,9 @@ _DRJIT_STEPS = ("house", "cameras", "pairs", "truth", "illuminance", "light", "d
 
 _OF_LIGHT = (
     "pbrs_farm.run.steps", "pbrs_farm.formats.house_bundle", "pbrs_farm.transport.light_scene",
-    "pbrs_farm.transport.illuminance", "pbrs_farm.transport.guiding.lampshade_exitance",
-    "pbrs_farm.transport.guiding.pilot", "pbrs_farm.transport.sample_passes",
-    "pbrs_farm.run.panoramas", "pbrs_farm.run.pilot_views", "pbrs_farm.run.blurred_camera",
+    "pbrs_farm.transport.illuminance", "pbrs_farm.transport.lampshade_exitance",
+    "pbrs_farm.transport.pilot", "pbrs_farm.transport.sample_passes",
+    "pbrs_farm.run.house_cache", "pbrs_farm.run.chosen_cameras", "pbrs_farm.run.chosen_cameras",
 )  # fmt: skip
 _OF_FINISHING = (
     "pbrs_farm.run.steps", "pbrs_farm.read.sweethome3d", "pbrs_farm.dress.dressing",
@@ -85,7 +85,7 @@ def _load(modules: Sequence[str]) -> None:
         choose_variant()
 
 
-def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Task) -> None:
+def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: RenderTask) -> None:
     """Run the steps of one task; a failed one leaves out those that read what it makes."""
     work = Work(
         store=store_from_url(setting.store_url, setting.store),

@@ -24,8 +24,7 @@ from pbrs_farm.core.house import House, Room, geometry_from_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.formats.cameras_json import cameras_json
-from pbrs_farm.formats.illuminance_json import illuminance_json
+from pbrs_farm.formats.cameras_json import cameras_json, illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.marker import Marker, read_marker
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
@@ -34,13 +33,19 @@ from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.formats.view_json import view_description, view_json
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
+from pbrs_farm.run.develop_step import view_histogram
+from pbrs_farm.run.dress_catalogue import house_of_source
 from pbrs_farm.run.dressed_house import dressed, furnished
 from pbrs_farm.run.house_cache import CachedHouse
-from pbrs_farm.run.house_of_source import house_of_source
-from pbrs_farm.run.light_checkpoint import LightCheckpoint
 from pbrs_farm.run.processes.verb_process import doing
-from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, required_source, run_unless_done
-from pbrs_farm.run.view_histogram import view_histogram
+from pbrs_farm.run.step_cache import (
+    LightCheckpoint,
+    Outcome,
+    StepOutput,
+    Work,
+    required_source,
+    run_unless_done,
+)
 
 if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
@@ -243,8 +248,7 @@ def _missed(cached: CachedHouse, camera: Camera) -> Bools:
 
 def _light(work: Work) -> StepOutput:
     """radiance.exr: both light groups (and each lamp) as linear images, with the denoiser's guides."""
-    from pbrs_farm.run.blurred_camera import blurred
-    from pbrs_farm.run.pilot_views import pilot_of_view
+    from pbrs_farm.run.chosen_cameras import blurred, pilot_of_view
     from pbrs_farm.transport.lamp_layers import layer_name
 
     # Render; the seed knows all that changes the picture and nothing else.

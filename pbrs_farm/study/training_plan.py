@@ -16,7 +16,7 @@ TASKS: Final = ("normals", "segmentation", "boundaries")
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class TrainingPlan:
     """All that a training depends on beside its views and its seed."""
 
     name: str
@@ -116,20 +116,20 @@ _PLAIN: Final[dict[str, Any]] = {"gain": 0.0, "gamma": 0.0, "tint": 0.0, "noise"
 _EDGE_JUDGING: Final[dict[str, Any]] = {"judge_views": 8, "final_views": 60}
 _QVGA: Final[dict[str, Any]] = {"width_px": 320, "height_px": 240}
 # Section 4.1: RMSprop from 1e-3, halved every 300 k steps; batch and length as the code has them.
-_PAPER_NORMALS = Plan(
+_PAPER_NORMALS = TrainingPlan(
     "paper", "normals", "paper", **_QVGA, **_PLAIN, batch=10, steps=1_137_000,
     optimiser="rmsprop", rate=1e-3, weight_decay=0.0, clip_norm=0.0, schedule="steps",
     loss_over="all", flip=False, checkpoint_every=2000, log_every=100, judge_every=20_000,
     final_views=2000,
 )  # fmt: skip
 # Section 4.2: SGD at 1e-5; the front end of Yu and Koltun with batch 14, momentum .9.
-_PAPER_CLASSES = Plan(
+_PAPER_CLASSES = TrainingPlan(
     "paper", "segmentation", "dilated", **_QVGA, **_PLAIN, batch=14, steps=60_000,
     optimiser="sgd", rate=1e-5, weight_decay=5e-4, clip_norm=0.0, schedule="constant",
     encoding="caffe", checkpoint_every=1000, log_every=50, judge_every=2000, final_views=2000,
 )  # fmt: skip
 # Section 4.3 with HED's released solver: batch 1 x 10, decay 2e-4, rates by layer.
-_PAPER_EDGES = Plan(
+_PAPER_EDGES = TrainingPlan(
     "paper", "boundaries", "hed", **_QVGA, **_PLAIN, batch=1, accumulate=10, steps=300_000,
     optimiser="sgd", rate=1e-6, weight_decay=2e-4, clip_norm=0.0, schedule="steps",
     rate_factor=0.1, released_rates=True, edge_sum=True, encoding="caffe",
@@ -140,20 +140,20 @@ _H200: Final[dict[str, Any]] = {
     "judge_every": 1000, "memory_gb": 32.0, "workers": 8,
 }  # fmt: skip
 # The best of sixteen trials, and longer, on homes that never trained (docs/study.md).
-_TINY_NORMALS = Plan(
+_TINY_NORMALS = TrainingPlan(
     "tiny", "normals", "residual", steps=4000, rate=1.5e-3, weight_decay=0.1, gain=0.3, gamma=0.3,
     tint=0.1, hue=1.0, judge_every=400,
 )  # fmt: skip
-_TINY_CLASSES = Plan(
+_TINY_CLASSES = TrainingPlan(
     "tiny", "segmentation", "residual", steps=1500, rate=2e-3, weight_decay=0.1, hue=0.3,
     judge_every=150,
 )  # fmt: skip
-_TINY_EDGES = Plan(
+_TINY_EDGES = TrainingPlan(
     "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01,
     judge_every=200, **_EDGE_JUDGING,
 )  # fmt: skip
 
-PLANS: Final[dict[tuple[str, str], Plan]] = {
+PLANS: Final[dict[tuple[str, str], TrainingPlan]] = {
     (plan.name, plan.task): plan
     for plan in (
         _TINY_NORMALS, _TINY_CLASSES, _TINY_EDGES,
@@ -175,7 +175,7 @@ PLANS: Final[dict[tuple[str, str], Plan]] = {
 PLAN_NAMES: Final = tuple(dict.fromkeys(name for name, _ in PLANS))
 
 
-def plan_of(task: str, name: str, overrides: dict[str, str] | None = None) -> Plan:
+def plan_of(task: str, name: str, overrides: dict[str, str] | None = None) -> TrainingPlan:
     """The plan by name for a task, with fields set from text. Raises BadInput."""
     if task not in TASKS:
         raise BadInput("train", task, "no such task", hint=f"of {', '.join(TASKS)}")
@@ -183,11 +183,11 @@ def plan_of(task: str, name: str, overrides: dict[str, str] | None = None) -> Pl
     if plan is None:
         known = ", ".join(n for n, t in PLANS if t == task)
         raise BadInput("--plan", name, f"no such plan for {task}", hint=f"of {known}")
-    hints = get_type_hints(Plan)
+    hints = get_type_hints(TrainingPlan)
     changed: dict[str, Any] = {}
     for field, text in (overrides or {}).items():
         if field not in hints or field in ("name", "task"):
-            known = ", ".join(f.name for f in fields(Plan)[2:])
+            known = ", ".join(f.name for f in fields(TrainingPlan)[2:])
             raise BadInput("--set", field, "no such field of a plan", hint=f"of {known}")
         changed[field] = _value(hints[field], field, text)
     return replace(plan, **changed)
@@ -204,27 +204,27 @@ def _value(kind: type, field: str, text: str) -> Any:
     raise BadInput("--set", f"{field}={text}", f"expected {kind.__name__}")
 
 
-def plan_as_json(plan: Plan) -> dict[str, Any]:
+def plan_as_json(plan: TrainingPlan) -> dict[str, Any]:
     """Every field by its name."""
     return asdict(plan)
 
 
-def plan_as_trained(plan: Plan) -> dict[str, Any]:
+def plan_as_trained(plan: TrainingPlan) -> dict[str, Any]:
     """Every field that weights or figures depend on: what a run that goes on must share."""
     row = {name: value for name, value in asdict(plan).items() if name not in _FREE}
     # A field that came later is left out where it changes nothing: runs of before go on.
     return row if plan.hue else {name: value for name, value in row.items() if name != "hue"}
 
 
-def plan_from_json(row: dict[str, Any], file: str) -> Plan:
+def plan_from_json(row: dict[str, Any], file: str) -> TrainingPlan:
     """The plan that a run's record holds; BadInput names the file where it is none."""
     try:
-        return Plan(**row)
+        return TrainingPlan(**row)
     except TypeError:
         raise BadInput(file, "plan", "not a plan of this version") from None
 
 
-def rate_at(plan: Plan, step: int) -> float:
+def rate_at(plan: TrainingPlan, step: int) -> float:
     """The learning rate of a step, 0 the first: a function of the step alone."""
     if plan.schedule == "constant":
         return plan.rate

@@ -19,8 +19,14 @@ from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.lamp_layers import MAX_SUMS, with_lamp_layers
-from pbrs_farm.transport.light_result import LightResult, blackened, joined_result, result_from_sums
-from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
+from pbrs_farm.transport.light_result import (
+    LightResult,
+    NoCheckpoint,
+    RenderCheckpoint,
+    blackened,
+    joined_result,
+    result_from_sums,
+)
 from pbrs_farm.transport.scene_tables.portals import nearest_portals, portals_of_house
 from pbrs_farm.transport.scene_tables.scene_tables import (
     SceneTables,
@@ -193,8 +199,8 @@ class LightScene:
         if self.variant.startswith("scalar"):
             return {}
         mitsuba(self.variant)
-        from pbrs_farm.transport.guiding.pilot import weights_by_distance
         from pbrs_farm.transport.illuminance import floor_points, illuminance_lx
+        from pbrs_farm.transport.pilot import weights_by_distance
 
         # Weight the lamps by their distance: there is no view that a pilot could render.
         spheres = bounding_spheres(self.tables)
@@ -268,7 +274,7 @@ class LightScene:
         self, camera: Camera, fields: LightFields, seed: int
     ) -> tuple[Any, EmitterWeights]:
         """(emitters, their EmitterWeights) with the sampling weights of this view."""
-        from pbrs_farm.transport.guiding.pilot import pilot_weights, trial_weights, uniform_weights
+        from pbrs_farm.transport.pilot import pilot_weights, trial_weights, uniform_weights
 
         # Start from uniform weights; a pilot measures what each emitter brings to the view.
         portals = nearest_portals(self._portals, camera.eye)
@@ -297,8 +303,8 @@ class LightScene:
         # Measure the lampshades' exitance once, with rays that are not guided yet and every lamp
         # alike: whichever view or room is first changes no picture.
         if self._emitters is None:
-            from pbrs_farm.transport.guiding.lampshade_exitance import guiding_targets, pdfs_by_face
-            from pbrs_farm.transport.guiding.pilot import uniform_weights
+            from pbrs_farm.transport.lampshade_exitance import guiding_targets, pdfs_by_face
+            from pbrs_farm.transport.pilot import uniform_weights
 
             uniform = uniform_weights(self.n_lamps, len(portals))
             self._emitters = Emitters(self.tables, self.sky, portals, uniform)

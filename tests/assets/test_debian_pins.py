@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.assets import debian, debian_pins, furniture_package, homes_package, skies
-from pbrs_farm.assets.debian import fetched_deb, version_of
-from pbrs_farm.assets.debian_pins import PINS, Pin, download_pinned
+from pbrs_farm.assets import debian, furniture_package, homes_package, skies
+from pbrs_farm.assets.debian import PINS, Pin, download_pinned, fetched_deb, version_of
 from pbrs_farm.core.errors import MachineFailed
 
 DATA = b"a Debian package" * 1000
@@ -44,7 +43,7 @@ def mirror(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, bytes]]:
     thread.start()
     monkeypatch.setenv("PBRS_DEBIAN_MIRROR", f"http://127.0.0.1:{server.server_port}/debian/")
     monkeypatch.setenv("PATH", "")
-    monkeypatch.setitem(debian_pins.PINS, PIN.package, PIN)
+    monkeypatch.setitem(debian.PINS, PIN.package, PIN)
     yield files
     server.shutdown()
     thread.join()

@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 
 from pbrs_farm.board.board_state import new_board
-from pbrs_farm.board.farm.live_farm import LiveFarm
+from pbrs_farm.board.live_farm import LiveFarm
 from pbrs_farm.board.options import BoardOptions
 from pbrs_farm.board.serve import bound_socket, server_of
 from pbrs_farm.store import store_from_url

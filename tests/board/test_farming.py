@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from pbrs_farm.board.farm.live_farm import LiveFarm
+from pbrs_farm.board.live_farm import LiveFarm
 from pbrs_farm.cli import main
 from pbrs_farm.core.recipe import recipe_from_name
 from tests.board.served import log_in, served

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pbrs_farm.board.pictures.tried_viewpoints import candidates
+from pbrs_farm.board.pages.tried_viewpoints import candidates
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name

@@ -13,8 +13,7 @@ import pytest
 
 from pbrs_farm.board.index.queries import Queries, filter_from_query, page_number
 from pbrs_farm.board.index.refresh import Refresher
-from pbrs_farm.board.index.stored_houses import HouseRow, ViewRow
-from pbrs_farm.board.index.view_index import ViewIndex
+from pbrs_farm.board.index.view_index import HouseRow, ViewIndex, ViewRow
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.images import array_from_png, decode_photo
 from pbrs_farm.store import MemoryStore

@@ -10,7 +10,7 @@ import httpx
 import numpy as np
 import pytest
 
-from pbrs_farm.board.pictures.light_layers import lamp_rows, packet, scale_of
+from pbrs_farm.board.pages.relighting import lamp_rows, packet, scale_of
 from tests.board.roots import HEIGHT, WIDTH, light_images, write_root
 from tests.board.served import served
 

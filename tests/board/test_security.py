@@ -8,9 +8,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from pbrs_farm.board.options import Limits, is_loopback
-from pbrs_farm.board.security.rates import Buckets
-from pbrs_farm.board.security.sessions import Sessions
+from pbrs_farm.board.guard import Buckets
+from pbrs_farm.board.options import BoardLimits, is_loopback
+from pbrs_farm.board.sessions import Sessions
 from pbrs_farm.store.secret import Secret
 from tests.board.roots import write_root, write_view
 from tests.board.served import TOKEN, log_in, served
@@ -213,7 +213,7 @@ def test_a_view_json_of_nonsense_is_shown_as_far_as_it_goes(tmp_path: Path) -> N
 
 
 def test_who_asks_too_often_waits(root: Path, tmp_path: Path) -> None:
-    limits = Limits(requests_per_s=0.001, burst=5)
+    limits = BoardLimits(requests_per_s=0.001, burst=5)
     with served(str(root), tmp_path, limits=limits) as client:
         codes = [client.get("/health").status_code for _ in range(7)]
         assert codes == [200] * 5 + [429] * 2

@@ -18,7 +18,7 @@ from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.curate import selection_run as selecting
 from pbrs_farm.formats.histogram_json import record_from_json
-from pbrs_farm.run.view_histogram import view_histogram
+from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.store import MemoryStore
 from tests.selection.histogram_sets import FIELDS, record, reference
 

@@ -9,8 +9,8 @@ import pytest
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice
+from pbrs_farm.export.coco import compressed_runs, run_lengths
 from pbrs_farm.export.export_views import export
-from pbrs_farm.export.run_lengths import compressed_runs, run_lengths
 from pbrs_farm.images import array_from_png, png_from_array
 from tests.check.roots import SIZE, make_root
 

@@ -5,7 +5,7 @@ import io
 import numpy as np
 from PIL import Image
 
-from pbrs_farm.gallery.before_after import before_after_png
+from pbrs_farm.gallery.contact_sheet import before_after_png
 
 
 def _sheet(caption: str) -> Image.Image:

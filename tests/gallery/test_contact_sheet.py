@@ -17,8 +17,8 @@ from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.classes import NYU40_COLOURS
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
+from pbrs_farm.gallery import contact_sheet, gallery_page, view_tiles
 from pbrs_farm.gallery import contact_sheet as sheet
-from pbrs_farm.gallery import gallery_page, lettering, view_tiles
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
 from pbrs_farm.gallery.view_tiles import TILES, Tile
@@ -240,11 +240,11 @@ def test_names_are_drawn_in_the_script_they_are_written_in(tmp_path: Path) -> No
     write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – Спальня")
     assert sheet.contact_sheet(tmp_path)
     assert "Modèle d’Élise – Спальня" in gallery(tmp_path)
-    assert not any("?" in part for _font, part in lettering._parts("Modèle d’Élise –"))
+    assert not any("?" in part for _font, part in contact_sheet._parts("Modèle d’Élise –"))
 
 
 def test_a_letter_that_no_font_has_is_a_question_mark() -> None:
-    assert "".join(part for _font, part in lettering._parts("a\u0378b\ufe0f")) == "a?b"
+    assert "".join(part for _font, part in contact_sheet._parts("a\u0378b\ufe0f")) == "a?b"
 
 
 def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:

@@ -13,9 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.run.processes.child_process import ChildProcess
+from pbrs_farm.run.processes.child_process import ChildProcess, Handler, Message, Send
 from pbrs_farm.run.processes.limits import ProcessLimits
-from pbrs_farm.run.processes.message import Handler, Message, Send
 from pbrs_farm.run.processes.render_process import Ended, RenderProcess
 from tests.run.fake_child import FakeChild, FakeClock
 

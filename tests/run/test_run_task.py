@@ -8,8 +8,8 @@ from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.read.source import resolve
 from pbrs_farm.run import run_task
 from pbrs_farm.run.house_cache import HouseCache
-from pbrs_farm.run.processes.message import Message
-from pbrs_farm.run.processes.render_task import Setting, Task
+from pbrs_farm.run.processes.child_process import Message
+from pbrs_farm.run.processes.render_task import RenderTask, Setting
 
 
 def test_memory_is_given_back_once_a_house_is_made(
@@ -25,6 +25,6 @@ def test_memory_is_given_back_once_a_house_is_made(
     def hear(message: Message) -> None:
         said.append(f"{message.kind} {message.body.get('step', message.text)}")
 
-    task = Task(source.house_id, ("house", "cameras"), source)
+    task = RenderTask(source.house_id, ("house", "cameras"), source)
     run_task.run_task(hear, setting, HouseCache(), task)
     assert said == ["step house", "given back", "event house", "step cameras", "event cameras"]

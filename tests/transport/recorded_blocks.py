@@ -19,7 +19,7 @@ from pbrs_farm.core.recipe import LightFields, recipe_from_name
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sunsky
 from pbrs_farm.transport.validation import known_rooms
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 from tests.transport import hard_rooms
 
 FILE: Final = Path(__file__).with_suffix(".json")

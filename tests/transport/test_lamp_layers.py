@@ -20,7 +20,7 @@ from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 
 needs_kernels = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"

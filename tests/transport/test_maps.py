@@ -18,9 +18,9 @@ from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
 from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
 from tests.transport.metropolis.test_metropolis import METROPOLIS
 from tests.transport.test_path_tracer import FIELDS, RECIPE
 

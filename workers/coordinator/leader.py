@@ -6,6 +6,7 @@ whatever the size of a job; it may be killed at any time, and a standby takes ov
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 import os
@@ -15,17 +16,26 @@ import signal
 import sys
 import threading
 import time
+import urllib.request
 from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, Final
+from urllib.parse import urlsplit
 
-from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.errors import BadInput, PbrsError
+from pbrs_farm.store.secret import Secret
 from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.coordinator.progress_rates import Rates, mean_s
 from workers.coordinator.shares import Shares, is_in, n_ready, stage_of_lane
 from workers.ids import LEASES, STAGES, lane_of, queue_of, task_from_text
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.task_ledger import JobView, Ledger, LedgerUnavailable, WorkerRegistry
+from workers.ledger.task_ledger import (
+    WITH_FAILURES,
+    JobView,
+    Ledger,
+    LedgerUnavailable,
+    WorkerRegistry,
+)
 from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
 from workers.logs import log_to_stderr
@@ -258,7 +268,6 @@ def _notice(config: FarmConfig, ledger: RedisLedger) -> Callable[[], None]:
     """What tells the configured webhook; nothing where there is none."""
     if not config.webhook.reveal():
         return lambda: None
-    from workers.coordinator.webhook import Webhook, poster, watch_jobs
 
     return watch_jobs(Webhook(ledger, poster(config.webhook)), ledger)
 
@@ -287,6 +296,111 @@ def main() -> int:
     send = celery_sender(make_app(config))
     Coordinator(config, ledger, send, registry=Registry(ledger), notice=notice).run(stop)
     return 0
+
+
+# Tells a URL when a job ends or pauses itself: one POST of JSON. Effects: a request, the ledger.
+# The ledger keeps what was told last of each job, so a new leader repeats nothing and misses
+# nothing.
+
+
+_webhook_log = logging.getLogger("pbrs.webhook")
+_TIMEOUT_S: Final = 10.0
+_MOST_TRIES: Final = 5
+_NEWEST: Final = 50  # jobs that are looked at
+_TOLD_STATES: Final = ("done", WITH_FAILURES, "paused", "cancelled")
+
+Post = Callable[[dict[str, Any]], None]
+
+
+class Webhook:
+    """Looks at jobs as the leader sees them and posts each new end or pause. post: may raise OSError."""
+
+    def __init__(self, ledger: Ledger, post: Post) -> None:
+        self._ledger = ledger
+        self._post = post
+        self._tries: Counter[tuple[str, str]] = Counter()
+
+    def look(self, views: list[JobView]) -> None:
+        """Tell what is new of these jobs."""
+        for view in views:
+            told = view.fields.get("told", "")
+            if view.outcome not in _TOLD_STATES:
+                # A job that runs again may end or pause again.
+                if told:
+                    self._ledger.set_told(view.job_id, "")
+            elif view.outcome != told:
+                self._tell(view)
+
+    def _tell(self, view: JobView) -> None:
+        try:
+            self._post(notice(view))
+        except (OSError, ValueError) as error:
+            self._tries[view.job_id, view.outcome] += 1
+            _webhook_log.warning("the webhook took nothing: %s", error)
+            if self._tries[view.job_id, view.outcome] < _MOST_TRIES:
+                return
+        self._ledger.set_told(view.job_id, view.outcome)
+
+
+def notice(view: JobView) -> dict[str, Any]:
+    """What is posted of a job; `text` is what chat programs show."""
+    counts = view.counts
+    reason = view.fields.get("reason", "")
+    row: dict[str, Any] = {
+        "job": view.job_id,
+        "state": view.outcome,
+        "reason": reason,
+        "recipe": view.fields.get("recipe_name", ""),
+        "houses": int(view.fields.get("n_houses", 0)),
+        "houses_done": int(counts.get("houses:done", 0)),
+        "houses_quarantined": int(counts.get("houses:quarantined", 0)),
+        "views": int(counts.get("views", 0)),
+        "tasks_failed": view.n_failed,
+    }
+    text = f"pbrs_farm: job {view.job_id} {view.outcome}{f': {reason}' if reason else ''}"
+    text += f"; {row['houses_done']} of {row['houses']} houses, {row['views']} views"
+    if view.n_failed:
+        text += f", {view.n_failed} task{'s' if view.n_failed > 1 else ''} failed"
+    return row | {"text": text}
+
+
+def poster(url: Secret) -> Post:
+    """A Post to the URL. Raises BadInput for one that is no http or https."""
+    if urlsplit(url.reveal()).scheme not in ("http", "https"):
+        raise BadInput("environment", "PBRS_WEBHOOK", "expected an http:// or https:// URL")
+
+    def post(row: dict[str, Any]) -> None:
+        request = urllib.request.Request(
+            url.reveal(), json.dumps(row).encode(), {"Content-Type": "application/json"}
+        )
+        with urllib.request.urlopen(request, timeout=_TIMEOUT_S):
+            pass
+
+    return post
+
+
+def watch_jobs(webhook: Webhook, ledger: Ledger) -> Callable[[], None]:
+    """What the leader calls now and then: a look at the newest jobs, in a thread of its own.
+
+    A URL that does not answer holds up no task; while one look lasts no other begins.
+    """
+    # Taken by begin, given back by the thread that it starts.
+    busy = threading.Lock()
+
+    def look() -> None:
+        try:
+            known = ledger.known_jobs()[-_NEWEST:]
+            webhook.look([v for job in known if (v := ledger.view(job)) is not None])
+        except LedgerUnavailable as error:
+            _webhook_log.warning("no notice: %s", error)
+        finally:
+            busy.release()
+
+    def begin() -> None:
+        if busy.acquire(blocking=False):
+            threading.Thread(target=look, daemon=True).start()
+
+    return begin
 
 
 if __name__ == "__main__":

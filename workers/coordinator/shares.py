@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from workers.ids import GEOMETRY, JOB, LIGHT, LIGHT_GPU, lane_of
-from workers.job_priority import DEFAULT_PRIORITY
+from workers.job import DEFAULT_PRIORITY
 from workers.ledger.task_ledger import STATES, JobView
 
 _RATIO: Final = 9  # tasks of a job for one of a job of the next lower rank

@@ -8,14 +8,14 @@ import time
 from dataclasses import dataclass
 from typing import Final
 
-from pbrs_farm.board.index.stored_houses import (
+from pbrs_farm.board.index.view_index import (
     HouseRow,
+    ViewIndex,
     house_fingerprints,
     read_house,
     selection_fingerprint,
     verdicts,
 )
-from pbrs_farm.board.index.view_index import ViewIndex
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.store.folder import FolderStore

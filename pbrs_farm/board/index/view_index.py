@@ -6,15 +6,181 @@ thread has a connection of its own.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sqlite3
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
-from pbrs_farm.board.index.stored_houses import HouseRow
+from pbrs_farm.board.root_reader import RootReader
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import PbrsError, StoreFailed
+from pbrs_farm.core.layers import LAYERS
 from pbrs_farm.core.lighting import ALL_MODES
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.object_store import check_key
+
+# The houses of an output root and the rows of their views, read from the store. Effects: reads
+# it.
+
+
+LAYER_BIT: Final = {layer.name: 1 << k for k, layer in enumerate(LAYERS)}
+_BIT_OF_FILE: Final = {layer.file: 1 << k for k, layer in enumerate(LAYERS)}
+_MAX_WARNINGS: Final = 8  # of a view that are kept
+_WATCHED: Final = ("done", "views", "house.json")  # what a house's step changes
+
+
+@dataclass(frozen=True, slots=True)
+class ViewRow:
+    """A view as the index keeps it."""
+
+    id: str
+    room: str  # name that can be shown
+    layers: int  # bit k: the file of LAYERS[k] is there
+    classes: int  # bit k: NYU40 class k is in view
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HouseRow:
+    """A house as the index keeps it."""
+
+    id: str
+    name: str
+    credit: str  # the line its pictures must carry, or ""
+    n_rooms: int
+    views: tuple[ViewRow, ...]
+
+
+def house_fingerprints(reader: RootReader) -> Iterator[tuple[str, str]]:
+    """(house id, a text that changes when the house does), by id.
+
+    In a folder: the times of its own folders, which every finished step touches. Elsewhere: the
+    names of its objects, so a rewritten object of the same name is not noticed.
+    """
+    store = reader.store
+    for root in keys.FOLDERS:
+        if isinstance(store, FolderStore):
+            yield from _folder_fingerprints(store.root / root)
+        else:
+            yield from _listed_fingerprints(reader.list(f"{root}/"))
+
+
+def _folder_fingerprints(folder: Path) -> Iterator[tuple[str, str]]:
+    try:
+        names = sorted(path.name for path in folder.iterdir() if path.is_dir())
+    except OSError:
+        return
+    for name in names:
+        if _is_id(name):
+            yield name, ":".join(_time(folder / name / part) for part in _WATCHED)
+
+
+def _time(path: Path) -> str:
+    try:
+        return f"{path.stat().st_mtime_ns:x}"
+    except OSError:
+        return ""
+
+
+def _listed_fingerprints(found: Iterator[str]) -> Iterator[tuple[str, str]]:
+    parts = (key.split("/", 2) for key in found)
+    in_houses = (p for p in parts if len(p) == 3)
+    for house, group in groupby(sorted(in_houses), key=lambda p: p[1]):
+        digest = hashlib.sha256("\n".join(p[2] for p in group).encode()).hexdigest()
+        yield house, digest
+
+
+def _is_id(name: str) -> bool:
+    """Whether the name of a folder can be part of a key; what cannot was not written by us."""
+    try:
+        check_key(name)
+    except StoreFailed:
+        return False
+    return True
+
+
+def read_house(reader: RootReader, house: str) -> HouseRow:
+    """The house and its views; what is damaged is left out, the rest stands."""
+    facts = reader.json_object(keys.house_key(house, "house.json"))
+    source = facts.get("source")
+    credit = source.get("attribution") if isinstance(source, dict) else ""
+    rooms = _room_names(facts.get("rooms"))
+    # Every file of a view is a key below views/<view>/.
+    prefix = keys.house_key(house, "views/")
+    named = (key.removeprefix(prefix).partition("/") for key in reader.list(prefix))
+    views = [
+        _view_row(reader, house, view, {file for _view, _slash, file in group}, rooms)
+        for view, group in groupby(sorted(p for p in named if p[2]), key=lambda p: p[0])
+    ]
+    name = shown(facts.get("name") or house)
+    return HouseRow(house, name, shown(credit or "", MAX_MESSAGE), len(rooms), tuple(views))
+
+
+def _room_names(rooms: Any) -> dict[str, str]:
+    """Room id -> its name, or its type, or its id."""
+    names: dict[str, str] = {}
+    for room in rooms if isinstance(rooms, list) else ():
+        if isinstance(room, dict) and "id" in room:
+            types = room.get("types")
+            kind = types[0] if isinstance(types, list) and types else ""
+            names[str(room["id"])] = shown(room.get("name") or kind) or f"Room {room['id']}"
+    return names
+
+
+def _view_row(
+    reader: RootReader, house: str, view: str, files: set[str], rooms: Mapping[str, str]
+) -> ViewRow:
+    facts: dict[str, Any] = {}
+    if "view.json" in files:
+        facts = reader.json_object(keys.view_key(house, view, "view.json"))
+    room = str(facts.get("room") or view.rpartition("_")[0])
+    warnings = facts.get("warnings")
+    texts = [shown(w, MAX_MESSAGE) for w in warnings] if isinstance(warnings, list) else []
+    return ViewRow(
+        id=view,
+        room=rooms.get(room) or shown(room) or "?",
+        layers=sum(_BIT_OF_FILE.get(file, 0) for file in files),
+        classes=_class_bits(facts.get("instances")),
+        warnings=tuple(texts[:_MAX_WARNINGS]),
+    )
+
+
+def _class_bits(instances: Any) -> int:
+    bits = 0
+    for row in instances if isinstance(instances, list) else ():
+        nyu40 = row.get("nyu40") if isinstance(row, dict) else None
+        if isinstance(nyu40, int) and 0 <= nyu40 <= 40:
+            bits |= 1 << nyu40
+    return bits
+
+
+def verdicts(reader: RootReader) -> dict[tuple[str, str], str]:
+    """(house, view) -> "" where the last selection kept it, else why not; {} without a selection."""
+    run = reader.json_object(keys.SELECTION).get("run")
+    if not run:
+        return {}
+    try:
+        data = reader.get(keys.selection_key(str(run), "jsonl"), 4 * 2**30)
+        rows = [json.loads(line) for line in data.splitlines()]
+        return {(str(r["house"]), str(r["view"])): shown(r["reason"]) for r in rows}
+    except (PbrsError, ValueError, RecursionError, KeyError, TypeError):
+        return {}
+
+
+def selection_fingerprint(reader: RootReader) -> str:
+    """A text that changes when another selection was made."""
+    data = reader.get_or_none(keys.SELECTION)
+    return "" if data is None else keys.sha256(data)
+
+
+# The index of an output root.
+
 
 _VERSION: Final = 1  # of the tables below
 _SCHEMA: Final = f"""

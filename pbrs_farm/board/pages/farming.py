@@ -14,10 +14,10 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response, StreamingResponse
 
-from pbrs_farm.board.farm.live_farm import LiveFarm
+from pbrs_farm.board.guard import form_of
+from pbrs_farm.board.live_farm import LiveFarm
 from pbrs_farm.board.pages.lists import board_of
 from pbrs_farm.board.pages.rendering import page
-from pbrs_farm.board.security.guard import form_of
 from pbrs_farm.core.errors import PbrsError
 
 _EVERY_S: Final = 2.0  # between two looks of a page that listens
@@ -158,7 +158,7 @@ async def steer(request: Request) -> Response:
 
 def _do(live: LiveFarm, what: str, of: str, to: str) -> str:
     """Do it to a job or worker; what came of it, for the audit. to: the new priority of a job."""
-    from workers.job_priority import priority_from_text
+    from workers.job import priority_from_text
 
     farm = live.farm
     if what == "priority":

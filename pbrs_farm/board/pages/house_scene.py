@@ -11,8 +11,8 @@ from starlette.responses import JSONResponse, Response
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.lists import asked_home, board_of
 from pbrs_farm.board.pages.rendering import thumb_url, view_url
+from pbrs_farm.board.pages.tried_viewpoints import candidates_in_process
 from pbrs_farm.board.pages.viewing import FOREVER
-from pbrs_farm.board.pictures.tried_viewpoints import candidates_in_process
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
@@ -54,7 +54,7 @@ def scene(request: Request) -> Response:
 
 
 def candidates(request: Request) -> Response:
-    """GET /homes/HOUSE/candidates.json: every viewpoint that was tried (pictures/tried_viewpoints.py)."""
+    """GET /homes/HOUSE/candidates.json: every viewpoint that was tried (pages/tried_viewpoints.py)."""
     home = asked_home(request)
     board = board_of(request)
     version = board.index.fingerprints().get(home.id, "")

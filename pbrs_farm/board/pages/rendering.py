@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
 from pbrs_farm.board.index.queries import ListedView
-from pbrs_farm.board.pictures.shown_layers import title_of
+from pbrs_farm.board.pictures import title_of
 from pbrs_farm.board.static_files import Asset
 from pbrs_farm.core.shown_text import printable, shown
 from workers.client.text import duration_text, memory_text

@@ -1,4 +1,4 @@
-// The packet of pictures/light_layers.py: planes of half floats and what they mean.
+// The packet of pages/relighting.py: planes of half floats and what they mean.
 
 const FLOATS = floatOfHalf(); // of each half float's 65,536 patterns
 

@@ -74,7 +74,7 @@ function normalText(normals, at) {
   return `${said[0]} right, ${said[1]} forward, ${said[2]} up`;
 }
 
-// The packet of pictures/label_pixels.py as typed arrays.
+// The packet of board/pictures.py as typed arrays.
 function planesOf(data) {
   const view = new DataView(data);
   const magic = String.fromCharCode(...new Uint8Array(data, 0, 4));

@@ -13,8 +13,10 @@ import select
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Any, Final, Literal, Protocol
 
 from pbrs_farm.run.processes.limits import resident_mb
 
@@ -158,3 +160,35 @@ def die_with_parent(sign: int = signal.SIGKILL) -> None:
     # The parent may have ended before prctl.
     if os.getppid() != parent:
         os.kill(os.getpid(), sign)
+
+
+# What a render process says to the process that started it; frozen values.
+
+
+# ready: it may be given a task. step: a step begins. waiting: storage does not answer.
+# share: how much of the step is done, 0..1. event: something else its parent wants to know.
+# done, fault: the end of the task.
+MessageKind = Literal["ready", "step", "waiting", "share", "event", "done", "fault"]
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One line from a render process."""
+
+    kind: MessageKind
+    text: str = ""
+    body: dict[str, Any] = field(default_factory=dict)  # JSON values that its parent understands
+
+    def line(self) -> bytes:
+        """The message as message_from_line reads it."""
+        return json.dumps(asdict(self), separators=(",", ":")).encode() + b"\n"
+
+
+def message_from_line(line: bytes) -> Message:
+    """The message a line holds."""
+    return Message(**json.loads(line))
+
+
+Send = Callable[[Message], None]
+# Runs the task a request line names; its last message, done or fault.
+Handler = Callable[[bytes], Message]

@@ -14,11 +14,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
+from pbrs_farm.run.processes.child_process import Message
 from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, child_of
 from pbrs_farm.run.processes.limits import ProcessLimits
-from pbrs_farm.run.processes.message import Message
 from pbrs_farm.run.processes.render_process import CHECK_EVERY_S, Ended, RenderProcess
-from pbrs_farm.run.processes.render_task import Event, Setting, Task, line_from_task
+from pbrs_farm.run.processes.render_task import Event, RenderTask, Setting, line_from_task
 
 RENDER: Final = 0
 """The lane of processes that do any task, or render light where another does all else."""
@@ -37,7 +37,7 @@ HANDLERS: Final = {
 class _Worker:
     process: RenderProcess
     lane: int
-    task: Task | None = None
+    task: RenderTask | None = None
     step: str = ""  # the step being done
     held_house: str = ""  # the house it keeps in memory
     done: list[str] = field(default_factory=list)  # steps of the task that ended, well or not
@@ -95,7 +95,7 @@ class Pool:
         """Houses being worked on."""
         return {w.task.house_id for w in self._workers if w.task is not None}
 
-    def give(self, task: Task, lane: int) -> None:
+    def give(self, task: RenderTask, lane: int) -> None:
         """Hand a task to an idle process of the lane, one that holds its house if there is one."""
         # Loading a house costs more than the views of a room: prefer the process that has it, then
         # a fresh process, then any.
@@ -130,12 +130,12 @@ class Pool:
                 else:
                     yield from _events_in(worker, worker.task, heard)
 
-    def _begin(self, worker: _Worker, task: Task) -> None:
+    def _begin(self, worker: _Worker, task: RenderTask) -> None:
         worker.task, worker.step, worker.done = task, task.steps[0], []
         worker.held_house = task.house_id
         worker.process.begin(line_from_task(self._setting, task))
 
-    def _ended(self, worker: _Worker, task: Task, ended: Ended) -> Iterator[Event]:
+    def _ended(self, worker: _Worker, task: RenderTask, ended: Ended) -> Iterator[Event]:
         """The end of a task; when its process died, the step fails and the rest begins anew."""
         worker.task = None
         if not ended.cause:
@@ -147,12 +147,14 @@ class Pool:
         yield Event("failed", task.house_id, task.view_id, worker.step, message=reason)
         left = tuple(s for s in task.steps if s != worker.step and s not in worker.done)
         if left:
-            self._begin(worker, Task(task.house_id, left, task.source, task.view_id, task.layers))
+            self._begin(
+                worker, RenderTask(task.house_id, left, task.source, task.view_id, task.layers)
+            )
         else:
             yield Event("end", task.house_id, task.view_id, "")
 
 
-def _events_in(worker: _Worker, task: Task, message: Message) -> Iterator[Event]:
+def _events_in(worker: _Worker, task: RenderTask, message: Message) -> Iterator[Event]:
     """The event in a message of a running task; none when it is only ready."""
     if message.kind == "step":
         worker.step = message.text

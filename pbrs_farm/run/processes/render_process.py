@@ -13,9 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from pbrs_farm.run.processes.child_process import Child, ending
+from pbrs_farm.run.processes.child_process import Child, Message, ending, message_from_line
 from pbrs_farm.run.processes.limits import ProcessLimits
-from pbrs_farm.run.processes.message import Message, message_from_line
 
 CHECK_EVERY_S: Final = 1.0
 REPORTED: Final = "reported"

@@ -17,7 +17,7 @@ from pbrs_farm.store.url import StoreSettings
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class RenderTask:
     """Steps of one house or one view, done in order by one process."""
 
     house_id: str
@@ -56,12 +56,12 @@ class Event:
     peak_mb: float = 0.0  # largest resident memory of the process so far
 
 
-_TASK = TypeAdapter(Task)
+_TASK = TypeAdapter(RenderTask)
 # What str() would blot out: revealed for the pipe to our own child, never for a file.
 _SECRETS = ("secret_key", "session_token")
 
 
-def line_from_task(setting: Setting, task: Task) -> bytes:
+def line_from_task(setting: Setting, task: RenderTask) -> bytes:
     """A task and its setting as task_from_line reads them. It holds the store's secret keys."""
     fields = {
         name: getattr(setting, name) for name in ("store_url", "n_threads", "debug", "runner")
@@ -71,7 +71,7 @@ def line_from_task(setting: Setting, task: Task) -> bytes:
     return json.dumps([text, _TASK.dump_json(task).decode()]).encode()
 
 
-def task_from_line(line: bytes) -> tuple[Setting, Task]:
+def task_from_line(line: bytes) -> tuple[Setting, RenderTask]:
     """The setting and the task of a line of line_from_task."""
     setting, task = json.loads(line)
     return _setting_from_text(setting), _TASK.validate_json(task)

@@ -16,8 +16,7 @@ import sys
 import traceback
 from typing import BinaryIO, NoReturn
 
-from pbrs_farm.run.processes.child_process import die_with_parent
-from pbrs_farm.run.processes.message import Message
+from pbrs_farm.run.processes.child_process import Message, die_with_parent
 
 
 def main(target: str) -> int:

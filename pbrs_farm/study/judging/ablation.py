@@ -12,16 +12,21 @@ from pathlib import Path
 from typing import Any
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.judging.evaluation import evaluate, open_run
-from pbrs_farm.study.judging.figure_table import is_underfit, markdown, spread_text, title_of
-from pbrs_farm.study.judging.paper_numbers import paper_row
-from pbrs_farm.study.judging.photo_views import JudgedViews
-from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.judging.evaluation import (
+    JudgedViews,
+    evaluate,
+    is_underfit,
+    markdown,
+    open_run,
+    paper_row,
+    spread_text,
+    title_of,
+)
+from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_job import Job, train
-from pbrs_farm.study.training.training_views import TrainingViews
-from pbrs_farm.study.training.view_arrays import ViewArrays
-from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views
-from pbrs_farm.study.training_plan import Plan
+from pbrs_farm.study.training.training_views import TrainingViews, ViewArrays
+from pbrs_farm.study.training.view_sources import ViewSource, held_out_views, training_views
+from pbrs_farm.study.training_plan import TrainingPlan
 
 Tell = Callable[[str], None]
 _ONE_SEED = "one seed: how far others would differ is not known"
@@ -32,7 +37,7 @@ class TrainingSet:
     """A row of the comparison."""
 
     name: str
-    source: Source
+    source: ViewSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +45,7 @@ class Comparison:
     """What is compared. out: a folder for all runs, each gone on with where it was killed."""
 
     sets: tuple[TrainingSet, ...]
-    plan: Plan
+    plan: TrainingPlan
     out: Path
     n_seeds: int = 3
     equal_views: bool = True
@@ -94,7 +99,7 @@ def _one(
     }
 
 
-def _line(row: dict[str, Any], plan: Plan) -> str:
+def _line(row: dict[str, Any], plan: TrainingPlan) -> str:
     task = task_of(plan.task)
     figure = task.figures[0]
     parts = []
@@ -161,7 +166,7 @@ def _is_underfit(task_name: str, run: dict[str, Any]) -> bool:
 
 
 def training_sets(
-    words: Sequence[str], modes: Sequence[str], source: Source
+    words: Sequence[str], modes: Sequence[str], source: ViewSource
 ) -> tuple[TrainingSet, ...]:
     """Rows of `[NAME=]ROOT[+ROOT][@MODE]`, one for each mode where none is named.
 

@@ -19,12 +19,13 @@ from pbrs_farm.study.judging.evaluation import (
     notes,
     predictions_of,
     report,
+    shown_figure,
     table,
+    title_of,
 )
-from pbrs_farm.study.judging.figure_table import shown_figure, title_of
 from pbrs_farm.study.metrics.angular import angles_deg
 from pbrs_farm.study.reading.png_rows import png_of_rows
-from pbrs_farm.study.tasks.study_task import Arrays, Task
+from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.run_folder import made_folder
 
 N_SHOWN: Final = 8  # of the worst views, and of the best
@@ -44,7 +45,7 @@ def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> 
 
 def error_page(run: Trained, evaluations: list[Evaluation]) -> str:
     """HTML without scripts; every picture is inside it."""
-    from pbrs_farm.gallery.templates import page
+    from pbrs_farm.gallery.gallery_page import page
 
     return page(
         "pbrs_farm.study.judging",
@@ -83,7 +84,9 @@ def _set(run: Trained, evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
-def _card(task: Task, evaluation: Evaluation, k: int, prediction: NDArray[Any]) -> dict[str, Any]:
+def _card(
+    task: StudyTask, evaluation: Evaluation, k: int, prediction: NDArray[Any]
+) -> dict[str, Any]:
     views, truth = evaluation.views, evaluation.views.truths[k]
     error = evaluation.rows["network"].errors[k]
     pictures = {
@@ -105,7 +108,7 @@ def _fitted(name: str, picture: NDArray[np.uint8], width: int, height: int) -> N
     return resized_by_area(picture, width, height)
 
 
-def _error_picture(task: Task, prediction: NDArray[Any], truth: Arrays) -> NDArray[np.uint8]:
+def _error_picture(task: StudyTask, prediction: NDArray[Any], truth: Arrays) -> NDArray[np.uint8]:
     """Black is right, white is wrong; blue has no truth."""
     if task.name == "normals":
         errors = angles_deg(prediction, truth["normal"]) / _WORST_DEG

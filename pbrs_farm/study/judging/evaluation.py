@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import math
+import statistics
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +16,167 @@ from torch import nn
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
-from pbrs_farm.study.judging.figure_table import is_underfit, markdown, shown_figure, title_of
-from pbrs_farm.study.judging.paper_numbers import PaperRow, paper_row, tuned_row
-from pbrs_farm.study.judging.photo_views import JudgedViews
 from pbrs_farm.study.metrics.edge_scores import EXACT_THRESHOLDS
 from pbrs_farm.study.networks.initial_weights import has_hed, start_from
 from pbrs_farm.study.networks.network_choice import network_of
-from pbrs_farm.study.tasks.edges_task import N_THRESHOLDS, EdgesTask
-from pbrs_farm.study.tasks.study_task import Task
-from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
+from pbrs_farm.study.tasks.tasks import N_THRESHOLDS, EdgesTask, task_of
 from pbrs_farm.study.training.checkpoint import load_checkpoint
 from pbrs_farm.study.training.prediction import Judged, placed, predicted, scored
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
+from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training.view_sources import NYU_LIGHT
-from pbrs_farm.study.training_plan import Plan, plan_of
+from pbrs_farm.study.training_plan import TrainingPlan, plan_of
+
+# Figures as Markdown tables: what was judged on what, beside baseline and paper; pure.
+
+
+UNDERFIT: Final = 0.8  # training error above this share of the baseline's: nothing may be ranked
+
+_TITLES: Final = {
+    "mean_deg": "mean, degrees", "median_deg": "median, degrees",
+    "below_11_25": "< 11.25", "below_22_5": "< 22.5", "below_30": "< 30",
+    "mean_iou": "mean IoU", "pixel_accuracy": "pixel accuracy",
+    "mean_accuracy": "mean accuracy", "weighted_iou": "f.w. IoU",
+    "ods": "ODS", "ois": "OIS", "ap": "AP", "r50": "R50",
+}  # fmt: skip
+
+
+def title_of(figure: str) -> str:
+    """A figure's name as tables have it."""
+    return _TITLES[figure]
+
+
+def shown_figure(figure: str, value: float) -> str:
+    """Degrees with two places, shares as per cent with one; "-" for none."""
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:.2f}" if figure.endswith("_deg") else f"{100 * value:.1f} %"
+
+
+def spread_text(figure: str, values: Sequence[float]) -> str:
+    """Mean and, of several seeds, the standard deviation of a sample."""
+    mean = shown_figure(figure, statistics.fmean(values))
+    if len(values) < 2:
+        return mean
+    scale = 1 if figure.endswith("_deg") else 100
+    return f"{mean} ± {scale * statistics.stdev(values):.2f}"
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table whose columns are as wide as their widest cell."""
+    cells = [list(head), *(list(row) for row in rows)]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(head))]
+    lines = [
+        "| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |"
+        for row in cells
+    ]
+    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
+    return "\n".join([lines[0], rule, *lines[1:]])
+
+
+def is_underfit(train_error: float, baseline_error: float) -> bool:
+    """The network hardly knows its own training views: no conclusion may be drawn from it."""
+    return train_error > UNDERFIT * baseline_error
+
+
+# The numbers of the paper's tables, by task and figure.
+# Zhang et al. 2017, tables 1 to 3, NYUv2's test split. They stand beside ours and are never mixed
+# with them: other pictures, other truth, 568,793 views and days of a GPU.
+
+
+@dataclass(frozen=True, slots=True)
+class PaperRow:
+    """A row of the paper: what it was trained on, and its figures in the order of Task.figures."""
+
+    pretrained: str
+    tuned: str
+    figures: tuple[float, ...]
+
+
+PAPER: Final[dict[str, tuple[PaperRow, ...]]] = {
+    # Mean, median, and shares below 11.25, 22.5, 30 degrees.
+    "normals": (
+        PaperRow("NYUv2 only", "", (27.30, 21.12, 0.2721, 0.5261, 0.6472)),
+        PaperRow("MLT object", "", (48.78, 47.49, 0.0356, 0.1279, 0.2135)),
+        PaperRow("MLT-OL", "", (49.33, 42.30, 0.0747, 0.2324, 0.3409)),
+        PaperRow("MLT-IL/OL", "", (27.90, 21.29, 0.2676, 0.5221, 0.6375)),
+        PaperRow("OpenGL-DL", "", (34.02, 28.00, 0.1856, 0.4114, 0.5290)),
+        PaperRow("OpenGL-IL", "", (33.06, 26.68, 0.2089, 0.4346, 0.5466)),
+        PaperRow("OpenGL-IL", "NYUv2", (23.38, 16.12, 0.3598, 0.6293, 0.7317)),
+        PaperRow("MLT-IL/OL", "NYUv2", (21.74, 14.75, 0.3937, 0.6625, 0.7606)),
+    ),
+    # Mean IoU alone is reported.
+    "segmentation": (
+        PaperRow("ImageNet (Yu et al.)", "NYUv2", (0.317,)),
+        PaperRow("ImageNet + OpenGL", "NYUv2", (0.328,)),
+        PaperRow("ImageNet + MLT", "NYUv2", (0.332,)),
+    ),
+    # ODS, OIS, AP, R50; the R50 of the first row cannot go with its ODS and AP.
+    "boundaries": (
+        PaperRow("NYUv2 only", "", (0.713, 0.725, 0.711, 0.267)),
+        PaperRow("OpenGL-IL", "", (0.523, 0.555, 0.511, 0.504)),
+        PaperRow("MLT-IL/OL", "", (0.604, 0.621, 0.587, 0.749)),
+        PaperRow("OpenGL-IL", "NYUv2", (0.716, 0.729, 0.715, 0.893)),
+        PaperRow("MLT-IL/OL", "NYUv2", (0.725, 0.736, 0.720, 0.887)),
+    ),
+}
+
+# Lighting mode -> its name in the paper.
+_NAMES: Final = {"mlt_il_ol": "MLT-IL/OL", "mlt_ol": "MLT-OL", "opengl_il": "OpenGL-IL",
+                 "opengl_dl": "OpenGL-DL"}  # fmt: skip
+
+
+def paper_row(task: str, mode: str) -> PaperRow:
+    """The paper's row for a lighting mode without fine-tuning; where it has none, MLT's best."""
+    name = _NAMES.get(mode, "MLT-IL/OL")
+    rows = PAPER[task]
+    same = [row for row in rows if row.pretrained == name and not row.tuned]
+    return same[0] if same else rows[-1]
+
+
+def tuned_row(task: str, pretrained: str) -> PaperRow:
+    """The paper's row tuned on NYUv2 from a lighting mode; without one, trained on NYUv2 alone."""
+    name = _NAMES.get(pretrained)
+    rows = PAPER[task]
+    tuned = [row for row in rows if row.tuned and name is not None]
+    # Segmentation tells MLT from OpenGL, the other tasks their lights too.
+    same = [row for row in tuned if row.pretrained == name]
+    kind = "MLT" if name and name.startswith("MLT") else "OpenGL"
+    return next(iter(same or [row for row in tuned if kind in row.pretrained]), rows[0])
+
+
+# Views to judge on whose truth has a size of its own, as of photographs.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedViews:
+    """Pictures at the network's size, and what is true of each."""
+
+    name: str  # what a table calls them
+    truth: str  # which truth and which mask, in words
+    ids: tuple[str, ...]
+    colour: NDArray[np.uint8]  # (N, h, w, 3) sRGB
+    truths: tuple[Arrays, ...]  # arrays (H, W, ...) of each view, of any size
+    credits: tuple[str, ...] = ()  # whose homes the pictures show
+
+    @property
+    def sizes(self) -> list[tuple[int, int]]:
+        """(height, width) of each truth."""
+        shapes = [next(iter(truth.values())).shape for truth in self.truths]
+        return [(int(shape[0]), int(shape[1])) for shape in shapes]
+
+
+def judged_of_arrays(
+    name: str, truth: str, views: ViewArrays, credits: tuple[str, ...] = ()
+) -> JudgedViews:
+    """Rendered views, whose truth has the network's size."""
+    truths = tuple(views.target(k) for k in range(len(views)))
+    return JudgedViews(name, truth, views.ids, views.colour, truths, credits)
+
+
+# A finished run judged on views.
+
 
 _HED_ROW = "HED untouched"
 
@@ -38,8 +187,8 @@ class Trained:
 
     folder: RunFolder
     record: dict[str, Any]
-    plan: Plan
-    task: Task
+    plan: TrainingPlan
+    task: StudyTask
     network: nn.Module
     baseline: F32
 

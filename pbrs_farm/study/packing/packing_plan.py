@@ -10,7 +10,7 @@ import numpy as np
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.study.reading.dataset_json import WHOLE
-from pbrs_farm.study.reading.view_sample import LAYERS, MODES, Request, Size
+from pbrs_farm.study.reading.view_sample import LAYERS, MODES, SampleRequest, Size
 from pbrs_farm.study.reading.views import ViewRef
 
 COLOURS = ("png", "jpeg")
@@ -35,18 +35,18 @@ class Packing:
 
     def __post_init__(self) -> None:
         for mode in self.modes:
-            Request(self.layers, mode, size=self.size)  # says what is wrong
+            SampleRequest(self.layers, mode, size=self.size)  # says what is wrong
         if self.colour not in COLOURS:
             raise BadInput("--colour", self.colour, "no such form", hint=f"of {', '.join(COLOURS)}")
         if self.views_per_shard < 1 or not 1 <= self.quality <= 100:
             text = f"{self.views_per_shard} views a shard, quality {self.quality}"
             raise BadInput("pack", "", text, hint="1 or more views, a quality of 1 to 100")
 
-    def requests(self) -> tuple[Request, ...]:
+    def requests(self) -> tuple[SampleRequest, ...]:
         """A request for the labels, and one for each mode's colour."""
         labels = tuple(layer for layer in self.layers if layer != "colour")
         modes = self.modes if "colour" in self.layers else ()
-        return (Request(labels), *(Request(("colour",), mode) for mode in modes))
+        return (SampleRequest(labels), *(SampleRequest(("colour",), mode) for mode in modes))
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
 import mmap
+import zipfile
+import zlib
 from collections import OrderedDict
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
@@ -14,6 +20,7 @@ from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.regular_files import fault_of, open_regular
 from pbrs_farm.store import Store
 from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.reading.baseline_jpeg import array_of_jpeg
 from pbrs_farm.study.reading.dataset_json import (
     DATASET_JSON,
     WHOLE,
@@ -21,7 +28,7 @@ from pbrs_farm.study.reading.dataset_json import (
     Shard,
     dataset_from_json,
 )
-from pbrs_farm.study.reading.packed_parts import arrays_of_part, part_of_array
+from pbrs_farm.study.reading.png_rows import array_of_rows, png_of_rows
 from pbrs_farm.study.reading.stored_layers import (
     Stored,
     ViewFacts,
@@ -30,9 +37,184 @@ from pbrs_farm.study.reading.stored_layers import (
     facts_from_json,
     sample_of_stored,
 )
-from pbrs_farm.study.reading.tar_members import Buffer, Member, members_of_tar
-from pbrs_farm.study.reading.view_sample import Request, Sample
+from pbrs_farm.study.reading.view_sample import Sample, SampleRequest
 from pbrs_farm.study.reading.views import ViewRef, Views
+
+# Arrays <-> deflated .npz bytes without a clock, as webdataset and numpy read them.
+
+
+_DATE: Final = (1980, 1, 1, 0, 0, 0)  # the first a zip file can hold
+_LEVEL: Final = 6
+
+
+def npz_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """.npz bytes; equal arrays give equal bytes."""
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
+        for name, array in arrays.items():
+            member = zipfile.ZipInfo(f"{name}.npy", _DATE)
+            member.compress_type = zipfile.ZIP_DEFLATED
+            part = io.BytesIO()
+            np.lib.format.write_array(part, np.ascontiguousarray(array), allow_pickle=False)
+            archive.writestr(member, part.getbuffer())
+    return whole.getvalue()
+
+
+def arrays_of_npz(data: bytes, place: str) -> dict[str, NDArray[Any]]:
+    """Name -> array; BadInput, naming place, where data is no .npz or is damaged."""
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        EOFError,
+        AttributeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ):
+        raise BadInput(place, "", "not an .npz of arrays, or damaged") from None
+
+
+# The parts of a packed view: which file of a shard holds which array, written and read.
+# Arrays of 8 bits are PNGs that zlib and numpy undo, colour a JPEG where it was packed so; arrays
+# of 16 bits are .npz, which no picture decoder can make 8 bits of.
+
+
+# Array -> the part that holds it; colour is <mode>.png or <mode>.jpg.
+_PARTS: Final = {
+    "normal": "normal.npz",
+    "valid": "normal.npz",
+    "depth": "depth.npz",
+    "class40": "class40.png",
+    "instance": "instance.npz",
+    "boundary": "boundary.png",
+}
+
+
+def label_parts(stored: Stored) -> dict[str, bytes]:
+    """Part -> bytes of a view's labels, in a fixed order."""
+    parts: dict[str, bytes] = {}
+    for part in dict.fromkeys(_PARTS.values()):
+        arrays = {n: stored[n] for n, own in _PARTS.items() if own == part and n in stored}
+        if arrays:
+            is_npz = part.endswith(".npz")
+            parts[part] = npz_of_arrays(arrays) if is_npz else png_of_rows(*arrays.values())
+    return parts
+
+
+def part_of_array(name: str, mode: str, parts: Collection[str]) -> str:
+    """The part that holds an array of a view that has these parts."""
+    if name != "colour":
+        return _PARTS[name]
+    return f"{mode}.jpg" if f"{mode}.jpg" in parts else f"{mode}.png"
+
+
+def arrays_of_part(names: Sequence[str], part: str, data: bytes, place: str) -> Stored:
+    """The arrays of those names in a part; BadInput, naming place, where it is damaged."""
+    if part.endswith(".npz"):
+        arrays = arrays_of_npz(data, place)
+        for name in names:
+            if name not in arrays:
+                raise BadInput(place, "", f"has no array {name}")
+        return {name: arrays[name] for name in names}
+    array = _jpeg_array(data, place) if part.endswith(".jpg") else array_of_rows(data, place)
+    if array is None:
+        raise BadInput(place, "", "a PNG of another program", hint="`pbrs-farm pack` writes shards")
+    return dict.fromkeys(names, array)
+
+
+def _jpeg_array(data: bytes, place: str) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 of a JPEG, by the first decoder there is: OpenCV, Pillow, our own."""
+    for decoder in (_by_opencv, _by_pillow, array_of_jpeg):
+        try:
+            array = decoder(data)
+        except ImportError:
+            continue
+        except (OSError, ValueError):
+            array = None
+        if array is not None:
+            return array
+        break
+    raise BadInput(place, "", "cannot be read as a JPEG: damaged")
+
+
+def _by_opencv(data: bytes) -> NDArray[np.uint8] | None:
+    import cv2
+
+    bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    return None if bgr is None else np.ascontiguousarray(bgr[..., ::-1])
+
+
+def _by_pillow(data: bytes) -> NDArray[np.uint8]:
+    from PIL import Image
+
+    with Image.open(io.BytesIO(data), formats=["JPEG"]) as picture:
+        return np.asarray(picture.convert("RGB"))
+
+
+# Tar shards written without a clock and read by offset, with numpy's memory at most.
+# The form is POSIX ustar with plain files only, which webdataset, tar and Python's tarfile read.
+
+
+_BLOCK: Final = 512
+_MAX_NAME: Final = 100  # bytes, of ustar without a prefix
+Buffer = bytes | memoryview
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A file of a tar: where its bytes lie."""
+
+    name: str
+    at: int
+    n_bytes: int
+
+
+def tar_member(name: str, data: bytes) -> bytes:
+    """Header, bytes and padding of one file: mode 644, no owner, time 0."""
+    encoded = name.encode()
+    if len(encoded) > _MAX_NAME:
+        raise BadInput(name, "", f"a name in a shard has at most {_MAX_NAME} bytes")
+    header = bytearray(_BLOCK)
+    header[: len(encoded)] = encoded
+    numbers = (b"0000644\0", b"0000000\0", b"0000000\0", b"%011o\0" % len(data), b"%011o\0" % 0)
+    header[100:148] = b"".join(numbers)
+    header[148:156] = b" " * 8  # the checksum is taken with spaces in its place
+    header[156:157] = b"0"
+    header[257:265] = b"ustar\x0000"
+    header[148:156] = b"%06o\0 " % sum(header)
+    return bytes(header) + data + bytes(-len(data) % _BLOCK)
+
+
+def tar_end() -> bytes:
+    """What ends a tar: two empty blocks."""
+    return bytes(2 * _BLOCK)
+
+
+def members_of_tar(tar: Buffer, place: str) -> Iterator[Member]:
+    """The files of a tar in its order; BadInput, naming place, where it is damaged or cut short."""
+    at = 0
+    while at + _BLOCK <= len(tar):
+        header = bytes(tar[at : at + _BLOCK])
+        if not any(header):
+            return
+        if header[257:262] != b"ustar" or header[156:157] not in (b"0", b"\0"):
+            raise BadInput(place, f"byte {at}", "not a shard of plain files: damaged")
+        name = header[:_MAX_NAME].rstrip(b"\0").decode("utf-8", "replace")
+        try:
+            n_bytes = int(header[124:136].rstrip(b"\0 "), 8)
+        except ValueError:
+            raise BadInput(place, f"byte {at}", "not a shard: damaged") from None
+        yield Member(name, at + _BLOCK, n_bytes)
+        at += _BLOCK + n_bytes + (-n_bytes % _BLOCK)
+    # Two empty blocks were to come.
+    raise BadInput(place, "", "ends too soon: truncated", hint="copy or pack it again")
+
+
+# Views of packed shards, with numpy alone.
+
 
 _N_OPEN: Final = 8  # shards that are kept open
 Parts = dict[str, Member]  # a view's parts by what follows its key
@@ -96,7 +278,7 @@ class ShardSet:
             )
         return found
 
-    def check(self, request: Request) -> None:
+    def check(self, request: SampleRequest) -> None:
         """Raise BadInput where the shards do not hold what request asks for."""
         held = self.dataset
         for layer in request.layers:
@@ -107,7 +289,7 @@ class ShardSet:
             hint = f"packed: {', '.join(held.modes)}"
             raise BadInput(self.url, "", f"no pictures in {request.mode} light", hint=hint)
 
-    def read_at(self, shard: Shard, view: int, request: Request) -> Sample:
+    def read_at(self, shard: Shard, view: int, request: SampleRequest) -> Sample:
         """The Sample of a view by its place in a shard."""
         opened = self._opened(shard)
         if view >= len(opened.views):
@@ -134,7 +316,7 @@ class ShardSet:
                     self._at[ViewRef(facts.house, facts.view)] = (shard, view)
         return tuple(sorted(self._at, key=lambda ref: (ref.is_object, ref)))
 
-    def lacks(self, ref: ViewRef, request: Request) -> str:
+    def lacks(self, ref: ViewRef, request: SampleRequest) -> str:
         self.check(request)
         return ""
 
@@ -160,7 +342,7 @@ class ShardSet:
         shard, view = self._at[ref]
         return self._table_at(self._opened(shard), view)
 
-    def read(self, ref: ViewRef, request: Request) -> Sample:
+    def read(self, ref: ViewRef, request: SampleRequest) -> Sample:
         self.check(request)
         return self.read_at(*self._at[ref], request)
 

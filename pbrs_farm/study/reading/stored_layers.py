@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
-from pbrs_farm.study.reading.normal_axes import decoded_normal
-from pbrs_farm.study.reading.view_sample import Request, Sample, Size
+from pbrs_farm.study.reading.view_sample import Sample, SampleRequest, Size, decoded_normal
 
 Stored = dict[str, NDArray[Any]]  # array name -> (H, W) or (H, W, 3)
 
@@ -130,7 +129,7 @@ def _resized(name: str, array: NDArray[Any], width: int, height: int) -> NDArray
     return resized_nearest(array, width, height)
 
 
-def sample_of_stored(facts: ViewFacts, stored: Stored, request: Request) -> Sample:
+def sample_of_stored(facts: ViewFacts, stored: Stored, request: SampleRequest) -> Sample:
     """The Sample of a view's stored arrays, at the size asked for."""
     size = request.size or facts.size
     stored = resized_stored(stored, size)

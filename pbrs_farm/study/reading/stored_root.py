@@ -28,7 +28,7 @@ from pbrs_farm.study.reading.stored_layers import (
     facts_from_json,
     sample_of_stored,
 )
-from pbrs_farm.study.reading.view_sample import MODES, Request, Sample
+from pbrs_farm.study.reading.view_sample import MODES, Sample, SampleRequest
 from pbrs_farm.study.reading.views import ViewRef, Views
 
 _TABLE: Final = "view.json"  # written when all else of a view is there
@@ -59,7 +59,7 @@ class StoredRoot:
         """id -> why, of views that a run has begun only."""
         return {r.id: f"no {_TABLE}" for r, files in self._files.items() if _TABLE not in files}
 
-    def lacks(self, ref: ViewRef, request: Request) -> str:
+    def lacks(self, ref: ViewRef, request: SampleRequest) -> str:
         wanted = (_file(name, request.mode) for name in array_names(request.layers))
         return next((file for file in wanted if file not in self._files[ref]), "")
 
@@ -80,10 +80,10 @@ class StoredRoot:
             raise BadInput(f"{self.url}/{key}", "", "not JSON: damaged") from None
         return row
 
-    def read(self, ref: ViewRef, request: Request) -> Sample:
+    def read(self, ref: ViewRef, request: SampleRequest) -> Sample:
         return sample_of_stored(self.facts(ref), self.arrays(ref, request), request)
 
-    def arrays(self, ref: ViewRef, request: Request) -> dict[str, NDArray[Any]]:
+    def arrays(self, ref: ViewRef, request: SampleRequest) -> dict[str, NDArray[Any]]:
         """The arrays of a request as they are stored, at their own size."""
         size = self.facts(ref).size
         arrays = {}

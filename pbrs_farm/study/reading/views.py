@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares
 from pbrs_farm.study.reading.stored_layers import ViewFacts
-from pbrs_farm.study.reading.view_sample import Request, Sample
+from pbrs_farm.study.reading.view_sample import Sample, SampleRequest
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -41,7 +41,7 @@ class ViewSource(Protocol):
         """What was opened."""
         ...
 
-    def lacks(self, ref: ViewRef, request: Request) -> str:
+    def lacks(self, ref: ViewRef, request: SampleRequest) -> str:
         """The first file of what is asked for that the view has not; "" where it has all."""
         ...
 
@@ -57,7 +57,7 @@ class ViewSource(Protocol):
         """view.json as it is stored (docs/formats.md); of shards the part that was packed."""
         ...
 
-    def read(self, ref: ViewRef, request: Request) -> Sample:
+    def read(self, ref: ViewRef, request: SampleRequest) -> Sample:
         """The arrays asked for; BadInput where one is missing, damaged or of the wrong type."""
         ...
 
@@ -129,9 +129,9 @@ class View:
         """A layer as it is stored, (H, W) or (H, W, C): "depth" in mm, "position" in metres, ..."""
         return self.source.layer(self.ref, name)
 
-    def sample(self, request: Request | None = None) -> Sample:
+    def sample(self, request: SampleRequest | None = None) -> Sample:
         """The arrays of a request: colour in mlt_il_ol light and normals in OpenCV's axes for None."""
-        return self.source.read(self.ref, request or Request())
+        return self.source.read(self.ref, request or SampleRequest())
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +178,7 @@ class Views(Sequence[View]):
         houses: Collection[str] | None = None,
         objects: bool | None = None,
         selection: str | None = None,
-        request: Request | None = None,
+        request: SampleRequest | None = None,
     ) -> Views:
         """The views of a split, of some houses, of rooms or of objects, with all that request needs.
 

@@ -10,13 +10,13 @@ from torch import Tensor
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.study.reading.view_sample import Sample
-from pbrs_farm.study.training_plan import Plan
+from pbrs_farm.study.training_plan import TrainingPlan
 
 Arrays = dict[str, NDArray[Any]]
 Batch = dict[str, Tensor]
 
 
-class Scorer(Protocol):
+class TaskScorer(Protocol):
     """Takes views one by one and says how good the predictions were."""
 
     def add(self, prediction: NDArray[Any], truth: Arrays) -> float:
@@ -28,7 +28,7 @@ class Scorer(Protocol):
         ...
 
 
-class Task(Protocol):
+class StudyTask(Protocol):
     """One of normals, segmentation and boundaries."""
 
     name: str
@@ -37,15 +37,15 @@ class Task(Protocol):
     error_name: str  # what `error` is, with its unit
     truth: str  # which truth and which mask, in words
 
-    def n_out(self, plan: Plan) -> int:
+    def n_out(self, plan: TrainingPlan) -> int:
         """Channels of the network's output."""
         ...
 
-    def targets(self, sample: Sample, plan: Plan) -> Arrays:
+    def targets(self, sample: Sample, plan: TrainingPlan) -> Arrays:
         """What of a view is trained and judged on, small; BadInput names what cannot be."""
         ...
 
-    def loss(self, output: Tensor, batch: Batch, plan: Plan) -> Tensor:
+    def loss(self, output: Tensor, batch: Batch, plan: TrainingPlan) -> Tensor:
         """(B,) whose mean is the loss."""
         ...
 
@@ -61,7 +61,7 @@ class Task(Protocol):
         """Its name, and the prediction that needs no picture, from the training views' targets."""
         ...
 
-    def scorer(self, plan: Plan) -> Scorer:
+    def scorer(self, plan: TrainingPlan) -> TaskScorer:
         """An empty one."""
         ...
 

@@ -15,9 +15,9 @@ from torch.nn import functional
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.study.networks.network_choice import encoded
-from pbrs_farm.study.tasks.study_task import Arrays, Task
-from pbrs_farm.study.training.view_arrays import ViewArrays
-from pbrs_farm.study.training_plan import Plan
+from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
+from pbrs_farm.study.training.training_views import ViewArrays
+from pbrs_farm.study.training_plan import TrainingPlan
 
 _BATCH = 16
 
@@ -30,7 +30,7 @@ class Judged:
     errors: tuple[float, ...]
 
 
-def device_of(plan: Plan) -> torch.device:
+def device_of(plan: TrainingPlan) -> torch.device:
     """Where the plan runs; MachineFailed where it asks for a GPU and there is none."""
     has_gpu = torch.cuda.is_available()
     if plan.device == "cuda" and not has_gpu:
@@ -39,14 +39,14 @@ def device_of(plan: Plan) -> torch.device:
     return torch.device("cuda" if has_gpu and plan.device != "cpu" else "cpu")
 
 
-def placed(network: nn.Module, plan: Plan) -> nn.Module:
+def placed(network: nn.Module, plan: TrainingPlan) -> nn.Module:
     """The network on the plan's device, in its memory format."""
     network = network.to(device_of(plan))
     return network.to(memory_format=torch.channels_last) if plan.channels_last else network
 
 
 def predicted(
-    network: nn.Module, colour: NDArray[np.uint8], task: Task, plan: Plan,
+    network: nn.Module, colour: NDArray[np.uint8], task: StudyTask, plan: TrainingPlan,
     sizes: Sequence[tuple[int, int]] = (),
 ) -> Iterator[NDArray[Any]]:  # fmt: skip
     """A prediction of each picture of colour (N, H, W, 3), in order. The network's mode is restored.
@@ -75,7 +75,7 @@ def predicted(
         network.train(was_training)
 
 
-def network_output(network: nn.Module, colour: torch.Tensor, plan: Plan) -> torch.Tensor:
+def network_output(network: nn.Module, colour: torch.Tensor, plan: TrainingPlan) -> torch.Tensor:
     """The network's map of colour (B, 3, H, W) 0..1, at that size; enlarged between where the plan says."""
     size = colour.shape[-2:]
     colour = encoded(colour, plan.encoding)
@@ -92,20 +92,25 @@ def as_colour(pictures: torch.Tensor) -> torch.Tensor:
     return pictures.permute(0, 3, 1, 2).float() / 255
 
 
-def judged(network: nn.Module, views: ViewArrays, task: Task, plan: Plan) -> Judged:
+def judged(network: nn.Module, views: ViewArrays, task: StudyTask, plan: TrainingPlan) -> Judged:
     """How good the network is on views."""
     predictions = predicted(network, views.colour, task, plan)
     return scored(predictions, (views.target(k) for k in range(len(views))), task, plan)
 
 
-def baseline_judged(baseline: F32, views: ViewArrays, task: Task, plan: Plan) -> Judged:
+def baseline_judged(
+    baseline: F32, views: ViewArrays, task: StudyTask, plan: TrainingPlan
+) -> Judged:
     """How good the same prediction for every view is."""
     targets = (views.target(k) for k in range(len(views)))
     return scored((baseline for _ in views.ids), targets, task, plan)
 
 
 def scored(
-    predictions: Iterable[NDArray[Any]], truths: Iterable[Arrays], task: Task, plan: Plan
+    predictions: Iterable[NDArray[Any]],
+    truths: Iterable[Arrays],
+    task: StudyTask,
+    plan: TrainingPlan,
 ) -> Judged:
     """How good predictions are, each of the size of its truth."""
     scorer = task.scorer(plan)

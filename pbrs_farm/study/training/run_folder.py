@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.training_plan import Plan, plan_as_trained, plan_from_json
+from pbrs_farm.study.training_plan import TrainingPlan, plan_as_trained, plan_from_json
 
 RUNNING, FINISHED, FAILED = "running", "finished", "failed"
 _SAME: Final = ("task", "seed", "mode", "init", "views_digest")  # of a run that goes on
@@ -142,7 +142,7 @@ def made_folder(path: Path) -> Path:
     raise BadInput(path, "", f"no folder can be written there: {why}") from None
 
 
-def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], Plan]:
+def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], TrainingPlan]:
     """The folder, record and plan of a run that is finished; BadInput for any other."""
     folder = RunFolder(root)
     row = folder.record()
@@ -153,7 +153,7 @@ def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], Plan]:
     return folder, row, plan_from_json(row["plan"], str(root / "run.json"))
 
 
-def plan_digest(plan: Plan) -> str:
+def plan_digest(plan: TrainingPlan) -> str:
     """First 16 hex of the sha256 over every field that weights or figures depend on."""
     text = json.dumps(plan_as_trained(plan), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

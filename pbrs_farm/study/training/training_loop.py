@@ -10,24 +10,148 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import pi, sqrt
+from typing import Any
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from pbrs_farm.core.errors import BadInput, PbrsError
-from pbrs_farm.study.tasks.study_task import Batch, Task
-from pbrs_farm.study.training.augmentation import augmented
+from pbrs_farm.study.networks.vgg import RATE_OF_FUSE, RATE_OF_SIDES, RATE_OF_STAGE_5, EdgeHed
+from pbrs_farm.study.tasks.study_task import Batch, StudyTask
 from pbrs_farm.study.training.checkpoint import (
     Position,
     load_checkpoint,
     save_checkpoint,
     save_weights,
 )
-from pbrs_farm.study.training.optimisers import optimiser_of, set_rate
 from pbrs_farm.study.training.prediction import as_colour, device_of, network_output, placed
 from pbrs_farm.study.training.run_folder import RunFolder, plan_digest
 from pbrs_farm.study.training.training_views import BatchRead, TrainingViews
-from pbrs_farm.study.training_plan import Plan, rate_at
+from pbrs_farm.study.training_plan import TrainingPlan, rate_at
+
+# Random changes to a batch that leave its labels true: mirror, enlarge, hue, light; torch.
+
+
+def augmented(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Generator) -> Batch:
+    """The batch, colour (B, 3, H, W) float 0..1 in it, changed by what dice (on the CPU) draw."""
+    n, device = len(batch["colour"]), batch["colour"].device
+
+    def drawn(*shape: int) -> Tensor:
+        return torch.rand((n, *shape), generator=dice).to(device)
+
+    if plan.flip:
+        flips = drawn() < 0.5
+        batch = task.mirrored(batch, flips)
+        colour = batch["colour"]
+        batch["colour"] = torch.where(flips.view(-1, 1, 1, 1), colour.flip(3), colour)
+    if plan.zoom > 1:
+        batch = _enlarged(batch, 1 / (1 + drawn() * (plan.zoom - 1)), 2 * drawn(2) - 1)
+    if plan.hue > 0:
+        batch["colour"] = turned_hue(batch["colour"], plan.hue * pi * (2 * drawn() - 1))
+    batch["colour"] = _relit(batch["colour"], plan, drawn)
+    if plan.noise > 0:
+        noise = torch.randn(batch["colour"].shape, generator=dice).to(device)
+        batch["colour"] = batch["colour"] + plan.noise * noise
+    return batch
+
+
+def turned_hue(colour: Tensor, angles: Tensor) -> Tensor:
+    """Colours (B, 3, H, W) turned about the grey axis by angles (B,), radians: other paint, same light."""
+    cos, sin = torch.cos(angles), torch.sin(angles)
+    # Rodrigues' formula about (1, 1, 1) / sqrt(3): three numbers that go round.
+    same = cos + (1 - cos) / 3
+    next_, last = (1 - cos) / 3 - sin / sqrt(3), (1 - cos) / 3 + sin / sqrt(3)
+    rows = torch.stack([same, next_, last], 1)
+    turn = torch.stack([rows, rows.roll(1, 1), rows.roll(2, 1)], 1)
+    return torch.einsum("bij,bjhw->bihw", turn, colour).clamp(0, 1)
+
+
+def _relit(colour: Tensor, plan: TrainingPlan, drawn: object) -> Tensor:
+    """Another exposure, tone and white balance."""
+    assert callable(drawn)
+    if plan.gain == plan.gamma == plan.tint == 0:
+        return colour
+    gain = 1 + plan.gain * (2 * drawn(1, 1, 1) - 1)
+    tint = 1 + plan.tint * (2 * drawn(3, 1, 1) - 1)
+    gamma = 1 + plan.gamma * (2 * drawn(1, 1, 1) - 1)
+    return (colour.clamp(min=1e-4) ** gamma * gain * tint).clamp(0, 1)
+
+
+def _enlarged(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
+    """A part of each view at full size: shares (B,) of its width, shifts (B, 2) -1..1 within it.
+
+    Colour is interpolated, labels are the nearest pixel's; directions stay, as if seen by a longer
+    lens.
+    """
+    n, _, height, width = batch["colour"].shape
+    theta = torch.zeros((n, 2, 3), device=shares.device)
+    theta[:, 0, 0] = theta[:, 1, 1] = shares
+    theta[:, :, 2] = shifts * (1 - shares)[:, None]
+    grid = functional.affine_grid(theta, [n, 1, height, width], align_corners=False)
+    colour = functional.grid_sample(
+        batch["colour"], grid, mode="bilinear", padding_mode="border", align_corners=False
+    )
+    # Turn the grid into rows and columns of labels.
+    columns = ((grid[..., 0] + 1) * width / 2 - 0.5).round().long().clamp(0, width - 1)
+    rows = ((grid[..., 1] + 1) * height / 2 - 0.5).round().long().clamp(0, height - 1)
+    views = torch.arange(n, device=shares.device).view(-1, 1, 1)
+    labels = {name: x[views, rows, columns] for name, x in batch.items() if name != "colour"}
+    return labels | {"colour": colour}
+
+
+# Optimisers as a plan names them, with the rates of layers apart; torch.
+
+
+def optimiser_of(network: nn.Module, plan: TrainingPlan) -> torch.optim.Optimizer:
+    """The optimiser; groups carry "scale", what their rate is of the plan's."""
+    groups = _released_groups(network, plan) if plan.released_rates else _groups(network, plan)
+    if plan.optimiser == "rmsprop":
+        return torch.optim.RMSprop(groups, lr=plan.rate, alpha=plan.alpha, eps=plan.epsilon)
+    if plan.optimiser == "sgd":
+        return torch.optim.SGD(groups, lr=plan.rate, momentum=plan.momentum)
+    return torch.optim.AdamW(groups, lr=plan.rate, eps=plan.epsilon)
+
+
+def set_rate(optimiser: torch.optim.Optimizer, rate: float) -> None:
+    """Give every group its share of the rate."""
+    for group in optimiser.param_groups:
+        group["lr"] = rate * group["scale"]
+
+
+def _groups(network: nn.Module, plan: TrainingPlan) -> list[dict[str, Any]]:
+    """Weights decay; biases and the two numbers of each normalisation do not."""
+    named = [p for p in network.parameters() if p.requires_grad]
+    return [
+        {"params": [p for p in named if p.ndim > 1], "weight_decay": plan.weight_decay, "scale": 1},
+        {"params": [p for p in named if p.ndim <= 1], "weight_decay": 0.0, "scale": 1},
+    ]
+
+
+def _released_groups(network: nn.Module, plan: TrainingPlan) -> list[dict[str, Any]]:
+    """HED's released rates: biases twice their weights', without decay."""
+    if not isinstance(network, EdgeHed):
+        return _groups(network, plan)
+    *early, last = network.stages
+    scaled = [(module, 1.0) for module in early]
+    scaled += [
+        (last, RATE_OF_STAGE_5),
+        (network.sides, RATE_OF_SIDES),
+        (network.fuse, RATE_OF_FUSE),
+    ]
+    groups = []
+    for module, scale in scaled:
+        for is_bias in (False, True):
+            chosen = [p for p in module.parameters() if (p.ndim <= 1) == is_bias]
+            decay = 0.0 if is_bias else plan.weight_decay
+            factor = scale * (2 if is_bias else 1)
+            groups.append({"params": chosen, "weight_decay": decay, "scale": factor})
+    return groups
+
+
+# The training loop.
+
 
 Observer = Callable[[dict[str, float]], None]
 Judge = Callable[[nn.Module], dict[str, float]]  # errors of the network as it is, by name
@@ -63,7 +187,7 @@ def share_of_process() -> Share:
 
 
 def train_network(
-    network: nn.Module, views: TrainingViews, task: Task, plan: Plan, *, seed: int,
+    network: nn.Module, views: TrainingViews, task: StudyTask, plan: TrainingPlan, *, seed: int,
     folder: RunFolder, observe: Observer, judge: Judge, share: Share,
 ) -> nn.Module:  # fmt: skip
     """Train from the folder's checkpoint, or from the network's own weights; writes weights last.
@@ -112,7 +236,7 @@ def train_network(
 
 
 def _row_since(
-    plan: Plan, step: int, loss_sum: float, n_summed: int, seconds: float
+    plan: TrainingPlan, step: int, loss_sum: float, n_summed: int, seconds: float
 ) -> dict[str, float]:
     """A row of the metrics: means since the last one of the loss, and views a second."""
     return {
@@ -143,8 +267,8 @@ def _resumed(
 class _Loop:
     model: nn.Module
     optimiser: torch.optim.Optimizer
-    task: Task
-    plan: Plan
+    task: StudyTask
+    plan: TrainingPlan
     seed: int
     share: Share
 

@@ -2,28 +2,155 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch.utils.data import DataLoader, Dataset
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import home_of
 from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.reading.view_sample import Request
+from pbrs_farm.study.reading.shard_set import ShardSet
+from pbrs_farm.study.reading.view_sample import SampleRequest
 from pbrs_farm.study.reading.views import View, Views
-from pbrs_farm.study.tasks.task_choice import task_of
-from pbrs_farm.study.training.streamed_views import Picture, StreamedViews
-from pbrs_farm.study.training.training_views import TrainingViews
-from pbrs_farm.study.training.view_arrays import ViewArrays, arrays_of_sample, arrays_of_samples
-from pbrs_farm.study.training_plan import Plan
+from pbrs_farm.study.tasks.study_task import Arrays
+from pbrs_farm.study.tasks.tasks import task_of
+from pbrs_farm.study.training.training_views import (
+    BatchOrder,
+    BatchRead,
+    TrainingViews,
+    ViewArrays,
+    arrays_of_sample,
+    arrays_of_samples,
+)
+from pbrs_farm.study.training_plan import TrainingPlan
+
+# Views that are read anew for each step, where all of them would not fit into memory. Effects:
+# reads views.
+
+
+Picture = tuple[View, SampleRequest]  # a view in one light
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StreamedViews:
+    """Training views by name alone; plan.workers processes read them ahead of the steps.
+
+    Views of shards come in an order that needs few shards at a time, so that these may lie in S3;
+    it is the same for every number of workers and processes.
+    """
+
+    pictures: tuple[Picture, ...]
+    plan: TrainingPlan
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """<house>/<view> of each."""
+        return tuple(view.id for view, _ in self.pictures)
+
+    @property
+    def homes(self) -> tuple[str, ...]:
+        """The houses there are views of."""
+        return tuple(dict.fromkeys(view.ref.house for view, _ in self.pictures))
+
+    def __len__(self) -> int:
+        return len(self.pictures)
+
+    def digest(self) -> str:
+        """First 16 hex of the sha256 over names, lights and shards: pixels are not looked at."""
+        sha = hashlib.sha256(b"streamed")
+        for view, request in self.pictures:
+            sha.update(f"\n{view.id} {request.mode}".encode())
+        for source in {id(view.source): view.source for view, _ in self.pictures}.values():
+            if isinstance(source, ShardSet):
+                sha.update("".join(shard.sha256 for shard in source.dataset.shards).encode())
+        return sha.hexdigest()[:16]
+
+    def some(self, most: int) -> StreamedViews:
+        """At most so many, spread over all."""
+        if len(self) <= most:
+            return self
+        at = np.linspace(0, len(self) - 1, most).round().astype(np.intp)
+        return StreamedViews(tuple(self.pictures[k] for k in at), self.plan)
+
+    def decoded(self, most: int) -> ViewArrays:
+        """At most so many, spread over all, in memory."""
+        samples = (view.sample(request) for view, request in self.some(most).pictures)
+        return arrays_of_samples(samples, task_of(self.plan.task), self.plan)
+
+    def batches(
+        self, steps: range, plan: TrainingPlan, seed: int, own: slice
+    ) -> Iterator[BatchRead]:
+        """The batch of each step; own: which rows of it."""
+        order = BatchOrder(len(self), plan.batch, seed, self._shards())
+        rows = (order.rows(step)[own].tolist() for step in steps)
+        options: dict[str, Any] = {"num_workers": plan.workers}
+        if plan.workers and any(view.source.url.startswith("s3:") for view, _ in self.pictures):
+            # S3's client does not survive a fork.
+            options["multiprocessing_context"] = "spawn"
+        loader = DataLoader(
+            _Pictures(self), batch_sampler=_Rows(rows), collate_fn=_stacked, **options
+        )
+        for ids, tensors in loader:
+            yield ids, {name: tensor.numpy() for name, tensor in tensors.items()}
+
+    def _shards(self) -> NDArray[np.intp] | None:
+        """(n,) the shard of each view; None where not all lie in shards."""
+        numbers: dict[tuple[str, str], int] = {}
+        groups = []
+        for view, _ in self.pictures:
+            if not isinstance(view.source, ShardSet):
+                return None
+            key = view.source.url, view.source.shard_of(view.ref).file
+            groups.append(numbers.setdefault(key, len(numbers)))
+        return np.array(groups, np.intp)
+
+
+class _Pictures(Dataset):  # type: ignore[misc]
+    """Colour and targets by number, for the processes that read."""
+
+    def __init__(self, views: StreamedViews) -> None:
+        self._views = views
+
+    def __getitem__(self, at: int) -> tuple[str, Arrays]:
+        view, request = self._views.pictures[at]
+        plan = self._views.plan
+        sample = view.sample(request)
+        return sample.id, arrays_of_sample(sample, task_of(plan.task), plan)
+
+
+class _Rows:
+    """Rows of steps, taken once."""
+
+    def __init__(self, rows: Iterator[list[int]]) -> None:
+        self._rows = rows
+
+    def __iter__(self) -> Iterator[list[int]]:
+        return self._rows
+
+
+def _stacked(samples: list[tuple[str, Arrays]]) -> tuple[list[str], dict[str, torch.Tensor]]:
+    # Tensors go from a process to another through shared memory, arrays through a pipe.
+    names = samples[0][1]
+    stacked = {n: torch.from_numpy(np.stack([arrays[n] for _, arrays in samples])) for n in names}
+    return [at for at, _ in samples], stacked
+
+
+# From roots or shards to the views of a plan.
+
 
 T = TypeVar("T")
 NYU_LIGHT: Final = "nyuv2"  # what a run's record calls the light of photographs
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class ViewSource:
     """Where views come from and how they are parted.
 
     places: roots or shards, or NYUv2's .mat alone. modes: each view is taken once in each of them. hold_out: homes by id,
@@ -54,7 +181,7 @@ class Source:
         return NYU_LIGHT if self.is_nyu else "+".join(self.modes)
 
 
-def training_views(source: Source, plan: Plan) -> TrainingViews:
+def training_views(source: ViewSource, plan: TrainingPlan) -> TrainingViews:
     """The views that train: in memory, or streamed where they take more than plan.memory_gb.
 
     Raises BadInput where there is none.
@@ -70,7 +197,7 @@ def training_views(source: Source, plan: Plan) -> TrainingViews:
     return _arrays(pictures, plan)
 
 
-def held_out_views(source: Source, plan: Plan, most: int = 0) -> ViewArrays | None:
+def held_out_views(source: ViewSource, plan: TrainingPlan, most: int = 0) -> ViewArrays | None:
     """The views of the homes that are held out, at most so many, and as fit into plan.memory_gb.
 
     None where there is none; of NYUv2 the test pictures.
@@ -83,13 +210,13 @@ def held_out_views(source: Source, plan: Plan, most: int = 0) -> ViewArrays | No
     return _arrays(_spread(pictures, max(_n_fitting(pictures, plan), plan.final_views)), plan)
 
 
-def all_views(source: Source, plan: Plan, most: int = 0) -> ViewArrays:
+def all_views(source: ViewSource, plan: TrainingPlan, most: int = 0) -> ViewArrays:
     """Every view of the source: one that no training has seen."""
     views = [view for place in source.places for view in _finished(open_views(place), source, plan)]
     return _arrays(_in_each_light(_spread(views, most), source, plan), plan)
 
 
-def left_out(source: Source, plan: Plan) -> dict[str, str]:
+def left_out(source: ViewSource, plan: TrainingPlan) -> dict[str, str]:
     """id -> why, of views that lack what the plan's task needs, or that a run has begun only."""
     if source.is_nyu:
         return {}
@@ -103,14 +230,16 @@ def left_out(source: Source, plan: Plan) -> dict[str, str]:
     return lacking
 
 
-def is_held_out(view: View, source: Source) -> bool:
+def is_held_out(view: View, source: ViewSource) -> bool:
     """The view's home never trains."""
     if source.hold_out is not None:
         return bool({view.ref.house, home_of(view.ref.house)} & source.hold_out)
     return view.source.split_of(view.ref, None) != "train"
 
 
-def _pictures(source: Source, plan: Plan, *, held_out: bool, most: int) -> tuple[Picture, ...]:
+def _pictures(
+    source: ViewSource, plan: TrainingPlan, *, held_out: bool, most: int
+) -> tuple[Picture, ...]:
     found: list[View] = []
     homes: set[str] = set()
     for place in source.places:
@@ -123,21 +252,23 @@ def _pictures(source: Source, plan: Plan, *, held_out: bool, most: int) -> tuple
     return _in_each_light(_spread(found, most), source, plan)
 
 
-def _in_each_light(views: Sequence[View], source: Source, plan: Plan) -> tuple[Picture, ...]:
+def _in_each_light(
+    views: Sequence[View], source: ViewSource, plan: TrainingPlan
+) -> tuple[Picture, ...]:
     requests = [_request(mode, plan) for mode in source.modes]
     return tuple((view, request) for request in requests for view in views)
 
 
-def _n_fitting(pictures: Sequence[Picture], plan: Plan) -> int:
+def _n_fitting(pictures: Sequence[Picture], plan: TrainingPlan) -> int:
     """How many views plan.memory_gb holds, by the first one's size."""
     view, request = pictures[0]
     arrays = arrays_of_sample(view.sample(request), task_of(plan.task), plan)
     return int(plan.memory_gb * 1e9 / sum(array.nbytes for array in arrays.values()))
 
 
-def _nyu_views(source: Source, plan: Plan, split: str, most: int) -> ViewArrays:
+def _nyu_views(source: ViewSource, plan: TrainingPlan, split: str, most: int) -> ViewArrays:
     # Imported where needed: it wants h5py.
-    from pbrs_farm.study.photographs.nyu_arrays import nyu_arrays
+    from pbrs_farm.study.photographs import nyu_arrays
 
     if len(source.places) > 1:
         text = "NYUv2 trains alone"
@@ -146,7 +277,7 @@ def _nyu_views(source: Source, plan: Plan, split: str, most: int) -> ViewArrays:
     return views.some(most) if most else views
 
 
-def _finished(views: Views, source: Source, plan: Plan) -> Views:
+def _finished(views: Views, source: ViewSource, plan: TrainingPlan) -> Views:
     """Those that have all that the plan's task needs, in every mode."""
     for mode in source.modes:
         views = views.only(objects=source.objects, request=_request(mode, plan))
@@ -159,11 +290,11 @@ def _spread(views: Sequence[T], most: int) -> list[T]:
     return [views[round(k * (len(views) - 1) / max(most - 1, 1))] for k in range(most)]
 
 
-def _arrays(pictures: Sequence[Picture], plan: Plan) -> ViewArrays:
+def _arrays(pictures: Sequence[Picture], plan: TrainingPlan) -> ViewArrays:
     samples = (view.sample(request) for view, request in pictures)
     return arrays_of_samples(samples, task_of(plan.task), plan)
 
 
-def _request(mode: str, plan: Plan) -> Request:
+def _request(mode: str, plan: TrainingPlan) -> SampleRequest:
     size = (plan.width_px, plan.height_px)
-    return Request(task_of(plan.task).layers, mode=mode, axes="opencv", size=size)
+    return SampleRequest(task_of(plan.task).layers, mode=mode, axes="opencv", size=size)

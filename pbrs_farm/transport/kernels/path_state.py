@@ -9,8 +9,6 @@ import drjit as dr
 import mitsuba as mi
 
 from pbrs_farm.core.recipe import LightFields
-from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
-from pbrs_farm.transport.guiding.nearby_lamps import NearbyLamps, ReferencePoint, no_reference
 from pbrs_farm.transport.kernels.bsdf import Bsdf
 from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera, camera_ray
 from pbrs_farm.transport.kernels.device_scene import (
@@ -19,8 +17,14 @@ from pbrs_farm.transport.kernels.device_scene import (
     offset_ray_origin,
 )
 from pbrs_farm.transport.kernels.emitters import Emitters
+from pbrs_farm.transport.kernels.lamp_guiding import (
+    NO_FACE,
+    NearbyLamps,
+    ReferencePoint,
+    no_reference,
+)
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, Sampler
-from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
+from pbrs_farm.transport.kernels.sunlight import SunlitPoints
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 ALL_EMITTERS, NO_EMITTERS = -1, -2
@@ -105,7 +109,7 @@ class DirectLightSample(NamedTuple):
     d: Any  # unit direction to the emitter
     incident: Any  # radiance times visibility and MIS weight, over the pdf
     emitter: Any = None  # number of the lamp, None for the sky
-    kind: Any = None  # of the shadow ray (arrival_rates.py)
+    kind: Any = None  # of the shadow ray (outdoor_choice.py)
     is_cast: Any = False  # Bool
     arrives: Any = False  # Bool: nothing stands in its way
 

@@ -13,17 +13,6 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from pbrs_farm.transport.guiding.guided_rays import (
-    cone_technique_pdf,
-    guided_mis_weight,
-    guiding_at,
-    reflection_probability,
-    sample_guided,
-    survival_boost,
-    target_technique_share,
-)
-from pbrs_farm.transport.guiding.guiding_targets import NO_FACE
-from pbrs_farm.transport.guiding.nearby_lamps import no_reference
 from pbrs_farm.transport.kernels.bsdf import (
     evaluate_bsdf,
     is_reconnectable,
@@ -34,6 +23,16 @@ from pbrs_farm.transport.kernels.bsdf import (
 from pbrs_farm.transport.kernels.device_scene import SurfaceInteraction, offset_ray_origin
 from pbrs_farm.transport.kernels.direct_light import Strategy, sample_direct_light
 from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL
+from pbrs_farm.transport.kernels.guided_rays import (
+    cone_technique_pdf,
+    guided_mis_weight,
+    guiding_at,
+    reflection_probability,
+    sample_guided,
+    survival_boost,
+    target_technique_share,
+)
+from pbrs_farm.transport.kernels.lamp_guiding import NO_FACE, no_reference
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,

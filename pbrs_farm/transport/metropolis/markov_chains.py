@@ -39,11 +39,12 @@ from pbrs_farm.transport.metropolis.film import (
     splat,
     target_function,
 )
-from pbrs_farm.transport.metropolis.split_path import SplitPath, no_direction
 from pbrs_farm.transport.metropolis.suffixes import (
     SUFFIX_FLOATS,
+    SplitPath,
     SuffixRecords,
     finish_suffix,
+    no_direction,
     record_suffix,
 )
 

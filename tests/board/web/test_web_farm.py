@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pbrs_farm.board.farm.live_farm import LiveFarm
+from pbrs_farm.board.live_farm import LiveFarm
 from tests.board.served import TOKEN, served
 from tests.board.web.browser import until
 from tests.workers.conftest import redis_server

@@ -13,15 +13,13 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import png_from_array
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import training_sets
-from pbrs_farm.study.judging.figure_table import is_underfit, markdown, spread_text
-from pbrs_farm.study.judging.judged_places import judged_place
-from pbrs_farm.study.judging.pair_views import camera_of, framed
-from pbrs_farm.study.judging.paper_numbers import PAPER, paper_row
+from pbrs_farm.study.judging.evaluation import PAPER, is_underfit, markdown, paper_row, spread_text
+from pbrs_farm.study.judging.judged_places import camera_of, framed, judged_place
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.tasks.task_choice import task_of
-from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views
+from pbrs_farm.study.tasks.tasks import task_of
+from pbrs_farm.study.training.view_sources import ViewSource, held_out_views, training_views
 from tests.study.small_roots import fill
 from tests.study.training.made_views import TINY, small_plan
 
@@ -61,22 +59,22 @@ def pairs(tmp_path: Path) -> Path:
 
 
 def test_homes_are_held_out_whole(root: Path) -> None:
-    plan, source = small_plan(), Source((str(root),), hold_out=frozenset({"home-2"}))
+    plan, source = small_plan(), ViewSource((str(root),), hold_out=frozenset({"home-2"}))
     assert training_views(source, plan).homes == ("home-0-00000000", "home-1-00000000")
     held_out = held_out_views(source, plan)
     assert held_out is not None
     assert held_out.homes == ("home-2-00000000",)
-    assert len(training_views(Source((str(root),), hold_out=frozenset()), plan)) == 9
-    assert len(training_views(Source((str(root),), hold_out=frozenset(), most=4), plan)) == 4
+    assert len(training_views(ViewSource((str(root),), hold_out=frozenset()), plan)) == 9
+    assert len(training_views(ViewSource((str(root),), hold_out=frozenset(), most=4), plan)) == 4
     with pytest.raises(BadInput, match="no such home"):
-        training_views(Source((str(root),), hold_out=frozenset({"villa"})), plan)
+        training_views(ViewSource((str(root),), hold_out=frozenset({"villa"})), plan)
 
 
 def test_shards_train_as_their_root_does(root: Path, tmp_path: Path) -> None:
     pack(open_views(root), tmp_path / "shards", Packing(modes=("mlt_il_ol",), views_per_shard=4))
     plan, held = small_plan(), frozenset({"home-2"})
     whole, packed = (
-        training_views(Source((str(place),), hold_out=held), plan)
+        training_views(ViewSource((str(place),), hold_out=held), plan)
         for place in (root, tmp_path / "shards")
     )
     assert whole.digest() == packed.digest()
@@ -171,12 +169,12 @@ def test_a_run_that_is_not_finished_is_not_judged(run: Path, tmp_path: Path) -> 
 
 
 def test_rows_of_a_comparison_are_named_by_root_and_light() -> None:
-    sets = training_sets(["a=x", "b=y+z@opengl_dl"], ["mlt_ol", "opengl_il"], Source(()))
+    sets = training_sets(["a=x", "b=y+z@opengl_dl"], ["mlt_ol", "opengl_il"], ViewSource(()))
     assert [each.name for each in sets] == ["a_mlt_ol", "a_opengl_il", "b"]
     assert sets[2].source.places == ("y", "z")
     assert sets[2].source.modes == ("opengl_dl",)
     with pytest.raises(BadInput, match="a second row"):
-        training_sets(["x", "y"], ["mlt_ol"], Source(()))
+        training_sets(["x", "y"], ["mlt_ol"], ViewSource(()))
 
 
 def test_a_comparison_shows_the_spread_of_its_seeds(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.study.metrics.angular import angles_deg
-from pbrs_farm.study.metrics.plane_normals import normals_of_depth
+from pbrs_farm.study.photographs import normals_of_depth
 
 K = np.array([[150.0, 0, 80], [0, 150.0, 60], [0, 0, 1]])
 

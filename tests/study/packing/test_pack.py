@@ -17,7 +17,7 @@ from pbrs_farm.images import decode_photo
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.view_sample import LAYERS, Request
+from pbrs_farm.study.reading.view_sample import LAYERS, SampleRequest
 from tests.study.small_roots import MODES, arrays_of_view, fill
 
 HOUSES = {f"home-{k}-00000000": 3 for k in range(8)}
@@ -154,9 +154,9 @@ def test_what_was_not_packed_is_told(root, tmp_path):
     with pytest.raises(
         BadInput, match=r"no layer depth in these shards \(packed: colour, normal\)"
     ):
-        view.sample(Request(("depth",)))
+        view.sample(SampleRequest(("depth",)))
     with pytest.raises(BadInput, match=r"no pictures in opengl_dl light"):
-        view.sample(Request(("colour",), "opengl_dl"))
+        view.sample(SampleRequest(("colour",), "opengl_dl"))
     with pytest.raises(BadInput, match="is packed already"):
         pack(pbrs_farm.open(tmp_path / "x"), tmp_path / "y", Packing())
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from pbrs_farm.export.run_lengths import compressed_runs
+from pbrs_farm.export.coco import compressed_runs
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.packing.pack_shards import pack

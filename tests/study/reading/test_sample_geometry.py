@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.reading.normal_axes import (
+from pbrs_farm.study.reading.view_sample import (
     AXES,
+    Sample,
     axes_from_axes,
+    cropped,
     decoded_normal,
     encoded_as_stored,
+    flipped,
+    resized,
+    with_axes,
 )
-from pbrs_farm.study.reading.sample_geometry import cropped, flipped, resized, with_axes
-from pbrs_farm.study.reading.view_sample import Sample
 
 FROM_CAMERA = np.diag([1.0, 1.0, 1.0])
 

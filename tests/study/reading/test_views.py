@@ -15,8 +15,7 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.s3 import S3Settings, S3Store
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.normal_axes import encoded_as_stored
-from pbrs_farm.study.reading.view_sample import LAYERS, Request
+from pbrs_farm.study.reading.view_sample import LAYERS, SampleRequest, encoded_as_stored
 from tests.check.roots import make_root
 from tests.study.small_roots import MODES, SIZE, arrays_of_view, fill, remove
 
@@ -31,7 +30,7 @@ def root(tmp_path: Path) -> Path:
 
 
 def test_a_sample_holds_what_the_files_hold(root):
-    sample = pbrs_farm.open(root)[1].sample(Request(LAYERS, "opengl_dl", axes="published"))
+    sample = pbrs_farm.open(root)[1].sample(SampleRequest(LAYERS, "opengl_dl", axes="published"))
     stored = arrays_of_view(1)
     assert (sample.id, sample.house, sample.room) == ("one-00000001/0_0_1", "one-00000001", "0_0")
     assert (sample.colour == stored["opengl_dl.png"]).all()
@@ -48,7 +47,7 @@ def test_a_sample_holds_what_the_files_hold(root):
 def test_only_what_is_asked_for_is_read(root):
     remove(root, f"{VIEW}/depth.png")
     (root / VIEW / "instance.png").write_bytes(b"damaged")
-    sample = pbrs_farm.open(root)[1].sample(Request(("colour",)))
+    sample = pbrs_farm.open(root)[1].sample(SampleRequest(("colour",)))
     assert set(sample.arrays()) == {"colour"}
 
 
@@ -63,7 +62,7 @@ def equal(a, b) -> bool:
 def test_samples_have_the_same_bits_from_folder_memory_and_shards(root, tmp_path, size):
     memory = MemoryStore()
     fill(memory, HOUSES)
-    request = Request(LAYERS, "mlt_il_ol", axes="opengl", size=size)
+    request = SampleRequest(LAYERS, "mlt_il_ol", axes="opengl", size=size)
     places = [pbrs_farm.open(root), pbrs_farm.open(memory)]
     for packed_size, name in ((size, "small"), (None, "large")):
         pack(
@@ -120,11 +119,11 @@ def test_views_that_a_run_has_not_finished_are_left_out_and_named(root):
     views = pbrs_farm.open(root)
     assert len(views) == 4
     assert views.left_out == {"one-00000001/0_0_1": "no view.json"}
-    asked = views.only(request=Request(("colour",), "mlt_il_ol"))
+    asked = views.only(request=SampleRequest(("colour",), "mlt_il_ol"))
     assert len(asked) == 3
     assert asked.left_out == {"one-00000001/0_0_2": "no mlt_il_ol.png"}
     with pytest.raises(BadInput, match=r"none of 4 views has what was asked for: .* no mlt_ol.png"):
-        views.only(request=Request(("colour",), "mlt_ol"))
+        views.only(request=SampleRequest(("colour",), "mlt_ol"))
 
 
 def test_16_bit_labels_that_arrive_as_8_bits_are_an_error(root):
@@ -137,7 +136,7 @@ def test_16_bit_labels_that_arrive_as_8_bits_are_an_error(root):
     file.write_bytes(png_from_array((stored >> 8) * np.uint16(257)))
     with pytest.raises(BadInput, match="8 bits spread over 16"):
         view.sample()
-    assert view.sample(Request(("colour", "class40"))).colour is not None
+    assert view.sample(SampleRequest(("colour", "class40"))).colour is not None
 
 
 def test_a_damaged_file_and_one_of_another_size_are_named(root):
@@ -147,13 +146,13 @@ def test_a_damaged_file_and_one_of_another_size_are_named(root):
         view.sample()
     (root / VIEW / "depth.png").write_bytes(png_from_array(np.ones((3, 3), np.uint16)))
     with pytest.raises(BadInput, match=r"depth.png: uint16 \(3, 3\), expected uint16 \(12, 16\)"):
-        view.sample(Request(("depth",)))
+        view.sample(SampleRequest(("depth",)))
     (root / VIEW / "view.json").write_text("{")
     with pytest.raises(BadInput, match=r"view.json: not JSON"):
-        pbrs_farm.open(root)[1].sample(Request(("class40",)))
+        pbrs_farm.open(root)[1].sample(SampleRequest(("class40",)))
     (root / VIEW / "view.json").write_text("{}")
     with pytest.raises(BadInput, match=r"view.json: not a view's camera"):
-        pbrs_farm.open(root)[1].sample(Request(("class40",)))
+        pbrs_farm.open(root)[1].sample(SampleRequest(("class40",)))
 
 
 def test_what_is_no_root_is_told(tmp_path):
@@ -177,7 +176,7 @@ def test_what_is_no_root_is_told(tmp_path):
 )
 def test_a_request_that_cannot_be_is_told(fields, match):
     with pytest.raises(BadInput, match=match):
-        Request(**fields)
+        SampleRequest(**fields)
 
 
 def test_views_can_be_sent_to_another_process(root, tmp_path):
@@ -197,7 +196,7 @@ def s3_like() -> S3Store:
 
 
 def test_samples_have_the_same_bits_from_s3(root, tmp_path):
-    request = Request(LAYERS, "mlt_il_ol", size=(8, 6))
+    request = SampleRequest(LAYERS, "mlt_il_ol", size=(8, 6))
     expected = [view.sample(request) for view in pbrs_farm.open(root)]
     bucket, shards = s3_like(), s3_like()
     fill(bucket, HOUSES)
@@ -250,7 +249,7 @@ def test_normals_of_a_floor_point_up_in_the_world(tmp_path):
     make_root(tmp_path)
     for axes, to_opencv in (("opencv", (1, 1, 1)), ("opengl", (1, -1, -1))):
         for view in pbrs_farm.open(tmp_path):
-            sample = view.sample(Request(("normal", "class40"), axes=axes))
+            sample = view.sample(SampleRequest(("normal", "class40"), axes=axes))
             floor = sample.normal[(sample.class40 == 2) & sample.valid] * np.array(to_opencv)
             world = floor @ view.world_from_camera_opencv[:3, :3].T
             assert len(world) > 100

@@ -10,7 +10,7 @@ import torch
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.networks.network_choice import network_of
-from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.prediction import network_output
 from tests.study.training.made_views import sample, small_plan, views
 

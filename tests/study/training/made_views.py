@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.study.reading.view_sample import Sample
-from pbrs_farm.study.tasks.task_choice import task_of
-from pbrs_farm.study.training.view_arrays import ViewArrays, arrays_of_samples
-from pbrs_farm.study.training_plan import Plan, plan_of
+from pbrs_farm.study.tasks.tasks import task_of
+from pbrs_farm.study.training.training_views import ViewArrays, arrays_of_samples
+from pbrs_farm.study.training_plan import TrainingPlan, plan_of
 
 SMALL = {
     "width_px": "40", "height_px": "32", "batch": "2", "steps": "6", "checkpoint_every": "2",
@@ -23,7 +23,7 @@ TINY = [
 """The same for three steps, as words of the command line."""
 
 
-def small_plan(task: str = "normals", **changed: str) -> Plan:
+def small_plan(task: str = "normals", **changed: str) -> TrainingPlan:
     """Plan tiny at 40x32 for six steps of two views."""
     return plan_of(task, "tiny", SMALL | changed)
 
@@ -53,7 +53,7 @@ def sample(number: int, size: tuple[int, int] = (40, 32)) -> Sample:
     )  # fmt: skip
 
 
-def views(n: int, plan: Plan) -> ViewArrays:
+def views(n: int, plan: TrainingPlan) -> ViewArrays:
     """n views as a plan's task wants them."""
     size = (plan.width_px, plan.height_px)
     return arrays_of_samples((sample(k, size) for k in range(n)), task_of(plan.task), plan)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from pbrs_farm.study.tasks.task_choice import task_of
-from pbrs_farm.study.training.augmentation import augmented, turned_hue
+from pbrs_farm.study.tasks.tasks import task_of
+from pbrs_farm.study.training.training_loop import augmented, turned_hue
 from tests.study.training.made_views import small_plan
 
 pytestmark = pytest.mark.study

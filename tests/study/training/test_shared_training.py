@@ -11,7 +11,7 @@ import pytest
 
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.networks.network_choice import network_of
-from pbrs_farm.study.tasks.task_choice import task_of
+from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
 from pbrs_farm.study.training.training_loop import Share, train_network
 from tests.study.small_roots import fill

@@ -13,10 +13,14 @@ from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.training.checkpoint import read_tensors
 from pbrs_farm.study.training.run_folder import RunFolder
-from pbrs_farm.study.training.streamed_views import StreamedViews
 from pbrs_farm.study.training.training_job import Job, train
-from pbrs_farm.study.training.view_arrays import ViewArrays
-from pbrs_farm.study.training.view_sources import Source, held_out_views, training_views
+from pbrs_farm.study.training.training_views import ViewArrays
+from pbrs_farm.study.training.view_sources import (
+    StreamedViews,
+    ViewSource,
+    held_out_views,
+    training_views,
+)
 from tests.study.small_roots import MODES, fill
 from tests.study.training.made_views import small_plan
 
@@ -32,8 +36,8 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def source_of(place: Path) -> Source:
-    return Source((str(place),), MODES, hold_out=frozenset({"home-3"}))
+def source_of(place: Path) -> ViewSource:
+    return ViewSource((str(place),), MODES, hold_out=frozenset({"home-3"}))
 
 
 def weights_of(place: Path, out: Path, **changed: str) -> dict[str, torch.Tensor]:

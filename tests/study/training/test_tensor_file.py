@@ -9,7 +9,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
-from pbrs_farm.study.training.tensor_file import read_tensor_file, write_tensor_file
+from pbrs_farm.study.training.checkpoint import read_tensor_file, write_tensor_file
 
 pytestmark = pytest.mark.study
 

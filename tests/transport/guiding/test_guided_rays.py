@@ -13,13 +13,13 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
-from pbrs_farm.transport.guiding import guided_rays as guide
-from pbrs_farm.transport.guiding.guiding_targets import BACK_SIDE, GuidingTargets
+from pbrs_farm.transport.kernels import guided_rays as guide
+from pbrs_farm.transport.kernels.lamp_guiding import BACK_SIDE, GuidingTargets
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 from tests.transport import hard_rooms
 
 pytestmark = pytest.mark.skipif(
@@ -66,7 +66,7 @@ def test_guided_rays_leave_the_mean_alone_and_cut_the_noise(
 def test_an_unguided_view_is_as_one_without_guiding(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, camera = loaded(hard_rooms.open_shade())
     fields = FIELDS.model_copy(update={"spp": 16})
-    plain = "pbrs_farm.transport.guiding.pilot.trial_weights"
+    plain = "pbrs_farm.transport.pilot.trial_weights"
     monkeypatch.setattr(plain, lambda *given: replace(given[3], is_guided=False))
     result = scene.render(camera, "0_0", fields, 1)
     assert result.facts["guided"] is False
@@ -130,7 +130,7 @@ def test_a_direction_drawn_in_a_cone_has_the_pdf_of_the_cone() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.guiding.nearby_lamps import Cones, cone_pdf, sample_cones
+    from pbrs_farm.transport.kernels.lamp_guiding import Cones, cone_pdf, sample_cones
 
     n = 1 << 18
     rng = mi.PCG32(size=n)
@@ -146,7 +146,7 @@ def test_a_direction_drawn_in_a_cone_has_the_pdf_of_the_cone() -> None:
 
 
 def targets_of(house: House) -> tuple[LightScene, GuidingTargets]:
-    from pbrs_farm.transport.guiding.lampshade_exitance import guiding_targets
+    from pbrs_farm.transport.lampshade_exitance import guiding_targets
 
     scene, camera = loaded((house, rooms.camera((0.5, 1.5, 0.5), (2.0, 1.0, 2.0))))
     emitters, _weights = scene.emitters(camera, FIELDS, 0)

@@ -12,7 +12,7 @@ if choose_variant().startswith("scalar"):
 
 
 def test_the_least_weights_of_many_lamps_leave_half_to_what_the_pilot_found() -> None:
-    from pbrs_farm.transport.guiding.pilot import LAMP_FLOOR, lamp_floors
+    from pbrs_farm.transport.pilot import LAMP_FLOOR, lamp_floors
 
     assert lamp_floors(500).sum() == pytest.approx(0.5)
     assert (lamp_floors(18) == LAMP_FLOOR).all()
@@ -21,14 +21,14 @@ def test_the_least_weights_of_many_lamps_leave_half_to_what_the_pilot_found() ->
 
 @pytest.mark.parametrize("n_emitters", [1, 18, 170])
 def test_the_pilot_of_a_home_is_whole(n_emitters: int) -> None:
-    from pbrs_farm.transport.guiding.pilot import pilot_size
+    from pbrs_farm.transport.pilot import pilot_size
 
     assert pilot_size(n_emitters) == (32, 24)
 
 
 @pytest.mark.parametrize("n_emitters", [171, 508, 2000])
 def test_the_pilot_of_very_many_emitters_is_smaller(n_emitters: int) -> None:
-    from pbrs_farm.transport.guiding.pilot import pilot_size
+    from pbrs_farm.transport.pilot import pilot_size
 
     width, height = pilot_size(n_emitters)
     assert width * height * n_emitters <= 1 << 17
@@ -39,8 +39,8 @@ def test_the_pilot_of_very_many_emitters_is_smaller(n_emitters: int) -> None:
 def test_a_firefly_that_guided_rays_lack_chooses_them_unless_it_is_daylight(
     bright: str, pays: bool
 ) -> None:
-    from pbrs_farm.transport.guiding.pilot import _pays
     from pbrs_farm.transport.path_tracer import SampleSums
+    from pbrs_farm.transport.pilot import _pays
 
     height, width = 8, 12
     n = 2 * height * width

@@ -16,7 +16,7 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sunsky
 from pbrs_farm.transport.validation import known_rooms as rooms
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 
 if choose_variant().startswith("scalar"):
     pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)
@@ -42,7 +42,7 @@ def three_lamps() -> tuple[House, Camera]:
 @pytest.fixture
 def tried(monkeypatch: pytest.MonkeyPatch) -> tuple[LightScene, Camera]:
     """The room, where even a small view has a trial."""
-    from pbrs_farm.transport.guiding import pilot
+    from pbrs_farm.transport import pilot
 
     monkeypatch.setattr(pilot, "_MIN_SAMPLES", 0)
     house, camera = three_lamps()
@@ -65,8 +65,7 @@ def plain_half(lanes: Any) -> Any:
 def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_that_around_it_or_the_views() -> (
     None
 ):
-    from pbrs_farm.transport.kernels.arrival_rates import N_KINDS, arrival_rates
-    from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
+    from pbrs_farm.transport.kernels.outdoor_choice import N_KINDS, VoxelGrid, arrival_rates
 
     grid = VoxelGrid(np.array([[0.1, 0.1, 0.1], [2.4, 0.1, 0.1]], np.float32))
     assert grid.n_voxels == 5
@@ -82,7 +81,7 @@ def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_that_around_it_o
 
 
 def test_a_voxel_counts_with_the_26_around_it() -> None:
-    from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
+    from pbrs_farm.transport.kernels.outdoor_choice import VoxelGrid
 
     grid = VoxelGrid(np.array([[0, 0, 0], [1.9, 1.4, 2.4]], np.float32))
     ones = np.ones((grid.n_voxels, 1), np.uint32)
@@ -100,7 +99,7 @@ def test_a_voxel_counts_with_the_26_around_it() -> None:
 def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
     tried: tuple[LightScene, Camera],
 ) -> None:
-    from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP, FIRST_SUNLIT
+    from pbrs_farm.transport.kernels.outdoor_choice import FIRST_LAMP, FIRST_SUNLIT
 
     scene, camera = tried
     _emitters, weights = scene.emitters(camera, FIELDS, 1)

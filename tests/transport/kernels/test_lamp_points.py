@@ -13,7 +13,7 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 
 if choose_variant().startswith("scalar"):
     pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)
@@ -44,7 +44,7 @@ def test_every_point_of_a_ball_faces_the_vertex_and_lies_on_the_ball() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.kernels.lamp_points import LampPointSampler
+    from pbrs_farm.transport.kernels.emitters import LampPointSampler
 
     scene = scene_of(0.3, symmetric=True)
     n = 20_000

@@ -15,7 +15,7 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sunsky
 from pbrs_farm.transport.validation import known_rooms as rooms
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 from tests.transport import hard_rooms
 
 if choose_variant().startswith("scalar"):
@@ -35,7 +35,7 @@ def test_a_ray_is_cast_by_what_it_is_expected_to_bring_and_one_in_ten_at_least()
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.kernels.shadow_roulette import ShadowRoulette
+    from pbrs_farm.transport.kernels.direct_light import ShadowRoulette
 
     n = 100_000
     u = (dr.arange(mi.Float, n) + 0.5) / n
@@ -62,7 +62,7 @@ def test_roulette_of_shadow_rays_leaves_the_mean_alone(
 ) -> None:
     # Ten times the usual threshold: nearly every ray is cast by chance. Significance: 16 blocks of
     # each group, |z| < 4.5 each is missed by chance once in 4500 runs.
-    from pbrs_farm.transport.guiding import pilot
+    from pbrs_farm.transport import pilot
 
     scene, camera = scene_and_camera(room)
     found: dict[float, list[list[np.ndarray]]] = {}

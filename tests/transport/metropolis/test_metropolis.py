@@ -13,8 +13,8 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky, sunsky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
 from tests.transport import hard_rooms
 from tests.transport.test_path_tracer import FIELDS, RECIPE, rendered
 
@@ -165,7 +165,7 @@ def test_the_rounds_of_a_launch_change_no_picture(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("n_pixels", [768, 19200, 307200, 2073600])
 def test_the_halves_of_the_film_share_no_prefix(n_chains: int, n_pixels: int) -> None:
     from pbrs_farm.transport.metropolis.film import ROUND_STEPS
-    from pbrs_farm.transport.metropolis.prefixes import prefix_schedule
+    from pbrs_farm.transport.metropolis.reconnection import prefix_schedule
 
     n_sets, every = prefix_schedule(n_chains, n_pixels)
     assert n_sets > 0
@@ -175,7 +175,7 @@ def test_the_halves_of_the_film_share_no_prefix(n_chains: int, n_pixels: int) ->
 
 
 def test_a_launch_has_every_set_of_prefixes_of_its_rounds() -> None:
-    from pbrs_farm.transport.metropolis.prefixes import PrefixSchedule
+    from pbrs_farm.transport.metropolis.reconnection import PrefixSchedule
 
     schedule = PrefixSchedule(n_sets=2, every=5)
     assert schedule.sets_of(range(5)) == range(2)

@@ -15,7 +15,7 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
-from pbrs_farm.transport.validation.statistics import blocks, z_scores
+from pbrs_farm.transport.validation.claims import blocks, z_scores
 from tests.transport import hard_rooms
 from tests.transport.metropolis.test_metropolis import METROPOLIS
 from tests.transport.test_path_tracer import FIELDS, RECIPE
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(
 def test_every_pixel_is_in_one_group_and_groups_are_no_larger_than_asked(
     height: int, width: int, n: int
 ) -> None:
-    from pbrs_farm.transport.metropolis.pixel_groups import stratified_groups
+    from pbrs_farm.transport.metropolis.film import stratified_groups
 
     groups = stratified_groups(height, width, n, seed=3)
     slots, pixels = groups.slots, groups.pixels
@@ -42,7 +42,7 @@ def test_every_pixel_is_in_one_group_and_groups_are_no_larger_than_asked(
 
 
 def test_groups_are_spread_and_neighbours_are_apart() -> None:
-    from pbrs_farm.transport.metropolis.pixel_groups import stratified_groups
+    from pbrs_farm.transport.metropolis.film import stratified_groups
 
     groups = stratified_groups(64, 64, 256, seed=1)
     group = (groups.slots // groups.n).reshape(64, 64)
@@ -51,7 +51,7 @@ def test_groups_are_spread_and_neighbours_are_apart() -> None:
 
 
 def test_importance_is_high_where_it_is_dark_and_bounded() -> None:
-    from pbrs_farm.transport.metropolis.bootstrap import pixel_importance
+    from pbrs_farm.transport.metropolis.integrator import pixel_importance
 
     rng = np.random.default_rng(0)
     pixels = rng.integers(0, 48 * 64, 30_000).astype(np.uint32)
@@ -64,7 +64,7 @@ def test_importance_is_high_where_it_is_dark_and_bounded() -> None:
 
 
 def test_a_black_picture_has_even_importance() -> None:
-    from pbrs_farm.transport.metropolis.bootstrap import pixel_importance
+    from pbrs_farm.transport.metropolis.integrator import pixel_importance
 
     importance = pixel_importance((3, 4), np.zeros(10, np.uint32), np.zeros(10, np.float32))
     assert np.array_equal(importance, np.ones((3, 4), np.float32))

@@ -16,8 +16,7 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.validation import claims
-from pbrs_farm.transport.validation.claims import LightClaim, light_claims
-from pbrs_farm.transport.validation.statistics import z_scores
+from pbrs_farm.transport.validation.claims import LightClaim, light_claims, z_scores
 
 VARIANT = choose_variant()
 

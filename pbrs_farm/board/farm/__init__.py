@@ -1,1 +1,0 @@
-"""A farm as the board shows and steers it."""

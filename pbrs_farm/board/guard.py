@@ -1,0 +1,237 @@
+"""What every request passes before a route sees it: rate, size, host, origin, session.
+
+An ASGI middleware, so that it also stands before streams and errors. Effects: none but answers.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from http.cookies import CookieError, SimpleCookie
+from typing import Any, Final
+from urllib.parse import parse_qs, urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from pbrs_farm.board.options import BoardOptions
+from pbrs_farm.board.sessions import COOKIE, Sessions
+
+# How often an address may ask: a bucket of tokens each. Effects: reads the clock.
+
+
+_MAX_ADDRESSES: Final = 4096  # that are remembered
+
+
+class Buckets:
+    """A bucket per address, filled at a rate; used from one thread."""
+
+    def __init__(
+        self, per_s: float, burst: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._per_s, self._burst, self._clock = per_s, burst, clock
+        self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # tokens, at which time
+
+    def takes(self, address: str) -> bool:
+        """Whether the address may ask once more now; if so, it has."""
+        now = self._clock()
+        left, since = self._left.pop(address, (self._burst, now))
+        left = min(self._burst, left + (now - since) * self._per_s)
+        may = left >= 1
+        self._left[address] = (left - 1 if may else left, now)
+        while len(self._left) > _MAX_ADDRESSES:
+            self._left.popitem(last=False)
+        return may
+
+
+# What every request passes before a route sees it.
+
+
+LOGIN: Final = "/login"
+_READS: Final = ("GET", "HEAD")
+_OPEN: Final = ("/static/", "/health", LOGIN)  # readable by everybody who may reach the board
+_CSP: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:;"
+    " connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+)
+HEADERS: Final = {
+    "Content-Security-Policy": _CSP,
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+
+
+class Guard:
+    """Lets through what may pass; sets scope["session"], "" for who has shown no token."""
+
+    def __init__(self, app: ASGIApp, options: BoardOptions, sessions: Sessions) -> None:
+        self._app, self._options, self._sessions = app, options, sessions
+        limits = options.limits
+        self._rates = Buckets(limits.requests_per_s, limits.burst)
+        self._logins = Buckets(limits.logins_per_s, limits.login_burst)
+        self._hosts = {"localhost", socket.gethostname().lower(), options.host.lower()}
+        self._hosts |= {name.lower() for name in options.allowed_hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer the request, or hand it on."""
+        if scope["type"] != "http":
+            if scope["type"] == "lifespan":
+                await self._app(scope, receive, send)
+            return
+        answer = await self._refusal(scope, receive)
+        if answer is not None:
+            await answer(scope, receive, _with_headers(send))
+        else:
+            receive = _repeated(scope.get("board_body"), receive)
+            await self._app(scope, receive, _with_headers(send))
+
+    async def _refusal(self, scope: Scope, receive: Receive) -> Response | None:
+        """The answer to a request that may not pass, None to one that may."""
+        headers, method, path = Headers(scope=scope), scope["method"], scope["path"]
+        address = (scope.get("client") or ("", 0))[0]
+        if not self._rates.takes(address):
+            return _told(429, "too many requests: wait a little", {"Retry-After": "2"})
+        if len(scope["raw_path"]) + len(scope["query_string"]) > self._options.limits.target_bytes:
+            return _told(414, "the address is too long")
+        if not self._is_our_host(headers.get("host", "")):
+            return _told(400, "this board is not called so: pbrs-farm board --allow-host NAME")
+        if method not in (*_READS, "POST"):
+            return _told(405, "the board knows GET and POST", {"Allow": "GET, HEAD, POST"})
+        # Who asks: a session's cookie, or a script that shows the token itself.
+        cookie = _cookie(headers.get("cookie", ""))
+        session = cookie if cookie and self._sessions.is_open(cookie) else ""
+        scheme, _, word = headers.get("authorization", "").partition(" ")
+        is_script = scheme.lower() == "bearer" and self._sessions.knows(word)
+        scope["session"] = session
+        scope["may_change"] = (bool(session) or is_script) and not self._options.is_readonly
+        if method in _READS:
+            may_read = self._options.is_private or session or is_script
+            if may_read or path.startswith(_OPEN):
+                return None
+            return RedirectResponse(LOGIN, 303)
+        return await self._refused_change(scope, receive, session, is_script=is_script)
+
+    async def _refused_change(
+        self, scope: Scope, receive: Receive, session: str, *, is_script: bool
+    ) -> Response | None:
+        headers, path = Headers(scope=scope), scope["path"]
+        if not _is_own_page(headers):
+            return _told(403, "a change must come from the board's own pages")
+        is_login = path == LOGIN
+        if self._options.is_readonly and not is_login:
+            return _told(403, "this board was started with --readonly")
+        body = await _body(receive, self._options.limits.body_bytes)
+        if body is None:
+            return _told(413, "the form is too large")
+        scope["board_body"] = body
+        if is_login:
+            if not self._logins.takes((scope.get("client") or ("", 0))[0]):
+                return _told(429, "too many tries: wait a minute", {"Retry-After": "60"})
+            return None
+        if is_script:
+            return None
+        if not session:
+            return _told(401, "show the board's token first: /login")
+        word = form_values(body).get("form_word", "") or headers.get("x-form-word", "")
+        if not self._sessions.is_form_word(session, word):
+            return _told(403, "the form is not of this session: load the page again")
+        return None
+
+    def _is_our_host(self, host: str) -> bool:
+        """A name we were told, or an address: no foreign name can be made to point here."""
+        name = _host_name(host)
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return name in self._hosts
+        return True
+
+
+def _host_name(host: str) -> str:
+    try:
+        return (urlsplit(f"//{host}").hostname or "").lower()
+    except ValueError:
+        return ""
+
+
+def _is_own_page(headers: Headers) -> bool:
+    """Whether a change comes from a page of this board, as far as the browser says."""
+    if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
+        return False
+    origin = headers.get("origin")
+    return origin is None or urlsplit(origin).netloc.lower() == headers.get("host", "").lower()
+
+
+def _cookie(text: str) -> str:
+    try:
+        morsel = SimpleCookie(text[:4096]).get(COOKIE)
+    except CookieError:
+        return ""
+    return morsel.value if morsel is not None else ""
+
+
+async def _body(receive: Receive, most: int) -> bytes | None:
+    """The whole body, None where it is larger than most; what is too much is not kept."""
+    body, more, is_within = b"", True, True
+    while more:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            return None
+        body = body + message.get("body", b"") if is_within else b""
+        is_within = is_within and len(body) <= most
+        if not is_within:
+            return None
+        more = message.get("more_body", False)
+    return body
+
+
+def _repeated(body: bytes | None, receive: Receive) -> Receive:
+    """receive, with the body that was read already given once more."""
+    if body is None:
+        return receive
+    messages: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
+
+    async def again() -> Message:
+        return messages.pop() if messages else await receive()
+
+    return again
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers.setdefault(name, value)
+            headers.setdefault("Cache-Control", "no-store")
+        await send(message)
+
+    return sending
+
+
+def _told(status: int, text: str, headers: dict[str, str] | None = None) -> Response:
+    return PlainTextResponse(f"{text}\n", status, headers)
+
+
+def form_values(body: bytes) -> dict[str, str]:
+    """Name -> value of a form's body; of a name that stands twice the last."""
+    try:
+        found = parse_qs(body.decode("utf-8"), keep_blank_values=True, max_num_fields=64)
+    except ValueError:
+        return {}
+    return {name: values[-1] for name, values in found.items()}
+
+
+async def form_of(request: Request) -> dict[str, str]:
+    """The form of a request that passed the guard."""
+    body: Any = request.scope.get("board_body") or b""
+    return form_values(body)

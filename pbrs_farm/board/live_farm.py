@@ -1,0 +1,177 @@
+"""What a farm does now, asked of Redis once for all who look. Effects: reads Redis and the store.
+
+Many pages may be open: each answer is kept for two seconds, so that looking costs the farm the same
+whether one looks or a hundred.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+
+if TYPE_CHECKING:
+    from workers.client.farm_client import Farm
+
+T = TypeVar("T")
+
+_KEPT_S: Final = 2.0  # an answer that Redis gave
+_MAX_KEPT: Final = 200  # answers
+_MAX_LOG: Final = 200_000  # characters of a log, its end
+_COMMAND: Final = re.compile(r"\[reproduce: (.+?)\]")
+
+
+@dataclass(frozen=True, slots=True)
+class FarmNow:
+    """All jobs and workers."""
+
+    jobs: tuple[dict[str, Any], ...] = ()  # rows of workers/client/job_rows.py, newest first
+    workers: tuple[dict[str, Any], ...] = ()  # rows of Farm.workers, with what each runs
+    storage: str = "ok"
+    fault: str = ""  # why the farm does not answer, or ""
+
+
+@dataclass(frozen=True, slots=True)
+class JobNow:
+    """One job."""
+
+    status: dict[str, Any]  # Farm.status
+    row: dict[str, Any]  # of workers/client/job_rows.py
+    failures: tuple[dict[str, Any], ...] = ()  # kinds, with the command that reproduces one
+    running: tuple[dict[str, Any], ...] = ()  # task, worker, seconds
+
+
+@dataclass(slots=True)
+class _KeptAnswer:
+    at: float
+    value: Any
+
+
+@dataclass(slots=True)
+class LiveFarm:
+    """A farm behind a memory of two seconds; safe to ask from many threads."""
+
+    farm: Farm
+    clock: Callable[[], float] = time.monotonic
+    _kept: dict[str, _KeptAnswer] = field(default_factory=dict)
+    _asking: threading.Lock = field(default_factory=threading.Lock)
+
+    def now(self) -> FarmNow:
+        """All jobs and workers; says so where the farm does not answer."""
+        return self._asked("", self._read_farm)
+
+    def job(self, job: str) -> JobNow:
+        """One job. Raises BadInput for one there is not, LedgerUnavailable."""
+        return self._asked(job, lambda: self._read_job(job))
+
+    def log(self, job: str, task: str) -> str:
+        """The end of a task's stored log. Raises BadInput where there is none."""
+        text = self.farm.logs(job, task)
+        return text[-_MAX_LOG:]
+
+    def forget(self) -> None:
+        """Ask anew next time: something was changed."""
+        with self._asking:
+            self._kept.clear()
+
+    def _asked(self, name: str, ask: Callable[[], T]) -> T:
+        # Whoever comes while somebody asks waits for that answer.
+        with self._asking:
+            kept = self._kept.get(name)
+            if kept is None or self.clock() - kept.at > _KEPT_S:
+                value = ask()
+                while len(self._kept) >= _MAX_KEPT:
+                    self._kept.pop(next(iter(self._kept)))
+                kept = self._kept[name] = _KeptAnswer(self.clock(), value)
+        answer: T = kept.value
+        return answer
+
+    def _read_farm(self) -> FarmNow:
+        from workers.client.job_rows import job_rows
+
+        try:
+            jobs = job_rows(self.farm)
+            workers = self.farm.workers()
+            active = [row["job"] for row in jobs if row["running"]]
+            now = self.farm.ledger.now()
+            # What each worker runs, of the jobs that run something.
+            runs: dict[str, list[str]] = {}
+            for job in active:
+                for task, (worker, since) in self.farm.ledger.claims(job).items():
+                    runs.setdefault(worker, []).append(f"{task} ({max(0.0, now - since):.0f} s)")
+            rows = [{**w, "tasks": sorted(runs.get(w["worker"], ()))} for w in workers]
+            storage = self.farm.registry.breaker() or "ok"
+        except PbrsError as error:
+            return FarmNow(fault=str(error))
+        return FarmNow(tuple(reversed(jobs)), tuple(rows), storage)
+
+    def _read_job(self, job: str) -> JobNow:
+        from workers.client.job_rows import job_row
+
+        status = self.farm.status(job)
+        row = job_row(self.farm.view(job), self.farm.registry.slots())
+        now = self.farm.ledger.now()
+        running = [
+            {"task": task, "worker": worker, "for_s": max(0.0, now - since)}
+            for task, (worker, since) in sorted(self.farm.ledger.claims(job).items())
+        ]
+        failures = [_with_command(kind) for kind in self.farm.failures(job)]
+        return JobNow(status, row, tuple(failures), tuple(running))
+
+
+def _with_command(kind: dict[str, Any]) -> dict[str, Any]:
+    """A kind of failure with the command that makes one of it happen again."""
+    example = shown(kind["example"], 2 * MAX_MESSAGE)
+    found = _COMMAND.search(example)
+    task = kind["tasks"][0] if kind["tasks"] else ""
+    command = found[1] if found else kind["command"]
+    return {**kind, "example": example, "task": task, "command": command}
+
+
+# The lines that say who changed what of a farm. Effects: appends to a file, writes to the log.
+
+
+_LOG: Final = logging.getLogger(__name__)
+_SHOWN: Final = 20  # lines that the page shows
+
+
+class Audit:
+    """A file of JSON lines, one a change."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._lock = threading.Lock()
+
+    def note(self, *, address: str, what: str, of: str, answer: str) -> None:
+        """Write one line: when, from which address, what was done to what, and what came of it."""
+        row = {
+            "utc": datetime.now(UTC).isoformat(timespec="seconds"),
+            "address": address,
+            "what": what,
+            "of": shown(of),
+            "answer": shown(answer, MAX_MESSAGE),
+        }
+        line = json.dumps(row)
+        with self._lock, self._file.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+        _LOG.warning("audit: %s", line)
+
+    def last(self) -> list[dict[str, Any]]:
+        """The last changes, newest first."""
+        try:
+            with self._file.open(encoding="utf-8") as file:
+                lines = deque(file, maxlen=_SHOWN)
+        except OSError:
+            return []
+        return [json.loads(line) for line in reversed(lines)]

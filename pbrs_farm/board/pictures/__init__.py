@@ -1,1 +1,0 @@
-"""What a browser shows of a view's stored files: thumbnails, coloured labels, pixels, light."""

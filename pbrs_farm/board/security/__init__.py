@@ -1,1 +1,0 @@
-"""Who may ask for what: hosts, origins, sessions, rates and sizes."""

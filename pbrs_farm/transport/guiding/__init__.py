@@ -1,1 +1,0 @@
-"""Where shadow rays and scattered rays are aimed: lamps near by, lampshades, portals."""
