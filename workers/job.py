@@ -3,30 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
-from workers.ids import GL, LIGHT
-
-# A job's priority: a number from 0, which goes first, to 9; pure.
-
-
-DEFAULT_PRIORITY: Final = 5
-LEAST_URGENT: Final = 9
-
-
-def priority_from_text(text: str) -> int:
-    """The priority a word names. Raises BadInput for what is no number from 0 to 9."""
-    if len(text) != 1 or not text.isascii() or not text.isdigit():
-        hint = f"a number from 0, which goes first, to {LEAST_URGENT}"
-        raise BadInput(repr(text[:40]), "", "not a priority", hint=hint)
-    return int(text)
-
+from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
 
 # What a job is and where its own objects are stored.
 

@@ -21,7 +21,7 @@ from workers.client.text import (
     status_text,
     workers_text,
 )
-from workers.job import LEAST_URGENT
+from workers.ids import LEAST_URGENT
 from workers.ledger.task_ledger import WITH_FAILURES
 
 if TYPE_CHECKING:

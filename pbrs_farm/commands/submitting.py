@@ -25,7 +25,7 @@ from pbrs_farm.commands.arguments import (
     views_wanted,
     warn,
 )
-from workers.job import DEFAULT_PRIORITY, LEAST_URGENT
+from workers.ids import DEFAULT_PRIORITY, LEAST_URGENT
 
 if TYPE_CHECKING:
     from workers.job import JobSpec

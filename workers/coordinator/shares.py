@@ -11,8 +11,7 @@ import heapq
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from workers.ids import GEOMETRY, JOB, LIGHT, LIGHT_GPU, lane_of
-from workers.job import DEFAULT_PRIORITY
+from workers.ids import DEFAULT_PRIORITY, GEOMETRY, JOB, LIGHT, LIGHT_GPU, lane_of
 from workers.ledger.task_ledger import STATES, JobView
 
 _RATIO: Final = 9  # tasks of a job for one of a job of the next lower rank

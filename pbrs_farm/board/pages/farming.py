@@ -158,7 +158,7 @@ async def steer(request: Request) -> Response:
 
 def _do(live: LiveFarm, what: str, of: str, to: str) -> str:
     """Do it to a job or worker; what came of it, for the audit. to: the new priority of a job."""
-    from workers.job import priority_from_text
+    from workers.ids import priority_from_text
 
     farm = live.farm
     if what == "priority":

@@ -8,6 +8,8 @@ import pytest
 from pbrs_farm.study.metrics.angular import angles_deg
 from pbrs_farm.study.photographs import normals_of_depth
 
+pytestmark = pytest.mark.study
+
 K = np.array([[150.0, 0, 80], [0, 150.0, 60], [0, 0, 1]])
 
 

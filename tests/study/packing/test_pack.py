@@ -184,9 +184,9 @@ import sys
 for name in ("pydantic", "OpenImageIO", "torch", "scipy", "pyarrow", "PIL", "obstore", "mitsuba"):
     sys.modules[name] = None
 import pbrs_farm
-from pbrs_farm.study.reading.view_sample import LAYERS, Request
+from pbrs_farm.study.reading.view_sample import LAYERS, SampleRequest
 views = pbrs_farm.open({str(tmp_path / "x")!r})
-print(len(views), views[0].sample(Request(LAYERS)).normal.shape)
+print(len(views), views[0].sample(SampleRequest(LAYERS)).normal.shape)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stderr == ""

@@ -6,6 +6,8 @@ from hypothesis import strategies as st
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.samples.view_loader import shard_order, view_order, whole_order
 
+pytestmark = pytest.mark.study
+
 COUNTS = st.lists(st.integers(1, 30), min_size=1, max_size=12)
 
 
