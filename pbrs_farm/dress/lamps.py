@@ -17,8 +17,9 @@ from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor
 from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import next_id
+from pbrs_farm.geometry.heights import highest_below, lowest_above
 from pbrs_farm.geometry.solids import lathe, sphere
-from pbrs_farm.geometry.surface_points import item_triangles, lowest_above
+from pbrs_farm.geometry.surface_points import item_triangles
 
 # Lamps made in code, for homes without a catalogue: an opal dome, a globe, a shade on a cord.
 
@@ -233,7 +234,7 @@ def _places(draft: Draft, space: HouseSpace, room: RoomSpace) -> list[tuple[F64,
     if not places:
         return []
     points = np.array(places)
-    tops = lowest_above(room.above, points, floor + 0.5)
+    tops = lowest_above(points, room.above, floor + 0.5)
     ok = np.isfinite(tops) & (tops < floor + _MOST_ROOM_M)
     return [(points[k], float(tops[k]), lows[k]) for k in np.flatnonzero(ok)]
 
@@ -267,7 +268,7 @@ def _is_free(
     if not shapely.contains(room.area, shapely.Point(place).buffer(radius)):
         return False
     ring = place + 0.05 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-    if np.abs(lowest_above(room.above, ring, room.room.floor_y + 0.5) - top_y).max() > 0.001:
+    if np.abs(lowest_above(ring, room.above, room.room.floor_y + 0.5) - top_y).max() > 0.001:
         return False
     bottom = top_y - float(high[1]) - 0.05
     if bottom < max((d.top_y for d in room.doors), default=-np.inf) + 0.05:
@@ -289,7 +290,6 @@ _FLOOR_LM, _TABLE_LM = 900.0, 400.0
 _STANDING_FROM_WALL_M = (
     0.6  # of a floor lamp's edge, at most: no lamp stands in the middle of a room
 )
-_UPSIDE_DOWN = np.array([1.0, -1.0, 1.0])
 
 
 def stand_by_sofas(
@@ -424,8 +424,8 @@ def _top(draft: Draft, space: HouseSpace, number: int, place: F64, shape: Shape)
     ring = [
         place + reach * 0.95 * np.array([np.cos(a), np.sin(a)]) for a in np.arange(8) * np.pi / 4
     ]
-    triangles = item_triangles(draft.items[number]) * _UPSIDE_DOWN
-    heights = -lowest_above(triangles, np.array([place, *ring]), -1e9)
+    triangles = item_triangles(draft.items[number])
+    heights = highest_below(np.array([place, *ring]), triangles)
     if not np.isfinite(heights).all() or np.ptp(heights) > 0.001:
         return None
     y = float(heights.max())

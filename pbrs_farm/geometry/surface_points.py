@@ -1,4 +1,4 @@
-"""Points spread evenly over an item's triangles, and heights of triangles above places; no effects."""
+"""Points spread evenly over an item's triangles; no effects."""
 
 from __future__ import annotations
 
@@ -83,26 +83,3 @@ def _first_of_each(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     first = np.full(n, -1, np.int32)
     first[keys[::-1]] = np.arange(len(keys) - 1, -1, -1, dtype=np.int32)
     return np.asarray(first[first >= 0], np.int64)
-
-
-def lowest_above(triangles: F64, places: F64, least_y: float) -> F64:
-    """(N,) y of the lowest of the triangles (F, 3, 3) above least_y at plan places (N, 2); inf = none."""
-    found = np.full(len(places), np.inf)
-    if not len(places) or not len(triangles):
-        return found
-    # Keep triangles above whose bounds meet the places'.
-    low, high = triangle_bounds(triangles[:, :, [0, 2]])
-    meets = (high >= places.min(0)).all(1) & (low <= places.max(0)).all(1)
-    for p, q, r in triangles[meets & (triangles[:, :, 1].max(1) > least_y)]:
-        # Solve for the place in the triangle's plan; upright ones have none.
-        e, f = (q - p)[[0, 2]], (r - p)[[0, 2]]
-        det = e[0] * f[1] - e[1] * f[0]
-        if abs(det) < 1e-9:
-            continue
-        d = places - p[[0, 2]]
-        u = (d[:, 0] * f[1] - d[:, 1] * f[0]) / det
-        v = (e[0] * d[:, 1] - e[1] * d[:, 0]) / det
-        y = p[1] + u * (q[1] - p[1]) + v * (r[1] - p[1])
-        covers = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (y > least_y)
-        found = np.where(covers, np.minimum(found, y), found)
-    return found

@@ -38,7 +38,7 @@ STEPS: Final = {
     step.name: step
     for step in (
         Step("house", 5, ("read", "repair"), per_view=False),
-        Step("cameras", 1, ("cameras", "lens"), ("house",), per_view=False),
+        Step("cameras", 2, ("cameras", "lens"), ("house",), per_view=False),
         Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.camera import Camera, Intrinsics
-from pbrs_farm.core.house import House, ItemKind
+from pbrs_farm.core.house import House, ItemKind, corners_of_surfaces
+from pbrs_farm.geometry.heights import highest_below, lowest_above
 from pbrs_farm.sample.candidates import cameras_looking
 
 ItemCounter = Callable[[Sequence[Camera]], NDArray[np.uint32]]
@@ -27,6 +28,7 @@ MAX_OBJECT_M3: Final = 12.0
 # A wall, floor or ceiling that covers more of all directions encloses the eye.
 MAX_STRUCTURE_SHARE: Final = 0.97
 
+_ONE_PLANE_M: Final = 1e-3  # between faces that count as in one plane
 _CUBE_PX: Final = 12  # width of a face of the cube around the eye
 _COUNTS_PER_CALL: Final = 1 << 22  # numbers in a table of counts: bounds memory
 _CAMERAS_PER_CALL: Final = 384  # a multiple of the six faces of a cube
@@ -64,7 +66,27 @@ def not_above_floor(house: House, eyes: F64, counter: ItemCounter) -> Bools:
     above = np.zeros(len(eyes), np.bool_)
     for part, rows in counted(counter, cameras, len(house.items)):
         above[part] = rows[:, bad].sum(1) > 0
-    return above
+    return above | _in_standing_wall(house, eyes)
+
+
+def _in_standing_wall(house: House, eyes: F64) -> Bools:
+    """(N,) bool: the eye (N, 3) is in a wall whose bottom lies in the floor's plane or above.
+
+    Of two faces in one plane, which one a ray meets differs between processors: look no further.
+    """
+    plan, inside = eyes[:, [0, 2]], np.zeros(len(eyes), np.bool_)
+    floors = [s for item in house.items if item.kind is ItemKind.FLOOR for s in item.surfaces]
+    floor_y = highest_below(plan, corners_of_surfaces(floors), eyes[:, 1])
+    for item in house.items:
+        if item.kind is not ItemKind.WALL:
+            continue
+        low, high = item.bounds
+        held = np.flatnonzero(((eyes > low) & (eyes < high)).all(1))
+        if len(held):
+            wall, y = corners_of_surfaces(item.surfaces), eyes[held, 1]
+            is_below = highest_below(plan[held], wall, y) >= floor_y[held] - _ONE_PLANE_M
+            inside[held] |= is_below & np.isfinite(lowest_above(plan[held], wall, y))
+    return inside
 
 
 def enclosed(house: House, eyes: F64, counter: ItemCounter) -> Bools:

@@ -12,16 +12,10 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.placing import Placing
-from pbrs_farm.dress.supports import (
-    PlanGrid,
-    SceneTriangles,
-    cells_over,
-    heights_under,
-    plan_turn,
-    top_heights,
-)
+from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, cells_over, plan_turn, top_heights
 from pbrs_farm.dress.things.assembly import Made, smooth
 from pbrs_farm.dress.things.things import THINGS
+from pbrs_farm.geometry.heights import highest_below
 
 # Pillows, cushions and a folded blanket on beds; they take the shape of what they lie on.
 
@@ -170,7 +164,7 @@ def lay_down(
     pressed, gap = [], np.inf
     for surface in shape.surfaces:
         points = (surface.positions - [0, half, 0]) @ turn.T + [plan[0], 0, plan[1]]
-        ground = heights_under(points[:, [0, 2]], corners, level + 0.12)
+        ground = highest_below(points[:, [0, 2]], corners, level + 0.12)
         points[:, 1] = np.maximum(points[:, 1] + level + sunk * half, ground + TOUCH_M)
         gap = min(gap, float((points[:, 1] - ground).min()))
         pressed.append(points)
@@ -361,7 +355,7 @@ def _settled(points: F64, corners: F64, turn: F64, centre: F64, thick: float) ->
         centre = centre - [0, fall, 0]
     # Give way where the back, or the seat, would reach into it.
     own = (corners - centre) @ turn
-    ground = heights_under(points[:, [0, 2]], own, _MOST_PRESSED_M)
+    ground = highest_below(points[:, [0, 2]], own, _MOST_PRESSED_M)
     pressed = points.copy()
     pressed[:, 1] = np.maximum(points[:, 1], ground + TOUCH_M)
     placed = pressed @ turn.T + centre
@@ -376,7 +370,7 @@ def _way_to_back(points: F64, corners: F64, turn: F64, centre: F64, thick: float
     # In the cushion's own frame the back is a height field under its upper half.
     own = (corners - centre) @ turn
     upper = points[:, 2] < 0
-    ground = heights_under(points[upper][:, [0, 2]], own, thick)
+    ground = highest_below(points[upper][:, [0, 2]], own, thick)
     found = np.isfinite(ground)
     if found.sum() < 0.4 * upper.sum():
         return None
@@ -387,7 +381,7 @@ def _way_to_seat(placed: F64, corners: F64) -> float | None:
     """How far the cushion falls, or is lifted where negative, to touch the seat."""
     low = placed[:, 1].min()
     lower = placed[placed[:, 1] < low + 0.06]
-    ground = heights_under(lower[:, [0, 2]], corners, low + 0.06)
+    ground = highest_below(lower[:, [0, 2]], corners, low + 0.06)
     gap = lower[:, 1] - ground
     if not np.isfinite(gap).any() or not -0.08 < gap.min() < 0.3:
         return None

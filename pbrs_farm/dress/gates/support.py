@@ -18,6 +18,7 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds, unique_points
 from pbrs_farm.dress.gates.bodies import Body, boxes_of
+from pbrs_farm.geometry.heights import heights_in
 from pbrs_farm.geometry.surface_points import item_triangles
 
 # Which faces lie above and below places of a house, and whose.
@@ -86,7 +87,7 @@ class Plumb:
             near = self._low[axis][triangle] < at + reach
             near &= self._high[axis][triangle] > at - reach
             place, triangle = place[near], triangle[near]
-        y = heights_at(points[place][:, [0, 2]], self._corners[triangle])
+        y = heights_in(points[place][:, [0, 2]], self._corners[triangle], _EDGE)
         with np.errstate(invalid="ignore"):
             met = np.abs(y - points[place, 1]) < reach_m
         return Hits(place[met], y[met], self._owner[triangle[met]])
@@ -137,20 +138,6 @@ def _grid(corners: F64, numbers: Ints, cell_m: float, *, is_last: bool) -> tuple
 def _counting(counts: Ints) -> Ints:
     """0, 1, ... for each count, one after another."""
     return np.asarray(np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts))
-
-
-def heights_at(places: F64, corners: F64) -> F64:
-    """(N,) y of triangles (N, 3, 3) at plan places (N, 2) of the same row; NaN beyond their edges."""
-    a, b, c = (corners[:, k][:, [0, 2]] for k in range(3))
-    ab, ac, ap = b - a, c - a, places - a
-    with np.errstate(divide="ignore", invalid="ignore"):
-        det = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-        s = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / det
-        t = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / det
-        on_it = (s >= -_EDGE) & (t >= -_EDGE) & (s + t <= 1 + _EDGE)
-        y = corners[:, 0, 1] + s * (corners[:, 1, 1] - corners[:, 0, 1])
-        y = y + t * (corners[:, 2, 1] - corners[:, 0, 1])
-    return np.where(on_it, y, np.nan)
 
 
 # Gate.

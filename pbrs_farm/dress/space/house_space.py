@@ -27,7 +27,8 @@ from pbrs_farm.dress.space.wall_faces import (
     runs,
     wall_planes,
 )
-from pbrs_farm.geometry.surface_points import item_triangles, lowest_above, surface_points
+from pbrs_farm.geometry.heights import lowest_above
+from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 # Wall faces cut to rooms, and what of them structure and things leave free.
 
@@ -346,7 +347,7 @@ def _near(triangles: F64, area: BaseGeometry) -> F64:
 
 def _ceiling(above: F64, room: Room) -> Callable[[F64], F64]:
     def ceiling_y(places: F64) -> F64:
-        found = lowest_above(above, places, room.floor_y + _ABOVE_FLOOR_M)
+        found = lowest_above(places, above, room.floor_y + _ABOVE_FLOOR_M)
         return np.where(np.isfinite(found), found, room.ceiling_y)
 
     return ceiling_y

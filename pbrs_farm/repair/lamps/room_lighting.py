@@ -26,6 +26,7 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.lighting import PowerUnit, flux_lm
 from pbrs_farm.core.mesh import distances_to_triangles
+from pbrs_farm.geometry.heights import lowest_above
 from pbrs_farm.repair.lamps.bulbs import icosphere
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of
@@ -119,21 +120,7 @@ def heights_above(house: House, room: Room, places: F64) -> F64:
     """(N,) y of the lowest structure above the room's floor at places (N, 2); inf = none."""
     surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
     triangles = corners_of_surfaces(surfaces)
-    # Keep those above the room whose bounds meet the places'.
-    least_y = room.floor_y + _ABOVE_FLOOR_M
-    a, b = triangles[:, :, [0, 2]].min(1), triangles[:, :, [0, 2]].max(1)
-    meets = (b >= places.min(0)).all(1) & (a <= places.max(0)).all(1)
-    found = np.full(len(places), np.inf)
-    for p, q, r in triangles[meets & (triangles[:, :, 1].max(1) > least_y)]:
-        # Solve for the place in the triangle's plan; upright ones have none.
-        edges = np.array([q - p, r - p])[:, [0, 2]].T
-        if abs(np.linalg.det(edges)) < 1e-9:
-            continue
-        u, v = np.linalg.solve(edges, (places - p[[0, 2]]).T)
-        y = p[1] + u * (q[1] - p[1]) + v * (r[1] - p[1])
-        covers = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (y > least_y)
-        found = np.where(covers, np.minimum(found, y), found)
-    return found
+    return lowest_above(places, triangles, room.floor_y + _ABOVE_FLOOR_M)
 
 
 def _tall_footprint(item: Item, room: Room) -> plan.Shape | None:

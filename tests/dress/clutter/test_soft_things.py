@@ -13,7 +13,8 @@ from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.clutter.cushions import find_seat, lying_place
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.supports import SceneTriangles, heights_under
+from pbrs_farm.dress.supports import SceneTriangles
+from pbrs_farm.geometry.heights import highest_below
 from tests.dress.furniture import boards, house, room, solid
 
 _PILLOW = 18
@@ -92,7 +93,7 @@ def test_cushions_stand_on_the_seat_and_lean_on_the_back() -> None:
     assert len(cushions) >= 4
     for cushion in cushions:
         points = _points(cushion)
-        ground = heights_under(points[:, [0, 2]], _corners(sofa), 0.6)
+        ground = highest_below(points[:, [0, 2]], _corners(sofa), 0.6)
         # It gives way by 1.2 mm, so that it touches with more than its lowest edge.
         assert (points[:, 1] - ground).min() == pytest.approx(-0.0012, abs=0.0002)
         # It is at the back, which is 20 cm deep, and between the arms.
@@ -106,8 +107,8 @@ def test_nothing_is_laid_where_something_lies() -> None:
     assert not _pillows(house(_bed(), case), 1)
 
 
-def test_heights_under_points_are_those_of_the_triangles() -> None:
+def test_highest_below_points_are_those_of_the_triangles() -> None:
     slope = np.array([[[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]])
     points = np.array([[0.25, 0.25], [0.5, 0.1], [0.9, 0.9]])
-    assert heights_under(points, slope) == pytest.approx([0.25, 0.5, -np.inf])
-    assert heights_under(points, slope, 0.3) == pytest.approx([0.25, -np.inf, -np.inf])
+    assert highest_below(points, slope) == pytest.approx([0.25, 0.5, -np.inf])
+    assert highest_below(points, slope, 0.3) == pytest.approx([0.25, -np.inf, -np.inf])
