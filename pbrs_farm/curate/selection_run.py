@@ -22,9 +22,9 @@ from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.core.record import Record
-from pbrs_farm.dress.space.room_kinds import named_kind
 from pbrs_farm.formats.histogram_json import ViewRecord, record_from_json
 from pbrs_farm.formats.manifest import sha256_by_key
+from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.selection.histogram_pack import (
     HistogramPack,
     bytes_from_pack,

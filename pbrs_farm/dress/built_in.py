@@ -18,9 +18,9 @@ from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finishes import box_mapped, connected_parts, grain_pattern
-from pbrs_farm.dress.space.room_kinds import RADIATORS, words_of_item
 from pbrs_farm.dress.style import METALS, WOODS, Metal, Rgb, Style, Wood, mix, rgb, shade
 from pbrs_farm.dress.textures.families import pattern_material
+from pbrs_farm.home.names import RADIATORS, words_of_item
 
 # One scheme of joinery a home: the coats of trim, doors, windows, stairs and what is fitted.
 # The shares are suggestions of ours for European homes: half of the trim is some white, a third

@@ -29,7 +29,6 @@ from pbrs_farm.dress.space.floor_bitmaps import (
     floor_bitmap,
     with_body,
 )
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
 from pbrs_farm.dress.style import Rgb, Style, mix, rgb, room_style
 from pbrs_farm.dress.textures.families import pattern_material, photographed
@@ -37,6 +36,7 @@ from pbrs_farm.dress.things import case_goods
 from pbrs_farm.dress.things.assembly import Made, metal, plain
 from pbrs_farm.dress.things.case_goods import Boards, Size, desk_chair
 from pbrs_farm.dress.walls.hanging import Hanging, next_id
+from pbrs_farm.home.room_use import RoomKind
 
 # What added furniture is made of: wood of the home, white or painted boards but on the draft.
 

@@ -11,15 +11,16 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import LAMP, NIGHT_STAND, SOFA, TABLE
 from pbrs_farm.core.house import ItemKind, LightPart, Material, MaterialKind, Surface
-from pbrs_farm.core.lighting import PowerUnit, flux_lm
+from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor_bitmap, house_space
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.geometry.heights import highest_below, lowest_above
 from pbrs_farm.geometry.solids import lathe, sphere
 from pbrs_farm.geometry.surface_points import item_triangles
+from pbrs_farm.home.lamps import flux_for_floor, flux_of_lamps
+from pbrs_farm.home.room_use import RoomKind
 
 # Lamps made in code, for homes without a catalogue: an opal dome, a globe, a shade on a cord.
 
@@ -438,10 +439,10 @@ def _top(draft: Draft, space: HouseSpace, number: int, place: F64, shape: Shape)
 # The part `lamps` of dressing.
 
 
-_WANTED_LX = {RoomKind.KITCHEN: 200, RoomKind.BATHROOM: 180, RoomKind.OFFICE: 180, RoomKind.HALL: 110}  # fmt: skip
-_USUAL_LX = 150
-_WEAK_LX = 30  # a room with less gets a lamp beside those it has
-_UTILISATION = 0.45  # share of a lamp's flux that reaches the floor, about
+# Of a furnished floor, on average.
+_WANTED_LX = {RoomKind.KITCHEN: 133, RoomKind.BATHROOM: 120, RoomKind.OFFICE: 120, RoomKind.HALL: 73}  # fmt: skip
+_USUAL_LX = 100
+_WEAK_LX = 20  # a room with less gets a lamp beside those it has
 _LEAST_M2 = 0.8
 _FLUX_LM = (500.0, 9000.0)  # of one lamp
 
@@ -457,21 +458,11 @@ def lamps(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
         if room.area.area < _LEAST_M2 or room.kind is RoomKind.OUTDOOR or not room.room.has_floor:
             continue
         if rng.random() < share:
-            area, has = float(room.area.area), room_flux_lm(draft, room)
-            wanted = _WANTED_LX.get(room.kind, _USUAL_LX) * area / _UTILISATION
-            if has * _UTILISATION / area < _WEAK_LX:
+            area, has = float(room.area.area), flux_of_lamps(draft.items[k] for k in room.items)
+            wanted = flux_for_floor(area, _WANTED_LX.get(room.kind, _USUAL_LX))
+            if has < flux_for_floor(area, _WEAK_LX):
                 flux = min(max(wanted - has, _FLUX_LM[0]), _FLUX_LM[1])
                 hang_from_ceiling(draft, catalogue, style, room_id, flux, rng)
         if rng.random() < share:
             stand_by_beds(draft, catalogue, style, room_id, rng)
             stand_by_sofas(draft, catalogue, style, room_id, rng)
-
-
-def room_flux_lm(draft: Draft, room: RoomSpace) -> float:
-    """Luminous flux of all lamps in the room, lm."""
-    return sum(
-        flux_lm(light.power, light.unit, light.share)
-        for number in room.items
-        for light in draft.items[number].lights
-        if draft.items[number].kind is not ItemKind.PERSON
-    )

@@ -23,7 +23,6 @@ from pbrs_farm.core.house import House, ItemKind, Note
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, floor_space
 from pbrs_farm.dress.space.passages import Passage
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.generate.floor_plan import (
     OpeningKind,
     PlacedPiece,
@@ -37,6 +36,7 @@ from pbrs_farm.generate.floor_plan import (
 from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.made import turned_by, upright_angle
 from pbrs_farm.generate.plan_walls import corners
+from pbrs_farm.home.room_use import RoomKind
 
 _EMPTY_SHARE: Final = 0.03  # of a room's floor
 _STANDS_M: Final = 0.5  # what begins higher above the floor hangs

@@ -23,15 +23,11 @@ from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.mesh import distances_to_triangles, face_areas, triangle_corners
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.geometry.solids import box
+from pbrs_farm.home.room_use import is_lived_in
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair, summary_of_report
 from pbrs_farm.repair.lamps.bulbs import icosphere, with_bulbs, with_shades
-from pbrs_farm.repair.lamps.room_lighting import (
-    GivenLights,
-    is_lived_in,
-    place_of_lamp,
-    with_room_lighting,
-)
+from pbrs_farm.repair.lamps.room_lighting import GivenLights, place_of_lamp, with_room_lighting
 from pbrs_farm.repair.structure.plan_geometry import polygon_of_room
 from tests.repair.embree import EmbreeOccluder
 

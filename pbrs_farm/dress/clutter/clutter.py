@@ -27,11 +27,11 @@ from pbrs_farm.dress.space.floor_bitmaps import (
     with_body,
 )
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, supports_of_item, surroundings
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.things.books import book_covers, leaning_book, run_of_books, stack_of_books
+from pbrs_farm.home.room_use import RoomKind
 
 # What stands on tables, desks, counters, chests: by the table of shares, greatest first.
 

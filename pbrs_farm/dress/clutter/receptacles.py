@@ -26,8 +26,9 @@ from pbrs_farm.core.classes import (
     TOILET,
 )
 from pbrs_farm.core.house import Item, ItemKind
-from pbrs_farm.dress.space.room_kinds import RoomKind, words_of_item
 from pbrs_farm.dress.supports import Support
+from pbrs_farm.home.names import words_of_item
+from pbrs_farm.home.room_use import RoomKind
 
 _HOLDS_NOTHING = (
     "shower", "bathtub", "bath tub", "radiator", "fireplace", "pool", "treadmill",

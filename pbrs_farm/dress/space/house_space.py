@@ -16,7 +16,6 @@ from pbrs_farm.core.mesh import area_vectors, boxes_meeting, points_bounds, tria
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.footprints import areal, plan_area
 from pbrs_farm.dress.space.passages import Passage, passages_of
-from pbrs_farm.dress.space.room_kinds import RoomKind, room_kind
 from pbrs_farm.dress.space.wall_faces import (
     CELL_M,
     FAR_M,
@@ -29,6 +28,7 @@ from pbrs_farm.dress.space.wall_faces import (
 )
 from pbrs_farm.geometry.heights import lowest_above
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
+from pbrs_farm.home.room_use import RoomKind, room_kind
 
 # Wall faces cut to rooms, and what of them structure and things leave free.
 

@@ -29,7 +29,6 @@ from pbrs_farm.dress.built_in import (
 )
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.house_space import RoomSpace, house_space
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import WOODS, Rgb, Style, mix, rgb, room_style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
 from pbrs_farm.dress.surfaces.wall_materials import (
@@ -48,6 +47,7 @@ from pbrs_farm.dress.textures.families import (
     photographed,
 )
 from pbrs_farm.dress.textures.wallpaper import inks
+from pbrs_farm.home.room_use import RoomKind
 
 # Floors and ceilings with the materials of their rooms, laid along the walls.
 

@@ -9,7 +9,6 @@ from pbrs_farm.core.classes import SINK, TOWEL
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style, mix, room_style
 from pbrs_farm.dress.textiles.curtains import (
     bar,
@@ -24,6 +23,7 @@ from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.things.assembly import Made, hung, metal
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.geometry.solids import box
+from pbrs_farm.home.room_use import RoomKind
 
 # Hangs towels near washbasins: on a rail of the catalogue, or on one made here.
 

@@ -16,11 +16,11 @@ from pbrs_farm.core.classes import BATHTUB, BED, FLOOR_MAT, SINK, SOFA, TABLE
 from pbrs_farm.core.house import Item, ItemKind, Material
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Rgb, Style, mix, room_style, shade
 from pbrs_farm.dress.things.assembly import Made, hung, plain
 from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.dress.walls.hung_things import faced_slab, jpeg_texture
+from pbrs_farm.home.room_use import RoomKind
 
 # Pictures of rugs and mats by a seed: bordered, striped, lattice, diamonds, shag, plain.
 # Every family is a function (rng, size, inks) -> (H, W, 3) float32, sRGB-encoded, 0..1.

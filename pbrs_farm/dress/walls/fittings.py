@@ -14,7 +14,6 @@ from pbrs_farm.core.house import Material
 from pbrs_farm.dress.built_in import coat_material, joinery_scheme
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, Passage
-from pbrs_farm.dress.space.room_kinds import RADIATORS, RoomKind, words_of_item
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.things.assembly import Made, Part, hung, plain, slab
 from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
@@ -26,6 +25,8 @@ from pbrs_farm.dress.walls.hung_things import (
     plate,
     round_mirror,
 )
+from pbrs_farm.home.names import RADIATORS, words_of_item
+from pbrs_farm.home.room_use import RoomKind
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
 _CASING_M = 0.16  # from a door's hole to the middle of its switch

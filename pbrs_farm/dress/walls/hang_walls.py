@@ -11,7 +11,6 @@ from pbrs_farm.core.classes import CABINET, CLOTHES, COUNTER, OTHERFURNITURE, SH
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, house_space
-from pbrs_farm.dress.space.room_kinds import RoomKind, is_cooked_in, words_of_item
 from pbrs_farm.dress.style import Rgb, Style, mix
 from pbrs_farm.dress.things.assembly import (
     Made,
@@ -35,6 +34,8 @@ from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import Fronts, open_box, tool_rail, wall_cupboard
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
 from pbrs_farm.dress.walls.wall_furniture import hang_cloth, hang_shelves
+from pbrs_farm.home.names import words_of_item
+from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
 # Cupboards, open boxes and rails over the worktops of kitchens that have none but on the draft.
 

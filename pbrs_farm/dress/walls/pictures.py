@@ -25,7 +25,6 @@ from pbrs_farm.core.classes import (
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Rgb, Style, room_style
 from pbrs_farm.dress.things.assembly import Made, Part, any_colour, hung, plain, slab
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
@@ -38,6 +37,7 @@ from pbrs_farm.dress.walls.hung_things import (
     ring,
 )
 from pbrs_farm.dress.walls.prints import print_pixels
+from pbrs_farm.home.room_use import RoomKind
 from pbrs_farm.images import decode_photo
 
 MOST_PICTURES = 7  # in a room

@@ -8,7 +8,6 @@ import numpy as np
 
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import Material, Surface
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textiles.rugs import rug_pixels
 from pbrs_farm.dress.things.assembly import Made, Part, hung, metal, plain, transformed, turned
@@ -22,6 +21,7 @@ from pbrs_farm.dress.walls.hung_things import (
     wall_cupboard,
     wall_shelf,
 )
+from pbrs_farm.home.room_use import RoomKind
 
 # How many things with shelves a room's walls get, from and to.
 _SHELVES: Final = {

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import re
-import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -16,6 +15,7 @@ from typing import Final
 
 from pbrs_farm.core.classes import NYU40_NAMES, PERSON, WINDOW
 from pbrs_farm.core.house import ItemKind
+from pbrs_farm.home.names import folded, parted
 
 CLASS_TAG: Final = "class:"
 """Begins the tag of an item that names the rule which decided its class."""
@@ -30,7 +30,6 @@ _ASIDES: Final = """with and on of for from under without in mit und auf fur von
 _ASIDE: Final = frozenset(_ASIDES.split())
 _MODIFIERS: Final = frozenset({"wall", "kitchen"})  # say where an unknown thing stands
 _HEAD_FIRST: Final = frozenset({"fr", "es", "it", "pt"})  # languages that name the thing first
-_LETTERS: Final = str.maketrans({"ł": "l", "ø": "o", "ß": "ss", "đ": "d", "ı": "i", "æ": "ae"})
 _LONGEST_PHRASE: Final = 4  # words
 
 _PLANT: Final = "plant"
@@ -121,15 +120,7 @@ def _vocabulary() -> Mapping[str, tuple[str, bool]]:
 
 def plain(text: str) -> str:
     """Lower case without accents; camelCase parted by spaces."""
-    parted = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text)
-    letters = unicodedata.normalize("NFKD", parted.lower().translate(_LETTERS))
-    return "".join(c for c in letters if not unicodedata.combining(c))
-
-
-def words_of(text: str) -> frozenset[str]:
-    """Lower-case words of a name; camelCase and digits part words; a plural adds its singular."""
-    words = re.findall(r"[a-z]+", plain(text))
-    return frozenset(words) | {w[:-1] for w in words if len(w) > 3 and w.endswith("s")}
+    return folded(parted(text))
 
 
 @lru_cache(maxsize=4096)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, Final
@@ -13,6 +11,7 @@ import numpy as np
 from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import (
@@ -214,7 +213,7 @@ def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]
     piece is clear: beside a glass it names the frame.
     """
     rows = {n: entry(gltf, "materials", n) for n in numbers if n is not None}
-    words = {n: words_of_name(str(row.get("name", ""))) for n, row in rows.items()}
+    words = {n: words_of(str(row.get("name", ""))) for n, row in rows.items()}
     glass = frozenset(n for n, w in words.items() if w & _GLASS and not w & _FRAME)
     if glass or any(_lets_light_through(row) for row in rows.values()):
         return glass
@@ -223,16 +222,8 @@ def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]
 
 def names_glass(name: str) -> bool:
     """Whether the name of a part of a window or door says that the part is glass."""
-    words = words_of_name(name)
+    words = words_of(name)
     return bool(words & _GLASS) and not words & _FRAME
-
-
-def words_of_name(name: str) -> frozenset[str]:
-    """Lower-case words of a name without accents; camelCase and digits part words."""
-    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    folded = unicodedata.normalize("NFKD", parted).casefold()
-    plain = "".join(c for c in folded if not unicodedata.combining(c))
-    return frozenset(re.findall(r"[^\W\d_]+", plain))
 
 
 def _lets_light_through(row: dict[str, Any]) -> bool:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 import shapely
@@ -27,6 +24,8 @@ from pbrs_farm.core.house import (
 from pbrs_farm.core.lighting import PowerUnit, flux_lm
 from pbrs_farm.core.mesh import distances_to_triangles
 from pbrs_farm.geometry.heights import lowest_above
+from pbrs_farm.home.lamps import flux_for_floor
+from pbrs_farm.home.room_use import is_lived_in
 from pbrs_farm.repair.lamps.bulbs import icosphere
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of
@@ -42,15 +41,9 @@ _OWN_WALL_M = 0.2  # a room's own walls may stand so far inside its outline
 _HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
 _RADIUS_M = 0.1
 _POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
-_UTILISATION = 0.3  # share of a ceiling lamp's flux that a furnished floor gets, docs/houses.md
 _LEAST_LM, _MOST_LM = 600.0, 10_000.0  # of one lamp: a small bulb, a chandelier
 _ABOVE_FLOOR_M = 0.5  # structure lower than this is the floor
 _GRID_M = 0.25  # of places tried below a sloped ceiling
-
-
-def flux_for_floor(area_m2: float, lux: float) -> float:
-    """Luminous flux in lm of ceiling lamps that give a floor this illuminance on average."""
-    return lux * area_m2 / _UTILISATION
 
 
 def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: float = 0.0) -> Item:
@@ -153,53 +146,6 @@ def _walls_inside(house: House, room: Room, area: plan.Shape) -> list[plan.Shape
 def _within(item: Item, point: F64, by_m: float) -> bool:
     low, high = item.bounds
     return bool(((point > low - by_m) & (point < high + by_m)).all())
-
-
-# Whether people live in a room, by its size, its types and its name.
-
-
-MIN_LIVED_IN_M2: Final = 2.0  # smaller is a cupboard or a shaft
-
-# Whole words, accents folded: English, French, German, Spanish, Portuguese, Italian, Dutch,
-# Scandinavian, Polish, Czech, Turkish, Russian, Korean.
-_OUTDOORS: Final = frozenset(
-    re.findall(
-        r"\w+",
-        """
-        balcony balconies terrace garden garage carport patio porch deck yard backyard courtyard
-        lawn driveway outdoor outdoors outside exterior loggia pergola gazebo
-        balcon terrasse jardin cour balkon garten hof vorgarten hinterhof stellplatz
-        terraza garaje cochera balcao sacada terraco quintal jardim garagem
-        balcone terrazza terrazzo giardino cortile autorimessa terras tuin
-        balkong altan terrass tradgard have hage garasje taras ogrod garaz terasa zahrada
-        teras bahce garaj otopark балкон терраса сад гараж двор 발코니 베란다 테라스 정원 차고
-        """,
-    )
-)
-# Written without spaces: looked for anywhere in the name.
-_OUTDOORS_WITHIN: Final = (
-    "阳台", "陽台", "露台", "花园", "花園", "庭院", "院子", "车库", "車庫",
-    "バルコニー", "ベランダ", "テラス", "ガレージ", "庭",
-)  # fmt: skip
-
-
-def is_lived_in(room: Room, area_m2: float) -> bool:
-    """Whether people live in the room: a balcony, terrace, garden or garage they do not.
-
-    Types go before the name; a room of several types is lived in when one of them is.
-    """
-    said = room.types or (room.name,)
-    return area_m2 > MIN_LIVED_IN_M2 and not all(_is_outdoors(text) for text in said)
-
-
-def _is_outdoors(text: str) -> bool:
-    if any(word in text for word in _OUTDOORS_WITHIN):
-        return True
-    # Fold accents; what that takes apart besides (Hangul) is composed again.
-    taken_apart = unicodedata.normalize("NFKD", text.casefold())
-    plain = "".join(c for c in taken_apart if not unicodedata.combining(c))
-    words = re.findall(r"[^\W\d_]+", unicodedata.normalize("NFC", plain))
-    return any(w in _OUTDOORS or w.removesuffix("s") in _OUTDOORS for w in words)
 
 
 # What lights each room, and a ceiling light where nothing does or no lamp is.

@@ -17,9 +17,9 @@ from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.clutter.placing import is_known
 from pbrs_farm.dress.clutter.receptacles import receptacle_of, shares
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.space.room_kinds import RoomKind
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from pbrs_farm.home.room_use import RoomKind
 from tests.dress.furniture import bookcase, house, room, solid
 
 _BOOKS = 23

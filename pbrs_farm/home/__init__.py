@@ -1,0 +1,1 @@
+"""What a home means: rooms, names, lamps; between the nouns and the stages, no effects."""

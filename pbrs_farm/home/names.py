@@ -1,0 +1,37 @@
+"""The words of which names of rooms and things are made; no effects."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import Final
+
+from pbrs_farm.core.house import Item
+
+RADIATORS: Final = frozenset({"radiator", "heater", "heizkorper", "heizkoerper", "radiateur"})
+# Letters that no decomposition takes apart.
+_LETTERS: Final = str.maketrans({"ł": "l", "ø": "o", "ß": "ss", "đ": "d", "ı": "i", "æ": "ae"})
+
+
+def folded(text: str) -> str:
+    """Lower case, without accents."""
+    # What that takes apart besides (Hangul) is composed again.
+    taken_apart = unicodedata.normalize("NFKD", text.casefold().translate(_LETTERS))
+    plain = "".join(c for c in taken_apart if not unicodedata.combining(c))
+    return unicodedata.normalize("NFC", plain)
+
+
+def parted(text: str) -> str:
+    """The text with a space between the words of camelCase."""
+    return re.sub(r"(?<=[^\W\d_])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])", " ", text)
+
+
+def words_of(name: str) -> frozenset[str]:
+    """Folded words of letters alone; camelCase adds its parts, a plural adds its singular."""
+    words = re.findall(r"[^\W\d_]+", folded(f"{name} {parted(name)}"))
+    return frozenset(words) | {word.removesuffix("s") for word in words}
+
+
+def words_of_item(item: Item) -> frozenset[str]:
+    """Words of what an item is called and of its class in the source: "Woven basket" has no oven."""
+    return words_of(f"{item.name} {item.source_class}")

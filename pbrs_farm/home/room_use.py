@@ -1,0 +1,137 @@
+"""What a room is for, by its types, its name and what stands in it; no effects.
+
+The words are in room_words.csv beside this file.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
+from functools import cache, lru_cache
+from importlib.resources import files
+from typing import Final, NamedTuple
+
+from pbrs_farm.core.classes import (
+    BATHTUB,
+    BED,
+    CABINET,
+    DESK,
+    OTHERFURNITURE,
+    REFRIGERATOR,
+    SINK,
+    SOFA,
+    TABLE,
+    TOILET,
+)
+from pbrs_farm.core.house import Item, Room
+from pbrs_farm.home.names import folded, words_of, words_of_item
+
+
+class RoomKind(StrEnum):
+    """What a room is for."""
+
+    LIVING = "living"
+    BEDROOM = "bedroom"
+    KITCHEN = "kitchen"
+    DINING = "dining"
+    BATHROOM = "bathroom"
+    OFFICE = "office"
+    HALL = "hall"
+    OUTDOOR = "outdoor"
+    STORE = "store"  # garage, cellar, closet, laundry
+    OTHER = "other"
+
+
+MIN_LIVED_IN_M2: Final = 2.0  # smaller is a cupboard or a shaft
+_LARGE_M2 = 9.0
+_COOKED_AT = frozenset({
+    "cooker", "stove", "stovetop", "oven", "hob", "hood", "dishwasher", "fridge", "refrigerator",
+    "herd", "gasherd", "elektroherd", "backofen",
+})  # fmt: skip
+
+
+def is_cooked_in(items: Iterable[Item]) -> bool:
+    """Whether a cooker, a hood, a dishwasher or a fridge stands among them."""
+    return any(
+        item.nyu40 == REFRIGERATOR
+        or (item.nyu40 in (CABINET, OTHERFURNITURE) and words_of_item(item) & _COOKED_AT)
+        for item in items
+    )
+
+
+def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
+    """What the room is for: what it is called, else what the items (those in it) say."""
+    named = named_kind(" ".join((*room.types, room.name)))
+    has = {item.nyu40 for item in items}
+    # A studio is a study in some languages and a home of one room in others.
+    if named is RoomKind.OFFICE and (BED in has or is_cooked_in(items)):
+        return RoomKind.LIVING
+    if named is not None:
+        return named
+    if not has & {TOILET, BATHTUB, BED} and is_cooked_in(items):
+        return RoomKind.KITCHEN
+    for kind, classes in (
+        (RoomKind.BATHROOM, {TOILET, BATHTUB}),
+        (RoomKind.BEDROOM, {BED}),
+        (RoomKind.KITCHEN, {REFRIGERATOR}),
+        (RoomKind.LIVING, {SOFA}),
+        (RoomKind.OFFICE, {DESK}),
+        (RoomKind.DINING, {TABLE}),
+        (RoomKind.BATHROOM, {SINK}),
+    ):
+        if has & classes:
+            return kind
+    # Small or long rooms without furniture are passages.
+    return RoomKind.HALL if area_m2 < _LARGE_M2 else RoomKind.OTHER
+
+
+def named_kind(name: str) -> RoomKind | None:
+    """What a room of that name is for; None where the name does not say."""
+    rule = _rule(name)
+    return rule.use if rule else None
+
+
+def is_lived_in(room: Room, area_m2: float) -> bool:
+    """Whether people live in the room: in a balcony, terrace, garden or garage they do not.
+
+    Types go before the name; a room of several types is lived in when one of them is.
+    """
+    rules = [_rule(text) for text in room.types or (room.name,)]
+    return area_m2 > MIN_LIVED_IN_M2 and any(rule is None or rule.is_lived_in for rule in rules)
+
+
+class _Rule(NamedTuple):
+    """A row of room_words.csv: names that have one of the words are of the use.
+
+    The first row that fits holds. A word is a whole word of a name, accents folded; a part, for
+    languages written without spaces, is looked for anywhere.
+    """
+
+    use: RoomKind
+    is_part: bool
+    is_lived_in: bool
+    words: frozenset[str]
+
+
+@cache
+def _rules() -> tuple[_Rule, ...]:
+    text = files("pbrs_farm.home").joinpath("room_words.csv").read_text("utf-8")
+    return tuple(
+        _Rule(
+            RoomKind(row["use"]),
+            row["match"] == "part",
+            row["lived_in"] == "yes",
+            frozenset(folded(word) for word in row["words"].split()),
+        )
+        for row in csv.DictReader(text.splitlines())
+    )
+
+
+@lru_cache(1024)
+def _rule(said: str) -> _Rule | None:
+    words, whole = words_of(said), folded(said)
+    for rule in _rules():
+        if any(w in whole for w in rule.words) if rule.is_part else words & rule.words:
+            return rule
+    return None

@@ -1,0 +1,46 @@
+"""What a room is for, by what it is called."""
+
+from dataclasses import replace
+
+import pytest
+
+from pbrs_farm.home.room_use import RoomKind, is_lived_in, room_kind
+from tests.builders import builtin_home
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("Living_Room", RoomKind.LIVING), ("Küche", RoomKind.KITCHEN), ("Salle de bains", RoomKind.BATHROOM),
+        ("Séjour", RoomKind.LIVING), ("Baño 2", RoomKind.BATHROOM), ("Łazienka", RoomKind.BATHROOM),
+        ("Dormitorio principal", RoomKind.BEDROOM), ("Кухня", RoomKind.KITCHEN), ("ванная", RoomKind.BATHROOM),
+        ("주방", RoomKind.KITCHEN), ("主卧", RoomKind.BEDROOM), ("リビング", RoomKind.LIVING),
+        ("Bedrooms", RoomKind.BEDROOM), ("Gang", RoomKind.HALL), ("Balcon", RoomKind.OUTDOOR),
+    ],
+)  # fmt: skip
+def test_a_room_is_what_its_name_says_in_many_languages(name: str, kind: RoomKind) -> None:
+    room = replace(builtin_home().rooms[0], name=name, types=())
+    assert room_kind(room, [], 12.0) is kind
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["Courtyard", "Lawn", "Backyard", "Gazebo", "Driveway", "Cour", "Hof", "Pergola", "Balconies",
+     "庭", "中庭", "терраса 2"],
+)  # fmt: skip
+def test_nobody_lives_where_the_name_says_outdoors(name: str) -> None:
+    room = replace(builtin_home().rooms[0], name=name, types=())
+    assert room_kind(room, [], 12.0) is RoomKind.OUTDOOR
+    assert not is_lived_in(room, 12.0)
+
+
+@pytest.mark.parametrize("name", ["Garage", "Carport 2", "Cochera", "车库", "Stellplatz"])
+def test_a_garage_stores_and_is_not_lived_in(name: str) -> None:
+    room = replace(builtin_home().rooms[0], name=name, types=())
+    assert room_kind(room, [], 12.0) is RoomKind.STORE
+    assert not is_lived_in(room, 12.0)
+
+
+def test_a_family_room_is_no_garden() -> None:
+    room = replace(builtin_home().rooms[0], name="家庭室", types=())
+    assert is_lived_in(room, 12.0)
