@@ -28,7 +28,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.plan import wanted
-from pbrs_farm.truth.surface_layers import albedo_png
+from pbrs_farm.truth.surface_layers import albedo_label
 
 HOME: Final = "Studio"
 N_PAIRS: Final = int(os.environ.get("PAIRS", "20"))
@@ -146,7 +146,7 @@ def _rays_picture(
     for top in range(0, height, band):
         hit = caster.hit_record(Camera(Intrinsics(width, band, fx, fy, cx, cy - top), pose))
         shade = 0.4 + 0.6 * np.abs(hit.geo_normal_world.astype(np.float64) @ _SUN)
-        picture[top : top + band] = albedo_png(hit, *scene) / 255 * shade[..., None]
+        picture[top : top + band] = albedo_label(hit, *scene) / 255 * shade[..., None]
     return picture
 
 

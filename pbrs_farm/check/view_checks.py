@@ -225,9 +225,9 @@ def _check_optional(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Ta
         _same(view, tally, "class_source", _source_class_is_right(view, arrays))
 
 
-def _is_unit(normal_png: NDArray[Any], valid: NDArray[Any]) -> NDArray[np.bool_]:
+def _is_unit(normal_label: NDArray[Any], valid: NDArray[Any]) -> NDArray[np.bool_]:
     """(H, W) bool: stored normals have length 1 where something is hit, 0 elsewhere."""
-    length = np.linalg.norm(normal_png * (2 / 65535) - 1, axis=-1)
+    length = np.linalg.norm(normal_label * (2 / 65535) - 1, axis=-1)
     return np.asarray(np.where(valid > 0, np.abs(length - 1) < 1e-3, length < 1e-4), bool)
 
 

@@ -24,6 +24,8 @@ class Layer:
     optional: bool = False  # only when --layers names it
     # "next", "previous" or "stereo": the view without which there is no such file.
     partner: str = ""
+    # What a lens must have: "planar depth" along its axis, "rows" that correspond in a pair.
+    needs: str = ""
 
 
 def _picture(name: str, step: str) -> Layer:
@@ -35,9 +37,20 @@ def _label(name: str, channels: str, dtype: str, unit: str, nodata: str = "0") -
 
 
 def _optional(
-    name: str, channels: str, dtype: str, unit: str, nodata: str = "0", file: str = ""
+    name: str,
+    channels: str,
+    dtype: str,
+    unit: str,
+    nodata: str = "0",
+    file: str = "",
+    needs: str = "",
 ) -> Layer:
-    return Layer(name, file or f"{name}.png", channels, dtype, unit, nodata, "truth", optional=True)
+    file = file or f"{name}.png"
+    return Layer(name, file, channels, dtype, unit, nodata, "truth", optional=True, needs=needs)
+
+
+def _along_axis(name: str, channels: str, dtype: str, unit: str) -> Layer:
+    return _optional(name, channels, dtype, unit, needs="planar depth")
 
 
 def _between(
@@ -48,9 +61,10 @@ def _between(
     unit: str,
     nodata: str = "0",
     ending: str = "png",
+    needs: str = "",
 ) -> Layer:
     file = f"{name}.{ending}"
-    return Layer(name, file, channels, dtype, unit, nodata, "truth", optional=True, partner=partner)
+    return Layer(name, file, channels, dtype, unit, nodata, "truth", True, partner, needs)
 
 
 def _flow(name: str, partner: str) -> tuple[Layer, ...]:
@@ -124,14 +138,14 @@ LAYERS: Final[tuple[Layer, ...]] = (
         "boundary_crease", "Y", "uint8", "255 = normals turn by more than 30 degrees, no depth gap"
     ),
     # Depth as other works encode or measure it.
-    _optional("hha", "RGB", "uint8", "disparity, height in cm, angle with gravity (Gupta et al. 2014)"),
-    _optional("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it"),
-    _optional("depth_sensor_tof", "Y", "uint16", "planar z in mm as a Kinect 2 (time of flight)"),
-    _optional("depth_sensor_stereo", "Y", "uint16", "planar z in mm as a stereo camera has it"),
+    _along_axis("hha", "RGB", "uint8", "disparity, height in cm, angle with gravity (Gupta et al. 2014)"),
+    _along_axis("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it"),
+    _along_axis("depth_sensor_tof", "Y", "uint16", "planar z in mm as a Kinect 2 (time of flight)"),
+    _along_axis("depth_sensor_stereo", "Y", "uint16", "planar z in mm as a stereo camera has it"),
     # Where surfaces lie in the next and the previous frame, and in the other picture of a pair.
     *_flow("forward", "next"),
     *_flow("backward", "previous"),
-    _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)"),
+    _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)", needs="rows"),
     _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128"),
 )  # fmt: skip
 

@@ -80,11 +80,11 @@ def flow_colours(flow: NDArray[Any], most_px: float | None = None) -> Srgb8Image
     return np.asarray(np.rint(255 * (1 - share * (1 - ring))), np.uint8)
 
 
-def normal_colours(normal_png: NDArray[Any]) -> Srgb8Image:
+def normal_colours(normal_label: NDArray[Any]) -> Srgb8Image:
     """(H, W, 3) uint8 of a normal layer as stored (16-bit RGB); only the precision is lost."""
-    if normal_png.dtype == np.uint8:
-        return np.asarray(normal_png[..., :3], np.uint8)
-    return np.asarray(normal_png[..., :3] >> 8, np.uint8)
+    if normal_label.dtype == np.uint8:
+        return np.asarray(normal_label[..., :3], np.uint8)
+    return np.asarray(normal_label[..., :3] >> 8, np.uint8)
 
 
 def boundary_colours(boundary: NDArray[np.uint8]) -> Srgb8Image:

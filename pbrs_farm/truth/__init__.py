@@ -10,7 +10,7 @@ from pbrs_farm.truth.optional_layers import (
     optional_tables,
 )
 from pbrs_farm.truth.room_layout import layout_table
-from pbrs_farm.truth.standard_layers import depth_mm, instance_png, layers_from_hit, normal_png
+from pbrs_farm.truth.standard_layers import depth_mm, instance_label, layers_from_hit, normal_label
 from pbrs_farm.truth.view_table import is_truncated, view_table
 
 __all__ = [
@@ -18,11 +18,11 @@ __all__ = [
     "LabelInputs",
     "coverage",
     "depth_mm",
-    "instance_png",
+    "instance_label",
     "is_truncated",
     "layers_from_hit",
     "layout_table",
-    "normal_png",
+    "normal_label",
     "optional_layers",
     "optional_tables",
     "sensor_depth",

@@ -108,7 +108,7 @@ def reaches(points: F64, faces: I32, camera: Camera, first_hit: FirstHit) -> Boo
     return np.asarray((t >= 1 - slack) | (face == faces))
 
 
-def flow_exr(found: Correspondence) -> F32:
+def flow_label(found: Correspondence) -> F32:
     """(H, W, 2) float32 for a 16-bit EXR: pixels right and down, 0 where it is not defined.
 
     Beyond 32,768 px it is stored as that.
@@ -124,7 +124,7 @@ def flow_kitti(found: Correspondence) -> NDArray[np.uint16]:
     return np.concatenate([steps, valid[..., None]], axis=-1).astype(np.uint16)
 
 
-def disparity_png(found: Correspondence) -> NDArray[np.uint16]:
+def disparity_label(found: Correspondence) -> NDArray[np.uint16]:
     """(H, W) uint16 as KITTI stores disparity: 256 times the pixels by which rows are shifted.
 
     At least 1 where a surface is, hidden in the other picture or not; 0 = nothing. Beyond 255.99

@@ -23,18 +23,18 @@ from pbrs_farm.truth.optical_flow import (
     Correspondence,
     Relation,
     correspondence,
-    disparity_png,
-    flow_exr,
+    disparity_label,
     flow_kitti,
+    flow_label,
 )
 from pbrs_farm.truth.standard_layers import (
     depth_mm,
     encoded_normal,
-    instance_png,
-    normal_png,
-    semantic_png,
+    instance_label,
+    normal_label,
+    semantic_label,
 )
-from pbrs_farm.truth.surface_layers import albedo_png, hha_png, shading_normals
+from pbrs_farm.truth.surface_layers import albedo_label, hha_label, shading_normals
 
 HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the same camera's hits
 
@@ -118,14 +118,15 @@ def _glass(inputs: LabelInputs) -> NDArray[np.uint8]:
 
 
 def _normal(inputs: LabelInputs, hit: HitRecord) -> NDArray[np.uint16]:
-    return normal_png(hit.geo_normal_world, inputs.camera.world_from_camera)
+    return normal_label(hit.geo_normal_world, inputs.camera.world_from_camera)
 
 
 def _normal_shading(inputs: LabelInputs) -> NDArray[np.uint16]:
     normals = shading_normals(inputs.hit, inputs.house, inputs.geometry, inputs.textures)
-    return normal_png(normals, inputs.camera.world_from_camera)
+    return normal_label(normals, inputs.camera.world_from_camera)
 
 
+# How each optional layer of core/layers.py is computed.
 _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     # Geometry of the hit.
     "depth_z": lambda s: s.hit.depth_z,
@@ -133,32 +134,32 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "normal_shading": _normal_shading,
     "normal_world": lambda s: encoded_normal(s.hit.geo_normal_world),
     # Appearance and classes of the hit.
-    "albedo": lambda s: albedo_png(s.hit, s.house, s.geometry, s.textures),
+    "albedo": lambda s: albedo_label(s.hit, s.house, s.geometry, s.textures),
     "material": _material,
-    "nyu13": lambda s: NYU13_FROM_NYU40[semantic_png(s.hit.item, s.house)],
+    "nyu13": lambda s: NYU13_FROM_NYU40[semantic_label(s.hit.item, s.house)],
     "class_source": _class_source,
     "glass": _glass,
     # The first hit behind glass.
     "behind_glass_depth": lambda s: depth_mm(s.behind.depth_z),
     "behind_glass_normal": lambda s: _normal(s, s.behind),
-    "behind_glass_semantic": lambda s: semantic_png(s.behind.item, s.house),
-    "behind_glass_instance": lambda s: instance_png(s.behind.item, s.house),
+    "behind_glass_semantic": lambda s: semantic_label(s.behind.item, s.house),
+    "behind_glass_instance": lambda s: instance_label(s.behind.item, s.house),
     # Edges, and what sensors and encoders make of depth.
     "boundary_occlusion": lambda s: s.boundaries[0],
-    "boundary_semantic": lambda s: instance_boundary(semantic_png(s.hit.item, s.house)),
+    "boundary_semantic": lambda s: instance_boundary(semantic_label(s.hit.item, s.house)),
     "boundary_crease": lambda s: s.boundaries[1],
-    "hha": lambda s: hha_png(s.hit, s.camera),
+    "hha": lambda s: hha_label(s.hit, s.camera),
     "depth_sensor": lambda s: sensor_depth(s.hit, s.camera, seed=s.seed),
     "depth_sensor_tof": lambda s: tof_depth(s.hit, s.camera, seed=s.seed),
     "depth_sensor_stereo": lambda s: stereo_depth(s.hit, s.camera, seed=s.seed),
     # Where the hits lie in other views.
-    "flow_forward": lambda s: flow_exr(s.to_partners["next"]),
+    "flow_forward": lambda s: flow_label(s.to_partners["next"]),
     "flow_forward_kitti": lambda s: flow_kitti(s.to_partners["next"]),
     "occlusion_forward": lambda s: s.to_partners["next"].state,
-    "flow_backward": lambda s: flow_exr(s.to_partners["previous"]),
+    "flow_backward": lambda s: flow_label(s.to_partners["previous"]),
     "flow_backward_kitti": lambda s: flow_kitti(s.to_partners["previous"]),
     "occlusion_backward": lambda s: s.to_partners["previous"].state,
-    "disparity": lambda s: disparity_png(s.to_partners["stereo"]),
+    "disparity": lambda s: disparity_label(s.to_partners["stereo"]),
     "occlusion_stereo": lambda s: s.to_partners["stereo"].state,
 }
 
@@ -179,13 +180,13 @@ def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, ND
 
 def check_lens(names: Collection[str], lens: Lens) -> None:
     """Raise BadInput for a named layer that a lens cannot have."""
-    for name in ("hha", "depth_sensor", "depth_sensor_tof", "depth_sensor_stereo"):
-        if name in names and not lens.depth_is_planar:
+    for layer in (LAYER[name] for name in names if name in LAYER):
+        if layer.needs == "planar depth" and not lens.depth_is_planar:
             what = f"needs depth along the axis, which lens.model {lens.model} has not"
-            raise BadInput("--layers", name, what, hint="lens.model pinhole or radtan")
-    if "disparity" in names and not lens.is_pinhole:
-        what = f"needs rows that correspond, which lens.model {lens.model} has not"
-        raise BadInput("--layers", "disparity", what, hint="lens.model pinhole")
+            raise BadInput("--layers", layer.name, what, hint="lens.model pinhole or radtan")
+        if layer.needs == "rows" and not lens.is_pinhole:
+            what = f"needs rows that correspond, which lens.model {lens.model} has not"
+            raise BadInput("--layers", layer.name, what, hint="lens.model pinhole")
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:

@@ -38,7 +38,7 @@ def unit_mask(normal: UnitVectors) -> Mask:
         return np.asarray(np.abs(squared - 1.0) <= UNIT_TOLERANCE)
 
 
-def normal_png(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArray[np.uint16]:
+def normal_label(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArray[np.uint16]:
     """(H, W, 3) uint16 normals in the published camera frame: round((n + 1) 65535 / 2).
 
     x right, y forward, z up (docs/spec/suncg.md section 5). A normal that is not of unit length (nothing there,
@@ -62,7 +62,7 @@ def _cleaned(normal: UnitVectors) -> UnitVectors:
     return normal if is_unit.all() else np.where(is_unit[..., None], normal, np.float32(0))
 
 
-def valid_png(hit: HitRecord) -> NDArray[np.uint8]:
+def valid_label(hit: HitRecord) -> NDArray[np.uint8]:
     """(H, W) uint8: 255 where something is hit and its geometric normal is of unit length, else 0."""
     return np.where(hit.valid & unit_mask(hit.geo_normal_world), 255, 0).astype(np.uint8)
 
@@ -93,12 +93,12 @@ def check_instances(house: House) -> None:
         )
 
 
-def semantic_png(item: ItemBuffer, house: House) -> NDArray[np.uint8]:
+def semantic_label(item: ItemBuffer, house: House) -> NDArray[np.uint8]:
     """(H, W) uint8 NYU40 id of the item seen, 0 = nothing or an item without a class."""
     return nyu40_of_instance(house)[item]
 
 
-def instance_png(item: ItemBuffer, house: House) -> NDArray[np.uint16]:
+def instance_label(item: ItemBuffer, house: House) -> NDArray[np.uint16]:
     """(H, W) uint16 instance id, 0 = nothing; raises BadHouse beyond 65,535 items."""
     check_instances(house)
     return item.astype(np.uint16)
@@ -106,12 +106,12 @@ def instance_png(item: ItemBuffer, house: House) -> NDArray[np.uint16]:
 
 def layers_from_hit(hit: HitRecord, house: House, camera: Camera) -> dict[str, NDArray[Any]]:
     """The layers of every view by name: depth, normal, valid, semantic, instance, boundary."""
-    instance = instance_png(hit.item, house)
+    instance = instance_label(hit.item, house)
     return {
         "depth": depth_mm(hit.depth_z),
-        "normal": normal_png(hit.geo_normal_world, camera.world_from_camera),
-        "valid": valid_png(hit),
-        "semantic": semantic_png(hit.item, house),
+        "normal": normal_label(hit.geo_normal_world, camera.world_from_camera),
+        "valid": valid_label(hit),
+        "semantic": semantic_label(hit.item, house),
         "instance": instance,
         "boundary": instance_boundary(instance),
     }

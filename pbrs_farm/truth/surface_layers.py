@@ -51,7 +51,7 @@ _STEPS = 4096  # entries of the encoding table: fine enough that every byte is r
 _BYTE_OF_LINEAR = np.rint(srgb_from_linear(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
 
 
-def albedo_png(
+def albedo_label(
     hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
 ) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 sRGB: diffuse colour times texture, multiplied in linear light; 0 = nothing.
@@ -129,7 +129,7 @@ _FLOOR_IN_VIEW_CM = -90.0  # the lowest point below this, from the eye, is taken
 _ASSUMED_FLOOR_CM = -130.0  # the floor's height from the eye when none is in view
 
 
-def hha_png(hit: HitRecord, camera: Camera) -> NDArray[np.uint8]:
+def hha_label(hit: HitRecord, camera: Camera) -> NDArray[np.uint8]:
     """(H, W, 3) uint8: H, H, A; (0, 0, 0) = nothing.
 
     R: 31000 / depth_z in cm, depth held to at least 100 cm. G: height in cm above the lowest point

@@ -16,7 +16,7 @@ from pbrs_farm.truth.optical_flow import (
     OUTSIDE,
     SEEN,
     correspondence,
-    disparity_png,
+    disparity_label,
     flow_kitti,
     partners_of,
 )
@@ -100,9 +100,9 @@ def test_kittis_flow_is_in_64ths_of_a_pixel_and_valid_where_seen() -> None:
 
 def test_disparity_is_256ths_of_focal_length_times_baseline_over_depth() -> None:
     found = matched(squares((9, 0, 0, 2)), at(0), at(0.065))
-    assert (disparity_png(found) == round(256 * F * 0.065 / 2)).all()
+    assert (disparity_label(found) == round(256 * F * 0.065 / 2)).all()
     nothing = matched(squares((0.1, 0, 0, 2)), at(0), at(0.065))
-    assert disparity_png(nothing)[0, 0] == 0
+    assert disparity_label(nothing)[0, 0] == 0
 
 
 def views() -> dict[str, View]:

@@ -37,14 +37,14 @@ def test_something_very_near_is_not_nothing_and_nan_is():
     ],
 )
 def test_normals_have_the_published_axes(normal, colour):
-    encoded = truth.normal_png(np.array([[normal]], np.float32), camera().world_from_camera)
+    encoded = truth.normal_label(np.array([[normal]], np.float32), camera().world_from_camera)
     assert encoded[0, 0].tolist() == list(colour)
 
 
 def test_normals_turn_with_the_camera():
     eye = np.zeros(3)
     right = Camera.look(Intrinsics.from_hfov(8, 6), eye, np.array([1.0, 0.0, 0.0]))
-    encoded = truth.normal_png(np.array([[[-1.0, 0, 0]]], np.float32), right.world_from_camera)
+    encoded = truth.normal_label(np.array([[[-1.0, 0, 0]]], np.float32), right.world_from_camera)
     assert encoded[0, 0].tolist() == [32768, 0, 32768]
 
 
@@ -72,7 +72,7 @@ def test_more_items_than_sixteen_bits_hold_is_refused():
     many = house(1).with_items(house(1).items * 65536)
     with pytest.raises(BadHouse, match="65536 items"):
         truth.layers_from_hit(hit([[1]], 2.0), many, camera(1, 1))
-    assert truth.instance_png(np.array([[65535]], np.uint32), house(1)).tolist() == [[65535]]
+    assert truth.instance_label(np.array([[65535]], np.uint32), house(1)).tolist() == [[65535]]
 
 
 def test_an_empty_view_has_layers_of_nothing():
