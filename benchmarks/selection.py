@@ -77,9 +77,12 @@ def write_packs(folder: Path, n_views: int) -> int:
     for _ in range(N_TEMPLATES):
         colour, depth = (synthetic_counts(rng, n, bins) for bins in (512, 128))
         views = tuple(f"0_{v}_0" for v in range(n))
-        columns = "Bedroom", "mlt_il_ol", "", "1:0.5 2:0.2 5:0.1", ""  # room types to black modes
-        texts = ((text,) * n for text in columns)
-        pack = HistogramPack("@" * 32, "s", SETTINGS, views, views, *texts, colour, depth, quality)
+        none, bedroom, mode = ("",) * n, ("Bedroom",) * n, ("mlt_il_ol",) * n
+        classes = ("1:0.5 2:0.2 5:0.1",) * n
+        pack = HistogramPack(
+            "@" * 32, "s", SETTINGS, views, views, bedroom, mode, none, classes, none,
+            colour, depth, quality,
+        )  # fmt: skip
         templates.append(bytes_from_pack(pack))
     n_bytes = 0
     for house in range(-(-n_views // n)):

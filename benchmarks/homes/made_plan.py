@@ -52,7 +52,8 @@ def measured(plan: Plan, pieces: tuple[PlacedPiece, ...]) -> dict[str, Any]:
 
 
 def _aspect(polygon: Any) -> float:
-    sides = LineString(shapely.minimum_rotated_rectangle(Polygon(polygon)).exterior.coords[:3])
+    around: Any = shapely.minimum_rotated_rectangle(Polygon(polygon))
+    sides = LineString(around.exterior.coords[:3])
     (a, b), (c, d), (e, f) = sides.coords
     short, long = sorted((math.dist((a, b), (c, d)), math.dist((c, d), (e, f))))
     return long / short

@@ -51,18 +51,18 @@ def compared(first: Run, second: Run) -> Comparison:
         raise ValueError(f"pictures are {shapes}: expected three or more of each, as many of both")
     truth, truth_relmse = _mean_of_both(first.pictures, second.pictures)
     scale = _scale(truth)
-    errors = [_errors(run.pictures, scale) for run in (first, second)]
+    one, other = (_errors(run.pictures, scale) for run in (first, second))
     times = first.cpu_s / second.cpu_s
-    relmse_ratio, median_ratio = _ratios(*errors, times)
+    relmse_ratio, median_ratio = _ratios(one, other, times)
 
     # Each pair of pictures left out in turn, for the ratios' own spread.
     without = []
     for k in range(len(first.pictures)):
-        kept = [_errors(np.delete(run.pictures, k, 0), scale) for run in (first, second)]
-        without.append(_ratios(*kept, times))
+        a, b = (_errors(np.delete(run.pictures, k, 0), scale) for run in (first, second))
+        without.append(_ratios(a, b, times))
     relmse_without, median_without = np.array(without).T
     return Comparison(
-        *errors, relmse_ratio, median_ratio, relmse_without, median_without, truth, truth_relmse
+        one, other, relmse_ratio, median_ratio, relmse_without, median_without, truth, truth_relmse
     )
 
 

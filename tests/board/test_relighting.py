@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
@@ -17,7 +18,7 @@ from tests.board.served import served
 VIEW = "/homes/a-1/views/0_0_1"
 
 
-def unpacked(data: bytes) -> tuple[dict[str, object], dict[str, np.ndarray]]:
+def unpacked(data: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """The facts of a packet and its planes as float32."""
     assert data[:4] == b"PBLT"
     (length,) = struct.unpack_from("<I", data, 4)

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.commands.using import write_sheets
-from pbrs_farm.gallery import view_tiles
 from pbrs_farm.gallery.sheet_parts import SheetParts
 from tests.gallery.test_contact_sheet import write_house
 
@@ -38,7 +37,7 @@ def test_parts_made_ahead_are_not_made_again(root: Path, monkeypatch: pytest.Mon
         for view in ("0_0_1", "0_0_2", "0_1_0"):
             parts.make("a", view)
         assert len(parts.tiles()) == len(parts.cards()) == 3
-        monkeypatch.setattr(view_tiles.images, "array_from_png", lambda *_: pytest.fail("read"))
+        monkeypatch.setattr("pbrs_farm.images.array_from_png", lambda *_: pytest.fail("read"))
         write_sheets(root, 24, parts)
 
 

@@ -6,6 +6,7 @@ import io
 import xml.etree.ElementTree as ET
 import zipfile
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,7 +44,9 @@ def house(seed: int) -> House:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_both_storeys_have_one_outline(seed: int) -> None:
-    grounds = [unary_union([Polygon(w.corners()) for w in p.walls]) for p in home(seed)[0]]
+    grounds: list[Any] = [
+        unary_union([Polygon(w.corners()) for w in p.walls]) for p in home(seed)[0]
+    ]
     outlines = [Polygon(max(g.geoms, key=lambda x: x.area).exterior if hasattr(g, "geoms") else g.exterior) for g in grounds]  # fmt: skip
     assert outlines[0].symmetric_difference(outlines[1]).area < 1e-6
 

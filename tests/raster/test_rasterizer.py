@@ -18,7 +18,6 @@ from pbrs_farm.core.house import (
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.recipe import RasterFields
 from pbrs_farm.raster import Rasterizer
-from pbrs_farm.raster import gl_device as device
 from pbrs_farm.raster.shader_programs import DL_SCALE, MAX_PANE_OPACITY
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -180,7 +179,7 @@ def test_a_machine_without_egl_is_told_what_to_install(monkeypatch):
     def refuse(**_: object) -> None:
         raise Exception("(detect) libEGL.so: cannot open shared object file")
 
-    monkeypatch.setattr(device.moderngl, "create_context", refuse)
+    monkeypatch.setattr("moderngl.create_context", refuse)
     with pytest.raises(MachineFailed, match="libegl1"):
         Rasterizer(house((), ()), {})
 

@@ -10,7 +10,7 @@ import pytest
 from pbrs_farm.core.house import Enclosure, House, Item, ItemKind
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair import RepairReport, repair, summary_of_report
-from pbrs_farm.repair.structure import joints, watertight
+from pbrs_farm.repair.structure import plan_geometry, watertight
 from pbrs_farm.repair.structure.booleans import reduced
 from pbrs_farm.repair.structure.prisms import level_plane, solid_prisms
 from tests.repair.embree import EmbreeOccluder
@@ -95,7 +95,7 @@ def test_a_wall_that_is_lost_is_told_in_report_note_and_words(
 ) -> None:
     def whole_outline(walls, rooms, table):  # type: ignore[no-untyped-def]
         """As repair once cut: with all of the other room."""
-        areas = {r.id: joints.plan.polygon_of_room(r.polygon) for r in rooms}
+        areas = {r.id: plan_geometry.polygon_of_room(r.polygon) for r in rooms}
         found = []
         for w in walls:
             others = [a for i, a in areas.items() if i != w.room_id]

@@ -124,9 +124,9 @@ def test_a_library_whose_networks_are_not_found_is_packed_whole(
 def test_a_library_that_denoises_otherwise_when_cut_is_packed_whole(
     wheels: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    core = tmp_path / "libOpenImageDenoise_core.so.3"
     monkeypatch.setattr(wheels, "picture", lambda folder: (folder / core.name).read_bytes())
     monkeypatch.setattr(wheels, "NETWORK", "kept")
-    core = tmp_path / "libOpenImageDenoise_core.so.3"
     core.write_bytes(library := with_networks(b"\xd7\x41one", b"\xd7\x41second"))
     wheels.cut_networks(tmp_path)
     assert core.read_bytes() == library

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ def arrays_of_view(seed: int, size: tuple[int, int] = SIZE) -> dict[str, np.ndar
     valid = rng.random((height, width)) > 0.1
     normal = np.where(valid[..., None], np.rint((n + 1) * 65535 / 2), 32768).astype(np.uint16)
     instance = (rng.integers(0, 3, (height, width)) * 300).astype(np.uint16)
-    arrays = {
+    arrays: dict[str, Any] = {
         "normal.png": normal,
         "valid.png": (valid * 255).astype(np.uint8),
         "depth.png": rng.integers(500, 9000, (height, width)).astype(np.uint16),

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.assets import debian, furniture_package
+from pbrs_farm.assets import debian, furniture_package, homes_package
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.store import MemoryStore, Store
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import REAL_RUNNER, SmallFarm
-from workers import house_files
 from workers.client.farm_client import completed, new_spec
 from workers.house_files import entries_from_arguments
 from workers.ids import GEOMETRY, GL, LIGHT, REDUCE, job_key
@@ -98,7 +97,7 @@ def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(house_files.homes_package, "cached", object)
+    monkeypatch.setattr(homes_package, "cached", object)
     ((entry, _ref),) = entries_from_arguments(["made:2,furniture=none"])
     name = f"{furniture_package.PACKAGE}_{furniture_package.TESTED_VERSION}_all.deb"
     store = MemoryStore()

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.assets import debian, furniture_package
+from pbrs_farm.assets import debian, furniture_package, homes_package
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.store import MemoryStore
-from workers import house_files
 from workers.house_files import (
     entries_from_arguments,
     fill_cache,
@@ -69,7 +68,7 @@ def test_a_users_library_travels_by_its_content_and_no_path_does(tmp_path: Path,
 def test_a_worker_takes_the_furniture_from_the_store_where_a_house_is_dressed(
     cache: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(house_files.homes_package, "cached", object)
+    monkeypatch.setattr(homes_package, "cached", object)
     name = f"{furniture_package.PACKAGE}_{furniture_package.TESTED_VERSION}_all.deb"
     store = MemoryStore()
     store.put(f"jobs/sources/{name}", b"deb")

@@ -14,9 +14,10 @@ from pbrs_farm.images import png_from_array
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import training_sets
 from pbrs_farm.study.judging.evaluation import PAPER, is_underfit, markdown, paper_row, spread_text
-from pbrs_farm.study.judging.judged_places import camera_of, framed, judged_place
+from pbrs_farm.study.judging.judged_places import camera_of, judged_place
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
+from pbrs_farm.study.photographs import framed
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import ViewSource, held_out_views, training_views
