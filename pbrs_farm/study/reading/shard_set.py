@@ -1,4 +1,4 @@
-"""Views of packed shards, with numpy alone. Effects: reads a folder or a store, maps files."""
+"""Views of packed shards. Effects: reads a folder or a store, maps files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.regular_files import fault_of, open_regular
 from pbrs_farm.store import Store
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.reading.baseline_jpeg import array_of_jpeg
 from pbrs_farm.study.reading.dataset_json import (
     DATASET_JSON,
     WHOLE,
@@ -126,32 +125,14 @@ def arrays_of_part(names: Sequence[str], part: str, data: bytes, place: str) -> 
 
 
 def _jpeg_array(data: bytes, place: str) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8 of a JPEG, by the first decoder there is: OpenCV, Pillow, our own."""
-    for decoder in (_by_opencv, _by_pillow, array_of_jpeg):
-        try:
-            array = decoder(data)
-        except ImportError:
-            continue
-        except (OSError, ValueError):
-            array = None
-        if array is not None:
-            return array
-        break
-    raise BadInput(place, "", "cannot be read as a JPEG: damaged")
+    """(H, W, 3) uint8 of a JPEG, by Pillow: one decoder, the same bits on every machine."""
+    from PIL import Image  # a shard of PNGs is read without it
 
-
-def _by_opencv(data: bytes) -> NDArray[np.uint8] | None:
-    import cv2
-
-    bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    return None if bgr is None else np.ascontiguousarray(bgr[..., ::-1])
-
-
-def _by_pillow(data: bytes) -> NDArray[np.uint8]:
-    from PIL import Image
-
-    with Image.open(io.BytesIO(data), formats=["JPEG"]) as picture:
-        return np.asarray(picture.convert("RGB"))
+    try:
+        with Image.open(io.BytesIO(data), formats=["JPEG"]) as picture:
+            return np.asarray(picture.convert("RGB"))
+    except (OSError, ValueError, SyntaxError):
+        raise BadInput(place, "", "cannot be read as a JPEG: damaged") from None
 
 
 # Tar shards written without a clock and read by offset, with numpy's memory at most.
@@ -211,9 +192,6 @@ def members_of_tar(tar: Buffer, place: str) -> Iterator[Member]:
         at += _BLOCK + n_bytes + (-n_bytes % _BLOCK)
     # Two empty blocks were to come.
     raise BadInput(place, "", "ends too soon: truncated", hint="copy or pack it again")
-
-
-# Views of packed shards, with numpy alone.
 
 
 _N_OPEN: Final = 8  # shards that are kept open

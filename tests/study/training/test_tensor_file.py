@@ -1,4 +1,4 @@
-"""Checkpoints are safetensors files that the library reads, and damaged ones are told."""
+"""Checkpoints hold every type of tensor, and a damaged one is told."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 import torch
-from safetensors import safe_open
-from safetensors.torch import save_file
 
 from pbrs_farm.study.training.checkpoint import read_tensor_file, write_tensor_file
 
@@ -27,19 +25,9 @@ def some_tensors() -> dict[str, torch.Tensor]:
     }
 
 
-def test_the_library_reads_what_is_written(tmp_path: Path) -> None:
+def test_what_is_written_is_read(tmp_path: Path) -> None:
     tensors, path = some_tensors(), tmp_path / "x.safetensors"
-    write_tensor_file(path, tensors, {"position": "here"})
-    with safe_open(path, framework="pt") as file:
-        assert file.metadata() == {"position": "here"}
-        assert set(file.keys()) == set(tensors)
-        for name, tensor in tensors.items():
-            assert torch.equal(file.get_tensor(name), tensor)
-
-
-def test_what_the_library_writes_is_read(tmp_path: Path) -> None:
-    tensors, path = some_tensors(), tmp_path / "x.safetensors"
-    save_file(tensors, path, metadata={"position": "there"})
+    write_tensor_file(path, tensors, {"position": "there"})
     found, words = read_tensor_file(path)
     assert words == {"position": "there"}
     assert found.keys() == tensors.keys()

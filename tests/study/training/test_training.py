@@ -40,7 +40,7 @@ train(Job(plan, Path(sys.argv[1]), seed=3), views(5, plan), observe=killed)
 
 _ALONE = """
 import sys
-for name in ("pydantic", "pydantic_core", "OpenImageIO", "scipy", "h5py", "jinja2", "PIL", "cv2", "safetensors"):
+for name in ("pydantic", "pydantic_core", "OpenImageIO", "scipy", "h5py", "jinja2", "PIL", "cv2"):
     sys.modules[name] = None
 from pathlib import Path
 from tests.study.training.made_views import small_plan, views
