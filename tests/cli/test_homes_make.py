@@ -26,7 +26,8 @@ def test_homes_and_their_plans_are_made_and_a_second_call_keeps_them(
     assert main(words) == 0
     names = {p.name for p in tmp_path.iterdir()}
     assert names == {"made-1.sh3d", "made-1.svg", "made-2.sh3d", "made-2.svg", "plans.html"}
-    assert capsys.readouterr().out.startswith("2 homes made in ")
+    # On a slow machine a line says how far it is before.
+    assert capsys.readouterr().out.splitlines()[-1].startswith("2 homes made in ")
     assert main(words) == 0
     assert "0 homes made" in (said := capsys.readouterr().out)
     assert "2 kept" in said
