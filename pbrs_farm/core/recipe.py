@@ -11,9 +11,11 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 from pydantic import Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Intrinsics
+from pbrs_farm.core.checked_json import place_in, sentence
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe_fields import (
     BlurFields,
@@ -240,16 +242,16 @@ def changed_recipe(
     try:
         return Recipe.model_validate(fields)
     except ValidationError as error:
-        lines = "; ".join(_fault(e["loc"], e["type"], e["msg"], e["input"]) for e in error.errors())
+        lines = "; ".join(map(_fault, error.errors(include_url=False)))
         raise BadRecipe(lines, hint="`pbrs-farm recipes` lists every field") from None
 
 
-def _fault(place: tuple[int | str, ...], kind: str, text: str, value: object) -> str:
+def _fault(fault: ErrorDetails) -> str:
     """What is wrong with a field; of one there is not, which it may have meant."""
-    path = ".".join(str(part) for part in place)
+    path, text, value = place_in(fault["loc"]), sentence(fault), fault["input"]
     if not path:  # of groups that do not fit each other
-        return text.removeprefix("Value error, ")
-    if kind != "extra_forbidden":
+        return text
+    if fault["type"] != "extra_forbidden":
         return f"{path}: {text}"
     # Of a group there is not, the field that was set in it.
     if isinstance(value, dict) and value:
@@ -258,7 +260,7 @@ def _fault(place: tuple[int | str, ...], kind: str, text: str, value: object) ->
     known = field_paths()
     same = [p for p in known if p.endswith(f".{path.rpartition('.')[2]}")]
     offer = question(near_names(path, same) or same[:2] or near_names(path, known))
-    return f"{path}: no such field" + (f", {offer}" if offer else "")
+    return f"{path}: {text}" + (f", {offer}" if offer else "")
 
 
 def field_paths() -> list[str]:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, I32
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.formats.serialise import json_from_bytes
 
 _MAGIC: Final = b"glTF"
 _JSON_CHUNK: Final = 0x4E4F534A  # "JSON", little-endian

@@ -10,9 +10,9 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.core.record import Record
@@ -102,11 +102,6 @@ class ViewRecord(Record):
         return (json.dumps(plain, sort_keys=True, separators=(",", ":")) + "\n").encode()
 
 
-def record_from_json(data: bytes | str, name: str) -> ViewRecord:
+def record_from_json(data: bytes, name: str) -> ViewRecord:
     """The record in a histogram.json; BadInput naming the file when it is none."""
-    try:
-        return ViewRecord.model_validate_json(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise BadInput(name, where, first["msg"], hint="render the view again") from None
+    return checked(ViewRecord, data, name, hint="render the view again")

@@ -13,17 +13,13 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_glb import V_DOWN, glb_from_house
-from pbrs_farm.formats.serialise import (
-    json_from_bytes,
-    json_from_value,
-    pretty_json,
-    value_from_json,
-)
+from pbrs_farm.formats.serialise import json_from_value, pretty_json, value_from_json
 
 FORMAT: Final = "pbrs_farm house 1"
 

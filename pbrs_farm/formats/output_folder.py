@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.checked_json import json_fault
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
-from pbrs_farm.formats.serialise import json_fault
 from pbrs_farm.regular_files import fault_of, read_regular
 
 

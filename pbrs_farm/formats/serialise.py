@@ -84,36 +84,6 @@ def _holds_dict(value: Any) -> bool:
     return isinstance(value, list) and any(isinstance(v, dict) or _holds_dict(v) for v in value)
 
 
-def json_from_bytes(data: bytes, file: str) -> Any:
-    """The JSON value in data; BadHouse for text that is no JSON, NaN, or absurdly deep nesting."""
-    try:
-        return json.loads(data, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        place, fault = json_fault(error)
-        raise BadHouse(file, place, fault) from None
-
-
-def json_fault(error: Exception) -> tuple[str, str]:
-    """(place, what is wrong) of what json.loads raises, in words that say nothing of Python."""
-    if isinstance(error, RecursionError):
-        return "", "nested too deeply"
-    if isinstance(error, json.JSONDecodeError):
-        return f"line {error.lineno} column {error.colno}", f"no valid JSON: {error.msg}"
-    if isinstance(error, UnicodeDecodeError):
-        return f"byte {error.start}", "no valid JSON: the text is not UTF-8"
-    if isinstance(error, _NoNumberError):
-        return "", f"no valid JSON: {error}"
-    return "", "no valid JSON: a number has too many digits"
-
-
-class _NoNumberError(ValueError):
-    """NaN or an infinity where JSON knows none."""
-
-
-def _refuse_constant(name: str) -> float:
-    raise _NoNumberError(f"{name} is not a number")
-
-
 def value_from_json(hint: Any, data: Any, file: str, place: str) -> Any:
     """The value of type hint that JSON values say; arrays and bytes among them pass through.
 

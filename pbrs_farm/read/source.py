@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import is_made, made_homes
@@ -289,10 +290,7 @@ def object_source(model: ObjectModel, files: SourceFiles | None = None) -> Sourc
 def _object_model(location: str) -> ObjectModel:
     from pbrs_farm.read.objects.model_folders import ObjectModel
 
-    try:
-        return TypeAdapter(ObjectModel).validate_json(location)
-    except ValidationError:
-        raise BadHouse(location[:80], "", "not a model's description") from None
+    return checked(ObjectModel, location.encode(), location[:80], error=BadHouse)
 
 
 def _read_object(source: SourceRef, fields: ReadFields) -> House:

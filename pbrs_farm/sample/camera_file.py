@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Annotated, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
 from pbrs_farm.core.camera import PAPER_HFOV_RAD, Camera, Intrinsics
+from pbrs_farm.core.checked_json import checked, exactly
 from pbrs_farm.core.errors import BadInput
 
 # room_camera.txt, the published camera file (docs/spec/suncg.md section 3.3), as cameras.
@@ -83,8 +84,8 @@ def _camera(words: list[str], file: str, line: int, width_px: int, height_px: in
 # A user's camera file.
 
 
-Vector = tuple[float, float, float]
-Row = tuple[float, float, float, float]
+Vector = Annotated[tuple[float, float, float], exactly(3)]
+Row = Annotated[tuple[float, float, float, float], exactly(4)]
 
 
 class GivenCamera(BaseModel):
@@ -97,7 +98,7 @@ class GivenCamera(BaseModel):
     eye: Vector | None = None  # metres
     towards: Vector | None = None
     up: Vector = (0.0, 1.0, 0.0)
-    world_from_camera: tuple[Row, Row, Row, Row] | None = None
+    world_from_camera: Annotated[tuple[Row, Row, Row, Row], exactly(4, "rows")] | None = None
     room: str | None = None  # id of the room it belongs to; None = where it stands
     hfov_rad: Annotated[float, Field(gt=0, lt=3.1)] = PAPER_HFOV_RAD  # of the picture's width
 
@@ -152,13 +153,7 @@ def cameras_from_file_text(
         if not lines:
             raise BadInput(file, "", "holds no camera")
         return [(line.camera, line.room_id) for line in lines]
-    try:
-        given = _CAMERAS.validate_json(text)
-    except ValidationError as error:
-        # Name the first camera and field that pydantic rejects.
-        first = error.errors()[0]
-        place = "camera " + ".".join(str(part) for part in first["loc"])
-        raise BadInput(file, place, first["msg"]) from None
+    given = checked(_CAMERAS, text.encode(), file, "camera")
     if not given:
         raise BadInput(file, "", "holds no camera")
     return [(camera.camera(width_px, height_px), camera.room) for camera in given]

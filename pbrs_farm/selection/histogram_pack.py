@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields
@@ -135,7 +136,7 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
         if head.pop("format") != _FORMAT:
             raise ValueError("another format")
         # Check that texts and numbers are of as many views as the line says.
-        settings = HistogramFields.model_validate(head.pop("settings"))
+        settings = checked(HistogramFields, head.pop("settings"), name, "settings")
         body = zlib.decompress(rest)
         text = {k: tuple(head[k]) for k in _TEXTS}
         n = len(text["views"])

@@ -13,10 +13,10 @@ from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.core.record import Record
@@ -132,12 +132,9 @@ def reference_from_bytes(data: bytes, name: str) -> Reference:
     """The Reference of a file; BadInput naming it when it is damaged or none of this version."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            facts = ReferenceFacts.model_validate_json(archive.read("reference.json"))
+            text, hint = archive.read("reference.json"), "build the reference again"
+            facts = checked(ReferenceFacts, text, name, hint=hint)
             colour, depth = (_array(archive.read(f"{k}.npy")) for k in ("colour", "depth"))
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise BadInput(name, where, first["msg"], hint="build the reference again") from None
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError):
         hint = "`pbrs-farm reference build` makes one"
         raise BadInput(name, "", "not a reference file, or damaged", hint=hint) from None

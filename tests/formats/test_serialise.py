@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.formats.serialise import json_from_bytes, pretty_json
+from pbrs_farm.formats.serialise import pretty_json
 
 PYTHONS_WORDS = ("literal", "codec", "integer string", "maximum recursion", "Traceback", "0x")
 

@@ -151,7 +151,7 @@ def test_every_modes_brightness_is_kept_and_a_record_of_before_is_read() -> None
     assert set(whole.picture) == set(Mode)
     former = json.loads(whole.json_bytes())
     former["picture"] = {Mode.MLT_IL_OL: former["picture"][Mode.MLT_IL_OL]}
-    assert set(record_from_json(json.dumps(former), "x").picture) == {Mode.MLT_IL_OL}
+    assert set(record_from_json(json.dumps(former).encode(), "x").picture) == {Mode.MLT_IL_OL}
 
 
 def test_a_damaged_record_is_named() -> None:

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from pbrs_farm.assets.debian import write_whole
 from pbrs_farm.core import keys
@@ -286,7 +286,7 @@ class ShapeStore:
     def shape(self, key: tuple[str | int, ...], make: Callable[[], Shape | None]) -> Shape | None:
         """The shape stored under key, else what make gives, which is stored; None is, too."""
         path = self._folder / f"{keys.digest(FORMAT, *key)}.npz"
-        with suppress(OSError, ValueError, KeyError, ValidationError, zipfile.BadZipFile, EOFError):
+        with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
             return _read(path)
         shape = make()
         with suppress(OSError):

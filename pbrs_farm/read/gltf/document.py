@@ -15,9 +15,9 @@ from urllib.parse import unquote
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, I32
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, accessor_array, entry, gltf_from_glb, view_bytes
-from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.mesh.obj import Mesh
 
 # A relative name -> the bytes of that file beside the scene, or None if there is none.

@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.classes import (
     DOOR,
     FLOOR,
@@ -28,7 +29,6 @@ from pbrs_farm.core.classes import (
 )
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Surface
-from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of, nyu40_of
 from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, planar_parts, room_parts

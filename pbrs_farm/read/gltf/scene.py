@@ -16,11 +16,11 @@ import shapely
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
-from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.room_floors import (
     MAX_ROOMS,

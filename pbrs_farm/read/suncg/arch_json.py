@@ -16,10 +16,10 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Opening, Surface
-from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.mesh.obj import Mesh, ObjMaterial

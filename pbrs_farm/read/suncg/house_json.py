@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.shown_text import shown
-from pbrs_farm.formats.serialise import json_from_bytes
 
 NODE_TYPES: Final = ("Room", "Object", "Ground", "Box")
 # What a model or a texture may be called; a file name that stays in its folder.

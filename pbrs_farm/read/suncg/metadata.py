@@ -13,12 +13,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP, REFRIGERATOR
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import ItemKind, LightPart
 from pbrs_farm.core.lighting import LightForm, PowerUnit
-from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder
 

@@ -13,10 +13,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.formats.serialise import json_from_bytes
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,

@@ -1,0 +1,173 @@
+"""JSON from outside: parsed, checked, and refused in one line of our own words; no effects.
+
+A reader of a file that others wrote says by a pydantic model what it expects. What `json` and
+pydantic say of a fault is translated here alone: the place in the file, and what is expected there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Annotated, Any, Final, TypeVar
+
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+
+from pbrs_farm.core.errors import BadHouse, BadInput
+from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
+
+T = TypeVar("T")
+
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""A number that stands as one in the file: no text, no true, no NaN."""
+
+_MOST_SHOWN: Final = 40  # characters of a value that does not fit
+_MOST_NAMES: Final = 12  # names of fields that a hint lists
+
+# Text that is JSON.
+
+
+def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHouse) -> Any:
+    """The JSON value in data; an error for text that is no JSON, NaN, or absurdly deep nesting."""
+    if not data.strip():
+        raise error(file, "", "no valid JSON: the text is empty")
+    try:
+        return json.loads(data, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as fault:
+        place, text = json_fault(fault)
+        raise error(file, place, text) from None
+
+
+def json_fault(error: Exception) -> tuple[str, str]:
+    """(place, what is wrong) of what json.loads raises, in words that say nothing of Python."""
+    if isinstance(error, RecursionError):
+        return "", "nested too deeply"
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno} column {error.colno}", f"no valid JSON: {error.msg}"
+    if isinstance(error, UnicodeDecodeError):
+        return f"byte {error.start}", "no valid JSON: the text is not UTF-8"
+    if isinstance(error, _NoNumberError):
+        return "", f"no valid JSON: {error}"
+    return "", "no valid JSON: a number has too many digits"
+
+
+class _NoNumberError(ValueError):
+    """NaN or an infinity where JSON knows none."""
+
+
+def _refuse_constant(name: str) -> float:
+    raise _NoNumberError(f"{name} is not a number")
+
+
+# Values that are what a reader expects.
+
+
+def checked(
+    kind: type[T] | TypeAdapter[T],
+    data: object,
+    file: object,
+    place: str = "",
+    *,
+    error: type[BadInput] = BadInput,
+    hint: str = "",
+) -> T:
+    """The kind that a JSON value says, or bytes of JSON; an error naming file and place if none.
+
+    place: where the value stands in the file.  hint: for faults that have no better one.
+    """
+    adapter: TypeAdapter[T] = kind if isinstance(kind, TypeAdapter) else _adapter_of(kind)
+    try:
+        if isinstance(data, bytes):
+            return adapter.validate_json(data)
+        return adapter.validate_python(data)
+    except ValidationError as fault:
+        # Name the first fault: the others may follow from it.
+        first = fault.errors(include_url=False)[0]
+    if first["type"] == "json_invalid" and isinstance(data, bytes):
+        # Ask json for the place in a text that is none; it nests deeper than pydantic.
+        json_from_bytes(data, file, error=error)
+        raise error(file, "", "no valid JSON: nested too deeply", hint=hint)
+    if first["type"] == "extra_forbidden":
+        word, known = str(first["loc"][-1]), _field_names(adapter)
+        offer = hint_of_choice if len(known) <= _MOST_NAMES else did_you_mean
+        hint = offer(word, known) or hint
+    inner = place_in(first["loc"])
+    between = ", " if place and inner and inner[0] != "[" else ""
+    raise error(file, f"{place}{between}{inner}", sentence(first), hint=hint)
+
+
+_adapter_of: Final[Callable[[Any], TypeAdapter[Any]]] = cache(TypeAdapter)
+
+
+def _field_names(adapter: TypeAdapter[Any]) -> list[str]:
+    """The fields of every model that the adapter's kind is made of."""
+    schema = adapter.json_schema()
+    models = [schema, *schema.get("$defs", {}).values()]
+    return [name for model in models for name in model.get("properties", {})]
+
+
+def place_in(path: Sequence[int | str]) -> str:
+    """A place below a value as a reader would point to it: materials[0].texture."""
+    steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+    return "".join(steps).removeprefix(".")
+
+
+_SENTENCES: Final = {
+    "missing": "is missing",
+    "extra_forbidden": "no such field",
+    "finite_number": "is not a finite number",
+    "too_short": "expected {min_length} values or more, got {actual_length}",
+    "too_long": "expected {max_length} values at most, got {actual_length}",
+    "string_too_short": "expected {min_length} characters or more",
+    "string_too_long": "expected {max_length} characters at most",
+    "string_pattern_mismatch": "is not written as {pattern}",
+    "greater_than": "expected more than {gt:g}",
+    "greater_than_equal": "expected {ge:g} or more",
+    "less_than": "expected less than {lt:g}",
+    "less_than_equal": "expected {le:g} or less",
+    "literal_error": "expected {expected}",
+    "enum": "expected {expected}",
+}
+_WANTED: Final = {
+    "string": "a text", "int": "a whole number", "float": "a number", "bool": "true or false",
+    "list": "a list", "tuple": "a list", "set": "a list", "frozen": "a list", "none": "null",
+    "dict": "an object", "model": "an object", "dataclass": "an object", "mapping": "an object",
+}  # fmt: skip
+
+
+def sentence(fault: ErrorDetails) -> str:
+    """What is wrong, of one fault that pydantic found, in words that say nothing of pydantic."""
+    kind, facts = fault["type"], fault.get("ctx", {})
+    if kind in ("value_error", "assertion_error"):
+        return str(facts["error"])  # our own validators write sentences
+    if kind in _SENTENCES:
+        text = _SENTENCES[kind].format(**facts)
+    else:
+        wanted = _WANTED.get(kind.partition("_")[0])
+        text = f"expected {wanted}" if wanted else "is not what belongs here"
+    tells_value = text.startswith("expected") and "got" not in text
+    return f"{text}, got {_shown_value(fault['input'])}" if tells_value else text
+
+
+def _shown_value(value: object) -> str:
+    if isinstance(value, dict):
+        return "an object"
+    if isinstance(value, list | tuple):
+        return "a list"
+    if isinstance(value, int) and value.bit_length() > 64:
+        return "a number of many digits"
+    value = value[:_MOST_SHOWN] if isinstance(value, str) else value
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= _MOST_SHOWN else f"{text[: _MOST_SHOWN - 3]}..."
+
+
+def exactly(n: int, what: str = "numbers") -> BeforeValidator:
+    """In Annotated: a list of n values, named by what they are where it is none."""
+
+    def check(value: object) -> object:
+        if not isinstance(value, list | tuple) or len(value) != n:
+            raise ValueError(f"expected {n} {what}")
+        return value
+
+    return BeforeValidator(check)
