@@ -5,19 +5,21 @@ Medians and shares are those of nine homes drawn by people (65 rooms), docs/home
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
+from pydantic import BaseModel, Field, StrictBool, TypeAdapter
 
+from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_bytes
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.made_home import check_wishes
+from pbrs_farm.core.record import Record
 from pbrs_farm.generate.floor_plan import RoomType
-from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, read_given
 
 MEDIAN_AREA: Final = {
     RoomType.LIVING: 27.2,
@@ -190,86 +192,77 @@ def _resized(wish: RoomWish, factor: float) -> RoomWish:
 
 
 MAX_ROOMS: Final = 14
-_TYPES: Final = [t.value for t in AREA_RANGE]
-_NUMBERS: Final = ("n_blind_sides", "notch")
-_FLAGS: Final = ("open_kitchen", "l_shaped", "balcony")
 _ASKED_HALL_SHARE: Final = 0.135  # of the other rooms, where the file names no hall
+_FORM: Final = '{"rooms": [{"type": "bedroom"}, ...]}'
 
 
-def json_from_file(path: Path) -> Any:
-    """The value of a JSON file. Raises BadInput where it cannot be read."""
-    try:
-        return json.loads(read_regular(path, MAX_TEXT_BYTES).decode("utf-8"))
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
-    except (ValueError, RecursionError) as error:
-        if not path.stat().st_size:
-            raise BadInput(path, "", "is empty") from None
-        raise BadInput(path, "", f"is no JSON: {error}") from None
+class _Room(BaseModel):
+    """A room as the file says it."""
+
+    type: Literal[tuple(t.value for t in AREA_RANGE)]  # type: ignore[valid-type]
+    area: Finite = 0.0
+    name: str = ""
+
+
+class _File(Record):
+    """A programme as the file says it; its rooms and pairs are looked at one by one."""
+
+    rooms: list[Any]
+    area: Finite | None = None
+    adjacent: list[Any] = Field(default_factory=list)
+    n_blind_sides: Finite = Field(0, ge=0, le=2)
+    notch: Finite = 0.0
+    open_kitchen: StrictBool = False
+    l_shaped: StrictBool = False
+    balcony: StrictBool = False
+
+
+_PAIR: Final = TypeAdapter(Annotated[tuple[str, str], exactly(2, "rooms")])
 
 
 def programme_from_json(path: Path) -> Programme:
     """The programme of a file. Raises BadInput, naming the rule that is broken and what would do."""
-    value = json_from_file(path)
-    if not isinstance(value, dict) or not isinstance(value.get("rooms"), list):
-        raise BadInput(path, "", "is no programme", hint='{"rooms": [{"type": "bedroom"}, ...]}')
-    fields = ("rooms", "area", "adjacent", *_NUMBERS, *_FLAGS)
-    unknown = sorted(set(value) - set(fields))
-    if unknown:
-        known = ", ".join(fields)
-        raise BadInput(path, unknown[0], "is no field of a programme", hint=f"one of {known}")
-    wishes = [_wish(path, k, row) for k, row in enumerate(value["rooms"])]
-    wishes = _with_area(path, value.get("area"), _complete(path, wishes))
-    for key in _FLAGS:
-        if not isinstance(value.get(key, False), bool):
-            raise BadInput(path, key, "is not true or false")
-    sides = _number(path, "n_blind_sides", value.get("n_blind_sides", 0), (0, 2))
-    notch = _number(path, "notch", value.get("notch", 0), (0, 0.2 * sum(w.area for w in wishes)))
+    given = checked(_File, json_from_file(path), path, hint=_FORM)
+    wishes = [_wish(path, k, row) for k, row in enumerate(given.rooms)]
+    wishes = _with_area(path, given.area, _complete(path, wishes))
+    most_notch = 0.2 * sum(w.area for w in wishes)
     return Programme(
-        tuple(wishes), open_kitchen=value.get("open_kitchen", False), n_blind_sides=int(sides),
-        notch=notch, l_shaped=value.get("l_shaped", False), balcony=value.get("balcony", False),
-        adjacent=_adjacent(path, value.get("adjacent", []), wishes),
+        tuple(wishes), open_kitchen=given.open_kitchen, n_blind_sides=int(given.n_blind_sides),
+        notch=_within(path, "notch", given.notch, (0, most_notch)), l_shaped=given.l_shaped,
+        balcony=given.balcony, adjacent=_adjacent(path, given.adjacent, wishes),
     )  # fmt: skip
+
+
+def json_from_file(path: Path) -> Any:
+    """The value of a JSON file. Raises BadInput where it cannot be read."""
+    return json_from_bytes(read_given(path, MAX_TEXT_BYTES), path, error=BadInput)
 
 
 def _wish(path: Path, number: int, row: object) -> RoomWish:
     place = f"room {number + 1}"
-    if isinstance(row, str):
-        row = {"type": row}
-    if not isinstance(row, dict) or not isinstance(row.get("type"), str):
-        raise BadInput(path, place, "has no type", hint=f"one of {', '.join(_TYPES)}")
-    if row["type"] not in _TYPES:
-        types = ", ".join(_TYPES)
-        raise BadInput(path, f"{place} ({row['type']})", "is no room type", hint=f"one of {types}")
-    type_ = RoomType(row["type"])
-    median = MEDIAN_AREA.get(type_, 0.0)
-    area = row.get("area", median)
-    if "area" in row:
-        area = _number(path, f"{place} ({type_.value})", area, AREA_RANGE[type_], " m2")
-    name = row.get("name", "")
-    if not isinstance(name, str):
-        raise BadInput(path, place, "has a name that is no text")
-    return RoomWish(type_, float(area), name[:60])
+    room = checked(_Room, {"type": row} if isinstance(row, str) else row, path, place)
+    type_ = RoomType(room.type)
+    area = MEDIAN_AREA.get(type_, 0.0)
+    if "area" in room.model_fields_set:
+        area = _within(path, f"{place} ({room.type})", room.area, AREA_RANGE[type_], " m2")
+    return RoomWish(type_, area, room.name[:60])
 
 
 def _adjacent(
-    path: Path, rows: object, wishes: list[RoomWish]
+    path: Path, rows: list[Any], wishes: list[RoomWish]
 ) -> tuple[tuple[int, tuple[int, ...]], ...]:
     """Pairs of rooms by name or type: the first shares a wall with one that the second names."""
-    if not isinstance(rows, list):
-        raise BadInput(path, "adjacent", "is no list of pairs", hint='[["Ada", "bathroom"]]')
     found = []
     for number, row in enumerate(rows):
         place = f"adjacent {number + 1}"
-        if not isinstance(row, list) or len(row) != 2 or not all(isinstance(x, str) for x in row):
-            raise BadInput(path, place, "is no pair of rooms", hint='["Ada", "bathroom"]')
-        firsts, seconds = (_called(path, place, word, wishes) for word in row)
+        words = checked(_PAIR, row, path, place, hint='["Ada", "bathroom"]')
+        firsts, seconds = (_called(path, place, word, wishes) for word in words)
         if len(firsts) > 1:
-            text = f"{row[0]!r} is {len(firsts)} rooms"
+            text = f"{words[0]!r} is {len(firsts)} rooms"
             raise BadInput(path, place, text, hint="name the room and write its name here")
         others = tuple(k for k in seconds if k != firsts[0])
         if not others:
-            raise BadInput(path, place, f"{row[0]!r} is one room")
+            raise BadInput(path, place, f"{words[0]!r} is one room")
         found.append((firsts[0], others))
     return tuple(found)
 
@@ -283,19 +276,17 @@ def _called(path: Path, place: str, word: str, wishes: list[RoomWish]) -> list[i
     return found
 
 
-def _number(
-    path: Path, place: str, value: object, bounds: tuple[float, float], unit: str = ""
+def _within(
+    path: Path, place: str, value: float, bounds: tuple[float, float], unit: str = ""
 ) -> float:
     low, high = bounds
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise BadInput(path, place, "is no number")
     if not low <= value <= high:
         nearest = min(max(value, low), high)
         raise BadInput(
             path, place, f"has {value:g}{unit}; {low:g} to {high:g} works",
             hint=f"the nearest is {nearest:g}{unit}",
         )  # fmt: skip
-    return float(value)
+    return value
 
 
 def _complete(path: Path, wishes: list[RoomWish]) -> list[RoomWish]:
@@ -323,7 +314,7 @@ def _complete(path: Path, wishes: list[RoomWish]) -> list[RoomWish]:
     return [*others, hall]
 
 
-def _with_area(path: Path, area: object, wishes: list[RoomWish]) -> list[RoomWish]:
+def _with_area(path: Path, area: float | None, wishes: list[RoomWish]) -> list[RoomWish]:
     """The rooms scaled to the area of the whole home, where one is wished."""
     if area is None:
         return wishes
@@ -331,11 +322,9 @@ def _with_area(path: Path, area: object, wishes: list[RoomWish]) -> list[RoomWis
     least = sum(AREA_RANGE[w.type][0] for w in wishes if w.type is not RoomType.HALL)
     hall = 3.0 + 0.95 * (len(wishes) - 1)
     most = sum(AREA_RANGE[w.type][1] for w in wishes)
-    if isinstance(area, bool) or not isinstance(area, (int, float)):
-        raise BadInput(path, "area", "is no number")
     if not least + hall <= area <= most:
         raise BadInput(
             path, "area", f"{len(wishes)} rooms in {area:g} m2 cannot be met",
             hint=f"rooms of these types take {math.ceil(least + hall)} to {most:.0f} m2",
         )  # fmt: skip
-    return scaled_rooms(wishes, float(area))
+    return scaled_rooms(wishes, area)

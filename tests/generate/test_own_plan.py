@@ -119,7 +119,7 @@ def test_a_turned_plan_is_turned_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("[", "is no JSON"),
+        ("[", "plan.json: line 1 column 2: no valid JSON"),
         ({}, "is no plan"),
         ({"rooms": []}, "has 0 rooms"),
         ({"rooms": [{"type": "pool", "polygon": square(0, 0, 2, 2)}]}, "pool.*one of living"),

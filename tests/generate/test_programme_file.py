@@ -40,17 +40,23 @@ def test_the_rooms_take_the_area_of_the_whole_home(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("{", "is no JSON"),
-        ([], "is no programme"),
-        ({"rooms": [*FLAT, "cellar"]}, "cellar.*is no room type.*one of living"),
+        ("{", "flat.json: line 1 column 2: no valid JSON"),
+        ([], "flat.json: expected an object, got a list.*rooms"),
+        (
+            {"rooms": [*FLAT, "cellar"]},
+            "room 5, type: expected 'living'.*or 'hall', got \"cellar\"",
+        ),
         ({"rooms": [*FLAT, *["bedroom"] * 6], "area": 20}, "11 rooms in 20 m2.*take 1[0-9]{2} to"),
         ({"rooms": [{"type": "bedroom", "area": 2}]}, "has 2 m2; 9 to 17 works.*nearest is 9 m2"),
         ({"rooms": ["bedroom"]}, "0 rooms to live in"),
         ({"rooms": FLAT[:3]}, "no bathroom"),
-        ({"rooms": FLAT, "garden": 1}, "garden.*no field.*open_kitchen"),
-        ({"rooms": FLAT, "balcony": 1}, "not true or false"),
-        ({"rooms": FLAT, "notch": "x"}, "is no number"),
+        ({"rooms": FLAT, "garden": 1}, "garden: no such field.*open_kitchen"),
+        ({"rooms": FLAT, "balcony": 1}, "balcony: expected true or false, got 1"),
+        ({"rooms": FLAT, "notch": "x"}, "notch: expected a number"),
         ({"rooms": ["bedroom"] * 40}, "at most 14"),
+        ({"rooms": [*FLAT, {"name": "x"}]}, "room 5, type: is missing"),
+        ({"rooms": FLAT, "area": True}, "area: expected a number, got true"),
+        ({"rooms": FLAT, "n_blind_sides": 3}, "n_blind_sides: expected 2 or less"),
     ],
 )
 def test_a_programme_that_cannot_be_met_is_one_line(
@@ -111,8 +117,8 @@ def test_a_bathroom_beside_a_bedroom_is_entered_from_it(
 @pytest.mark.parametrize(
     ("pairs", "message"),
     [
-        ("Ada", "is no list of pairs"),
-        ([["Ada"]], "adjacent 1: is no pair"),
+        ("Ada", "adjacent: expected a list"),
+        ([["Ada"]], "adjacent 1: expected 2 rooms"),
         ([["Ada", "cellar"]], "no room is called 'cellar'.*one of living, Ada, kitchen"),
         ([["Ada", "bedroom"]], "'Ada' is one room"),
         ([["Ada", "Ada"]], "'Ada' is one room"),
