@@ -20,13 +20,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import shapely
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.ops import unary_union
 
+from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import (
     OpeningKind,
@@ -250,6 +252,50 @@ _SIZES: Final = {
 }  # fmt: skip
 
 
+def _in_plan(value: object) -> object:
+    # Drop what GeoJSON may have behind the plan's two coordinates: a height.
+    if not isinstance(value, list) or len(value) < 2:
+        raise ValueError("expected a point [x, y]")
+    return value[:2]
+
+
+_Metres = Annotated[Finite, Field(ge=-1e5, le=1e5), AfterValidator(lambda value: round(value, 4))]
+_Point = Annotated[tuple[_Metres, _Metres], BeforeValidator(_in_plan)]
+_Length = Annotated[Finite, Field(ge=0, lt=20)]
+
+
+class _RoomFields(BaseModel):
+    type: RoomType
+    name: Any = None
+    polygon: list[_Point] = Field(min_length=3)
+
+
+class _OpeningFields(BaseModel):
+    at: _Point
+    kind: Any = None
+    entrance: Any = None
+    width: Annotated[_Length, Field(ge=0.3)] = 0.9
+    height: Annotated[_Length, Field(ge=0.3)] = 2.1
+    sill: _Length = 0.0
+
+
+class _PlanFields(BaseModel):
+    rooms: list[Any] = Field(min_length=1, max_length=MAX_ROOMS)
+    height: Finite = Field(2.5, ge=2, le=6)
+    doors: list[Any] = Field(default_factory=list)
+    windows: list[Any] = Field(default_factory=list)
+
+
+class _Geometry(BaseModel):
+    type: Literal["Polygon", "Point"]
+    coordinates: list[Any] = Field(min_length=1)
+
+
+class _Feature(BaseModel):
+    properties: dict[str, Any] | None
+    geometry: _Geometry
+
+
 @dataclass(frozen=True, slots=True)
 class OwnPlan:
     """A plan that was read, and what of a table it leaves out, a line each."""
@@ -273,91 +319,48 @@ def plan_from_file(path: Path, apartment: str = "") -> OwnPlan:
 def _plan_of(path: Path, value: Any, *, is_table: bool = False) -> OwnPlan:
     if isinstance(value, dict) and value.get("type") == "FeatureCollection":
         value = _from_geojson(path, value)
-    if not isinstance(value, dict) or not isinstance(value.get("rooms"), list):
-        raise BadInput(path, "", "is no plan", hint='{"rooms": [...], "doors": [...]}')
-    if not 0 < len(value["rooms"]) <= MAX_ROOMS:
-        raise BadInput(path, "", f"has {len(value['rooms'])} rooms; 1 to {MAX_ROOMS} work")
-    height = value.get("height", 2.5)
-    if not _is_number(height) or not 2.0 <= height <= 6.0:
-        raise BadInput(path, "height", "is no number from 2 to 6 metres")
+    given = checked(_PlanFields, value, path, hint='{"rooms": [...], "doors": [...]}')
     # Walls stand between the drawn rooms; openings then find their wall.
-    drawn = [_room(path, k, row) for k, row in enumerate(value["rooms"])]
+    drawn = [_room(path, k, row) for k, row in enumerate(given.rooms)]
     _check_apart(path, drawn)
     walls, rooms = _walled(path, drawn)
     openings: list[PlanOpening] = []
     left_out = []
     # A table lists what it cannot place; a file written for us must be right.
-    for key, kind in (("doors", OpeningKind.DOOR), ("windows", OpeningKind.WINDOW)):
-        rows = value.get(key, [])
-        if not isinstance(rows, list):
-            raise BadInput(path, key, "is no list")
-        for k, row in enumerate(rows):
-            place = f"{key[:-1]} {k + 1}"
-            try:
-                openings.append(_opening(path, place, row, kind, walls, rooms, float(height)))
-            except BadInput as error:
-                if not is_table:
-                    raise
-                left_out.append(str(error))
-    return OwnPlan(Plan(rooms, walls, tuple(openings), float(height)), tuple(left_out))
+    told = [(f"door {k}", row, OpeningKind.DOOR) for k, row in enumerate(given.doors, 1)]
+    told += [(f"window {k}", row, OpeningKind.WINDOW) for k, row in enumerate(given.windows, 1)]
+    for place, row, kind in told:
+        try:
+            openings.append(_opening(path, place, row, kind, walls, rooms, given.height))
+        except BadInput as error:
+            if not is_table:
+                raise
+            left_out.append(str(error))
+    return OwnPlan(Plan(rooms, walls, tuple(openings), given.height), tuple(left_out))
 
 
 def _from_geojson(path: Path, value: dict[str, Any]) -> dict[str, Any]:
     plan: dict[str, Any] = {"rooms": [], "doors": [], "windows": []}
-    features = value.get("features")
-    for number, feature in enumerate(features if isinstance(features, list) else ()):
-        try:
-            row, form = dict(feature["properties"] or {}), feature["geometry"]
-            if form["type"] == "Polygon":
-                plan["rooms"].append(row | {"polygon": form["coordinates"][0]})
-            elif form["type"] == "Point":
-                kind = OpeningKind(str(row.get("kind")))
-                is_door = kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE)
-                plan["doors" if is_door else "windows"].append(row | {"at": form["coordinates"]})
-            else:
-                raise BadInput(path, f"feature {number + 1}", "is no Polygon and no Point")
-        except (TypeError, KeyError, IndexError, ValueError):
-            raise BadInput(path, f"feature {number + 1}", "is no room and no opening") from None
-    if _is_number(height := value.get("height")):
-        plan["height"] = height
-    return plan
-
-
-def _is_number(value: object) -> bool:
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)  # type: ignore[arg-type]
-
-
-def _points(value: object) -> list[Point] | None:
-    if not isinstance(value, list) or not all(
-        isinstance(p, list) and len(p) >= 2 and all(_is_number(c) for c in p[:2]) for p in value
-    ):
-        return None
-    return [(round(float(p[0]), 4), round(float(p[1]), 4)) for p in value]
+    for k, feature in enumerate(checked(list, value.get("features"), path, "features"), 1):
+        given = checked(_Feature, feature, path, f"feature {k}")
+        row, at = given.properties or {}, given.geometry.coordinates
+        if given.geometry.type == "Polygon":
+            plan["rooms"].append(row | {"polygon": at[0]})
+            continue
+        kind = checked(OpeningKind, row.get("kind"), path, f"feature {k}, kind")
+        is_door = kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE)
+        plan["doors" if is_door else "windows"].append(row | {"at": at})
+    return plan if value.get("height") is None else plan | {"height": value["height"]}
 
 
 def _room(path: Path, number: int, row: object) -> tuple[RoomType, str, Polygon]:
     place = f"room {number + 1}"
-    if not isinstance(row, dict):
-        raise BadInput(path, place, "is no object with a type and a polygon")
-    types = [t.value for t in RoomType]
-    if row.get("type") not in types:
-        text = f"has the type {str(row.get('type'))[:40]!r}, which is none"
-        raise BadInput(path, place, text, hint=f"one of {', '.join(types)}")
-    points = _points(row.get("polygon"))
-    if points is None or len(set(points)) < 3:
-        raise BadInput(
-            path, place, "has no polygon: a list of three points [x, y] or more, all finite"
-        )
-    if max(abs(c) for p in points for c in p) > 1e5:
-        raise BadInput(path, place, "lies far from the origin", hint="metres from a corner")
-    shape = Polygon(points)
+    room = checked(_RoomFields, row, path, place)
+    shape = Polygon(room.polygon)
     if not shape.is_valid or shape.area < _LEAST_M2:
         why = "crosses itself" if not shape.is_valid else f"has {shape.area:.2f} m2"
         raise BadInput(path, place, f"{why}; simple polygons of {_LEAST_M2} m2 or more work")
-    type_ = RoomType(row["type"])
-    name = row.get("name") or type_.label
-    return type_, str(name)[:60], _oriented(shape)
+    return room.type, str(room.name or room.type.label)[:60], _oriented(shape)
 
 
 def _oriented(shape: Polygon) -> Polygon:
@@ -484,23 +487,19 @@ def _opening(
     walls: tuple[PlanWall, ...], rooms: tuple[PlanRoom, ...], height: float,
 ) -> PlanOpening:  # fmt: skip
     """A door or window in the wall nearest to where it is said to be."""
-    points = _points([row.get("at")]) if isinstance(row, dict) else None
-    if not isinstance(row, dict) or points is None:
-        raise BadInput(path, place, 'has no place "at": [x, y]')
-    if row.get("entrance") or row.get("kind") == "entrance":
+    given = checked(_OpeningFields, row, path, place)
+    if given.entrance or given.kind == "entrance":
         kind = OpeningKind.ENTRANCE
-    if row.get("kind") == "french_window":
+    if given.kind == "french_window":
         kind = OpeningKind.FRENCH_WINDOW
-    at = shapely.Point(points[0])
+    at = shapely.Point(given.at)
     lines = [LineString([w.start, w.end]) for w in walls]
     wall = min(range(len(walls)), key=lambda k: (lines[k].distance(at), k))
     if lines[wall].distance(at) > _REACH_M:
         text = f"is {lines[wall].distance(at):.1f} m from the nearest wall"
         raise BadInput(path, place, text, hint=f"within {_REACH_M} m of one")
-    sizes = [row.get(k, d) for k, d in zip(("width", "height", "sill"), _SIZES[kind], strict=True)]
-    if not all(_is_number(s) and 0 <= s < 20 for s in sizes) or min(sizes[:2]) < 0.3:
-        raise BadInput(path, place, "has no width, height and sill in metres")
-    width, tall, sill = (float(s) for s in sizes)
+    usual = dict(zip(("width", "height", "sill"), _SIZES[kind], strict=True))
+    width, tall, sill = (usual | given.model_dump(include=set(usual), exclude_unset=True)).values()
     if sill + tall > height - 0.02:
         raise BadInput(path, place, f"is higher than the room: {height - 0.02 - sill:.2f} m works")
     along = min(

@@ -51,6 +51,10 @@ SKEWED = TOUCHING | {
 }
 
 
+GEOJSON: dict[str, Any] = {"type": "FeatureCollection"}
+HATCH = {"properties": {"kind": "hatch"}, "geometry": {"type": "Point", "coordinates": [2, 4]}}
+
+
 def plan(folder: Path, value: object) -> Plan:
     path = folder / "plan.json"
     path.write_text(value if isinstance(value, str) else json.dumps(value))
@@ -120,19 +124,31 @@ def test_a_turned_plan_is_turned_back(tmp_path: Path) -> None:
     ("value", "message"),
     [
         ("[", "plan.json: line 1 column 2: no valid JSON"),
-        ({}, "is no plan"),
-        ({"rooms": []}, "has 0 rooms"),
-        ({"rooms": [{"type": "pool", "polygon": square(0, 0, 2, 2)}]}, "pool.*one of living"),
-        ({"rooms": [{"type": "hall", "polygon": [[0, 0], [1, "x"]]}]}, "room 1: has no polygon"),
+        ({}, "rooms: is missing.*doors"),
+        ({"rooms": []}, "rooms: expected 1 values or more, got 0"),
+        (
+            {"rooms": [{"type": "pool", "polygon": square(0, 0, 2, 2)}]},
+            "room 1, type: expected 'living'.*got \"pool\"",
+        ),
+        (
+            {"rooms": [{"type": "hall", "polygon": [[0, 0], [1, "x"]]}]},
+            r"room 1, polygon\[1\]\[1\]: expected a number",
+        ),
         ({"rooms": [{"type": "hall", "polygon": [[0, 0], [2, 2], [2, 0], [0, 2]]}]}, "crosses"),
         ({"rooms": [{"type": "hall", "polygon": square(0, 0, 900, 2)}]}, "over 200 m wide"),
         ({"rooms": [TOUCHING["rooms"][0]] * 2}, "overlaps 'Salon' by 20.00 m2"),
         (TOUCHING | {"doors": [{"at": [2, 2]}]}, "door 1: is [0-9.]+ m from the nearest wall"),
-        (TOUCHING | {"doors": [{}]}, "door 1: has no place"),
+        (TOUCHING | {"doors": [{}]}, "door 1, at: is missing"),
         (TOUCHING | {"windows": [{"at": [2, 0], "width": 9}]}, "window 1: is wider than its wall"),
         (TOUCHING | {"windows": [{"at": [2, 0], "height": 3}]}, "higher than the room"),
-        (TOUCHING | {"height": 1}, "from 2 to 6 metres"),
-        ({"type": "FeatureCollection", "features": [1]}, "feature 1: is no room"),
+        (TOUCHING | {"height": 1}, "height: expected 2 or more, got 1"),
+        (TOUCHING | {"windows": [{"at": [2, 0], "sill": None}]}, "window 1, sill: expected a num"),
+        ({"rooms": [{"type": "hall", "polygon": [[0, 0], [1, 1]]}]}, "room 1, polygon: expected 3"),
+        ({"rooms": [{"type": "hall", "polygon": square(2, 2, 0, 0)}]}, "room 1: has 0.00 m2|cross"),
+        ({"rooms": [{"type": "hall", "polygon": square(1e6, 0, 2, 2)}]}, "room 1, polygon.*100000"),
+        (GEOJSON | {"features": [1]}, "feature 1: expected an object"),
+        (GEOJSON | {"features": [{"geometry": {"type": "Line"}}]}, "feature 1, properties: is mis"),
+        (GEOJSON | {"features": [HATCH]}, "feature 1, kind: expected 'door'"),
     ],
 )
 def test_a_plan_that_cannot_be_built_is_one_line(
