@@ -10,13 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import shapely
+from pydantic import BeforeValidator, Field
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.checked_json import json_from_bytes
+from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_bytes
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Opening, Surface
@@ -24,7 +25,17 @@ from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.mesh.obj import Mesh, ObjMaterial
 from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal
-from pbrs_farm.read.suncg.house_json import JsonReader, Node, Override, world_from_house_of
+from pbrs_farm.read.suncg.house_json import (
+    Axes,
+    Given,
+    Label,
+    Lenient,
+    Node,
+    Override,
+    Overrides,
+    Vector,
+    numbers,
+)  # fmt: skip
 from pbrs_farm.read.suncg.models import ModelMaterials
 from pbrs_farm.read.suncg.wall_holes import CUTTER_REACH_M, LEAST_HOLE_M, box_between
 
@@ -68,26 +79,70 @@ class Arch:
 
 def arch_from_json(data: bytes, file: str) -> Arch:
     """The elements of arch.json by room; BadHouse naming the element that is wrong."""
-    document = json_from_bytes(data, file)
-    if not isinstance(document, dict):
-        raise BadHouse(file, "", "expected an object; this is no arch.json")
-    reader = JsonReader(file)
-    # Bound the work before any element is looked at.
-    raw_elements = reader.items(document, "elements", "")
-    if len(raw_elements) > MAX_ELEMENTS:
-        raise BadHouse(file, "elements", f"more than {MAX_ELEMENTS}")
-    defaults = document.get("defaults")
+    hint = "an arch.json has a list of elements"
+    document = checked(_Document, json_from_bytes(data, file), file, error=BadHouse, hint=hint)
     found: dict[str, list[Element]] = {}
-    for i, raw in enumerate(raw_elements):
-        element = _element(reader, raw, f"element {i}", defaults)
+    for i, raw in enumerate(document.elements):
+        element = _element(file, raw, f"element {i}", document.defaults)
         if element is not None:
             found.setdefault(element.room_id, []).append(element)
-    return Arch(world_from_house_of(reader, document), found)
+    return Arch(document.world_from_house(file), found)
 
 
-def _element(reader: JsonReader, raw: Any, place: str, defaults: Any) -> Element | None:
-    if not isinstance(raw, dict):
-        raise BadHouse(reader.file, place, "expected an object")
+class _Document(Axes):
+    # The count bounds the work before any element is looked at.
+    elements: Annotated[list[Any], Field(max_length=MAX_ELEMENTS)]
+    defaults: Any = None
+
+
+_Length = Annotated[Finite, Field(ge=0, lt=1000)]
+_Corner = Annotated[F64, numbers(2)]
+
+
+class _Common(Given):
+    room_id: Label = Field("", alias="roomId")
+    overrides: Overrides = Field((), alias="materials")
+    depth: _Length
+
+
+class _Box(Given):
+    min: _Corner
+    max: _Corner
+
+
+class _Hole(Given):
+    box: _Box
+
+
+class _Wall(_Common):
+    """A wall by its two ends, its height above them and its holes."""
+
+    points: Annotated[list[Vector], exactly(2, "ends")]
+    height: _Length
+    extraHeight: _Length  # noqa: N815
+    holes: Annotated[tuple[_Hole, ...], Lenient] = ()
+
+
+def _rings(points: object) -> object:
+    # Tell one ring of corners from a list of rings by what the first entries hold.
+    if not isinstance(points, list):
+        return points
+    nested = points and all(isinstance(p, list) and p and isinstance(p[0], list) for p in points)
+    return points if nested else [points]
+
+
+_Ring = Annotated[list[Vector], Field(min_length=3)]
+
+
+class _Slab(_Common):
+    """A slab by its outline and holes in house coordinates, which may be one ring."""
+
+    points: Annotated[list[_Ring], BeforeValidator(_rings)]
+    offset: Vector = np.zeros(3)
+
+
+def _element(file: str, raw: Any, place: str, defaults: Any) -> Element | None:
+    raw = checked(dict, raw, file, place, error=BadHouse)
     kind = raw.get("type")
     if not isinstance(kind, str) or kind not in _KINDS:
         return None
@@ -95,59 +150,16 @@ def _element(reader: JsonReader, raw: Any, place: str, defaults: Any) -> Element
     # Take what the element lacks from the defaults of its kind.
     usual = defaults.get(kind) if isinstance(defaults, dict) else None
     usual = usual if isinstance(usual, dict) else {}
-    usual_depth = usual.get("depth", WALL_DEPTH_M if kind == "Wall" else SLAB_DEPTH_M)
-    depth = _length(reader, raw.get("depth", usual_depth), f"{place}, depth")
-    room_id = str(raw.get("roomId", ""))[:60]
-    overrides = reader.overrides(raw.get("materials"), place)
+    depth = usual.get("depth", WALL_DEPTH_M if kind == "Wall" else SLAB_DEPTH_M)
+    raw = {"depth": depth} | raw | {"extraHeight": usual.get("extraHeight", 0)}
     if kind == "Wall":
-        # Read a wall by its two ends, its height above them and its holes.
-        points = reader.items(raw, "points", place)
-        if len(points) != 2:
-            raise BadHouse(reader.file, f"{place}, points", "expected two ends")
-        ends = np.array([reader.numbers(p, 3, f"{place}, points") for p in points])
-        extra = _length(reader, usual.get("extraHeight", 0), f"{place}, extraHeight")
-        height = _length(reader, raw.get("height"), f"{place}, height") + extra
-        holes = tuple(
-            _hole(reader, hole, f"{place}, holes[{k}]")
-            for k, hole in enumerate(raw["holes"] if isinstance(raw.get("holes"), list) else [])
-        )
-        return Element(kind, place, room_id, (ends,), overrides, depth, height, holes)
-    rings = _rings(reader, raw, place)
-    return Element(kind, place, room_id, rings, overrides, depth)
-
-
-def _length(reader: JsonReader, value: Any, place: str) -> float:
-    (number,) = reader.numbers([value], 1, place)
-    if not 0 <= number < 1000:
-        raise BadHouse(reader.file, place, f"{number:g} is no length")
-    return float(number)
-
-
-def _hole(reader: JsonReader, raw: Any, place: str) -> tuple[float, float, float, float]:
-    box = raw.get("box") if isinstance(raw, dict) else None
-    if not isinstance(box, dict):
-        raise BadHouse(reader.file, place, "has no box")
-    (u0, v0), (u1, v1) = (
-        reader.numbers(box.get(k), 2, f"{place}, box.{k}") for k in ("min", "max")
-    )
-    return (float(u0), float(v0), float(u1), float(v1))
-
-
-def _rings(reader: JsonReader, raw: dict[str, Any], place: str) -> tuple[F64, ...]:
-    """Outline and holes in house coordinates; points may be one ring or a list of rings."""
-    points = reader.items(raw, "points", place)
-    # Tell one ring of corners from a list of rings by what the first entries hold.
-    nested = bool(points) and all(
-        isinstance(p, list) and p and isinstance(p[0], list) for p in points
-    )
-    offset = reader.numbers(raw.get("offset", [0, 0, 0]), 3, f"{place}, offset")
-    rings = []
-    for ring in points if nested else [points]:
-        corners = [reader.numbers(p, 3, f"{place}, points") for p in ring]
-        if len(corners) < 3:
-            raise BadHouse(reader.file, f"{place}, points", "fewer than three corners")
-        rings.append(np.array(corners) + offset)
-    return tuple(rings)
+        wall = checked(_Wall, raw, file, place, error=BadHouse)
+        holes = tuple((*h.box.min.tolist(), *h.box.max.tolist()) for h in wall.holes)
+        height, ends = wall.height + wall.extraHeight, (np.array(wall.points),)
+        return Element(kind, place, wall.room_id, ends, wall.overrides, wall.depth, height, holes)
+    slab = checked(_Slab, raw, file, place, error=BadHouse)
+    rings = tuple(np.array(ring) + slab.offset for ring in slab.points)
+    return Element(kind, place, slab.room_id, rings, slab.overrides, slab.depth)
 
 
 def arch_items(arch: Arch, node: Node, room_id: str, materials: ModelMaterials) -> Iterator[Item]:

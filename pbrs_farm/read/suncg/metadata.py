@@ -9,11 +9,12 @@ import csv
 import io
 import math
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Annotated, Final, Literal
 
 import numpy as np
+from pydantic import BaseModel, BeforeValidator, Field
 
-from pbrs_farm.core.checked_json import json_from_bytes
+from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_bytes
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP, REFRIGERATOR
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import linear_from_srgb
@@ -167,12 +168,13 @@ def _lights(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]
         return {}
     # Rows are model id -> its lamps; what is no list is passed over.
     name, data = found
-    entry_json = json_from_bytes(data, name)
-    if not isinstance(entry_json, dict):
-        raise BadHouse(name, "", "expected an object")
+    table = checked(dict, json_from_bytes(data, name), name, error=BadHouse)
     return {
-        model: tuple(_light(light, name, f"{model}[{k}]") for k, light in enumerate(lights))
-        for model, lights in entry_json.items()
+        model: tuple(
+            _light_part(checked(_Light, light, name, f"{model}[{k}]", error=BadHouse))
+            for k, light in enumerate(lights)
+        )
+        for model, lights in table.items()
         if isinstance(lights, list)
     }
 
@@ -184,51 +186,44 @@ _FORMS: Final = {
 }
 
 
-def _light(entry_json: Any, file: str, place: str) -> LightPart:
-    if not isinstance(entry_json, dict) or str(entry_json.get("type")) not in _FORMS:
-        raise BadHouse(file, place, f"expected one of {', '.join(_FORMS)}")
-    # Only lines have another end, only spots and lines a direction.
-    form = _FORMS[entry_json["type"]]
-    end = entry_json.get("position2") if form is LightForm.LINE else None
-    direction = entry_json.get("direction") if form is not LightForm.POINT else None
-    return LightPart(
-        position=_triple(entry_json.get("position"), file, f"{place}.position"),
-        radius_m=0.0,
-        power=_number(entry_json.get("power"), file, f"{place}.power"),
-        unit=PowerUnit.WATT,
-        rgb_linear=_colour(entry_json.get("color", "#ffffff"), file, f"{place}.color"),
-        form=form,
-        direction=(0.0, -1.0, 0.0)
-        if direction is None
-        else _triple(direction, file, f"{place}.direction"),
-        cutoff_rad=_number(entry_json.get("cutoffAngle", math.pi), file, f"{place}.cutoffAngle"),
-        dropoff=_number(entry_json.get("dropoffRate", 0.0), file, f"{place}.dropoffRate"),
-        position_end=None if end is None else _triple(end, file, f"{place}.position2"),
-    )
-
-
-def _number(value: Any, file: str, place: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < 1e6:
-        raise BadHouse(file, place, "expected a number >= 0")
-    return float(value)
-
-
-def _triple(value: Any, file: str, place: str) -> tuple[float, float, float]:
-    if not isinstance(value, list) or len(value) != 3:
-        raise BadHouse(file, place, "expected three numbers")
-    x, y, z = (
-        float(v) if isinstance(v, (int, float)) and abs(v) < 1e6 else math.nan for v in value
-    )
-    if not math.isfinite(x + y + z):
-        raise BadHouse(file, place, "expected three finite numbers")
-    return (x, y, z)
-
-
-def _colour(value: Any, file: str, place: str) -> tuple[float, float, float]:
+def _colour(value: object) -> tuple[float, ...]:
     try:
         rgb = np.array([int(str(value)[k : k + 2], 16) for k in (1, 3, 5)]) / 255
     except ValueError:
-        raise BadHouse(file, place, "expected #rrggbb") from None
+        raise ValueError("expected #rrggbb") from None
     linear = linear_from_srgb(rgb)
-    r, g, b = (float(c) for c in linear / max(linear.max(), 1e-6))
-    return (r, g, b)
+    return tuple(float(c) for c in linear / max(linear.max(), 1e-6))
+
+
+_Coordinate = Annotated[Finite, Field(gt=-1e6, lt=1e6)]
+_Triple = Annotated[tuple[_Coordinate, _Coordinate, _Coordinate], exactly(3)]
+_Amount = Annotated[Finite, Field(ge=0, lt=1e6)]
+
+
+class _Light(BaseModel):
+    type: Literal["PointLight", "SpotLight", "LineLight"]
+    position: _Triple
+    power: _Amount
+    color: Annotated[tuple[float, float, float], BeforeValidator(_colour)] = (1.0, 1.0, 1.0)
+    direction: _Triple | None = None
+    cutoff: _Amount = Field(math.pi, alias="cutoffAngle")
+    dropoff: _Amount = Field(0.0, alias="dropoffRate")
+    end: _Triple | None = Field(None, alias="position2")
+
+
+def _light_part(light: _Light) -> LightPart:
+    # Only lines have another end, only spots and lines a direction.
+    form = _FORMS[light.type]
+    direction = None if form is LightForm.POINT else light.direction
+    return LightPart(
+        position=light.position,
+        radius_m=0.0,
+        power=light.power,
+        unit=PowerUnit.WATT,
+        rgb_linear=light.color,
+        form=form,
+        direction=direction or (0.0, -1.0, 0.0),
+        cutoff_rad=light.cutoff,
+        dropoff=light.dropoff,
+        position_end=light.end if form is LightForm.LINE else None,
+    )

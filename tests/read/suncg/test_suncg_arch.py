@@ -146,8 +146,8 @@ def test_repair_closes_and_cuts_a_v2_house(tmp_path: Path) -> None:
         (lambda a: a["elements"][0].update(points=[[0, 0, 0]]), "element 0 (Wall 0_0_0), points"),
         (lambda a: a["elements"][0].update(height=-1), "element 0 (Wall 0_0_0), height"),
         (lambda a: a["elements"][0].update(depth="x"), "element 0 (Wall 0_0_0), depth"),
-        (lambda a: a["elements"][0].update(holes=[{}]), "element 0 (Wall 0_0_0), holes[0]"),
-        (lambda a: a["elements"][4].update(points=[[[0, 0, 0]]]), "element 4 (Floor 0_0f), points"),
+        (lambda a: a["elements"][0].update(holes=[{}]), "element 0 (Wall 0_0_0), holes[0].box"),
+        (lambda a: a["elements"][4].update(points=[[[0, 0, 0]]]), "element 4 (Floor 0_0f), points[0]"),
         (lambda a: a["elements"][4].update(offset=[0]), "element 4 (Floor 0_0f), offset"),
     ],
 )  # fmt: skip
