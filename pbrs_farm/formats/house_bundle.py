@@ -101,7 +101,7 @@ def house_from_bundle(glb_data: bytes, json_data: bytes) -> House:
         _item_with_arrays(gltf, item, i) for i, item in enumerate(_dicts(data, "items"))
     ]
     data["textures"] = _textures_with_data(gltf, _dicts(data, "textures"))
-    house: House = value_from_json(House, data, "house.json", "")
+    house = value_from_json(House, data, "house.json")
     _check_references(house)
     return house
 

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import functools
 import json
-import math
-import types
 import typing
-from dataclasses import MISSING, Field, fields, is_dataclass
+from collections.abc import Callable
+from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
 from json.encoder import encode_basestring_ascii
-from typing import Any, Final
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
-from pydantic import BaseModel
-from pydantic_core import to_jsonable_python
+from pydantic import BaseModel, GetPydanticSchema, TypeAdapter
+from pydantic_core import CoreSchema, to_jsonable_python
+from pydantic_core import core_schema as cs
 
+from pbrs_farm.core.checked_json import checked, exactly
 from pbrs_farm.core.errors import BadHouse
+
+T = TypeVar("T")
 
 # Shape of an array field by class and field (None = any length).
 SHAPES: Final[dict[tuple[str, str], tuple[int | None, ...]]] = {
@@ -84,87 +87,86 @@ def _holds_dict(value: Any) -> bool:
     return isinstance(value, list) and any(isinstance(v, dict) or _holds_dict(v) for v in value)
 
 
-def value_from_json(hint: Any, data: Any, file: str, place: str) -> Any:
-    """The value of type hint that JSON values say; arrays and bytes among them pass through.
+def value_from_json(kind: type[T], data: Any, file: str) -> T:
+    """The value of a dataclass that JSON values say; arrays and bytes among them pass through.
 
     Unknown keys are ignored, missing fields take their defaults; what does not fit is BadHouse.
     """
-    if hint in _SCALARS:
-        return _scalar(hint, data, file, place)
-    origin = _origin(hint)
+    adapter: TypeAdapter[T] = _adapter_of(kind)
+    return checked(adapter, data, file, error=BadHouse)
+
+
+_adapter_of: Final[Callable[[Any], TypeAdapter[Any]]] = functools.cache(
+    lambda kind: TypeAdapter(Annotated[Any, GetPydanticSchema(lambda *_: _schema(kind))])
+)
+
+
+_SCALARS: Final[dict[Any, CoreSchema]] = {
+    str: cs.str_schema(strict=True),
+    bytes: cs.bytes_schema(strict=True),
+    bool: cs.bool_schema(strict=True),
+    int: cs.int_schema(strict=True),
+    float: cs.float_schema(strict=True, allow_inf_nan=False),  # an int is one, too
+}
+
+
+def _schema(hint: Any, shape: tuple[int | None, ...] | None = None) -> CoreSchema:
+    """What pydantic checks a value of that type by; shape: of an array."""
+    origin, args = typing.get_origin(hint), typing.get_args(hint)
     if origin is np.ndarray:
-        dtype = typing.get_args(typing.get_args(hint)[1])[0]
-        return _array(dtype, data, file, place)
+        dtype = typing.get_args(args[1])[0]
+        return cs.no_info_plain_validator_function(functools.partial(_array, dtype, shape))
     # "X | None" is the only union among the fields.
-    if origin in (typing.Union, types.UnionType):
-        kinds = [a for a in typing.get_args(hint) if a is not type(None)]
-        return None if data is None else value_from_json(kinds[0], data, file, place)
+    if type(None) in args:
+        return cs.nullable_schema(_schema(args[0], shape))
+    if origin is tuple and args[-1] is Ellipsis:
+        return cs.tuple_schema([_schema(args[0])], variadic_item_index=0)
     if origin is tuple:
-        return _tuple(typing.get_args(hint), data, file, place)
+        check: Any = exactly(len(args), "values").func
+        return cs.no_info_before_validator_function(check, cs.tuple_schema([*map(_schema, args)]))
     if origin is dict:
-        return _dict(typing.get_args(hint)[1], data, file, place)
-    if isinstance(hint, type) and is_dataclass(hint):
-        return _dataclass(hint, data, file, place)
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return _enum(hint, data, file, place)
-    return _scalar(hint, data, file, place)
+        return cs.dict_schema(_SCALARS[str], _schema(args[1]))
+    if is_dataclass(hint):
+        return _schema_of_dataclass(hint)
+    if issubclass(hint, Enum):
+        return cs.enum_schema(hint, list(hint), sub_type="str")
+    return _SCALARS[hint]
 
 
-_SCALARS: Final = (str, int, float, bool)
-
-
-@functools.cache
-def _origin(hint: Any) -> Any:
-    return typing.get_origin(hint)
-
-
-@functools.cache
-def _hints(cls: type) -> dict[str, Any]:
-    return typing.get_type_hints(cls)
-
-
-def _dataclass(cls: type, data: Any, file: str, place: str) -> Any:
-    if not isinstance(data, dict):
-        raise _misfit(file, place, "an object", data)
-    # Read field by field; one that is not there takes its default.
-    hints = _hints(cls)
-    found: dict[str, Any] = {}
-    field: Field[Any]
+def _schema_of_dataclass(cls: Any) -> CoreSchema:
+    hints, rows = typing.get_type_hints(cls), []
     for field in fields(cls):
-        inner = f"{place}.{field.name}" if place else field.name
-        if field.name not in data:
-            if field.default is MISSING and field.default_factory is MISSING:
-                raise BadHouse(file, inner, "is missing")
-            continue
-        value = value_from_json(hints[field.name], data[field.name], file, inner)
-        shape = SHAPES.get((cls.__name__, field.name))
-        if shape is not None and value is not None:
-            value = _shaped(value, shape, file, inner)
-        found[field.name] = value
-    return cls(**found)
+        schema = _schema(hints[field.name], SHAPES.get((cls.__name__, field.name)))
+        if field.default is not MISSING:
+            schema = cs.with_default_schema(schema, default=field.default)
+        rows.append(cs.dataclass_field(field.name, schema, kw_only=True))
+    arguments = cs.dataclass_args_schema(cls.__name__, rows)
+    return cs.dataclass_schema(cls, arguments, [row["name"] for row in rows], slots=True)
 
 
-def _array(dtype: Any, data: Any, file: str, place: str) -> np.ndarray[Any, Any]:
+def _array(dtype: Any, shape: tuple[int | None, ...] | None, data: Any) -> np.ndarray[Any, Any]:
     # Arrays from house.glb stand in the data already.
     if isinstance(data, np.ndarray):
         if data.dtype != dtype:
-            raise BadHouse(file, place, f"expected {np.dtype(dtype)}, got {data.dtype}")
-        return data
+            raise ValueError(f"expected {np.dtype(dtype)}, got {data.dtype}")
+        return _shaped(data, shape)
     try:
         # Convert from the widest type, to see what the asked one cannot hold.
         wide = np.array(data, np.int64 if np.issubdtype(dtype, np.integer) else np.float64)
         with np.errstate(over="ignore"):  # what overflows is told below
             array = wide.astype(dtype)
     except (ValueError, TypeError, OverflowError):
-        raise _misfit(file, place, f"an array of {np.dtype(dtype)}", data) from None
+        raise ValueError(f"expected an array of {np.dtype(dtype)}") from None
     if not np.isfinite(array).all() or (wide.dtype.kind == "i" and (array != wide).any()):
-        raise BadHouse(file, place, "holds a number that is not finite or out of range")
-    return array
+        raise ValueError("holds a number that is not finite or out of range")
+    return _shaped(array, shape)
 
 
 def _shaped(
-    array: np.ndarray[Any, Any], shape: tuple[int | None, ...], file: str, place: str
+    array: np.ndarray[Any, Any], shape: tuple[int | None, ...] | None
 ) -> np.ndarray[Any, Any]:
+    if shape is None:
+        return array
     # An empty list in JSON has lost its width.
     if array.size == 0 and shape[0] is None:
         return array.reshape(0, *[n or 0 for n in shape[1:]])
@@ -172,53 +174,5 @@ def _shaped(
         w is not None and w != n for w, n in zip(shape, array.shape)
     ):
         wanted = ", ".join("any" if n is None else str(n) for n in shape)
-        raise BadHouse(file, place, f"expected shape ({wanted}), got {array.shape}")
+        raise ValueError(f"expected shape ({wanted}), got {array.shape}")
     return array
-
-
-def _tuple(args: tuple[Any, ...], data: Any, file: str, place: str) -> tuple[Any, ...]:
-    if not isinstance(data, (list, tuple)):
-        raise _misfit(file, place, "a list", data)
-    if len(args) == 2 and args[1] is Ellipsis:
-        return tuple(value_from_json(args[0], v, file, f"{place}[{i}]") for i, v in enumerate(data))
-    if len(data) != len(args):
-        raise BadHouse(file, place, f"expected {len(args)} values, got {len(data)}")
-    return tuple(
-        value_from_json(a, v, file, f"{place}[{i}]") for i, (a, v) in enumerate(zip(args, data))
-    )
-
-
-def _dict(hint: Any, data: Any, file: str, place: str) -> dict[str, Any]:
-    if not isinstance(data, dict):
-        raise _misfit(file, place, "an object", data)
-    return {k: value_from_json(hint, v, file, f"{place}.{k}") for k, v in data.items()}
-
-
-def _enum(hint: type[Enum], data: Any, file: str, place: str) -> Enum:
-    try:
-        return hint(data)
-    except ValueError:
-        known = ", ".join(str(e.value) for e in hint)
-        raise _misfit(file, place, f"one of {known}", data) from None
-
-
-def _scalar(hint: Any, data: Any, file: str, place: str) -> Any:
-    # An int is a float where one is asked for; a bool is no number.
-    if hint is float and isinstance(data, (int, float)) and not isinstance(data, bool):
-        try:
-            number = float(data)
-        except OverflowError:
-            number = math.inf
-        if not math.isfinite(number):
-            raise BadHouse(file, place, "is not a finite number")
-        return number
-    if hint is int and isinstance(data, bool):
-        raise _misfit(file, place, "an int", data)
-    if not isinstance(data, hint):
-        raise _misfit(file, place, f"a {hint.__name__}", data)
-    return data
-
-
-def _misfit(file: str, place: str, wanted: str, got: Any) -> BadHouse:
-    text = repr(got) if isinstance(got, (str, int, float, bool, type(None))) else type(got).__name__
-    return BadHouse(file, place, f"expected {wanted}, got {text[:80]}")

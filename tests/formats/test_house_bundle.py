@@ -175,6 +175,11 @@ def _damaged(house: House, edit: Any) -> tuple[bytes, bytes]:
         (lambda p: p["openings"][0].update(quad=[[0, 0, 0]]), "openings[0].quad"),
         (lambda p: p["textures"].pop(), "extras.textures"),
         (lambda p: p["materials"][0].update(diffuse=[1, 2]), "materials[0].diffuse"),
+        (lambda p: p["materials"][0].update(diffuse=[1, 2, "3"]), "materials[0].diffuse[2]"),
+        (lambda p: p["materials"][0].update(opacity=True), "materials[0].opacity"),
+        (lambda p: p["items"][1].update(name=3), "items[1].name"),
+        (lambda p: p["openings"][0].update(is_window=1), "openings[0].is_window"),
+        (lambda p: p["openings"][0].update(normal=[0, 0, 10**400]), "openings[0].normal"),
     ],
 )  # fmt: skip
 def test_a_damaged_house_json_is_refused_naming_the_place(edit: Any, place: str) -> None:
