@@ -34,22 +34,17 @@ def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHou
         raise error(file, "", "no valid JSON: the text is empty")
     try:
         return json.loads(data, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as fault:
-        place, text = json_fault(fault)
-        raise error(file, place, text) from None
-
-
-def json_fault(error: Exception) -> tuple[str, str]:
-    """(place, what is wrong) of what json.loads raises, in words that say nothing of Python."""
-    if isinstance(error, RecursionError):
-        return "", "nested too deeply"
-    if isinstance(error, json.JSONDecodeError):
-        return f"line {error.lineno} column {error.colno}", f"no valid JSON: {error.msg}"
-    if isinstance(error, UnicodeDecodeError):
-        return f"byte {error.start}", "no valid JSON: the text is not UTF-8"
-    if isinstance(error, _NoNumberError):
-        return "", f"no valid JSON: {error}"
-    return "", "no valid JSON: a number has too many digits"
+    except RecursionError:
+        place, text = "", "nested too deeply"
+    except json.JSONDecodeError as fault:
+        place, text = f"line {fault.lineno} column {fault.colno}", fault.msg
+    except UnicodeDecodeError as fault:
+        place, text = f"byte {fault.start}", "the text is not UTF-8"
+    except _NoNumberError as fault:
+        place, text = "", str(fault)
+    except ValueError:
+        place, text = "", "a number has too many digits"
+    raise error(file, place, f"no valid JSON: {text}")
 
 
 class _NoNumberError(ValueError):

@@ -9,13 +9,15 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+from pydantic import TypeAdapter
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.checked_json import json_fault
+from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
-from pbrs_farm.regular_files import fault_of, read_regular
+from pbrs_farm.regular_files import read_given
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,26 +111,18 @@ def reasons_of(root: Path) -> dict[tuple[str, str], str]:
     path = root / keys.selection_key(str(run), "jsonl")
     if not path.is_file():
         return {}
+    lines = read_given(path).splitlines()
     try:
         # A line per view, an empty reason where it is kept.
-        rows = [json.loads(line) for line in read_regular(path).splitlines()]
+        rows = [json.loads(line) for line in lines]
         return {(row["house"], row["view"]): str(row["reason"]) for row in rows}
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
     except (ValueError, RecursionError, KeyError, TypeError):
         raise BadInput(path, "", "not the lines of a selection") from None
 
 
+_OBJECT: Final = TypeAdapter(dict[str, Any])
+
+
 def json_object(path: Path) -> dict[str, Any]:
     """The JSON object in a file; {} if there is no such file; BadInput if it holds something else."""
-    try:
-        value = json.loads(read_regular(path))
-    except FileNotFoundError:
-        return {}
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
-    except (ValueError, RecursionError) as error:
-        raise BadInput(path, *json_fault(error)) from None
-    if not isinstance(value, dict):
-        raise BadInput(path, "", "expected a JSON object")
-    return value
+    return checked(_OBJECT, read_given(path), path) if path.exists() else {}

@@ -247,10 +247,11 @@ class Farm:
 
     def spec(self, job: str) -> JobSpec:
         """What the job was submitted with; BadInput when the store knows no such job."""
+        from pbrs_farm.core.checked_json import checked
         from workers.job import JobSpec
 
         try:
-            return JobSpec.model_validate_json(self.store.get(job_key(check_job_id(job))))
+            return checked(JobSpec, self.store.get(job_key(check_job_id(job))), job_key(job))
         except ObjectMissing:
             raise BadInput(job, "", f"no such job in {self.store.url}") from None
 

@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO, Any, Final
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
 from pbrs_farm.formats.manifest import lines_by_house
 from pbrs_farm.formats.marker import read_marker
@@ -318,7 +319,7 @@ class HouseRunner:
 
     def _read_spec(self, job: str) -> JobSpec:
         try:
-            return JobSpec.model_validate_json(self._store.get(job_key(job)))
+            return checked(JobSpec, self._store.get(job_key(job)), job_key(job))
         except ObjectMissing:
             hint = "does PBRS_STORE differ?"
             raise BadHouse(job_key(job), "", "no such job in this store", hint=hint) from None

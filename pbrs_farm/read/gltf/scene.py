@@ -9,14 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import shapely
+from pydantic import BaseModel, Field
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.checked_json import json_from_bytes
+from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
@@ -60,42 +61,37 @@ def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]
 
     Raises BadHouse naming the room that is wrong.
     """
-    fields_json = json_from_bytes(data, file)
-    rows = fields_json.get("rooms") if isinstance(fields_json, dict) else None
-    if not isinstance(rows, list) or not rows:
-        raise BadHouse(file, "rooms", 'expected {"rooms": [{"polygon": [[x, z], ...]}, ...]}')
+    hint = '{"rooms": [{"polygon": [[x, z], ...]}, ...]}'
+    rows = checked(_RoomFile, json_from_bytes(data, file), file, error=BadHouse, hint=hint).rooms
     check_number(len(rows), file)
     return [_room(row, file, f"rooms[{i}]", items) for i, row in enumerate(rows)]
 
 
-def _room(row: Any, file: str, place: str, items: Sequence[Item]) -> Room:
-    # Read the polygon: plan points in metres.
-    corners = row.get("polygon") if isinstance(row, dict) else None
-    try:
-        plan = np.array(corners, np.float64)
-    except (ValueError, TypeError):
-        plan = np.zeros(0)
-    if plan.ndim != 2 or plan.shape[1:] != (2,) or not 3 <= len(plan) <= 10_000:
-        raise BadHouse(file, f"{place}.polygon", "expected three or more [x, z]")
-    if not (np.abs(plan) < 1e6).all():
-        raise BadHouse(file, f"{place}.polygon", "holds a number that is not finite")
-    area = shapely.Polygon(plan)
+_Metres = Annotated[Finite, Field(gt=-1e6, lt=1e6)]
+
+
+class _GivenRoom(BaseModel):
+    polygon: list[Annotated[tuple[_Metres, _Metres], exactly(2)]] = Field(
+        min_length=3, max_length=10_000
+    )
+    floor_y: _Metres | None = None
+    ceiling_y: _Metres | None = None
+    name: Any = ""
+    types: Any = None
+
+
+class _RoomFile(BaseModel):
+    rooms: list[_GivenRoom] = Field(min_length=1)
+
+
+def _room(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) -> Room:
+    area = shapely.Polygon(row.polygon)
     polygon = polygon_of(area) if area.is_valid else None
     if polygon is None:
         raise BadHouse(file, f"{place}.polygon", "crosses itself or has no area")
-    given = {k: _height(row, k, file, place) for k in ("floor_y", "ceiling_y")}
-    name, types = str(row.get("name", ""))[:60], row.get("types")
-    words = tuple(str(t)[:60] for t in types) if isinstance(types, list) else ()
-    return _with_heights(polygon, name, words, given, items)
-
-
-def _height(row: dict[str, Any], key: str, file: str, place: str) -> float | None:
-    value = row.get(key)
-    if value is None:
-        return None
-    if type(value) not in (int, float) or not abs(value) < 1e6:
-        raise BadHouse(file, f"{place}.{key}", "expected a height in metres")
-    return float(value)
+    given = {"floor_y": row.floor_y, "ceiling_y": row.ceiling_y}
+    words = tuple(str(t)[:60] for t in row.types) if isinstance(row.types, list) else ()
+    return _with_heights(polygon, str(row.name)[:60], words, given, items)
 
 
 def rooms_from_floors(items: Sequence[Item]) -> list[Room]:

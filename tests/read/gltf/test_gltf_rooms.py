@@ -63,10 +63,12 @@ def test_rooms_of_the_polygon_file_win() -> None:
     [
         ({}, "rooms"),
         ({"rooms": []}, "rooms"),
-        ({"rooms": [3]}, "rooms[0].polygon"),
+        ({"rooms": [3]}, "rooms[0]"),
+        ({"rooms": [{}]}, "rooms[0].polygon"),
+        ({"rooms": [{"polygon": [[0, 0], [1, 1]]}]}, "rooms[0].polygon"),
         ({"rooms": [{"polygon": [[0, 0], [1, 1], [1, 0], [0, 1]]}]}, "rooms[0].polygon"),
-        ({"rooms": [{"polygon": [[0, 0], [1, 1], [1e9, 0]]}]}, "rooms[0].polygon"),
-        ({"rooms": [{"polygon": [[0, 0], [1, 1], ["a", 0]]}]}, "rooms[0].polygon"),
+        ({"rooms": [{"polygon": [[0, 0], [1, 1], [1e9, 0]]}]}, "rooms[0].polygon[2][0]"),
+        ({"rooms": [{"polygon": [[0, 0], [1, 1], ["a", 0]]}]}, "rooms[0].polygon[2][0]"),
         ({"rooms": [{"polygon": [[0, 0], [0, 1], [1, 0]], "floor_y": "x"}]}, "rooms[0].floor_y"),
     ],
 )  # fmt: skip
