@@ -141,7 +141,7 @@ def sentence(fault: ErrorDetails) -> str:
     else:
         wanted = _WANTED.get(kind.partition("_")[0])
         text = f"expected {wanted}" if wanted else "is not what belongs here"
-    tells_value = text.startswith("expected") and "got" not in text
+    tells_value = text.startswith("expected") and ", got" not in text
     return f"{text}, got {_shown_value(fault['input'])}" if tells_value else text
 
 

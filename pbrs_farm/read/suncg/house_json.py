@@ -136,12 +136,9 @@ class Node(Given):
 
 # What a node of each type must say, and what of it is not read.
 _NEEDED: Final = {k: {"dimensions" if k == "Box" else "modelId": None} for k in NODE_TYPES}
-_UNREAD: Final = {
-    "Room": ("transform", "dimensions"),
-    "Ground": ("transform", "dimensions"),
-    "Object": ("dimensions",),
-    "Box": ("modelId",),
-}
+_UNREAD: Final = {"Object": ("dimensions",), "Box": ("modelId",)} | dict.fromkeys(
+    ("Room", "Ground"), ("transform", "dimensions")
+)
 
 
 class Axes(Given):

@@ -48,6 +48,14 @@ def test_a_job_submitted_twice_is_one_job(farm: Farm) -> None:
     assert farm.view(first.job_id).n_waiting_houses == 3
 
 
+def test_a_job_file_that_does_not_fit_is_refused_in_one_line(farm: Farm) -> None:
+    key = job_key(job := submit(farm).job.job_id)
+    farm.store.put(key, json.dumps(json.loads(farm.store.get(key)) | {"spp": 3}).encode())
+    with pytest.raises(BadInput, match=rf"^{key}: spp: no such field") as caught:
+        farm.spec(job)
+    assert not re.search(r"pydantic|[Ii]nput|\n", str(caught.value))
+
+
 def test_another_recipe_in_the_same_store_is_refused_with_what_differs(farm: Farm) -> None:
     submit(farm)
     with pytest.raises(BadRecipe, match=r"light\.spp: 10 -> 28"):
