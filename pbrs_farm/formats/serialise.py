@@ -120,7 +120,7 @@ def _schema(hint: Any, shape: tuple[int | None, ...] | None = None) -> CoreSchem
     if type(None) in args:
         return cs.nullable_schema(_schema(args[0], shape))
     if origin is tuple and args[-1] is Ellipsis:
-        return cs.tuple_schema([_schema(args[0])], variadic_item_index=0)
+        return cs.tuple_schema([_schema(args[0])], variadic_item_index=0, fail_fast=True)
     if origin is tuple:
         check: Any = exactly(len(args), "values").func
         return cs.no_info_before_validator_function(check, cs.tuple_schema([*map(_schema, args)]))

@@ -267,7 +267,7 @@ _Length = Annotated[Finite, Field(ge=0, lt=20)]
 class _RoomFields(BaseModel):
     type: RoomType
     name: Any = None
-    polygon: list[_Point] = Field(min_length=3)
+    polygon: list[_Point] = Field(min_length=3, fail_fast=True)
 
 
 class _OpeningFields(BaseModel):

@@ -72,7 +72,7 @@ _Metres = Annotated[Finite, Field(gt=-1e6, lt=1e6)]
 
 class _GivenRoom(BaseModel):
     polygon: list[Annotated[tuple[_Metres, _Metres], exactly(2)]] = Field(
-        min_length=3, max_length=10_000
+        min_length=3, max_length=10_000, fail_fast=True
     )
     floor_y: _Metres | None = None
     ceiling_y: _Metres | None = None
@@ -81,7 +81,7 @@ class _GivenRoom(BaseModel):
 
 
 class _RoomFile(BaseModel):
-    rooms: list[_GivenRoom] = Field(min_length=1)
+    rooms: list[_GivenRoom] = Field(min_length=1, fail_fast=True)
 
 
 def _room(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) -> Room:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 import shapely
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, FailFast, Field
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_bytes
@@ -120,7 +120,7 @@ class _Wall(_Common):
     points: Annotated[list[Vector], exactly(2, "ends")]
     height: _Length
     extraHeight: _Length  # noqa: N815
-    holes: Annotated[tuple[_Hole, ...], Lenient] = ()
+    holes: Annotated[tuple[_Hole, ...], FailFast(), Lenient] = ()
 
 
 def _rings(points: object) -> object:
@@ -131,13 +131,13 @@ def _rings(points: object) -> object:
     return points if nested else [points]
 
 
-_Ring = Annotated[list[Vector], Field(min_length=3)]
+_Ring = Annotated[list[Vector], Field(min_length=3, fail_fast=True)]
 
 
 class _Slab(_Common):
     """A slab by its outline and holes in house coordinates, which may be one ring."""
 
-    points: Annotated[list[_Ring], BeforeValidator(_rings)]
+    points: Annotated[list[_Ring], FailFast(), BeforeValidator(_rings)]
     offset: Vector = np.zeros(3)
 
 

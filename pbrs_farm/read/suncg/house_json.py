@@ -13,6 +13,7 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    FailFast,
     Field,
     PlainValidator,
     StrictInt,
@@ -100,7 +101,7 @@ class Override(Given):
     diffuse: Annotated[tuple[float, float, float], BeforeValidator(_rgb)] | None = None
 
 
-Overrides = Annotated[tuple[Override, ...], Lenient]
+Overrides = Annotated[tuple[Override, ...], FailFast(), Lenient]
 
 
 class Bounds(Given):
@@ -129,8 +130,8 @@ class Node(Given):
     is_mirrored: Annotated[bool | None, BeforeValidator(_flag)] = Field(None, alias="isMirrored")
     dimensions: Annotated[tuple[_Size, _Size, _Size], exactly(3)] = (0.0, 0.0, 0.0)  # of a Box, m
     # Positions of a room's nodes, and what it is for.
-    members: Annotated[tuple[StrictInt, ...], Lenient] = Field((), alias="nodeIndices")
-    types: Annotated[tuple[Label, ...], Lenient] = Field((), alias="roomTypes")
+    members: Annotated[tuple[StrictInt, ...], FailFast(), Lenient] = Field((), alias="nodeIndices")
+    types: Annotated[tuple[Label, ...], FailFast(), Lenient] = Field((), alias="roomTypes")
     hidden: frozenset[str]  # Floor, Ceiling, Walls
 
 

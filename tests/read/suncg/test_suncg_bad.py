@@ -103,6 +103,16 @@ def test_text_that_is_no_house_json_is_refused(root: Path, text: str) -> None:
         read(root)
 
 
+def test_of_a_million_wrong_entries_only_the_first_costs_anything(root: Path) -> None:
+    plain = suncg_root.house_json()
+    node(2, materials=["wood"] * 1_000_000)(plain)
+    (root / JSON).write_text(json.dumps(plain))
+    start = time.process_time()
+    with pytest.raises(BadHouse, match=r"node 2 .*materials\[0\]: expected an object"):
+        read(root)
+    assert time.process_time() - start < 3
+
+
 def test_house_json_cut_anywhere_is_refused(root: Path) -> None:
     whole = (root / JSON).read_bytes()
     for end in range(0, len(whole), 211):
