@@ -1,11 +1,60 @@
-"""What stored JSON is read into; no effects."""
+"""What stored JSON and the tables beside the code are read into. Effect: reads tables."""
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+import csv
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+
+from pbrs_farm.core.errors import BadInput
+
+_T = TypeVar("_T")
 
 
 class Record(BaseModel):
     """A frozen value whose JSON has these fields and no others."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def read_toml(path: Path, kind: type[_T]) -> _T:
+    """A TOML table beside the code as that type; BadInput names the file and the entry."""
+    return _read(path, kind, tomllib.loads)
+
+
+def read_csv(path: Path, row: type[_T]) -> tuple[_T, ...]:
+    """The rows of a CSV table beside the code, lines with # left out; BadInput as of read_toml."""
+
+    def rows(text: str) -> list[dict[str, str]]:
+        lines = (line for line in text.splitlines() if not line.startswith("#"))
+        return list(csv.DictReader(lines))
+
+    return _read(path, tuple[row, ...], rows)  # type: ignore[valid-type]
+
+
+def _read(path: Path, kind: type[_T], parse: Callable[[str], Any]) -> _T:
+    try:
+        raw = parse(path.read_text("utf-8"))
+    except (OSError, ValueError, csv.Error) as error:
+        raise BadInput(path.name, "", str(error)) from error
+    try:
+        return TypeAdapter(kind).validate_python(raw)
+    except ValidationError as error:
+        wrong = error.errors()[0]
+        # Rows that have a name are known by it.
+        names, here = [], raw
+        for key in wrong["loc"]:
+            here = _within(here, key)
+            names.append(str(here.get("name", key) if isinstance(here, dict) else key))
+        raise BadInput(path.name, " ".join(names), wrong["msg"]) from error
+
+
+def _within(raw: Any, key: int | str) -> Any:
+    try:
+        return raw[key]
+    except (LookupError, TypeError):
+        return None

@@ -1,0 +1,48 @@
+"""Tables beside the code: what is wrong in one is named by its file and entry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.record import Record, read_csv, read_toml
+from pbrs_farm.dress import style
+from pbrs_farm.dress.style import _Styles
+
+
+class _Row(Record):
+    name: str
+    share: float = 0.0
+
+
+def test_rows_of_a_csv_are_read_and_lines_with_a_hash_left_out(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("# shares\nname,share\noak,0.5\nash,1\n")
+    rows = read_csv(tmp_path / "a.csv", _Row)
+    assert [(r.name, r.share) for r in rows] == [("oak", 0.5), ("ash", 1.0)]
+
+
+def test_a_bad_row_of_a_csv_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("name,share\noak,0.5\nash,much\n")
+    with pytest.raises(BadInput, match=r"a\.csv: ash share: .*number"):
+        read_csv(tmp_path / "a.csv", _Row)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('light = "c9a679"', 'light = "c9a6"', "woods oak light: .*six hexadecimal digits"),
+        ("figure = 0.75", "figures = 0.75", "woods ash figures: Unexpected"),
+        ('"pale oak", "birch"', '"pale oak", "brich"', "nordic: no wood or metal brich"),
+        ("woods = [", "woods = ", "Invalid|invalid|Expected|Unclosed"),
+    ],
+)
+def test_what_is_wrong_in_the_styles_is_named(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    text = Path(style.__file__).with_name("style.toml").read_text("utf-8")
+    assert old in text
+    (tmp_path / "style.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(BadInput, match=rf"style\.toml: (?:.*)(?:{message})"):
+        read_toml(tmp_path / "style.toml", _Styles)
