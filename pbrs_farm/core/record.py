@@ -6,10 +6,11 @@ import csv
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, TypeAdapter, ValidationError
 
+from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 
 _T = TypeVar("_T")
@@ -19,6 +20,16 @@ class Record(BaseModel):
     """A frozen value whose JSON has these fields and no others."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def _nyu40(name: object) -> object:
+    if name not in NYU40_NAMES:
+        raise ValueError(f"class {name!r} is none of NYU40")
+    return NYU40_NAMES.index(str(name))
+
+
+Nyu40 = Annotated[int, BeforeValidator(_nyu40)]
+"""A class of NYU40, by its name in tables."""
 
 
 def read_toml(path: Path, kind: type[_T]) -> _T:

@@ -6,19 +6,20 @@ and leaves most of the floor and a good part of the wall free.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
-from typing import Final
+from pathlib import Path
+from typing import Final, NamedTuple
 
 import numpy as np
 import shapely
+from pydantic import model_validator
 from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.catalogue import Catalogue, Place
-from pbrs_farm.core.classes import BED, BOOKSHELF, CABINET, DESK, DRESSER, NIGHT_STAND, SHELVES
 from pbrs_farm.core.house import Material
+from pbrs_farm.core.record import Nyu40, Record, read_toml
 from pbrs_farm.core.walkable import CELL_M, FloorGrid
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finishes import box_mapped, grain_pattern
@@ -32,9 +33,8 @@ from pbrs_farm.dress.space.floor_bitmaps import (
 from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
 from pbrs_farm.dress.style import Rgb, Style, mix, rgb, room_style
 from pbrs_farm.dress.textures.families import pattern_material, photographed
-from pbrs_farm.dress.things import case_goods
-from pbrs_farm.dress.things.assembly import Made, metal, plain
-from pbrs_farm.dress.things.case_goods import Boards, Size, desk_chair
+from pbrs_farm.dress.things.assembly import Made, plain
+from pbrs_farm.dress.things.things import CASE_GOODS
 from pbrs_farm.dress.walls.hanging import Hanging, next_id
 from pbrs_farm.home.room_use import RoomKind
 
@@ -45,10 +45,20 @@ _WHITE: Rgb = (0.9, 0.9, 0.88)
 _PAINTS = tuple(rgb(code) for code in ("3d4a52", "5f6b5c", "2f3338", "8a8d8a", "7b8f98", "b9b09f"))
 
 
+class Boards(NamedTuple):
+    """What a piece is made of, in the order that case_goods.toml knows."""
+
+    body: Material
+    front: Material
+    top: Material
+    cloth: Rgb = (0.6, 0.58, 0.55)
+
+
 @dataclass(frozen=True, slots=True)
 class Look:
     """Boards, and of materials that show a picture how large one repeat of it is."""
 
+    style: Style
     boards: Boards
     size_m: Mapping[Material, tuple[float, float]]
 
@@ -74,7 +84,7 @@ def look_of(draft: Draft, catalogue: Catalogue, style: Style, rng: np.random.Gen
     else:
         body, front, top = painted, painted, wood
     cloth = style.textiles[int(rng.integers(len(style.textiles)))]
-    return Look(Boards(body, front, top, metal(style), cloth), {wood: grain.size_m})
+    return Look(style, Boards(body, front, top, cloth), {wood: grain.size_m})
 
 
 def grained(made: Made, look: Look) -> Made:
@@ -202,65 +212,41 @@ def _largest_way(bitmap: FloorBitmap) -> int:
     return int(np.bincount(bitmap.ways.reshape(-1))[1:].max(initial=0))
 
 
-# What furniture rooms usually have beside the largest pieces, and of which sizes.
+# What furniture rooms usually have beside the largest pieces, and of which sizes: furniture.toml.
 
 
-Maker = Callable[[np.random.Generator, Boards, Size], Made]
 Range = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class WantedKind:
+class WantedKind(Record):
     """One kind of furniture that stands at a wall."""
 
-    make: Maker
+    model: str
     width: Range
     height: Range
     depth: Range
     before_m: float = 0.55  # free floor in front of it
-    alike: tuple[int, ...] = ()  # NYU40 ids: a room that has one wants less of it
+    alike: tuple[Nyu40, ...] = ()  # a room that has one wants less of it
     groups: tuple[str, ...] = ()  # of the catalogue
-    beside: int | None = None  # it stands beside a thing of that class
+    beside: Nyu40 | None = None  # it stands beside a thing of that class
 
 
-def _nightstand(rng: np.random.Generator, boards: Boards, size: Size) -> Made:
-    return case_goods.chest(rng, boards, size, nyu40=NIGHT_STAND)
+class _Furniture(Record):
+    kinds: dict[str, WantedKind]
+    wanted: dict[RoomKind, tuple[tuple[str, float], ...]]
+
+    @model_validator(mode="after")
+    def _rooms_want_what_there_is(self) -> _Furniture:
+        known = {*self.kinds}
+        for room, wanted in self.wanted.items():
+            if unknown := {name for name, _chance in wanted} - known:
+                raise ValueError(f"{room}: no kind {', '.join(sorted(unknown))}")
+        return self
 
 
-def _cubes(rng: np.random.Generator, boards: Boards, size: Size) -> Made:
-    columns = max(1, int(size[0] / 0.36))
-    rows = min(max(1, int(size[1] / 0.36)), 5 if columns > 1 else 4)
-    return case_goods.cube_shelf(boards, columns, rows)
-
-
-KINDS: Final[Mapping[str, WantedKind]] = MappingProxyType({
-    "bookcase": WantedKind(case_goods.bookcase, (0.4, 1.7), (1.7, 2.15), (0.24, 0.31), 0.25, (BOOKSHELF,), ("bookcase",)),
-    "low bookcase": WantedKind(case_goods.bookcase, (0.45, 1.4), (0.8, 1.15), (0.24, 0.31), 0.25, (BOOKSHELF, SHELVES)),
-    "cubes": WantedKind(_cubes, (0.45, 1.5), (0.75, 1.9), (0.38, 0.38), 0.3, (SHELVES,)),
-    "rack": WantedKind(case_goods.rack, (0.4, 1.1), (1.5, 1.95), (0.27, 0.38), 0.25, (SHELVES,), ("shelves",)),
-    "chest": WantedKind(case_goods.chest, (0.5, 1.3), (0.74, 1.05), (0.38, 0.47), 0.35, (DRESSER,), ("dresser",)),
-    "sideboard": WantedKind(case_goods.sideboard, (0.9, 1.8), (0.7, 0.88), (0.36, 0.44), 0.4, (CABINET, DRESSER)),
-    "wardrobe": WantedKind(case_goods.wardrobe, (0.8, 1.9), (1.9, 2.2), (0.5, 0.6), 0.45, (CABINET,), ("wardrobe",)),
-    "tall cabinet": WantedKind(case_goods.tall_cabinet, (0.3, 0.45), (1.6, 1.95), (0.26, 0.34), 0.3, (CABINET,)),
-    "shoe cabinet": WantedKind(case_goods.shoe_cabinet, (0.5, 1.0), (0.8, 1.15), (0.18, 0.26), 0.4),
-    "console": WantedKind(case_goods.console, (0.6, 1.2), (0.74, 0.82), (0.26, 0.36), 0.35),
-    "bench": WantedKind(case_goods.bench, (0.7, 1.3), (0.44, 0.48), (0.32, 0.4), 0.35),
-    "desk": WantedKind(case_goods.desk, (0.8, 1.4), (0.73, 0.75), (0.5, 0.64), 0.5, (DESK,)),
-    "nightstand": WantedKind(_nightstand, (0.36, 0.5), (0.45, 0.6), (0.34, 0.42), 0.15, (NIGHT_STAND,), ("nightstand",), BED),
-})  # fmt: skip
-
-# Kind of furniture and how likely a room of that use has it, the most wanted first.
-WANTED: Final[Mapping[RoomKind, tuple[tuple[str, float], ...]]] = MappingProxyType({
-    RoomKind.LIVING: (("bookcase", 0.95), ("sideboard", 0.65), ("cubes", 0.45), ("bookcase", 0.6), ("console", 0.3), ("rack", 0.35), ("desk", 0.25), ("low bookcase", 0.4), ("tall cabinet", 0.3)),
-    RoomKind.BEDROOM: (("nightstand", 0.9), ("nightstand", 0.7), ("wardrobe", 0.6), ("desk", 0.55), ("chest", 0.7), ("bookcase", 0.5), ("low bookcase", 0.35), ("rack", 0.3), ("tall cabinet", 0.3), ("bench", 0.2)),
-    RoomKind.DINING: (("sideboard", 0.85), ("bookcase", 0.5), ("console", 0.3), ("cubes", 0.3)),
-    RoomKind.KITCHEN: (("rack", 0.6), ("sideboard", 0.35), ("tall cabinet", 0.4), ("bench", 0.2)),
-    RoomKind.HALL: (("shoe cabinet", 0.75), ("wardrobe", 0.35), ("console", 0.4), ("bookcase", 0.4), ("bench", 0.35), ("chest", 0.25)),
-    RoomKind.OFFICE: (("bookcase", 0.95), ("bookcase", 0.75), ("cubes", 0.5), ("chest", 0.4), ("rack", 0.4), ("bookcase", 0.4)),
-    RoomKind.BATHROOM: (("tall cabinet", 0.75), ("rack", 0.4)),
-    RoomKind.STORE: (("rack", 0.9), ("rack", 0.8), ("wardrobe", 0.3), ("rack", 0.5)),
-    RoomKind.OTHER: (("bookcase", 0.7), ("chest", 0.5), ("sideboard", 0.4), ("desk", 0.3), ("cubes", 0.3)),
-})  # fmt: skip
+_FILE: Final = read_toml(Path(__file__).with_name("furniture.toml"), _Furniture)
+KINDS: Final[Mapping[str, WantedKind]] = _FILE.kinds
+WANTED: Final[Mapping[RoomKind, tuple[tuple[str, float], ...]]] = _FILE.wanted
 
 
 # The part `furniture` of dressing.
@@ -342,8 +328,9 @@ def _stand(
     draft.refused[f"{PART}: no free wall for a {name}"] += 1
 
 
-def _generated(kind: WantedKind, look: Look, size: Size, own: int) -> Made:
-    return grained(kind.make(np.random.default_rng(own), look.boards, size), look)
+def _generated(kind: WantedKind, look: Look, size: tuple[float, float, float], own: int) -> Made:
+    rng = np.random.default_rng(own)
+    return grained(CASE_GOODS.make(kind.model, rng, look.style, look.boards, size), look)
 
 
 def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: int) -> Made | None:
@@ -437,7 +424,7 @@ def _chair_before(
     draft: Draft, floor: RoomFloor, spot: FloorSpot, look: Look, rng: np.random.Generator
 ) -> None:
     """A chair before a desk, turned to it; none where it would be in the way."""
-    made = grained(desk_chair(rng, look.boards), look)
+    made = grained(CASE_GOODS.make("desk_chair", rng, look.style, look.boards), look)
     high = made[1].bounds[1]
     out = OUT_M + spot.depth + float(high[2]) + float(rng.uniform(0.05, 0.12))
     y = floor.room.room.floor_y

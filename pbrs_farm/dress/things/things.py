@@ -183,7 +183,7 @@ SOLIDS: Final = {
 ARITHMETIC: Final = {
     "pi": np.pi, "sin": np.sin, "cos": np.cos, "min": min, "max": max, "round": round, "int": int,
     "abs": abs, "sorted": sorted, "range": range, "linspace": _linspace, "pairwise": pairwise,
-    "product": product, "enumerate": enumerate, "single": lambda v: float(np.float32(v)),
+    "product": product, "enumerate": enumerate, "len": len, "single": lambda v: float(np.float32(v)),
     "mix": mix, "shade": shade, "plain": plain, "glass": glass, "rotation_x": rotation_x,
     "rotation_y": rotation_y, "rotation_z": rotation_z, "lying_along_x": LYING_ALONG_X,
     "lying_along_z": LYING_ALONG_Z, "half_turn": np.diag([-1.0, 1.0, -1.0]),
@@ -197,3 +197,10 @@ def things_of(*names: str, **solids: object) -> Things:
 
 
 THINGS: Final = things_of("tableware", "household", "desk", "bath", "floor_things", "soft")
+
+CASE_GOODS: Final = things_of(
+    "case_goods",
+    lowest=lambda part: float(part[0].positions[:, 1].min()),
+    chance_of=lambda seed, share: bool(np.random.default_rng(seed).random() < share),
+)
+"""Furniture of boards: most take what it is made of and its size."""

@@ -10,19 +10,17 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.furniture import KINDS, furniture
+from pbrs_farm.dress.furniture import KINDS, Boards, furniture
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
 from pbrs_farm.dress.things.assembly import Made, plain
-from pbrs_farm.dress.things.case_goods import Boards, bookcase, cube_shelf, desk_chair
+from pbrs_farm.dress.things.things import CASE_GOODS
 from tests.builders import builtin_home
 
 STYLE = style_for(np.random.default_rng(1))
 _WOOD = plain("wood", (0.6, 0.5, 0.4), 0.4)
-BOARDS = Boards(
-    _WOOD, plain("white", (0.9, 0.9, 0.9), 0.4), _WOOD, plain("metal", (0.5, 0.5, 0.5), 0.3)
-)
+BOARDS = Boards(_WOOD, plain("white", (0.9, 0.9, 0.9), 0.4), _WOOD)
 
 
 def _draft(seed: int, share: float = 1.0) -> Draft:
@@ -43,8 +41,8 @@ def _pieces() -> list[Made]:
             size = tuple(
                 float(rng.uniform(*side)) for side in (kind.width, kind.height, kind.depth)
             )
-            found.append(kind.make(rng, BOARDS, (size[0], size[1], size[2])))
-    return [*found, desk_chair(np.random.default_rng(1), BOARDS)]
+            found.append(CASE_GOODS.make(kind.model, rng, STYLE, BOARDS, size))
+    return [*found, CASE_GOODS.make("desk_chair", np.random.default_rng(1), STYLE, BOARDS)]
 
 
 def test_every_kind_stands_on_its_base_and_its_bodies_are_closed_and_face_outwards() -> None:
@@ -62,20 +60,20 @@ def test_pieces_are_as_large_as_their_kind_says() -> None:
     for kind in KINDS.values():
         rng = np.random.default_rng(5)
         size = (kind.width[1], kind.height[1], kind.depth[1])
-        w, d, h = kind.make(rng, BOARDS, size)[0].size
+        w, d, h = CASE_GOODS.make(kind.model, rng, STYLE, BOARDS, size)[0].size
         assert w < size[0] + 0.02
         assert h < size[1] + 0.03
         assert d < size[2] + 0.05
 
 
 @pytest.mark.parametrize(
-    ("made", "least"),
-    [
-        (bookcase(np.random.default_rng(2), BOARDS, (0.8, 2.0, 0.3)), 4),
-        (cube_shelf(BOARDS, 3, 4), 12),
-    ],
+    ("name", "size", "least"),
+    [("bookcase", (0.8, 2.0, 0.3), 4), ("cube_shelf", (1.1, 1.5, 0.38), 12)],
 )
-def test_the_boards_of_a_shelf_are_found_as_supports(made: Made, least: int) -> None:
+def test_the_boards_of_a_shelf_are_found_as_supports(
+    name: str, size: tuple[float, float, float], least: int
+) -> None:
+    made = CASE_GOODS.make(name, np.random.default_rng(2), STYLE, BOARDS, size)
     draft = Draft(builtin_home(), 1)
     room = draft.source.rooms[0]
     middle = room.polygon.mean(0)
