@@ -53,6 +53,7 @@ def words(rng: np.random.Generator, style: Style) -> dict[str, Any]:
         "integers": lambda low, high: int(rng.integers(low, high)),
         "chance": lambda share: bool(rng.random() < share),
         "pick": lambda *choices: choices[int(rng.integers(len(choices)))],
+        "weighted": lambda *shares: int(rng.choice(len(shares), p=shares)),
         "any_colour": lambda: any_colour(rng, style),
         "colour_within": colour_within,
         "textile": textile,

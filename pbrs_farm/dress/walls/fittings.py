@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -9,21 +10,19 @@ from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
-from pbrs_farm.core.classes import MIRROR, OTHERFURNITURE, SINK
-from pbrs_farm.core.house import Material
+from pbrs_farm.core.classes import MIRROR, SINK
 from pbrs_farm.dress.built_in import coat_material, joinery_scheme
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.things.assembly import Made, Part, hung, plain, slab
+from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
+    HUNG_THINGS,
     clock,
     frame_material,
     jpeg_texture,
     mirror,
-    plate,
-    round_mirror,
 )
 from pbrs_farm.home.names import RADIATORS, words_of_item
 from pbrs_farm.home.room_use import RoomKind
@@ -69,7 +68,10 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
     frame = frame_material(rng, style)
     if rng.random() < 0.35:
         diameter = float(rng.uniform(0.45, 0.75))
-        made, low = round_mirror(diameter, frame), 1.55 - diameter / 2
+        made, low = (
+            HUNG_THINGS.make("round_mirror", rng, style, diameter, frame),
+            1.55 - diameter / 2,
+        )
     else:
         width, height = float(rng.uniform(0.4, 0.6)), float(rng.uniform(1.1, 1.5))
         made, low = mirror(width, height, frame, 0.03), 0.45
@@ -143,7 +145,9 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
     colour = (0.9, 0.9, 0.88) if rng.random() < 0.8 else shade(style.metal.colour, 0.8)
     if rng.random() >= share:
         return
-    switch = _fitting(catalogue, "switch", rng) or plate(1, is_socket=False, colour=colour)
+    switch = _fitting(catalogue, "switch", rng) or HUNG_THINGS.make(
+        "wall_switch", rng, style, 1, colour
+    )
     lit = 0
     for door in room.doors:
         side = door.side_of(room.room.id)
@@ -151,7 +155,9 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
             lit += 1
     for _ in range(_SOCKETS.get(room.kind, 3)):
         n = int(rng.choice([1, 1, 2, 3]))
-        socket = _fitting(catalogue, "socket", rng) or plate(n, is_socket=True, colour=colour)
+        socket = _fitting(catalogue, "socket", rng) or HUNG_THINGS.make(
+            "wall_socket", rng, style, n, colour
+        )
         hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
 
 
@@ -192,7 +198,6 @@ def _beside(
 _HEATED: Final = 0.75  # of homes without any, that are heated so
 _LOW_M, _SPACE_M = 0.12, 0.1  # above the floor; below the sill
 _LEAST_SILL_M: Final = 0.6
-_DEPTH_M: Final = 0.11
 _OTHER_HEAT: Final = frozenset({"fireplace", "stove"})
 _UNHEATED = (RoomKind.STORE, RoomKind.OUTDOOR)
 
@@ -209,6 +214,10 @@ def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
     if room.kind in _UNHEATED or rng.random() >= share:
         return
     paint = coat_material(joinery_scheme(hanging.draft, style).radiator)
+
+    def make(wide: float, high: float) -> Made:
+        return HUNG_THINGS.make("panel_radiator", rng, style, wide, high, paint)
+
     for window in room.windows:
         side = window.side_of(room.room.id)
         sill = window.bottom_y - hanging.floor_y
@@ -220,12 +229,16 @@ def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
             if face.normal @ window.inward(side) < 0.99 or abs(face.out_of(at[None])[0]) > 0.03:
                 continue
             s, width = float(face.s_of(at[None])[0]), window.width
-            if _hang_below(hanging, k, s, (width, height), paint):
+            if _hang_below(hanging, k, s, (width, height), make):
                 break
 
 
 def _hang_below(
-    hanging: Hanging, face: int, s: float, size: tuple[float, float], paint: Material
+    hanging: Hanging,
+    face: int,
+    s: float,
+    size: tuple[float, float],
+    make: Callable[[float, float], Made],
 ) -> bool:
     width, height = size
     low = hanging.floor_y + _LOW_M
@@ -238,31 +251,7 @@ def _hang_below(
             hanging.faces[face].free_m(s - half, s + half, hanging.floor_y + 0.05, low + height)
             > 0.3
         ):
-            hanging.hang(*radiator(wide, height, paint), face, s, low, margin_m=0.02)
+            made = make(wide, height)
+            hanging.hang(*made, face, s, low, margin_m=0.02)
             return True
     return False
-
-
-def radiator(width: float, height: float, paint: Material) -> Made:
-    """A painted panel with ribs, a grille on top and a white valve; hung by two brackets."""
-    front, back = _DEPTH_M, 0.035
-    half = width / 2
-    parts: list[Part] = [(slab((-half, 0.0, back), (half, height, front - 0.008)), paint)]
-    # Press ribs into the front, 4 cm apart.
-    n = max(4, round(width / 0.04))
-    step = width / n
-    for k in range(n):
-        x = -half + (k + 0.5) * step
-        rib = slab((x - 0.3 * step, 0.02, front - 0.008), (x + 0.3 * step, height - 0.03, front))
-        parts.append((rib, paint))
-    for x in (-half + 0.1, half - 0.1):
-        parts.append((slab((x - 0.015, 0.1, 0.0), (x + 0.015, height - 0.1, back)), paint))
-    dark = plain("radiator grille", (0.55, 0.55, 0.54), 0.6)
-    for k in range(max(3, round(width / 0.06))):
-        x = -half + 0.03 + k * 0.06
-        if x + 0.045 < half:
-            top = slab((x, height, back + 0.01), (x + 0.045, height + 0.002, front - 0.02))
-            parts.append((top, dark))
-    knob = slab((half, height - 0.07, 0.05), (half + 0.05, height - 0.03, 0.09))
-    parts.append((knob, plain("radiator valve", (0.9, 0.9, 0.89), 0.4)))
-    return hung("panel_radiator", "radiator", OTHERFURNITURE, parts)

@@ -1,4 +1,6 @@
-"""Pictures as things: framed, on canvas, as posters; mirrors, clocks and fittings; no effects.
+"""Pictures as things: framed, on canvas, as posters; mirrors and clocks; no effects.
+
+What needs no picture is described in things/hung_things.toml.
 
 Shapes have their back at z = 0 and grow to +z, the middle of the lower edge at the origin.
 """
@@ -6,25 +8,18 @@ Shapes have their back at z = 0 and grow to +z, the middle of the lower edge at 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, Srgb8Image
-from pbrs_farm.core.classes import CABINET, MIRROR, OTHERPROP, PICTURE, SHELVES
+from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.things.assembly import (
-    Made,
-    Part,
-    any_colour,
-    hung,
-    metal,
-    plain,
-    slab,
-    transformed,
-    turned,
-)
+from pbrs_farm.dress.things.assembly import Made, hung, metal, plain, smooth
+from pbrs_farm.dress.things.things import things_of
 from pbrs_farm.geometry.solids import box, lathe, quads_surface
 from pbrs_farm.images import jpeg_from_array
 
@@ -54,7 +49,9 @@ def frame_material(rng: np.random.Generator, style: Style) -> Material:
     return plain("frame dark", shade(style.wood.dark, 0.6), 0.35)
 
 
-def ring(name: str, low: F64, high: F64, width: float, depth: float) -> Surface:
+def ring(
+    name: str, low: Sequence[float] | F64, high: Sequence[float] | F64, width: float, depth: float
+) -> Surface:
     """A closed rectangular moulding with mitred corners; low, high (2,) are its outer corners."""
     outer = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     inner = outer + width * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
@@ -135,16 +132,6 @@ def mirror(width: float, height: float, frame: Material | None, bar: float = 0.0
     return hung("mirror", "mirror", MIRROR, parts)
 
 
-def round_mirror(diameter: float, frame: Material) -> Made:
-    """A round mirror in a narrow ring."""
-    r = diameter / 2
-    glass = Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9))
-    rim = np.array([[0, 0], [r, 0], [r, 0.02], [r - 0.014, 0.02], [r - 0.014, 0.012]])
-    pane = np.array([[r - 0.014, 0.012], [0, 0.012]])
-    parts = [(_disc("rim", rim, r), frame), (_disc("mirror", pane, r), glass)]
-    return hung("round_mirror", "mirror", MIRROR, parts)
-
-
 def clock(diameter: float, dial: Texture, frame: Material) -> Made:
     """A round wall clock with a printed dial."""
     r = diameter / 2
@@ -157,41 +144,6 @@ def clock(diameter: float, dial: Texture, frame: Material) -> Made:
         (replace(face, uvs=uv.astype(np.float32)), _printed(dial, 0.4)),
     ]
     return hung("clock", "clock", OTHERPROP, parts, [dial])
-
-
-def wall_shelf(width: float, depth: float, boards: int, board: Material, bracket: Material) -> Made:
-    """Boards above one another on two brackets each; the lowest board's top is at y = 0.04."""
-    parts = []
-    for k in range(boards):
-        y = 0.028 + 0.32 * k
-        centre = np.array([0.0, y, depth / 2])
-        parts.append((box("board", centre, np.array([width / 2, 0.012, depth / 2]), 0), board))
-        for side in (-1, 1):
-            x = side * (width / 2 - 0.12)
-            arm = box("bracket", np.array([x, y - 0.02, depth * 0.4]), np.array([0.01, 0.008, depth * 0.4]), 0)  # fmt: skip
-            parts.append((arm, bracket))
-    return hung("wall_shelf", "shelves", SHELVES, parts)
-
-
-def plate(n_gangs: int, *, is_socket: bool, colour: Rgb) -> Made:
-    """A socket or a switch of the usual 8 cm, n beside one another."""
-    cover = plain("plate", colour, 0.3)
-    dark = plain("plate hole", shade(colour, 0.25 if is_socket else 0.9), 0.5)
-    parts = []
-    width = 0.081 * n_gangs
-    centre = np.array([0.0, 0.0405, 0.0045])
-    parts.append((box("plate", centre, np.array([width / 2, 0.0405, 0.0045]), 0), cover))
-    for k in range(n_gangs):
-        x = (k - (n_gangs - 1) / 2) * 0.081
-        if is_socket:
-            r = 0.019
-            well = np.array([[r + 0.003, 0.009], [r, 0.0093], [0, 0.0093]])
-            parts.append((_moved(_disc("well", well, 0.0405), (x, 0.0, 0.0)), dark))
-        else:
-            half = np.array([0.029, 0.029, 0.002])
-            parts.append((box("rocker", np.array([x, 0.0405, 0.0105]), half, 0), cover))
-    name = "socket" if is_socket else "switch"
-    return hung(f"wall_{name}", name, OTHERPROP, parts)
 
 
 def _moulding(rng: np.random.Generator, short: float) -> tuple[float, float]:
@@ -226,151 +178,38 @@ def _at(p: F64, z: float) -> list[float]:
     return [float(p[0]), float(p[1]), z]
 
 
-# What hangs over a kitchen's worktop: cupboards, open boxes, a rail with tools.
-# Shapes have their back at z = 0 and grow to +z, the middle of the lower edge at the origin.
+def _draped(wide: float, long: float, deep: float, phase: float) -> Surface:
+    """A closed hanging bag of cloth, its top at y = 0: pinched above, folded below."""
+    n, rows = 22, 9
+    angles = 2 * np.pi * np.arange(n) / n
+    v = np.linspace(0, 1, rows)
+    # Widen from the collar to the shoulders, then slowly to the hem.
+    grow = np.interp(v, [0.0, 0.06, 0.14, 0.5, 1.0], [0.25, 0.62, 0.9, 0.85, 1.0])
+    fold = 1 + 0.22 * v[:, None] * np.sin(5 * angles + phase + 0.8 * v[:, None])
+    x = wide / 2 * grow[:, None] * np.cos(angles)
+    z = deep / 2 * np.minimum(grow + 0.1, 1.0)[:, None] * np.sin(angles) * fold
+    y = np.broadcast_to(-long * v[:, None], x.shape)
+    ring = np.stack([x, y, z], -1).reshape(-1, 3)
+    points = np.concatenate([ring, [[0.0, 0.0, 0.0]], [[0.0, -long, 0.0]]])
+    k, after = np.arange(n), (np.arange(n) + 1) % n
+    faces = [np.stack([np.full(n, rows * n), after, k], -1)]
+    for r in range(rows - 1):
+        a, b = r * n, (r + 1) * n
+        faces += [
+            np.stack([a + k, a + after, b + after], -1),
+            np.stack([a + k, b + after, b + k], -1),
+        ]
+    last = (rows - 1) * n
+    faces.append(np.stack([np.full(n, rows * n + 1), last + k, last + after], -1))
+    return smooth("coat", points, np.concatenate(faces).astype(np.int32))
 
 
-_BOARD_M = 0.018
-_DEPTH_M = 0.32
-_ROD_Z_M = 0.045  # of a rail before its wall
-_OUT = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # turns +y to +z
-
-
-@dataclass(frozen=True, slots=True)
-class Fronts:
-    """What a kitchen's cupboards are made of."""
-
-    body: Material
-    front: Material
-    metal: Material
-
-
-def wall_cupboard(
-    fronts: Fronts, width: float, height: float, n_doors: int, d: float = _DEPTH_M
-) -> Made:
-    """A closed cupboard with its doors; d: its depth."""
-    w = width / 2
-    parts: list[Part] = [(slab((-w, 0.0, 0.0), (w, height, d)), fronts.body)]
-    step = width / n_doors
-    for k in range(n_doors):
-        x = -w + k * step
-        front = slab((x + 0.002, 0.002, d + 0.0005), (x + step - 0.002, height - 0.002, d + 0.0185))
-        parts.append((front, fronts.front))
-        # The handle is low, where the door opens.
-        at = x + (step - 0.04 if k % 2 == 0 and n_doors > 1 else 0.04)
-        parts.append(
-            (slab((at - 0.005, 0.04, d + 0.0345), (at + 0.005, 0.2, d + 0.0425)), fronts.metal)
-        )
-        for y in (0.05, 0.185):
-            foot = slab((at - 0.004, y, d + 0.0185), (at + 0.004, y + 0.008, d + 0.0345))
-            parts.append((foot, fronts.metal))
-    return hung("wall_cupboard", "upper_cabinet", CABINET, parts)
-
-
-def open_box(fronts: Fronts, width: float, height: float, d: float = _DEPTH_M - 0.04) -> Made:
-    """An open cupboard of one to three shelves; d: its depth."""
-    w, t = width / 2, _BOARD_M
-    parts: list[Part] = [
-        (slab((-w, 0.0, 0.0), (-w + t, height, d)), fronts.body),
-        (slab((w - t, 0.0, 0.0), (w, height, d)), fronts.body),
-        (slab((-w + t, 0.0, 0.0), (w - t, height, 0.006)), fronts.body),
-    ]
-    n = max(1, round(height / 0.3))
-    for y in np.linspace(0.0, height - t, n + 1):
-        parts.append((slab((-w + t, float(y), 0.006), (w - t, float(y) + t, d)), fronts.body))
-    return hung("open_cupboard", "shelves", SHELVES, parts)
-
-
-def tool_rail(rng: np.random.Generator, style: Style, steel: Material, width: float) -> Made:
-    """A bar on two holders with tools, pans and cups on hooks; the bar hangs above y = 0.3."""
-    half, y = width / 2, 0.36
-    bar = turned([(0.0, 0.0), (0.006, 0.0), (0.006, width), (0.0, width)], n=12)
-    # Lay the bar along x.
-    along = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    parts: list[Part] = [(transformed(bar, along, (-half, y, _ROD_Z_M)), steel)]
-    for x in (-half + 0.03, half - 0.03):
-        parts.append(
-            (slab((x - 0.008, y - 0.008, 0.0), (x + 0.008, y + 0.008, _ROD_Z_M - 0.004)), steel)
-        )
-    x = -half + 0.1
-    while x < half - 0.08:
-        make = (_ladle, _turner, _pan, _cup)[int(rng.choice(4, p=[0.3, 0.3, 0.22, 0.18]))]
-        parts += make(rng, style, steel, x, y - 0.006)
-        x += float(rng.uniform(0.1, 0.15)) + (0.1 if make is _pan else 0.0)
-    return hung("tool_rail", "kitchen_tool", OTHERPROP, parts)
-
-
-def _hook(steel: Material, x: float, y: float) -> Part:
-    # It reaches from the bar down to what hangs.
-    return slab(
-        (x - 0.0015, y - 0.03, _ROD_Z_M - 0.0015), (x + 0.0015, y + 0.001, _ROD_Z_M + 0.0015)
-    ), steel
-
-
-def _handle(rng: np.random.Generator, style: Style, steel: Material) -> Material:
-    dark = plain("handle", (0.08, 0.08, 0.08), 0.5)
-    wood = plain(f"handle {style.wood.name}", style.wood.mean, 0.6)
-    return (steel, dark, wood)[int(rng.integers(3))]
-
-
-def _stick(material: Material, x: float, top: float, low: float) -> Part:
-    return slab((x - 0.006, low, _ROD_Z_M - 0.003), (x + 0.006, top, _ROD_Z_M + 0.003)), material
-
-
-def _ladle(
-    rng: np.random.Generator, style: Style, steel: Material, x: float, y: float
-) -> list[Part]:
-    r, low = float(rng.uniform(0.03, 0.042)), y - float(rng.uniform(0.24, 0.3))
-    ball = [(0.0, -r), (0.7 * r, -0.7 * r), (r, 0.0), (0.7 * r, 0.7 * r), (0.0, r)]
-    bowl = transformed(turned(ball, n=14), np.diag([1.0, 1.0, 0.55]), (x, low, _ROD_Z_M))
-    return [
-        _hook(steel, x, y),
-        _stick(_handle(rng, style, steel), x, y - 0.028, low + 0.6 * r),
-        (bowl, steel),
-    ]
-
-
-def _turner(
-    rng: np.random.Generator, style: Style, steel: Material, x: float, y: float
-) -> list[Part]:
-    w, low = float(rng.uniform(0.028, 0.04)), y - float(rng.uniform(0.2, 0.24))
-    handle = _handle(rng, style, steel)
-    blade = slab((x - w, low - 0.1, _ROD_Z_M - 0.0015), (x + w, low + 0.002, _ROD_Z_M + 0.0015))
-    return [
-        _hook(steel, x, y),
-        _stick(handle, x, y - 0.028, low),
-        (blade, handle if rng.random() < 0.5 else steel),
-    ]
-
-
-def _pan(rng: np.random.Generator, style: Style, steel: Material, x: float, y: float) -> list[Part]:
-    r, low = float(rng.uniform(0.08, 0.1)), y - 0.13
-    black = plain("pan", (0.07, 0.07, 0.075), 0.4)
-    profile = [
-        (0.0, 0.0),
-        (0.85 * r, 0.0),
-        (r, 0.035),
-        (0.96 * r, 0.035),
-        (0.82 * r, 0.005),
-        (0.0, 0.005),
-    ]
-    dish = transformed(turned(profile, n=24), _OUT, (x, low - r, 0.008))
-    return [
-        _hook(steel, x, y),
-        (slab((x - 0.009, low - 0.004, 0.028), (x + 0.009, y - 0.024, 0.046)), black),
-        (dish, black if rng.random() < 0.6 else steel),
-    ]
-
-
-def _cup(rng: np.random.Generator, style: Style, steel: Material, x: float, y: float) -> list[Part]:
-    r, h = 0.038, 0.085
-    colour = plain("hung cup", any_colour(rng, style), 0.25)
-    profile = [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.004, h), (r - 0.004, 0.004), (0.0, 0.004)]
-    # It hangs by its handle, its mouth to the side.
-    body = transformed(
-        turned(profile, n=18),
-        np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
-        (x - h / 2, y - 0.03 - 0.018 - r, _ROD_Z_M),
-    )
-    ear = slab((x - 0.018, y - 0.05, _ROD_Z_M - 0.005), (x + 0.018, y - 0.026, _ROD_Z_M + 0.005))
-    return [_hook(steel, x, y), (ear, colour), (body, colour)]
+HUNG_THINGS: Final = things_of(
+    "hung_things",
+    diagonal=lambda *scale: np.diag(scale),
+    disc=lambda profile, up, x=0.0: _moved(_disc("disc", np.array(profile), up), (x, 0.0, 0.0)),
+    ring=lambda low, high, width, depth: ring("ring", low, high, width, depth),
+    draped=_draped,
+    mirror_glass=Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9)),
+)
+"""What hangs on walls and needs no picture: most take their sizes and materials."""

@@ -11,30 +11,20 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import PRINTS, Catalogue, Picture
-from pbrs_farm.core.classes import (
-    BED,
-    CABINET,
-    CHAIR,
-    DESK,
-    DRESSER,
-    OTHERFURNITURE,
-    SOFA,
-    TABLE,
-    WHITEBOARD,
-)
+from pbrs_farm.core.classes import BED, CABINET, CHAIR, DESK, DRESSER, OTHERFURNITURE, SOFA, TABLE
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Rgb, Style, room_style
-from pbrs_farm.dress.things.assembly import Made, Part, any_colour, hung, plain, slab
+from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
+    HUNG_THINGS,
     canvas,
     frame_material,
     framed,
     jpeg_texture,
     poster,
-    ring,
 )
 from pbrs_farm.dress.walls.prints import print_pixels
 from pbrs_farm.home.room_use import RoomKind
@@ -301,7 +291,8 @@ def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: flo
     if rng.random() >= _BOARDS.get(kind, 0.0) * share:
         return
     width, height = float(rng.uniform(0.55, 0.95)), float(rng.uniform(0.42, 0.65))
-    made = pin_board(rng, style, width, height)
+    frame = frame_material(rng, style)
+    made = HUNG_THINGS.make("pin_board", rng, style, width, height, frame)
     low = hanging.floor_y + _LOW_M
     places = _over_desks(hanging, space)
     if kind is not RoomKind.BEDROOM:
@@ -325,36 +316,3 @@ def _over_desks(hanging: Hanging, space: HouseSpace) -> list[tuple[int, float]]:
         if item.nyu40 in (DESK, TABLE) and 0.6 < high[1] - hanging.floor_y < 0.95:
             found += [(k, (s0 + s1) / 2) for k, s0, s1 in faces_behind(hanging.room, low, high)[:1]]
     return found
-
-
-def pin_board(rng: np.random.Generator, style: Style, width: float, height: float) -> Made:
-    """Cork in a frame, with papers, cards and photographs pinned to it."""
-    low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
-    parts: list[Part] = [
-        (ring("frame", low, high, 0.022, 0.018), frame_material(rng, style)),
-        (
-            slab((low[0] + 0.022, 0.022, 0.001), (high[0] - 0.022, height - 0.022, 0.01)),
-            plain("cork", (0.66, 0.5, 0.34), 0.9),
-        ),
-    ]
-    # Pin sheets to cells of a grid, so that they lie beside one another.
-    columns, rows = max(2, int(width / 0.19)), max(2, int(height / 0.2))
-    for i in range(columns * rows):
-        if rng.random() < 0.3:
-            continue
-        w, h = (float(v) for v in rng.uniform((0.07, 0.08), (0.15, 0.16)))
-        x = low[0] + 0.03 + (i % columns + 0.5) * (width - 0.06) / columns
-        y = 0.03 + (i // columns + 0.5) * (height - 0.06) / rows
-        white = rng.random() < 0.5
-        sheet = plain("sheet", (0.92, 0.91, 0.88) if white else any_colour(rng, style), 0.8)
-        card = slab((x - w / 2, y - h / 2, 0.01), (x + w / 2, y + h / 2, 0.0108))
-        parts.append((card, sheet))
-        if white:
-            lines = plain("print", (0.45, 0.45, 0.47), 0.8)
-            for k in range(int(rng.integers(2, 5))):
-                top = y + h / 2 - 0.018 - 0.018 * k
-                line = slab((x - 0.38 * w, top - 0.003, 0.0108), (x + 0.35 * w, top, 0.0111))
-                parts.append((line, lines))
-        pin = slab((x - 0.005, y + h / 2 - 0.012, 0.0108), (x + 0.005, y + h / 2 - 0.002, 0.016))
-        parts.append((pin, plain("pin", any_colour(rng, style), 0.3)))
-    return hung("pin_board", "pin_board", WHITEBOARD, parts)

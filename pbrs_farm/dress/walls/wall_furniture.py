@@ -7,20 +7,13 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.classes import OTHERPROP
-from pbrs_farm.core.house import Material, Surface
+from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textiles.rugs import rug_pixels
-from pbrs_farm.dress.things.assembly import Made, Part, hung, metal, plain, transformed, turned
+from pbrs_farm.dress.things.assembly import Made, Part, hung, plain, transformed, turned
 from pbrs_farm.dress.walls.fittings import hang_anywhere
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging
-from pbrs_farm.dress.walls.hung_things import (
-    Fronts,
-    faced_slab,
-    jpeg_texture,
-    open_box,
-    wall_cupboard,
-    wall_shelf,
-)
+from pbrs_farm.dress.walls.hung_things import HUNG_THINGS, faced_slab, jpeg_texture
 from pbrs_farm.home.room_use import RoomKind
 
 # How many things with shelves a room's walls get, from and to.
@@ -49,7 +42,7 @@ def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
     wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     is_bath = kind is RoomKind.BATHROOM
     if is_bath and rng.random() < _RADIATORS * share:
-        hang_anywhere(hanging, towel_radiator(rng), _LADDER_M, 0.2, rng)
+        hang_anywhere(hanging, HUNG_THINGS.make("towel_radiator", rng, style), _LADDER_M, 0.2, rng)
     wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
     board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
     # What hangs in one room is of one make, of several widths.
@@ -73,24 +66,23 @@ def _shelf(
 ) -> tuple[Made, float, float]:
     """Something with shelves, how high above the floor its lower edge hangs, and what stays free above it."""
     depth = float(rng.uniform(0.14, 0.18) if is_bath else rng.uniform(0.19, 0.27))
-    kind, fronts = rng.random(), Fronts(board, board, metal(style))
+    kind = rng.random()
     if kind < 0.5:
         boards = int(rng.choice([1, 2, 2, 3]))
         return (
-            wall_shelf(width, depth, boards, board, metal(style)),
+            HUNG_THINGS.make("wall_shelf", rng, style, width, depth, boards, board),
             1.5 if boards == 1 else 1.38,
             _ABOVE_M,
         )
     if kind < 0.75:
         height = float(rng.choice([0.34, 0.34, 0.62]))
-        return open_box(fronts, width, height, depth), float(rng.uniform(1.35, 1.55)), _ABOVE_M
+        made = HUNG_THINGS.make("open_cupboard", rng, style, board, width, height, depth)
+        return made, float(rng.uniform(1.35, 1.55)), _ABOVE_M
     n_doors = max(1, round(width / 0.45))
     height = float(rng.uniform(0.38, 0.6))
-    return (
-        wall_cupboard(fronts, width, height, n_doors, depth + 0.06),
-        float(rng.uniform(1.4, 1.6)),
-        0.05,
-    )
+    given = (board, board, width, height, depth + 0.06, n_doors)
+    made = HUNG_THINGS.make("wall_cupboard", rng, style, *given)
+    return made, float(rng.uniform(1.4, 1.6)), 0.05
 
 
 def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
@@ -129,42 +121,3 @@ def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: flo
         )
     )
     return hung("wall_cloth", "wall_cloth", OTHERPROP, parts, [texture])
-
-
-def towel_radiator(rng: np.random.Generator) -> Made:
-    """A ladder of tubes that towels are dried on, in groups with gaps between."""
-    w, h = float(rng.uniform(0.42, 0.56)), float(rng.uniform(0.9, 1.3))
-    is_dark = rng.random() < 0.2
-    paint = plain("towel radiator", (0.12, 0.12, 0.13) if is_dark else (0.92, 0.92, 0.91), 0.3)
-    parts: list[Part] = []
-    post = turned([(0.0, 0.0), (0.015, 0.0), (0.015, h), (0.0, h)], n=12)
-    for sign in (-1, 1):
-        parts.append((transformed(post, np.eye(3), (sign * (w / 2 - 0.015), 0.0, 0.06)), paint))
-        for y in (0.1, h - 0.1):
-            foot = _tube(0.008, 0.048)
-            parts.append(
-                (
-                    transformed(
-                        foot,
-                        np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]]),
-                        (sign * (w / 2 - 0.015), y, 0.0),
-                    ),
-                    paint,
-                )
-            )
-    along = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    y = 0.05
-    while y < h - 0.03:
-        # Five tubes, then room for a towel.
-        for _ in range(5):
-            if y < h - 0.02:
-                parts.append(
-                    (transformed(_tube(0.011, w - 0.03), along, (-w / 2 + 0.015, y, 0.068)), paint)
-                )
-            y += 0.04
-        y += 0.06
-    return hung("towel_radiator", "radiator", OTHERPROP, parts)
-
-
-def _tube(radius: float, length: float) -> Surface:
-    return turned([(0.0, 0.0), (radius, 0.0), (radius, length), (0.0, length)], n=10)

@@ -14,12 +14,10 @@ from pbrs_farm.dress.built_in import coat_material, joinery_scheme
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
-from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.walls import walls
-from pbrs_farm.dress.walls.fittings import hang_radiators, radiator, wants_radiators
-from pbrs_farm.dress.walls.hang_walls import coat_rack
+from pbrs_farm.dress.walls.fittings import hang_radiators, wants_radiators
 from pbrs_farm.dress.walls.hanging import Hanging
-from pbrs_farm.dress.walls.pictures import pin_board
+from pbrs_farm.dress.walls.hung_things import HUNG_THINGS
 from tests.builders import builtin_home
 
 
@@ -50,15 +48,18 @@ def _named(draft: Draft, name: str) -> list[Item]:
 
 
 @pytest.mark.parametrize(
-    "made",
+    ("name", "given"),
     [
-        radiator(1.0, 0.5, Material("paint")),
-        coat_rack(np.random.default_rng(1), _style(), 3, is_bath=False),
-        pin_board(np.random.default_rng(1), _style(), 0.8, 0.5),
+        ("panel_radiator", (1.0, 0.5, Material("paint"))), ("coat_rack", (3, False)),
+        ("pin_board", (0.8, 0.5, Material("frame"))), ("tool_rail", (0.9,)), ("towel_radiator", ()),
+        ("wall_cupboard", (Material("body"), Material("front"), 0.8, 0.6, 0.3, 2)),
+        ("open_cupboard", (Material("body"), 0.8, 0.6, 0.3)), ("wall_switch", (2, (0.9, 0.9, 0.9))),
     ],
-)
-def test_what_hangs_begins_at_its_wall_and_faces_outwards(made: Made) -> None:
-    _piece, shape = made
+)  # fmt: skip
+def test_what_hangs_begins_at_its_wall_and_faces_outwards(
+    name: str, given: tuple[object, ...]
+) -> None:
+    _piece, shape = HUNG_THINGS.make(name, np.random.default_rng(1), _style(), *given)
     assert shape.bounds[0, 2] == pytest.approx(0.0, abs=1e-6)
     for surface in shape.surfaces:
         corners = triangle_corners(surface.positions, surface.faces)

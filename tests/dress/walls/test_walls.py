@@ -155,7 +155,9 @@ def test_a_round_thing_looks_away_from_the_wall() -> None:
     dial = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
     for _piece, shape in (
         hung_things.clock(0.3, dial, Material("rim")),
-        hung_things.round_mirror(0.5, Material("rim")),
+        hung_things.HUNG_THINGS.make(
+            "round_mirror", np.random.default_rng(1), _style(), 0.5, Material("rim")
+        ),
     ):
         front = shape.surfaces[1]
         assert front.normals is not None
