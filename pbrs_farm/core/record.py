@@ -32,6 +32,15 @@ Nyu40 = Annotated[int, BeforeValidator(_nyu40)]
 """A class of NYU40, by its name in tables."""
 
 
+def _several(told: object) -> object:
+    return told.split("|") if isinstance(told, str) else told
+
+
+_Of = TypeVar("_Of")
+Several = Annotated[tuple[_Of, ...], BeforeValidator(_several)]
+"""Some of a kind, in one cell with | between them."""
+
+
 def read_toml(path: Path, kind: type[_T]) -> _T:
     """A TOML table beside the code as that type; BadInput names the file and the entry."""
     return _read(path, kind, tomllib.loads)
@@ -42,7 +51,8 @@ def read_csv(path: Path, row: type[_T]) -> tuple[_T, ...]:
 
     def rows(text: str) -> list[dict[str, str]]:
         lines = (line for line in text.splitlines() if not line.startswith("#"))
-        return list(csv.DictReader(lines))
+        # What a cell does not say has its usual value.
+        return [{k: v for k, v in row.items() if v} for row in csv.DictReader(lines)]
 
     return _read(path, tuple[row, ...], rows)  # type: ignore[valid-type]
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 import shapely
@@ -14,10 +16,11 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.classes import BED, CHAIR, SOFA
 from pbrs_farm.core.house import Item, ItemKind
+from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.core.walkable import CELL_M
 from pbrs_farm.dress.clutter.cushions import dress_bed, dress_seat
 from pbrs_farm.dress.clutter.placing import LIFT_M, Placing, Stock, TopSpot, Worktop, is_round
-from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of, shares, usual_area
+from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of, shares
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.floor_bitmaps import (
     FloorBitmap,
@@ -42,14 +45,25 @@ _FULL = 0.45  # no more is put where less than this share of the surface is free
 _MOST_FACTOR = 1.6
 _CHAIR_M = 0.6  # from a chair's middle to the table it belongs to
 
-# Kinds that are drawn to the front: hands reach for them.
-_IN_FRONT = ("laptop", "papers", "notebook", "remote", "phone", "plates", "cutlery", "glass", "cup")
+_Kinds = tuple[tuple[str, float], ...]
+
+
+class _Clutter(Record):
+    # The file clutter.toml.
+    in_front: tuple[str, ...]
+    usual_m2: dict[str, float]
+    floors: dict[RoomKind, _Kinds]
+    shelves: dict[str, _Kinds]
+
+
+_FILE: Final = read_toml(Path(__file__).with_name("clutter.toml"), _Clutter)
+_USUAL_M2 = 0.4  # of receptacles that the file does not name
 
 
 def fill_top(placing: Placing, top: Worktop, receptacle: str) -> int:
     """Put things on the worktop as the table says; how many were put there."""
     rng = placing.rng
-    factor = min(top.support.area / usual_area(receptacle), _MOST_FACTOR)
+    factor = min(top.support.area / _FILE.usual_m2.get(receptacle, _USUAL_M2), _MOST_FACTOR)
     wanted: list[str] = []
     for row in shares().get(receptacle, ()):
         chance = np.clip((row.share + placing.bias * row.share**0.5) * factor, 0, 0.98)
@@ -98,7 +112,7 @@ def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
         if top.free_share() < _FULL and n:
             placing.refuse("surface full")
             continue
-        pull = -3.0 if kind in _IN_FRONT else 5.0 + 12.0 * made[0].size[2]
+        pull = -3.0 if kind in _FILE.in_front else 5.0 + 12.0 * made[0].size[2]
         n += placing.drop(top, made, faces_anywhere=is_round(kind), depth_pull=pull)
     return n
 
@@ -112,20 +126,6 @@ _KEPT_M = 0.04  # between things
 _DOOR_M = 1.0  # kept free before doors
 _HEAD_M = 1.9
 _RUG_M = 0.03  # what is lower may lie anywhere, but carries nothing
-
-# What stands on floors: kind, chance in a room.
-_USUAL: dict[RoomKind, tuple[tuple[str, float], ...]] = {
-    RoomKind.HALL: (("stool", 0.4), ("shoes", 0.8), ("shoes", 0.6), ("bag", 0.35), ("suitcase", 0.2), ("basket", 0.15)),
-    RoomKind.LIVING: (("armchair", 0.85), ("armchair", 0.4), ("basket", 0.5), ("pouf", 0.55), ("toy", 0.35), ("bag", 0.25), ("storage_box", 0.25)),
-    RoomKind.BEDROOM: (("armchair", 0.4), ("stool", 0.4), ("laundry_basket", 0.4), ("suitcase", 0.25), ("pouf", 0.25), ("basket", 0.4), ("shoes", 0.45), ("toy", 0.3), ("bag", 0.3), ("storage_box", 0.3), ("bin", 0.2)),
-    RoomKind.KITCHEN: (("stool", 0.5), ("bin", 0.75), ("bag", 0.25), ("bottle", 0.25), ("carton", 0.12)),
-    RoomKind.DINING: (("basket", 0.25), ("toy", 0.2), ("bag", 0.2)),
-    RoomKind.BATHROOM: (("stool", 0.45), ("laundry_basket", 0.5), ("basket", 0.4), ("bin", 0.5), ("shoes", 0.15)),
-    RoomKind.OFFICE: (("armchair", 0.4), ("stool", 0.4), ("bin", 0.8), ("carton", 0.4), ("bag", 0.4), ("storage_box", 0.4)),
-    RoomKind.STORE: (("cartons", 0.8), ("carton", 0.8), ("storage_box", 0.6), ("basket", 0.3), ("bag", 0.3), ("shoes", 0.4)),
-    RoomKind.OTHER: (("armchair", 0.5), ("stool", 0.3), ("carton", 0.3), ("basket", 0.4), ("bag", 0.2)),
-    RoomKind.OUTDOOR: (("plant_pot", 0.5), ("plant_pot", 0.3)),
-}  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -144,7 +144,9 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
     rng = placing.rng
     # Draw what the room usually has before its floor is looked at, which costs more.
     wanted = [
-        kind for kind, chance in _USUAL.get(room.kind, ()) if rng.random() < chance * placing.share
+        kind
+        for kind, chance in _FILE.floors.get(room.kind, ())
+        if rng.random() < chance * placing.share
     ]
     floor = _floor(scene, space, room) if wanted else None
     flights = flights_of(placing.draft, room.room, room.area)
@@ -240,33 +242,6 @@ _LEAST_BOOK_M = 0.14  # free height that upright books need
 _HEADROOM_M = 0.015
 _TOUCH_M = 0.0003  # between a run and the book that leans on it
 
-_Kinds = tuple[tuple[str, float], ...]
-
-# What else stands on shelves, and how often.
-_DECOR: _Kinds = (
-    ("vase", 0.2), ("ornament", 0.2), ("table_frame", 0.2), ("candle", 0.12), ("storage_box", 0.25),
-    ("shelf_basket", 0.25), ("clock", 0.08), ("bowl", 0.08), ("magazines", 0.08), ("toy", 0.04),
-    ("plant_pot", 0.06),
-)  # fmt: skip
-_KITCHEN: _Kinds = (
-    ("plates", 0.25), ("bowl", 0.2), ("cup", 0.25), ("glass", 0.2), ("jar", 0.3), ("bottle", 0.15),
-    ("kitchen_tool", 0.1), ("pot", 0.1), ("shelf_basket", 0.08),
-)  # fmt: skip
-_CHILD: _Kinds = (
-    ("toy", 0.35),
-    ("storage_box", 0.25),
-    ("ball", 0.1),
-    ("shelf_basket", 0.2),
-    ("table_frame", 0.1),
-)
-_OFFICE: _Kinds = (
-    ("binders", 0.5),
-    ("storage_box", 0.2),
-    ("papers", 0.2),
-    ("table_frame", 0.1),
-    ("ornament", 0.1),
-)
-
 
 @dataclass(frozen=True, slots=True)
 class ShelfPlan:
@@ -281,17 +256,16 @@ class ShelfPlan:
 def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
     """How the shelves of one bookcase are filled, by the room it stands in."""
     rng = placing.rng
-    others, books = _DECOR, float(rng.uniform(0.08, 0.26))
+    others, books = "decor", float(rng.uniform(0.08, 0.26))
     if kind is RoomKind.KITCHEN or (kind is RoomKind.DINING and rng.random() < 0.4):
-        others, books = _KITCHEN, 0.15
+        others, books = "kitchen", 0.15
     elif kind is RoomKind.OFFICE:
-        others, books = _OFFICE, float(rng.uniform(0.15, 0.35))
+        others, books = "office", float(rng.uniform(0.15, 0.35))
     elif kind is RoomKind.BEDROOM and rng.random() < 0.35:
-        others, books = _CHILD, float(rng.uniform(0.08, 0.25))
+        others, books = "child", float(rng.uniform(0.08, 0.25))
     fullness = float(np.clip(rng.uniform(0.55, 1.0) + placing.bias, 0.2, 1.0))
-    return ShelfPlan(
-        books, fullness * min(placing.share, 1.0), others, float(rng.uniform(0.01, 0.04))
-    )
+    inset_m = float(rng.uniform(0.01, 0.04))
+    return ShelfPlan(books, fullness * min(placing.share, 1.0), _FILE.shelves[others], inset_m)
 
 
 def fill_shelf(placing: Placing, top: Worktop, plan: ShelfPlan) -> int:

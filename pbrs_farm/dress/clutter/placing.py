@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -14,6 +15,7 @@ from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.catalogue import Catalogue, Place, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import ItemKind, Room
+from pbrs_farm.core.record import Record, Several, read_csv
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.supports import Support
@@ -140,11 +142,11 @@ _DESIGNS: Final = 1  # of a kind in one home
 _MOST_TRIES: Final = 2  # models that are loaded to find them
 
 
-@dataclass(frozen=True, slots=True)
-class ThingKind:
-    """Where a kind's pieces come from."""
+class ThingKind(Record):
+    """Where a kind's pieces come from: a row of kinds.csv."""
 
-    groups: tuple[str, ...] = ()  # of the catalogue
+    kind: str
+    groups: Several[str] = ()  # of the catalogue
     made: str = ""  # generator's name
     most_m: float = 0.6  # the longest side
     is_round: bool = False  # it may face anywhere
@@ -153,44 +155,8 @@ class ThingKind:
 
 
 # Of the generated things, those that a catalogue has, too, or that may face anywhere.
-_KINDS: Final[dict[str, ThingKind]] = {
-    "armchair": ThingKind(("armchair",), most_m=1.1, place=Place.FLOOR, most_faces=12_000),
-    "ball": ThingKind(("ball",), most_m=0.3, is_round=True),
-    "bath_small": ThingKind(("bath_small",), "toiletries", 0.3),
-    "bin": ThingKind(("bin",), "bin", 0.6, True),
-    "basket": ThingKind(("basket",), "basket", 0.6, True),
-    "bottle": ThingKind(("bottle",), "bottle", 0.4, True),
-    "bowl": ThingKind(("bowl",), "bowl", 0.4, True),
-    "box": ThingKind(("box",), "storage_box", 0.45),
-    "candle": ThingKind(("candle",), "candle", 0.4, True),
-    "clock": ThingKind(("clock",), "clock", 0.3),
-    "coffee_machine": ThingKind(("coffee_machine",), most_m=0.5),
-    "cup": ThingKind(("cup",), "cup", 0.2, True),
-    "cutlery": ThingKind(("cutlery",), most_m=0.35),
-    "electronics": ThingKind(("electronics", "speaker"), most_m=0.5),
-    "folded_towels": ThingKind(("towel",), "folded_towels", 0.5),
-    "food": ThingKind(("food",), "fruit", 0.4, True),
-    "fruit": ThingKind(("fruit",), "fruit", 0.4, True),
-    "glass": ThingKind(("glass",), "glass", 0.3, True),
-    "jewel": ThingKind(("jewel",), most_m=0.2),
-    "kettle": ThingKind(("kettle",), "kettle", 0.35, True),
-    "kitchen_tool": ThingKind(("kitchen_tool", "kitchen_appliance"), "jar", 0.5),
-    "laptop": ThingKind(("laptop",), "laptop", 0.45),
-    "microwave": ThingKind(("microwave",), most_m=0.6),
-    "monitor": ThingKind(("monitor",), most_m=0.7),
-    "ornament": ThingKind(("ornament",), "ornament", 0.5, True),
-    "one_plate": ThingKind(made="one_plate", is_round=True),
-    "pan": ThingKind(("pot_pan",), "pan", 0.5),
-    "phone": ThingKind(("phone",), "phone", 0.3),
-    "plates": ThingKind(("plate",), "plates", 0.4, True),
-    "pot": ThingKind(("pot_pan",), "pot", 0.45),
-    "remote": ThingKind(("remote",), "remote", 0.3, True),
-    "shoes": ThingKind(("shoes",), "shoes", 0.4),
-    "stool": ThingKind(("stool",), "stool", 0.8, place=Place.FLOOR, most_faces=6_000),
-    "table_lamp": ThingKind(("table_lamp",), most_m=0.65),
-    "toaster": ThingKind(("toaster",), most_m=0.45),
-    "toy": ThingKind(("toy",), most_m=0.45, is_round=True),
-    "vase": ThingKind(("vase",), "vase", 0.5, True),
+_KINDS: Final = {
+    row.kind: row for row in read_csv(Path(__file__).with_name("kinds.csv"), ThingKind)
 }
 
 
@@ -259,7 +225,7 @@ def is_known(kind: str) -> bool:
 
 
 def _kind(name: str) -> ThingKind:
-    return _KINDS.get(name) or ThingKind(made=name)
+    return _KINDS.get(name) or ThingKind(kind=name, made=name)
 
 
 def _n_faces(shape: Shape) -> int:
