@@ -18,7 +18,19 @@ from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finishes import box_mapped, connected_parts, grain_pattern
-from pbrs_farm.dress.style import METALS, WOODS, Metal, Rgb, Style, Wood, mix, rgb, shade
+from pbrs_farm.dress.style import (
+    COLOURS,
+    METALS,
+    WOODS,
+    WOODS_FOR,
+    Metal,
+    Rgb,
+    Style,
+    Wood,
+    mix,
+    rgb,
+    shade,
+)
 from pbrs_farm.dress.textures.families import pattern_material
 from pbrs_farm.home.names import RADIATORS, words_of_item
 
@@ -28,30 +40,6 @@ from pbrs_farm.home.names import RADIATORS, words_of_item
 
 
 _T = TypeVar("_T")
-
-
-def _colours(codes: str) -> tuple[Rgb, ...]:
-    return tuple(rgb(code) for code in codes.split())
-
-
-# Whites as paint is sold: from a cold one to ivory.
-WHITES: Final = _colours("f5f6f4 f1f0ea eff0eb ecece7 f1ece1 eee9da e9e0d2 e7ebda e3d9c6 e0e1de")
-_GREYS: Final = _colours("d5d5d4 c9c7c1 b9b4a8 a39b8b 9da3a6 8f8b83 7d7f7d")
-_PAINTS: Final = _colours("8f9f8b a9b7a5 b7c4c4 7f93a0 44566b 3a4a44 5c6f5f a3a08a b59f86 6b5b50")
-_DARKS: Final = _colours("383e42 2b2b2c 474a51 4d4a46 3b3430 293133")
-_FRONT_DOORS: Final = _colours("7b2d26 274b3a 22395b 383e42 5f3a24 c0a24a 3f5f73 6b2f3a e7e3d8")
-_RENDERS: Final = _colours("efe9dc e3dccb e8d3ae dcc3a0 d9b48f cfd3d2 c9c2b4 d8c9bd b9bdb6 f1f0ea")
-_STONES: Final = _colours("a9a6a1 8c8a87 c4bdb1 b8a893 6a6866 d5cdbf")
-_FLOOR_WOODS: Final = (
-    "oak",
-    "pale oak",
-    "beech",
-    "pine",
-    "ash",
-    "walnut",
-    "smoked oak",
-    "grey oak",
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,17 +93,15 @@ def joinery_scheme(draft: Draft, style: Style) -> JoineryScheme:
             rng, (0.35, _metal("brushed steel")), (0.2, _metal("black steel")), (0.2, _white(rng)),
             (0.25, Coat("metal", metal=style.metal)),
         ),
-        stone=Coat("stone", aged(rng, _one(rng, _STONES)), 0.6),
-        render=Coat("render", aged(rng, _one(rng, _RENDERS)), 0.85),
-        plaster=Coat("plaster", aged(rng, _one(rng, (*WHITES, *_GREYS[:3], *_RENDERS))), 0.7),
+        stone=Coat("stone", aged(rng, _one(rng, COLOURS["stones"])), 0.6),
+        render=Coat("render", aged(rng, _one(rng, COLOURS["renders"])), 0.85),
+        plaster=Coat("plaster", aged(rng, _one(rng, (*COLOURS["whites"], *COLOURS["greys"][:3], *COLOURS["renders"]))), 0.7),
     )  # fmt: skip
 
 
 def _trim(rng: np.random.Generator, style: Style) -> Coat:
-    wood = (
-        style.wood if rng.random() < 0.5 else WOODS[_one(rng, ("oak", "pine", "beech", "walnut"))]
-    )
-    grey, painted = aged(rng, _one(rng, _GREYS)), _painted(rng, style)
+    wood = style.wood if rng.random() < 0.5 else WOODS[_one(rng, WOODS_FOR.trim)]
+    grey, painted = aged(rng, _one(rng, COLOURS["greys"])), _painted(rng, style)
     return _one_of(
         rng, (0.5, _white(rng)), (0.12, Coat("paint", grey)), (0.12, Coat("paint", painted)),
         (0.26, Coat("wood", wood=wood)),
@@ -130,20 +116,20 @@ def _leaf(rng: np.random.Generator, style: Style, trim: Coat) -> Coat:
 
 
 def _front(rng: np.random.Generator, leaf: Coat) -> Coat:
-    wood = WOODS[_one(rng, ("oak", "teak", "mahogany", "walnut"))]
-    painted = Coat("paint", aged(rng, _one(rng, _FRONT_DOORS)))
+    wood = WOODS[_one(rng, WOODS_FOR.front_doors)]
+    painted = Coat("paint", aged(rng, _one(rng, COLOURS["front_doors"])))
     return _one_of(rng, (0.5, painted), (0.3, Coat("wood", wood=wood)), (0.2, leaf))
 
 
 def _window(rng: np.random.Generator, style: Style, trim: Coat) -> Coat:
-    dark = Coat("paint", aged(rng, _one(rng, _DARKS)), 0.45)
+    dark = Coat("paint", aged(rng, _one(rng, COLOURS["darks"])), 0.45)
     wood = Coat("wood", wood=style.wood)
     return _one_of(rng, (0.45, _white(rng, 0.3)), (0.3, trim), (0.15, dark), (0.1, wood))
 
 
 def _stair(rng: np.random.Generator, style: Style, trim: Coat) -> Coat:
-    wood = style.wood if rng.random() < 0.5 else WOODS[_one(rng, _FLOOR_WOODS)]
-    stone = Coat("stone", aged(rng, _one(rng, _STONES)), 0.5)
+    wood = style.wood if rng.random() < 0.5 else WOODS[_one(rng, WOODS_FOR.stairs)]
+    stone = Coat("stone", aged(rng, _one(rng, COLOURS["stones"])), 0.5)
     return _one_of(rng, (0.72, Coat("wood", wood=wood)), (0.14, trim), (0.14, stone))
 
 
@@ -155,7 +141,7 @@ def _railing(rng: np.random.Generator, style: Style, trim: Coat) -> Coat:
 
 
 def _radiator(rng: np.random.Generator, trim: Coat) -> Coat:
-    dark = Coat("paint", aged(rng, _one(rng, _DARKS)), 0.45)
+    dark = Coat("paint", aged(rng, _one(rng, COLOURS["darks"])), 0.45)
     # Few paint them as they paint their doors.
     like_trim = _white(rng, 0.3) if trim.wood else trim
     return _one_of(
@@ -164,7 +150,7 @@ def _radiator(rng: np.random.Generator, trim: Coat) -> Coat:
 
 
 def _appliance_coat(rng: np.random.Generator) -> Coat:
-    dark = Coat("paint", aged(rng, _one(rng, _DARKS)), 0.25)
+    dark = Coat("paint", aged(rng, _one(rng, COLOURS["darks"])), 0.25)
     cream = Coat("paint", aged(rng, rgb("e6dcc3")), 0.25)
     return _one_of(
         rng, (0.5, _white(rng, 0.25)), (0.3, _metal("brushed steel")), (0.12, dark), (0.08, cream)
@@ -177,11 +163,11 @@ def _painted(rng: np.random.Generator, style: Style) -> Rgb:
     draw = rng.random()
     if draw < 0.35:
         return aged(rng, own)
-    return aged(rng, _one(rng, _DARKS if draw > 0.85 else _PAINTS))
+    return aged(rng, _one(rng, COLOURS["darks"] if draw > 0.85 else COLOURS["paints"]))
 
 
 def _white(rng: np.random.Generator, roughness: float = 0.4) -> Coat:
-    return Coat("paint", aged(rng, _one(rng, WHITES)), roughness)
+    return Coat("paint", aged(rng, _one(rng, COLOURS["whites"])), roughness)
 
 
 def aged(rng: np.random.Generator, colour: Rgb) -> Rgb:

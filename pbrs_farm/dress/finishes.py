@@ -12,42 +12,24 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import field_validator
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.classes import (
-    BATHTUB,
-    BED,
-    BOOKSHELF,
-    CABINET,
-    CHAIR,
-    COUNTER,
-    DESK,
-    DOOR,
-    DRESSER,
-    NIGHT_STAND,
-    OTHERFURNITURE,
-    OTHERPROP,
-    PILLOW,
-    REFRIGERATOR,
-    SHELVES,
-    SINK,
-    SOFA,
-    TABLE,
-    TOILET,
-    TOWEL,
-)
+from pbrs_farm.core.classes import BED
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
+from pbrs_farm.core.record import Nyu40, Record, read_toml
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.style import METALS, WOODS, Metal, Rgb, Style, Wood
+from pbrs_farm.dress.style import COLOURS, METALS, WOODS, Metal, Rgb, Style, Wood
 from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
 
 # Texture coordinates for meshes without any: each face by the side of its own axes it looks to.
@@ -144,31 +126,37 @@ class PartKind(StrEnum):
     OTHER = "other"  # stays as it is
 
 
-_WOODEN: Final = frozenset({
-    BED, BOOKSHELF, CABINET, CHAIR, COUNTER, DESK, DOOR, DRESSER, NIGHT_STAND, SHELVES, SOFA, TABLE,
-})  # fmt: skip
-_UPHOLSTERED: Final = frozenset({BED, SOFA, PILLOW})
-_WET: Final = frozenset({SINK, BATHTUB, TOILET, REFRIGERATOR, OTHERFURNITURE, OTHERPROP, TOWEL})
-_WOODEN_GROUPS: Final = frozenset(
-    {"tv_stand", "wardrobe", "piano", "ottoman", "sink", "base_cabinet", "upper_cabinet"}
-)
-_FRONTS: Final = frozenset(
-    {"sink", "base_cabinet", "upper_cabinet", "fridge", "cooker", "dishwasher", "washer", "oven"}
-)
-_SOFT_GROUPS: Final = frozenset({"armchair", "ottoman", "sofa", "corner_sofa"})
+class _Classes(Record):
+    wooden: frozenset[Nyu40]
+    upholstered: frozenset[Nyu40]
+    wet: frozenset[Nyu40]
+
+
+class _Groups(Record):
+    wooden: frozenset[str]
+    soft: frozenset[str]
+    fronts: frozenset[str]
+
+
+class _Finishes(Record):
+    # The file finishes.toml.
+    words: dict[PartKind, frozenset[str]]
+    metals: dict[str, tuple[str, ...]]
+    classes: _Classes
+    groups: _Groups
+
+    @field_validator("metals")
+    @classmethod
+    def _metals_are_known(cls, told: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        if unknown := told.keys() - METALS.keys():
+            raise ValueError(f"no metal {', '.join(sorted(unknown))}")
+        return told
+
+
+_FILE: Final = read_toml(Path(__file__).with_name("finishes.toml"), _Finishes)
 _LARGE_M: Final = 0.3
 _BRIGHT: Final = 0.75
 _KINDS: Final = (ItemKind.OBJECT, ItemKind.LAMP, ItemKind.DOOR)
-
-_WORDS: Final = (
-    (PartKind.OTHER, "glass verre mirror screen plastic pane paper light bulb lens led coated"),
-    (PartKind.METAL, "metal chrome chromed steel iron aluminium aluminum alu inox brass silver "
-     "gold copper bronze nickel acier"),
-    (PartKind.WOOD, "wood wooden oak pine bois holz madera legno walnut beech teak cherry birch "
-     "mahogany maple alder rovere hout drewno"),
-    (PartKind.SOFT, "fabric cloth textile tissu cushion coussin mattress matelas leather cuir "
-     "sheet blanket velvet upholstery stoff tela seat"),
-)  # fmt: skip
 
 
 def kind_of_part(material: Material, item: Item, group: str) -> PartKind:
@@ -184,11 +172,13 @@ def kind_of_part(material: Material, item: Item, group: str) -> PartKind:
     named = kind_by_name(material.name)
     if named in (PartKind.METAL, PartKind.OTHER):
         return named
-    may_be_wood = item.nyu40 in _WOODEN or group in _WOODEN_GROUPS
+    may_be_wood = item.nyu40 in _FILE.classes.wooden or group in _FILE.groups.wooden
     if named is PartKind.WOOD or (named is None and is_brown(material.diffuse)):
         return PartKind.WOOD if may_be_wood else PartKind.OTHER
     if named is PartKind.SOFT:
-        may_be_soft = may_be_wood or item.nyu40 in _UPHOLSTERED or group in _SOFT_GROUPS
+        may_be_soft = (
+            may_be_wood or item.nyu40 in _FILE.classes.upholstered or group in _FILE.groups.soft
+        )
         return PartKind.SOFT if may_be_soft else PartKind.OTHER
     return PartKind.OTHER
 
@@ -197,8 +187,8 @@ def kind_by_name(name: str) -> PartKind | None:
     """What whole words of a material's name say, or None."""
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     words = set(re.findall(r"[a-z]+", parted.lower()))
-    for kind, known in _WORDS:
-        if words & set(known.split()):
+    for kind, known in _FILE.words.items():
+        if words & known:
             return kind
     return None
 
@@ -210,24 +200,26 @@ def is_bed(item: Item) -> bool:
 
 def has_taps(item: Item) -> bool:
     """Whether its metal is a tap, a sink or a rail: bright whatever the home's taste."""
-    return item.nyu40 in _WET
+    return item.nyu40 in _FILE.classes.wet
 
 
 def is_upholstered(item: Item, group: str) -> bool:
     """Whether its largest soft part is cloth or leather whatever its name."""
-    return item.nyu40 in _UPHOLSTERED or group in _SOFT_GROUPS
+    return item.nyu40 in _FILE.classes.upholstered or group in _FILE.groups.soft
 
 
 def is_furniture(item: Item, group: str) -> bool:
     """Whether boards of any colour may be of wood: furniture, but no door."""
-    is_known = item.nyu40 in _WOODEN or group in _WOODEN_GROUPS
+    is_known = item.nyu40 in _FILE.classes.wooden or group in _FILE.groups.wooden
     return is_known and item.kind is ItemKind.OBJECT
 
 
 def is_lacquered(item: Item, material: Material, group: str) -> bool:
     """Whether a plain part of no known kind is painted board: of furniture and kitchens."""
     is_plain = material.texture_id is None and material.kind is MaterialKind.OPAQUE
-    may_be = item.kind is ItemKind.OBJECT and (is_furniture(item, group) or group in _FRONTS)
+    may_be = item.kind is ItemKind.OBJECT and (
+        is_furniture(item, group) or group in _FILE.groups.fronts
+    )
     is_toned_down = is_loud(material.diffuse) and _is_large(item)
     return is_plain and (may_be or is_toned_down) and material.roughness is None
 
@@ -283,11 +275,6 @@ _GREY_STAYS: Final = 0.6
 _DARKEST: Final = 0.02  # linear: black wood still shows its grain, black paint some light
 _SHEEN: Final = (0.5, 0.5, 0.5)  # Ks of lacquer: 4 % at normal incidence
 _PALE: Final = "birch"
-_METAL_OF_NAME: Final = (
-    (("brass", "gold", "laiton"), "brass"), (("copper", "cuivre"), "copper"),
-    (("bronze",), "bronze"), (("chrom", "inox"), "chrome"), (("alu",), "aluminium"),
-    (("iron",), "black steel"), (("steel", "acier", "nickel"), "brushed steel"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -436,7 +423,7 @@ def _soft(
     elif family != "leather" and rng.random() < _LEATHER_SHARE:
         family = "leather"
     if family == "leather":
-        hides = [(0.13, 0.1, 0.09), (0.42, 0.24, 0.14), (0.6, 0.4, 0.25), (0.78, 0.72, 0.63)]
+        hides = COLOURS["hides"]
         wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
     seed = int(draft.rng(PART, family).integers(2**31))
     pattern = photographed(draft, catalogue, Pattern(family, seed))
@@ -482,7 +469,7 @@ def _metal(
 
 
 def _metal_of(name: str, usual: Metal) -> Metal:
-    for words, known in _METAL_OF_NAME:
+    for known, words in _FILE.metals.items():
         if any(word in name for word in words):
             return METALS[known]
     return usual

@@ -31,7 +31,7 @@ from pbrs_farm.dress.space.floor_bitmaps import (
     with_body,
 )
 from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
-from pbrs_farm.dress.style import Rgb, Style, mix, rgb, room_style
+from pbrs_farm.dress.style import COLOURS, Rgb, Style, mix, room_style
 from pbrs_farm.dress.textures.families import pattern_material, photographed
 from pbrs_farm.dress.things.assembly import Made, plain
 from pbrs_farm.dress.things.things import CASE_GOODS
@@ -42,7 +42,6 @@ from pbrs_farm.home.room_use import RoomKind
 
 
 _WHITE: Rgb = (0.9, 0.9, 0.88)
-_PAINTS = tuple(rgb(code) for code in ("3d4a52", "5f6b5c", "2f3338", "8a8d8a", "7b8f98", "b9b09f"))
 
 
 class Boards(NamedTuple):
@@ -70,7 +69,7 @@ def look_of(draft: Draft, catalogue: Catalogue, style: Style, rng: np.random.Gen
     wood = draft.materials[grain.number]
     kind, tone = rng.random(), float(rng.uniform(0.3, 0.45))
     white = plain("board white", _WHITE, tone)
-    colour = _PAINTS[int(rng.integers(len(_PAINTS)))]
+    colour = COLOURS["boards"][int(rng.integers(len(COLOURS["boards"])))]
     painted = plain("board painted", mix(colour, style.palette[4], 0.25), tone)
     # Half of it is of wood; white and painted carcasses may have tops or fronts of wood.
     if kind < 0.5:

@@ -101,8 +101,17 @@ class _Taste(Record):
     darkness: float = 0.0
 
 
+class _WoodsFor(Record):
+    # What is not of the home's own wood.
+    trim: tuple[str, ...]
+    front_doors: tuple[str, ...]
+    stairs: tuple[str, ...]
+    floors: tuple[str, ...]
+
+
 class _Styles(Record):
     # The file style.toml.
+    woods_for: _WoodsFor
     woods: tuple[Wood, ...]
     metals: tuple[Metal, ...]
     tastes: tuple[_Taste, ...]
@@ -110,6 +119,9 @@ class _Styles(Record):
     @model_validator(mode="after")
     def _tastes_know_their_woods(self) -> _Styles:
         known = {w.name for w in self.woods} | {m.name for m in self.metals}
+        used = {name for names in self.woods_for.model_dump().values() for name in names}
+        if unknown := used - {w.name for w in self.woods}:
+            raise ValueError(f"woods_for: no wood {', '.join(sorted(unknown))}")
         for taste in self.tastes:
             if unknown := {*taste.woods, *taste.metals} - known:
                 raise ValueError(f"{taste.name}: no wood or metal {', '.join(sorted(unknown))}")
@@ -119,7 +131,10 @@ class _Styles(Record):
 _FILE: Final = read_toml(Path(__file__).with_name("style.toml"), _Styles)
 WOODS: Final = {wood.name: wood for wood in _FILE.woods}
 METALS: Final = {metal.name: metal for metal in _FILE.metals}
+WOODS_FOR: Final = _FILE.woods_for
 _TASTES: Final = _FILE.tastes
+COLOURS: Final = read_toml(Path(__file__).with_name("colours.toml"), dict[str, Colours])
+"""What things are sold in, by name."""
 STYLES = tuple(taste.name for taste in _TASTES)
 
 

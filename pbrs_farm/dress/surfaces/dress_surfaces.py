@@ -29,7 +29,7 @@ from pbrs_farm.dress.built_in import (
 )
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.house_space import RoomSpace, house_space
-from pbrs_farm.dress.style import WOODS, Rgb, Style, mix, rgb, room_style
+from pbrs_farm.dress.style import COLOURS, WOODS, WOODS_FOR, Rgb, Style, mix, rgb, room_style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
 from pbrs_farm.dress.surfaces.wall_materials import (
     REVEAL,
@@ -93,21 +93,7 @@ def _laid(surface: Surface, material: PatternMaterial, origin: F64, axes: F64) -
 _T = TypeVar("_T")
 _TILED_FLOORS = (RoomKind.BATHROOM, RoomKind.KITCHEN)
 WOOD_FLOORS = ("planks", "strip", "laminate", "herringbone", "chevron")
-_WHITES = tuple(
-    rgb(c) for c in ("f4f3ef", "f2efe8", "efece4", "f5f6f6", "edeae0", "f3ead9", "e9e8e4", "e9e2d3")
-)
-_SOFT = tuple(
-    rgb(c) for c in ("f0dfb4", "eacb95", "e9c4a4", "e3b9a6", "e8cfc6", "d9b7bb", "cfc3d6", "bfc8dc", "b3cbd9", "b8d3d3", "bcd4c2", "c9d6ad", "dcdcb0", "d6cbb6", "c8b8a3", "bdb9b3")
-)  # fmt: skip
-_TILE_BODIES = tuple(
-    rgb(c) for c in ("ecebe7", "e2ded5", "d5cdbf", "c4bdb1", "a9a6a1", "8c8a87", "6a6866", "d9d5cb", "b8a893", "54524f")
-)  # fmt: skip
-_WALL_TILES = tuple(
-    rgb(c) for c in ("f0efec", "f0efec", "eae6dc", "dcd6c8", "d2dbdb", "c3d0cc", "d3c9bb", "c9cdd0", "9fb4b4", "b9a48c")
-)  # fmt: skip
-_CLAYS = tuple(rgb(c) for c in ("b47553", "a9694a", "bb8462", "a0614a"))
-_BRICKS = tuple(rgb(c) for c in ("985f4b", "8c5544", "a56a50", "7c5244"))
-_MARBLES = (("edebe6", "8a8786"), ("e6ddcf", "a38b70"), ("34363a", "b9b4ac"), ("dfe1e0", "777c80"))
+_MARBLES = tuple(zip(COLOURS["marbles"], COLOURS["marble_veins"], strict=True))
 _DIRT = rgb("b9b5ac")
 
 
@@ -151,7 +137,7 @@ def home_finish(rng: np.random.Generator, style: Style) -> HomeFinish:
     wood = [f for f in style.floors if f in WOOD_FLOORS] or ["planks"]
     usual = _wood_floor(rng, style, wood[0] if rng.random() < 0.6 else _one(rng, wood))
     second = _dry_floor(rng, style, RoomKind.OTHER)
-    white = aged(rng, _one(rng, _WHITES))
+    white = aged(rng, _one(rng, COLOURS["wall_whites"]))
     ceiling = Pattern("smooth plaster", _seed(rng), (white,))
     if rng.random() < 0.06 and style.name in ("country", "warm wood", "nordic"):
         ceiling = replace(_wood_floor(rng, style, "planks").pattern, darkness=-0.4)
@@ -173,7 +159,7 @@ def floor_of(
     if kind is RoomKind.OUTDOOR:
         return _outdoor_floor(rng) if rng.random() < 0.8 else None
     if kind is RoomKind.STORE:
-        return Floor(Pattern("concrete", _seed(rng), (_one(rng, (rgb("a3a29e"), rgb("8f8e8b"))),)))
+        return Floor(Pattern("concrete", _seed(rng), (_one(rng, COLOURS["concretes"]),)))
     if kind in _TILED_FLOORS:
         if rng.random() < 0.85:
             return home.wet_floor if rng.random() < 0.4 else _tile_floor(rng, style)
@@ -196,7 +182,7 @@ def walls_of(
     if kind is RoomKind.OUTDOOR:
         return None
     if kind is RoomKind.STORE:
-        return WallFinish(Pattern("plaster", _seed(rng), (_one(rng, _WHITES),)))
+        return WallFinish(Pattern("plaster", _seed(rng), (_one(rng, COLOURS["wall_whites"]),)))
     paint = _paint(rng, style, home)
     if kind is RoomKind.BATHROOM:
         return _bathroom_walls(rng, style)
@@ -234,7 +220,7 @@ def _paint(rng: np.random.Generator, style: Style, home: HomeFinish) -> Pattern:
     elif draw < 0.85:
         tint = mix(style.palette[2], (0.95, 0.94, 0.92), float(rng.uniform(0.3, 0.65)))
     else:
-        tint = _one(rng, _SOFT)
+        tint = _one(rng, COLOURS["soft_tints"])
     return Pattern("paint", _seed(rng, 3), (tint,))
 
 
@@ -247,7 +233,7 @@ def _accent(rng: np.random.Generator, style: Style) -> Pattern:
 def _brick(rng: np.random.Generator, style: Style) -> Pattern:
     if rng.random() < 0.5:
         return Pattern("painted brick", _seed(rng), (mix(style.palette[0], (1, 1, 1), 0.3),))
-    return Pattern("brick", _seed(rng), (_one(rng, _BRICKS),))
+    return Pattern("brick", _seed(rng), (_one(rng, COLOURS["bricks"]),))
 
 
 def _wallpaper(rng: np.random.Generator, style: Style, ground: Rgb) -> Pattern:
@@ -258,7 +244,7 @@ def _wallpaper(rng: np.random.Generator, style: Style, ground: Rgb) -> Pattern:
 def _wall_tiles(rng: np.random.Generator, style: Style, height_m: float) -> tuple[Pattern, float]:
     """Wall tiles, and the height near height_m that is a whole number of them."""
     laid, tile_m = _one(rng, (("20", 0.2), ("20x40", 0.2), ("30x60", 0.3), ("15", 0.15), ("10", 0.1), ("subway", 0.075)))  # fmt: skip
-    tint = _one(rng, _WALL_TILES)
+    tint = _one(rng, COLOURS["wall_tiles"])
     if rng.random() < 0.12:
         tint = mix(style.palette[2], (0.95, 0.95, 0.94), 0.3)
     grout = mix(tint, _DIRT, 0.55)
@@ -266,11 +252,11 @@ def _wall_tiles(rng: np.random.Generator, style: Style, height_m: float) -> tupl
 
 
 def _bathroom_walls(rng: np.random.Generator, style: Style) -> WallFinish:
-    above = Pattern("paint", _seed(rng, 3), (_one(rng, _WHITES),))
+    above = Pattern("paint", _seed(rng, 3), (_one(rng, COLOURS["wall_whites"]),))
     draw = rng.random()
     if draw < 0.12:
         light, vein = _one(rng, _MARBLES[:2])
-        return WallFinish(Pattern("marble", _seed(rng), (rgb(light), rgb(vein))))
+        return WallFinish(Pattern("marble", _seed(rng), (light, vein)))
     if draw < 0.45:
         tiles, _height = _wall_tiles(rng, style, 2.5)
         return WallFinish(tiles)
@@ -286,13 +272,13 @@ def _dry_floor(rng: np.random.Generator, style: Style, kind: RoomKind) -> Floor:
     if name == "carpet":
         return _carpet(rng, style)
     if name == "terracotta":
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, _CLAYS),)))
+        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)))
     return _tile_floor(rng, style) if name == "tiles" else _wood_floor(rng, style, name)
 
 
 def _wood_floor(rng: np.random.Generator, style: Style, name: str) -> Floor:
     # Floors are seldom of the furniture's own wood.
-    wood = style.wood if rng.random() < 0.45 else WOODS[_one(rng, ("oak", "pale oak", "oak", "ash", "beech", "walnut", "smoked oak", "grey oak", "pine"))]  # fmt: skip
+    wood = style.wood if rng.random() < 0.45 else WOODS[_one(rng, WOODS_FOR.floors)]
     pattern = Pattern(name, _seed(rng), wood=wood, darkness=round(style.darkness, 3))
     return Floor(pattern, np.pi / 4 if name == "herringbone" else 0.0)
 
@@ -307,14 +293,14 @@ def _tile_floor(rng: np.random.Generator, style: Style) -> Floor:
     turn = np.pi / 4 if rng.random() < 0.12 else 0.0
     if draw < 0.08:
         light, vein = _one(rng, _MARBLES)
-        return Floor(Pattern("marble", _seed(rng), (rgb(light), rgb(vein))), turn)
+        return Floor(Pattern("marble", _seed(rng), (light, vein)), turn)
     if draw < 0.16 or (style.floors[0] == "terracotta" and draw < 0.4):
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, _CLAYS),)), turn)
+        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)), turn)
     if draw < 0.25:
-        dark = _one(rng, (rgb("3a3a3b"), rgb("6d4436"), rgb("4a5a5c"), rgb("8c8a84")))
+        dark = _one(rng, COLOURS["checkers"])
         tints = (rgb("e6e3db"), dark, mix(dark, _DIRT, 0.5))
         return Floor(Pattern("tiles", _seed(rng), tints, variant=_one(rng, ("15", "20", "30")) + "-checker"), turn)  # fmt: skip
-    body = _one(rng, _TILE_BODIES)
+    body = _one(rng, COLOURS["floor_tiles"])
     stone = "-stone" if rng.random() < 0.55 else ""
     laid = _one(rng, ("30", "30", "45", "60", "30x60"))
     return Floor(Pattern("tiles", _seed(rng), (body, mix(body, _DIRT, 0.6)), variant=laid + stone), turn)  # fmt: skip
@@ -325,8 +311,8 @@ def _outdoor_floor(rng: np.random.Generator) -> Floor:
     if draw < 0.35:
         return Floor(Pattern("planks", _seed(rng), wood=WOODS["teak"], darkness=0.1))
     if draw < 0.6:
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, _CLAYS),)))
-    body = _one(rng, _TILE_BODIES[2:8])
+        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)))
+    body = _one(rng, COLOURS["floor_tiles"][2:8])
     return Floor(Pattern("tiles", _seed(rng), (body, mix(body, _DIRT, 0.6)), variant="45-stone"))
 
 

@@ -14,7 +14,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Material, Surface, Texture
-from pbrs_farm.dress.style import Rgb, Style, shade
+from pbrs_farm.dress.style import COLOURS, Rgb, Style, shade
 from pbrs_farm.dress.things.assembly import Made, Part, any_colour, made, transformed
 from pbrs_farm.geometry.solids import box
 
@@ -30,60 +30,12 @@ N_COVERS = 14  # cells that have a front cover; the first ones
 N_CELLS = _COLUMNS * _ROWS
 
 Box4 = tuple[float, float, float, float]  # u0, v0, u1, v1; v up
-_SYLLABLES = [
-    "an",
-    "ar",
-    "be",
-    "bor",
-    "ca",
-    "da",
-    "del",
-    "den",
-    "el",
-    "en",
-    "er",
-    "es",
-    "fa",
-    "fin",
-    "ga",
-    "gar",
-    "hel",
-    "in",
-    "is",
-    "jo",
-    "ka",
-    "la",
-    "len",
-    "lo",
-    "ma",
-    "mar",
-    "mi",
-    "mor",
-    "na",
-    "nor",
-    "o",
-    "or",
-    "pa",
-    "per",
-    "ra",
-    "ren",
-    "ri",
-    "ro",
-    "sa",
-    "sen",
-    "so",
-    "ta",
-    "ter",
-    "ti",
-    "tor",
-    "u",
-    "va",
-    "ven",
-    "vi",
-    "wal",
-    "win",
-    "ya",
-]
+_SYLLABLES = (
+    "an", "ar", "be", "bor", "ca", "da", "del", "den", "el", "en", "er", "es", "fa", "fin", "ga",
+    "gar", "hel", "in", "is", "jo", "ka", "la", "len", "lo", "ma", "mar", "mi", "mor", "na", "nor",
+    "o", "or", "pa", "per", "ra", "ren", "ri", "ro", "sa", "sen", "so", "ta", "ter", "ti", "tor",
+    "u", "va", "ven", "vi", "wal", "win", "ya",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,8 +111,7 @@ def _cover_colour(rng: np.random.Generator, style: Style) -> Rgb:
         return (grey, grey * 0.98, grey * float(rng.uniform(0.85, 0.97)))
     if kind < 0.6:
         return tuple(float(v) for v in rng.uniform(0.08, 0.25, 3))  # type: ignore[return-value]
-    loud = ((0.62, 0.13, 0.12), (0.1, 0.25, 0.42), (0.12, 0.34, 0.25), (0.82, 0.6, 0.15),
-            (0.35, 0.2, 0.13), (0.75, 0.4, 0.2), (0.45, 0.5, 0.55), (0.4, 0.15, 0.3))  # fmt: skip
+    loud = COLOURS["book_covers"]
     return shade(loud[int(rng.integers(len(loud)))], float(rng.uniform(0.7, 1.3)))
 
 
