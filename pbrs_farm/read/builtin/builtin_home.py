@@ -1,6 +1,6 @@
 """A small furnished home of our own, built in code: for demos without a network, and for tests.
 
-No effects. Two rooms side by side, a door between them, a front door, a window in each room, two
+Effect: reads builtin.toml beside. Two rooms side by side, a door between them, a front door, a window in each room, two
 lamps (one with a bulb, one without). It is a House as a reader gives it: walls are uncut solids,
 floors and ceilings planes, so that repair has its usual work to do.
 """
@@ -10,27 +10,35 @@ from __future__ import annotations
 import math
 import struct
 import zlib
+from dataclasses import replace
+from pathlib import Path
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.classes import CEILING, FLOOR, WALL
+from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import (
+    Box,
     House,
     Item,
     ItemKind,
     Level,
+    LightPart,
     Material,
-    MaterialKind,
     Opening,
     Room,
     Source,
     StoredCamera,
+    Surface,
 )
-from pbrs_farm.geometry.solids import box, wall_prism
-from pbrs_farm.read.builtin import builtin_furniture as furniture
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.record import Nyu40, Record, read_toml
+from pbrs_farm.geometry.solids import box, box_quads, lathe, quads_surface, sphere, wall_prism
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal
@@ -87,6 +95,110 @@ def stripes(
     return np.asarray(np.broadcast_to(row, (size_px, size_px, 3)), np.uint8)
 
 
+# Pieces of boxes and turned profiles, each in its own frame: centre of the base at the origin, x to
+# its right, y up, front towards +z; metres. `_place` puts one into the world.
+
+
+Triple = tuple[float, float, float]
+Four = tuple[float, float, float, float]
+Boxes = tuple[tuple[Triple, Triple], ...]  # low and high corners in the piece's frame
+
+
+class Part(Record):
+    """Boxes of one material."""
+
+    material: str
+    slabs: tuple[Four, ...] = ()  # width, depth, from and to which height
+    boxes: Boxes = ()
+    legs: Four | None = None
+
+    @property
+    def all_boxes(self) -> Boxes:
+        """Slabs and legs as boxes, too."""
+        slabs = [((-w / 2, y0, -d / 2), (w / 2, y1, d / 2)) for w, d, y0, y1 in self.slabs]
+        return (*slabs, *self.boxes, *(_legs(*self.legs) if self.legs else ()))
+
+
+class Turned(Record):
+    """A profile turned about the piece's axis."""
+
+    material: str
+    profile: tuple[tuple[float, float], ...]  # (radius, height) from the bottom
+
+
+class BuiltinPiece(Record):
+    """A thing to place."""
+
+    nyu40: Nyu40 = Field(alias="class")
+    parts: tuple[Part, ...] = ()
+    turned: tuple[Turned, ...] = ()
+    kind: ItemKind = ItemKind.OBJECT
+    bulb: tuple[Triple, float, bool] | None = None  # its place, radius, whether it is a sphere
+
+    @property
+    def materials(self) -> set[str]:
+        """The names of what it is made of."""
+        return {part.material for part in self.parts} | {body.material for body in self.turned}
+
+
+def _legs(w: float, d: float, h: float, t: float) -> Boxes:
+    """Four legs of thickness t under a w x d rectangle, h high."""
+    xs = ((-w / 2, -w / 2 + t), (w / 2 - t, w / 2))
+    zs = ((-d / 2, -d / 2 + t), (d / 2 - t, d / 2))
+    return tuple(((x0, 0.0, z0), (x1, h, z1)) for x0, x1 in xs for z0, z1 in zs)
+
+
+def _place(
+    name: str, piece: BuiltinPiece, item_id: str, room_id: str, at: Triple, turn_deg: float,
+    materials: dict[str, int],
+) -> Item:  # fmt: skip
+    """The piece as an item, turned about +y and moved to at (3,)."""
+    turn = rotation_y(np.radians(turn_deg))
+    origin = np.asarray(at, np.float64)
+    surfaces = [_boxes(part, turn, origin, materials) for part in piece.parts]
+    for body in piece.turned:
+        profile, number = np.asarray(body.profile), materials[body.material]
+        surfaces.append(lathe(body.material, profile, origin, number))
+    # Put the bulb in, as a sphere that emits or as a light alone.
+    lights: tuple[LightPart, ...] = ()
+    if piece.bulb is not None:
+        local, radius, is_modelled = piece.bulb
+        centre = turn @ np.asarray(local) + origin
+        if is_modelled:
+            surfaces.append(sphere("bulb", centre, radius, materials["bulb"]))
+        emitting = (len(surfaces) - 1,) if is_modelled else ()
+        x, y, z = (float(c) for c in centre)
+        lights = (LightPart((x, y, z), radius, 0.5, PowerUnit.SWEETHOME3D, emitting=emitting),)
+    item = Item(
+        id=item_id,
+        name=name,
+        kind=piece.kind,
+        level_id="0",
+        surfaces=tuple(surfaces),
+        nyu40=piece.nyu40,
+        source_class=f"builtin#{name}",
+        room_id=room_id,
+        lights=lights,
+    )
+    return replace(item, box=_oriented_box(item, turn, origin))
+
+
+def _boxes(part: Part, turn: F64, origin: F64, materials: dict[str, int]) -> Surface:
+    quads = []
+    for low, high in part.all_boxes:
+        a, b = np.asarray(low, np.float64), np.asarray(high, np.float64)
+        quads.append(box_quads((a + b) / 2, (b - a) / 2))
+    world = np.concatenate(quads) @ turn.T + origin
+    return quads_surface(part.material, world, materials[part.material])
+
+
+def _oriented_box(item: Item, turn: F64, origin: F64) -> Box:
+    world = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
+    local = (world - origin) @ turn
+    low, high = local.min(0), local.max(0)
+    return Box(turn @ ((low + high) / 2) + origin, (high - low) / 2, turn)
+
+
 # A small furnished home of our own, built in code.
 
 
@@ -97,6 +209,38 @@ OUTER_M, INNER_M = 0.2, 0.1  # thickness of the walls
 # Inner faces of the rooms: x0, z0, x1, z1.
 LIVING = (0.0, 0.0, 5.0, 4.0)
 BEDROOM = (5.0 + INNER_M, 0.0, 9.0, 4.0)
+
+
+class _Hole(Record):
+    id: str
+    is_window: bool
+    room: str
+    centre: tuple[float, float]
+    along: Literal["x", "z"]
+    width: float
+    bottom: float
+    top: float
+
+
+class _Home(Record):
+    # The file builtin.toml.
+    materials: tuple[Material, ...]
+    pieces: dict[str, BuiltinPiece]
+    places: tuple[tuple[str, str, Triple, float], ...]
+    holes: tuple[_Hole, ...]
+
+    @model_validator(mode="after")
+    def _is_there(self) -> _Home:
+        materials = {m.name for m in self.materials}
+        for name, piece in self.pieces.items():
+            if unknown := piece.materials - materials:
+                raise ValueError(f"{name}: no material {', '.join(sorted(unknown))}")
+        if unknown := {place[0] for place in self.places} - self.pieces.keys():
+            raise ValueError(f"places: no piece {', '.join(sorted(unknown))}")
+        return self
+
+
+_FILE: Final = read_toml(Path(__file__).with_name("builtin.toml"), _Home)
 
 
 def builtin_home() -> House:
@@ -125,33 +269,16 @@ def builtin_home() -> House:
 def _materials() -> tuple[MaterialLibrary, dict[str, int]]:
     """The home's materials in a library, and the index of each by its name."""
     library = MaterialLibrary(Notes("builtin", strict=True))
-    floor = _texture(library, "planks", planks())
-    rug = _texture(library, "rug", checks(64, 8, (150, 40, 45), (205, 190, 160)))
-    picture = _texture(library, "picture", stripes(64, 6, (30, 90, 150), (230, 190, 60)))
-    materials = (
-        Material("wall_default", is_default=True),
-        Material("wall_sand", diffuse=(0.93, 0.88, 0.78)),
-        Material("ceiling_default", is_default=True),
-        _glossy("floor_planks", (1.0, 1.0, 1.0), floor),
-        Material("carpet", diffuse=(0.55, 0.57, 0.6)),
-        _glossy("wood", (0.72, 0.53, 0.34)),
-        _glossy("wood_dark", (0.36, 0.24, 0.16)),
-        Material("white", diffuse=(0.92, 0.92, 0.9)),
-        _glossy("black", (0.05, 0.05, 0.05)),
-        Material("metal", diffuse=(0.35, 0.35, 0.36), specular=(0.6, 0.6, 0.6), shininess=80.0),
-        Material("cloth_blue", diffuse=(0.35, 0.5, 0.68)),
-        Material("cloth_navy", diffuse=(0.16, 0.22, 0.38)),
-        Material("cloth_red", diffuse=(0.68, 0.24, 0.2)),
-        Material("leaf", diffuse=(0.2, 0.45, 0.16)),
-        Material("clay", diffuse=(0.7, 0.4, 0.28)),
-        Material("shade", diffuse=(0.95, 0.9, 0.8)),
-        Material("rug", texture_id=rug),
-        Material("picture", texture_id=picture),
-        Material("glass", MaterialKind.GLASS, diffuse=(0.9, 0.95, 0.95), opacity=0.2),
-        Material("pane", MaterialKind.PANE, diffuse=(0.9, 0.95, 0.95), opacity=0.2),
-        Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9)),
-        Material("bulb", MaterialKind.BULB),
-    )
+    pictures = {
+        "planks": planks(),
+        "rug": checks(64, 8, (150, 40, 45), (205, 190, 160)),
+        "picture": stripes(64, 6, (30, 90, 150), (230, 190, 60)),
+    }
+    textures = {name: _texture(library, name, pixels) for name, pixels in pictures.items()}
+    materials = [
+        replace(m, texture_id=textures[m.texture_id]) if m.texture_id else m
+        for m in _FILE.materials
+    ]
     return library, {m.name: library.index(m) for m in materials}
 
 
@@ -159,14 +286,6 @@ def _texture(library: MaterialLibrary, name: str, rgb_srgb8: NDArray[np.uint8]) 
     png = png_from_srgb8(rgb_srgb8)
     loaded = library.texture(name, name=name, place=name, load=lambda: png)
     return loaded and loaded.texture.id
-
-
-def _glossy(
-    name: str, diffuse: tuple[float, float, float], texture_id: str | None = None
-) -> Material:
-    return Material(
-        name, diffuse=diffuse, specular=(0.2, 0.2, 0.2), shininess=40.0, texture_id=texture_id
-    )
 
 
 def _room(room_id: str, name: str, rect: tuple[float, float, float, float], kind: str) -> Room:
@@ -225,19 +344,11 @@ def _planes(index: dict[str, int]) -> list[Item]:
     return items
 
 
-# id, is window, room, centre in the wall's middle plane (x, z), along x or z, width, bottom, top
-_HOLES = (
-    ("door_inner", False, "0_0", (5.05, 3.2), "z", 0.9, 0.0, 2.05),
-    ("door_front", False, "0_0", (-0.1, 3.2), "z", 0.95, 0.0, 2.1),
-    ("window_living", True, "0_0", (2.5, -0.1), "x", 1.8, 0.9, 2.1),
-    ("window_bedroom", True, "0_1", (7.3, 4.1), "x", 1.2, 0.9, 2.1),
-)
-
-
 def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
     openings, items = [], []
-    for item_id, is_window, room_id, (x, z), along, width, y0, y1 in _HOLES:
-        axes = np.eye(3) if along == "x" else np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    for hole in _FILE.holes:
+        (x, z), width, y0, y1 = hole.centre, hole.width, hole.bottom, hole.top
+        axes = np.eye(3) if hole.along == "x" else np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
         centre = np.array([x, (y0 + y1) / 2, z])
         half = np.array([width / 2, (y1 - y0) / 2, 0.16])
         cutter = box("cutter", centre, half, index["wall_default"], axes=axes)
@@ -245,18 +356,17 @@ def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
         corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
         quad = centre + (corners * half) @ axes.T
         openings.append(
-            Opening(f"opening_{item_id}", "0", item_id, is_window, cutter, quad, axes[:, 2])
+            Opening(f"opening_{hole.id}", "0", hole.id, hole.is_window, cutter, quad, axes[:, 2])
         )
         # The joinery stands in the hole, turned with the wall.
-        piece = _window_piece(width, y1 - y0) if is_window else _door_piece(width, y1 - y0)
-        turn = 0.0 if along == "x" else 90.0
-        items.append(furniture.place(piece, item_id, room_id, (x, y0, z), turn, index))
+        name, make = ("window", _window_piece) if hole.is_window else ("door", _door_piece)
+        turn = 0.0 if hole.along == "x" else 90.0
+        piece = make(width, y1 - y0)
+        items.append(_place(name, piece, hole.id, hole.room, (x, y0, z), turn, index))
     return tuple(openings), items
 
 
-def _frame(
-    w: float, h: float, t: float, d: float
-) -> tuple[tuple[furniture.Triple, furniture.Triple], ...]:
+def _frame(w: float, h: float, t: float, d: float) -> Boxes:
     return (
         ((-w / 2, 0.0, -d), (-w / 2 + t, h, d)),
         ((w / 2 - t, 0.0, -d), (w / 2, h, d)),
@@ -264,59 +374,30 @@ def _frame(
     )
 
 
-def _door_piece(w: float, h: float) -> furniture.BuiltinPiece:
+def _door_piece(w: float, h: float) -> BuiltinPiece:
     leaf = ((-w / 2 + 0.05, 0.0, -0.02), (w / 2 - 0.05, h - 0.05, 0.02))
-    knobs = (((w / 2 - 0.16, 0.98, -0.07), (w / 2 - 0.1, 1.02, 0.07)),)
-    parts = (
-        furniture.Part("white", _frame(w, h, 0.05, 0.11)),
-        furniture.Part("wood", (leaf,)),
-        furniture.Part("metal", knobs),
-    )
-    return furniture.BuiltinPiece("door", 8, parts, kind=ItemKind.DOOR)
+    knobs = ((w / 2 - 0.16, 0.98, -0.07), (w / 2 - 0.1, 1.02, 0.07))
+    parts = _parts(white=_frame(w, h, 0.05, 0.11), wood=(leaf,), metal=(knobs,))
+    return BuiltinPiece(**{"class": "door"}, parts=parts, kind=ItemKind.DOOR)
 
 
-def _window_piece(w: float, h: float) -> furniture.BuiltinPiece:
+def _window_piece(w: float, h: float) -> BuiltinPiece:
     sill = ((-w / 2 + 0.05, 0.0, -0.05), (w / 2 - 0.05, 0.05, 0.05))
     mullion = ((-0.025, 0.05, -0.03), (0.025, h - 0.05, 0.03))
     panes = (
         ((-w / 2 + 0.05, 0.05, -0.002), (-0.025, h - 0.05, 0.002)),
         ((0.025, 0.05, -0.002), (w / 2 - 0.05, h - 0.05, 0.002)),
     )
-    parts = (
-        furniture.Part("white", (*_frame(w, h, 0.05, 0.05), sill, mullion)),
-        furniture.Part("pane", panes),
-    )
-    return furniture.BuiltinPiece("window", 9, parts, kind=ItemKind.WINDOW)
+    parts = _parts(white=(*_frame(w, h, 0.05, 0.05), sill, mullion), pane=panes)
+    return BuiltinPiece(**{"class": "window"}, parts=parts, kind=ItemKind.WINDOW)
+
+
+def _parts(**boxes: Boxes) -> tuple[Part, ...]:
+    return tuple(Part(material=name, boxes=some) for name, some in boxes.items())
 
 
 def _furniture(index: dict[str, int]) -> list[Item]:
-    f = furniture
-    places: tuple[tuple[furniture.BuiltinPiece, str, furniture.Triple, float], ...] = (
-        (f.RUG, "0_0", (1.8, 0.0, 1.9), 0),
-        (f.SOFA, "0_0", (1.8, 0.0, 0.65), 0),
-        (f.COFFEE_TABLE, "0_0", (1.8, 0.0, 1.9), 0),
-        (f.BOWL, "0_0", (1.95, 0.41, 1.85), 0),
-        (f.ARMCHAIR, "0_0", (0.55, 0.0, 1.95), 70),
-        (f.FLOOR_LAMP, "0_0", (0.35, 0.0, 0.45), 0),
-        (f.TV_BENCH, "0_0", (1.7, 0.0, 3.72), 180),
-        (f.TV, "0_0", (1.7, 0.45, 3.74), 180),
-        (f.BOOKSHELF, "0_0", (3.6, 0.0, 0.17), 0),
-        (f.DINING_TABLE, "0_0", (4.1, 0.0, 1.9), 90),
-        (f.CHAIR, "0_0", (3.5, 0.0, 1.7), 90),
-        (f.CHAIR, "0_0", (4.7, 0.0, 2.0), -100),
-        (f.PICTURE, "0_0", (4.983, 1.3, 1.6), -90),
-        (f.PLANT, "0_0", (0.3, 0.0, 2.5), 0),
-        (f.BED, "0_1", (7.2, 0.0, 1.02), 0),
-        (f.PILLOW, "0_1", (6.85, 0.5, 0.4), 4),
-        (f.PILLOW, "0_1", (7.55, 0.5, 0.4), -3),
-        (f.NIGHT_STAND, "0_1", (6.2, 0.0, 0.22), 0),
-        (f.WARDROBE, "0_1", (8.68, 0.0, 1.4), -90),
-        (f.DESK, "0_1", (7.4, 0.0, 3.68), 180),
-        (f.CHAIR, "0_1", (7.4, 0.0, 3.2), 10),
-        (f.MIRROR, "0_1", (5.117, 0.7, 1.9), 90),
-        (f.PENDANT, "0_1", (7.1, 1.9, 2.1), 0),
-    )
     return [
-        f.place(piece, f"piece_{k}", room_id, at, turn, index)
-        for k, (piece, room_id, at, turn) in enumerate(places)
+        _place(name, _FILE.pieces[name], f"piece_{k}", room_id, at, turn, index)
+        for k, (name, room_id, at, turn) in enumerate(_FILE.places)
     ]
