@@ -19,8 +19,17 @@ from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.core.walkable import CELL_M
 from pbrs_farm.dress.clutter.cushions import dress_bed, dress_seat
-from pbrs_farm.dress.clutter.placing import LIFT_M, Placing, Stock, TopSpot, Worktop, is_round
-from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of, shares
+from pbrs_farm.dress.clutter.placing import (
+    LIFT_M,
+    Placing,
+    Stock,
+    TopSpot,
+    Worktop,
+    can_hold,
+    is_round,
+    receptacle_of,
+    shares,
+)
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.floor_bitmaps import (
     FloorBitmap,

@@ -15,14 +15,15 @@ from pbrs_farm.dress.things.assembly import plain
 from pbrs_farm.dress.walls.fittings import (
     fit_switches,
     hang_clock,
+    hang_cloth,
     hang_mirrors,
     hang_radiators,
+    hang_shelves,
     wants_radiators,
 )
 from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import HUNG_THINGS
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
-from pbrs_farm.dress.walls.wall_furniture import hang_cloth, hang_shelves
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 

@@ -14,8 +14,7 @@ from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import clutter
-from pbrs_farm.dress.clutter.placing import is_known
-from pbrs_farm.dress.clutter.receptacles import receptacle_of, shares
+from pbrs_farm.dress.clutter.placing import is_known, receptacle_of, shares
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
