@@ -111,6 +111,7 @@ def place_in(path: Sequence[int | str]) -> str:
 _SENTENCES: Final = {
     "missing": "is missing",
     "extra_forbidden": "no such field",
+    "unexpected_keyword_argument": "no such field",
     "finite_number": "is not a finite number",
     "too_short": "expected {min_length} values or more, got {actual_length}",
     "too_long": "expected {max_length} values at most, got {actual_length}",

@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, TypeAdapter, ValidationError
 
+from pbrs_farm.core.checked_json import sentence
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 
@@ -71,7 +72,7 @@ def _read(path: Path, kind: type[_T], parse: Callable[[str], Any]) -> _T:
         for key in wrong["loc"]:
             here = _within(here, key)
             names.append(str(here.get("name", key) if isinstance(here, dict) else key))
-        raise BadInput(path.name, " ".join(names), wrong["msg"]) from error
+        raise BadInput(path.name, " ".join(names), sentence(wrong)) from error
 
 
 def _within(raw: Any, key: int | str) -> Any:

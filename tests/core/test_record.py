@@ -39,7 +39,7 @@ def test_a_bad_row_of_a_csv_is_named(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ('light = "c9a679"', 'light = "c9a6"', "woods oak light: .*six hexadecimal digits"),
-        ("figure = 0.75", "figures = 0.75", "woods ash figures: Unexpected"),
+        ("figure = 0.75", "figures = 0.75", "woods ash figures: no such field"),
         ('"pale oak", "birch"', '"pale oak", "brich"', "nordic: no wood or metal brich"),
         ("woods = [", "woods = ", "Invalid|invalid|Expected|Unclosed"),
     ],
