@@ -15,7 +15,7 @@ from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.walls.hanging import next_id
+from pbrs_farm.dress.walls.hanging import WANTS, next_id
 from pbrs_farm.geometry.heights import highest_below, lowest_above
 from pbrs_farm.geometry.solids import lathe, sphere
 from pbrs_farm.geometry.surface_points import item_triangles
@@ -439,9 +439,6 @@ def _top(draft: Draft, space: HouseSpace, number: int, place: F64, shape: Shape)
 # The part `lamps` of dressing.
 
 
-# Of a furnished floor, on average.
-_WANTED_LX = {RoomKind.KITCHEN: 133, RoomKind.BATHROOM: 120, RoomKind.OFFICE: 120, RoomKind.HALL: 73}  # fmt: skip
-_USUAL_LX = 100
 _WEAK_LX = 20  # a room with less gets a lamp beside those it has
 _LEAST_M2 = 0.8
 _FLUX_LM = (500.0, 9000.0)  # of one lamp
@@ -459,7 +456,7 @@ def lamps(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
             continue
         if rng.random() < share:
             area, has = float(room.area.area), flux_of_lamps(draft.items[k] for k in room.items)
-            wanted = flux_for_floor(area, _WANTED_LX.get(room.kind, _USUAL_LX))
+            wanted = flux_for_floor(area, WANTS[room.kind].lux)
             if has < flux_for_floor(area, _WEAK_LX):
                 flux = min(max(wanted - has, _FLUX_LM[0]), _FLUX_LM[1])
                 hang_from_ceiling(draft, catalogue, style, room_id, flux, rng)

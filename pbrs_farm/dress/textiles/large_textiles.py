@@ -21,7 +21,7 @@ from pbrs_farm.dress.textiles.curtains import (
 from pbrs_farm.dress.textiles.rugs import cover_drawn_rugs, lay_rugs
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.things.assembly import Made, hung, metal
-from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind
 
@@ -102,17 +102,6 @@ def _nearest(
 # The part `textiles_large` of dressing.
 
 
-# How likely a window gets curtains, and how likely a blind where it got none.
-_CURTAINS = {
-    RoomKind.LIVING: 0.92, RoomKind.BEDROOM: 0.92, RoomKind.DINING: 0.85, RoomKind.OFFICE: 0.75,
-    RoomKind.OTHER: 0.75, RoomKind.KITCHEN: 0.4, RoomKind.HALL: 0.3, RoomKind.BATHROOM: 0.2,
-}  # fmt: skip
-_BLINDS = {
-    RoomKind.LIVING: 0.2, RoomKind.BEDROOM: 0.3, RoomKind.KITCHEN: 0.5, RoomKind.BATHROOM: 0.5,
-    RoomKind.OFFICE: 0.5, RoomKind.OTHER: 0.3, RoomKind.DINING: 0.2, RoomKind.HALL: 0.15,
-}  # fmt: skip
-
-
 def textiles_large(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Hang curtains, blinds and towels, lay rugs. share: 0..1 of what rooms would get."""
     cover_drawn_rugs(draft, style, share)
@@ -135,8 +124,8 @@ def _dress_windows(
     """All windows of a room alike: people buy one cloth."""
     if not room.windows:
         return
-    curtains = rng.random() < _CURTAINS.get(room.kind, 0.0) * share
-    blinds = rng.random() < _BLINDS.get(room.kind, 0.0) * share
+    curtains = rng.random() < WANTS[room.kind].curtains * share
+    blinds = rng.random() < WANTS[room.kind].blinds * share
     cloth = room_cloth(draft, style, room, rng) if curtains else None
     look = int(rng.integers(1 << 30))
     for window in room.windows:

@@ -18,7 +18,7 @@ from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.textiles.rugs import rug_pixels
 from pbrs_farm.dress.things.assembly import Made, Part, hung, plain, transformed, turned
-from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
+from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
     HUNG_THINGS,
     clock,
@@ -32,9 +32,6 @@ from pbrs_farm.home.room_use import RoomKind
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
 _CASING_M = 0.16  # from a door's hole to the middle of its switch
-_CLOCKS = {RoomKind.KITCHEN: 0.6, RoomKind.LIVING: 0.4, RoomKind.OFFICE: 0.5, RoomKind.DINING: 0.3}
-_MIRRORS = {RoomKind.HALL: 0.9, RoomKind.BEDROOM: 0.65, RoomKind.LIVING: 0.35}
-_SOCKETS = {RoomKind.HALL: 1, RoomKind.BATHROOM: 1, RoomKind.KITCHEN: 2}
 
 
 def hang_mirrors(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
@@ -47,7 +44,7 @@ def hang_mirrors(hanging: Hanging, space: HouseSpace, style: Style, share: float
         for number in room.items:
             if hanging.draft.items[number].nyu40 == SINK:
                 _over_basin(hanging, space.bounds[number], rng, style)
-    if rng.random() < _MIRRORS.get(room.kind, 0.0) * share:
+    if rng.random() < WANTS[room.kind].mirror * share:
         _tall_mirror(hanging, rng, style)
 
 
@@ -84,7 +81,7 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
 def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
     """A clock in some kitchens, living rooms and studies."""
     rng = hanging.draft.rng("clock", hanging.room.room.id)
-    if rng.random() >= _CLOCKS.get(hanging.room.kind, 0.0) * share:
+    if rng.random() >= WANTS[hanging.room.kind].clock * share:
         return
     frame = frame_material(rng, style)
     light = rng.random() < 0.75
@@ -156,7 +153,7 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
         side = door.side_of(room.room.id)
         if side is not None and lit < 3 and _beside(hanging, door, side, switch, rng):
             lit += 1
-    for _ in range(_SOCKETS.get(room.kind, 3)):
+    for _ in range(WANTS[room.kind].sockets):
         n = int(rng.choice([1, 1, 2, 3]))
         socket = _fitting(catalogue, "socket", rng) or HUNG_THINGS.make(
             "wall_socket", rng, style, n, colour
@@ -263,18 +260,6 @@ def _hang_below(
 # Shelves, boxes and cupboards on walls, towel radiators and woven cloth.
 
 
-# How many things with shelves a room's walls get, from and to.
-_SHELVES: Final = {
-    RoomKind.LIVING: (1, 3), RoomKind.BEDROOM: (1, 2), RoomKind.OFFICE: (1, 3),
-    RoomKind.KITCHEN: (1, 2), RoomKind.DINING: (0, 2), RoomKind.HALL: (0, 2),
-    RoomKind.BATHROOM: (1, 2), RoomKind.STORE: (1, 3), RoomKind.OTHER: (0, 2),
-}  # fmt: skip
-_CLOTHS: Final = {
-    RoomKind.LIVING: 0.3,
-    RoomKind.BEDROOM: 0.35,
-    RoomKind.HALL: 0.2,
-    RoomKind.OTHER: 0.2,
-}
 _RADIATORS: Final = 0.65  # of bathrooms
 _LADDER_M: Final = 0.45  # of a towel radiator's foot above the floor
 _ABOVE_M: Final = 0.32  # free over the highest board: things stand there
@@ -285,7 +270,7 @@ def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
     """Boards, open boxes and cupboards: the clutter that follows fills them. A bath's towel radiator."""
     kind = hanging.room.kind
     rng = hanging.draft.rng("shelf", hanging.room.room.id)
-    low, high = _SHELVES.get(kind, (0, 0))
+    low, high = WANTS[kind].shelves, WANTS[kind].most_shelves
     wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     is_bath = kind is RoomKind.BATHROOM
     if is_bath and rng.random() < _RADIATORS * share:
@@ -335,7 +320,7 @@ def _shelf(
 def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
     """A woven cloth on a rod, in some rooms."""
     rng = hanging.draft.rng("wall cloth", hanging.room.room.id)
-    if rng.random() >= _CLOTHS.get(hanging.room.kind, 0.0) * share:
+    if rng.random() >= WANTS[hanging.room.kind].cloth * share:
         return
     width, height = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.6, 1.1))
     hang_anywhere(hanging, wall_cloth(rng, style, width, height), 1.6 - height / 2, IN_FRONT_M, rng)

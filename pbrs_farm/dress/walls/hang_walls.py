@@ -21,7 +21,7 @@ from pbrs_farm.dress.walls.fittings import (
     hang_shelves,
     wants_radiators,
 )
-from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
+from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import HUNG_THINGS
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
 from pbrs_farm.home.names import words_of_item
@@ -138,26 +138,19 @@ def _hang_rail(
 
 _HOOKS_M: Final = 1.68  # of the board's lower edge above the floor
 _RACK_BEFORE_M: Final = 0.55
-_RACKS: Final = {
-    RoomKind.HALL: 0.85,
-    RoomKind.BEDROOM: 0.4,
-    RoomKind.BATHROOM: 0.45,
-    RoomKind.OFFICE: 0.25,
-}
-_MOST: Final = {RoomKind.HALL: 4, RoomKind.BEDROOM: 2, RoomKind.BATHROOM: 2, RoomKind.OFFICE: 1}
 
 
 def hang_coats(hanging: Hanging, style: Style, share: float) -> None:
     """Hooks with what the room's people take off there, on a free stretch of wall."""
     kind = hanging.room.kind
     rng = hanging.draft.rng("coats", hanging.room.room.id)
-    if rng.random() >= _RACKS.get(kind, 0.0) * share:
+    if rng.random() >= WANTS[kind].coats * share:
         return
     # Nobody hangs coats where it smells of cooking.
     items = hanging.draft.items
     if is_cooked_in(items[k] for k in hanging.room.items if k < len(items)):
         return
-    for n in range(_MOST[kind], 0, -1):
+    for n in range(WANTS[kind].most_coats, 0, -1):
         piece, shape = HUNG_THINGS.make("coat_rack", rng, style, n, kind is RoomKind.BATHROOM)
         low, high = shape.bounds
         width, bottom = float(high[0] - low[0]), hanging.floor_y + _HOOKS_M

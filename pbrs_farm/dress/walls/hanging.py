@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 import shapely
@@ -12,10 +14,35 @@ from shapely.geometry.base import BaseGeometry
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.house import Item
+from pbrs_farm.core.record import Record, read_csv
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import RoomSpace, WallFace
 from pbrs_farm.dress.space.floor_bitmaps import flights_of
 from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M
+from pbrs_farm.home.room_use import RoomKind
+
+
+class RoomWants(Record):
+    """What a room gets: a row of rooms.csv. Likelihoods 0..1, counts, lux."""
+
+    room: RoomKind
+    pictures: int
+    most_pictures: int
+    shelves: int
+    most_shelves: int
+    mirror: float
+    clock: float
+    cloth: float
+    pin_board: float
+    coats: float
+    most_coats: int
+    sockets: int
+    curtains: float
+    blinds: float
+    lux: float
+
+
+WANTS: Final = {row.room: row for row in read_csv(Path(__file__).with_name("rooms.csv"), RoomWants)}
 
 GAP_M = 0.0008  # between a wall's face and the back of what hangs on it
 _LEAF_M = (0.03, 0.12, 0.22)  # before a wall: where the leaf of a door would stand

@@ -17,7 +17,7 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Rgb, Style, room_style
 from pbrs_farm.dress.things.assembly import Made
-from pbrs_farm.dress.walls.hanging import IN_FRONT_M, Hanging, faces_behind
+from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
     HUNG_THINGS,
     canvas,
@@ -36,12 +36,6 @@ _EYE_M = 1.55  # height of a picture's middle above the floor
 _CEILING_M = 0.12  # kept free below the ceiling
 _APART_M = 0.25  # between one group of pictures and the next
 
-# How many groups of pictures a room gets, by its use.
-_GROUPS = {
-    RoomKind.LIVING: (2, 4), RoomKind.BEDROOM: (1, 3), RoomKind.DINING: (1, 2),
-    RoomKind.HALL: (1, 3), RoomKind.OFFICE: (1, 2), RoomKind.OTHER: (1, 2),
-    RoomKind.KITCHEN: (0, 2), RoomKind.BATHROOM: (0, 1),
-}  # fmt: skip
 # Over what pictures hang, and how much it is liked.
 _BENEATH = {
     BED: 1.0, SOFA: 1.0, DRESSER: 0.8, DESK: 0.6, TABLE: 0.5, CABINET: 0.5, OTHERFURNITURE: 0.4,
@@ -141,7 +135,7 @@ def hang_pictures(
 ) -> None:
     """Pictures for one room, as many as its use and its walls allow."""
     room = hanging.room
-    low, high = _GROUPS.get(room.kind, (0, 0))
+    low, high = WANTS[room.kind].pictures, WANTS[room.kind].most_pictures
     rng = hanging.draft.rng("pictures", room.room.id)
     wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     taste = room_style(style, rng)
@@ -278,9 +272,6 @@ def _picture(
 # Boards of cork with what a household pins to them but on the draft.
 
 
-_BOARDS: Final = {
-    RoomKind.OFFICE: 0.75, RoomKind.BEDROOM: 0.35, RoomKind.KITCHEN: 0.4, RoomKind.HALL: 0.2,
-}  # fmt: skip
 _LOW_M: Final = 1.2
 
 
@@ -288,7 +279,7 @@ def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: flo
     """A pin board over the room's desk, else on any free wall of a kitchen, hall or study."""
     kind = hanging.room.kind
     rng = hanging.draft.rng("pin board", hanging.room.room.id)
-    if rng.random() >= _BOARDS.get(kind, 0.0) * share:
+    if rng.random() >= WANTS[kind].pin_board * share:
         return
     width, height = float(rng.uniform(0.55, 0.95)), float(rng.uniform(0.42, 0.65))
     frame = frame_material(rng, style)

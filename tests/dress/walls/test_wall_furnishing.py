@@ -16,8 +16,9 @@ from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.walls import walls
 from pbrs_farm.dress.walls.fittings import hang_radiators, wants_radiators
-from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.hung_things import HUNG_THINGS
+from pbrs_farm.home.room_use import RoomKind
 from tests.builders import builtin_home
 
 
@@ -102,3 +103,11 @@ def test_coats_hang_free_of_the_floor() -> None:
     assert coats
     for item in coats:
         assert item.bounds[0, 1] > 0.3
+
+
+def test_every_use_of_a_room_has_a_row_of_what_it_gets() -> None:
+    assert set(WANTS) == set(RoomKind)
+    for row in WANTS.values():
+        assert row.pictures <= row.most_pictures
+        assert row.shelves <= row.most_shelves
+        assert bool(row.coats) == bool(row.most_coats)
