@@ -32,7 +32,7 @@ from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.metrics.edge_scores import edge_counts, n_matched
 
 if TYPE_CHECKING:
-    from pbrs_farm.study.training.view_sources import ViewSource
+    from pbrs_farm.study.training.view_sources import TrainingSource
 
 UNITS = LOADING_UNITS | {
     "study.normals_heldout": "degrees, mean on held-out homes: bare, photo cameras, mlt_il_ol, plan tiny",
@@ -115,10 +115,10 @@ def _trained(
     return train(job, views.some(4) if by_heart else views, held_out)
 
 
-def _source() -> ViewSource:
-    from pbrs_farm.study.training.view_sources import ViewSource
+def _source() -> TrainingSource:
+    from pbrs_farm.study.training.view_sources import TrainingSource
 
-    return ViewSource((str(_root()),), hold_out=frozenset(HELD_OUT))
+    return TrainingSource((str(_root()),), hold_out=frozenset(HELD_OUT))
 
 
 def _by_heart(folder: Path) -> Figures:

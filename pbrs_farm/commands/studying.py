@@ -20,7 +20,7 @@ from pbrs_farm.commands.arguments import (
 from pbrs_farm.core.errors import MachineFailed
 
 if TYPE_CHECKING:
-    from pbrs_farm.study.training.view_sources import ViewSource
+    from pbrs_farm.study.training.view_sources import TrainingSource
     from pbrs_farm.study.training_plan import TrainingPlan
 
 TASKS = ("normals", "segmentation", "boundaries")
@@ -97,10 +97,10 @@ def _hold_out(args: argparse.Namespace) -> frozenset[str] | None:
     return None if words is None else frozenset(words) - {"none"}
 
 
-def _source(args: argparse.Namespace) -> ViewSource:
-    from pbrs_farm.study.training.view_sources import ViewSource
+def _source(args: argparse.Namespace) -> TrainingSource:
+    from pbrs_farm.study.training.view_sources import TrainingSource
 
-    return ViewSource(tuple(args.root), tuple(args.modes), _hold_out(args), most=args.views)
+    return TrainingSource(tuple(args.root), tuple(args.modes), _hold_out(args), most=args.views)
 
 
 def _need_torch() -> None:
@@ -193,16 +193,16 @@ def _ablation(args: argparse.Namespace) -> int:
     from pbrs_farm.study.judging.evaluation import check_exact
     from pbrs_farm.study.judging.judged_places import homes_that_train, judged_place
     from pbrs_farm.study.training.run_folder import made_folder
-    from pbrs_farm.study.training.view_sources import ViewSource
+    from pbrs_farm.study.training.view_sources import TrainingSource
 
     at_least("--seeds", args.seeds, 1)
     check_exact(args.task, exact=args.exact)
-    plan, common = _plan(args, args.task), ViewSource((), (), _hold_out(args), most=args.views)
+    plan, common = _plan(args, args.task), TrainingSource((), (), _hold_out(args), most=args.views)
     made_folder(args.out)
     # A set of training views a row; all rows share plan, seeds and held-out homes.
     sets = training_sets(args.root, args.modes, common)
     if args.objects:
-        objects = ViewSource((args.objects,), ("mlt_il_ol",), frozenset(), True, args.views)
+        objects = TrainingSource((args.objects,), ("mlt_il_ol",), frozenset(), True, args.views)
         sets = (*sets, TrainingSet("objects", objects))
     # No row may be judged on homes that any of the rows trains on.
     trained_on = homes_that_train([each.source for each in sets])

@@ -359,7 +359,7 @@ class Row(Record):
     source: str
 
 
-class _Rule(Record):
+class _ReceptacleRule(Record):
     # One row of receptacles.csv: what fits all that it names is that receptacle.
     room: Several[RoomKind] = ()
     classes: Several[Nyu40] = Field((), alias="class")
@@ -383,8 +383,8 @@ def shares() -> Mapping[str, tuple[Row, ...]]:
 
 
 @cache
-def _rules() -> tuple[_Rule, ...]:
-    return read_csv(Path(__file__).with_name("receptacles.csv"), _Rule)
+def _rules() -> tuple[_ReceptacleRule, ...]:
+    return read_csv(Path(__file__).with_name("receptacles.csv"), _ReceptacleRule)
 
 
 def can_hold(item: Item) -> bool:

@@ -54,7 +54,7 @@ _WRONG: Final = (ArithmeticError, AttributeError, LookupError, TypeError, ValueE
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class Description:
     """One thing of a file, or a part that its things use."""
 
     file: str
@@ -74,10 +74,10 @@ class Things:
         self, files: Sequence[Path], words: Words, constants: Mapping[str, object]
     ) -> None:
         self._files, self._words, self._constants = files, words, constants
-        self._entries: dict[str, Entry] = {}
+        self._entries: dict[str, Description] = {}
 
     @property
-    def entries(self) -> Mapping[str, Entry]:
+    def entries(self) -> Mapping[str, Description]:
         """Everything that the files describe, by name; BadInput names the file and the entry."""
         if not self._entries:
             tables = [(path.name, _read(path)) for path in self._files]
@@ -90,7 +90,7 @@ class Things:
                             raise BadInput(file, name, "is the name of a word already")
                         known[name] = _signature(entry.get("takes", ()))
             found = {
-                name: _Reader(file, name, known).entry(entry)
+                name: _DescriptionReader(file, name, known).entry(entry)
                 for file, table in tables
                 for name, entry in table.items()
             }
@@ -126,14 +126,14 @@ class Things:
         return made(family, parts, group=group, nyu40=nyu40, place=entry.place, textures=textures)
 
 
-def _scope(entry: Entry, base: Scope, given: Sequence[object]) -> Scope:
+def _scope(entry: Description, base: Scope, given: Sequence[object]) -> Scope:
     return {
         "__builtins__": {}, **base, "family": entry.family,
         **dict(zip(entry.takes, given, strict=True)),
     }  # fmt: skip
 
 
-def _call(entry: Entry, base: Scope, *given: object) -> Loose:
+def _call(entry: Description, base: Scope, *given: object) -> Loose:
     # A part: its steps see their arguments and the words, not the names of the thing that uses it.
     loose, scope = Loose(), _scope(entry, base, given)
     for step in entry.steps:
@@ -153,14 +153,14 @@ def _read(path: Path) -> dict[str, Any]:
         raise BadInput(path.name, "", str(error)) from error
 
 
-class _Reader:
+class _DescriptionReader:
     """Reads one entry: every expression is checked and compiled once."""
 
     def __init__(self, file: str, name: str, known: Mapping[str, object]) -> None:
         self._file, self._name, self._known = file, name, known
         self._names = {*known, "family"}
 
-    def entry(self, table: object) -> Entry:
+    def entry(self, table: object) -> Description:
         """The entry of that table."""
         if not isinstance(table, dict):
             raise self._bad("is no table")
@@ -178,7 +178,7 @@ class _Reader:
         if place not in list(Place):
             raise self._bad(f"place {place!r} is none", did_you_mean(place, list(Place)))
         self._names |= set(takes)
-        return Entry(
+        return Description(
             self._file, self._name, self._steps(steps), tuple(takes),
             text["family"] or self._name, text["group"], NYU40_NAMES.index(label), Place(place),
         )  # fmt: skip

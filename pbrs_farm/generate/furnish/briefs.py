@@ -57,7 +57,7 @@ class _Templates(_ForSome):
         return make
 
 
-class _Group(_ForSome):
+class _PieceGroup(_ForSome):
     name: str
     of: tuple[_Templates, ...]
     instead: tuple[_Templates, ...] = ()
@@ -67,8 +67,8 @@ class _Group(_ForSome):
 
 
 class _Brief(Record):
-    groups: tuple[_Group, ...]
-    fillers: tuple[_Group, ...] = ()
+    groups: tuple[_PieceGroup, ...]
+    fillers: tuple[_PieceGroup, ...] = ()
     density: float = 0.0
     least_share: float = 0.0
 
@@ -87,7 +87,7 @@ def brief_of(plan: Plan, space: FurnishSpace, shelf: Shelf, rng: np.random.Gener
         name = _CHILDS_ROOM
     facts, measures = _facts(plan, space, type_), _measures(space, type_, rng)
 
-    def told(groups: Iterable[_Group]) -> tuple[PieceGroup, ...]:
+    def told(groups: Iterable[_PieceGroup]) -> tuple[PieceGroup, ...]:
         # Draw only for what the room is large enough for.
         wanted = [
             g

@@ -211,7 +211,7 @@ LIVING = (0.0, 0.0, 5.0, 4.0)
 BEDROOM = (5.0 + INNER_M, 0.0, 9.0, 4.0)
 
 
-class _Hole(Record):
+class _OpeningRow(Record):
     id: str
     is_window: bool
     room: str
@@ -227,7 +227,7 @@ class _Home(Record):
     materials: tuple[Material, ...]
     pieces: dict[str, BuiltinPiece]
     places: tuple[tuple[str, str, Triple, float], ...]
-    holes: tuple[_Hole, ...]
+    holes: tuple[_OpeningRow, ...]
 
     @model_validator(mode="after")
     def _is_there(self) -> _Home:

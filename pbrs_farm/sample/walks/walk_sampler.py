@@ -164,7 +164,7 @@ _YAW_PART, _TILT_PART = 0.95, 0.3  # of the turn that is allowed: together below
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Things:
+class WalkThings:
     """What can be looked at: N items that are no structure, door or window."""
 
     ids: NDArray[np.int64]  # (N,) instance ids
@@ -172,7 +172,7 @@ class Things:
     weights: F64  # (N,) how much each draws the eye
 
 
-def things_of(house: House) -> Things:
+def things_of(house: House) -> WalkThings:
     """The house's furniture and things, by the size of their boxes."""
     ids, middles, weights = [], [], []
     for number, item in enumerate(house.items, start=1):
@@ -184,7 +184,7 @@ def things_of(house: House) -> Things:
             ids.append(number)
             middles.append((low + high) / 2)
             weights.append(math.sqrt(size))
-    return Things(
+    return WalkThings(
         np.array(ids, np.int64), np.array(middles, np.float64).reshape(-1, 3), np.array(weights)
     )
 
@@ -200,7 +200,7 @@ class Walker:
 
 def gaze(
     walker: Walker,
-    things: Things,
+    things: WalkThings,
     geometry: Geometry,
     first_hit: FirstHit,
     turn_rps: float,
@@ -231,7 +231,9 @@ def gaze(
     )
 
 
-def _towards(walker: Walker, part: slice, things: Things, chosen: int | None) -> tuple[F64, F64]:
+def _towards(
+    walker: Walker, part: slice, things: WalkThings, chosen: int | None
+) -> tuple[F64, F64]:
     """Azimuth and tilt of one fixation: to the middle of a thing, or along the way."""
     usual = math.radians(_USUAL_TILT_DEG)
     heading = walker.heading[part]
@@ -246,7 +248,7 @@ def _towards(walker: Walker, part: slice, things: Things, chosen: int | None) ->
 def _chosen(
     walker: Walker,
     at: int,
-    things: Things,
+    things: WalkThings,
     geometry: Geometry,
     first_hit: FirstHit,
     looked_at: list[int],
@@ -284,7 +286,11 @@ def _openness(eye: F64, towards: F64, first_hit: FirstHit) -> F64:
 
 
 def _in_sight(
-    eye: F64, candidates: NDArray[np.intp], things: Things, geometry: Geometry, first_hit: FirstHit
+    eye: F64,
+    candidates: NDArray[np.intp],
+    things: WalkThings,
+    geometry: Geometry,
+    first_hit: FirstHit,
 ) -> Bools:
     if not len(candidates):
         return np.zeros(0, bool)

@@ -25,7 +25,7 @@ from pbrs_farm.study.judging.evaluation import (
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_views import TrainingViews, ViewArrays
-from pbrs_farm.study.training.view_sources import ViewSource, held_out_views, training_views
+from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from pbrs_farm.study.training_plan import TrainingPlan
 
 Tell = Callable[[str], None]
@@ -37,7 +37,7 @@ class TrainingSet:
     """A row of the comparison."""
 
     name: str
-    source: ViewSource
+    source: TrainingSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +166,7 @@ def _is_underfit(task_name: str, run: dict[str, Any]) -> bool:
 
 
 def training_sets(
-    words: Sequence[str], modes: Sequence[str], source: ViewSource
+    words: Sequence[str], modes: Sequence[str], source: TrainingSource
 ) -> tuple[TrainingSet, ...]:
     """Rows of `[NAME=]ROOT[+ROOT][@MODE]`, one for each mode where none is named.
 

@@ -28,7 +28,12 @@ from pbrs_farm.study.photographs import (
 )
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.view_sources import ViewSource, all_views, held_out_views, is_held_out
+from pbrs_farm.study.training.view_sources import (
+    TrainingSource,
+    all_views,
+    held_out_views,
+    is_held_out,
+)
 from pbrs_farm.study.training_plan import TrainingPlan
 
 
@@ -53,11 +58,11 @@ def judged_place(
     if hold_out is None and known_held_out:
         hold_out = frozenset(home_of(house) for house in known_held_out)
         hold_out &= frozenset(home_of(house) for house in open_views(place).homes)
-    source = ViewSource((place,), (own_mode or mode,), hold_out)
+    source = TrainingSource((place,), (own_mode or mode,), hold_out)
     return _of_homes(source, plan, label or path.name, trained_on, most)
 
 
-def homes_that_train(sources: Sequence[ViewSource]) -> frozenset[str]:
+def homes_that_train(sources: Sequence[TrainingSource]) -> frozenset[str]:
     """Every home that trains in any of them."""
     return frozenset(
         view.ref.house
@@ -73,7 +78,7 @@ def _is_root(path: Path) -> bool:
 
 
 def _of_homes(
-    source: ViewSource, plan: TrainingPlan, name: str, trained_on: frozenset[str], most: int
+    source: TrainingSource, plan: TrainingPlan, name: str, trained_on: frozenset[str], most: int
 ) -> JudgedViews:
     homes = {home_of(house) for house in open_views(source.places[0]).homes}
     seen = homes & {home_of(house) for house in trained_on}

@@ -150,7 +150,7 @@ NYU_LIGHT: Final = "nyuv2"  # what a run's record calls the light of photographs
 
 
 @dataclass(frozen=True, slots=True)
-class ViewSource:
+class TrainingSource:
     """Where views come from and how they are parted.
 
     places: roots or shards, or NYUv2's .mat alone. modes: each view is taken once in each of them. hold_out: homes by id,
@@ -181,7 +181,7 @@ class ViewSource:
         return NYU_LIGHT if self.is_nyu else "+".join(self.modes)
 
 
-def training_views(source: ViewSource, plan: TrainingPlan) -> TrainingViews:
+def training_views(source: TrainingSource, plan: TrainingPlan) -> TrainingViews:
     """The views that train: in memory, or streamed where they take more than plan.memory_gb.
 
     Raises BadInput where there is none.
@@ -197,7 +197,7 @@ def training_views(source: ViewSource, plan: TrainingPlan) -> TrainingViews:
     return _arrays(pictures, plan)
 
 
-def held_out_views(source: ViewSource, plan: TrainingPlan, most: int = 0) -> ViewArrays | None:
+def held_out_views(source: TrainingSource, plan: TrainingPlan, most: int = 0) -> ViewArrays | None:
     """The views of the homes that are held out, at most so many, and as fit into plan.memory_gb.
 
     None where there is none; of NYUv2 the test pictures.
@@ -210,13 +210,13 @@ def held_out_views(source: ViewSource, plan: TrainingPlan, most: int = 0) -> Vie
     return _arrays(_spread(pictures, max(_n_fitting(pictures, plan), plan.final_views)), plan)
 
 
-def all_views(source: ViewSource, plan: TrainingPlan, most: int = 0) -> ViewArrays:
+def all_views(source: TrainingSource, plan: TrainingPlan, most: int = 0) -> ViewArrays:
     """Every view of the source: one that no training has seen."""
     views = [view for place in source.places for view in _finished(open_views(place), source, plan)]
     return _arrays(_in_each_light(_spread(views, most), source, plan), plan)
 
 
-def left_out(source: ViewSource, plan: TrainingPlan) -> dict[str, str]:
+def left_out(source: TrainingSource, plan: TrainingPlan) -> dict[str, str]:
     """id -> why, of views that lack what the plan's task needs, or that a run has begun only."""
     if source.is_nyu:
         return {}
@@ -230,7 +230,7 @@ def left_out(source: ViewSource, plan: TrainingPlan) -> dict[str, str]:
     return lacking
 
 
-def is_held_out(view: View, source: ViewSource) -> bool:
+def is_held_out(view: View, source: TrainingSource) -> bool:
     """The view's home never trains."""
     if source.hold_out is not None:
         return bool({view.ref.house, home_of(view.ref.house)} & source.hold_out)
@@ -238,7 +238,7 @@ def is_held_out(view: View, source: ViewSource) -> bool:
 
 
 def _pictures(
-    source: ViewSource, plan: TrainingPlan, *, held_out: bool, most: int
+    source: TrainingSource, plan: TrainingPlan, *, held_out: bool, most: int
 ) -> tuple[Picture, ...]:
     found: list[View] = []
     homes: set[str] = set()
@@ -253,7 +253,7 @@ def _pictures(
 
 
 def _in_each_light(
-    views: Sequence[View], source: ViewSource, plan: TrainingPlan
+    views: Sequence[View], source: TrainingSource, plan: TrainingPlan
 ) -> tuple[Picture, ...]:
     requests = [_request(mode, plan) for mode in source.modes]
     return tuple((view, request) for request in requests for view in views)
@@ -266,7 +266,7 @@ def _n_fitting(pictures: Sequence[Picture], plan: TrainingPlan) -> int:
     return int(plan.memory_gb * 1e9 / sum(array.nbytes for array in arrays.values()))
 
 
-def _nyu_views(source: ViewSource, plan: TrainingPlan, split: str, most: int) -> ViewArrays:
+def _nyu_views(source: TrainingSource, plan: TrainingPlan, split: str, most: int) -> ViewArrays:
     # Imported where needed: it wants h5py.
     from pbrs_farm.study.photographs import nyu_arrays
 
@@ -277,7 +277,7 @@ def _nyu_views(source: ViewSource, plan: TrainingPlan, split: str, most: int) ->
     return views.some(most) if most else views
 
 
-def _finished(views: Views, source: ViewSource, plan: TrainingPlan) -> Views:
+def _finished(views: Views, source: TrainingSource, plan: TrainingPlan) -> Views:
     """Those that have all that the plan's task needs, in every mode."""
     for mode in source.modes:
         views = views.only(objects=source.objects, request=_request(mode, plan))

@@ -20,7 +20,7 @@ from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.photographs import framed
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.view_sources import ViewSource, held_out_views, training_views
+from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from tests.study.small_roots import fill
 from tests.study.training.made_views import TINY, small_plan
 
@@ -60,22 +60,24 @@ def pairs(tmp_path: Path) -> Path:
 
 
 def test_homes_are_held_out_whole(root: Path) -> None:
-    plan, source = small_plan(), ViewSource((str(root),), hold_out=frozenset({"home-2"}))
+    plan, source = small_plan(), TrainingSource((str(root),), hold_out=frozenset({"home-2"}))
     assert training_views(source, plan).homes == ("home-0-00000000", "home-1-00000000")
     held_out = held_out_views(source, plan)
     assert held_out is not None
     assert held_out.homes == ("home-2-00000000",)
-    assert len(training_views(ViewSource((str(root),), hold_out=frozenset()), plan)) == 9
-    assert len(training_views(ViewSource((str(root),), hold_out=frozenset(), most=4), plan)) == 4
+    assert len(training_views(TrainingSource((str(root),), hold_out=frozenset()), plan)) == 9
+    assert (
+        len(training_views(TrainingSource((str(root),), hold_out=frozenset(), most=4), plan)) == 4
+    )
     with pytest.raises(BadInput, match="no such home"):
-        training_views(ViewSource((str(root),), hold_out=frozenset({"villa"})), plan)
+        training_views(TrainingSource((str(root),), hold_out=frozenset({"villa"})), plan)
 
 
 def test_shards_train_as_their_root_does(root: Path, tmp_path: Path) -> None:
     pack(open_views(root), tmp_path / "shards", Packing(modes=("mlt_il_ol",), views_per_shard=4))
     plan, held = small_plan(), frozenset({"home-2"})
     whole, packed = (
-        training_views(ViewSource((str(place),), hold_out=held), plan)
+        training_views(TrainingSource((str(place),), hold_out=held), plan)
         for place in (root, tmp_path / "shards")
     )
     assert whole.digest() == packed.digest()
@@ -170,12 +172,12 @@ def test_a_run_that_is_not_finished_is_not_judged(run: Path, tmp_path: Path) -> 
 
 
 def test_rows_of_a_comparison_are_named_by_root_and_light() -> None:
-    sets = training_sets(["a=x", "b=y+z@opengl_dl"], ["mlt_ol", "opengl_il"], ViewSource(()))
+    sets = training_sets(["a=x", "b=y+z@opengl_dl"], ["mlt_ol", "opengl_il"], TrainingSource(()))
     assert [each.name for each in sets] == ["a_mlt_ol", "a_opengl_il", "b"]
     assert sets[2].source.places == ("y", "z")
     assert sets[2].source.modes == ("opengl_dl",)
     with pytest.raises(BadInput, match="a second row"):
-        training_sets(["x", "y"], ["mlt_ol"], ViewSource(()))
+        training_sets(["x", "y"], ["mlt_ol"], TrainingSource(()))
 
 
 def test_a_comparison_shows_the_spread_of_its_seeds(

@@ -15,7 +15,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.judged_places import judged_place
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.view_sources import ViewSource, held_out_views, training_views
+from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from tests.study.small_roots import fill
 from tests.study.training.made_views import TINY, small_plan
 
@@ -58,7 +58,7 @@ def test_pictures_are_cut_to_the_crop_and_the_test_split(task: str, mat: Path) -
 
 @pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries"])
 def test_its_train_split_trains_and_its_test_split_is_held_out(task: str, mat: Path) -> None:
-    plan, source = small_plan(task), ViewSource((str(mat),))
+    plan, source = small_plan(task), TrainingSource((str(mat),))
     views, held_out = training_views(source, plan), held_out_views(source, plan)
     assert views.ids == ("NYUv2/0002",)
     assert held_out is not None
@@ -104,13 +104,13 @@ def test_a_run_is_tuned_on_it_and_judged_beside_the_papers_tuned_row(
 def test_what_training_on_it_needs_is_said(mat: Path) -> None:
     plan = small_plan()
     with pytest.raises(BadInput, match="NYUv2 trains alone"):
-        training_views(ViewSource((str(mat), "root")), plan)
+        training_views(TrainingSource((str(mat), "root")), plan)
     (mat.parent / "splits.mat").write_bytes(b"no matrix")
     with pytest.raises(BadInput, match="not the MATLAB 5 file"):
-        training_views(ViewSource((str(mat),)), plan)
+        training_views(TrainingSource((str(mat),)), plan)
     (mat.parent / "splits.mat").unlink()
     with pytest.raises(BadInput, match=r"splits.mat.*needed beside"):
-        training_views(ViewSource((str(mat),)), plan)
+        training_views(TrainingSource((str(mat),)), plan)
     mat.write_bytes(b"no matrix at all")
     with pytest.raises(BadInput, match="not a MATLAB"):
         judged_place(str(mat), plan, mode="mlt_il_ol")

@@ -17,7 +17,7 @@ from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training.view_sources import (
     StreamedViews,
-    ViewSource,
+    TrainingSource,
     held_out_views,
     training_views,
 )
@@ -36,8 +36,8 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def source_of(place: Path) -> ViewSource:
-    return ViewSource((str(place),), MODES, hold_out=frozenset({"home-3"}))
+def source_of(place: Path) -> TrainingSource:
+    return TrainingSource((str(place),), MODES, hold_out=frozenset({"home-3"}))
 
 
 def weights_of(place: Path, out: Path, **changed: str) -> dict[str, torch.Tensor]:
